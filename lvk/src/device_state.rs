@@ -27,12 +27,9 @@ use crate::pipeline::{
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
-use crate::software_ray_query::bvh_cache::BvhCache;
-use crate::software_ray_query::storage::SoftwareAccelStorage;
 use crate::store::Store;
 use crate::submit::profiler::Profiler;
 use crate::submit::{Finished, Submitter};
-use crate::swapchain::state::Swapchain;
 use crate::upload::{BufferRecycler, Staging};
 
 /// The parts of a context below the command layer. Fields are dropped in this order, the device last.
@@ -56,7 +53,8 @@ pub(crate) struct DeviceState {
     pub(crate) shader_cache: Option<ShaderCache>,
     pub(crate) bindless: Bindless,
     /// Where the context keeps trees that the CPU has built.
-    pub(crate) tree_cache: Option<BvhCache>,
+    #[cfg(feature = "software-ray-query")]
+    pub(crate) tree_cache: Option<crate::software_ray_query::bvh_cache::BvhCache>,
     pub(crate) submitter: Submitter<DeferredFree>,
     pub(crate) profiler: Profiler,
     /// Where graphics pipelines query rays.
@@ -97,7 +95,10 @@ pub(crate) enum DeferredFree {
     RayTracingPipeline(Arc<RayTracingPipeline>),
     QueryPool(Arc<QueryPool>),
     AccelStruct(Arc<AccelStruct>),
-    Swapchain(#[expect(dead_code, reason = "held only to be dropped")] Arc<Swapchain>),
+    #[cfg(feature = "window")]
+    Swapchain(
+        #[expect(dead_code, reason = "held only to be dropped")] Arc<crate::swapchain::state::Swapchain>,
+    ),
     /// What a top-level structure showed; handles of it may still be in use.
     TlasContents(Box<TlasContents>),
     /// What a compacted structure took the place of, or what took its place.
@@ -107,7 +108,11 @@ pub(crate) enum DeferredFree {
     /// As [`BufferRef`](Self::BufferRef), one of those who [share](crate::resource::image::Image::add_texture) the image.
     TextureRef(Arc<Texture>),
     /// A structure of the library's own that a command buffer fills, whoever else holds it.
-    SoftwareStorage(#[expect(dead_code, reason = "held only to be dropped")] Arc<SoftwareAccelStorage>),
+    #[cfg(feature = "software-ray-query")]
+    SoftwareStorage(
+        #[expect(dead_code, reason = "held only to be dropped")]
+        Arc<crate::software_ray_query::storage::SoftwareAccelStorage>,
+    ),
     /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
     SizeQuery(#[expect(dead_code, reason = "held only to be dropped")] Arc<CompactedSizeQuery>),
 }
@@ -207,10 +212,12 @@ impl DeviceState {
             }
             DeferredFree::RenderPipeline(_)
             | DeferredFree::ComputePipeline(_)
-            | DeferredFree::Swapchain(_)
             | DeferredFree::BlasStorage(_)
-            | DeferredFree::SoftwareStorage(_)
             | DeferredFree::SizeQuery(_) => {}
+            #[cfg(feature = "software-ray-query")]
+            DeferredFree::SoftwareStorage(_) => {}
+            #[cfg(feature = "window")]
+            DeferredFree::Swapchain(_) => {}
         }
     }
 

@@ -62,8 +62,12 @@ handles! {
     RayTracingLibraryHandle, "ray tracing library";
     /// Names a pool of queries.
     QueryPoolHandle, "query pool";
-    /// Names a swapchain.
-    SwapchainHandle, "swapchain";
     /// Names a bottom- or top-level acceleration structure.
     AccelStructHandle, "acceleration structure";
+}
+
+#[cfg(feature = "window")]
+handles! {
+    /// Names a swapchain.
+    SwapchainHandle, "swapchain";
 }

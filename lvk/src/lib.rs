@@ -100,14 +100,15 @@
 //!
 //! # Features
 //!
-//! All features are enabled by default.
+//! All features are enabled by default. The code and the crates of a disabled feature are not compiled.
 //!
 //! * `glsl` compiles GLSL at run time. It needs a C++17 compiler when the library is built. Without it, modules take
-//!   only SPIR-V words.
+//!   only SPIR-V words, and [`ShaderSource::Glsl`] is [`Error::Unsupported`].
 //! * `software-ray-query` contains the library's own BVH builders and traversal, for devices without ray queries.
-//!   Without it, such devices have no ray queries.
+//!   Without it, such devices have no ray queries: [`RayQueryRequest::Auto`] selects hardware or nothing,
+//!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
 //! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
-//!   context renders only to textures.
+//!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
 
 mod accel;
 mod barrier;
@@ -131,9 +132,11 @@ mod pool;
 mod queue;
 mod resource;
 mod shader;
-pub(crate) mod software_ray_query;
+#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
+mod software_ray_query;
 mod store;
 mod submit;
+#[cfg(feature = "window")]
 mod swapchain;
 #[cfg(any(test, feature = "test-hooks"))]
 mod test_support;
@@ -145,7 +148,6 @@ pub use test_support::hooks as test_hooks;
 
 pub use ash;
 pub use glam;
-pub use raw_window_handle;
 
 pub use accel::culling::InstanceCulling;
 pub use accel::desc::{BlasDesc, PrimitiveOrder, TlasDesc};
@@ -189,11 +191,9 @@ pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
 pub use gpu::start::external::RawContext;
 pub use gpu::start::profile::DeviceProfile;
 pub use gpu::start::user_extensions::UserExtensions;
-pub use gpu::start::window::WindowHandles;
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
-    TextureHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
 pub use pipeline::blend::{Blend, BlendComponent, BlendFactor, BlendOp, ColorWriteMask};
 pub use pipeline::compute::ComputePipelineDesc;
@@ -218,6 +218,10 @@ pub use shader::compile_glsl;
 pub use shader::{ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
-pub use swapchain::desc::{
-    ColorSpace, HdrMetadata, PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo,
+#[cfg(feature = "window")]
+pub use {
+    gpu::start::window::WindowHandles,
+    handle::SwapchainHandle,
+    raw_window_handle,
+    swapchain::desc::{ColorSpace, HdrMetadata, PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo},
 };

@@ -1,12 +1,11 @@
-//! The library without its feature `glsl`, which needs no C++ compiler: shaders from SPIR-V words, and the library's own
-//! kernels. `LVK_TEST_LIBRARY` names a Vulkan loader in place of the system's.
+//! The library without its feature `glsl`, which needs no C++ compiler: shaders from SPIR-V words, and with the feature
+//! `software-ray-query` the library's own kernels. `LVK_TEST_LIBRARY` names a Vulkan loader in place of the system's.
 #![cfg(not(feature = "glsl"))]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, ComputePipelineDesc, Context, ContextDesc,
-    Dependencies, Error, MemoryKind, RayQueryRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc,
-    TlasInstance, Triangles,
+    BufferDesc, ComputePipelineDesc, Context, ContextDesc, Dependencies, Error, RayQueryRequest,
+    ShaderModuleDesc, ShaderSource, ShaderStage,
 };
 
 /// `None`, loudly, where there is no device and none is demanded.
@@ -14,7 +13,10 @@ fn context() -> Option<Context> {
     let library = std::env::var_os("LVK_TEST_LIBRARY").map(std::path::PathBuf::from);
     let made = Context::new(&ContextDesc {
         vulkan_library: library.as_deref(),
-        ray_query: RayQueryRequest::Software,
+        ray_query: match cfg!(feature = "software-ray-query") {
+            true => RayQueryRequest::Software,
+            false => RayQueryRequest::Auto,
+        },
         ..Default::default()
     });
     match made {
@@ -62,8 +64,13 @@ fn words_run_and_texts_are_refused() {
 }
 
 /// Builds by kernels, which come as words.
+#[cfg(feature = "software-ray-query")]
 #[test]
 fn accel_structs_are_built_by_kernels() {
+    use lvk::{
+        BlasDesc, BlasGeometry, BufferUsage, BuildFlags, MemoryKind, TlasDesc, TlasInstance, Triangles,
+    };
+
     let Some(ctx) = context() else { return };
     let corners: Vec<f32> = (0..900).map(|number| (number * number % 89) as f32).collect();
     let desc = BufferDesc {
@@ -81,4 +88,14 @@ fn accel_structs_are_built_by_kernels() {
     ctx.wait_idle().unwrap();
     assert!(ctx.blas_sizes(&BlasDesc { geometries: &geometries, flags, ..Default::default() }).is_ok());
     drop((tlas, mesh));
+}
+
+#[cfg(not(feature = "software-ray-query"))]
+#[test]
+fn software_queries_are_refused() {
+    let desc = ContextDesc { ray_query: RayQueryRequest::Software, ..Default::default() };
+    match Context::new(&desc) {
+        Err(Error::Unsupported { why, .. }) => assert!(why.contains("`software-ray-query`"), "{why}"),
+        other => panic!("{:?}", other.err()),
+    }
 }

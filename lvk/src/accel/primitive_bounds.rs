@@ -143,6 +143,12 @@ impl AabbListBytes<'_> {
     }
 }
 
+/// A geometry as it was read.
+pub(crate) enum GeometryBytes<'a> {
+    Triangles(TriangleBytes<'a>),
+    Boxes(AabbListBytes<'a>),
+}
+
 /// The bytes of one element; `None` if they are not all there.
 fn element_bytes(bytes: &[u8], stride: usize, packed: usize, index: u32) -> Option<&[u8]> {
     let stride = if stride == 0 { packed } else { stride };

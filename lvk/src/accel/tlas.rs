@@ -109,7 +109,7 @@ impl Tlas {
     /// Bytes of the structure.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let hardware = self.structure.as_ref().map_or(0, RawAccelStruct::memory_bytes);
-        hardware + self.software.as_ref().map_or(0, |software| software.storage.memory_bytes())
+        hardware + self.software.as_ref().map_or(0, SoftwareTlas::memory_bytes)
     }
 
     /// Bytes of buffers the library keeps for it.

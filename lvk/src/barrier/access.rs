@@ -334,6 +334,7 @@ impl Use {
     }
 
     /// Goes to the presentation engine, which waits by a semaphore.
+    #[cfg_attr(not(any(feature = "window", test)), expect(dead_code, reason = "only swapchains present"))]
     pub(crate) const fn present() -> Self {
         Self::new(Stages::empty(), Access::empty(), Layout::Present)
     }

@@ -9,7 +9,7 @@ use ash::vk;
 use super::CommandBuffer;
 use super::open_build::{CpuBvhUpdate, OpenBuild};
 use super::queue_support::BUILD_ON_QUEUE;
-use super::software::{SoftwareBuilds, check_unmoved};
+use super::software_ray_query::{SoftwareBuilds, check_unmoved};
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasPart, BlasStructures};
 use crate::accel::build::BuildInput;

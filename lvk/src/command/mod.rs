@@ -7,11 +7,11 @@ pub(crate) mod build_blas;
 pub(crate) mod compute;
 mod copy_accel;
 pub(crate) mod dependencies;
-pub(crate) mod gpu_build;
 mod kernel_dispatch;
 mod label;
 mod open_build;
 mod pending_visibility;
+#[cfg(feature = "window")]
 mod present;
 mod push_constants;
 pub(crate) mod query;
@@ -19,7 +19,8 @@ mod query_usage;
 pub(crate) mod queue_support;
 mod recording_state;
 pub(crate) mod render;
-mod software;
+#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
+pub(crate) mod software_ray_query;
 mod subresource_accesses;
 pub(crate) mod trace;
 pub(crate) mod transfer;

@@ -22,6 +22,7 @@ use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
+use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::submit::ownership::QueueAccess;
 
 /// What is known of a structure before the next command.
@@ -544,7 +545,7 @@ impl TlasBuildRequest<'_> {
 
 /// What the table says of a structure with these rows.
 fn tlas_table_entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
-    [rows, tlas.software.as_ref().map_or(0, |software| software.storage.address)]
+    [rows, tlas.software.as_ref().map_or(0, SoftwareTlas::address)]
 }
 
 /// Fails where there are more instances of the caller than the structure was made for.

@@ -1,7 +1,6 @@
 //! How a context is made.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use crate::gpu::caps::capabilities::FeatureRequest;
 use crate::gpu::caps::optional_features::OptionalFeature;
@@ -10,7 +9,7 @@ use crate::gpu::caps::ray_query_path::RayQueryRequest;
 use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
 use crate::gpu::start::profile::DeviceProfile;
 use crate::gpu::start::user_extensions::UserExtensions;
-use crate::gpu::start::window::WindowHandles;
+use crate::gpu::start::window::WindowRef;
 use crate::resource::ycbcr::YuvConversion;
 
 /// Describes a context.
@@ -51,7 +50,8 @@ pub struct ContextDesc<'a> {
     /// A window that the device must be able to show pictures in; swapchains without a window of their own take it, see
     /// [`Context::create_swapchain`](crate::Context::create_swapchain). `None` for contexts without windows, which use no
     /// extension of any window system.
-    pub window: Option<Arc<dyn WindowHandles>>,
+    #[cfg(feature = "window")]
+    pub window: Option<std::sync::Arc<dyn crate::WindowHandles>>,
     /// Another device to rehearse on this one, also by the requirements above; none for the device as it is.
     pub profile: Option<&'a DeviceProfile>,
     /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
@@ -97,7 +97,8 @@ pub struct ContextDesc<'a> {
     /// checksum of the primitives and settings it was built from. It is made when needed, and never emptied.
     ///
     /// A file that is damaged, or of another version, is dropped with a warning to the `log` crate and made anew, never an
-    /// error. Keep the folder where only the program writes it.
+    /// error. Keep the folder where only the program writes it. Without the feature `software-ray-query` the folder is left
+    /// alone.
     pub tree_cache: Option<&'a Path>,
 }
 
@@ -116,6 +117,7 @@ impl Default for ContextDesc<'_> {
             queues: QueueRequest::default(),
             required_features: &[],
             user_extensions: UserExtensions::default(),
+            #[cfg(feature = "window")]
             window: None,
             profile: None,
             frames_in_flight: 2,
@@ -129,5 +131,19 @@ impl Default for ContextDesc<'_> {
             shader_cache: None,
             tree_cache: None,
         }
+    }
+}
+
+impl ContextDesc<'_> {
+    /// The window that the device must be able to present to.
+    #[cfg(feature = "window")]
+    pub(crate) fn window_ref(&self) -> Option<WindowRef<'_>> {
+        self.window.as_deref()
+    }
+
+    /// The window that the device must be able to present to: none.
+    #[cfg(not(feature = "window"))]
+    pub(crate) fn window_ref(&self) -> Option<WindowRef<'_>> {
+        None
     }
 }

@@ -7,6 +7,7 @@ use ash::vk;
 use super::Context;
 use super::holder::Holder;
 use super::plan_blas::part_limits;
+use super::software_ray_query::software_tlas;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::{Blas, BlasPart, BlasStructures};
@@ -26,10 +27,6 @@ use crate::queue::Queue;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::blas::SoftwareBlas;
-use crate::software_ray_query::bvh::rebraid::record_capacity;
-use crate::software_ray_query::gpu_build::layout::GpuBuildPlan;
-use crate::software_ray_query::storage::SoftwareAccelStorage;
-use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::submit::SubmitHandle;
 
 impl Context {
@@ -268,16 +265,4 @@ fn hardware_tlas(
     let bytes = sizes.structure_bytes;
     let structure = RawAccelStruct::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;
     Ok((structure, sizes))
-}
-
-/// Room for what software traces, where it does.
-fn software_tlas(shared: &DeviceState, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
-    if !shared.gpu.caps.software_ray_query() {
-        return Ok(None);
-    }
-    let plan = GpuBuildPlan::tlas(name, capacity)?;
-    let built_capacity = record_capacity(capacity);
-    let bytes = GpuBuildPlan::tlas(name, built_capacity)?.blob_bytes;
-    let body = SoftwareAccelStorage::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
-    Ok(Some(SoftwareTlas { storage: Arc::new(body), plan, record_capacity: built_capacity }))
 }

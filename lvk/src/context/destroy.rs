@@ -4,8 +4,7 @@ use super::Context;
 use crate::device_state::{DeferredFree, DeviceState};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
-    TextureHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
 
 /// Handles whose objects a context can destroy: all of them.
@@ -63,15 +62,6 @@ impl Destroy for ShaderModuleHandle {
     /// Pipelines do not need their modules once they are created.
     fn destroy_in(self, ctx: &Context) {
         drop(ctx.device_state().store.shader_modules.remove(self));
-    }
-}
-
-impl Destroy for SwapchainHandle {
-    /// Its images go too, whoever has one.
-    fn destroy_in(self, ctx: &Context) {
-        if let Ok(swapchain) = ctx.device_state().store.swapchains.remove(self) {
-            ctx.retire_swapchain(swapchain);
-        }
     }
 }
 

@@ -33,8 +33,10 @@ impl Context {
     /// # Errors
     /// [`NoDevice`](crate::Error::NoDevice) where the device lacks what the library needs;
     /// [`InvalidUsage`](crate::Error::InvalidUsage) where the device cannot have what it is said to have, an extension is
-    /// missing from the list, or a queue family cannot do what its queue is for.
+    /// missing from the list, or a queue family cannot do what its queue is for; [`Unsupported`](crate::Error::Unsupported) for
+    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) without the feature `software-ray-query`.
     pub unsafe fn from_raw(raw: RawContext<'_>, desc: &ContextDesc<'_>) -> Result<Self> {
+        desc.ray_query.check()?;
         let queues = requested_queues(desc);
         // SAFETY: by the caller.
         let gpu = unsafe {

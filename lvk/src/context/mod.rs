@@ -26,9 +26,11 @@ mod query_results;
 mod read_bounds;
 pub(crate) mod readback;
 pub(crate) mod serialize;
-mod software_blas;
+#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
+mod software_ray_query;
 mod submit;
 mod transfer;
+#[cfg(feature = "window")]
 mod window;
 
 use std::sync::Arc;
@@ -39,7 +41,6 @@ use crate::device_state::DeviceState;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::debug::messenger::ValidationSink;
 use crate::gpu::memory::budget::MemoryBudget;
-use crate::gpu::start::window::WindowHandles;
 use crate::lock_order::Mutex;
 
 use frame::FrameRing;
@@ -63,7 +64,8 @@ struct ContextInner {
     /// Compactions under way.
     compactions: Mutex<Compactions>,
     /// For swapchains that name none.
-    window: Option<Arc<dyn WindowHandles>>,
+    #[cfg(feature = "window")]
+    window: Option<Arc<dyn crate::gpu::start::window::WindowHandles>>,
     shared: Arc<DeviceState>,
 }
 

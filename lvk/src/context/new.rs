@@ -31,7 +31,6 @@ use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shader::ShaderCache;
-use crate::software_ray_query::bvh_cache::BvhCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::submit::profiler::Profiler;
@@ -43,15 +42,17 @@ impl Context {
     /// # Errors
     /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
     /// reason for each device when none will do; [`Unsupported`](crate::Error::Unsupported) when validation is wanted
-    /// and its layer is missing, or the instance has no extension of [`ContextDesc::user_extensions`].
+    /// and its layer is missing, the instance has no extension of [`ContextDesc::user_extensions`], or
+    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) is asked for without the feature `software-ray-query`.
     pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
+        desc.ray_query.check()?;
         let sink = desc.validation_sink.clone().unwrap_or_default();
         let instance = Instance::new(&InstanceDesc {
             application_name: desc.application_name,
             library: desc.vulkan_library,
             validation: desc.validation,
             extra: desc.user_extensions.instance_extensions(),
-            window: desc.window.as_deref(),
+            window: desc.window_ref(),
             sink,
         })?;
         let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
@@ -64,7 +65,7 @@ impl Context {
             extra: desc.user_extensions,
             debug_names: desc.debug_names,
             queues: requested_queues(desc),
-            window: desc.window.as_deref(),
+            window: desc.window_ref(),
         };
         Self::with_gpu(Arc::new(Gpu::new(instance, &request)?), desc)
     }
@@ -77,6 +78,7 @@ impl Context {
             compactions: Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),
             recording_states: RecordingStatePool::new(),
+            #[cfg(feature = "window")]
             window: desc.window.clone(),
             shared,
         };
@@ -124,7 +126,8 @@ fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
         shader_cache: desc.shader_cache.map(ShaderCache::new),
-        tree_cache: desc.tree_cache.map(BvhCache::new),
+        #[cfg(feature = "software-ray-query")]
+        tree_cache: desc.tree_cache.map(crate::software_ray_query::bvh_cache::BvhCache::new),
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),

@@ -7,13 +7,14 @@ use std::sync::Arc;
 use super::Context;
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::{BlasGeometry, GeometryTransform, Triangles};
-use crate::accel::primitive_bounds::{AabbListBytes, Bounds, IndexBytes, TriangleBytes, VertexBytes};
+use crate::accel::primitive_bounds::{
+    AabbListBytes, Bounds, GeometryBytes, IndexBytes, TriangleBytes, VertexBytes,
+};
 use crate::command::transfer::BufferCopy;
 use crate::error::Result;
 use crate::format::IndexFormat;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
-use crate::software_ray_query::bvh::primitives::GeometryBytes;
 
 /// Most bytes read back at once: inputs of a whole scene may be more than there is readback memory for.
 const MAX_READ_BYTES: u64 = 64 << 20;

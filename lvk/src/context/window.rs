@@ -6,6 +6,7 @@ use ash::vk;
 
 use super::Context;
 use super::create_texture::default_views;
+use super::destroy::Destroy;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::device_state::DeferredFree;
@@ -25,6 +26,15 @@ use crate::swapchain::state::{
     ChainImage, Current, Swapchain, SwapchainConfig, SwapchainInner, SwapchainResources,
 };
 use crate::swapchain::surface::{Surface, SurfaceState};
+
+impl Destroy for SwapchainHandle {
+    /// Its images go too, whoever has one.
+    fn destroy_in(self, ctx: &Context) {
+        if let Ok(swapchain) = ctx.device_state().store.swapchains.remove(self) {
+            ctx.retire_swapchain(swapchain);
+        }
+    }
+}
 
 impl Context {
     /// Creates a swapchain for a window (`vkCreateSwapchainKHR`). See [`manual::windows`](crate::manual::windows).
@@ -205,7 +215,7 @@ impl Context {
     }
 
     /// Gives up the images of a swapchain, and what its handle named.
-    pub(super) fn retire_swapchain(&self, swapchain: Arc<Swapchain>) {
+    fn retire_swapchain(&self, swapchain: Arc<Swapchain>) {
         let mut guard = swapchain.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
         lifecycle.mark_out_of_date();

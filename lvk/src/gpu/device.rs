@@ -12,7 +12,7 @@ use super::caps::features::Features;
 use super::caps::format_features::FormatFeatureCache;
 use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
-use super::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
+use super::caps::optional_features::OptionalFeature;
 use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
@@ -25,9 +25,9 @@ use super::start::instance::Instance;
 use super::start::physical_device::PhysicalDevice;
 use super::start::profile::DeviceProfile;
 use super::start::select::{Candidate, choose};
-use super::start::surface::{SurfaceProbe, WindowFunctions};
+use super::start::surface::SurfaceProbe;
 use super::start::user_extensions::UserExtensions;
-use super::start::window::WindowHandles;
+use super::start::window::{WindowExtensions, WindowRef};
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
@@ -47,7 +47,7 @@ pub(crate) struct DeviceRequest<'a> {
     pub(crate) debug_names: Option<bool>,
     pub(crate) queues: QueueRequest,
     /// A window that the device has to present to.
-    pub(crate) window: Option<&'a dyn WindowHandles>,
+    pub(crate) window: Option<WindowRef<'a>>,
 }
 
 /// One logical device with everything made from it that is not a resource. It knows no resource.
@@ -73,7 +73,8 @@ pub(crate) struct Gpu {
     /// Samplers alive with a border colour of their own, of which a device has few.
     pub(crate) custom_borders: AtomicU32,
     /// Present where the context is for windows.
-    pub(crate) windows: Option<WindowFunctions>,
+    #[cfg(feature = "window")]
+    pub(crate) windows: Option<super::start::surface::WindowFunctions>,
     physical: vk::PhysicalDevice,
     /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
@@ -177,7 +178,10 @@ impl Gpu {
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_copies,
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
-            windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
+            #[cfg(feature = "window")]
+            windows: super::start::surface::WindowFunctions::new(&instance, &device, |feature| {
+                caps.has(feature)
+            }),
             debug_utils: should_name_objects(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
@@ -199,6 +203,7 @@ impl Gpu {
     }
 
     /// The queue for everything; Vulkan wants one thread at a time on it.
+    #[cfg(feature = "window")]
     pub(crate) fn graphics_queue(&self) -> Guard<'_, vk::Queue> {
         self.queues.raw(0)
     }
@@ -243,7 +248,8 @@ impl Gpu {
     }
 
     /// The functions of windows, or the error that says how to get them.
-    pub(crate) fn window_functions(&self) -> Result<&WindowFunctions> {
+    #[cfg(feature = "window")]
+    pub(crate) fn window_functions(&self) -> Result<&super::start::surface::WindowFunctions> {
         self.windows.as_ref().ok_or_else(|| {
             Error::unsupported(
                 "a swapchain",
@@ -336,11 +342,11 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
         return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
     }
     let probe = request.window.map(|window| SurfaceProbe::new(instance, window)).transpose()?;
-    let unknown = unavailable_window_features(instance);
+    let unknown = WindowExtensions::unavailable_features(instance.windows.as_ref());
     for device in &mut devices {
         device.capabilities.remove_features(unknown);
         if let Some(probe) = &probe {
-            device.select_present_queue(probe);
+            device.select_present_queue(probe.queue_family(device.raw));
         }
     }
     let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
@@ -354,15 +360,6 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
 fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
     if request == QueueRequest::Shared {
         device.set_queues([device.places[0]; 3]);
-    }
-}
-
-/// What devices have for windows and cannot be turned on for want of an extension of the instance.
-fn unavailable_window_features(instance: &Instance) -> FeatureSet {
-    match &instance.windows {
-        None => OF_WINDOWS.into_iter().collect(),
-        Some(windows) if windows.maintenance => FeatureSet::NONE,
-        Some(_) => FeatureSet::NONE.with(OptionalFeature::SwapchainMaintenance1),
     }
 }
 

@@ -16,27 +16,27 @@ use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 pub(crate) const GROUP_SIZE: u32 = 64;
 
 /// Every kernel: its name, the path of its SPIR-V below `src` without the ending, and the GLSL files of the same folder
-/// that are concatenated to its source.
+/// that are concatenated to its source. A group of kernels is compiled where its `cfg` holds.
 macro_rules! kernels {
-    ($($(#[$doc:meta])* $name:ident = $file:literal, [$($piece:literal),*];)*) => {
+    ($(#[cfg($when:meta)] { $($(#[$doc:meta])* $name:ident = $file:literal, [$($piece:literal),*];)* })*) => {
         /// Which of the library's compute shaders.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
         pub(crate) enum Kernel {
-            $($(#[$doc])* $name,)*
+            $($($(#[$doc])* #[cfg($when)] $name,)*)*
         }
 
         impl Kernel {
-            pub(crate) const ALL: &'static [Self] = &[$(Self::$name),*];
+            pub(crate) const ALL: &'static [Self] = &[$($(#[cfg($when)] Self::$name,)*)*];
 
             pub(crate) fn name(self) -> &'static str {
                 match self {
-                    $(Self::$name => concat!("lvk ", $file),)*
+                    $($(#[cfg($when)] Self::$name => concat!("lvk ", $file),)*)*
                 }
             }
 
             fn bytes(self) -> &'static [u8] {
                 match self {
-                    $(Self::$name => include_bytes!(concat!("../", $file, ".comp.spv")),)*
+                    $($(#[cfg($when)] Self::$name => include_bytes!(concat!("../", $file, ".comp.spv")),)*)*
                 }
             }
 
@@ -44,7 +44,7 @@ macro_rules! kernels {
             #[cfg(all(test, feature = "glsl"))]
             fn source(self) -> (&'static str, &'static [&'static str]) {
                 match self {
-                    $(Self::$name => ($file, &[$($piece),*]),)*
+                    $($(#[cfg($when)] Self::$name => ($file, &[$($piece),*]),)*)*
                 }
             }
         }
@@ -52,79 +52,83 @@ macro_rules! kernels {
 }
 
 kernels! {
-    /// Gathers the indices or boxes of a part of a mesh.
-    Gather = "kernels/gather", ["gather.comp.glsl"];
-    /// Puts addresses into instances and writes their rows.
-    Instances = "kernels/instances", ["instances.comp.glsl"];
-    /// Forgets what an earlier build left in the scratch memory.
-    BuildReset = "software_ray_query/kernels/reset", ["job.glsl", "reset.comp.glsl"];
-    /// Boxes of triangles and boxes.
-    BuildPrimitives = "software_ray_query/kernels/primitives",
-        ["job.glsl", "box.glsl", "bounds.glsl", "input.glsl", "primitives.comp.glsl"];
-    /// Boxes of instances, and the instances as the structure keeps them.
-    BuildInstances = "software_ray_query/kernels/instances",
-        ["job.glsl", "box.glsl", "bounds.glsl", "instance.glsl", "instances.comp.glsl"];
-    /// Codes of places.
-    BuildCodes = "software_ray_query/kernels/codes", ["job.glsl", "box.glsl", "code.glsl", "codes.comp.glsl"];
-    /// Counts digits of codes.
-    SortCount = "software_ray_query/kernels/sort_count", ["job.glsl", "rank.glsl", "sort_count.comp.glsl"];
-    /// Sums the counts.
-    SortScan = "software_ray_query/kernels/sort_scan", ["job.glsl", "rank.glsl", "sort_scan.comp.glsl"];
-    /// Moves codes to where they belong.
-    SortScatter = "software_ray_query/kernels/sort_scatter", ["job.glsl", "rank.glsl", "sort_scatter.comp.glsl"];
-    /// The hierarchy.
-    BuildTree = "software_ray_query/kernels/tree",
-        ["job.glsl", "arrivals.glsl", "tree.glsl", "tree.comp.glsl"];
-    /// No child has arrived at any node.
-    ResetArrivals = "software_ray_query/kernels/arrivals", ["job.glsl", "arrivals.glsl", "arrivals.comp.glsl"];
-    /// Boxes of binary nodes, and better places for them.
-    BuildImprove = "software_ray_query/kernels/improve",
-        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl",
-         "arrivals.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "improve.comp.glsl"];
-    /// A level of wide nodes, of binary ones.
-    Collapse = "software_ray_query/kernels/collapse",
-        ["job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl", "node.glsl",
-         "wide.glsl", "encode.glsl", "collapse.glsl", "collapse.comp.glsl"];
-    /// Everything of a bottom-level structure but its nodes.
-    Place = "software_ray_query/kernels/place",
-        ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
-         "arrivals.glsl", "node.glsl", "wide.glsl", "packed.glsl", "place.glsl",
-         "place.comp.glsl"];
-    /// Boxes of wide nodes, where there was no room for those made of binary ones.
-    FitPacked = "software_ray_query/kernels/fit_packed",
-        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
-         "arrivals.glsl", "node.glsl", "wide.glsl", "encode.glsl", "packed.glsl",
-         "fit_wide.glsl", "fit_packed.comp.glsl"];
-    /// Boxes of binary nodes.
-    FitBinary = "software_ray_query/kernels/fit",
-        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
-         "arrivals.glsl", "node.glsl", "no_rotation.glsl", "fit.glsl", "fit.comp.glsl"];
-    /// Boxes of wide nodes.
-    FitWide = "software_ray_query/kernels/fit_wide",
-        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
-         "wide.glsl", "encode.glsl", "fit_wide.glsl", "fit_wide.comp.glsl"];
-    /// Primitives of leaves from inputs that moved.
-    RefitLeaves = "software_ray_query/kernels/refit",
-        ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
-         "arrivals.glsl", "wide.glsl", "refit.glsl", "refit.comp.glsl"];
-    /// The binary tree of a whole bottom-level structure by one workgroup.
-    BuildSmallBlas = "software_ray_query/kernels/small_blas",
-        ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "input.glsl",
-         "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
-         "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
-         "small_blas.comp.glsl", "small.glsl"];
-    /// The rest of such a structure by one workgroup.
-    BuildSmallWide = "software_ray_query/kernels/small_wide",
-        ["shared.glsl", "job.glsl", "box.glsl", "input.glsl", "leaf.glsl",
-         "kept_any.glsl", "leaf_write.glsl", "arrivals.glsl", "node.glsl", "wide.glsl",
-         "encode.glsl", "collapse.glsl", "packed.glsl", "place.glsl", "fit_wide.glsl",
-         "meet.glsl", "small_wide.comp.glsl"];
-    /// A whole top-level structure by one workgroup.
-    BuildSmallTlas = "software_ray_query/kernels/small_tlas",
-        ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "instance.glsl",
-         "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
-         "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
-         "small_tlas.comp.glsl", "small.glsl"];
+    #[cfg(all())] {
+        /// Gathers the indices or boxes of a part of a mesh.
+        Gather = "kernels/gather", ["gather.comp.glsl"];
+        /// Puts addresses into instances and writes their rows.
+        Instances = "kernels/instances", ["instances.comp.glsl"];
+    }
+    #[cfg(feature = "software-ray-query")] {
+        /// Forgets what an earlier build left in the scratch memory.
+        BuildReset = "software_ray_query/kernels/reset", ["job.glsl", "reset.comp.glsl"];
+        /// Boxes of triangles and boxes.
+        BuildPrimitives = "software_ray_query/kernels/primitives",
+            ["job.glsl", "box.glsl", "bounds.glsl", "input.glsl", "primitives.comp.glsl"];
+        /// Boxes of instances, and the instances as the structure keeps them.
+        BuildInstances = "software_ray_query/kernels/instances",
+            ["job.glsl", "box.glsl", "bounds.glsl", "instance.glsl", "instances.comp.glsl"];
+        /// Codes of places.
+        BuildCodes = "software_ray_query/kernels/codes", ["job.glsl", "box.glsl", "code.glsl", "codes.comp.glsl"];
+        /// Counts digits of codes.
+        SortCount = "software_ray_query/kernels/sort_count", ["job.glsl", "rank.glsl", "sort_count.comp.glsl"];
+        /// Sums the counts.
+        SortScan = "software_ray_query/kernels/sort_scan", ["job.glsl", "rank.glsl", "sort_scan.comp.glsl"];
+        /// Moves codes to where they belong.
+        SortScatter = "software_ray_query/kernels/sort_scatter", ["job.glsl", "rank.glsl", "sort_scatter.comp.glsl"];
+        /// The hierarchy.
+        BuildTree = "software_ray_query/kernels/tree",
+            ["job.glsl", "arrivals.glsl", "tree.glsl", "tree.comp.glsl"];
+        /// No child has arrived at any node.
+        ResetArrivals = "software_ray_query/kernels/arrivals", ["job.glsl", "arrivals.glsl", "arrivals.comp.glsl"];
+        /// Boxes of binary nodes, and better places for them.
+        BuildImprove = "software_ray_query/kernels/improve",
+            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl",
+             "arrivals.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "improve.comp.glsl"];
+        /// A level of wide nodes, of binary ones.
+        Collapse = "software_ray_query/kernels/collapse",
+            ["job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl", "node.glsl",
+             "wide.glsl", "encode.glsl", "collapse.glsl", "collapse.comp.glsl"];
+        /// Everything of a bottom-level structure but its nodes.
+        Place = "software_ray_query/kernels/place",
+            ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
+             "arrivals.glsl", "node.glsl", "wide.glsl", "packed.glsl", "place.glsl",
+             "place.comp.glsl"];
+        /// Boxes of wide nodes, where there was no room for those made of binary ones.
+        FitPacked = "software_ray_query/kernels/fit_packed",
+            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
+             "arrivals.glsl", "node.glsl", "wide.glsl", "encode.glsl", "packed.glsl",
+             "fit_wide.glsl", "fit_packed.comp.glsl"];
+        /// Boxes of binary nodes.
+        FitBinary = "software_ray_query/kernels/fit",
+            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
+             "arrivals.glsl", "node.glsl", "no_rotation.glsl", "fit.glsl", "fit.comp.glsl"];
+        /// Boxes of wide nodes.
+        FitWide = "software_ray_query/kernels/fit_wide",
+            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
+             "wide.glsl", "encode.glsl", "fit_wide.glsl", "fit_wide.comp.glsl"];
+        /// Primitives of leaves from inputs that moved.
+        RefitLeaves = "software_ray_query/kernels/refit",
+            ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
+             "arrivals.glsl", "wide.glsl", "refit.glsl", "refit.comp.glsl"];
+        /// The binary tree of a whole bottom-level structure by one workgroup.
+        BuildSmallBlas = "software_ray_query/kernels/small_blas",
+            ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "input.glsl",
+             "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
+             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
+             "small_blas.comp.glsl", "small.glsl"];
+        /// The rest of such a structure by one workgroup.
+        BuildSmallWide = "software_ray_query/kernels/small_wide",
+            ["shared.glsl", "job.glsl", "box.glsl", "input.glsl", "leaf.glsl",
+             "kept_any.glsl", "leaf_write.glsl", "arrivals.glsl", "node.glsl", "wide.glsl",
+             "encode.glsl", "collapse.glsl", "packed.glsl", "place.glsl", "fit_wide.glsl",
+             "meet.glsl", "small_wide.comp.glsl"];
+        /// A whole top-level structure by one workgroup.
+        BuildSmallTlas = "software_ray_query/kernels/small_tlas",
+            ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "instance.glsl",
+             "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
+             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
+             "small_tlas.comp.glsl", "small.glsl"];
+    }
 }
 
 /// Push constants of [`Kernel::Gather`].

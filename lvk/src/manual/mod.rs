@@ -33,6 +33,7 @@ pub mod interop {}
 #[doc = include_str!("measuring.md")]
 pub mod measuring {}
 
+#[cfg(feature = "window")]
 #[doc = include_str!("windows.md")]
 pub mod windows {}
 

@@ -139,6 +139,7 @@ impl Image {
     }
 
     /// The same, which keeps its owner as long as it is used.
+    #[cfg(feature = "window")]
     pub(crate) fn with_external_owner(mut self, owner: Arc<dyn Any + Send + Sync>) -> Self {
         self.owner = Some(owner);
         self

@@ -93,7 +93,7 @@ impl<'a> Includes<'a> {
     }
 
     fn resolve(&self, local: bool, name: &str) -> Result<(IncludeOrigin, String), String> {
-        if let Some((name, text)) = preamble::LIBRARY.into_iter().find(|(known, _)| *known == name) {
+        if let Some((name, text)) = preamble::library().find(|(known, _)| *known == name) {
             return Ok((IncludeOrigin::Library(name), text.to_owned()));
         }
         if let Some(found) = self.resolve_listed(local, name) {
@@ -128,7 +128,8 @@ impl<'a> Includes<'a> {
 
     fn not_found(&self, name: &str, beside: Option<&Path>) -> String {
         if name.starts_with("lvk/") {
-            let known: Vec<_> = preamble::LIBRARY.iter().map(|(name, _)| format!("<{name}>")).collect();
+            let mut known: Vec<_> = preamble::library().map(|(name, _)| format!("<{name}>")).collect();
+            known.sort();
             return format!("the library has no <{name}>; it has {}", known.join(", "));
         }
         let mut places: Vec<String> = Vec::new();

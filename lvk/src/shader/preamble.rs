@@ -6,26 +6,22 @@ use super::ShaderStage;
 use super::options::CompileOptions;
 use crate::bindless::input_attachments::InputAttachment;
 use crate::bindless::layout;
+use crate::software_ray_query;
 
 /// Helpers and resource arrays for every stage.
 const BINDLESS: &str = include_str!("glsl/bindless.glsl");
 
 /// The files behind `#include <lvk/..>`.
-pub(super) const LIBRARY: [(&str, &str); 16] = [
+pub(super) fn library() -> impl Iterator<Item = (&'static str, &'static str)> {
+    CORE_LIBRARY.iter().chain(software_ray_query::GLSL).copied()
+}
+
+const CORE_LIBRARY: &[(&str, &str)] = &[
     ("lvk/hardware_ray_query.glsl", include_str!("glsl/hardware_ray_query.glsl")),
     ("lvk/hit_numbers.glsl", include_str!("glsl/hit_numbers.glsl")),
     ("lvk/ray_flags.glsl", include_str!("glsl/ray_flags.glsl")),
     ("lvk/ray_query.glsl", include_str!("glsl/ray_query.glsl")),
     ("lvk/ray_tracing.glsl", include_str!("glsl/ray_tracing.glsl")),
-    ("lvk/software_boxes.glsl", include_str!("../software_ray_query/glsl/software_boxes.glsl")),
-    ("lvk/software_cpu_node.glsl", include_str!("../software_ray_query/glsl/software_cpu_node.glsl")),
-    ("lvk/software_cpu_walk.glsl", include_str!("../software_ray_query/glsl/software_cpu_walk.glsl")),
-    ("lvk/software_layout.glsl", include_str!("../software_ray_query/glsl/software_layout.glsl")),
-    ("lvk/software_ray_query.glsl", include_str!("../software_ray_query/glsl/software_ray_query.glsl")),
-    ("lvk/software_stack.glsl", include_str!("../software_ray_query/glsl/software_stack.glsl")),
-    ("lvk/software_triangle.glsl", include_str!("../software_ray_query/glsl/software_triangle.glsl")),
-    ("lvk/software_walk.glsl", include_str!("../software_ray_query/glsl/software_walk.glsl")),
-    ("lvk/software_wide_node.glsl", include_str!("../software_ray_query/glsl/software_wide_node.glsl")),
     ("lvk/tlas.glsl", include_str!("glsl/tlas.glsl")),
     ("lvk/tlas_table.glsl", include_str!("glsl/tlas_table.glsl")),
 ];

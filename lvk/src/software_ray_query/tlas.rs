@@ -15,6 +15,16 @@ pub(crate) struct SoftwareTlas {
 }
 
 impl SoftwareTlas {
+    /// The address that the table of top-level structures holds.
+    pub(crate) fn address(&self) -> u64 {
+        self.storage.address
+    }
+
+    /// Bytes of memory.
+    pub(crate) fn memory_bytes(&self) -> u64 {
+        self.storage.memory_bytes()
+    }
+
     /// What it takes and its builds take.
     pub(crate) fn sizes(&self) -> AccelStructSizes {
         AccelStructSizes {

@@ -6,6 +6,7 @@ pub(crate) mod deferred_free;
 pub(crate) mod emit_barriers;
 pub(crate) mod input_attachment_sets;
 pub(crate) mod ownership;
+#[cfg_attr(not(any(feature = "window", test)), expect(dead_code, reason = "only swapchains present"))]
 pub(crate) mod presentable;
 pub(crate) mod profiler;
 pub(crate) mod queue;

@@ -435,6 +435,7 @@ impl<T> Submitter<T> {
     }
 
     /// Changes who has the images of swapchains.
+    #[cfg(feature = "window")]
     pub(crate) fn with_presentables<R>(&self, change: impl FnOnce(&mut Presentables) -> R) -> R {
         change(&mut self.lock().presentables)
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ash::vk;
 
-use super::window::{WindowExtensions, WindowHandles};
+use super::window::{WindowExtensions, WindowRef};
 use crate::error::{Error, Result};
 use crate::gpu::debug::messenger::{Messenger, ValidationMode, ValidationSink, c_name};
 
@@ -36,7 +36,7 @@ pub(crate) struct InstanceDesc<'a> {
     /// Extensions of the caller's own.
     pub(crate) extra: &'a [&'a CStr],
     /// A window that the instance has to know.
-    pub(crate) window: Option<&'a dyn WindowHandles>,
+    pub(crate) window: Option<WindowRef<'a>>,
     pub(crate) sink: ValidationSink,
 }
 

@@ -6,6 +6,8 @@ pub(crate) mod instance;
 pub(crate) mod physical_device;
 pub(crate) mod profile;
 pub(crate) mod select;
+#[cfg_attr(not(feature = "window"), path = "surface_disabled.rs")]
 pub(crate) mod surface;
 pub(crate) mod user_extensions;
+#[cfg_attr(not(feature = "window"), path = "window_disabled.rs")]
 pub(crate) mod window;

@@ -5,7 +5,6 @@ use std::ffi::{CStr, CString};
 use ash::vk;
 
 use super::select::DeviceKind;
-use super::surface::SurfaceProbe;
 use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::features::{Calibration, Features, Subgroups, missing_required};
@@ -207,9 +206,9 @@ fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
 }
 
 impl PhysicalDevice {
-    /// Takes a queue that presents to the window, or says that there is none.
-    pub(crate) fn select_present_queue(&mut self, window: &SurfaceProbe<'_>) {
-        match window.queue_family(self.raw) {
+    /// Takes a family whose queues present to the window, or says that there is none.
+    pub(crate) fn select_present_queue(&mut self, family: Option<u32>) {
+        match family {
             Some(family) => self.use_single_family(family),
             None => {
                 self.missing.push("a queue for graphics and compute that presents to the window".to_owned())

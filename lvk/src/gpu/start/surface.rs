@@ -3,7 +3,7 @@
 use ash::vk;
 
 use super::instance::Instance;
-use super::window::{WindowHandles, display, raw_window, required_extensions};
+use super::window::{WindowHandles, WindowRef, display, raw_window, required_extensions};
 use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::OptionalFeature;
 
@@ -45,7 +45,7 @@ pub(crate) struct SurfaceProbe<'a> {
 }
 
 impl<'a> SurfaceProbe<'a> {
-    pub(crate) fn new(instance: &'a Instance, window: &dyn WindowHandles) -> Result<Self> {
+    pub(crate) fn new(instance: &'a Instance, window: WindowRef<'_>) -> Result<Self> {
         Ok(Self {
             raw: create_surface(instance, window)?,
             functions: ash::khr::surface::Instance::new(&instance.entry, &instance.raw),

@@ -6,6 +6,7 @@ use std::fmt;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle};
 
 use crate::error::{Error, Result};
+use crate::gpu::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
 
 /// A window, of whatever library made it: everything with the handles of the crate `raw-window-handle` is one.
 ///
@@ -21,20 +22,23 @@ impl fmt::Debug for dyn WindowHandles + '_ {
     }
 }
 
+/// A window while an instance and a device are made.
+pub(crate) type WindowRef<'a> = &'a dyn WindowHandles;
+
 /// The extensions of an instance that knows windows.
 #[derive(Debug, Clone)]
 pub(crate) struct WindowExtensions {
     /// Of the window system, with `VK_KHR_surface`.
     system: Vec<&'static CStr>,
     /// `VK_EXT_surface_maintenance1`, with what it needs.
-    pub(crate) maintenance: bool,
+    maintenance: bool,
     /// `VK_EXT_swapchain_colorspace`.
     color_spaces: bool,
 }
 
 impl WindowExtensions {
     /// Those for windows like `window`, of which `has` says what there is.
-    pub(crate) fn query(window: &dyn WindowHandles, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
+    pub(crate) fn query(window: WindowRef<'_>, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
         let system = required_extensions(display(window)?)?;
         if let Some(name) = system.iter().find(|name| !has(name)) {
             let what = format!("the instance extension {}", name.to_string_lossy());
@@ -50,6 +54,15 @@ impl WindowExtensions {
     /// Those of the window system.
     pub(super) fn system(&self) -> &[&'static CStr] {
         &self.system
+    }
+
+    /// The features of a device for windows that cannot be enabled with these extensions.
+    pub(crate) fn unavailable_features(extensions: Option<&Self>) -> FeatureSet {
+        match extensions {
+            None => OF_WINDOWS.into_iter().collect(),
+            Some(extensions) if extensions.maintenance => FeatureSet::NONE,
+            Some(_) => FeatureSet::NONE.with(OptionalFeature::SwapchainMaintenance1),
+        }
     }
 
     /// All of them.

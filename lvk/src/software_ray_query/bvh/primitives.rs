@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::settings::BvhSettings;
 use crate::accel::geometry::GeometryFlags;
-use crate::accel::primitive_bounds::{AabbListBytes, Bounds, TriangleBytes};
+use crate::accel::primitive_bounds::{Bounds, GeometryBytes};
 use crate::software_ray_query::layout::{LeafBox, LeafTriangle};
 
 /// Bounds end here: the sums of areas that a build compares still are numbers. Kernels have it in `build/box.glsl`.
@@ -25,12 +25,6 @@ pub(crate) struct Mesh {
     pub(crate) vertices: Vec<[u32; 3]>,
     /// Of each geometry.
     pub(crate) flags: Vec<GeometryFlags>,
-}
-
-/// A geometry as it was read.
-pub(crate) enum GeometryBytes<'a> {
-    Triangles(TriangleBytes<'a>),
-    Boxes(AabbListBytes<'a>),
 }
 
 impl Mesh {
@@ -110,7 +104,7 @@ fn clamp_to_max(corner: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::primitive_bounds::{IndexBytes, VertexBytes};
+    use crate::accel::primitive_bounds::{IndexBytes, TriangleBytes, VertexBytes};
     use crate::format::VertexFormat;
 
     /// Vertices of which the fourth is none.

@@ -1,4 +1,7 @@
-//! Bottom-level structures of the library's own, built by the CPU when they are created.
+//! Structures of the library's own: bottom-level ones are built by the CPU when they are created, but those that the GPU
+//! builds.
+//!
+//! `disabled.rs` has the names that other files use, for builds without the feature `software-ray-query`.
 
 use std::sync::Arc;
 
@@ -12,7 +15,7 @@ use crate::accel::blas::{Blas, BlasStructures};
 use crate::accel::blas_file::BlasFile;
 use crate::accel::desc::BlasDesc;
 use crate::command::transfer::BufferCopy;
-use crate::device_state::DeferredFree;
+use crate::device_state::{DeferredFree, DeviceState};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::parallel::parallel_map;
@@ -21,11 +24,14 @@ use crate::software_ray_query::blas::{
 };
 use crate::software_ray_query::bvh::encode_blas::{self, BlasBlob};
 use crate::software_ray_query::bvh::primitives::Mesh;
+use crate::software_ray_query::bvh::rebraid::record_capacity;
 use crate::software_ray_query::bvh::settings::BvhSettings;
 use crate::software_ray_query::bvh::subtrees::subtree_parts;
 use crate::software_ray_query::bvh_cache::BvhKey;
+use crate::software_ray_query::gpu_build::layout::GpuBuildPlan;
 use crate::software_ray_query::rebraid_parts::RebraidParts;
 use crate::software_ray_query::storage::SoftwareAccelStorage;
+use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::software_ray_query::validate_blob::{self, ExpectedMesh};
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
@@ -145,4 +151,16 @@ impl Context {
             cmd.fill_software_blas(target, body, &blob.bytes)
         })
     }
+}
+
+/// Room for what software traces, where it does.
+pub(super) fn software_tlas(shared: &DeviceState, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
+    if !shared.gpu.caps.software_ray_query() {
+        return Ok(None);
+    }
+    let plan = GpuBuildPlan::tlas(name, capacity)?;
+    let built_capacity = record_capacity(capacity);
+    let bytes = GpuBuildPlan::tlas(name, built_capacity)?.blob_bytes;
+    let body = SoftwareAccelStorage::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
+    Ok(Some(SoftwareTlas { storage: Arc::new(body), plan, record_capacity: built_capacity }))
 }

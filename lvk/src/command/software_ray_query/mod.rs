@@ -1,11 +1,14 @@
 //! Builds of the library's own structures.
+//!
+//! `disabled.rs` has the names that other files use, for builds without the feature `software-ray-query`.
+
+pub(crate) mod gpu_build;
 
 use std::sync::Arc;
 
 use ash::vk;
 
 use super::CommandBuffer;
-use super::gpu_build::{GpuBuild, GpuRefit};
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::blas_refs::{BlasRef, BlasRefSet};
@@ -25,6 +28,8 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::software_ray_query::bvh::encode_instances::{InstancedBlas, PlacedInstance, place_instance};
 use crate::software_ray_query::bvh::encode_tlas;
+
+use gpu_build::{GpuBuild, GpuRefit};
 
 /// So many instances the CPU builds a tree over that is worth more than its time. A driver that runs on the CPU has no
 /// faster builds.

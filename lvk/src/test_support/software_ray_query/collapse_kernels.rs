@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::collapse_model::{BelowNode, Bvh2Reference, Bvh8Child, Bvh8Reference};
 use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
@@ -10,7 +11,6 @@ use crate::resource::Buffer;
 use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, GpuBuildPlan};
 use crate::software_ray_query::gpu_build::steps::wide_steps;
 use crate::software_ray_query::layout::LeafKind;
-use crate::test_support::collapse_model::{BelowNode, Bvh2Reference, Bvh8Child, Bvh8Reference};
 
 /// Words of the state, as `software_ray_query/kernels/job.glsl` numbers them.
 const ACTIVE: usize = 6;

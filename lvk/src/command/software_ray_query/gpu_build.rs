@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::CommandBuffer;
 use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
 use crate::barrier::{Stages, Use};
+use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::kernels::spread_workgroups;
 use crate::resource::Buffer;
