@@ -8,7 +8,7 @@ use ash::vk;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::BlasStructures;
-use crate::accel::blas_refs::AccelGeneration;
+use crate::accel::blas_refs::{AccelGeneration, BlasRef};
 use crate::accel::compaction::CompactedSizeQuery;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
@@ -19,6 +19,7 @@ use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::handle::AccelStructHandle;
 use crate::kernels::Kernels;
 use crate::leak_report;
 use crate::lock_order::{Guard, Mutex};
@@ -280,6 +281,11 @@ impl DeviceState {
         updates
             .drain_replaced()
             .for_each(|contents| self.free_later(DeferredFree::TlasContents(Box::new(contents))));
+    }
+
+    /// References the BLAS that a handle names.
+    pub(crate) fn blas_ref(&self, handle: AccelStructHandle) -> Result<BlasRef> {
+        self.store.accel_structs.get(handle)?.blas_ref(handle)
     }
 
     /// Rises with every structure that is destroyed or moves.

@@ -1,12 +1,15 @@
 //! An acceleration structure as its handle names it: its name, its flags, and what stands behind it.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::blas::Blas;
+use super::blas_refs::BlasRef;
 use super::flags::{AccelStructSizes, BuildFlags};
 use super::tlas::Tlas;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result};
+use crate::handle::AccelStructHandle;
 
 /// An acceleration structure of either level.
 pub(crate) struct AccelStruct {
@@ -24,7 +27,7 @@ pub(crate) struct AccelStruct {
 /// What differs between the two levels.
 pub(crate) enum AccelKind {
     /// A bottom-level structure.
-    Blas(Blas),
+    Blas(Arc<Blas>),
     /// A top-level structure.
     Tlas(Tlas),
 }
@@ -36,13 +39,18 @@ impl AccelStruct {
     }
 
     /// The bottom level, or an error that says what the handle names instead.
-    pub(crate) fn blas(&self) -> Result<&Blas> {
+    pub(crate) fn blas(&self) -> Result<&Arc<Blas>> {
         match &self.kind {
             AccelKind::Blas(blas) => Ok(blas),
             AccelKind::Tlas(_) => {
                 Err(Error::usage(&self.name, "a bottom-level structure is needed, this is a top-level one"))
             }
         }
+    }
+
+    /// References the bottom level that `handle` names.
+    pub(crate) fn blas_ref(&self, handle: AccelStructHandle) -> Result<BlasRef> {
+        Ok(BlasRef::new(handle, self.id, self.flags, Arc::clone(self.blas()?)))
     }
 
     /// The top level, or an error that says what the handle names instead.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::build::BuildInput;
 use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
@@ -47,10 +48,11 @@ pub(crate) enum CompactionState {
     Idle,
 }
 
-/// What one part is built from.
+/// Input of the builds of one part.
 pub(crate) struct BlasPart {
-    /// Primitives of each geometry; a part may have none of some.
-    pub(crate) counts: Vec<u32>,
+    /// The geometries as Vulkan takes them: for the size query, for builds and for refits. A part may have no primitives of
+    /// some geometries.
+    pub(crate) input: BuildInput,
     /// Which primitives these are, where they are not all of the mesh in its own order.
     pub(crate) map: Option<PrimitiveMap>,
     pub(crate) sizes: AccelStructSizes,

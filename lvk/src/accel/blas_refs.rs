@@ -1,18 +1,17 @@
-//! The bottom-level structures that a top-level one shows: listed once, and kept as long as the same are shown.
+//! The BLAS that a TLAS references, without duplicates. The set is kept as long as the same BLAS are referenced.
 
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 use std::sync::Arc;
 
-use super::accel_struct::AccelStruct;
-use super::blas::BlasStructures;
+use super::blas::{Blas, BlasStructures};
 use super::flags::BuildFlags;
-use crate::barrier::IdHasher;
+use crate::barrier::{IdHasher, ResourceId};
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
 
-/// Finds the structure of a handle.
-pub(crate) type ResolveBlas<'a> = &'a (dyn Fn(AccelStructHandle) -> Result<Arc<AccelStruct>> + Sync);
+/// Finds the BLAS of a handle.
+pub(crate) type ResolveBlas<'a> = &'a (dyn Fn(AccelStructHandle) -> Result<BlasRef> + Sync);
 
 /// Rises with every structure that is destroyed, and with every one that moves: while it stays the same, so does what was
 /// found.
@@ -26,24 +25,28 @@ pub(crate) struct AccelGeneration {
 #[derive(Clone)]
 pub(crate) struct BlasRef {
     pub(crate) handle: AccelStructHandle,
-    pub(crate) blas: Arc<AccelStruct>,
+    /// The resource that barriers and queues know it by.
+    pub(crate) id: ResourceId,
+    allows_compaction: bool,
+    pub(crate) blas: Arc<Blas>,
     pub(crate) structures: Arc<BlasStructures>,
 }
 
 impl BlasRef {
-    /// A structure as it stands now.
-    pub(crate) fn new(handle: AccelStructHandle, blas: Arc<AccelStruct>) -> Result<Self> {
-        let body = blas.blas()?.structures();
-        Ok(Self { handle, blas, structures: body })
+    /// References a BLAS with its present Vulkan structures.
+    pub(crate) fn new(handle: AccelStructHandle, id: ResourceId, flags: BuildFlags, blas: Arc<Blas>) -> Self {
+        let structures = blas.structures();
+        let allows_compaction = flags.contains(BuildFlags::ALLOW_COMPACTION);
+        Self { handle, id, allows_compaction, blas, structures }
     }
 
     fn is_outdated(&self) -> bool {
-        self.blas.blas().is_ok_and(|blas| !Arc::ptr_eq(&blas.structures(), &self.structures))
+        !Arc::ptr_eq(&self.blas.structures(), &self.structures)
     }
 
     /// Whether it may yet be compacted, which gives it another address.
     fn may_move(&self) -> bool {
-        self.blas.flags.contains(BuildFlags::ALLOW_COMPACTION) && self.structures.compacted_from.is_none()
+        self.allows_compaction && self.structures.compacted_from.is_none()
     }
 
     /// Whether its address does not do in an instance.
@@ -53,8 +56,7 @@ impl BlasRef {
 
     /// Whether its hits need rows to become the caller's numbers.
     fn needs_hit_remap(&self) -> bool {
-        let mapped = self.blas.blas().is_ok_and(|blas| blas.parts.iter().any(|part| part.map.is_some()));
-        mapped || self.structures.structures.len() > 1
+        self.blas.parts.iter().any(|part| part.map.is_some()) || self.structures.structures.len() > 1
     }
 
     /// What instances refer to, where they refer to an address.
@@ -96,8 +98,8 @@ impl BlasRefSet {
         let (mut spans, mut parts) = (Vec::with_capacity(list.len()), Vec::with_capacity(list.len()));
         for blas_ref in &list {
             spans.push([parts.len() as u32, blas_ref.structures.structures.len() as u32]);
-            let shapes = blas_ref.blas.blas().map_or(&[][..], |blas| &blas.parts);
-            let maps = shapes.iter().map(|part| part.map.as_ref().map_or(0, |map| map.table.address));
+            let maps =
+                blas_ref.blas.parts.iter().map(|part| part.map.as_ref().map_or(0, |map| map.table.address));
             let structures = blas_ref.structures.structures.iter().map(|structure| structure.address);
             parts.extend(structures.zip(maps).map(|(structure, map)| [structure, map]));
         }
@@ -136,13 +138,14 @@ impl BlasRefSet {
 
     /// Whether everything is still there, where it was.
     pub(crate) fn is_current(&self, resolve: ResolveBlas<'_>) -> bool {
-        self.refs.iter().all(|blas_ref| resolve(blas_ref.handle).is_ok() && !blas_ref.is_outdated())
+        let is_same = |known: &BlasRef, now: BlasRef| Arc::ptr_eq(&known.structures, &now.structures);
+        self.refs.iter().all(|known| resolve(known.handle).is_ok_and(|now| is_same(known, now)))
     }
 
     /// The same structures as they stand now.
-    pub(crate) fn refreshed(&self) -> Result<Self> {
-        let renew = |blas_ref: &BlasRef| BlasRef::new(blas_ref.handle, Arc::clone(&blas_ref.blas));
-        Ok(Self::new(self.refs.iter().map(renew).collect::<Result<_>>()?))
+    pub(crate) fn refreshed(&self) -> Self {
+        let refresh = |known: &BlasRef| BlasRef { structures: known.blas.structures(), ..known.clone() };
+        Self::new(self.refs.iter().map(refresh).collect())
     }
 
     /// Whether it lists exactly these, in this order.
@@ -265,7 +268,7 @@ impl<'a> BlasRefCollector<'a> {
         if let Some(ref_index) = index_map.get(&handle) {
             return Ok(before + ref_index);
         }
-        let blas_ref = BlasRef::new(handle, (self.resolve)(handle)?)?;
+        let blas_ref = (self.resolve)(handle)?;
         self.needs_kernel |= blas_ref.needs_kernel();
         index_map.insert(handle, list.len());
         list.push(blas_ref);
@@ -306,17 +309,17 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::accel::accel_struct::AccelKind;
-    use crate::accel::blas::Blas;
-    use crate::accel::flags::AccelStructSizes;
     use crate::pool::HandlePool;
 
-    type Structures = HandlePool<AccelStructHandle, AccelStruct>;
+    type Structures = HandlePool<AccelStructHandle, Blas>;
 
-    fn blas() -> AccelStruct {
+    fn blas() -> Blas {
         let body = BlasStructures { structures: Vec::new(), compacted_from: None, rebuildable: true };
-        let blas = Blas::new(Vec::new(), None, Vec::new(), body, None);
-        AccelStruct::new("mesh", BuildFlags::empty(), AccelStructSizes::default(), AccelKind::Blas(blas))
+        Blas::new(Vec::new(), None, Vec::new(), body, None)
+    }
+
+    fn find(pool: &Structures, handle: AccelStructHandle) -> Result<BlasRef> {
+        Ok(BlasRef::new(handle, ResourceId(0), BuildFlags::empty(), pool.get(handle)?))
     }
 
     fn sorted(mut handles: Vec<AccelStructHandle>) -> Vec<u64> {
@@ -334,7 +337,7 @@ mod tests {
         ) {
             let pool = Structures::new(7);
             let handles: Vec<_> = (0..count).map(|_| pool.insert(blas())).collect();
-            let resolve = |handle| pool.get(handle);
+            let resolve = |handle| find(&pool, handle);
             let (mut known, mut marks) = (BlasRefSet::default(), BitSet::default());
             for list in lists {
                 let list: Vec<_> = list.iter().map(|index| *index.get(&handles)).collect();
@@ -359,19 +362,15 @@ mod tests {
     fn a_set_stands_until_something_of_it_is_gone_or_has_moved() {
         let pool = Structures::new(7);
         let handles = [pool.insert(blas()), pool.insert(blas())];
-        let resolve = |handle| pool.get(handle);
-        let set = || {
-            BlasRefSet::new(
-                handles.map(|handle| BlasRef::new(handle, resolve(handle).unwrap()).unwrap()).into(),
-            )
-        };
+        let resolve = |handle| find(&pool, handle);
+        let set = || BlasRefSet::new(handles.map(|handle| resolve(handle).unwrap()).into());
         let (first, other) = (set(), pool.insert(blas()));
         pool.remove(other).unwrap();
         assert!(first.is_current(&resolve) && !first.is_outdated());
         let body = BlasStructures { structures: Vec::new(), compacted_from: Some(1), rebuildable: false };
-        resolve(handles[1]).unwrap().blas().unwrap().replace_structures(body, 0).unwrap();
+        pool.get(handles[1]).unwrap().replace_structures(body, 0).unwrap();
         assert!(!first.is_current(&resolve) && first.is_outdated());
-        assert!(!first.refreshed().unwrap().is_outdated());
+        assert!(!first.refreshed().is_outdated());
         let second = set();
         assert!(second.is_current(&resolve));
         pool.remove(handles[0]).unwrap();

@@ -1,20 +1,21 @@
-//! What Vulkan is told about a build: the same values for the size query and for the build.
+//! The input of a build in Vulkan's terms. The same value serves the size query and every build.
 
 use std::sync::Arc;
 
 use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
-use super::blas::BlasPart;
 use super::flags::{AccelStructSizes, BuildFlags};
 use super::geometry::{BlasGeometry, VulkanGeometry, check_geometries, host_or_device_address};
 use super::instance::INSTANCE_BYTES;
+use super::primitive_map::PrimitiveMap;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 
-/// The inputs of one build, converted.
+/// The input of one build, converted once.
+#[derive(Clone)]
 pub(crate) struct BuildInput {
     ty: vk::AccelerationStructureTypeKHR,
     flags: BuildFlags,
@@ -45,17 +46,18 @@ impl BuildInput {
         Ok(Self::new(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &converted))
     }
 
-    /// The same for one part of the mesh: its own primitives, from the inputs gathered for it.
-    pub(crate) fn into_part(mut self, part: &BlasPart) -> Self {
-        let Some(map) = &part.map else { return self };
-        for (index, geometry) in self.geometries.iter_mut().enumerate() {
+    /// Returns the input of a part of the mesh: `counts` primitives of each geometry, read from the inputs gathered for
+    /// the part.
+    pub(crate) fn for_part(&self, map: &PrimitiveMap, counts: &[u32]) -> Self {
+        let mut part = self.clone();
+        for (index, geometry) in part.geometries.iter_mut().enumerate() {
             use_gathered_inputs(geometry, map.input_address(index));
         }
-        self.set_counts(&part.counts);
-        self
+        part.set_counts(counts);
+        part
     }
 
-    /// As [`into_part`](Self::into_part) for a part that is only planned: good for size queries.
+    /// As [`for_part`](Self::for_part) for a part that is only planned: good for size queries.
     pub(crate) fn with_gathered_inputs(mut self) -> Self {
         const NO_ADDRESS: u64 = 0;
         self.geometries.iter_mut().for_each(|geometry| use_gathered_inputs(geometry, NO_ADDRESS));

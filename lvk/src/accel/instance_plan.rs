@@ -16,7 +16,7 @@ const MAX_THREADS: usize = 8;
 /// Whether the first structure referred to needs no more than an address, as then mostly all do.
 pub(crate) fn first_needs_only_address(instances: &[TlasInstance], resolve: ResolveBlas<'_>) -> Result<bool> {
     let Some(first) = instances.first() else { return Ok(true) };
-    Ok(!BlasRef::new(first.blas, resolve(first.blas)?)?.needs_kernel())
+    Ok(!resolve(first.blas)?.needs_kernel())
 }
 
 /// What instances refer to that were written with addresses.
@@ -147,7 +147,7 @@ fn merge_refs(chunks: impl Iterator<Item = Result<Option<Vec<BlasRef>>>>) -> Res
         match chunk? {
             None => needs_kernel = true,
             Some(blas_refs) => {
-                all.extend(blas_refs.into_iter().filter(|blas_refs| seen.insert(blas_refs.blas.id.0)))
+                all.extend(blas_refs.into_iter().filter(|blas_ref| seen.insert(blas_ref.id.0)))
             }
         }
     }
@@ -269,16 +269,15 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::accel::accel_struct::{AccelKind, AccelStruct};
     use crate::accel::blas::{Blas, BlasStructures};
-    use crate::accel::flags::{AccelStructSizes, BuildFlags};
+    use crate::accel::flags::BuildFlags;
+    use crate::barrier::ResourceId;
     use crate::handle::AccelStructHandle;
     use crate::pool::HandlePool;
 
-    fn blas() -> AccelStruct {
+    fn blas() -> Blas {
         let body = BlasStructures { structures: Vec::new(), compacted_from: None, rebuildable: true };
-        let blas = Blas::new(Vec::new(), None, Vec::new(), body, None);
-        AccelStruct::new("mesh", BuildFlags::empty(), AccelStructSizes::default(), AccelKind::Blas(blas))
+        Blas::new(Vec::new(), None, Vec::new(), body, None)
     }
 
     proptest! {
@@ -291,9 +290,11 @@ mod tests {
             same in any::<bool>(),
             wrong in prop::option::weighted(0.2, any::<prop::sample::Index>()),
         ) {
-            let pool = HandlePool::<AccelStructHandle, AccelStruct>::new(7);
+            let pool = HandlePool::<AccelStructHandle, Blas>::new(7);
             let handles: Vec<_> = (0..count).map(|_| pool.insert(blas())).collect();
-            let resolve = |handle| pool.get(handle);
+            let resolve = |handle| {
+                Ok(BlasRef::new(handle, ResourceId(0), BuildFlags::empty(), pool.get(handle)?))
+            };
             let handle = |index: &prop::sample::Index| *index.get(&handles);
             let blas_refs = before.iter().map(handle);
             let previous = {

@@ -3,7 +3,6 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
 use super::CommandBuffer;
@@ -11,28 +10,41 @@ use super::open_build::{CpuBvhUpdate, OpenBuild};
 use super::queue_support::BUILD_ON_QUEUE;
 use super::software_ray_query::{SoftwareBuilds, check_unmoved};
 use crate::accel::AccelStruct;
-use crate::accel::blas::{Blas, BlasPart, BlasStructures};
+use crate::accel::blas::{Blas, BlasStructures};
 use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
-use crate::accel::scratch::{ScratchBatch, aligned_scratch_address, plan_scratch};
-use crate::barrier::Use;
+use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
+use crate::barrier::{ResourceId, Use};
 use crate::device_state::DeferredFree;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 
-/// Plans the builds or refits of what software traces.
-type PlanSoftwareBuilds = fn(&CommandBuffer, &[Arc<AccelStruct>], &[bool]) -> Result<SoftwareBuilds>;
+/// Builds and refits of BLAS, to be recorded together.
+pub(crate) struct BlasBuildPlan {
+    open: Vec<OpenBuild>,
+    parts: Vec<BlasPartBuild>,
+    software: SoftwareBuilds,
+    is_first: bool,
+}
 
-/// One build of a part of a bottom-level structure to record.
+/// Build or refit of one part of a BLAS.
 struct BlasPartBuild {
-    target: Arc<AccelStruct>,
-    /// The structure that is built, one of the target's.
+    id: ResourceId,
+    blas: Arc<Blas>,
+    /// Index of the part in `blas`.
+    part: usize,
+    /// The Vulkan structure of the part.
     raw: vk::AccelerationStructureKHR,
-    input: BuildInput,
     refit: bool,
     scratch_bytes: u64,
     read_buffers: Vec<Arc<Buffer>>,
+}
+
+impl BlasPartBuild {
+    fn input(&self) -> &BuildInput {
+        &self.blas.parts[self.part].input
+    }
 }
 
 impl CommandBuffer {
@@ -59,54 +71,90 @@ impl CommandBuffer {
         if let Some(twice) = found.iter().find(|target| !seen.insert(target.id.0)) {
             return Err(Error::usage(&twice.name, "the structure is listed twice in one build"));
         }
-        self.build_blas_objects(&found, mode)
-    }
-
-    /// Builds structures for the first time. Those of the library's own come ready from the CPU.
-    pub(crate) fn build_first_time(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
-        self.first_builds = true;
-        let built = self.build_with(structures, BuildMode::Rebuild, |cmd, structures, _| {
-            cmd.plan_first_software_builds(structures)
-        });
-        self.first_builds = false;
-        built
-    }
-
-    /// As [`build_blas`](Self::build_blas), by object.
-    pub(crate) fn build_blas_objects(
-        &mut self,
-        structures: &[Arc<AccelStruct>],
-        mode: BuildMode,
-    ) -> Result<()> {
         self.shared.gpu.check_acceleration_structures()?;
-        self.build_with(structures, mode, Self::plan_software_builds)
+        let plan = self.plan_blas_builds(&found, mode, false)?;
+        self.record_blas_builds(plan)
     }
 
-    /// Builds what the device traces, and what software does as `plan_software_builds` says.
-    fn build_with(
-        &mut self,
-        structures: &[Arc<AccelStruct>],
+    /// Plans builds or refits of BLAS. `is_first` means that nothing is built yet: of what software traces, the CPU has built
+    /// its share already, and no TLAS references the BLAS.
+    pub(crate) fn plan_blas_builds(
+        &self,
+        targets: &[Arc<AccelStruct>],
         mode: BuildMode,
-        plan_software: PlanSoftwareBuilds,
-    ) -> Result<()> {
-        let mut open = Vec::with_capacity(structures.len());
-        let mut builds = Vec::with_capacity(structures.len());
-        let mut refits = Vec::with_capacity(structures.len());
-        for target in structures {
+        is_first: bool,
+    ) -> Result<BlasBuildPlan> {
+        let mut open = Vec::with_capacity(targets.len());
+        let mut parts = Vec::with_capacity(targets.len());
+        let mut refits = Vec::with_capacity(targets.len());
+        for target in targets {
+            let blas = target.blas()?;
             let (mut build, body) = OpenBuild::for_blas(target)?;
             let refit = resolve_refit(target, &body, mode, self.refit_count(target)?)?;
-            (build.refit, build.bvh_update) = (refit, self.cpu_bvh_update(target, refit)?);
+            build.refit = refit;
+            if !is_first {
+                build.bvh_update = self.cpu_bvh_update(target, blas, refit);
+            }
             open.push(build);
-            self.plan_blas_builds(target, &body, refit, &mut builds)?;
             refits.push(refit);
+            let inputs = self.build_input_buffers(blas)?;
+            for (index, (part, structure)) in blas.parts.iter().zip(&body.structures).enumerate() {
+                let mut read_buffers = inputs.clone();
+                read_buffers.extend(part.map.as_ref().and_then(|map| map.gathered_inputs()));
+                let sizes = &part.sizes;
+                parts.push(BlasPartBuild {
+                    id: target.id,
+                    blas: Arc::clone(blas),
+                    part: index,
+                    raw: structure.raw,
+                    refit,
+                    scratch_bytes: if refit { sizes.update_scratch_bytes } else { sizes.build_scratch_bytes },
+                    read_buffers,
+                });
+            }
         }
-        let software = plan_software(self, structures, &refits)?;
-        if self.shared.gpu.accel.is_some() {
-            self.gather_inputs(structures, &refits)?;
-            self.record_builds(&builds)?;
+        let software = match is_first {
+            true => self.plan_first_software_builds(targets)?,
+            false => self.plan_software_builds(targets, &refits)?,
+        };
+        Ok(BlasBuildPlan { open, parts, software, is_first })
+    }
+
+    /// Records builds of parts in batches that share the scratch buffer (`vkCmdBuildAccelerationStructuresKHR`), and then
+    /// those of what software traces.
+    pub(crate) fn record_blas_builds(&mut self, plan: BlasBuildPlan) -> Result<()> {
+        let BlasBuildPlan { open, parts, software, is_first } = plan;
+        let shared = Arc::clone(&self.shared);
+        if shared.gpu.accel.is_some() {
+            self.gather_inputs(open.iter().map(|build| (&*build.target, build.refit)))?;
+            let alignment = shared.gpu.caps.limits.scratch_alignment.into();
+            let sizes: Vec<_> = parts.iter().map(|build| build.scratch_bytes).collect();
+            let own = &shared.scratch[self.recording.queue_index];
+            let batches = plan_scratch(&sizes, alignment, own.tiers.batch_bytes());
+            let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
+            let ext = shared.gpu.accel_functions()?;
+            let (scratch, replaced) = own.get_or_grow(&shared.gpu, most)?;
+            self.free_replaced_scratch(replaced);
+            let base = aligned_scratch_address(scratch.address, alignment);
+            for batch in batches {
+                let builds = &parts[batch.builds];
+                self.state.accesses.add_id(own.id, Use::accel_build_write());
+                builds.iter().for_each(|build| self.use_build_accesses(build, is_first));
+                self.flush_barriers();
+                let infos: Vec<_> = (builds.iter().zip(&batch.offsets))
+                    .map(|(build, offset)| build.input().build(build.raw, build.refit, base + offset))
+                    .collect();
+                let ranges: Vec<_> = builds.iter().map(|build| &build.input().ranges[..]).collect();
+                // SAFETY: inputs, structures and scratch memory are alive, checked, aligned and large enough; barriers
+                // keep them apart from other commands.
+                unsafe { ext.cmd_build_acceleration_structures(self.raw(), &infos, &ranges) };
+            }
         }
-        if let Err(error) = self.record_software_builds(software) {
-            let name = structures.first().map_or("build_blas", |target| &target.name);
+        self.first_builds = is_first;
+        let recorded = self.record_software_builds(software);
+        self.first_builds = false;
+        if let Err(error) = recorded {
+            let name = open.first().map_or("build_blas", |build| &build.target.name);
             return Err(self.poison(name, error));
         }
         for build in &open {
@@ -117,18 +165,25 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// What the next build does to the tree that the CPU made.
-    fn cpu_bvh_update(&self, target: &AccelStruct, refit: bool) -> Result<CpuBvhUpdate> {
-        let software = target.blas()?.software.as_ref();
-        let Some(software) = software.filter(|software| software.is_built_on_cpu() && !self.first_builds)
-        else {
-            return Ok(CpuBvhUpdate::None);
+    fn use_build_accesses(&mut self, build: &BlasPartBuild, is_first: bool) {
+        let write = Use::accel_build_write();
+        let shared = &self.shared;
+        let group = if is_first { shared.new_blas[self.recording.queue_index] } else { shared.all_blas };
+        self.state.accesses.add_id(build.id, write);
+        self.state.accesses.add_accumulating(group, write);
+        build.read_buffers.iter().for_each(|buffer| self.use_buffer(buffer, Use::accel_build_input()));
+    }
+
+    /// Returns what the next build does to the BVH that the CPU made.
+    fn cpu_bvh_update(&self, target: &AccelStruct, blas: &Blas, refit: bool) -> CpuBvhUpdate {
+        let Some(software) = blas.software.as_ref().filter(|software| software.is_built_on_cpu()) else {
+            return CpuBvhUpdate::None;
         };
-        Ok(match (refit, self.moved_storage(target, software).is_some()) {
+        match (refit, self.moved_storage(target, software).is_some()) {
             (true, false) => CpuBvhUpdate::Refit,
             (true, true) => CpuBvhUpdate::None,
             (false, _) => CpuBvhUpdate::Replace,
-        })
+        }
     }
 
     /// A command failed with a part of it recorded: the command buffer cannot be submitted any more.
@@ -156,87 +211,10 @@ impl CommandBuffer {
         Ok(self.state.refits.get(&target.id.0).copied().unwrap_or(submitted))
     }
 
-    /// Adds a build for each part.
-    fn plan_blas_builds(
-        &self,
-        target: &Arc<AccelStruct>,
-        body: &BlasStructures,
-        refit: bool,
-        builds: &mut Vec<BlasPartBuild>,
-    ) -> Result<()> {
-        let blas = target.blas()?;
-        let reads = self.build_input_buffers(blas)?;
-        for (part, structure) in blas.parts.iter().zip(&body.structures) {
-            let mut reads = reads.clone();
-            reads.extend(part.map.as_ref().and_then(|map| map.gathered_inputs()));
-            builds.push(BlasPartBuild {
-                target: Arc::clone(target),
-                raw: structure.raw,
-                input: self.part_input(target, blas, part)?,
-                refit,
-                scratch_bytes: part_scratch_bytes(part, refit),
-                read_buffers: reads,
-            });
-        }
-        Ok(())
-    }
-
-    fn part_input(&self, target: &AccelStruct, blas: &Blas, part: &BlasPart) -> Result<BuildInput> {
-        let find = |handle| self.shared.store.buffers.get(handle);
-        let transforms = blas.transforms.as_ref().map(|buffer| buffer.address);
-        let (gpu, name) = (&self.shared.gpu, &target.name);
-        let whole =
-            BuildInput::from_geometries(gpu, name, &blas.geometries, target.flags, &find, transforms)?;
-        Ok(whole.into_part(part))
-    }
-
+    /// Finds the buffers that builds of the BLAS read.
     pub(super) fn build_input_buffers(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
         let buffers = blas.geometries.iter().flat_map(|geometry| geometry.buffers());
         buffers.map(|handle| self.shared.store.buffers.get(handle)).collect()
-    }
-
-    /// Records builds in batches that share the scratch buffer.
-    fn record_builds(&mut self, builds: &[BlasPartBuild]) -> Result<()> {
-        let shared = Arc::clone(&self.shared);
-        let alignment = shared.gpu.caps.limits.scratch_alignment.into();
-        let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
-        let own = &shared.scratch[self.recording.queue_index];
-        let batches = plan_scratch(&sizes, alignment, own.tiers.batch_bytes());
-        let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
-        let ext = shared.gpu.accel_functions()?;
-        let (scratch, replaced) = own.get_or_grow(&shared.gpu, most)?;
-        self.free_replaced_scratch(replaced);
-        for batch in batches {
-            self.state.accesses.add_id(own.id, Use::accel_build_write());
-            let base = aligned_scratch_address(scratch.address, alignment);
-            self.record_batch(ext, &builds[batch.builds.clone()], &batch, base);
-        }
-        Ok(())
-    }
-
-    /// Records builds that share the scratch buffer without overlapping in it.
-    fn record_batch(&mut self, ext: &ExtDevice, builds: &[BlasPartBuild], batch: &ScratchBatch, base: u64) {
-        builds.iter().for_each(|build| self.use_build_accesses(build));
-        self.flush_barriers();
-        let infos: Vec<_> = builds
-            .iter()
-            .zip(&batch.offsets)
-            .map(|(build, offset)| build.input.build(build.raw, build.refit, base + offset))
-            .collect();
-        let ranges: Vec<&[vk::AccelerationStructureBuildRangeInfoKHR]> =
-            builds.iter().map(|build| &build.input.ranges[..]).collect();
-        // SAFETY: inputs, structures and scratch memory are alive, checked, aligned and large enough; barriers keep
-        // them apart from other commands.
-        unsafe { ext.cmd_build_acceleration_structures(self.raw(), &infos, &ranges) };
-    }
-
-    fn use_build_accesses(&mut self, build: &BlasPartBuild) {
-        self.state.accesses.add_id(build.target.id, Use::accel_build_write());
-        let group = self.built_group();
-        self.state.accesses.add_accumulating(group, Use::accel_build_write());
-        for buffer in &build.read_buffers {
-            self.use_buffer(buffer, Use::accel_build_input());
-        }
     }
 
     /// The next command reads bottom-level structures, whichever it may be.
@@ -268,8 +246,4 @@ fn resolve_refit(target: &AccelStruct, body: &BlasStructures, mode: BuildMode, r
         return Err(Error::usage(&target.name, message));
     }
     Ok(refit)
-}
-
-fn part_scratch_bytes(part: &BlasPart, refit: bool) -> u64 {
-    if refit { part.sizes.update_scratch_bytes } else { part.sizes.build_scratch_bytes }
 }

@@ -133,7 +133,7 @@ impl CommandBuffer {
         let body = target.blas()?.structures();
         if may_be_rebuilt(target, &body) {
             // A refit reads the same indices as the build did.
-            return self.gather_inputs(std::slice::from_ref(target), &[false]);
+            return self.gather_inputs(std::iter::once((&**target, false)));
         }
         self.free_build_inputs(target)
     }

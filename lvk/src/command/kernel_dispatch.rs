@@ -6,9 +6,8 @@ use ash::vk;
 
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
-use crate::accel::blas::{Blas, BlasPart};
+use crate::accel::blas::Blas;
 use crate::accel::geometry::BlasGeometry;
-use crate::accel::primitive_map::PrimitiveMap;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::format::IndexFormat;
@@ -22,11 +21,16 @@ const KIND_BOXES: u32 = 3;
 const BOX_BYTES: u64 = 24;
 
 impl CommandBuffer {
-    /// Gathers indices and boxes for the parts of these structures. A refit moves vertices or boxes, never indices.
-    pub(super) fn gather_inputs(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
+    /// Gathers indices and AABBs for the parts of BLAS that are built, or refitted where the flag says so. A refit moves
+    /// vertices or AABBs, never indices.
+    pub(super) fn gather_inputs<'a>(
+        &mut self,
+        builds: impl Iterator<Item = (&'a AccelStruct, bool)>,
+    ) -> Result<()> {
         let mut runs = Vec::new();
-        for (target, refit) in structures.iter().zip(refits) {
-            self.plan_gathers(target, *refit, &mut runs).inspect_err(|_| self.state.accesses.clear())?;
+        for (target, refit) in builds {
+            let planned = self.plan_gathers(target.blas()?, refit, &mut runs);
+            planned.inspect_err(|_| self.state.accesses.clear())?;
         }
         if runs.is_empty() {
             return Ok(());
@@ -38,40 +42,21 @@ impl CommandBuffer {
         )
     }
 
-    fn plan_gathers(
-        &mut self,
-        target: &AccelStruct,
-        refit: bool,
-        runs: &mut Vec<GatherPushConstants>,
-    ) -> Result<()> {
-        let blas = target.blas()?;
+    fn plan_gathers(&mut self, blas: &Blas, refit: bool, runs: &mut Vec<GatherPushConstants>) -> Result<()> {
         for part in &blas.parts {
-            if let Some(map) = &part.map {
-                self.plan_gather(blas, part, map, refit, runs)?;
+            let Some(map) = &part.map else { continue };
+            let Some(inputs) = map.gathered_inputs() else { continue };
+            let counts = part.input.ranges.iter().map(|range| range.primitive_count);
+            for (index, (geometry, count)) in blas.geometries.iter().zip(counts).enumerate() {
+                if count == 0 || (refit && !geometry.is_aabbs()) {
+                    continue;
+                }
+                let source = self.gather_source(geometry)?;
+                self.use_buffer(&map.table, Use::shader_read(Stages::COMPUTE));
+                self.use_buffer(&inputs, Use::shader_write(Stages::COMPUTE));
+                let (numbers, gathered) = (map.primitive_ids_address(index), map.input_address(index));
+                runs.push(GatherPushConstants { numbers, gathered, count, ..source });
             }
-        }
-        Ok(())
-    }
-
-    fn plan_gather(
-        &mut self,
-        blas: &Blas,
-        part: &BlasPart,
-        map: &PrimitiveMap,
-        refit: bool,
-        runs: &mut Vec<GatherPushConstants>,
-    ) -> Result<()> {
-        let Some(inputs) = map.gathered_inputs() else { return Ok(()) };
-        let geometries = blas.geometries.iter().zip(&part.counts).enumerate();
-        for (index, (geometry, count)) in geometries.filter(|(_, (_, count))| **count > 0) {
-            if refit && !geometry.is_aabbs() {
-                continue;
-            }
-            let source = self.gather_source(geometry)?;
-            self.use_buffer(&map.table, Use::shader_read(Stages::COMPUTE));
-            self.use_buffer(&inputs, Use::shader_write(Stages::COMPUTE));
-            let (numbers, gathered) = (map.primitive_ids_address(index), map.input_address(index));
-            runs.push(GatherPushConstants { numbers, gathered, count: *count, ..source });
         }
         Ok(())
     }

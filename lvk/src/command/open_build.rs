@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
-use crate::accel::blas::{Blas, BlasStructures};
+use crate::accel::blas::BlasStructures;
 use crate::error::{Error, Result};
 
 /// A build that is recorded; until it is submitted the body must not be replaced by a compacted one.
@@ -63,8 +63,8 @@ impl OpenBuild {
     pub(crate) fn mark_submitted(mut self, value: u64) {
         self.target.mark_used_by_submission(value);
         self.submitted = true;
-        if let (CpuBvhUpdate::Replace, Ok(Blas { software: Some(software), .. })) =
-            (self.bvh_update, self.target.blas())
+        if self.bvh_update == CpuBvhUpdate::Replace
+            && let Some(software) = self.target.blas().ok().and_then(|blas| blas.software.as_ref())
         {
             software.set_moved_storage();
         }

@@ -112,7 +112,7 @@ impl CommandBuffer {
         let tlas = target.tlas()?;
         let contents = tlas.contents().clone();
         let (Some(source), Some(count)) = (contents.source, contents.instance_count) else { return Ok(()) };
-        let blas_refs = Arc::new(contents.blas_refs.refreshed()?);
+        let blas_refs = Arc::new(contents.blas_refs.refreshed());
         let source = InstanceSource::clone(&source);
         self.with_tlas_trackers(|cmd, updates| {
             let index = updates.index_of(target);
@@ -339,7 +339,7 @@ impl CommandBuffer {
         let generation = self.shared.accel_generation();
         let is_first = !update.is_recorded();
         let contents = update.current(tlas);
-        let find = |handle| self.shared.store.accel_structs.get(handle);
+        let find = |handle| self.shared.blas_ref(handle);
         let is_current = contents.generation == generation || contents.blas_refs.is_current(&find);
         let blas_refs = if is_current { &contents.blas_refs } else { no_refs };
         PreviousState {
@@ -465,7 +465,7 @@ impl CommandBuffer {
             blas_refs
                 .refs()
                 .iter()
-                .for_each(|blas_refs| self.reference_resource(blas_refs.blas.id, QueueAccess::Read));
+                .for_each(|blas_refs| self.reference_resource(blas_refs.id, QueueAccess::Read));
         }
     }
 

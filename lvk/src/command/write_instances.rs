@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use super::CommandBuffer;
 use super::transfer::BufferCopy;
 use crate::accel::AccelStruct;
-use crate::accel::blas_refs::{BitSet, BlasRef, BlasRefSet};
+use crate::accel::blas_refs::{BitSet, BlasRefSet};
 use crate::accel::build::instance_bytes;
 use crate::accel::flags::BuildFlags;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance};
@@ -100,7 +100,7 @@ impl CommandBuffer {
         seen_refs: &mut BitSet,
     ) -> Result<Option<StagedInstances>> {
         let (shared, sequence) = (&self.shared, self.recording.staging_key());
-        let find = |handle| shared.store.accel_structs.get(handle);
+        let find = |handle| shared.blas_ref(handle);
         if previous.needs_kernel
             || (previous.refs().is_empty() && !first_needs_only_address(instances, &find)?)
         {
@@ -126,7 +126,7 @@ impl CommandBuffer {
         previous: &Arc<BlasRefSet>,
         memory: &mut PlanMemory,
     ) -> Result<InstancePlan> {
-        let find = |handle| self.shared.store.accel_structs.get(handle);
+        let find = |handle| self.shared.blas_ref(handle);
         InstancePlan::new(name, instances, previous, memory, &find)
     }
 
@@ -189,8 +189,7 @@ impl CommandBuffer {
         instances: &DeviceInstances<'_>,
         previous: &Arc<BlasRefSet>,
     ) -> Result<(Arc<BlasRefSet>, InstanceSource)> {
-        let store = &self.shared.store;
-        let buffer = store.buffers.get(instances.buffer)?;
+        let buffer = self.shared.store.buffers.get(instances.buffer)?;
         buffer.check_usage(BufferUsage::STORAGE)?;
         if !instances.offset.is_multiple_of(INSTANCE_ALIGNMENT) {
             let message = format!("instances start at a multiple of 16 bytes, not at {}", instances.offset);
@@ -201,7 +200,7 @@ impl CommandBuffer {
         let blas_refs = if previous.has_handles(instances.blas) {
             Arc::clone(previous)
         } else {
-            let find = |handle: &_| BlasRef::new(*handle, store.accel_structs.get(*handle)?);
+            let find = |handle: &_| self.shared.blas_ref(*handle);
             Arc::new(BlasRefSet::new(instances.blas.iter().map(find).collect::<Result<_>>()?))
         };
         let own = InstanceBytes { address: buffer.address + instances.offset, buffer: Some(buffer) };

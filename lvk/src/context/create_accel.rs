@@ -6,12 +6,12 @@ use ash::vk;
 
 use super::Context;
 use super::holder::Holder;
-use super::plan_blas::part_limits;
+use super::plan_blas::{BlasInputs, part_limits};
 use super::software_ray_query::software_tlas;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::{Blas, BlasPart, BlasStructures};
-use crate::accel::build::{BuildInput, transform_matrices};
+use crate::accel::build::BuildInput;
 use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
 use crate::accel::instance_plan::{InstancePlan, PlanMemory};
@@ -21,11 +21,8 @@ use crate::accel::tlas::Tlas;
 use crate::command::queue_support::{BUILD_ON_QUEUE, needs_compute};
 use crate::device_state::DeviceState;
 use crate::error::{Error, Result, check_limit};
-use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::AccelStructHandle;
 use crate::queue::Queue;
-use crate::resource::Buffer;
-use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::blas::SoftwareBlas;
 use crate::submit::SubmitHandle;
 
@@ -57,11 +54,16 @@ impl Context {
     /// buffers that are too small or lack [`BufferUsage::ACCEL_INPUT`], a memory budget that is used up
     /// ([`ContextDesc::accel_budget_bytes`](crate::ContextDesc)).
     pub fn create_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Holder<AccelStructHandle>>> {
-        let (holders, objects) = self.new_batch(descs)?;
-        self.build_batch(&objects, |chunk, is_last| {
-            self.record_in_prologue(|cmd| cmd.build_first_time(chunk))?;
-            if is_last { Ok(()) } else { self.flush().map(drop) }
-        })?;
+        let (holders, objects) = self.new_blas_batch(descs)?;
+        for (batch, is_last) in self.scratch_batches(&objects)? {
+            self.record_in_prologue(|cmd| {
+                let plan = cmd.plan_blas_builds(batch, BuildMode::Rebuild, true)?;
+                cmd.record_blas_builds(plan)
+            })?;
+            if !is_last {
+                self.flush()?;
+            }
+        }
         Ok(holders)
     }
 
@@ -80,29 +82,36 @@ impl Context {
         descs: &[BlasDesc<'_>],
     ) -> Result<(Vec<Holder<AccelStructHandle>>, SubmitHandle)> {
         needs_compute(queue, BUILD_ON_QUEUE)?;
-        let (holders, objects) = self.new_batch(descs)?;
+        let (holders, objects) = self.new_blas_batch(descs)?;
         let mut built = SubmitHandle::default();
-        self.build_batch(&objects, |chunk, _| {
+        for (batch, _) in self.scratch_batches(&objects)? {
             let mut cmd = self.acquire_command_buffer_on(queue)?;
-            cmd.build_first_time(chunk)?;
+            let plan = cmd.plan_blas_builds(batch, BuildMode::Rebuild, true)?;
+            cmd.record_blas_builds(plan)?;
             built = self.submit_in_background(cmd)?;
-            Ok(())
-        })?;
+        }
         Ok((holders, built))
     }
 
-    /// The structures of a batch, not built yet.
-    fn new_batch(&self, descs: &[BlasDesc<'_>]) -> Result<NewBatch> {
-        let shapes = self.plan_blas_parts(descs)?;
+    /// Makes the BLAS of a batch; nothing is built yet.
+    fn new_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<NewBatch> {
+        let shared = self.device_state();
+        let inputs = self.plan_blas_inputs(descs)?;
         let blobs = self.software_blobs(descs)?;
         let mut holders = Vec::with_capacity(descs.len());
         let mut objects = Vec::with_capacity(descs.len());
-        for ((desc, parts), blob) in descs.iter().zip(shapes).zip(&blobs) {
+        for ((desc, inputs), blob) in descs.iter().zip(inputs).zip(&blobs) {
             let software = self.software_blas(desc, blob.as_ref())?;
-            let object = new_blas(self.device_state(), desc, parts, software)?;
-            let handle = self.device_state().store.accel_structs.insert(object);
+            let structure = |part: &BlasPart| {
+                let (ty, bytes) =
+                    (vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, part.sizes.structure_bytes);
+                RawAccelStruct::new(&shared.gpu, &shared.accel_storage, desc.debug_name, ty, bytes)
+            };
+            let structures = inputs.parts.iter().map(structure).collect::<Result<Vec<_>>>()?;
+            let body = BlasStructures { structures, compacted_from: None, rebuildable: true };
+            let handle = shared.store.accel_structs.insert(new_blas_object(desc, inputs, body, software));
             holders.push(Holder::new(self, handle, 0));
-            objects.push(self.device_state().store.accel_structs.get(handle)?);
+            objects.push(shared.store.accel_structs.get(handle)?);
         }
         for (object, blob) in objects.iter().zip(blobs) {
             blob.map(|blob| self.upload_software_blob(object, &blob)).transpose()?;
@@ -110,23 +119,23 @@ impl Context {
         Ok((holders, objects))
     }
 
-    /// Builds structures for the first time: calls `build` for each scratch budget that they fill, the last time with `true`.
-    fn build_batch(
+    /// Splits BLAS into batches whose first builds fill the scratch budget. The last batch has `true`.
+    fn scratch_batches<'a>(
         &self,
-        objects: &[Arc<AccelStruct>],
-        mut build: impl FnMut(&[Arc<AccelStruct>], bool) -> Result<()>,
-    ) -> Result<()> {
+        objects: &'a [Arc<AccelStruct>],
+    ) -> Result<Vec<(&'a [Arc<AccelStruct>], bool)>> {
         let budget = self.device_state().scratch[0].tiers.batch_bytes();
-        let (mut first, mut scratch) = (0, 0_u64);
+        let (mut batches, mut first, mut scratch) = (Vec::new(), 0, 0_u64);
         for (index, object) in objects.iter().enumerate() {
             let next = object.blas()?.initial_scratch_bytes();
             if index > first && scratch.saturating_add(next) > budget {
-                build(&objects[first..index], false)?;
+                batches.push((&objects[first..index], false));
                 (first, scratch) = (index, 0);
             }
             scratch = scratch.saturating_add(next);
         }
-        build(&objects[first..], true)
+        batches.push((&objects[first..], true));
+        Ok(batches)
     }
 
     /// Creates a top-level structure and builds it before the next submission. [`Holder::index`] is its element of
@@ -156,57 +165,19 @@ impl Context {
 /// Handles of structures, and what they name.
 type NewBatch = (Vec<Holder<AccelStructHandle>>, Vec<Arc<AccelStruct>>);
 
-/// Makes a bottom-level structure of these parts; nothing is built yet.
-fn new_blas(
-    shared: &DeviceState,
-    desc: &BlasDesc<'_>,
-    parts: Vec<BlasPart>,
-    software: Option<SoftwareBlas>,
-) -> Result<AccelStruct> {
-    let name = desc.debug_name;
-    let structures: Result<Vec<_>> = parts
-        .iter()
-        .map(|part| {
-            let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
-            let bytes = part.sizes.structure_bytes;
-            RawAccelStruct::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)
-        })
-        .collect();
-    let body = BlasStructures { structures: structures?, compacted_from: None, rebuildable: true };
-    new_blas_object(shared, desc, parts, body, software)
-}
-
-/// The object behind the handle of a bottom-level structure.
+/// Makes the object behind the handle of a BLAS.
 pub(super) fn new_blas_object(
-    shared: &DeviceState,
     desc: &BlasDesc<'_>,
-    parts: Vec<BlasPart>,
+    inputs: BlasInputs,
     body: BlasStructures,
     software: Option<SoftwareBlas>,
-) -> Result<AccelStruct> {
-    let transforms = match transform_matrices(desc.geometries) {
-        Some(matrices) => Some(new_transforms(shared, desc.debug_name, &matrices)?),
-        None => None,
-    };
+) -> AccelStruct {
+    let BlasInputs { transforms, parts } = inputs;
     let hardware = parts.iter().map(|part| part.sizes);
     let all = hardware.chain(software.as_ref().map(|software| software.sizes(desc.flags)));
     let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::max_with);
     let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body, software);
-    Ok(AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(blas)))
-}
-
-fn new_transforms(shared: &DeviceState, name: &str, matrices: &[f32]) -> Result<Buffer> {
-    let bytes: &[u8] = bytemuck::cast_slice(matrices);
-    let desc = BufferDesc {
-        size_bytes: bytes.len() as u64,
-        usage: BufferUsage::ACCEL_INPUT,
-        memory: MemoryKind::HostVisible,
-        data: None,
-        debug_name: name,
-    };
-    let buffer = Buffer::new(&shared.gpu, &desc, InternalUsage::NONE)?;
-    buffer.write(0, bytes);
-    Ok(buffer)
+    AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(Arc::new(blas)))
 }
 
 /// Makes a top-level structure for a slot the caller reserved, whatever it takes; nothing is built yet.
@@ -244,7 +215,7 @@ fn new_tlas_within_limits(
 
 /// Instances Vulkan will be given.
 fn built_count(shared: &DeviceState, desc: &TlasDesc<'_>) -> Result<u32> {
-    let find = |handle| shared.store.accel_structs.get(handle);
+    let find = |handle| shared.blas_ref(handle);
     let (known, mut memory) = (Arc::default(), PlanMemory::default());
     let plan = InstancePlan::new(desc.debug_name, desc.instances, &known, &mut memory, &find)?;
     Ok(plan.built_count)

@@ -2,7 +2,7 @@
 
 use super::Context;
 use crate::accel::blas::BlasPart;
-use crate::accel::build::BuildInput;
+use crate::accel::build::{BuildInput, transform_matrices};
 use crate::accel::desc::{BlasDesc, PrimitiveOrder};
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::primitive_bounds::Bounds;
@@ -13,10 +13,20 @@ use crate::device_state::DeviceState;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
+use crate::gpu::memory::allocator::MemoryKind;
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::blas::max_sizes;
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.
 const MIN_REORDERED_PRIMITIVES: u64 = 64;
+
+/// The input of a BLAS: the matrices that are given by value, and the parts to build.
+pub(super) struct BlasInputs {
+    pub(super) transforms: Option<Buffer>,
+    /// None where only software traces.
+    pub(super) parts: Vec<BlasPart>,
+}
 
 /// What becomes of a mesh.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -34,92 +44,108 @@ impl Context {
     /// what the context's [`DeviceProfile`](crate::DeviceProfile) says); at most, where only software traces it.
     pub fn blas_sizes(&self, desc: &BlasDesc<'_>) -> Result<AccelStructSizes> {
         let shared = self.device_state();
-        let input = build_input(shared, desc)?;
+        // Size queries only see whether a matrix has an address.
+        const PLACEHOLDER_ADDRESS: u64 = 16;
+        check_desc(shared, desc)?;
+        let input = build_input(shared, desc, Some(PLACEHOLDER_ADDRESS))?;
         if shared.gpu.accel.is_some() {
             return input.query_sizes(&shared.gpu);
         }
         max_sizes(desc.debug_name, desc.geometries, desc.flags)
     }
 
-    /// The parts of every structure, with the tables of those that are cut or reordered.
-    pub(super) fn plan_blas_parts(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Vec<BlasPart>>> {
+    /// Converts the geometries of every BLAS and plans its parts, with the tables of those that are split or reordered.
+    pub(super) fn plan_blas_inputs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<BlasInputs>> {
         let shared = self.device_state();
+        let converted =
+            descs.iter().map(|desc| convert_geometries(shared, desc)).collect::<Result<Vec<_>>>()?;
         if shared.gpu.accel.is_none() {
             // Software has no parts; the descriptions are checked as for hardware.
-            return descs.iter().map(|desc| build_input(shared, desc).map(|_| Vec::new())).collect();
+            let checked = |(transforms, _)| BlasInputs { transforms, parts: Vec::new() };
+            return Ok(converted.into_iter().map(checked).collect());
         }
-        let mut sizes = Vec::with_capacity(descs.len());
-        let mut treatments = Vec::with_capacity(descs.len());
-        for desc in descs {
-            let whole = build_input(shared, desc)?.query_sizes(&shared.gpu)?;
-            treatments.push(choose_plan(&shared.gpu, desc, &whole));
-            sizes.push(whole);
+        let mut plans = Vec::with_capacity(descs.len());
+        for (desc, (_, input)) in descs.iter().zip(&converted) {
+            let sizes = input.query_sizes(&shared.gpu)?;
+            plans.push((choose_plan(&shared.gpu, desc, &sizes), sizes));
         }
-        let treated = |(_, treatment): &(&BlasDesc<'_>, &BlasPlan)| **treatment != BlasPlan::Whole;
-        let read: Vec<_> = descs.iter().zip(&treatments).filter(treated).map(|(desc, _)| desc).collect();
+        let is_read = |(_, (plan, _)): &(&BlasDesc<'_>, &(BlasPlan, _))| *plan != BlasPlan::Whole;
+        let read: Vec<_> = descs.iter().zip(&plans).filter(is_read).map(|(desc, _)| desc).collect();
         let mut bounds = self.read_bounds(&read)?.into_iter();
-        let mut shapes = Vec::with_capacity(descs.len());
-        for ((desc, sizes), treatment) in descs.iter().zip(sizes).zip(treatments) {
-            let bounds = match treatment {
-                BlasPlan::Whole => None,
-                _ => bounds.next(),
+        let mut inputs = Vec::with_capacity(descs.len());
+        for ((desc, (transforms, input)), (plan, sizes)) in descs.iter().zip(converted).zip(plans) {
+            let bounds = if plan == BlasPlan::Whole { None } else { bounds.next() }.unwrap_or_default();
+            let plans = match plan {
+                BlasPlan::Whole => Vec::new(),
+                BlasPlan::Reordered => reordered_whole(&bounds).into_iter().collect(),
+                BlasPlan::Split { order } => split_into_parts(shared, desc, &input, &bounds, order)?,
             };
-            shapes.push(self.plan_parts_of_one(desc, sizes, treatment, bounds.unwrap_or_default())?);
+            let parts = match plans.is_empty() {
+                true => vec![BlasPart { input, map: None, sizes }],
+                false => plans.iter().map(|plan| self.new_part(desc, &input, plan)).collect::<Result<_>>()?,
+            };
+            inputs.push(BlasInputs { transforms, parts });
         }
-        Ok(shapes)
+        Ok(inputs)
     }
 
-    fn plan_parts_of_one(
+    /// Makes a part of a mesh with the input `whole`. Its tables are uploaded before the next submission.
+    pub(super) fn new_part(
         &self,
         desc: &BlasDesc<'_>,
-        whole: AccelStructSizes,
-        treatment: BlasPlan,
-        bounds: Vec<Vec<Bounds>>,
-    ) -> Result<Vec<BlasPart>> {
-        let plans = match treatment {
-            BlasPlan::Whole => Vec::new(),
-            BlasPlan::Reordered => reordered_whole(&bounds).into_iter().collect(),
-            BlasPlan::Split { order } => split_into_parts(self.device_state(), desc, &bounds, order)?,
-        };
-        if plans.is_empty() {
-            let counts = desc.geometries.iter().map(|geometry| geometry.primitive_count()).collect();
-            return Ok(vec![BlasPart { counts, map: None, sizes: whole }]);
-        }
-        plans.into_iter().map(|plan| self.new_part(desc, &plan)).collect()
-    }
-
-    /// A part with its tables, which are uploaded before the next submission.
-    pub(super) fn new_part(&self, desc: &BlasDesc<'_>, plan: &PartPlan) -> Result<BlasPart> {
+        whole: &BuildInput,
+        plan: &PartPlan,
+    ) -> Result<BlasPart> {
         let shared = self.device_state();
         let boxes = desc.geometries.first().is_some_and(|geometry| geometry.is_aabbs());
         let map = PrimitiveMap::new(&shared.gpu, desc.debug_name, &plan.geometries, boxes)?;
         let words = encode_table(&plan.geometries);
         self.upload_to_buffer(&map.table, 0, bytemuck::cast_slice(&words))?;
         let counts: Vec<u32> = plan.geometries.iter().map(|list| list.len() as u32).collect();
-        let mut input = build_input(shared, desc)?.with_gathered_inputs();
-        input.set_counts(&counts);
+        let input = whole.for_part(&map, &counts);
         let sizes = input.query_sizes(&shared.gpu)?;
-        Ok(BlasPart { counts, map: Some(map), sizes })
+        Ok(BlasPart { input, map: Some(map), sizes })
     }
 }
 
-/// The checked input of the mesh as a whole. Addresses of matrices do not matter to size queries, but for being null.
-pub(super) fn build_input(shared: &DeviceState, desc: &BlasDesc<'_>) -> Result<BuildInput> {
-    const PLACEHOLDER_ADDRESS: u64 = 16;
-    shared.gpu.check_acceleration_structures()?;
-    desc.flags.check_blas(&shared.gpu, desc.debug_name)?;
-    let find = |handle| shared.store.buffers.get(handle);
-    let name = desc.debug_name;
-    BuildInput::from_geometries(
-        &shared.gpu,
-        name,
-        desc.geometries,
-        desc.flags,
-        &find,
-        Some(PLACEHOLDER_ADDRESS),
-    )
+/// Checks the geometries of a BLAS and converts them, once for all of its size queries and builds. Makes the buffer of the
+/// matrices that are given by value.
+pub(super) fn convert_geometries(
+    shared: &DeviceState,
+    desc: &BlasDesc<'_>,
+) -> Result<(Option<Buffer>, BuildInput)> {
+    check_desc(shared, desc)?;
+    let matrices = transform_matrices(desc.geometries);
+    let transforms =
+        matrices.map(|matrices| new_transforms(shared, desc.debug_name, &matrices)).transpose()?;
+    let input = build_input(shared, desc, transforms.as_ref().map(|buffer| buffer.address))?;
+    Ok((transforms, input))
 }
 
+fn check_desc(shared: &DeviceState, desc: &BlasDesc<'_>) -> Result<()> {
+    shared.gpu.check_acceleration_structures()?;
+    desc.flags.check_blas(&shared.gpu, desc.debug_name)
+}
+
+/// Converts the mesh as a whole. `transforms` is the address of the matrices that are given by value.
+fn build_input(shared: &DeviceState, desc: &BlasDesc<'_>, transforms: Option<u64>) -> Result<BuildInput> {
+    let find = |handle| shared.store.buffers.get(handle);
+    BuildInput::from_geometries(&shared.gpu, desc.debug_name, desc.geometries, desc.flags, &find, transforms)
+}
+
+fn new_transforms(shared: &DeviceState, name: &str, matrices: &[f32]) -> Result<Buffer> {
+    let bytes: &[u8] = bytemuck::cast_slice(matrices);
+    let desc = BufferDesc {
+        size_bytes: bytes.len() as u64,
+        usage: BufferUsage::ACCEL_INPUT,
+        memory: MemoryKind::HostVisible,
+        data: None,
+        debug_name: name,
+    };
+    let buffer = Buffer::new(&shared.gpu, &desc, InternalUsage::NONE)?;
+    buffer.write(0, bytes);
+    Ok(buffer)
+}
 fn choose_plan(gpu: &Gpu, desc: &BlasDesc<'_>, whole: &AccelStructSizes) -> BlasPlan {
     let primitives: u64 = desc.geometries.iter().map(|geometry| u64::from(geometry.primitive_count())).sum();
     let order = match desc.order {
@@ -150,10 +176,11 @@ pub(super) fn part_limits(limits: &Limits) -> PartLimits {
 fn split_into_parts(
     shared: &DeviceState,
     desc: &BlasDesc<'_>,
+    whole: &BuildInput,
     bounds: &[Vec<Bounds>],
     order: bool,
 ) -> Result<Vec<PartPlan>> {
-    let mut input = build_input(shared, desc)?.with_gathered_inputs();
+    let mut input = whole.clone().with_gathered_inputs();
     let mut sizes = |counts: &[u32]| {
         input.set_counts(counts);
         let sizes = input.query_sizes(&shared.gpu)?;

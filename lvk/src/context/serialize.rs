@@ -8,7 +8,7 @@ use ash::vk;
 use super::Context;
 use super::create_accel::new_blas_object;
 use super::holder::Holder;
-use super::plan_blas::build_input;
+use super::plan_blas::{BlasInputs, convert_geometries};
 use crate::accel::AccelStruct;
 use crate::accel::blas::{BlasPart, BlasStructures};
 use crate::accel::blas_file::{
@@ -94,9 +94,9 @@ impl Context {
         for part in &blob.parts {
             bytes.push(self.check_driver(part).map_err(|reason| rejected_error(desc, reason))?);
         }
-        let shapes = self.loaded_parts(desc, &blob, &bytes)?;
+        let inputs = self.loaded_inputs(desc, &blob, &bytes)?;
         // SAFETY: the caller vouches for what the driver wrote; all else is checked.
-        unsafe { self.deserialize(desc, &blob, shapes, &bytes) }
+        unsafe { self.deserialize(desc, &blob, inputs, &bytes) }
     }
 
     /// As [`load_blas`](Self::load_blas), and as [`create_blas`](Self::create_blas) where there are no bytes or they
@@ -178,8 +178,9 @@ impl Context {
     /// The words of a part's table.
     fn read_primitive_map(&self, shape: &BlasPart) -> Result<Option<Vec<u32>>> {
         let Some(map) = &shape.map else { return Ok(None) };
-        let count = shape.counts.iter().map(|count| *count as usize).sum::<usize>();
-        let mut words = vec![0_u32; shape.counts.len() + count];
+        let ranges = &shape.input.ranges;
+        let count = ranges.iter().map(|range| range.primitive_count as usize).sum::<usize>();
+        let mut words = vec![0_u32; ranges.len() + count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
         let size = bytes.len() as u64;
         self.read_back(size, bytes, |cmd, target| {
@@ -232,13 +233,13 @@ impl Context {
         &self,
         desc: &BlasDesc<'_>,
         blob: &BlasFile,
-        shapes: Vec<BlasPart>,
+        inputs: BlasInputs,
         bytes: &[u64],
     ) -> Result<Holder<AccelStructHandle>> {
         let shared = self.device_state();
         let (name, ty) = (desc.debug_name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL);
         let fits = |(shape, bytes): (&BlasPart, &u64)| shape.sizes.structure_bytes <= *bytes;
-        let rebuildable = shapes.iter().zip(bytes).all(fits);
+        let rebuildable = inputs.parts.iter().zip(bytes).all(fits);
         let structure =
             |bytes: &u64| RawAccelStruct::new(&shared.gpu, &shared.accel_storage, name, ty, *bytes);
         let structures = bytes.iter().map(structure).collect::<Result<Vec<_>>>()?;
@@ -246,8 +247,7 @@ impl Context {
         // What software traces beside it is built anew: the file is the driver's.
         let built = self.software_blobs(std::slice::from_ref(desc))?.pop().flatten();
         let software = self.software_blas(desc, built.as_ref())?;
-        let handle =
-            shared.store.accel_structs.insert(new_blas_object(shared, desc, shapes, body, software)?);
+        let handle = shared.store.accel_structs.insert(new_blas_object(desc, inputs, body, software));
         let holder = Holder::new(self, handle, 0);
         let object = shared.store.accel_structs.get(handle)?;
         built.map(|built| self.upload_software_blob(&object, &built)).transpose()?;
@@ -296,30 +296,28 @@ impl Context {
         MAX_GROUP_BYTES.min(self.device_state().gpu.caps.limits.max_accel_structure_bytes)
     }
 
-    /// The shapes of loaded parts, with their tables. `bytes` is how large each part will be.
-    fn loaded_parts(&self, desc: &BlasDesc<'_>, blob: &BlasFile, bytes: &[u64]) -> Result<Vec<BlasPart>> {
+    /// The input of a loaded BLAS, with the tables of its parts. `bytes` is how large each part will be.
+    fn loaded_inputs(&self, desc: &BlasDesc<'_>, blob: &BlasFile, bytes: &[u64]) -> Result<BlasInputs> {
         let shared = self.device_state();
-        let whole = build_input(shared, desc)?;
+        let (transforms, whole) = convert_geometries(shared, desc)?;
         let counts: Vec<_> = desc.geometries.iter().map(BlasGeometry::primitive_count).collect();
         let plans = part_plans_from_file(blob, &counts).ok_or_else(|| {
             rejected_error(desc, "its parts are not those of the mesh, each primitive once")
         })?;
-        let mut shapes = Vec::with_capacity(plans.len());
+        let mut parts = Vec::with_capacity(plans.len());
         for (plan, bytes) in plans.iter().zip(bytes) {
             let shape = match plan {
-                None => {
-                    BlasPart { counts: counts.clone(), map: None, sizes: whole.query_sizes(&shared.gpu)? }
-                }
-                Some(plan) => self.new_part(desc, plan)?,
+                None => BlasPart { input: whole.clone(), map: None, sizes: whole.query_sizes(&shared.gpu)? },
+                Some(plan) => self.new_part(desc, &whole, plan)?,
             };
             let most = shape.sizes.structure_bytes;
             if *bytes > most {
                 let reason = format!("a part is to take {bytes} bytes, where a build takes at most {most}");
                 return Err(rejected_error(desc, reason));
             }
-            shapes.push(shape);
+            parts.push(shape);
         }
-        Ok(shapes)
+        Ok(BlasInputs { transforms, parts })
     }
 }
 

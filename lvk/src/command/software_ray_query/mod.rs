@@ -270,7 +270,7 @@ impl CommandBuffer {
         shown: &BlasRefSet,
     ) -> Result<()> {
         let buffer = self.shared.store.buffers.get(instances.buffer)?;
-        let address = |shown: &BlasRef| Ok(software_storage(&shown.blas)?.address);
+        let address = |shown: &BlasRef| Ok(software_storage(&target.name, &shown.blas)?.address);
         let mut table = shown.refs().iter().map(address).collect::<Result<Vec<u64>>>()?;
         let entries = table.len() as u32;
         table.resize(table.len().max(1), 0);
@@ -321,7 +321,7 @@ impl CommandBuffer {
 
     fn instanced_blas(&self, handle: AccelStructHandle) -> Result<Option<InstancedBlas>> {
         let blas = self.shared.store.accel_structs.get(handle)?;
-        let address = software_storage(&blas)?.address;
+        let address = software_storage(&blas.name, blas.blas()?)?.address;
         let parts = blas.blas()?.software.as_ref().and_then(SoftwareBlas::rebraid_parts);
         Ok(parts.map(|parts| InstancedBlas { address, parts: Arc::clone(parts) }))
     }
@@ -338,7 +338,10 @@ impl CommandBuffer {
             check_instance(&target.name, index, instance)?;
             let address = match last {
                 Some((handle, address)) if handle == instance.blas => address,
-                _ => software_storage(&*self.shared.store.accel_structs.get(instance.blas)?)?.address,
+                _ => {
+                    let blas = self.shared.store.accel_structs.get(instance.blas)?;
+                    software_storage(&blas.name, blas.blas()?)?.address
+                }
             };
             last = Some((instance.blas, address));
             out.copy_from_slice(bytemuck::bytes_of(&to_raw(instance, address)));
@@ -379,7 +382,7 @@ pub(super) fn check_unmoved(blas: &AccelStruct) -> Result<()> {
 }
 
 /// What software traces of a bottom-level structure.
-fn software_storage(blas: &AccelStruct) -> Result<&Arc<SoftwareAccelStorage>> {
-    let none = || Error::usage(&blas.name, "the acceleration structure has no BVH for software traversal");
-    Ok(&blas.blas()?.software.as_ref().ok_or_else(none)?.storage)
+fn software_storage<'a>(name: &str, blas: &'a Blas) -> Result<&'a Arc<SoftwareAccelStorage>> {
+    let none = || Error::usage(name, "the acceleration structure has no BVH for software traversal");
+    Ok(&blas.software.as_ref().ok_or_else(none)?.storage)
 }

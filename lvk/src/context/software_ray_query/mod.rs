@@ -8,12 +8,13 @@ use std::sync::Arc;
 use super::Context;
 use super::create_accel::new_blas_object;
 use super::holder::Holder;
-use super::plan_blas::build_input;
+use super::plan_blas::{BlasInputs, convert_geometries};
 use super::read_bounds::geometry_bytes;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasStructures};
 use crate::accel::blas_file::BlasFile;
 use crate::accel::desc::BlasDesc;
+use crate::accel::flags::BuildMode;
 use crate::command::transfer::BufferCopy;
 use crate::device_state::{DeferredFree, DeviceState};
 use crate::error::{Error, Result};
@@ -122,7 +123,7 @@ impl Context {
             object: desc.debug_name.to_owned(),
             reason: reason.to_owned(),
         };
-        build_input(self.device_state(), desc)?;
+        let (transforms, _) = convert_geometries(self.device_state(), desc)?;
         let bytes = match &blob.parts[..] {
             [part] => part.driver.strip_prefix(&SOFTWARE_BLOB_UUID[..]),
             _ => None,
@@ -133,12 +134,16 @@ impl Context {
         let built = BlasBlob { bytes: bytes.to_vec(), bounds: validated.bounds };
         let software = self.software_blas(desc, Some(&built))?;
         let body = BlasStructures { structures: Vec::new(), compacted_from: None, rebuildable: true };
-        let object = new_blas_object(self.device_state(), desc, Vec::new(), body, software)?;
+        let inputs = BlasInputs { transforms, parts: Vec::new() };
+        let object = new_blas_object(desc, inputs, body, software);
         let handle = self.device_state().store.accel_structs.insert(object);
         let holder = Holder::new(self, handle, 0);
         let object = self.device_state().store.accel_structs.get(handle)?;
         self.upload_software_blob(&object, &built)?;
-        self.record_in_prologue(|cmd| cmd.build_first_time(std::slice::from_ref(&object)))?;
+        self.record_in_prologue(|cmd| {
+            let plan = cmd.plan_blas_builds(std::slice::from_ref(&object), BuildMode::Rebuild, true)?;
+            cmd.record_blas_builds(plan)
+        })?;
         Ok(holder)
     }
 
