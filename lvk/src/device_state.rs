@@ -56,7 +56,7 @@ pub(crate) struct DeviceState {
     /// Where the context keeps trees that the CPU has built.
     #[cfg(feature = "software-ray-query")]
     pub(crate) tree_cache: Option<crate::software_ray_query::bvh_cache::BvhCache>,
-    pub(crate) submitter: Submitter<DeferredFree>,
+    pub(crate) submitter: Submitter<DeferredObject>,
     pub(crate) profiler: Profiler,
     /// Where graphics pipelines query rays.
     pub(crate) graphics_queries: RayQueryStages,
@@ -87,7 +87,7 @@ pub(crate) struct DefaultObjects {
 }
 
 /// An object that waits until the GPU is done with it.
-pub(crate) enum DeferredFree {
+pub(crate) enum DeferredObject {
     Buffer(Arc<Buffer>),
     Texture(Arc<Texture>),
     Sampler(Arc<Sampler>),
@@ -126,7 +126,7 @@ impl DeviceState {
     }
 
     /// Destroys an object later, once no command buffer can use it.
-    pub(crate) fn free_later(&self, garbage: DeferredFree) {
+    pub(crate) fn free_later(&self, garbage: DeferredObject) {
         const COLLECT_INTERVAL: usize = 256;
         self.mark_slot_retired(&garbage);
         let waiting = self.submitter.retire(garbage);
@@ -138,18 +138,18 @@ impl DeviceState {
     }
 
     /// The slot of the object may be reached no longer by what is recorded from now on.
-    fn mark_slot_retired(&self, garbage: &DeferredFree) {
+    fn mark_slot_retired(&self, garbage: &DeferredObject) {
         let newest = || self.submitter.newest_sequence();
         match garbage {
             // Indices of textures in Y'CbCr are constants, which nobody checks.
-            DeferredFree::Texture(texture) if texture.is_yuv() => {}
-            DeferredFree::Texture(texture) => {
+            DeferredObject::Texture(texture) if texture.is_yuv() => {}
+            DeferredObject::Texture(texture) => {
                 self.bindless.record_retired(&TEXTURE_ARRAYS, texture.slot, newest)
             }
-            DeferredFree::Sampler(sampler) => {
+            DeferredObject::Sampler(sampler) => {
                 self.bindless.record_retired(&[BindlessArray::Samplers], sampler.slot, newest);
             }
-            DeferredFree::AccelStruct(object) => {
+            DeferredObject::AccelStruct(object) => {
                 if let AccelKind::Tlas(tlas) = &object.kind {
                     self.bindless.record_retired(&[BindlessArray::AccelStructs], tlas.slot, newest);
                 }
@@ -176,18 +176,18 @@ impl DeviceState {
         self.release_finished(self.submitter.collect_known())
     }
 
-    pub(crate) fn release_finished(&self, finished: Finished<DeferredFree>) -> Result<()> {
+    pub(crate) fn release_finished(&self, finished: Finished<DeferredObject>) -> Result<()> {
         finished.staged.into_iter().for_each(|sequence| self.staging.release(sequence));
         finished.garbage.into_iter().for_each(|garbage| self.free_now(garbage));
         self.profiler.collect(finished.passed)
     }
 
     /// Drops an object the GPU is done with, and frees its slot.
-    pub(crate) fn free_now(&self, garbage: DeferredFree) {
+    pub(crate) fn free_now(&self, garbage: DeferredObject) {
         match garbage {
-            DeferredFree::Buffer(buffer) => self.submitter.forget(buffer.id),
-            DeferredFree::QueryPool(pool) => self.submitter.forget(pool.id),
-            DeferredFree::Texture(texture) => {
+            DeferredObject::Buffer(buffer) => self.submitter.forget(buffer.id),
+            DeferredObject::QueryPool(pool) => self.submitter.forget(pool.id),
+            DeferredObject::Texture(texture) => {
                 if texture.image.remove_texture() {
                     self.submitter.forget(texture.image.id);
                 }
@@ -197,28 +197,28 @@ impl DeviceState {
                     self.bindless.free_texture(texture.slot);
                 }
             }
-            DeferredFree::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),
-            DeferredFree::AccelStruct(object) => self.free_accel_struct(&object),
-            DeferredFree::RayTracingPipeline(pipeline) => self.submitter.forget(pipeline.table.id),
-            DeferredFree::TlasContents(contents) => self.recycle_instance_source(*contents),
-            DeferredFree::BufferRef(buffer) => {
+            DeferredObject::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),
+            DeferredObject::AccelStruct(object) => self.free_accel_struct(&object),
+            DeferredObject::RayTracingPipeline(pipeline) => self.submitter.forget(pipeline.table.id),
+            DeferredObject::TlasContents(contents) => self.recycle_instance_source(*contents),
+            DeferredObject::BufferRef(buffer) => {
                 if let Some(unused) = Arc::into_inner(buffer) {
                     self.submitter.forget(unused.id);
                 }
             }
-            DeferredFree::TextureRef(texture) => {
+            DeferredObject::TextureRef(texture) => {
                 if texture.image.remove_texture() {
                     self.submitter.forget(texture.image.id);
                 }
             }
-            DeferredFree::RenderPipeline(_)
-            | DeferredFree::ComputePipeline(_)
-            | DeferredFree::BlasStorage(_)
-            | DeferredFree::SizeQuery(_) => {}
+            DeferredObject::RenderPipeline(_)
+            | DeferredObject::ComputePipeline(_)
+            | DeferredObject::BlasStorage(_)
+            | DeferredObject::SizeQuery(_) => {}
             #[cfg(feature = "software-ray-query")]
-            DeferredFree::SoftwareStorage(_) => {}
+            DeferredObject::SoftwareStorage(_) => {}
             #[cfg(feature = "window")]
-            DeferredFree::Swapchain(_) => {}
+            DeferredObject::Swapchain(_) => {}
         }
     }
 
@@ -280,7 +280,7 @@ impl DeviceState {
         });
         updates
             .drain_replaced()
-            .for_each(|contents| self.free_later(DeferredFree::TlasContents(Box::new(contents))));
+            .for_each(|contents| self.free_later(DeferredObject::TlasContents(Box::new(contents))));
     }
 
     /// References the BLAS that a handle names.

@@ -15,7 +15,7 @@ use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
 use crate::barrier::{ResourceId, Use};
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
@@ -226,7 +226,7 @@ impl CommandBuffer {
     /// Keeps a scratch buffer that a larger one has replaced until the GPU is done with it.
     pub(super) fn free_replaced_scratch(&self, replaced: Option<Arc<Buffer>>) {
         if let Some(buffer) = replaced {
-            self.shared.free_later(DeferredFree::Buffer(buffer));
+            self.shared.free_later(DeferredObject::Buffer(buffer));
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::accel::compaction::CompactedSizeQuery;
 use crate::accel::primitive_map::PrimitiveMap;
 use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::barrier::{Stages, Use};
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::Result;
 use crate::resource::{Buffer, QueryPool};
 
@@ -142,7 +142,7 @@ impl CommandBuffer {
     fn free_build_inputs(&self, target: &AccelStruct) -> Result<()> {
         let maps = target.blas()?.parts.iter().filter_map(|part| part.map.as_ref());
         maps.filter_map(PrimitiveMap::take_gathered_inputs)
-            .for_each(|inputs| self.shared.free_later(DeferredFree::Buffer(inputs)));
+            .for_each(|inputs| self.shared.free_later(DeferredObject::Buffer(inputs)));
         Ok(())
     }
 

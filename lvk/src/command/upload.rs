@@ -7,7 +7,7 @@ use ash::vk;
 use super::CommandBuffer;
 use super::pending_visibility::PendingVisibility;
 use crate::barrier::Use;
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::Result;
 use crate::upload::PendingUploads;
 use crate::upload::copy_regions::CopyRegion;
@@ -32,7 +32,7 @@ impl CommandBuffer {
             start = end;
         }
         for TextureUpload { target, .. } in textures {
-            self.shared.free_later(DeferredFree::TextureRef(target));
+            self.shared.free_later(DeferredObject::TextureRef(target));
         }
         Ok(())
     }
@@ -51,7 +51,7 @@ impl CommandBuffer {
                 self.copy_page_regions(pieces, pages, target.raw);
             }
             self.state.pending_visibility.push(PendingVisibility::Buffer(Arc::clone(&target)));
-            self.shared.free_later(DeferredFree::BufferRef(target));
+            self.shared.free_later(DeferredObject::BufferRef(target));
         }
     }
 

@@ -16,7 +16,7 @@ use crate::accel::instance_plan::{
 use crate::accel::tlas::{BlasIndexing, InstanceBytes, InstanceSource, Tlas};
 use crate::accel::tlas_tracker::TlasChange;
 use crate::barrier::{Stages, Use};
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::kernels::{InstancesPushConstants, Kernel};
 use crate::resource::Buffer;
@@ -178,7 +178,7 @@ impl CommandBuffer {
         let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
         let buffer = self.shared.instance_buffers.acquire(&self.shared.gpu, name, size_bytes)?;
         buffer.fill_with(fill);
-        self.shared.free_later(DeferredFree::BufferRef(Arc::clone(&buffer)));
+        self.shared.free_later(DeferredObject::BufferRef(Arc::clone(&buffer)));
         Ok(InstanceBytes { address: buffer.address, buffer: Some(buffer) })
     }
 
@@ -236,7 +236,7 @@ impl CommandBuffer {
             &copy,
             &[BufferCopy { source_offset: instances.offset, target_offset: 0, size: bytes }],
         )?;
-        shared.free_later(DeferredFree::BufferRef(Arc::clone(&copy)));
+        shared.free_later(DeferredObject::BufferRef(Arc::clone(&copy)));
         source.instances = InstanceBytes { address: copy.address, buffer: Some(copy) };
         Ok(())
     }

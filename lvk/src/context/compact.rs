@@ -10,7 +10,7 @@ use crate::accel::blas::{BlasStructures, CompactionState};
 use crate::accel::compaction::{CompactedSizeQuery, CompactionRefusal, Compactions, PlannedCopy};
 use crate::accel::flags::BuildFlags;
 use crate::accel::raw_accel_struct::RawAccelStruct;
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::lock_order::Guard;
@@ -81,7 +81,7 @@ impl Context {
         let pool = QueryPool::with_type(&self.device_state().gpu, &desc, ty)?;
         let query = Arc::new(CompactedSizeQuery::new(pool, targets));
         let asked = self.record_in_prologue(|cmd| cmd.query_compacted_sizes(&query));
-        self.device_state().free_later(DeferredFree::SizeQuery(Arc::clone(&query)));
+        self.device_state().free_later(DeferredObject::SizeQuery(Arc::clone(&query)));
         asked.map(|()| Some(query))
     }
 
@@ -170,9 +170,9 @@ impl Context {
         let Some(old) = replaced else { return Ok(CompactionStep::Retry) };
         blas.set_compaction_state(CompactionState::None);
         let freed = Arc::downgrade(&old);
-        shared.free_later(DeferredFree::BlasStorage(old));
+        shared.free_later(DeferredObject::BlasStorage(old));
         // Its handle may be gone, and nobody else keep it until the copy is made.
-        shared.free_later(DeferredFree::BlasStorage(blas.structures()));
+        shared.free_later(DeferredObject::BlasStorage(blas.structures()));
         shared.mark_tlas_outdated();
         Ok(CompactionStep::Copied(freed))
     }

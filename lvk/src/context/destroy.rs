@@ -1,7 +1,7 @@
 //! Destroys objects, once the GPU is done with them.
 
 use super::Context;
-use crate::device_state::{DeferredFree, DeviceState};
+use crate::device_state::{DeferredObject, DeviceState};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
@@ -27,7 +27,7 @@ macro_rules! destroy {
             fn destroy_in(self, ctx: &Context) {
                 let shared: &DeviceState = ctx.device_state();
                 if let Ok(object) = shared.store.$pool.remove(self) {
-                    shared.free_later(DeferredFree::$garbage(object));
+                    shared.free_later(DeferredObject::$garbage(object));
                 }
             }
         })*
@@ -53,7 +53,7 @@ impl Destroy for TextureHandle {
             return;
         }
         if let Ok(texture) = textures.remove(self) {
-            shared.free_later(DeferredFree::Texture(texture));
+            shared.free_later(DeferredObject::Texture(texture));
         }
     }
 }

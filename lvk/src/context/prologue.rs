@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::command::CommandBuffer;
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::Result;
 use crate::lock_order::Guard;
 use crate::queue::Queue;
@@ -72,7 +72,7 @@ impl Context {
     /// Textures that are gone need no contents.
     fn drop_dead_uploads(&self, uploads: &mut PendingUploads) {
         for gone in uploads.drain_dead() {
-            self.device_state().free_now(DeferredFree::TextureRef(gone));
+            self.device_state().free_now(DeferredObject::TextureRef(gone));
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::command::transfer::BufferCopy;
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::Result;
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::{BufferHandle, TextureHandle};
@@ -107,7 +107,7 @@ impl Context {
         let mut cmd = self.acquire_command_buffer()?;
         record(&mut cmd, &target)?;
         // Before the submission: should that fail half-way, the GPU may yet write the buffer.
-        self.device_state().free_later(DeferredFree::Buffer(Arc::clone(&target)));
+        self.device_state().free_later(DeferredObject::Buffer(Arc::clone(&target)));
         let submission = self.submit(cmd)?;
         Ok(Readback { target: Some(target), submission, ctx: self.clone() })
     }

@@ -22,7 +22,7 @@ use crate::accel::primitive_map::{covers_mesh, decode_table};
 use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::accel::split::PartPlan;
 use crate::command::transfer::BufferCopy;
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::format::IndexFormat;
 use crate::handle::AccelStructHandle;
@@ -128,7 +128,7 @@ impl Context {
         let pool = Arc::new(QueryPool::with_type(&self.device_state().gpu, &desc, ty)?);
         let mut cmd = self.acquire_command_buffer()?;
         cmd.write_size_properties(object, body, &pool, 0, ty)?;
-        self.device_state().free_later(DeferredFree::QueryPool(Arc::clone(&pool)));
+        self.device_state().free_later(DeferredObject::QueryPool(Arc::clone(&pool)));
         self.wait(self.submit(cmd)?)?;
         let sizes: Option<Vec<_>> = pool.values(0, count)?.into_iter().collect();
         sizes.ok_or_else(|| {
@@ -163,7 +163,7 @@ impl Context {
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
         let mut bytes = vec![0; places.total as usize];
         self.read_back(places.total, &mut bytes, |cmd, target| {
-            self.device_state().free_later(DeferredFree::Buffer(Arc::clone(&buffer)));
+            self.device_state().free_later(DeferredObject::Buffer(Arc::clone(&buffer)));
             cmd.serialize_parts(object, structures, &buffer, &addresses)?;
             cmd.copy_buffer_objects(
                 &buffer,
@@ -287,7 +287,7 @@ impl Context {
                 cmd.deserialize_parts(object, first, &buffer, &addresses)
             })
         });
-        self.device_state().free_later(DeferredFree::Buffer(buffer));
+        self.device_state().free_later(DeferredObject::Buffer(buffer));
         recorded
     }
 

@@ -9,7 +9,7 @@ use super::create_texture::default_views;
 use super::destroy::Destroy;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
-use crate::device_state::DeferredFree;
+use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::handle::SwapchainHandle;
@@ -221,7 +221,7 @@ impl Context {
         lifecycle.mark_out_of_date();
         LiveBackend { ctx: self, name: &swapchain.name, resources }.retire_current();
         drop(guard);
-        self.device_state().free_later(DeferredFree::Swapchain(swapchain));
+        self.device_state().free_later(DeferredObject::Swapchain(swapchain));
     }
 
     /// Another thread may have destroyed the swapchain while this one waited for its lock.
@@ -407,7 +407,7 @@ impl LiveBackend<'_> {
             let id = image.object.image.id;
             waits.extend(shared.submitter.with_presentables(|presentables| presentables.retire(id)));
             if shared.store.textures.remove(image.texture).is_ok() {
-                shared.free_later(DeferredFree::Texture(image.object));
+                shared.free_later(DeferredObject::Texture(image.object));
             }
             syncs.push(image.sync);
         }

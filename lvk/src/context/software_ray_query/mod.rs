@@ -16,7 +16,7 @@ use crate::accel::blas_file::BlasFile;
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::BuildMode;
 use crate::command::transfer::BufferCopy;
-use crate::device_state::{DeferredFree, DeviceState};
+use crate::device_state::{DeferredObject, DeviceState};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::parallel::parallel_map;
@@ -152,7 +152,7 @@ impl Context {
         let Some(software) = target.blas()?.software.as_ref() else { return Ok(()) };
         let body = &software.storage;
         self.record_in_prologue(|cmd| {
-            self.device_state().free_later(DeferredFree::SoftwareStorage(Arc::clone(body)));
+            self.device_state().free_later(DeferredObject::SoftwareStorage(Arc::clone(body)));
             cmd.fill_software_blas(target, body, &blob.bytes)
         })
     }
