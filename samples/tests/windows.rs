@@ -12,7 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use image::RgbaImage;
-use lvk_samples::driver::{VirtualDisplay, virtual_display};
+use lvk_dev_driver::{VirtualDisplay, virtual_display};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     ConfigureWindowAux, ConnectionExt as _, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,

@@ -17,6 +17,7 @@ pub mod local_read;
 pub mod meshes;
 pub mod noise;
 pub mod picture;
+pub mod pipelines;
 pub mod queues;
 pub mod radv;
 pub mod random;

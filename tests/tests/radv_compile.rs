@@ -4,9 +4,10 @@
 use std::path::Path;
 
 use lvk::{Context, ContextDesc, ShaderStage};
-use lvk_samples::pipelines::{self, SamplePipeline, SampleStage};
+use lvk_samples::pipelines::{SamplePipeline, SampleStage};
 use lvk_tests::child::on_radv;
 use lvk_tests::device::vulkan;
+use lvk_tests::pipelines;
 use lvk_tests::radv::Radv;
 
 /// The compute shaders that the library runs by itself.

@@ -18,8 +18,8 @@ use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
 use super::{library_warnings, png, say, window};
-use crate::driver::{DriverRequest, prepare};
 use crate::shader_folder;
+use lvk_dev_driver::{DriverRequest, prepare};
 
 /// Frames to time where none are asked for, on a GPU.
 const GPU_FRAMES: u32 = 60;

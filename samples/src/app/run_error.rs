@@ -2,8 +2,8 @@
 
 use super::interrupt;
 use super::png::PngError;
-use crate::driver::DriverError;
 use crate::scene::SceneError;
+use lvk_dev_driver::DriverError;
 
 /// Why a sample's program ended without its picture.
 #[derive(Debug, thiserror::Error)]

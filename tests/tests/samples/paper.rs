@@ -4,10 +4,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use lvk_bench::paper::{CAMERA_COUNT, Experiment, PICTURES, Pictures, Plan, Statistic, TracePath, measure};
 use lvk_samples::app::progress::Progress;
-use lvk_samples::bench::paper::{
-    CAMERA_COUNT, Experiment, PICTURES, Pictures, Plan, Statistic, TracePath, measure,
-};
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
 use lvk_tests::still_life::still_life;
