@@ -1,4 +1,4 @@
-//! Which shared libraries a shared library needs, and the order in which to open them.
+//! Reads the dependencies of an ELF shared library, and the order in which to open them.
 
 use std::collections::HashSet;
 
@@ -16,9 +16,9 @@ struct Segment {
     size_bytes: usize,
 }
 
-/// The names (sonames) in the dynamic section of the 64-bit little-endian ELF file `image`, in file order.
-/// `None` if it is no such file or is damaged; a file without a dynamic section needs nothing.
-pub(super) fn needed(image: &[u8]) -> Option<Vec<String>> {
+/// Returns the sonames of the `DT_NEEDED` entries of the 64-bit little-endian ELF file `image`, in file order. Returns `None`
+/// for a damaged or other file, and an empty list for a file without a dynamic section.
+pub(super) fn needed_libraries(image: &[u8]) -> Option<Vec<String>> {
     let segments = segments(image)?;
     let Some(dynamic) = segments.iter().find(|segment| segment.kind == SEGMENT_DYNAMIC) else {
         return Some(Vec::new());
@@ -32,8 +32,8 @@ pub(super) fn needed(image: &[u8]) -> Option<Vec<String>> {
     names.map(|(_, at)| string_at(image, strings.checked_add(usize::try_from(*at).ok()?)?)).collect()
 }
 
-/// `root` and everything it needs, each after all that it needs itself. `needed` answers for one library, or
-/// `None` for those that belong to the machine and are left out.
+/// Returns `root` and its dependencies, dependencies first (depth-first order). `needed` returns the dependencies of one
+/// library, or `None` for a system library, which is left out.
 pub(super) fn load_order<E>(
     root: &str,
     mut needed: impl FnMut(&str) -> Result<Option<Vec<String>>, E>,
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn order_of(graph: &[(&str, &[&str])], root: &str) -> Vec<String> {
+    fn load_order_in(graph: &[(&str, &[&str])], root: &str) -> Vec<String> {
         let lookup = |name: &str| {
             let found = graph.iter().find(|(key, _)| *key == name);
             Ok::<_, ()>(found.map(|(_, below)| below.iter().map(|&name| name.to_owned()).collect()))
@@ -118,30 +118,30 @@ mod tests {
 
     #[test]
     fn the_unwinder_needs_the_c_library() {
-        assert_eq!(needed(&LIBRARY).unwrap(), ["libc.so.6"]);
+        assert_eq!(needed_libraries(&LIBRARY).unwrap(), ["libc.so.6"]);
     }
 
     #[test]
     fn other_files_are_refused() {
-        assert_eq!(needed(b""), None);
-        assert_eq!(needed(b"#!/bin/sh"), None);
-        assert_eq!(needed(&[0x7f, b'E', b'L', b'F', 1, 1, 0, 0]), None);
+        assert_eq!(needed_libraries(b""), None);
+        assert_eq!(needed_libraries(b"#!/bin/sh"), None);
+        assert_eq!(needed_libraries(&[0x7f, b'E', b'L', b'F', 1, 1, 0, 0]), None);
     }
 
     #[test]
-    fn what_is_needed_comes_first_and_the_machines_libraries_not_at_all() {
+    fn dependencies_come_first_and_system_libraries_are_left_out() {
         let graph: &[(&str, &[&str])] =
             &[("driver", &["llvm", "z", "libc"]), ("llvm", &["xml", "z"]), ("xml", &["z"]), ("z", &[])];
-        assert_eq!(order_of(graph, "driver"), ["z", "xml", "llvm", "driver"]);
-        assert!(order_of(graph, "libc").is_empty());
+        assert_eq!(load_order_in(graph, "driver"), ["z", "xml", "llvm", "driver"]);
+        assert!(load_order_in(graph, "libc").is_empty());
     }
 
     #[test]
-    fn circles_end() {
-        assert_eq!(order_of(&[("a", &["b"]), ("b", &["a", "b"])], "a"), ["b", "a"]);
+    fn cycles_terminate() {
+        assert_eq!(load_order_in(&[("a", &["b"]), ("b", &["a", "b"])], "a"), ["b", "a"]);
     }
 
-    /// A small library this process has open, and its bytes.
+    /// Bytes of a small library that this process has open.
     static LIBRARY: LazyLock<Vec<u8>> = LazyLock::new(|| {
         let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
         let path = maps.split_whitespace().find(|word| word.ends_with("/libgcc_s.so.1")).unwrap();
@@ -156,7 +156,7 @@ mod tests {
                 image[at] = value;
             }
             image.truncate((image.len() as f64 * (kept + 0.2)) as usize);
-            let _ = needed(&image);
+            let _ = needed_libraries(&image);
         }
     }
 }

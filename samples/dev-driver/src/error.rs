@@ -1,60 +1,60 @@
-//! What can go wrong between "no driver here" and a usable one.
+//! Errors of [`prepare`](super::prepare) and of downloads.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why [`prepare`](super::prepare) could not make a driver available.
+/// An error of [`prepare`](super::prepare) and of the other functions of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriverError {
-    /// The machine has no capable driver and none could be fetched.
+    /// The system has no driver with ray tracing, and the software driver could not be downloaded.
     #[error(
-        "no Vulkan driver with ray tracing was found and none can be fetched because {cause}; install a GPU driver \
+        "no Vulkan driver with ray tracing was found and none can be downloaded because {cause}; install a GPU driver \
          with ray tracing, or on Debian and Ubuntu `apt install mesa-vulkan-drivers libvulkan1` (Mesa 24.1 or newer)"
     )]
     NoDriver {
-        /// What stopped the fetch.
+        /// Error of the download.
         #[source]
-        cause: FetchError,
+        cause: DownloadError,
     },
-    /// Validation was asked for, the machine has no current layer and none could be fetched.
+    /// Validation was requested, the system has no current layer, and the layer could not be downloaded.
     #[error(
-        "no current Vulkan validation layer was found and none can be fetched because {cause}; install \
+        "no current Vulkan validation layer was found and none can be downloaded because {cause}; install \
          VK_LAYER_KHRONOS_validation 1.3.296 or newer (package `vulkan-validationlayers`, or the Vulkan SDK), \
          or run without validation"
     )]
     NoValidationLayer {
-        /// What stopped the fetch.
+        /// Error of the download.
         #[source]
-        cause: FetchError,
+        cause: DownloadError,
     },
-    /// The driver for AMD cards cannot be fetched.
-    #[error("the driver for AMD cards (RADV) cannot be fetched because {cause}")]
+    /// RADV, the driver for AMD GPUs, could not be downloaded.
+    #[error("the driver for AMD GPUs (RADV) cannot be downloaded because {cause}")]
     NoRadv {
-        /// What stopped the fetch.
+        /// Error of the download.
         #[source]
-        cause: FetchError,
+        cause: DownloadError,
     },
-    /// The X server without a screen cannot be fetched.
+    /// Xvfb is not installed and could not be downloaded.
     #[error(
-        "no Xvfb was found and none can be fetched because {cause}; install the packages xvfb and x11-xkb-utils"
+        "no Xvfb was found and none can be downloaded because {cause}; install the packages xvfb and x11-xkb-utils"
     )]
     NoDisplay {
-        /// What stopped the fetch.
+        /// Error of the download.
         #[source]
-        cause: FetchError,
+        cause: DownloadError,
     },
-    /// `LVK_DRIVER=system` on a machine without a Vulkan loader.
+    /// `LVK_DRIVER=system` is set, but the system has no Vulkan loader.
     #[error(
-        "LVK_DRIVER=system, but this machine has no Vulkan loader ({reason}); install `libvulkan1` and a driver, or \
+        "LVK_DRIVER=system, but this system has no Vulkan loader ({reason}); install `libvulkan1` and a driver, or \
          unset LVK_DRIVER"
     )]
     NoSystemLoader {
         /// The dynamic linker's message.
         reason: String,
     },
-    /// An environment variable holds a value this program does not know.
-    #[error("{name}={value} is not understood; expected {expected}")]
+    /// An environment variable has an unknown value.
+    #[error("{name}={value} is not valid; expected {expected}")]
     Variable {
         /// Name of the variable.
         name: &'static str,
@@ -63,48 +63,48 @@ pub enum DriverError {
         /// The accepted values.
         expected: &'static str,
     },
-    /// A folder fetched earlier is complete, yet cannot be used.
-    #[error("the fetched {} cannot be used: {reason}; delete its folder and start again", path.display())]
+    /// A downloaded file cannot be used.
+    #[error("the downloaded {} cannot be used: {reason}; delete its folder and start again", path.display())]
     Broken {
-        /// The fetched file.
+        /// The downloaded file.
         path: PathBuf,
-        /// What failed.
+        /// Cause of the failure.
         reason: String,
     },
 }
 
-/// Why a driver or layer could not be fetched.
+/// Reason why a download failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum FetchError {
+pub enum DownloadError {
     /// `LVK_NO_DOWNLOAD` is set.
     #[error("LVK_NO_DOWNLOAD is set")]
     Forbidden,
-    /// The packages are for another kind of machine.
-    #[error("fetched drivers exist for 64-bit x86 Linux with glibc only")]
+    /// The packages exist for another platform only.
+    #[error("downloadable drivers exist for 64-bit x86 Linux with glibc only")]
     Platform,
     /// A program or file of the package system is missing.
-    #[error("{what} is missing, which comes with Debian's package system")]
+    #[error("{what} is missing; it is part of Debian's package system")]
     MissingTool {
         /// The program or file.
         what: String,
     },
-    /// The package system refused; offline, an old glibc or a bad signature end here.
+    /// A command of the package system failed: no network, a glibc that is too old, or an invalid signature.
     #[error("`{command}` failed: {message}")]
     PackageTool {
         /// The command that failed.
         command: String,
-        /// Its error output in one line.
+        /// The first error line of its output.
         message: String,
     },
-    /// The packages do not hold what is needed from them.
-    #[error("the fetched packages are not as expected: {reason}")]
+    /// The packages lack an expected file.
+    #[error("the downloaded packages are not as expected: {reason}")]
     Content {
-        /// What is missing.
+        /// The missing file or the cause.
         reason: String,
     },
-    /// No folder can be written to.
-    #[error("no folder for it can be written (tried {tried}); set LVK_VULKAN_DIR to one that can")]
+    /// None of the folders is writable.
+    #[error("no writable folder for the download (tried {tried}); set LVK_VULKAN_DIR to a writable folder")]
     NoFolder {
         /// The folders tried.
         tried: String,
@@ -112,17 +112,17 @@ pub enum FetchError {
     /// A file operation failed.
     #[error("cannot {action} {}: {source}", path.display())]
     File {
-        /// What was attempted, as a verb.
+        /// The attempted operation, as a verb.
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// The system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
-impl FetchError {
-    /// Makes the closure for `map_err` that names the file and what was attempted.
+impl DownloadError {
+    /// Returns a closure for `map_err` that adds the file and the attempted operation.
     pub(super) fn file<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> Self + 'a {
         move |source| Self::File { action, path: path.to_path_buf(), source }
     }

@@ -1,84 +1,87 @@
-//! A Vulkan driver without set-up: the machine's own if it can trace rays, else a software driver fetched once.
+//! Provides a Vulkan driver without manual setup: the system driver if it supports ray tracing, otherwise a software driver
+//! that is downloaded once.
 //!
-//! Call [`prepare`] before the first `lvk::Context` and hand [`Driver::loader`] to it. The fetched driver is
-//! Mesa's lavapipe from Debian's `bookworm-backports`; apt resolves, downloads and verifies it as whatever user
-//! runs the program, into the project's `.vulkan` folder (or `~/.cache/lvk/vulkan` once the project has moved).
+//! Call [`prepare`] before the first `lvk::Context` and pass [`Driver::loader`] to the context. The downloaded driver is
+//! Mesa's lavapipe from Debian's `bookworm-backports`. `apt-get` resolves, downloads and verifies the packages as the current
+//! user, into the project's `.vulkan` folder (or `~/.cache/lvk/vulkan` if the project folder no longer exists).
 //!
 //! | Variable | Meaning |
 //! |---|---|
-//! | `LVK_DRIVER=system` | use the machine's driver, whatever it can do |
-//! | `LVK_DRIVER=software` | use the fetched software driver even beside a GPU |
-//! | `LVK_NO_DOWNLOAD=1` | never fetch anything |
-//! | `LVK_VULKAN_DIR=path` | the folder for fetched files |
-//! | `VK_DRIVER_FILES`, `VK_ICD_FILENAMES` | drivers of the user's choice, used as they are |
+//! | `LVK_DRIVER=system` | use the system driver, with or without ray tracing |
+//! | `LVK_DRIVER=software` | use the downloaded software driver even if the system has a GPU |
+//! | `LVK_NO_DOWNLOAD=1` | never download |
+//! | `LVK_VULKAN_DIR=path` | the folder for downloaded files |
+//! | `VK_DRIVER_FILES`, `VK_ICD_FILENAMES` | drivers chosen by the user, used unchanged |
 
 mod apt;
-mod assemble;
 mod display;
+mod download;
 mod elf;
-mod environment;
 mod error;
-mod layer_description;
-mod prefix;
-mod preload;
-mod probe;
-mod provision;
+mod file;
+mod install;
+mod layer_json;
+mod layout;
+mod library_preload;
+mod loader_environment;
 mod settings;
+mod system_vulkan;
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 pub use display::VirtualDisplay;
-pub use error::{DriverError, FetchError};
-use prefix::{Manifest, Part};
-use probe::SystemVulkan;
-use settings::{Settings, Wish};
+pub use error::{DownloadError, DriverError};
+use layout::{Component, Manifest};
+use settings::{DriverPreference, Settings};
+use system_vulkan::SystemVulkan;
 
 static PREPARED: Mutex<Option<Prepared>> = Mutex::new(None);
 
-/// What to make available besides a driver.
+/// Options of [`prepare`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DriverRequest {
-    /// Also a current Khronos validation layer.
+    /// Also provide a current Khronos validation layer.
     pub validation: bool,
 }
 
-/// A driver this process can use.
+/// A Vulkan driver that this process can use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Driver {
-    /// The Vulkan loader to open by absolute path; `None` for the one the dynamic linker finds.
+    /// Absolute path of the Vulkan loader; `None` for the loader that the dynamic linker finds.
     pub loader: Option<PathBuf>,
-    /// Whose driver it is.
+    /// Origin of the driver.
     pub origin: DriverOrigin,
 }
 
-/// Whose driver a [`Driver`] is.
+/// Origin of a [`Driver`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DriverOrigin {
-    /// The machine's or the user's own.
+    /// Installed on the system, or chosen by the user.
     System,
-    /// The fetched software driver.
-    Provisioned {
-        /// The folder it lives in.
-        prefix: PathBuf,
+    /// The downloaded software driver.
+    Downloaded {
+        /// Folder of the driver.
+        folder: PathBuf,
     },
 }
 
-/// What the first call of [`prepare`] found out.
+/// Result of the first call of [`prepare`].
 struct Prepared {
     settings: Settings,
     driver: Driver,
     has_layer: bool,
 }
 
-/// Makes a Vulkan driver available to this process, fetching one if the machine has none that can trace rays.
+/// Provides a Vulkan driver to this process. Downloads a software driver if the system has none with ray tracing.
 ///
-/// Call it before the first Vulkan call, from any thread; later calls cost nothing. It sets `VK_DRIVER_FILES`
-/// for a fetched driver and adds the folder of the fetched layer to `VK_ADD_LAYER_PATH`.
+/// Call this function before the first Vulkan call, from any thread. Later calls return the same driver at no cost. The
+/// function sets `VK_DRIVER_FILES` for a downloaded driver and adds the folder of the downloaded layer to
+/// `VK_ADD_LAYER_PATH`.
 ///
 /// # Errors
-/// See [`DriverError`]; each message says what to install or set.
+/// See [`DriverError`]. Each message names what to install or set.
 pub fn prepare(request: &DriverRequest) -> Result<Driver, DriverError> {
     let mut guard = PREPARED.lock().unwrap_or_else(PoisonError::into_inner);
     let prepared = match guard.take() {
@@ -87,42 +90,42 @@ pub fn prepare(request: &DriverRequest) -> Result<Driver, DriverError> {
     };
     let prepared = guard.insert(prepared);
     if request.validation && !prepared.has_layer {
-        obtain(&prepared.settings, &[Part::Validation])?;
+        ensure_installed(&prepared.settings, &[Component::Validation])?;
         prepared.has_layer = true;
     }
     Ok(prepared.driver.clone())
 }
 
-/// The description file of SwiftShader, a software driver with Vulkan 1.3 and without ray tracing: a process
-/// started with `VK_DRIVER_FILES` set to it sees what a device without ray tracing is like.
+/// Returns the path of SwiftShader's driver manifest (ICD JSON). SwiftShader is a software driver with Vulkan 1.3 and without
+/// ray tracing. Start a process with `VK_DRIVER_FILES` set to this path to test a device without ray tracing.
 ///
 /// # Errors
-/// [`DriverError::NoValidationLayer`] if the package that carries both cannot be fetched.
+/// [`DriverError::NoValidationLayer`] if the package that contains both cannot be downloaded.
 pub fn swiftshader_icd() -> Result<PathBuf, DriverError> {
-    Ok(folder_of(Part::Validation, &Settings::from_env()?)?.join(prefix::SWIFTSHADER_JSON))
+    Ok(installed_folder(Component::Validation, &Settings::from_env()?)?.join(layout::SWIFTSHADER_JSON))
 }
 
-/// The description file of RADV, Mesa's driver for AMD cards, whose libraries this opens in the process: one started
-/// with `VK_DRIVER_FILES` set to it and `RADV_FORCE_FAMILY` to the name of a chip, such as `navi31`, compiles pipelines
-/// for that chip with no card in the machine. The device has no memory, so nothing else works on it.
+/// Opens the libraries of RADV, Mesa's driver for AMD GPUs, and returns the path of its driver manifest (ICD JSON). A process
+/// started with `VK_DRIVER_FILES` set to this path and `RADV_FORCE_FAMILY` set to a chip name, such as `navi31`, compiles
+/// pipelines for that chip without a GPU in the machine. The device has no memory, so nothing else works on it.
 ///
 /// # Errors
-/// [`DriverError::NoRadv`] if the package cannot be fetched, [`DriverError::Broken`] if a fetched file is damaged.
+/// [`DriverError::NoRadv`] if the package cannot be downloaded, [`DriverError::Broken`] if a downloaded file is damaged.
 pub fn radv_icd() -> Result<PathBuf, DriverError> {
-    let prefix = folder_of(Part::Radv, &Settings::from_env()?)?;
-    preload::preload(&prefix, &Manifest::read(&prefix).unwrap_or_default().preload)?;
-    Ok(prefix.join(prefix::RADV_JSON))
+    let folder = installed_folder(Component::Radv, &Settings::from_env()?)?;
+    library_preload::preload(&folder, &Manifest::read(&folder).unwrap_or_default().preload)?;
+    Ok(folder.join(layout::RADV_JSON))
 }
 
-/// Starts an X server without a screen, for programs that need windows: the machine's own Xvfb, or a fetched one.
+/// Starts a headless X server (Xvfb) for programs that open windows: the system's Xvfb, or a downloaded one.
 ///
 /// # Errors
-/// [`DriverError::NoDisplay`] if there is none and the packages cannot be fetched, [`DriverError::Broken`] if it does not
+/// [`DriverError::NoDisplay`] if Xvfb is not installed and cannot be downloaded, [`DriverError::Broken`] if it does not
 /// start.
 pub fn virtual_display() -> Result<VirtualDisplay, DriverError> {
-    match VirtualDisplay::of_machine() {
+    match VirtualDisplay::from_system() {
         Some(display) => display,
-        None => VirtualDisplay::of_folder(&folder_of(Part::Display, &Settings::from_env()?)?),
+        None => VirtualDisplay::from_folder(&installed_folder(Component::Display, &Settings::from_env()?)?),
     }
 }
 
@@ -131,92 +134,104 @@ impl Prepared {
         let settings = Settings::from_env()?;
         let system = SystemVulkan::open();
         let has_layer = system.as_ref().is_ok_and(|system| request.validation && system.has_current_layer());
-        let choice = choose(&settings, system)?;
-        let layer = [Part::Validation].into_iter().filter(|_| request.validation && !has_layer);
-        let parts: Vec<Part> = choice.fetched_part().into_iter().chain(layer).collect();
-        obtain(&settings, &parts)?;
-        let driver = choice.start(&settings)?;
-        environment::publish(&settings, &driver);
+        let source = choose_source(&settings, system)?;
+        let layer = [Component::Validation].into_iter().filter(|_| request.validation && !has_layer);
+        let components: Vec<Component> = source.required_component().into_iter().chain(layer).collect();
+        ensure_installed(&settings, &components)?;
+        let driver = source.activate(&settings)?;
+        loader_environment::set_variables(&settings, &driver);
         Ok(Self { settings, driver, has_layer: request.validation })
     }
 }
 
-/// Which loader and which drivers.
+/// The loader and the drivers that the process uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Choice {
-    /// All of the machine.
+enum DriverSource {
+    /// The system's loader and drivers.
     System,
-    /// The user's drivers under the fetched loader, for want of one of the machine.
-    UsersDrivers,
-    /// All fetched.
+    /// The user's drivers with the downloaded loader: the system has no loader.
+    UserDrivers,
+    /// The downloaded loader and software driver.
     Software,
 }
 
-fn choose(settings: &Settings, system: Result<SystemVulkan, String>) -> Result<Choice, DriverError> {
-    match (settings.wish, system) {
-        (Wish::Software, _) => Ok(Choice::Software),
-        (Wish::System, Ok(_)) => Ok(Choice::System),
-        (Wish::System, Err(reason)) => Err(DriverError::NoSystemLoader { reason }),
-        (Wish::Auto, Ok(_)) if settings.users_driver_files().is_some() => Ok(Choice::System),
-        (Wish::Auto, Err(_)) if settings.users_driver_files().is_some() => Ok(Choice::UsersDrivers),
-        // A child of a process that uses the fetched driver is told of it, so the machine's own is not asked.
-        (Wish::Auto, Ok(system)) if settings.driver_files.is_none() && system.can_trace_rays() => {
-            Ok(Choice::System)
+fn choose_source(
+    settings: &Settings,
+    system: Result<SystemVulkan, String>,
+) -> Result<DriverSource, DriverError> {
+    match (settings.preference, system) {
+        (DriverPreference::Software, _) => Ok(DriverSource::Software),
+        (DriverPreference::System, Ok(_)) => Ok(DriverSource::System),
+        (DriverPreference::System, Err(reason)) => Err(DriverError::NoSystemLoader { reason }),
+        (DriverPreference::Auto, Ok(_)) if settings.user_driver_files().is_some() => Ok(DriverSource::System),
+        (DriverPreference::Auto, Err(_)) if settings.user_driver_files().is_some() => {
+            Ok(DriverSource::UserDrivers)
         }
-        (Wish::Auto, _) => Ok(Choice::Software),
+        // A child process inherits `VK_DRIVER_FILES` of the downloaded driver and must use the same driver.
+        (DriverPreference::Auto, Ok(system))
+            if settings.driver_files.is_none() && system.can_trace_rays() =>
+        {
+            Ok(DriverSource::System)
+        }
+        (DriverPreference::Auto, _) => Ok(DriverSource::Software),
     }
 }
 
-impl Choice {
-    fn fetched_part(self) -> Option<Part> {
-        (self != Self::System).then_some(Part::Driver)
+impl DriverSource {
+    fn required_component(self) -> Option<Component> {
+        (self != Self::System).then_some(Component::Driver)
     }
 
-    /// Readies the process for the chosen driver.
-    fn start(self, settings: &Settings) -> Result<Driver, DriverError> {
+    /// Loads the driver's libraries into this process where it was downloaded.
+    fn activate(self, settings: &Settings) -> Result<Driver, DriverError> {
         if self == Self::System {
             return Ok(Driver { loader: None, origin: DriverOrigin::System });
         }
-        let prefix = folder_of(Part::Driver, settings)?;
-        let loader = Some(prefix.join(prefix::LOADER));
-        if self == Self::UsersDrivers {
+        let folder = installed_folder(Component::Driver, settings)?;
+        let loader = Some(folder.join(layout::LOADER));
+        if self == Self::UserDrivers {
             return Ok(Driver { loader, origin: DriverOrigin::System });
         }
-        preload::preload(&prefix, &Manifest::read(&prefix).unwrap_or_default().preload)?;
-        Ok(Driver { loader, origin: DriverOrigin::Provisioned { prefix } })
+        library_preload::preload(&folder, &Manifest::read(&folder).unwrap_or_default().preload)?;
+        Ok(Driver { loader, origin: DriverOrigin::Downloaded { folder } })
     }
 }
 
-/// The complete folder of `part`, fetched if it is nowhere.
-fn folder_of(part: Part, settings: &Settings) -> Result<PathBuf, DriverError> {
-    obtain(settings, &[part])?;
-    let gone = || refusal(part, FetchError::Content { reason: "what was fetched is gone again".to_owned() });
-    part.find(&settings.folders).ok_or_else(gone)
+/// Returns the folder of `component`. Downloads the component if no folder has it.
+fn installed_folder(component: Component, settings: &Settings) -> Result<PathBuf, DriverError> {
+    ensure_installed(settings, &[component])?;
+    let gone = || {
+        driver_error(
+            component,
+            DownloadError::Content { reason: "the downloaded folder was removed meanwhile".to_owned() },
+        )
+    };
+    component.find(&settings.folders).ok_or_else(gone)
 }
 
-/// Fetches those of `parts` that are nowhere, all in one go.
-fn obtain(settings: &Settings, parts: &[Part]) -> Result<(), DriverError> {
-    let missing: Vec<Part> =
-        parts.iter().copied().filter(|part| part.find(&settings.folders).is_none()).collect();
+/// Downloads the missing ones of `components` together.
+fn ensure_installed(settings: &Settings, components: &[Component]) -> Result<(), DriverError> {
+    let missing: Vec<Component> =
+        components.iter().copied().filter(|component| component.find(&settings.folders).is_none()).collect();
     match missing.first() {
-        Some(first) => fetch(settings, &missing).map_err(|cause| refusal(*first, cause)),
+        Some(first) => download_components(settings, &missing).map_err(|cause| driver_error(*first, cause)),
         None => Ok(()),
     }
 }
 
-fn fetch(settings: &Settings, missing: &[Part]) -> Result<(), FetchError> {
-    if !settings.may_download {
-        return Err(FetchError::Forbidden);
+fn download_components(settings: &Settings, missing: &[Component]) -> Result<(), DownloadError> {
+    if !settings.download_allowed {
+        return Err(DownloadError::Forbidden);
     }
-    provision::provision(settings.writable_folder()?, missing)
+    download::download_missing(settings.writable_folder()?, missing)
 }
 
-fn refusal(part: Part, cause: FetchError) -> DriverError {
-    match part {
-        Part::Driver => DriverError::NoDriver { cause },
-        Part::Validation => DriverError::NoValidationLayer { cause },
-        Part::Radv => DriverError::NoRadv { cause },
-        Part::Display => DriverError::NoDisplay { cause },
+fn driver_error(component: Component, cause: DownloadError) -> DriverError {
+    match component {
+        Component::Driver => DriverError::NoDriver { cause },
+        Component::Validation => DriverError::NoValidationLayer { cause },
+        Component::Radv => DriverError::NoRadv { cause },
+        Component::Display => DriverError::NoDisplay { cause },
     }
 }
 
@@ -224,9 +239,13 @@ fn refusal(part: Part, cause: FetchError) -> DriverError {
 mod tests {
     use super::*;
 
-    fn settings(wish: Wish, folder: &std::path::Path, driver_files: Option<&str>) -> Settings {
+    fn settings(
+        preference: DriverPreference,
+        folder: &std::path::Path,
+        driver_files: Option<&str>,
+    ) -> Settings {
         let driver_files = driver_files.map(Into::into);
-        Settings { wish, may_download: false, folders: vec![folder.to_path_buf()], driver_files }
+        Settings { preference, download_allowed: false, folders: vec![folder.to_path_buf()], driver_files }
     }
 
     fn no_system() -> Result<SystemVulkan, String> {
@@ -234,23 +253,25 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_without_vulkan_gets_the_software_driver() {
+    fn a_system_without_vulkan_gets_the_software_driver() {
         let folder = tempfile::tempdir().unwrap();
-        let choose = |wish, files| choose(&settings(wish, folder.path(), files), no_system());
-        assert_eq!(choose(Wish::Auto, None).unwrap(), Choice::Software);
-        assert_eq!(choose(Wish::Auto, Some("/own.json")).unwrap(), Choice::UsersDrivers);
-        assert_eq!(choose(Wish::Software, Some("/own.json")).unwrap(), Choice::Software);
-        let message = choose(Wish::System, None).unwrap_err().to_string();
+        let choose =
+            |preference, files| choose_source(&settings(preference, folder.path(), files), no_system());
+        assert_eq!(choose(DriverPreference::Auto, None).unwrap(), DriverSource::Software);
+        assert_eq!(choose(DriverPreference::Auto, Some("/own.json")).unwrap(), DriverSource::UserDrivers);
+        assert_eq!(choose(DriverPreference::Software, Some("/own.json")).unwrap(), DriverSource::Software);
+        let message = choose(DriverPreference::System, None).unwrap_err().to_string();
         assert!(message.contains("LVK_DRIVER=system") && message.contains("no such library"), "{message}");
     }
 
     #[test]
-    fn a_forbidden_fetch_says_what_to_install() {
+    fn a_forbidden_download_names_what_to_install() {
         let folder = tempfile::tempdir().unwrap();
-        let settings = settings(Wish::Auto, folder.path(), None);
-        let driver = obtain(&settings, &[Part::Driver, Part::Validation]).unwrap_err().to_string();
+        let settings = settings(DriverPreference::Auto, folder.path(), None);
+        let driver =
+            ensure_installed(&settings, &[Component::Driver, Component::Validation]).unwrap_err().to_string();
         assert!(driver.contains("LVK_NO_DOWNLOAD") && driver.contains("mesa-vulkan-drivers"), "{driver}");
-        let layer = obtain(&settings, &[Part::Validation]).unwrap_err().to_string();
+        let layer = ensure_installed(&settings, &[Component::Validation]).unwrap_err().to_string();
         assert!(layer.contains("LVK_NO_DOWNLOAD") && layer.contains("vulkan-validationlayers"), "{layer}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
@@ -258,11 +279,13 @@ mod tests {
     #[test]
     fn a_damaged_driver_folder_is_named() {
         let root = tempfile::tempdir().unwrap();
-        let folder = Part::Driver.folder(root.path());
+        let folder = Component::Driver.folder(root.path());
         std::fs::create_dir_all(folder.join("lib")).unwrap();
         std::fs::write(folder.join("lib/libdamaged.so"), "text").unwrap();
         Manifest { preload: vec!["lib/libdamaged.so".into()], ..Manifest::default() }.write(&folder).unwrap();
-        let error = Choice::Software.start(&settings(Wish::Auto, root.path(), None)).unwrap_err();
+        let error = DriverSource::Software
+            .activate(&settings(DriverPreference::Auto, root.path(), None))
+            .unwrap_err();
         assert!(matches!(&error, DriverError::Broken { path, .. } if path.starts_with(&folder)), "{error}");
     }
 }

@@ -1,25 +1,27 @@
-//! The JSON that tells a Vulkan loader about a layer, written from what the layer library says of itself.
+//! Writes the layer manifest (JSON) of the validation layer from the properties that the layer library reports.
 
 use std::ffi::{CStr, c_char};
 use std::path::Path;
 
 use ash::vk;
 
-use super::error::FetchError;
+use super::error::DownloadError;
 
 /// Name of the validation layer.
 pub(super) const LAYER_NAME: &CStr = c"VK_LAYER_KHRONOS_validation";
 const DEVICE_EXTENSIONS: [(&CStr, u32); 1] = [(vk::EXT_TOOLING_INFO_NAME, 1)];
 
-/// Opens the layer `library` and describes it under the path `shown`, which is relative to the description.
-pub(super) fn of(library: &Path, shown: &str) -> Result<String, FetchError> {
+/// Opens the layer `library` and returns its layer manifest. `library_path` is the path in the manifest, relative to the
+/// manifest file.
+pub(super) fn describe(library: &Path, library_path: &str) -> Result<String, DownloadError> {
     let unusable =
-        |reason: String| FetchError::Content { reason: format!("{}: {reason}", library.display()) };
+        |reason: String| DownloadError::Content { reason: format!("{}: {reason}", library.display()) };
     // SAFETY: the file comes from a verified package; the initialisers of a Vulkan layer have no preconditions.
     let handle = unsafe { libloading::Library::new(library) }.map_err(|error| unusable(error.to_string()))?;
     let layers = layers(&handle).map_err(|error| unusable(error.to_string()))?;
     let layer = layers.iter().find(|layer| layer.layer_name_as_c_str() == Ok(LAYER_NAME));
-    let layer = layer.ok_or_else(|| unusable("it does not hold the validation layer".to_owned()))?;
+    let layer = layer
+        .ok_or_else(|| unusable("the library does not contain VK_LAYER_KHRONOS_validation".to_owned()))?;
     let extensions = extensions(&handle).map_err(|error| unusable(error.to_string()))?;
     let named = |name: &CStr| name.to_string_lossy().into_owned();
     let instance: Vec<_> = extensions
@@ -29,15 +31,15 @@ pub(super) fn of(library: &Path, shown: &str) -> Result<String, FetchError> {
         })
         .collect();
     let device: Vec<_> = DEVICE_EXTENSIONS.iter().map(|(name, version)| (named(name), *version)).collect();
-    Ok(json(shown, layer.spec_version, layer.implementation_version, &instance, &device))
+    Ok(json(library_path, layer.spec_version, layer.implementation_version, &instance, &device))
 }
 
 fn layers(library: &libloading::Library) -> Result<Vec<vk::LayerProperties>, libloading::Error> {
     // SAFETY: the symbol has this type by the Vulkan specification.
     let enumerate: libloading::Symbol<'_, vk::PFN_vkEnumerateInstanceLayerProperties> =
         unsafe { library.get(b"vkEnumerateInstanceLayerProperties\0")? };
-    Ok(list(|count, data| {
-        // SAFETY: `count` and `data` are null or valid for `count` elements, as `list` promises.
+    Ok(enumerate_all(|count, data| {
+        // SAFETY: `count` and `data` are null or valid for `count` elements, as `enumerate_all` ensures.
         unsafe { enumerate(count, data) }
     }))
 }
@@ -47,15 +49,15 @@ fn extensions(library: &libloading::Library) -> Result<Vec<vk::ExtensionProperti
     let enumerate: libloading::Symbol<'_, vk::PFN_vkEnumerateInstanceExtensionProperties> =
         unsafe { library.get(b"vkEnumerateInstanceExtensionProperties\0")? };
     let name: *const c_char = LAYER_NAME.as_ptr();
-    Ok(list(|count, data| {
+    Ok(enumerate_all(|count, data| {
         // SAFETY: as above, and `name` is a C string that outlives the call.
         unsafe { enumerate(name, count, data) }
     }))
 }
 
-/// The two calls of a Vulkan enumeration. The pointers given to `call` are a valid count, and null or room for
-/// that many elements; a failure counts as an empty list.
-fn list<T: Clone + Default>(call: impl Fn(*mut u32, *mut T) -> vk::Result) -> Vec<T> {
+/// Makes the two calls of a Vulkan enumeration. `call` gets a valid pointer to the count, and null or a pointer to `count`
+/// elements. Returns an empty list on failure.
+fn enumerate_all<T: Clone + Default>(call: impl Fn(*mut u32, *mut T) -> vk::Result) -> Vec<T> {
     let mut count = 0;
     if call(&mut count, std::ptr::null_mut()) != vk::Result::SUCCESS {
         return Vec::new();
@@ -119,10 +121,10 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_layer_is_refused() {
+    fn a_file_that_is_not_a_layer_is_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("libx.so");
         std::fs::write(&path, "text").unwrap();
-        assert!(matches!(of(&path, "../lib/libx.so"), Err(FetchError::Content { .. })));
+        assert!(matches!(describe(&path, "../lib/libx.so"), Err(DownloadError::Content { .. })));
     }
 }

@@ -1,56 +1,56 @@
-//! Layout of a folder with fetched libraries, and the manifest that makes it valid.
+//! Folder layout of the downloaded components, and the manifest that marks a component as complete.
 //!
 //! ```text
-//! <folder>/driver/lib/*.so*                 loader, software driver and all it needs
+//! <folder>/driver/lib/*.so*                 loader, software driver and its dependencies
 //! <folder>/driver/icd.d/lvp_icd.json        for VK_DRIVER_FILES
 //! <folder>/validation/lib/*.so              validation layer and SwiftShader
 //! <folder>/validation/explicit_layer.d/     for VK_ADD_LAYER_PATH
 //! <folder>/validation/icd.d/swiftshader_icd.json
-//! <folder>/radv/lib/*.so*                   driver for AMD cards and all it needs but a loader
+//! <folder>/radv/lib/*.so*                   driver for AMD GPUs and its dependencies, without a loader
 //! <folder>/radv/icd.d/radeon_icd.json
-//! <folder>/display/bin/Xvfb, xkbcomp         X server without a screen, and what it compiles keyboards with
-//! <folder>/display/lib/*.so*                all that both need, and what programs with windows open
-//! <folder>/display/xkb/                     descriptions of keyboards
-//! <folder>/*/manifest                       written last; without it the folder does not count
+//! <folder>/display/bin/Xvfb, xkbcomp         headless X server and its keymap compiler
+//! <folder>/display/lib/*.so*                dependencies of both, and libraries that window clients open
+//! <folder>/display/xkb/                     keyboard descriptions
+//! <folder>/*/manifest                       written last; a folder without a manifest is incomplete
 //! ```
 //! Every path inside is relative, so the folder can be moved and copied.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::apt::{Order, Suite};
+use super::apt::{PackageRequest, Suite};
 
-/// The loader inside [`Part::Driver`].
+/// The loader inside [`Component::Driver`].
 pub(super) const LOADER: &str = "lib/libvulkan.so.1";
-/// The software driver inside [`Part::Driver`].
+/// The software driver inside [`Component::Driver`].
 pub(super) const DRIVER: &str = "lib/libvulkan_lvp.so";
-/// The driver's description inside [`Part::Driver`].
+/// The driver manifest (ICD JSON) inside [`Component::Driver`].
 pub(super) const DRIVER_JSON: &str = "icd.d/lvp_icd.json";
-/// The validation layer inside [`Part::Validation`].
+/// The validation layer inside [`Component::Validation`].
 pub(super) const LAYER: &str = "lib/libVkLayer_khronos_validation.so";
-/// Folder of layer descriptions inside [`Part::Validation`].
+/// Folder of layer manifests inside [`Component::Validation`].
 pub(super) const LAYER_FOLDER: &str = "explicit_layer.d";
-/// A driver without ray tracing inside [`Part::Validation`].
+/// SwiftShader, a driver without ray tracing, inside [`Component::Validation`].
 pub(super) const SWIFTSHADER: &str = "lib/libvk_swiftshader.so";
-/// Its description inside [`Part::Validation`].
+/// Its driver manifest inside [`Component::Validation`].
 pub(super) const SWIFTSHADER_JSON: &str = "icd.d/swiftshader_icd.json";
-/// The driver inside [`Part::Radv`].
+/// The driver inside [`Component::Radv`].
 pub(super) const RADV: &str = "lib/libvulkan_radeon.so";
-/// Its description inside [`Part::Radv`].
+/// Its driver manifest inside [`Component::Radv`].
 pub(super) const RADV_JSON: &str = "icd.d/radeon_icd.json";
 
-/// The X server inside [`Part::Display`].
+/// The X server inside [`Component::Display`].
 pub(super) const X_SERVER: &str = "bin/Xvfb";
-/// What it compiles keyboards with.
+/// The program that compiles keymaps for the X server.
 pub(super) const KEYBOARD_COMPILER: &str = "bin/xkbcomp";
-/// What it compiles.
+/// Folder of keyboard descriptions.
 pub(super) const KEYBOARDS: &str = "xkb";
 
 const MANIFEST: &str = "manifest";
-/// Counts layouts: a folder written for another one is fetched anew.
-const MANIFEST_HEAD: &str = "lvk vulkan folder 1";
+/// First line of a manifest: the layout version. A folder of another version is downloaded again.
+const MANIFEST_VERSION: &str = "lvk vulkan folder 1";
 
-/// Libraries that programs with windows open while they run.
+/// Libraries that window clients open at run time.
 pub(super) const CLIENT_LIBRARIES: [&str; 6] = [
     "libX11.so.6",
     "libX11-xcb.so.1",
@@ -60,8 +60,8 @@ pub(super) const CLIENT_LIBRARIES: [&str; 6] = [
     "libxkbcommon-x11.so.0",
 ];
 
-/// Xvfb and the libraries above with those they are linked to. Its dependencies as packages would bring Mesa's OpenGL and LLVM along, ten
-/// times as much, for an extension that is off here.
+/// Packages of Xvfb, of [`CLIENT_LIBRARIES`] and of their dependencies. The list is explicit, because the package
+/// dependencies of Xvfb include Mesa's OpenGL and LLVM, ten times the size, for GLX, which is off here.
 const DISPLAY_PACKAGES: [&str; 42] = [
     "xvfb",
     "x11-xkb-utils",
@@ -107,21 +107,21 @@ const DISPLAY_PACKAGES: [&str; 42] = [
     "zlib1g",
 ];
 
-/// One of the things that can be fetched.
+/// A component that can be downloaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum Component {
     /// Loader and software driver with ray tracing.
     Driver,
     /// Validation layer, and a software driver without ray tracing.
     Validation,
-    /// Mesa's driver for AMD cards, which compiles for them without one.
+    /// RADV, Mesa's driver for AMD GPUs, which compiles shaders without a GPU.
     Radv,
-    /// An X server without a screen.
+    /// A headless X server (Xvfb).
     Display,
 }
 
-impl Part {
-    /// Where this part lives below the Vulkan folder `root`.
+impl Component {
+    /// Returns the folder of this component below the Vulkan folder `root`.
     pub(super) fn folder(self, root: &Path) -> PathBuf {
         root.join(match self {
             Self::Driver => "driver",
@@ -131,73 +131,79 @@ impl Part {
         })
     }
 
-    /// Where it is put together before it is complete.
-    pub(super) fn partial_folder(self, root: &Path) -> PathBuf {
+    /// Returns the folder in which the component is assembled before it is complete.
+    pub(super) fn staging_folder(self, root: &Path) -> PathBuf {
         self.folder(root).with_extension("partial")
     }
 
-    /// The packages it is made of.
-    pub(super) fn order(self) -> Order {
+    /// Returns the packages that contain this component.
+    pub(super) fn packages(self) -> PackageRequest {
         match self {
-            Self::Driver => Order {
+            Self::Driver => PackageRequest {
                 packages: &["mesa-vulkan-drivers", "libvulkan1"],
                 with_dependencies: true,
                 suite: Suite::Backports,
             },
-            Self::Radv => {
-                Order { packages: &["mesa-vulkan-drivers"], with_dependencies: true, suite: Suite::Backports }
-            }
-            Self::Validation => {
-                Order { packages: &["chromium-common"], with_dependencies: false, suite: Suite::Security }
-            }
-            Self::Display => {
-                Order { packages: &DISPLAY_PACKAGES, with_dependencies: false, suite: Suite::Security }
-            }
+            Self::Radv => PackageRequest {
+                packages: &["mesa-vulkan-drivers"],
+                with_dependencies: true,
+                suite: Suite::Backports,
+            },
+            Self::Validation => PackageRequest {
+                packages: &["chromium-common"],
+                with_dependencies: false,
+                suite: Suite::Security,
+            },
+            Self::Display => PackageRequest {
+                packages: &DISPLAY_PACKAGES,
+                with_dependencies: false,
+                suite: Suite::Security,
+            },
         }
     }
 
-    /// What it is, for a person to read.
+    /// Returns the name of the component for messages.
     pub(super) fn title(self) -> &'static str {
         match self {
             Self::Driver => "software driver lavapipe",
             Self::Validation => "validation layer",
-            Self::Radv => "driver for AMD cards, RADV",
-            Self::Display => "X server without a screen, Xvfb",
+            Self::Radv => "driver for AMD GPUs, RADV",
+            Self::Display => "headless X server, Xvfb",
         }
     }
 
-    /// All of them.
+    /// All components.
     pub(super) const ALL: [Self; 4] = [Self::Driver, Self::Validation, Self::Radv, Self::Display];
 
-    /// The complete folder of this part, if one of `roots` has it.
+    /// Returns the first complete folder of this component below `roots`.
     pub(super) fn find(self, roots: &[PathBuf]) -> Option<PathBuf> {
         roots.iter().map(|root| self.folder(root)).find(|folder| Manifest::read(folder).is_some())
     }
 }
 
-/// What a complete folder says about itself.
+/// The manifest of a complete component folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Manifest {
-    /// Name and version of the packages it was made from.
+    /// Name and version of the source packages.
     pub(super) packages: Vec<(String, String)>,
     /// Libraries to open before the loader starts, in this order, relative to the folder.
     pub(super) preload: Vec<String>,
 }
 
 impl Manifest {
-    /// The manifest of `folder`; `None` if there is none or it is not for this layout.
+    /// Reads the manifest of `folder`; `None` if there is none or its layout version differs.
     pub(super) fn read(folder: &Path) -> Option<Self> {
         Self::parse(&fs::read_to_string(folder.join(MANIFEST)).ok()?)
     }
 
-    /// Writes it into `folder`, which completes the folder.
+    /// Writes the manifest into `folder`, which marks the folder as complete.
     pub(super) fn write(&self, folder: &Path) -> std::io::Result<()> {
         fs::write(folder.join(MANIFEST), self.to_text())
     }
 
     fn parse(text: &str) -> Option<Self> {
         let mut lines = text.lines();
-        if lines.next()? != MANIFEST_HEAD {
+        if lines.next()? != MANIFEST_VERSION {
             return None;
         }
         let mut manifest = Self::default();
@@ -217,7 +223,7 @@ impl Manifest {
     fn to_text(&self) -> String {
         let packages = self.packages.iter().map(|(name, version)| format!("package {name} {version}\n"));
         let preload = self.preload.iter().map(|path| format!("preload {path}\n"));
-        format!("{MANIFEST_HEAD}\n{}", packages.chain(preload).collect::<String>())
+        format!("{MANIFEST_VERSION}\n{}", packages.chain(preload).collect::<String>())
     }
 }
 
@@ -239,21 +245,21 @@ mod tests {
     }
 
     #[test]
-    fn other_layouts_do_not_count() {
+    fn other_layout_versions_are_rejected() {
         assert_eq!(Manifest::parse(""), None);
         assert_eq!(Manifest::parse("lvk vulkan folder 0\n"), None);
-        assert_eq!(Manifest::parse(&format!("{MANIFEST_HEAD}\nunknown word\n")), None);
+        assert_eq!(Manifest::parse(&format!("{MANIFEST_VERSION}\nunknown word\n")), None);
     }
 
     #[test]
-    fn a_folder_counts_only_with_its_manifest() {
+    fn a_folder_without_a_manifest_is_incomplete() {
         let (with, without) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         for root in [&with, &without] {
-            fs::create_dir(Part::Driver.folder(root.path())).unwrap();
+            fs::create_dir(Component::Driver.folder(root.path())).unwrap();
         }
-        example().write(&Part::Driver.folder(with.path())).unwrap();
+        example().write(&Component::Driver.folder(with.path())).unwrap();
         let roots = [without.path().to_path_buf(), with.path().to_path_buf()];
-        assert_eq!(Part::Driver.find(&roots), Some(Part::Driver.folder(with.path())));
-        assert_eq!(Part::Validation.find(&roots), None);
+        assert_eq!(Component::Driver.find(&roots), Some(Component::Driver.folder(with.path())));
+        assert_eq!(Component::Validation.find(&roots), None);
     }
 }

@@ -1,4 +1,4 @@
-//! Which mirror of Debian this machine uses, read from its package sources.
+//! Finds the Debian mirror of this system in its package sources.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,16 +8,16 @@ const SECURITY: &str = "http://deb.debian.org/debian-security";
 const RELEASES: [&str; 9] =
     ["bookworm", "trixie", "forky", "bullseye", "stable", "testing", "unstable", "oldstable", "sid"];
 
-/// Where Debian's packages come from.
+/// A mirror of Debian's archives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Mirror {
-    /// Address of the archive proper, with its backports.
+    /// Address of the main archive, which contains the backports.
     pub(super) archive: String,
     /// Address of the security archive.
     pub(super) security: String,
 }
 
-/// One package source: every address carries every suite.
+/// One package source: every address has every suite.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Source {
     addresses: Vec<String>,
@@ -26,19 +26,19 @@ struct Source {
 }
 
 impl Mirror {
-    /// Debian's own network.
+    /// Debian's default mirror, `deb.debian.org`.
     pub(super) fn debian() -> Self {
         Self { archive: ARCHIVE.to_owned(), security: SECURITY.to_owned() }
     }
 
-    /// The mirror the machine is set up with, where it names one, then Debian's own network.
+    /// Returns the mirror in the system's configuration, if any, then the default mirror.
     pub(super) fn candidates(configuration: &Path) -> Vec<Self> {
-        let mut mirrors = vec![Self::of(&read(configuration)), Self::debian()];
+        let mut mirrors = vec![Self::from_sources(&read_sources(configuration)), Self::debian()];
         mirrors.dedup();
         mirrors
     }
 
-    fn of(sources: &[Source]) -> Self {
+    fn from_sources(sources: &[Source]) -> Self {
         let find = |wanted: fn(&Source) -> bool| {
             sources
                 .iter()
@@ -76,8 +76,8 @@ impl Source {
     }
 }
 
-/// All sources below `configuration` (`/etc/apt`); what cannot be read is left out, as a fall-back exists.
-fn read(configuration: &Path) -> Vec<Source> {
+/// Reads all sources below `configuration` (`/etc/apt`). Skips unreadable files, because the default mirror remains.
+fn read_sources(configuration: &Path) -> Vec<Source> {
     let listed = fs::read_dir(configuration.join("sources.list.d")).into_iter().flatten().flatten();
     let mut files: Vec<PathBuf> = listed.map(|entry| entry.path()).collect();
     files.sort();
@@ -93,7 +93,7 @@ fn read(configuration: &Path) -> Vec<Source> {
     files.iter().flat_map(parse).filter(|source| !source.addresses.is_empty()).collect()
 }
 
-/// The one-line form, `deb [options] address suite component...`.
+/// Parses the one-line form, `deb [options] address suite component...`.
 fn parse_lines(text: &str) -> Vec<Source> {
     text.lines().filter_map(parse_line).collect()
 }
@@ -108,7 +108,7 @@ fn parse_line(line: &str) -> Option<Source> {
     Some(Source { addresses, suites: vec![suite], components: words.collect() })
 }
 
-/// The stanza form (deb822), `Types: deb` and so on.
+/// Parses the deb822 form (`Types: deb` and so on).
 fn parse_stanzas(text: &str) -> Vec<Source> {
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
     lines.split(|line| line.trim().is_empty()).filter_map(parse_stanza).collect()
@@ -125,7 +125,7 @@ fn parse_stanza(lines: &[&str]) -> Option<Source> {
     Some(Source { addresses, suites: field(lines, "Suites"), components: field(lines, "Components") })
 }
 
-/// The words of a field, over its continuation lines.
+/// Returns the words of a field, with its continuation lines.
 fn field(lines: &[&str], name: &str) -> Vec<String> {
     let value_of = |line: &str| {
         let (key, value) = line.split_once(':')?;
@@ -137,7 +137,7 @@ fn field(lines: &[&str], name: &str) -> Vec<String> {
     std::iter::once(first.as_str()).chain(more).flat_map(str::split_whitespace).map(str::to_owned).collect()
 }
 
-/// Removable media cannot answer for other suites.
+/// True for network addresses: removable media do not have other suites.
 fn is_network(address: &str) -> bool {
     address.contains(':') && !address.starts_with("cdrom:")
 }
@@ -150,7 +150,7 @@ mod tests {
         let mut sources = parse_lines(lines);
         sources.extend(parse_stanzas(stanzas));
         sources.retain(|source| !source.addresses.is_empty());
-        Mirror::of(&sources)
+        Mirror::from_sources(&sources)
     }
 
     #[test]
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn other_peoples_archives_are_not_debian() {
+    fn third_party_archives_are_not_debian() {
         let found = mirror(
             "deb https://download.example/linux/debian bookworm stable\n\
              deb https://packages.example/apt stable main\n\
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_machines_mirror_comes_before_debians() {
+    fn the_configured_mirror_comes_before_the_default() {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("sources.list.d")).unwrap();
         fs::write(folder.path().join("sources.list"), "deb http://near/debian bookworm main\n").unwrap();

@@ -1,6 +1,6 @@
-//! What `apt-get` prints, read.
+//! Parses the output of `apt-get`.
 
-/// One package that `apt-get --print-uris` would fetch.
+/// One package that `apt-get --print-uris` lists.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Archive {
     /// Package name.
@@ -11,7 +11,7 @@ pub(super) struct Archive {
     pub(super) size_bytes: u64,
 }
 
-/// The archives among the lines of `--print-uris`: `'address' name_version_architecture.deb size hash`.
+/// Returns the archives in the output of `--print-uris`: `'address' name_version_architecture.deb size hash`.
 pub(super) fn archives(text: &str) -> Vec<Archive> {
     text.lines().filter(|line| line.starts_with('\'')).filter_map(archive).collect()
 }
@@ -28,23 +28,23 @@ fn archive(line: &str) -> Option<Archive> {
     })
 }
 
-/// Percent done, from a line of the status channel such as `dlstatus:3:41.5:Retrieving file 3 of 37`.
-pub(super) fn percent(line: &str) -> Option<f64> {
+/// Returns the percentage in a line of the status channel such as `dlstatus:3:41.5:Retrieving file 3 of 37`.
+pub(super) fn percent_done(line: &str) -> Option<f64> {
     let mut fields = line.strip_prefix("dlstatus:")?.split(':').skip(1);
     fields.next()?.parse().ok().filter(|percent: &f64| (0.0..=100.0).contains(percent))
 }
 
-/// The amount in a line such as `Fetched 9,500 kB in 2s (4,750 kB/s)`.
-pub(super) fn fetched(text: &str) -> Option<&str> {
+/// Returns the size in a line such as `Fetched 9,500 kB in 2s (4,750 kB/s)`.
+pub(super) fn downloaded_size(text: &str) -> Option<&str> {
     let line = text.lines().find_map(|line| line.strip_prefix("Fetched "))?;
     line.split_once(" in ").map(|(amount, _)| amount)
 }
 
-/// The telling part of an error output: its first error, else its last line.
-pub(super) fn complaint(text: &str) -> String {
+/// Returns the first error of an error output, or its last line if no line is an error.
+pub(super) fn first_error(text: &str) -> String {
     let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty());
     let error = lines().find_map(|line| line.strip_prefix("E: "));
-    error.or_else(|| lines().next_back()).unwrap_or("it gave no reason").to_owned()
+    error.or_else(|| lines().next_back()).unwrap_or("no error message").to_owned()
 }
 
 #[cfg(test)]
@@ -67,24 +67,24 @@ mod tests {
 
     #[test]
     fn percent_reads_only_the_download_status() {
-        assert_eq!(percent("dlstatus:36:83.2769:Retrieving file 36 of 36"), Some(83.2769));
-        assert_eq!(percent("pmstatus:x:50:Installing"), None);
-        assert_eq!(percent("dlstatus:1:nonsense:Retrieving"), None);
-        assert_eq!(percent("dlstatus:1:NaN:Retrieving"), None);
-        assert_eq!(percent("Get:1 http://near bookworm InRelease"), None);
+        assert_eq!(percent_done("dlstatus:36:83.2769:Retrieving file 36 of 36"), Some(83.2769));
+        assert_eq!(percent_done("pmstatus:x:50:Installing"), None);
+        assert_eq!(percent_done("dlstatus:1:nonsense:Retrieving"), None);
+        assert_eq!(percent_done("dlstatus:1:NaN:Retrieving"), None);
+        assert_eq!(percent_done("Get:1 http://near bookworm InRelease"), None);
     }
 
     #[test]
     fn the_index_size_is_found() {
-        assert_eq!(fetched("Hit:1\nFetched 9,500 kB in 2s (4,750 kB/s)\n"), Some("9,500 kB"));
-        assert_eq!(fetched("Reading package lists..."), None);
+        assert_eq!(downloaded_size("Hit:1\nFetched 9,500 kB in 2s (4,750 kB/s)\n"), Some("9,500 kB"));
+        assert_eq!(downloaded_size("Reading package lists..."), None);
     }
 
     #[test]
-    fn the_first_error_is_the_complaint() {
+    fn the_first_error_is_found() {
         let text = "W: a warning\nE: Unable to locate package x\nE: later\n";
-        assert_eq!(complaint(text), "Unable to locate package x");
-        assert_eq!(complaint("something\nelse\n\n"), "else");
-        assert_eq!(complaint(""), "it gave no reason");
+        assert_eq!(first_error(text), "Unable to locate package x");
+        assert_eq!(first_error("something\nelse\n\n"), "else");
+        assert_eq!(first_error(""), "no error message");
     }
 }

@@ -1,4 +1,4 @@
-//! Opening fetched libraries inside this process, so that no environment variable has to be set around it.
+//! Opens downloaded libraries inside this process, so that the caller need not set `LD_LIBRARY_PATH`.
 
 use std::ffi::OsStr;
 use std::mem::forget;
@@ -8,14 +8,14 @@ use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 
 use super::error::DriverError;
 
-/// Answers only for libraries that are open already (`dlfcn.h` of glibc and musl on x86-64).
+/// Makes `dlopen` succeed only for libraries that are already open (`dlfcn.h` of glibc and musl on x86-64).
 const RTLD_NOLOAD: i32 = 4;
 
-/// Opens `libraries` (relative to `folder`, each after what it needs) for the rest of the process's life.
+/// Opens `libraries` (relative to `folder`, dependencies first) until the process ends.
 ///
-/// The dynamic linker satisfies later requests for the same soname from what is open, so the driver finds what
-/// it needs without a search path. A library the process has already is kept: two copies of one library, such
-/// as the C++ runtime, must not meet.
+/// The dynamic linker resolves later requests for the same soname to the open library, so the driver finds its dependencies
+/// without a search path. The function skips a library that the process has already opened: a process must not contain two
+/// copies of one library, such as the C++ runtime.
 pub(super) fn preload(folder: &Path, libraries: &[String]) -> Result<(), DriverError> {
     for library in libraries {
         let path = folder.join(library);
@@ -23,7 +23,7 @@ pub(super) fn preload(folder: &Path, libraries: &[String]) -> Result<(), DriverE
             continue;
         }
         // SAFETY: the file belongs to a complete folder made from verified packages; initialisers of these
-        // libraries have no preconditions. The handle is never closed, so no code of it can vanish.
+        // libraries have no preconditions. The handle is never closed, so its code stays mapped.
         let opened = unsafe { Library::open(Some(&path), RTLD_NOW | RTLD_LOCAL) };
         forget(opened.map_err(|error| broken(&path, &error))?);
     }
@@ -33,7 +33,7 @@ pub(super) fn preload(folder: &Path, libraries: &[String]) -> Result<(), DriverE
 fn is_open(soname: &OsStr) -> bool {
     // SAFETY: with RTLD_NOLOAD nothing is loaded, hence no initialiser runs.
     let open = unsafe { Library::open(Some(soname), RTLD_NOLOAD | RTLD_NOW) };
-    // The handle stays, so that the library cannot be closed between here and the driver that needs it.
+    // The handle leaks on purpose: the library must stay open until the driver uses it.
     open.map(forget).is_ok()
 }
 
@@ -46,13 +46,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_c_library_is_open_and_nonsense_is_not() {
+    fn the_c_library_is_open_and_an_unknown_library_is_not() {
         assert!(is_open(OsStr::new("libc.so.6")));
         assert!(!is_open(OsStr::new("libnothing-of-this-name.so.9")));
     }
 
     #[test]
-    fn libraries_the_process_has_are_not_opened_again() {
+    fn open_libraries_are_not_opened_again() {
         preload(Path::new("/no/such/folder"), &["lib/libc.so.6".to_owned()]).unwrap();
     }
 

@@ -1,44 +1,44 @@
-//! Telling the Vulkan loader, which reads the environment, where the fetched files are.
+//! Environment variables that point the Vulkan loader to the downloaded driver and layers.
 
 use std::env;
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
-use super::prefix::{DRIVER_JSON, LAYER_FOLDER, Part};
+use super::layout::{Component, DRIVER_JSON, LAYER_FOLDER};
 use super::settings::Settings;
 use super::{Driver, DriverOrigin};
 
-/// Where Mesa keeps compiled shaders; without it, in the user's own cache folder.
+/// Folder of Mesa's shader cache. Mesa uses the user's cache folder if the variable is not set.
 const MESA_CACHE: &str = "MESA_SHADER_CACHE_DIR";
 
-/// Sets the variables for `driver` and for layers, in one go and once per process.
+/// Sets the variables for `driver` and for layers, once per process.
 ///
-/// The layer folders are named whether or not they are there yet: the loader skips those that are not, and a
-/// layer fetched later is then found without touching the environment again.
-pub(super) fn publish(settings: &Settings, driver: &Driver) {
+/// The list contains layer folders that do not exist yet. The loader skips them, and finds a layer that is downloaded later
+/// without another change of the environment.
+pub(super) fn set_variables(settings: &Settings, driver: &Driver) {
     let (name, value) =
         layer_variable(env::var_os("VK_LAYER_PATH"), env::var_os("VK_ADD_LAYER_PATH"), &settings.folders);
-    let prefix = match &driver.origin {
-        DriverOrigin::Provisioned { prefix } => Some(prefix),
+    let folder = match &driver.origin {
+        DriverOrigin::Downloaded { folder } => Some(folder),
         DriverOrigin::System => None,
     };
-    let keeps_shaders = env::var_os(MESA_CACHE).is_some();
+    let has_shader_cache = env::var_os(MESA_CACHE).is_some();
     // SAFETY: changing the environment is unsound only while another thread reads it through the C library.
-    // This runs once per process, under the lock of `prepare`, which is documented to come before the first
-    // Vulkan call; other threads of this project read the environment through `std` only, which locks.
+    // This runs once per process, under the lock of `prepare`, whose documentation requires the call before the first
+    // Vulkan call. Other threads of this project read the environment through `std` only, which locks.
     unsafe {
         env::set_var(name, value);
-        if let Some(prefix) = prefix {
-            env::set_var("VK_DRIVER_FILES", prefix.join(DRIVER_JSON));
-            if !keeps_shaders {
-                env::set_var(MESA_CACHE, prefix.with_file_name("shader_cache"));
+        if let Some(folder) = folder {
+            env::set_var("VK_DRIVER_FILES", folder.join(DRIVER_JSON));
+            if !has_shader_cache {
+                env::set_var(MESA_CACHE, folder.with_file_name("shader_cache"));
             }
         }
     }
 }
 
-/// The variable and value that add our layer folders to the user's, which come first. `VK_LAYER_PATH` makes
-/// the loader ignore `VK_ADD_LAYER_PATH`, so it is extended where it is set.
+/// Returns the variable and value that append the downloaded layer folders to the user's folders. The loader ignores
+/// `VK_ADD_LAYER_PATH` if `VK_LAYER_PATH` is set, so the function extends `VK_LAYER_PATH` in that case.
 fn layer_variable(
     path: Option<OsString>,
     added: Option<OsString>,
@@ -49,8 +49,8 @@ fn layer_variable(
         None => ("VK_ADD_LAYER_PATH", added.unwrap_or_default()),
     };
     let mut all: Vec<PathBuf> = env::split_paths(&users).filter(|path| path != OsStr::new("")).collect();
-    for ours in folders.iter().map(|folder| Part::Validation.folder(folder).join(LAYER_FOLDER)) {
-        // A folder whose name holds the separator cannot be listed.
+    for ours in folders.iter().map(|folder| Component::Validation.folder(folder).join(LAYER_FOLDER)) {
+        // `join_paths` rejects a folder whose name contains the path separator.
         if !all.contains(&ours) && env::join_paths([&ours]).is_ok() {
             all.push(ours);
         }

@@ -1,22 +1,22 @@
-//! The text files that give `apt-get` a private state: nothing of the machine's own is written.
+//! Configuration files that give `apt-get` a private state, so that it writes no file of the system.
 
 use std::path::Path;
 
-use super::sources::Mirror;
+use super::mirror::Mirror;
 
-/// Suite that carries the software driver with ray tracing.
+/// Suite that contains the software driver with ray tracing.
 pub(super) const BACKPORTS: &str = "bookworm-backports";
-/// Suite that carries a current validation layer.
+/// Suite that contains a current validation layer.
 pub(super) const SECURITY: &str = "bookworm-security";
 const KEYRING: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
-/// File every signature is checked with; the machine's own, from package `debian-archive-keyring`.
+/// Returns the keyring that verifies every signature: the system's, from package `debian-archive-keyring`.
 pub(super) fn keyring() -> &'static Path {
     Path::new(KEYRING)
 }
 
-/// Package sources in stanza form. Only package lists are asked for, not translations and icons.
-pub(super) fn sources(mirror: &Mirror) -> String {
+/// Returns the package sources in deb822 form. They request package lists only, without translations and icons.
+pub(super) fn debian_sources(mirror: &Mirror) -> String {
     let stanza = |address: &str, suites: &str| {
         format!(
             "Types: deb\nURIs: {address}\nSuites: {suites}\nComponents: main\nTargets: Packages\nSigned-By: {KEYRING}\n"
@@ -26,9 +26,9 @@ pub(super) fn sources(mirror: &Mirror) -> String {
     format!("{archive}\n{}", stanza(&mirror.security, SECURITY))
 }
 
-/// Configuration read after the machine's own, so that its proxy and credentials stay in force, its hooks
-/// (which may write elsewhere) do not run, and no setting of it can switch off the signature check.
-pub(super) fn settings(work: &Path) -> String {
+/// Returns the configuration that apt reads after the system's. The system's proxy and credentials stay in force, its hooks
+/// (which may write elsewhere) do not run, and none of its settings can disable the signature check.
+pub(super) fn apt_conf(work: &Path) -> String {
     let work = work.display();
     format!(
         "#clear APT::Update::Pre-Invoke;\n\
@@ -60,9 +60,9 @@ pub(super) fn settings(work: &Path) -> String {
     )
 }
 
-/// A package database in which only the machine's C library is installed: it is the one library that cannot be
-/// brought along, so its version is what the packages' requirements are held against.
-pub(super) fn status(libc_version: &str) -> String {
+/// Returns a package database that contains only the system's C library. The C library cannot be downloaded, so apt checks
+/// the requirements of the packages against its version.
+pub(super) fn dpkg_status(libc_version: &str) -> String {
     format!(
         "Package: libc6\nStatus: install ok installed\nArchitecture: amd64\nMulti-Arch: same\n\
          Maintainer: -\nVersion: {libc_version}\nDescription: -\n\n"
@@ -75,17 +75,19 @@ mod tests {
 
     #[test]
     fn sources_are_signed_and_name_the_mirror() {
-        let text =
-            sources(&Mirror { archive: "http://near/debian".into(), security: "http://near/sec".into() });
+        let text = debian_sources(&Mirror {
+            archive: "http://near/debian".into(),
+            security: "http://near/sec".into(),
+        });
         assert_eq!(text.matches("Signed-By: /usr/share/keyrings/").count(), 2);
         assert!(text.contains("URIs: http://near/debian\nSuites: bookworm bookworm-backports\n"));
         assert!(text.contains("\n\nTypes: deb\nURIs: http://near/sec\nSuites: bookworm-security\n"));
     }
 
     #[test]
-    fn every_place_apt_writes_to_is_below_the_work_folder() {
-        let text = settings(Path::new("/p/w"));
-        for place in [
+    fn every_folder_that_apt_writes_is_below_the_work_folder() {
+        let text = apt_conf(Path::new("/p/w"));
+        for key in [
             "Dir::State",
             "Dir::State::lists",
             "Dir::State::status",
@@ -93,7 +95,7 @@ mod tests {
             "Dir::Cache::archives",
             "Dir::Log",
         ] {
-            assert!(text.contains(&format!("\n{place} \"/p/w/")), "{place}");
+            assert!(text.contains(&format!("\n{key} \"/p/w/")), "{key}");
         }
     }
 }
