@@ -9,29 +9,29 @@ use lvk::DeviceProfile;
 
 use super::paper::PaperArgs;
 
-/// Measures what lvk costs and gains on this device, and prints tables in markdown.
+/// Measures the costs and gains of lvk on a device and prints Markdown tables.
 ///
-/// Sizes that are not given suit the device: real ones on a GPU, smaller ones on a driver that runs on the CPU.
+/// Default sizes depend on the device: full sizes on a GPU, smaller sizes on a driver that runs on the CPU.
 #[derive(Debug, Clone, PartialEq, Parser)]
 #[command(name = "bench", version, after_help = EXAMPLES)]
 pub struct BenchArgs {
-    /// What to measure
+    /// Benchmark to run
     #[command(subcommand)]
     pub(super) benchmark: Option<Benchmark>,
 
-    /// Only see whether it works: tiny sizes, one run
+    /// Smoke test: tiny sizes, one run
     #[arg(long, global = true)]
     pub(super) quick: bool,
 
-    /// Runs of each measurement, of which the median counts [default: by benchmark and device]
+    /// Runs per measurement; the median is printed [default: by benchmark and device]
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(super) runs: Option<u32>,
 
-    /// Device to use, by its number or part of its name [default: the most capable one]
+    /// Device to use: its number or part of its name [default: the most capable one]
     #[arg(long, value_name = "NUMBER|NAME", global = true)]
     pub(super) device: Option<String>,
 
-    /// Rehearse another device on this one: without what it lacks, and within its limits
+    /// Emulate a device profile on this device: disable missing features and clamp limits
     #[arg(
         long,
         value_name = "NAME",
@@ -40,11 +40,11 @@ pub struct BenchArgs {
     )]
     pub(super) profile: Option<DeviceProfile>,
 
-    /// Print the devices and what they can do, and exit
+    /// Print the devices and their ray tracing support, and exit
     #[arg(long, global = true)]
     pub(super) list_devices: bool,
 
-    /// Print the scenes that `paper --scenes` knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
+    /// Print the scenes that `paper --scenes` accepts by name, and exit; searches FOLDER, by default the folder in LVK_SCENES
     #[arg(
         long,
         value_name = "FOLDER",
@@ -55,31 +55,31 @@ pub struct BenchArgs {
     )]
     pub(super) list_scenes: Option<OsString>,
 
-    /// Run with Vulkan validation; a message is an error, and the figures mean little
+    /// Run with Vulkan validation; a message is an error, and times are not meaningful
     #[arg(long, global = true)]
     pub(super) validate: bool,
 }
 
-/// What to measure.
+/// The benchmarks.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub(super) enum Benchmark {
-    /// Many small meshes: one batch against a submission and a wait for each
+    /// BLAS builds of many small meshes: one batch compared with one submission and wait per mesh
     Batch(BatchArgs),
-    /// Builds, refits and compaction of one large mesh, beside hand-written Vulkan
+    /// BLAS builds, refits and compaction of one large mesh, compared with hand-written Vulkan
     Compaction(MeshArgs),
-    /// What the library costs the host: draws, dispatches, objects, submissions, uploads, the start, the heap
+    /// CPU overhead of the library: draws, dispatches, objects, submissions, uploads, start-up, heap growth
     Core,
-    /// A mesh whole and split into parts: what tracing costs
+    /// Ray tracing cost of a mesh split into several BLAS, compared with one BLAS
     Split(SplitArgs),
-    /// Updates of a top-level structure, against a copy of the bytes and the driver's own build
+    /// TLAS updates, compared with a memory copy plus the driver's build
     Tlas(TlasArgs),
-    /// Orders of triangles: as given, along a Morton curve, by the library
+    /// Triangle orders: given order, Morton order, the library's spatial order
     Order(TraceArgs),
-    /// Ray queries walked by the library, beside the device's own tracing
+    /// Software ray queries of the library, compared with the driver's ray tracing
     Queries(QueriesArgs),
-    /// A traced frame by lvk and by hand-written Vulkan
+    /// A ray traced frame by lvk and by hand-written Vulkan
     Overhead(TraceArgs),
-    /// The paper's experiment: stand-alone and hybrid rendering along the paths of five cameras, as a report
+    /// The paper's experiment: stand-alone and hybrid rendering along five camera paths, with a report
     Paper(PaperArgs),
 }
 
@@ -90,19 +90,19 @@ pub(super) struct BatchArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) meshes: Option<u32>,
 
-    /// Triangles of each [default: 1000]
+    /// Triangles per mesh [default: 1000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) triangles: Option<u32>,
 }
 
-/// Which mesh.
+/// The measured mesh.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub(super) struct MeshArgs {
-    /// Wavefront OBJ to measure with, its triangles in the order of the file [default: a mesh made by formulas]
+    /// Wavefront OBJ file; its triangles keep the order of the file [default: a generated mesh]
     #[arg(long, value_name = "FILE")]
     pub(super) scene: Option<PathBuf>,
 
-    /// Triangles of the mesh made by formulas [default: by benchmark and device]
+    /// Triangles of the generated mesh [default: by benchmark and device]
     #[arg(
         long,
         value_name = "N",
@@ -112,57 +112,57 @@ pub(super) struct MeshArgs {
     pub(super) triangles: Option<u32>,
 }
 
-/// Which mesh, and what picture of it.
+/// The measured mesh, camera and image size.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub(super) struct TraceArgs {
     #[command(flatten)]
     pub(super) mesh: MeshArgs,
 
-    /// Which of the scene's five cameras to look through
+    /// One of the scene's five cameras
     #[arg(long, value_name = "1-5", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=5))]
     pub(super) camera: u32,
 
     #[command(flatten)]
-    pub(super) picture: PictureArgs,
+    pub(super) image: ImageSizeArgs,
 }
 
-/// How large a picture.
+/// The image size.
 #[derive(Debug, Clone, PartialEq, Args)]
-pub(super) struct PictureArgs {
-    /// Width of the picture in pixels [default: 1280, or 160 on a driver that runs on the CPU]
+pub(super) struct ImageSizeArgs {
+    /// Image width in pixels [default: 1280, or 160 on a driver that runs on the CPU]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(super) width: Option<u32>,
 
-    /// Height of the picture in pixels [default: 720, or 90 on a driver that runs on the CPU]
+    /// Image height in pixels [default: 720, or 90 on a driver that runs on the CPU]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(super) height: Option<u32>,
 }
 
-/// Which mesh, what pictures of it, how many instances.
+/// The measured mesh, cameras, image size and instance count.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub(super) struct QueriesArgs {
     #[command(flatten)]
     pub(super) mesh: MeshArgs,
 
-    /// Which of the scene's five cameras to look through [default: all, one after the other]
+    /// One of the scene's five cameras [default: all cameras in turn]
     #[arg(long, value_name = "1-5", value_parser = clap::value_parser!(u32).range(1..=5))]
     pub(super) camera: Option<u32>,
 
     #[command(flatten)]
-    pub(super) picture: PictureArgs,
+    pub(super) image: ImageSizeArgs,
 
-    /// Overlapping instances that the mesh is cut into
+    /// Number of overlapping instances that the mesh is split into
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(super) instances: u32,
 }
 
-/// Which mesh, what picture, how many parts.
+/// The measured mesh, image size and number of parts.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub(super) struct SplitArgs {
     #[command(flatten)]
     pub(super) trace: TraceArgs,
 
-    /// Least number of parts
+    /// Minimum number of parts
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(2..=10_000))]
     pub(super) parts: u32,
 }
@@ -179,15 +179,15 @@ const EXAMPLES: &str = "\
 Examples:
   bench batch                                      1000 meshes of 1000 triangles
   bench compaction --scene living_room.obj         builds, refits and compaction of that scene
-  bench core                                       what the library costs the host, beside its limits
-  bench split --parts 100 --runs 200               parts of the mesh made by formulas
-  bench order --scene living_room.obj --camera 3   what the order of triangles does to rays a second
-  bench queries --scene living_room.obj            ray queries in software beside the device's own tracing
-  bench overhead --quick                           does it work at all?
-  bench paper --out report                         the paper's tables and figures, with the scenes of LVK_SCENES
+  bench core                                       CPU overhead of the library, with its limits
+  bench split --parts 100 --runs 200               the generated mesh in at least 100 parts
+  bench order --scene living_room.obj --camera 3   rays per second by triangle order
+  bench queries --scene living_room.obj            software ray queries and the driver's ray tracing
+  bench overhead --quick                           smoke test
+  bench paper --out report                         the paper's tables and figures, with the scenes in LVK_SCENES
 
-Exit status: 0 when everything was measured, 1 for trouble with the device, 2 for wrong arguments or input, 130 after
-Ctrl-C, which lets `paper` finish the scene under way and its report.";
+Exit status: 0 on success, 1 for a device error, 2 for wrong arguments or input, 130 after Ctrl-C. After Ctrl-C, `paper`
+finishes the current scene and its report.";
 
 #[cfg(test)]
 mod tests {
@@ -199,12 +199,12 @@ mod tests {
     }
 
     #[test]
-    fn the_definition_is_sound() {
+    fn the_definition_is_valid() {
         BenchArgs::command().debug_assert();
     }
 
     #[test]
-    fn options_of_all_benchmarks_may_stand_on_either_side() {
+    fn global_options_may_precede_or_follow_the_benchmark() {
         for line in ["--quick --runs 3 batch --meshes 7", "batch --meshes 7 --runs 3 --quick"] {
             let args = parsed(line).unwrap();
             assert_eq!((args.quick, args.runs), (true, Some(3)), "{line}");
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_measured_is_refused_with_exit_status_2() {
+    fn invalid_arguments_have_exit_status_2() {
         for line in [
             "everything",
             "batch --meshes 0",

@@ -1,4 +1,4 @@
-//! Many small meshes: one batch against a submission and a wait for each.
+//! BLAS builds of many small meshes: one batch compared with one submission and wait per mesh.
 
 use std::time::Instant;
 
@@ -9,36 +9,37 @@ use lvk::{
 
 use super::args::BatchArgs;
 use super::error::BenchError;
-use super::measure::{median_of, since, take_turns};
-use super::mesh::{MeshBuffers, input};
-use super::setup::{Choice, Setup};
-use super::table::{Table, bytes, grouped, ms, times};
+use super::measure::{elapsed_ms, interleave, median_of};
+use super::mesh::{MeshBuffers, create_input_buffer};
+use super::setup::{DefaultBy, Setup};
+use super::table::{Table, format_bytes, format_grouped, format_ms, format_ratio};
 
 type Holders = Vec<Holder<AccelStructHandle>>;
 
-/// Compares a batch with one submission and wait for each mesh, and the batch with one that has little scratch memory.
+/// Compares a batch with one submission and wait per mesh, and with a batch that has a small scratch budget.
 pub(super) fn measure(setup: &Setup, args: &BatchArgs) -> Result<Table, BenchError> {
     let ctx = setup.open()?;
-    let [meshes, triangles] = setup.choose(&ctx, Choice { quick: [20, 50], cpu: [1000; 2], gpu: [1000; 2] });
+    let [meshes, triangles] =
+        setup.default_for(&ctx, DefaultBy { quick: [20, 50], cpu: [1000; 2], gpu: [1000; 2] });
     let [meshes, triangles] = [args.meshes.unwrap_or(meshes), args.triangles.unwrap_or(triangles)];
-    let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 3, gpu: 10 });
+    let runs = setup.runs(&ctx, DefaultBy { quick: 1, cpu: 3, gpu: 10 });
     let what = format!(
         "batch: {} meshes of {} triangles",
-        grouped(u64::from(meshes)),
-        grouped(u64::from(triangles))
+        format_grouped(u64::from(meshes)),
+        format_grouped(u64::from(triangles))
     );
     let mut table =
-        Table::new(setup.headline(&ctx, &what), &["builds, until the GPU is done", "time", "a mesh"]);
-    let budget = compare(&ctx, meshes, triangles, runs, &mut table)?;
+        Table::new(setup.headline(&ctx, &what), &["builds, until the GPU is done", "time", "per mesh"]);
+    let budget = add_comparison_rows(&ctx, meshes, triangles, runs, &mut table)?;
     drop(ctx);
-    squeeze(setup, meshes, triangles, runs, budget, &mut table)?;
-    table.note(format!("medians of {runs} runs, taken in turns; triangles in the order given"));
-    table.note("limit: the batch at least 5 times faster on the H200, scratch never above its budget");
+    add_small_budget_rows(setup, meshes, triangles, runs, budget, &mut table)?;
+    table.add_note(format!("medians of {runs} interleaved runs; triangles in the given order"));
+    table.add_note("limit: the batch at least 5 times faster on the H200, scratch never above its budget");
     Ok(table)
 }
 
-/// Rows of both ways; answers a budget for scratch memory that all builds together exceed several times.
-fn compare(
+/// Adds the rows of both variants. Returns a scratch budget that is an eighth of the memory of all builds, or enough for 16.
+fn add_comparison_rows(
     ctx: &Context,
     meshes: u32,
     triangles: u32,
@@ -47,23 +48,26 @@ fn compare(
 ) -> Result<u64, BenchError> {
     let grids = Grids::new(ctx, meshes, triangles)?;
     let [batch, each] =
-        take_turns(runs, |which| if which == 0 { grids.batch(ctx) } else { grids.each(ctx) })?;
+        interleave(
+            runs,
+            |which| if which == 0 { grids.build_batch(ctx) } else { grids.build_one_by_one(ctx) },
+        )?;
     let [batch, each] = [batch, each].map(|samples| median_of(&samples, |time| *time));
-    let cells = |time: f64| [ms(time), format!("{:.2} us", 1e3 * time / f64::from(meshes))];
-    table.row("one batch", cells(batch));
-    table.row("a submission and a wait for each", cells(each));
-    table.row("ratio", [times(each / batch)]);
+    let cells = |time: f64| [format_ms(time), format!("{:.2} us", 1e3 * time / f64::from(meshes))];
+    table.add_row("one batch", cells(batch));
+    table.add_row("one submission and wait per mesh", cells(each));
+    table.add_row("ratio", [format_ratio(each / batch)]);
     let budget = ContextDesc::default().scratch_budget_bytes;
-    table.row("peak of scratch memory", scratch_cells(ctx, budget));
+    table.add_row("peak scratch memory", scratch_cells(ctx, budget));
     let one = ctx.blas_sizes(&grids.descs()[0])?.build_scratch_bytes;
     let alignment = u64::from(ctx.capabilities().limits.scratch_alignment).max(1);
     let all = one.next_multiple_of(alignment) * u64::from(meshes);
-    table.row("scratch memory of all builds together", [bytes(all)]);
+    table.add_row("scratch memory of all builds, summed", [format_bytes(all)]);
     Ok((all / 8).max(16 * (one + alignment)))
 }
 
-/// Rows of a batch with so little scratch memory that it takes several submissions.
-fn squeeze(
+/// Adds the rows of a batch whose small scratch budget requires several submissions.
+fn add_small_budget_rows(
     setup: &Setup,
     meshes: u32,
     triangles: u32,
@@ -73,23 +77,23 @@ fn squeeze(
 ) -> Result<(), BenchError> {
     let ctx = setup.open_with(budget)?;
     let grids = Grids::new(&ctx, meshes, triangles)?;
-    let [samples] = take_turns(runs, |_| grids.batch(&ctx))?;
+    let [samples] = interleave(runs, |_| grids.build_batch(&ctx))?;
     let time = median_of(&samples, |time| *time);
-    let name = format!("one batch, scratch budget {}", bytes(budget));
-    table.row(name, [ms(time), format!("{:.2} us", 1e3 * time / f64::from(meshes))]);
-    table.row("peak of scratch memory then", scratch_cells(&ctx, budget));
+    let name = format!("one batch, scratch budget {}", format_bytes(budget));
+    table.add_row(name, [format_ms(time), format!("{:.2} us", 1e3 * time / f64::from(meshes))]);
+    table.add_row("peak scratch memory, small budget", scratch_cells(&ctx, budget));
     Ok(())
 }
 
 fn scratch_cells(ctx: &Context, budget: u64) -> [String; 2] {
     let scratch = ctx.accel_memory().scratch_bytes;
-    [bytes(scratch), format!("{:.1} % of budget", 100.0 * scratch as f64 / budget as f64)]
+    [format_bytes(scratch), format!("{:.1} % of budget", 100.0 * scratch as f64 / budget as f64)]
 }
 
-/// Wavy patches, all in one pair of buffers.
+/// Wavy grids that share one vertex buffer and one index buffer.
 struct Grids {
     buffers: MeshBuffers,
-    /// Bytes from the indices of one mesh to those of the next.
+    /// Bytes from the vertices of one mesh to those of the next.
     stride_bytes: u64,
     geometries: Vec<[BlasGeometry; 1]>,
 }
@@ -98,15 +102,15 @@ impl Grids {
     fn new(ctx: &Context, meshes: u32, triangles: u32) -> Result<Self, BenchError> {
         let columns = f64::from(triangles).div_euclid(2.0).sqrt().ceil().max(1.0) as u32;
         let rows = triangles.div_ceil(2 * columns);
-        let place = |mesh: u32| {
+        let mesh_vertices = |mesh: u32| {
             (0..(rows + 1) * (columns + 1)).map(move |vertex| vertex_at(mesh, vertex, columns + 1))
         };
-        let positions: Vec<[f32; 3]> = (0..meshes).flat_map(place).collect();
+        let positions: Vec<[f32; 3]> = (0..meshes).flat_map(mesh_vertices).collect();
         let grid = (0..triangles).map(|triangle| triangle_at(triangle, columns));
         let indices: Vec<[u32; 3]> = grid.collect();
         let buffers = MeshBuffers {
-            positions: input(ctx, "positions", bytemuck::cast_slice(&positions))?,
-            indices: input(ctx, "indices", bytemuck::cast_slice(&indices))?,
+            positions: create_input_buffer(ctx, "positions", bytemuck::cast_slice(&positions))?,
+            indices: create_input_buffer(ctx, "indices", bytemuck::cast_slice(&indices))?,
             vertex_count: (rows + 1) * (columns + 1),
             triangle_count: triangles,
         };
@@ -132,47 +136,47 @@ impl Grids {
         self.geometries.iter().map(|geometries| desc(geometries)).collect()
     }
 
-    /// Milliseconds of one batch.
-    fn batch(&self, ctx: &Context) -> Result<f64, BenchError> {
+    /// Builds all meshes in one batch and returns the milliseconds.
+    fn build_batch(&self, ctx: &Context) -> Result<f64, BenchError> {
         let start = Instant::now();
         let made = ctx.create_blas_batch(&self.descs())?;
         ctx.wait(ctx.flush()?)?;
-        let time = since(start);
-        clear(ctx, made)?;
+        let time = elapsed_ms(start);
+        free_and_wait(ctx, made)?;
         Ok(time)
     }
 
-    /// Milliseconds of a submission and a wait for each.
-    fn each(&self, ctx: &Context) -> Result<f64, BenchError> {
+    /// Builds the meshes with one submission and wait each and returns the milliseconds.
+    fn build_one_by_one(&self, ctx: &Context) -> Result<f64, BenchError> {
         let mut made = Holders::with_capacity(self.geometries.len());
         let start = Instant::now();
         for desc in self.descs() {
             made.push(ctx.create_blas(&desc)?);
             ctx.wait(ctx.flush()?)?;
         }
-        let time = since(start);
-        clear(ctx, made)?;
+        let time = elapsed_ms(start);
+        free_and_wait(ctx, made)?;
         Ok(time)
     }
 }
 
-/// Gives the memory back before the next run.
-fn clear(ctx: &Context, made: Holders) -> lvk::Result<()> {
+/// Frees the BLAS before the next run.
+fn free_and_wait(ctx: &Context, made: Holders) -> lvk::Result<()> {
     drop(made);
     ctx.wait_idle()
 }
 
 fn vertex_at(mesh: u32, vertex: u32, columns: u32) -> [f32; 3] {
-    let [x, z] = [vertex % columns, vertex / columns].map(|place| place as f32 / columns as f32);
+    let [x, z] = [vertex % columns, vertex / columns].map(|cell| cell as f32 / columns as f32);
     let phase = 0.1 * mesh as f32;
     [x, 0.1 * (9.0 * x + phase).sin() * (7.0 * z - phase).cos(), z]
 }
 
 fn triangle_at(triangle: u32, columns: u32) -> [u32; 3] {
     let (row, column) = (triangle / 2 / columns, triangle / 2 % columns);
-    let corner = row * (columns + 1) + column;
+    let vertex = row * (columns + 1) + column;
     match triangle % 2 {
-        0 => [corner, corner + 1, corner + columns + 1],
-        _ => [corner + 1, corner + columns + 2, corner + columns + 1],
+        0 => [vertex, vertex + 1, vertex + columns + 1],
+        _ => [vertex + 1, vertex + columns + 2, vertex + columns + 1],
     }
 }

@@ -1,4 +1,4 @@
-//! Why there is no figure.
+//! Errors of the benchmarks.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use lvk_samples::app::interrupt;
 use lvk_samples::app::run_error::RunError;
 use lvk_samples::scene::SceneError;
 
-/// Why there is no figure.
+/// An error of a benchmark.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum BenchError {
     #[error(transparent)]
@@ -23,7 +23,7 @@ pub(super) enum BenchError {
     Paper(#[from] PaperError),
     #[error("{call} failed in the hand-written code: {result}")]
     HandWritten { call: &'static str, result: vk::Result },
-    #[error("{device} can trace rays neither by pipeline nor by query; choose another one with --device")]
+    #[error("{device} can trace rays neither by pipeline nor by query; choose another device with --device")]
     NoRayTracing { device: String },
     #[error("{device} wrote no timestamp")]
     NoTimestamp { device: String },
@@ -31,9 +31,9 @@ pub(super) enum BenchError {
     NoCompaction { device: String, tries: u32 },
     #[error("interrupted; {done} of {of} scenes are in {}", page.display())]
     Interrupted { done: usize, of: usize, page: PathBuf },
-    #[error("which benchmark? bench --help lists them")]
+    #[error("no benchmark is named; `bench --help` lists them")]
     NoBenchmark,
-    #[error("no folder to keep trees in: {0}")]
+    #[error("cannot create a folder for the BVH cache: {0}")]
     NoFolder(#[from] std::io::Error),
     #[error(transparent)]
     Listing(#[from] RunError),
@@ -42,12 +42,12 @@ pub(super) enum BenchError {
 }
 
 impl BenchError {
-    /// For `map_err` of a Vulkan call of the hand-written side.
-    pub(super) fn of(call: &'static str) -> impl Fn(vk::Result) -> Self {
+    /// Returns a closure for `map_err` of a Vulkan call of the hand-written code.
+    pub(super) fn hand_written(call: &'static str) -> impl Fn(vk::Result) -> Self {
         move |result| Self::HandWritten { call, result }
     }
 
-    /// 2 when the user can mend it by other arguments or input, 1 for trouble with the device, 130 after Ctrl-C.
+    /// Returns the exit status: 2 for wrong arguments or input, 1 for a device error, 130 after Ctrl-C.
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Interrupted { .. } => interrupt::STATUS,

@@ -1,4 +1,4 @@
-//! An instance as Vulkan reads it.
+//! The instance record that Vulkan reads, `VkAccelerationStructureInstanceKHR`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -9,12 +9,12 @@ pub(super) struct InstanceRecord {
     transform: [f32; 12],
     custom_index_and_mask: u32,
     hit_group_offset_and_flags: u32,
-    /// An address, or for `lvk::DeviceInstances` a place in a list.
+    /// A BLAS address, or for `lvk::DeviceInstances` an index into its BLAS list.
     reference: u64,
 }
 
 impl InstanceRecord {
-    /// An instance that every ray sees, of the first hit group.
+    /// Creates an instance with mask 0xff that uses the first hit group.
     pub(super) fn new(transform: [f32; 12], reference: u64) -> Self {
         const ALL: u32 = 0xff << 24;
         Self { transform, custom_index_and_mask: ALL, hit_group_offset_and_flags: 0, reference }

@@ -1,8 +1,8 @@
 //! The `bench` program measures the costs and gains of `lvk` on the device in use. Every ratio compares two figures of the
 //! same run.
 //!
-//! GPU times come from timestamps, CPU times from the clock of the host. Where two things are compared they take turns,
-//! so that both see the same clocks and temperatures; figures are medians.
+//! GPU times come from timestamp queries, CPU times from the host clock. Compared variants run interleaved, so that clocks and
+//! temperatures are equal for all of them. Figures are medians.
 
 mod args;
 mod batch;

@@ -1,4 +1,4 @@
-//! Times of commands, on the GPU and on the host.
+//! Measures GPU and CPU times of command buffers.
 
 use std::time::Instant;
 
@@ -7,20 +7,20 @@ use lvk::{CommandBuffer, Context, Holder, QueryPoolDesc, QueryPoolHandle};
 use super::error::BenchError;
 use lvk_samples::app::timings;
 
-/// What one submission took, in milliseconds.
+/// Times of one submission, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Timed {
-    /// On the GPU, between the timestamps around what was recorded.
+pub(super) struct SubmissionTimes {
+    /// GPU time between the timestamps around the recorded commands.
     pub(super) gpu: f64,
-    /// On the host, from taking a command buffer until it was submitted.
+    /// CPU time from the acquisition of the command buffer to its submission.
     pub(super) cpu: f64,
-    /// On the host, what the caller records alone.
+    /// CPU time of the caller's recording alone.
     pub(super) record: f64,
-    /// From taking a command buffer until the GPU was done.
+    /// Time from the acquisition of the command buffer until the GPU was done.
     pub(super) total: f64,
 }
 
-/// Times command buffers of one context.
+/// Measures command buffers of one context.
 pub(super) struct Stopwatch {
     ctx: Context,
     pool: Holder<QueryPoolHandle>,
@@ -36,27 +36,27 @@ impl Stopwatch {
         Ok(Self { ctx: ctx.clone(), pool })
     }
 
-    /// Submits what `record` records, with nothing else under way, and waits for it.
+    /// Submits the commands that `record` records and waits for them. No other submission may be pending.
     pub(super) fn time(
         &self,
         record: impl FnOnce(&mut CommandBuffer) -> lvk::Result<()>,
-    ) -> Result<Timed, BenchError> {
+    ) -> Result<SubmissionTimes, BenchError> {
         let start = Instant::now();
         let mut cmd = self.ctx.acquire_command_buffer()?;
         cmd.reset_queries(*self.pool, 0..2)?;
         cmd.write_timestamp(*self.pool, 0)?;
         let before = Instant::now();
         record(&mut cmd)?;
-        let record = since(before);
+        let record = elapsed_ms(before);
         cmd.write_timestamp(*self.pool, 1)?;
         let submission = self.ctx.submit(cmd)?;
-        let cpu = since(start);
+        let cpu = elapsed_ms(start);
         self.ctx.wait(submission)?;
-        let total = since(start);
-        Ok(Timed { gpu: self.read()?, cpu, record, total })
+        let total = elapsed_ms(start);
+        Ok(SubmissionTimes { gpu: self.read_timestamps_ms()?, cpu, record, total })
     }
 
-    fn read(&self) -> Result<f64, BenchError> {
+    fn read_timestamps_ms(&self) -> Result<f64, BenchError> {
         match self.ctx.timestamps_ms(*self.pool, 0, 2)?[..] {
             [Some(begin), Some(end)] => Ok(end - begin),
             _ => Err(BenchError::NoTimestamp { device: self.ctx.capabilities().device_name.clone() }),
@@ -64,19 +64,19 @@ impl Stopwatch {
     }
 }
 
-/// Milliseconds since `start`.
-pub(super) fn since(start: Instant) -> f64 {
+/// Returns the milliseconds since `start`.
+pub(super) fn elapsed_ms(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
-/// The median of one number of each sample; not a number when there are none.
+/// Returns the median of `number` over the samples; NaN for no samples.
 pub(super) fn median_of<T>(samples: &[T], number: impl Fn(&T) -> f64) -> f64 {
     timings::spread(samples.iter().map(number).collect()).map_or(f64::NAN, |spread| spread.median)
 }
 
-/// The medians of all of a submission.
-pub(super) fn median(samples: &[Timed]) -> Timed {
-    Timed {
+/// Returns the median of each time.
+pub(super) fn median(samples: &[SubmissionTimes]) -> SubmissionTimes {
+    SubmissionTimes {
         gpu: median_of(samples, |timed| timed.gpu),
         cpu: median_of(samples, |timed| timed.cpu),
         record: median_of(samples, |timed| timed.record),
@@ -84,32 +84,32 @@ pub(super) fn median(samples: &[Timed]) -> Timed {
     }
 }
 
-/// Runs that do not count, so that clocks are up and memory is there.
+/// Discarded runs, which raise the clocks and allocate memory.
 const WARM_UP_RUNS: u32 = 3;
 
-/// Lets `N` things take turns, `runs` times after a warm-up, the first to go changing from round to round. Answers the
-/// samples of each.
-pub(super) fn take_turns<T, const N: usize>(
+/// Runs `N` variants interleaved, `runs` times each after a warm-up. Each round starts with another variant. Returns the
+/// samples of each variant.
+pub(super) fn interleave<T, const N: usize>(
     runs: u32,
     run: impl FnMut(usize) -> Result<T, BenchError>,
 ) -> Result<[Vec<T>; N], BenchError> {
     let mut samples = std::array::from_fn(|_| Vec::with_capacity(runs as usize));
-    in_turns(runs, &mut samples, run)?;
+    run_interleaved(runs, &mut samples, run)?;
     Ok(samples)
 }
 
-/// As [`take_turns`], for any number of things.
-pub(super) fn all_take_turns<T>(
+/// Like [`interleave`], for `count` variants.
+pub(super) fn interleave_all<T>(
     count: usize,
     runs: u32,
     run: impl FnMut(usize) -> Result<T, BenchError>,
 ) -> Result<Vec<Vec<T>>, BenchError> {
     let mut samples: Vec<_> = (0..count).map(|_| Vec::with_capacity(runs as usize)).collect();
-    in_turns(runs, &mut samples, run)?;
+    run_interleaved(runs, &mut samples, run)?;
     Ok(samples)
 }
 
-fn in_turns<T>(
+fn run_interleaved<T>(
     runs: u32,
     samples: &mut [Vec<T>],
     mut run: impl FnMut(usize) -> Result<T, BenchError>,
@@ -132,9 +132,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everyone_has_as_many_turns_and_the_warm_up_does_not_count() {
+    fn variants_run_equally_often_and_the_warm_up_does_not_count() {
         let mut order = Vec::new();
-        let [a, b] = take_turns(4, |which| {
+        let [a, b] = interleave(4, |which| {
             order.push(which);
             Ok(order.len())
         })

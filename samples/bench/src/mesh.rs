@@ -1,4 +1,4 @@
-//! What is traced: triangles of a file or made by formulas, and their structures.
+//! The traced mesh, from a file or generated, with its buffers and acceleration structures.
 
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, Context,
@@ -11,33 +11,33 @@ use super::synthetic::spheres;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::scene::{Camera, ObjOptions, Scene};
 
-/// Triangles and a view of them.
+/// Triangles with cameras and a light.
 #[derive(Debug, Clone)]
 pub(super) struct Mesh {
     pub(super) name: String,
     pub(super) positions: Vec<[f32; 3]>,
-    /// Three vertices each.
+    /// Three vertex indices each.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// The one to look through.
+    /// The current camera.
     pub(super) camera: Camera,
-    /// All there are.
+    /// All cameras.
     pub(super) cameras: [Camera; 5],
-    /// Where shadow rays go.
+    /// Target of the shadow rays.
     pub(super) light: [f32; 3],
 }
 
 impl Mesh {
-    /// The mesh that the command line names, seen through this camera (1 to 5), or one of so many triangles.
+    /// Loads the mesh that the command line names, with camera `camera` (1 to 5), or generates a mesh.
     pub(super) fn new(args: &MeshArgs, camera: u32, default_triangles: u32) -> Result<Self, BenchError> {
         let Some(path) = &args.scene else {
             return Ok(spheres(args.triangles.unwrap_or(default_triangles)));
         };
         let scene = Scene::from_obj(path, &ObjOptions::default(), &mut Progress::visible())?;
-        Ok(Self::of_scene(scene, camera))
+        Ok(Self::from_scene(scene, camera))
     }
 
-    /// All triangles in the order of the source, whatever order the scene has them in.
-    fn of_scene(scene: Scene, camera: u32) -> Self {
+    /// Takes the triangles of the scene in the order of the source file.
+    fn from_scene(scene: Scene, camera: u32) -> Self {
         let mut numbered: Vec<_> = scene.source_triangles.iter().zip(&scene.triangles).collect();
         numbered.sort_by_key(|(source, _)| **source);
         Self {
@@ -50,13 +50,13 @@ impl Mesh {
         }
     }
 
-    /// For headlines.
+    /// Returns the name and triangle count for headlines.
     pub(super) fn describe(&self) -> String {
-        format!("{}, {} triangles", self.name, super::table::grouped(self.triangles.len() as u64))
+        format!("{}, {} triangles", self.name, super::table::format_grouped(self.triangles.len() as u64))
     }
 }
 
-/// Triangles in memory of the device.
+/// Vertex and index buffers of a mesh.
 pub(super) struct MeshBuffers {
     pub(super) positions: Holder<BufferHandle>,
     pub(super) indices: Holder<BufferHandle>,
@@ -67,14 +67,14 @@ pub(super) struct MeshBuffers {
 impl MeshBuffers {
     pub(super) fn new(ctx: &Context, mesh: &Mesh) -> lvk::Result<Self> {
         Ok(Self {
-            positions: input(ctx, "positions", bytemuck::cast_slice(&mesh.positions))?,
-            indices: input(ctx, "indices", bytemuck::cast_slice(&mesh.triangles))?,
+            positions: create_input_buffer(ctx, "positions", bytemuck::cast_slice(&mesh.positions))?,
+            indices: create_input_buffer(ctx, "indices", bytemuck::cast_slice(&mesh.triangles))?,
             vertex_count: mesh.positions.len() as u32,
             triangle_count: mesh.triangles.len() as u32,
         })
     }
 
-    /// All triangles as one geometry, opaque.
+    /// Returns all triangles as one opaque geometry.
     pub(super) fn geometry(&self) -> BlasGeometry {
         BlasGeometry::Triangles(Triangles::indexed(
             *self.positions,
@@ -84,7 +84,7 @@ impl MeshBuffers {
         ))
     }
 
-    /// A structure of all triangles; not waited for.
+    /// Creates a BLAS of all triangles. Does not wait for the build.
     pub(super) fn blas(
         &self,
         ctx: &Context,
@@ -95,15 +95,15 @@ impl MeshBuffers {
     }
 }
 
-/// A mesh that rays can be traced through.
-pub(super) struct Traceable {
+/// A mesh with a built BLAS and TLAS.
+pub(super) struct BuiltMesh {
     pub(super) blas: Holder<AccelStructHandle>,
     pub(super) tlas: Holder<AccelStructHandle>,
     _buffers: MeshBuffers,
 }
 
-impl Traceable {
-    /// One untransformed instance of a structure with these triangles, built.
+impl BuiltMesh {
+    /// Builds a BLAS of these triangles and a TLAS with one untransformed instance.
     pub(super) fn new(ctx: &Context, buffers: MeshBuffers, order: PrimitiveOrder) -> lvk::Result<Self> {
         let blas = buffers.blas(ctx, BuildFlags::FAST_TRACE, order)?;
         let instances = [TlasInstance::new(*blas)];
@@ -115,8 +115,12 @@ impl Traceable {
     }
 }
 
-/// A buffer that structures are built from.
-pub(super) fn input(ctx: &Context, debug_name: &str, data: &[u8]) -> lvk::Result<Holder<BufferHandle>> {
+/// Creates a buffer with acceleration structure build input.
+pub(super) fn create_input_buffer(
+    ctx: &Context,
+    debug_name: &str,
+    data: &[u8],
+) -> lvk::Result<Holder<BufferHandle>> {
     let usage = BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT;
     ctx.create_buffer(&BufferDesc { usage, data: Some(data), debug_name, ..BufferDesc::default() })
 }
@@ -126,12 +130,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scene_comes_in_the_order_of_its_source() {
+    fn a_mesh_has_the_triangle_order_of_the_source_file() {
         let mut scene = Scene::procedural();
         let count = scene.triangles.len();
         scene.source_triangles = (0..count as u32).rev().collect();
         let (first, last) = (scene.triangles[0], scene.triangles[count - 1]);
-        let mesh = Mesh::of_scene(scene, 2);
+        let mesh = Mesh::from_scene(scene, 2);
         assert_eq!(
             (mesh.triangles[0], mesh.triangles[count - 1], mesh.triangles.len()),
             (last, first, count)

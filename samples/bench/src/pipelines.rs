@@ -1,14 +1,14 @@
-//! The benchmarks' pipelines as data.
+//! Descriptions of the benchmarks' pipelines.
 
 use lvk::ShaderStage;
 
 use lvk_samples::pipelines::{SamplePipeline, SampleStage};
 use lvk_samples::shaders::bench as texts;
 
-/// The folder of the shaders.
+/// Folder of the shaders.
 pub(super) const SAMPLE: &str = "bench";
 
-/// Every pipeline of the benchmarks.
+/// Returns every pipeline of the benchmarks.
 #[must_use]
 pub fn pipelines() -> Vec<SamplePipeline> {
     vec![
@@ -23,7 +23,7 @@ fn tracing(name: &'static str, defines: &'static [(&'static str, &'static str)])
     SamplePipeline { name, stages: stages(defines).to_vec(), color: Vec::new(), depth: None }
 }
 
-/// Two ray generation shaders, two miss shaders, one hit shader: for primary and for shadow rays.
+/// Returns the stages for primary and shadow rays: two ray generation shaders, two miss shaders, one closest-hit shader.
 pub(super) fn stages(defines: &'static [(&'static str, &'static str)]) -> [SampleStage; 5] {
     let stage = |stage, text, name| SampleStage { stage, text, defines, name };
     [
@@ -39,7 +39,7 @@ fn compute(name: &'static str, defines: &'static [(&'static str, &'static str)])
     SamplePipeline { name, stages: vec![query_stage(defines)], color: Vec::new(), depth: None }
 }
 
-/// Rays by query, primary ones unless defined otherwise.
+/// Returns the compute stage that traces by ray query: primary rays, or shadow rays by `defines`.
 pub(super) fn query_stage(defines: &'static [(&'static str, &'static str)]) -> SampleStage {
     SampleStage { stage: ShaderStage::Compute, text: texts::RAYS_COMP, defines, name: "rays.comp" }
 }

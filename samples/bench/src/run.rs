@@ -1,4 +1,4 @@
-//! The program on the command line.
+//! Runs the benchmark that the command line selects.
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -10,11 +10,11 @@ use super::table::Table;
 use super::{batch, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
 use lvk_samples::app::{device, scene_list};
 
-/// Does what the command line says. Prints tables to standard output, errors in one line to standard error; the
-/// status is 0 when everything was measured, 1 for trouble with the device, 2 for wrong input.
+/// Runs the selected benchmark. Prints tables to standard output, and an error in one line to standard error. The exit status
+/// is 0 on success, 1 for a device error, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &BenchArgs) -> ExitCode {
-    match answered(args) {
+    match execute(args) {
         Ok(text) => {
             let _ = write!(std::io::stdout(), "{text}");
             ExitCode::SUCCESS
@@ -26,7 +26,7 @@ pub fn run(args: &BenchArgs) -> ExitCode {
     }
 }
 
-fn answered(args: &BenchArgs) -> Result<String, BenchError> {
+fn execute(args: &BenchArgs) -> Result<String, BenchError> {
     if let Some(folder) = &args.list_scenes {
         return Ok(scene_list::listing(Some(std::path::Path::new(folder))) + "\n");
     }
@@ -35,11 +35,11 @@ fn answered(args: &BenchArgs) -> Result<String, BenchError> {
         return Ok(String::new());
     }
     let benchmark = args.benchmark.as_ref().ok_or(BenchError::NoBenchmark)?;
-    let tables = measured(args, benchmark)?;
+    let tables = measure(args, benchmark)?;
     Ok(tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n"))
 }
 
-fn measured(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchError> {
+fn measure(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchError> {
     let setup = Setup::new(args)?;
     let tables = match benchmark {
         Benchmark::Batch(args) => vec![batch::measure(&setup, args)?],

@@ -1,4 +1,4 @@
-//! The device to measure, and how much to measure on it.
+//! Opens the measured device, and selects default sizes for it.
 
 use std::path::{Path, PathBuf};
 
@@ -6,28 +6,28 @@ use lvk::{
     Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, ValidationMode, ValidationSink,
 };
 
-use super::args::{BenchArgs, Benchmark, PictureArgs};
+use super::args::{BenchArgs, Benchmark, ImageSizeArgs};
 use super::error::BenchError;
 use lvk_dev_driver::{DriverRequest, prepare};
 use lvk_samples::app::ray_args::RayTracing;
 use lvk_samples::hybrid::RayPath;
 
-/// How to open the device, and what the command line says to all benchmarks.
+/// Options that all benchmarks share, and the settings to open the device.
 pub(super) struct Setup {
     loader: Option<PathBuf>,
     device: Option<String>,
     profile: DeviceProfile,
-    /// Who walks the trees of ray queries: the driver, unless software is to be measured.
+    /// Implementation of ray queries: the driver's, unless the software implementation is measured.
     ray_query: RayQueryRequest,
     runs: Option<u32>,
     quick: bool,
-    /// Where messages go, if the validation layer is to run.
+    /// Receives validation messages; `None` without validation.
     sink: Option<ValidationSink>,
 }
 
-/// Values for a smoke test, for a driver on the CPU, and for a GPU.
+/// Default values for a smoke test, for a driver on the CPU, and for a GPU.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Choice<T> {
+pub(super) struct DefaultBy<T> {
     pub(super) quick: T,
     pub(super) cpu: T,
     pub(super) gpu: T,
@@ -40,41 +40,41 @@ impl Setup {
             loader: driver.loader,
             device: args.device.clone(),
             profile: args.profile.clone().unwrap_or_default(),
-            ray_query: ray_query(args.benchmark.as_ref()),
+            ray_query: ray_query_request(args.benchmark.as_ref()),
             runs: args.runs,
             quick: args.quick,
             sink: args.validate.then(ValidationSink::default),
         })
     }
 
-    /// The device, as the command line has it.
+    /// Opens the device that the command line selects.
     pub(super) fn open(&self) -> Result<Context, BenchError> {
         self.open_with(ContextDesc::default().scratch_budget_bytes)
     }
 
-    /// The same, but what is recorded does nothing.
-    pub(super) fn open_silent(&self) -> Result<Context, BenchError> {
+    /// Opens the device with command functions that do nothing.
+    pub(super) fn open_null_device(&self) -> Result<Context, BenchError> {
         Ok(lvk::test_hooks::silent_context(&self.desc(&self.profile))?)
     }
 
-    /// The same with this budget for scratch memory.
+    /// Opens the device with this scratch budget.
     pub(super) fn open_with(&self, scratch_budget_bytes: u64) -> Result<Context, BenchError> {
         self.open_profile(scratch_budget_bytes, &self.profile, 0)
     }
 
-    /// The device with room for so many textures at least.
+    /// Opens the device with at least `textures` texture slots.
     pub(super) fn open_for_textures(&self, textures: u32) -> Result<Context, BenchError> {
         self.open_profile(ContextDesc::default().scratch_budget_bytes, &self.profile, textures)
     }
 
-    /// The same with at most so many primitives in a structure.
+    /// Opens the device with at most `max_blas_primitives` primitives per BLAS.
     pub(super) fn open_limited(&self, max_blas_primitives: u64) -> Result<Context, BenchError> {
         let max_blas_primitives = max_blas_primitives.min(self.profile.max_blas_primitives);
         let profile = DeviceProfile { max_blas_primitives, ..self.profile.clone() };
         self.open_profile(ContextDesc::default().scratch_budget_bytes, &profile, 0)
     }
 
-    /// The device with pipelines as asked for, ray queries by whom, and built trees kept in this folder.
+    /// Opens the device with these requests for ray tracing pipelines and ray queries, and with this folder as BVH cache.
     pub(super) fn open_tracing(
         &self,
         ray_tracing_pipeline: FeatureRequest,
@@ -109,7 +109,7 @@ impl Setup {
         }
     }
 
-    /// None beside queries in software: the device's own structures would be built for nothing.
+    /// Disables ray tracing pipelines beside software ray queries: the driver's acceleration structures would be unused.
     fn pipeline(&self) -> FeatureRequest {
         match self.ray_query {
             RayQueryRequest::Software => FeatureRequest::Off,
@@ -117,13 +117,13 @@ impl Setup {
         }
     }
 
-    /// What the validation layer said so far; contexts should be gone, as their end is checked too.
+    /// Takes the validation messages. Drop all contexts first, as their destruction is validated, too.
     pub(super) fn validation_messages(&self) -> Vec<String> {
         self.sink.iter().flat_map(ValidationSink::take).map(|message| message.to_string()).collect()
     }
 
-    /// What suits the device.
-    pub(super) fn choose<T>(&self, ctx: &Context, choice: Choice<T>) -> T {
+    /// Returns the default value for the device.
+    pub(super) fn default_for<T>(&self, ctx: &Context, choice: DefaultBy<T>) -> T {
         match (self.quick, ctx.capabilities().is_cpu) {
             (true, _) => choice.quick,
             (false, true) => choice.cpu,
@@ -131,42 +131,43 @@ impl Setup {
         }
     }
 
-    /// Runs of each measurement: as the user says, else what suits the device.
-    pub(super) fn runs(&self, ctx: &Context, choice: Choice<u32>) -> u32 {
-        self.runs.unwrap_or_else(|| self.choose(ctx, choice))
+    /// Returns the number of runs: the user's, or the default for the device.
+    pub(super) fn runs(&self, ctx: &Context, choice: DefaultBy<u32>) -> u32 {
+        self.runs.unwrap_or_else(|| self.default_for(ctx, choice))
     }
 
-    /// Width and height of pictures: as the user says, else what suits the device.
-    pub(super) fn picture_size(&self, ctx: &Context, args: &PictureArgs) -> [u32; 2] {
-        let [width, height] = self.choose(ctx, Choice { quick: [32, 18], cpu: [160, 90], gpu: [1280, 720] });
+    /// Returns the image size: the user's, or the default for the device.
+    pub(super) fn image_size(&self, ctx: &Context, args: &ImageSizeArgs) -> [u32; 2] {
+        let [width, height] =
+            self.default_for(ctx, DefaultBy { quick: [32, 18], cpu: [160, 90], gpu: [1280, 720] });
         [args.width.unwrap_or(width), args.height.unwrap_or(height)]
     }
 
-    /// Whether figures mean little, because sizes are tiny or the validation layer is at work.
-    pub(super) fn is_rehearsal(&self) -> bool {
+    /// True if times are not meaningful, because sizes are tiny or validation is on.
+    pub(super) fn is_smoke_test(&self) -> bool {
         self.quick || self.sink.is_some()
     }
 
-    /// The title of a table about `what`.
+    /// Returns the headline of a table about `what`, with device and driver.
     pub(super) fn headline(&self, ctx: &Context, what: &str) -> String {
         let caps = ctx.capabilities();
         let (major, minor, patch) = caps.api_version;
         let driver = format!("{} {}", caps.driver_name, caps.driver_info);
-        let quick = if self.is_rehearsal() { " (a rehearsal: the figures mean little)" } else { "" };
+        let quick = if self.is_smoke_test() { " (smoke test: times are not meaningful)" } else { "" };
         let profile = caps.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
         let driver = driver.trim_end();
         format!("## {what}{quick}\n\n{}{profile}; {driver}, Vulkan {major}.{minor}.{patch}", caps.device_name)
     }
 }
 
-fn ray_query(benchmark: Option<&Benchmark>) -> RayQueryRequest {
+fn ray_query_request(benchmark: Option<&Benchmark>) -> RayQueryRequest {
     match benchmark {
         Some(Benchmark::Paper(paper)) if paper.rt == RayTracing::Software => RayQueryRequest::Software,
         _ => RayQueryRequest::HardwareIfPresent,
     }
 }
 
-/// By what the device can trace rays, never nothing, and a note on what it cannot.
+/// Returns the ray tracing paths of the device, at least one, and a note on the missing path.
 ///
 /// # Errors
 /// [`BenchError::NoRayTracing`].
@@ -185,7 +186,7 @@ pub(super) fn ray_paths(ctx: &Context) -> Result<(Vec<RayPath>, Option<String>),
     }
 }
 
-/// For tables.
+/// Returns the name of a path for tables.
 pub(super) fn path_name(path: RayPath) -> &'static str {
     match path {
         RayPath::Pipeline => "pipeline",

@@ -1,8 +1,8 @@
-//! A table in markdown, with a headline above and notes below.
+//! A Markdown table with a headline and notes.
 
 use std::fmt;
 
-/// A table in markdown, with a headline above and notes below. Columns after the first are set to the right.
+/// A Markdown table with a headline above and notes below. Columns after the first are right-aligned.
 pub(super) struct Table {
     headline: String,
     rows: Vec<Vec<String>>,
@@ -10,21 +10,21 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// `columns` are the heads of the columns.
+    /// Creates an empty table with these column heads.
     pub(super) fn new(headline: String, columns: &[&str]) -> Self {
         let head = columns.iter().map(|head| (*head).to_owned()).collect();
         Self { headline, rows: vec![head], notes: Vec::new() }
     }
 
-    /// Adds a row; missing cells stay empty.
-    pub(super) fn row(&mut self, name: impl Into<String>, cells: impl IntoIterator<Item = String>) {
+    /// Adds a row. Missing cells stay empty.
+    pub(super) fn add_row(&mut self, name: impl Into<String>, cells: impl IntoIterator<Item = String>) {
         let row: Vec<String> = std::iter::once(name.into()).chain(cells).collect();
         debug_assert!(row.len() <= self.rows[0].len(), "{row:?}");
         self.rows.push(row);
     }
 
     /// Adds a line below the table.
-    pub(super) fn note(&mut self, text: impl Into<String>) {
+    pub(super) fn add_note(&mut self, text: impl Into<String>) {
         self.notes.push(text.into());
     }
 
@@ -63,23 +63,23 @@ impl fmt::Display for Table {
     }
 }
 
-/// Milliseconds, to the microsecond.
-pub(super) fn ms(milliseconds: f64) -> String {
+/// Formats milliseconds with microsecond precision.
+pub(super) fn format_ms(milliseconds: f64) -> String {
     format!("{milliseconds:.3} ms")
 }
 
-/// How many times.
-pub(super) fn times(ratio: f64) -> String {
+/// Formats a ratio, for example `1.250x`.
+pub(super) fn format_ratio(ratio: f64) -> String {
     format!("{ratio:.3}x")
 }
 
-/// Bytes, by thousands.
-pub(super) fn bytes(count: u64) -> String {
-    format!("{} B", grouped(count))
+/// Formats a byte count with thousands separators.
+pub(super) fn format_bytes(count: u64) -> String {
+    format!("{} B", format_grouped(count))
 }
 
-/// A number with a comma after every three digits.
-pub(super) fn grouped(number: u64) -> String {
+/// Formats an integer with thousands separators.
+pub(super) fn format_grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::with_capacity(digits.len() * 4 / 3);
     for (place, digit) in digits.chars().enumerate() {
@@ -98,9 +98,9 @@ mod tests {
     #[test]
     fn tables_are_aligned_markdown() {
         let mut table = Table::new("## title".to_owned(), &["what", "GPU"]);
-        table.row("a build", [ms(1.5)]);
-        table.row("ratio", []);
-        table.note("measured");
+        table.add_row("a build", [format_ms(1.5)]);
+        table.add_row("ratio", []);
+        table.add_note("measured");
         let expected = "## title\n\n| what    |      GPU |\n|---------|---------:|\n| a build | 1.500 ms |\n\
                         | ratio   |          |\n\n- measured\n";
         assert_eq!(table.to_string(), expected);
@@ -108,8 +108,8 @@ mod tests {
 
     #[test]
     fn digits_are_grouped_by_three() {
-        let grouped = [0, 999, 1000, 123_456, 1_234_567].map(grouped);
+        let grouped = [0, 999, 1000, 123_456, 1_234_567].map(format_grouped);
         assert_eq!(grouped, ["0", "999", "1,000", "123,456", "1,234,567"]);
-        assert_eq!((bytes(1024), times(2.0)), ("1,024 B".to_owned(), "2.000x".to_owned()));
+        assert_eq!((format_bytes(1024), format_ratio(2.0)), ("1,024 B".to_owned(), "2.000x".to_owned()));
     }
 }

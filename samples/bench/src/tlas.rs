@@ -1,4 +1,4 @@
-//! Updates of a top-level structure, against a copy of the bytes and the driver's own build.
+//! TLAS updates, compared with a memory copy plus the driver's build.
 
 use std::rc::Rc;
 use std::time::Instant;
@@ -12,61 +12,70 @@ use lvk::{
 
 use super::args::TlasArgs;
 use super::error::BenchError;
-use super::hand_written::{RawCommands, RawDevice, RawStructure, instance_geometry};
+use super::hand_written::{RawAccelStruct, RawCommands, RawDevice, instance_geometry};
 use super::instance_record::InstanceRecord;
-use super::measure::{Stopwatch, Timed, median, since, take_turns};
+use super::measure::{Stopwatch, SubmissionTimes, elapsed_ms, interleave, median};
 use super::mesh::MeshBuffers;
-use super::setup::{Choice, Setup};
+use super::setup::{DefaultBy, Setup};
 use super::synthetic::spheres;
-use super::table::{Table, grouped, ms, times};
+use super::table::{Table, format_grouped, format_ms, format_ratio};
 
-/// Triangles of the mesh that all instances show.
+/// Triangles of the mesh that all instances reference.
 const MESH_TRIANGLES: u32 = 1000;
 
-/// Compares updates by `lvk` with a copy of the bytes and the driver's own build, for several numbers of instances.
+/// Compares updates by `lvk` with a memory copy plus the driver's build, for several instance counts.
 pub(super) fn measure(setup: &Setup, args: &TlasArgs) -> Result<Table, BenchError> {
     let ctx = setup.open()?;
-    let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 5, gpu: 30 });
+    let runs = setup.runs(&ctx, DefaultBy { quick: 1, cpu: 5, gpu: 30 });
     let default: &[u32] =
-        setup.choose(&ctx, Choice { quick: &[2000], cpu: &[100_000], gpu: &[100_000, 1_000_000] });
+        setup.default_for(&ctx, DefaultBy { quick: &[2000], cpu: &[100_000], gpu: &[100_000, 1_000_000] });
     let counts = if args.instances.is_empty() { default } else { &args.instances };
-    let columns =
-        ["", "record or copy (CPU)", "build (GPU)", "sum", "until done", "ratio of sums", "ratio until done"];
+    let columns = [
+        "",
+        "record or copy (CPU)",
+        "build (GPU)",
+        "sum",
+        "until the GPU is done",
+        "ratio of sums",
+        "ratio until done",
+    ];
     let mut table = Table::new(setup.headline(&ctx, "tlas: updates"), &columns);
     for count in counts {
-        let bench = Bench::new(&ctx, *count)?;
-        bench.rebuilds(runs, &mut table)?;
-        bench.refits(runs, &mut table)?;
+        let bench = TlasBench::new(&ctx, *count)?;
+        bench.add_rebuild_rows(runs, &mut table)?;
+        bench.add_refit_rows(runs, &mut table)?;
     }
-    table.note(format!("medians of {runs} runs, taken in turns; all instances show one mesh"));
-    table.note("the plain copy writes 64 bytes an instance into mapped memory, as one piece; the driver builds from there");
-    table.note("limit: the update from the host at most 1.3 times the plain copy and the driver's own build");
+    table.add_note(format!("medians of {runs} interleaved runs; all instances reference one mesh"));
+    table.add_note("the plain copy writes 64 bytes per instance into mapped memory in one call; the driver builds from there");
+    table.add_note(
+        "limit: the update from the host takes at most 1.3 times the plain copy and the driver's build",
+    );
     Ok(table)
 }
 
-/// One number of instances, in every form.
-struct Bench {
+/// The inputs of all variants for one instance count.
+struct TlasBench {
     ctx: Context,
     stopwatch: Stopwatch,
     commands: RawCommands,
     device: Rc<RawDevice>,
     blas: Holder<AccelStructHandle>,
     instances: Vec<TlasInstance>,
-    /// As Vulkan reads them.
+    /// The instance records with BLAS addresses.
     records: Vec<InstanceRecord>,
-    /// Mapped memory for those.
+    /// Host-visible buffer for `records`.
     mapped: Holder<BufferHandle>,
-    /// The same records with places instead of addresses, in memory of the device.
+    /// Device-local records with indices into the BLAS list instead of addresses.
     on_device: Holder<BufferHandle>,
     _buffers: MeshBuffers,
 }
 
-impl Bench {
+impl TlasBench {
     fn new(ctx: &Context, count: u32) -> Result<Self, BenchError> {
         let buffers = MeshBuffers::new(ctx, &spheres(MESH_TRIANGLES))?;
         let blas = buffers.blas(ctx, BuildFlags::FAST_TRACE, PrimitiveOrder::Given)?;
         let address = ctx.accel_struct_addresses(*blas)?[0];
-        let transforms: Vec<_> = (0..count).map(|number| transform_of(number, count)).collect();
+        let transforms: Vec<_> = (0..count).map(|number| instance_transform(number, count)).collect();
         let instance =
             |transform: &[f32; 12]| TlasInstance { transform: *transform, ..TlasInstance::new(*blas) };
         let records = |reference| transforms.iter().map(move |rows| InstanceRecord::new(*rows, reference));
@@ -114,18 +123,18 @@ impl Bench {
         Ok(tlas)
     }
 
-    fn raw(&self, flags: vk::BuildAccelerationStructureFlagsKHR) -> Result<RawStructure, BenchError> {
+    fn raw(&self, flags: vk::BuildAccelerationStructureFlagsKHR) -> Result<RawAccelStruct, BenchError> {
         let geometry = instance_geometry(self.ctx.buffer_address(*self.mapped)?);
-        RawStructure::new(&self.device, geometry, self.count(), flags)
+        RawAccelStruct::new(&self.device, geometry, self.count(), flags)
     }
 
-    /// Copies the records into mapped memory and has the driver build from there.
-    fn plain(&self, build: impl FnOnce(vk::CommandBuffer)) -> Result<Timed, BenchError> {
+    /// Copies the records into mapped memory and runs the driver's build.
+    fn copy_and_build(&self, build: impl FnOnce(vk::CommandBuffer)) -> Result<SubmissionTimes, BenchError> {
         let start = Instant::now();
         self.ctx.upload_buffer(*self.mapped, 0, bytemuck::cast_slice(&self.records))?;
-        let copy = since(start);
+        let copy = elapsed_ms(start);
         let timed = self.commands.time(build)?;
-        Ok(Timed { record: copy, total: copy + timed.total, ..timed })
+        Ok(SubmissionTimes { record: copy, total: copy + timed.total, ..timed })
     }
 
     fn update_on_device(
@@ -140,51 +149,51 @@ impl Bench {
         cmd.update_tlas_from_buffer(tlas, &instances, mode)
     }
 
-    fn rebuilds(&self, runs: u32, table: &mut Table) -> Result<(), BenchError> {
+    fn add_rebuild_rows(&self, runs: u32, table: &mut Table) -> Result<(), BenchError> {
         let tlas = self.tlas(BuildFlags::FAST_TRACE)?;
         let raw = self.raw(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)?;
         let mode = BuildMode::Rebuild;
-        let samples: [Vec<_>; 3] = take_turns(runs, |which| match which {
-            0 => self.plain(|commands| raw.build(commands)),
+        let samples: [Vec<_>; 3] = interleave(runs, |which| match which {
+            0 => self.copy_and_build(|commands| raw.build(commands)),
             1 => self.stopwatch.time(|cmd| cmd.update_tlas(*tlas, &self.instances, mode)),
             _ => self.stopwatch.time(|cmd| self.update_on_device(cmd, *tlas, mode)),
         })?;
-        self.rows("rebuild", samples, table);
+        self.add_rows("rebuild", samples, table);
         Ok(())
     }
 
-    fn refits(&self, runs: u32, table: &mut Table) -> Result<(), BenchError> {
+    fn add_refit_rows(&self, runs: u32, table: &mut Table) -> Result<(), BenchError> {
         use vk::BuildAccelerationStructureFlagsKHR as Raw;
         let tlas = self.tlas(BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE)?;
         let raw = self.raw(Raw::PREFER_FAST_TRACE | Raw::ALLOW_UPDATE)?;
-        self.plain(|commands| raw.build(commands))?;
+        self.copy_and_build(|commands| raw.build(commands))?;
         let mode = BuildMode::Refit;
-        let samples: [Vec<_>; 3] = take_turns(runs, |which| match which {
-            0 => self.plain(|commands| raw.refit(commands)),
+        let samples: [Vec<_>; 3] = interleave(runs, |which| match which {
+            0 => self.copy_and_build(|commands| raw.refit(commands)),
             1 => self.stopwatch.time(|cmd| cmd.update_tlas(*tlas, &self.instances, mode)),
             _ => self.stopwatch.time(|cmd| self.update_on_device(cmd, *tlas, mode)),
         })?;
-        self.rows("refit", samples, table);
+        self.add_rows("refit", samples, table);
         Ok(())
     }
 
-    fn rows(&self, mode: &str, samples: [Vec<Timed>; 3], table: &mut Table) {
+    fn add_rows(&self, mode: &str, samples: [Vec<SubmissionTimes>; 3], table: &mut Table) {
         let medians = samples.map(|samples| median(&samples));
         let names = ["plain copy + driver", "lvk, from the host", "lvk, from a buffer"];
-        let sum = |timed: &Timed| timed.record + timed.gpu;
+        let sum = |timed: &SubmissionTimes| timed.record + timed.gpu;
         for (name, timed) in names.iter().zip(&medians) {
-            let name = format!("{mode} of {}: {name}", grouped(u64::from(self.count())));
+            let name = format!("{mode} of {}: {name}", format_grouped(u64::from(self.count())));
             let ratios = [sum(timed) / sum(&medians[0]), timed.total / medians[0].total];
             let figures = [timed.record, timed.gpu, sum(timed), timed.total];
-            table.row(name, figures.map(ms).into_iter().chain(ratios.map(times)));
+            table.add_row(name, figures.map(format_ms).into_iter().chain(ratios.map(format_ratio)));
         }
     }
 }
 
-/// A turned and shrunken instance in a cube of them.
-pub(super) fn transform_of(number: u32, count: u32) -> [f32; 12] {
+/// Returns the transform of a rotated and scaled instance in a cube of instances.
+pub(super) fn instance_transform(number: u32, count: u32) -> [f32; 12] {
     let side = f64::from(count).cbrt().ceil() as u32;
-    let place = [number % side, number / side % side, number / side / side].map(|cell| 20.0 * cell as f32);
+    let position = [number % side, number / side % side, number / side / side].map(|cell| 20.0 * cell as f32);
     let turn = Quat::from_rotation_y(0.37 * number as f32);
-    transform_rows(&Affine3A::from_scale_rotation_translation(Vec3::splat(0.5), turn, place.into()))
+    transform_rows(&Affine3A::from_scale_rotation_translation(Vec3::splat(0.5), turn, position.into()))
 }

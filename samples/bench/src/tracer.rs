@@ -1,4 +1,4 @@
-//! Traces the primary rays of a picture, and a shadow ray from where each hit: by pipeline or by query.
+//! Traces the primary rays of an image and a shadow ray from each hit, by ray tracing pipeline or by ray query.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
 use glam::Vec3;
@@ -14,23 +14,23 @@ use lvk_samples::hybrid::RayPath;
 use lvk_samples::pipelines::SampleStage;
 use lvk_samples::shaders::bench as texts;
 
-/// Side of a work group in pixels (`shaders/bench/rays.comp.glsl`).
-const GROUP: u32 = 8;
+/// Side of a workgroup in pixels (`shaders/bench/rays.comp.glsl`).
+const WORKGROUP_SIDE: u32 = 8;
 
-/// Which rays.
+/// Kind of rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Rays {
-    /// From the camera, one a pixel.
+pub(super) enum RayKind {
+    /// One ray per pixel from the camera.
     Primary,
-    /// From where those hit to the light.
+    /// One ray from each hit to the light.
     Shadow,
 }
 
-impl Rays {
-    /// In the order they must be traced.
+impl RayKind {
+    /// Both kinds, in tracing order.
     pub(super) const BOTH: [Self; 2] = [Self::Primary, Self::Shadow];
 
-    /// For tables.
+    /// Returns the name for tables.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Primary => "primary rays",
@@ -39,13 +39,13 @@ impl Rays {
     }
 }
 
-/// What a primary ray hit (`Hit` in `shaders/bench/view.glsl`).
+/// The hit of a primary ray (`Hit` in `shaders/bench/view.glsl`).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct Hit {
-    /// Distance from the eye; negative where the ray left the scene.
+    /// Distance from the eye; negative for a miss.
     pub(super) t: f32,
-    /// Place in the list of triangles.
+    /// Index of the triangle.
     pub(super) primitive: u32,
 }
 
@@ -64,8 +64,8 @@ pub(super) struct View {
     light: [f32; 3],
 }
 
-/// Results of a picture, and the push constants that name them.
-pub(super) struct Picture {
+/// Result buffers of an image, and the push constants that refer to them.
+pub(super) struct TracedImage {
     ctx: Context,
     hits: Holder<BufferHandle>,
     lit: Holder<BufferHandle>,
@@ -73,7 +73,7 @@ pub(super) struct Picture {
     pub(super) view: View,
 }
 
-/// Pipelines of one path.
+/// The pipelines of one ray tracing path.
 pub(super) struct Tracer {
     pipelines: Pipelines,
 }
@@ -83,8 +83,8 @@ enum Pipelines {
     Compute { primary: Holder<ComputePipelineHandle>, shadow: Holder<ComputePipelineHandle> },
 }
 
-impl Picture {
-    /// A picture of `size` pixels by the mesh's camera. `tlas` is the number of the structure in shaders.
+impl TracedImage {
+    /// Creates buffers for an image of `size` pixels by the mesh's camera. `tlas` is the TLAS index in shaders.
     pub(super) fn new(ctx: &Context, mesh: &Mesh, size: [u32; 2], tlas: u32) -> lvk::Result<Self> {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let buffer = |size_bytes, debug_name| {
@@ -97,31 +97,31 @@ impl Picture {
         Ok(Self { ctx: ctx.clone(), hits, lit, size, view })
     }
 
-    /// What the primary rays hit. Waits.
+    /// Downloads the hits of the primary rays.
     pub(super) fn hits(&self) -> lvk::Result<Vec<Hit>> {
         let mut hits = vec![Hit::zeroed(); (self.size[0] * self.size[1]) as usize];
         self.ctx.download_buffer(*self.hits, 0, bytemuck::cast_slice_mut(&mut hits))?;
         Ok(hits)
     }
 
-    /// For each pixel, 1 where its shadow ray reached the light, else 0. Waits.
+    /// Downloads one number per pixel: 1 if the shadow ray reached the light, else 0.
     pub(super) fn lit(&self) -> lvk::Result<Vec<u32>> {
         let mut lit = vec![0; (self.size[0] * self.size[1]) as usize];
         self.ctx.download_buffer(*self.lit, 0, bytemuck::cast_slice_mut(&mut lit))?;
         Ok(lit)
     }
 
-    /// How many rays it takes. Waits; shadow rays are known once the primary ones are traced.
-    pub(super) fn ray_count(&self, rays: Rays) -> lvk::Result<usize> {
+    /// Returns the number of rays. Downloads the hits; trace the primary rays first.
+    pub(super) fn ray_count(&self, rays: RayKind) -> lvk::Result<usize> {
         let hits = self.hits()?;
         Ok(match rays {
-            Rays::Primary => hits.len(),
-            Rays::Shadow => hits.iter().filter(|hit| hit.t >= 0.0).count(),
+            RayKind::Primary => hits.len(),
+            RayKind::Shadow => hits.iter().filter(|hit| hit.t >= 0.0).count(),
         })
     }
 
-    /// Number of pixels in which two pictures show different distances (by more than 1e-5 of them), triangles or light.
-    pub(super) fn differing(&self, other: &Self) -> lvk::Result<usize> {
+    /// Counts the pixels whose distances (by more than 1e-5, relative), triangles or shadows differ.
+    pub(super) fn count_differing_pixels(&self, other: &Self) -> lvk::Result<usize> {
         let (hits, others) = (self.hits()?, other.hits()?);
         let (lit, other_lit) = (self.lit()?, other.lit()?);
         let same = |(a, b): (&Hit, &Hit)| a.primitive == b.primitive && (a.t - b.t).abs() <= 1e-5 * a.t.abs();
@@ -165,8 +165,8 @@ impl Tracer {
         Ok(Self { pipelines })
     }
 
-    /// A tracer by pipeline of words that were compiled before, one for each of [`stages`].
-    pub(super) fn of_words(
+    /// Creates a ray tracing pipeline from compiled SPIR-V, one module for each of [`stages`].
+    pub(super) fn from_spirv(
         ctx: &Context,
         stages: &[SampleStage; 5],
         words: &[Vec<u32>],
@@ -179,42 +179,50 @@ impl Tracer {
         Ok(Self { pipelines: Pipelines::Tracing(tracing_pipeline(ctx, &modules?)?) })
     }
 
-    /// Records a trace of the picture. Shadow rays need the primary ones before them, in any submission.
-    pub(super) fn record(&self, cmd: &mut CommandBuffer, picture: &Picture, rays: Rays) -> lvk::Result<()> {
-        let [width, height] = picture.size;
-        let writes = [*picture.hits, *picture.lit];
+    /// Records a trace of the image. Trace the primary rays before the shadow rays.
+    pub(super) fn record(
+        &self,
+        cmd: &mut CommandBuffer,
+        image: &TracedImage,
+        rays: RayKind,
+    ) -> lvk::Result<()> {
+        let [width, height] = image.size;
+        let writes = [*image.hits, *image.lit];
         let dependencies = match rays {
-            Rays::Primary => Dependencies { buffers: &writes[..1], ..Dependencies::default() },
-            Rays::Shadow => {
+            RayKind::Primary => Dependencies { buffers: &writes[..1], ..Dependencies::default() },
+            RayKind::Shadow => {
                 Dependencies { read_buffers: &writes[..1], buffers: &writes[1..], ..Dependencies::default() }
             }
         };
         match &self.pipelines {
             Pipelines::Tracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
-                cmd.push_constants(&picture.view)?;
+                cmd.push_constants(&image.view)?;
                 cmd.trace_rays_with(rays as u32, [width, height, 1], &dependencies)
             }
             Pipelines::Compute { primary, shadow } => {
-                cmd.bind_compute_pipeline(if rays == Rays::Primary { **primary } else { **shadow })?;
-                cmd.push_constants(&picture.view)?;
-                cmd.dispatch([width.div_ceil(GROUP), height.div_ceil(GROUP), 1], &dependencies)
+                cmd.bind_compute_pipeline(if rays == RayKind::Primary { **primary } else { **shadow })?;
+                cmd.push_constants(&image.view)?;
+                cmd.dispatch(
+                    [width.div_ceil(WORKGROUP_SIDE), height.div_ceil(WORKGROUP_SIDE), 1],
+                    &dependencies,
+                )
             }
         }
     }
 }
 
-/// A pipeline of modules in the order of [`stages`].
+/// Creates a pipeline from modules in the order of [`stages`].
 fn tracing_pipeline(
     ctx: &Context,
     modules: &[Holder<ShaderModuleHandle>],
 ) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let of = |places: std::ops::Range<usize>| -> Vec<ShaderModuleHandle> {
-        modules[places].iter().map(Holder::handle).collect()
+    let handles = |range: std::ops::Range<usize>| -> Vec<ShaderModuleHandle> {
+        modules[range].iter().map(Holder::handle).collect()
     };
     ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &of(0..2),
-        miss: &of(2..4),
+        ray_gen: &handles(0..2),
+        miss: &handles(2..4),
         hit_groups: &[HitGroup { closest_hit: Some(modules[4].handle()), ..HitGroup::default() }],
         debug_name: "bench rays",
         ..RayTracingPipelineDesc::default()

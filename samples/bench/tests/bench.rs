@@ -1,11 +1,11 @@
-//! The `bench` program as a user meets it: every benchmark runs in its smallest form and prints its figures.
+//! Runs every benchmark of the `bench` program in its smallest form and checks the printed figures.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use std::process::{Command, Output};
 
 use lvk_samples::app::metrics::compare;
 
-/// Standard output of the program, which must succeed, with a silent validation layer.
+/// Returns the standard output of a successful run without validation messages.
 fn table(args: &[&str]) -> String {
     let args = [args, &["--validate"]].concat();
     let (status, out, err) = outcome(&args);
@@ -33,7 +33,7 @@ fn devices_and_scenes_are_listed_without_a_benchmark() {
     assert!(status == Some(2) && err.contains("--help"), "{err}");
 }
 
-/// The cells of the row that begins with `name`, the name left out.
+/// Returns the cells of the row that begins with `name`, without the name.
 fn row(table: &str, name: &str) -> Vec<String> {
     let line = table.lines().find(|line| line.trim_start_matches("| ").starts_with(name));
     let line = line.unwrap_or_else(|| panic!("no row '{name}' in\n{table}"));
@@ -41,7 +41,7 @@ fn row(table: &str, name: &str) -> Vec<String> {
     cells[..cells.len() - 1].to_vec()
 }
 
-/// The number in front of the unit of a cell.
+/// Returns the number of a cell without its unit.
 fn number(cell: &str) -> f64 {
     let digits: String = cell.chars().take_while(|c| c.is_ascii_digit() || ".,".contains(*c)).collect();
     digits.replace(',', "").parse().unwrap_or_else(|_| panic!("no number in '{cell}'"))
@@ -57,17 +57,17 @@ fn assert_positive(table: &str, name: &str, cells: std::ops::Range<usize>) {
 #[test]
 fn a_batch_is_timed_and_its_scratch_memory_within_the_budget() {
     let table = table(&["batch", "--quick"]);
-    for name in ["one batch", "a submission and a wait for each", "one batch, scratch budget"] {
+    for name in ["one batch", "one submission and wait per mesh", "one batch, scratch budget"] {
         assert_positive(&table, name, 0..2);
     }
     assert_positive(&table, "ratio", 0..1);
-    for name in ["peak of scratch memory ", "peak of scratch memory then"] {
+    for name in ["peak scratch memory ", "peak scratch memory, small budget"] {
         assert!(number(&row(&table, name)[1]) <= 100.0, "{table}");
     }
 }
 
 #[test]
-fn builds_and_sizes_stand_beside_hand_written_ones() {
+fn builds_and_sizes_are_compared_with_hand_written_vulkan() {
     let table = table(&["compaction", "--quick"]);
     for name in
         ["build, fast trace", "build, fast build", "rebuild, updates allowed", "refit", "before compaction"]
@@ -77,25 +77,28 @@ fn builds_and_sizes_stand_beside_hand_written_ones() {
     let [before, after] =
         ["before compaction ", "after compaction "].map(|name| number(&row(&table, name)[0]));
     assert!(after <= before, "{table}");
-    let freed = number(&row(&table, "given back to the allocator")[0]);
-    assert!((freed - (before - after)).abs() < 1.0, "what compaction saves is given back\n{table}");
+    let freed = number(&row(&table, "freed to the allocator")[0]);
+    assert!(
+        (freed - (before - after)).abs() < 1.0,
+        "the allocator gets back the memory that compaction saves\n{table}"
+    );
 }
 
 #[test]
-fn a_split_mesh_shows_the_same_picture() {
+fn a_split_mesh_renders_the_same_image() {
     let table = table(&["split", "--quick", "--parts", "12"]);
     let head = table.lines().find(|line| line.contains(" parts |")).unwrap();
     let parts = number(head.split('|').nth(3).unwrap().trim());
     assert!(parts >= 12.0, "{table}");
     let traced = table.lines().filter(|line| line.starts_with("| primary rays by")).count();
     assert!(traced > 0, "{table}");
-    for line in table.lines().filter(|line| line.starts_with("| pixels that differ")) {
+    for line in table.lines().filter(|line| line.starts_with("| differing pixels")) {
         assert!(line.contains(" 0 of 576 "), "{table}");
     }
 }
 
 #[test]
-fn updates_of_instances_are_timed_for_every_number_asked_for() {
+fn tlas_updates_are_timed_for_every_requested_instance_count() {
     let table = table(&["tlas", "--quick", "--instances", "1", "--instances", "300"]);
     for count in ["1", "300"] {
         for mode in ["rebuild", "refit"] {
@@ -107,10 +110,10 @@ fn updates_of_instances_are_timed_for_every_number_asked_for() {
 }
 
 #[test]
-fn orders_are_timed_and_show_the_same_picture() {
+fn orders_are_timed_and_render_the_same_image() {
     let table = table(&["order", "--quick"]);
     assert!(table.lines().any(|line| line.starts_with("| primary rays by")), "{table}");
-    for line in table.lines().filter(|line| line.starts_with("| pixels that differ")) {
+    for line in table.lines().filter(|line| line.starts_with("| differing pixels")) {
         assert!(line.contains(" 0 |"), "{table}");
     }
 }
@@ -118,35 +121,33 @@ fn orders_are_timed_and_show_the_same_picture() {
 #[test]
 fn queries_in_software_are_timed_and_agree_with_the_devices_pipeline() {
     let tables = table(&["queries", "--quick", "--camera", "1", "--instances", "5"]);
-    let [rates, cut, agreement, structures]: [&str; 4] =
+    let [rates, chunks, agreement, structures]: [&str; 4] =
         tables.split("\n##").collect::<Vec<_>>().try_into().unwrap_or_else(|_| panic!("{tables}"));
     for name in ["software, fast trace", "software, low memory", "software, fast build"] {
         assert_positive(rates, name, 0..1);
     }
-    assert!(cut.contains("As 5 overlapping instances"), "{cut}");
-    assert_positive(cut, "software, fast trace", 0..1);
+    assert!(chunks.contains("As 5 overlapping instances"), "{chunks}");
+    assert_positive(chunks, "software, fast trace", 0..1);
     for line in agreement.lines().filter(|line| line.starts_with("| software")) {
         for share in line.split('|').skip(2).filter(|cell| cell.contains('%')) {
             assert!(number(share.trim()) > 99.0, "{agreement}");
         }
     }
-    for name in
-        ["bytes a triangle, low memory", "build by the CPU, fast trace", "refit of what the GPU built"]
-    {
+    for name in ["bytes per triangle, low memory", "CPU build, fast trace", "GPU refit of a GPU build"] {
         assert_positive(structures, name, 0..1);
     }
 }
 
 #[test]
-fn a_frame_is_timed_by_both_hands_and_shows_the_same_picture() {
+fn a_frame_is_timed_by_lvk_and_by_hand_and_renders_the_same_image() {
     let table = table(&["overhead", "--quick"]);
     if table.contains("not measured") {
         return eprintln!("NOT TESTED, no ray tracing pipelines");
     }
-    for name in ["trace (GPU)", "record and submit (CPU)", "until done"] {
+    for name in ["trace (GPU)", "record and submit (CPU)", "until the GPU is done"] {
         assert_positive(&table, name, 0..3);
     }
-    assert_eq!(row(&table, "pixels that differ")[1], "0 of 576");
+    assert_eq!(row(&table, "differing pixels")[1], "0 of 576");
 }
 
 #[test]
@@ -157,12 +158,12 @@ fn the_papers_experiment_writes_its_report() {
     let table = table(&[&["paper", "--quick", "--out", out.to_str().unwrap()], &size[..]].concat());
     assert!(table.contains("| courtyard, "), "{table}");
     let page = std::fs::read_to_string(out.join("report.md")).unwrap();
-    assert!(page.contains("--width 32") && page.contains("a rehearsal"), "{page}");
-    assert!(!page.contains(folder.path().to_str().unwrap()), "folders are everybody's own");
+    assert!(page.contains("--width 32") && page.contains("a smoke test"), "{page}");
+    assert!(!page.contains(folder.path().to_str().unwrap()), "the report contains no private folder");
 }
 
-/// The experiment in its smallest form by this path: its table, and its folder; `None`, loudly, where the device lacks
-/// the path.
+/// Runs the experiment in its smallest form by this path. Returns its table and folder; prints a message and returns `None` if
+/// the device lacks the path.
 fn small_paper(rt: &str) -> Option<(String, tempfile::TempDir)> {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
@@ -178,7 +179,7 @@ fn small_paper(rt: &str) -> Option<(String, tempfile::TempDir)> {
 }
 
 #[test]
-fn the_papers_experiment_in_software_says_so_and_shows_the_same() {
+fn the_papers_experiment_in_software_names_the_path_and_renders_the_same() {
     let (table, software) = small_paper("software").unwrap();
     assert!(table.contains("| courtyard, software query "), "{table}");
     let text = |name: &str| std::fs::read_to_string(software.path().join(name)).unwrap();
@@ -201,7 +202,7 @@ fn the_papers_experiment_in_software_says_so_and_shows_the_same() {
 }
 
 #[test]
-fn what_a_device_lacks_is_said_and_no_failure() {
+fn a_missing_feature_is_reported_and_no_failure() {
     let without_query = table(&["order", "--quick", "--profile", "no-ray-query"]);
     assert!(without_query.contains("ray queries not measured"), "{without_query}");
     assert!(!without_query.contains("| primary rays by query"), "{without_query}");
@@ -211,13 +212,16 @@ fn what_a_device_lacks_is_said_and_no_failure() {
         alone.contains("ray tracing pipelines not measured") && alone.contains("ray queries not measured"),
         "{alone}"
     );
-    assert!(alone.contains("| software, fast trace") && !alone.contains("| pipeline, as given"), "{alone}");
+    assert!(
+        alone.contains("| software, fast trace") && !alone.contains("| pipeline, given order"),
+        "{alone}"
+    );
     let without_pipeline = table(&["overhead", "--quick", "--profile", "no-rt-pipeline"]);
     assert!(without_pipeline.contains("not measured"), "{without_pipeline}");
 }
 
 #[test]
-fn wrong_input_and_no_ray_tracing_have_statuses_of_their_own() {
+fn wrong_input_and_no_ray_tracing_have_different_exit_statuses() {
     let (status, _, err) = outcome(&["order", "--quick", "--scene", "absent.obj"]);
     assert!(status == Some(2) && err.contains("absent.obj"), "{status:?}: {err}");
     let (status, _, err) = outcome(&["split", "--quick", "--profile", "no-ray-tracing"]);
@@ -225,11 +229,11 @@ fn wrong_input_and_no_ray_tracing_have_statuses_of_their_own() {
 }
 
 #[test]
-fn what_the_core_costs_stands_beside_its_limits() {
+fn cpu_overhead_is_compared_with_its_limits() {
     let table = table(&["core", "--quick"]);
     assert_positive(&table, "push constants + draw", 0..2);
-    assert_positive(&table, "- own share", 0..1);
-    assert_positive(&table, "dispatch behind", 0..2);
+    assert_positive(&table, "- library share", 0..1);
+    assert_positive(&table, "dispatch after", 0..2);
     assert_positive(&table, "empty submission", 0..2);
     assert!(table.contains("60 ms") && !table.contains("NaN"), "{table}");
 }

@@ -1,4 +1,4 @@
-//! Measures what `lvk` costs and gains; `--help` tells the rest.
+//! Measures the costs and gains of `lvk`; see `--help`.
 
 use std::process::ExitCode;
 

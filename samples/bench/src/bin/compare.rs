@@ -1,4 +1,4 @@
-//! Compares two pictures: `compare FIRST.png SECOND.png` prints PSNR, SSIM and how many pixels differ.
+//! Compares two images: `compare FIRST.png SECOND.png` prints PSNR, SSIM and the share of differing pixels.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -7,13 +7,13 @@ use clap::Parser;
 use image::RgbaImage;
 use lvk_samples::app::metrics;
 
-/// Compares two pictures of the same size.
+/// Compares two images of the same size.
 #[derive(Parser)]
 #[command(version)]
 struct Args {
-    /// A picture
+    /// First image
     first: PathBuf,
-    /// The picture it is compared with
+    /// Second image
     second: PathBuf,
 }
 
@@ -34,7 +34,7 @@ fn compare(args: &Args) -> Result<String, String> {
     let (first, second) = (read(&args.first)?, read(&args.second)?);
     if first.dimensions() != second.dimensions() {
         let sizes = (first.dimensions(), second.dimensions());
-        return Err(format!("the pictures differ in size: {:?} and {:?}", sizes.0, sizes.1));
+        return Err(format!("the images differ in size: {:?} and {:?}", sizes.0, sizes.1));
     }
     let (width, height) = first.dimensions();
     let found = metrics::compare(first.as_raw(), second.as_raw(), width, height);

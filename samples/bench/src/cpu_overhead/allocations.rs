@@ -1,15 +1,15 @@
-//! Counts what the program takes from the heap.
+//! Counts the heap allocations of the program.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 static COUNT: AtomicU64 = AtomicU64::new(0);
 
-/// The system's allocator, counting: the global one of the `bench` program.
+/// The system allocator with a counter. It is the global allocator of the `bench` program.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CountingAllocator;
 
-// SAFETY: everything is the system allocator's own.
+// SAFETY: every call is forwarded to the system allocator.
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.fetch_add(1, Ordering::Relaxed);
@@ -29,7 +29,7 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 }
 
-/// Allocations so far, by Rust code; 0 where the program does not count.
-pub(super) fn count() -> u64 {
+/// Returns the number of allocations by Rust code so far; 0 if [`CountingAllocator`] is not the global allocator.
+pub(super) fn allocation_count() -> u64 {
     COUNT.load(Ordering::Relaxed)
 }

@@ -1,4 +1,4 @@
-//! Dispatches that write one storage image, each behind the one before.
+//! Dispatches that write one storage image, each after a barrier.
 
 use std::rc::Rc;
 use std::time::Instant;
@@ -6,22 +6,22 @@ use std::time::Instant;
 use lvk::ash::vk;
 use lvk::{Context, Dependencies};
 
-use super::Amount;
-use super::recorded::{Limits, recorded};
+use super::Workload;
+use super::recording::{Limits, measure_recording};
 use super::row::Row;
 use super::scene::{Push, Scene};
 use crate::error::BenchError;
 use crate::hand_written::RawRecorder;
-use crate::measure::since;
+use crate::measure::elapsed_ms;
 
-pub(super) fn measure(ctx: &Context, silent: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
-    let count = (amount.draws / 10).max(1);
-    let what = format!("dispatch behind a storage image's barrier, {count} recorded");
-    let limits = Limits { ratio: 1.25, own_ns: 25.0 };
-    recorded(ctx, silent, (amount.runs, count), (ours, by_hand), (what, limits))
+pub(super) fn measure(ctx: &Context, silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+    let count = (workload.draws / 10).max(1);
+    let what = format!("dispatch after a storage image barrier, {count} recorded");
+    let limits = Limits { ratio: 1.25, library_ns: 25.0 };
+    measure_recording(ctx, silent, (workload.runs, count), (ours, by_hand), (what, limits))
 }
 
-/// Milliseconds to record them.
+/// Returns the milliseconds of the recording.
 fn ours(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
     let mut cmd = ctx.acquire_command_buffer()?;
     let push: Push = [scene.image.index(); 16];
@@ -32,7 +32,7 @@ fn ours(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
     for _ in 0..count {
         cmd.dispatch([1, 1, 1], &Dependencies { storage_images: &images, ..Dependencies::default() })?;
     }
-    Ok(since(start))
+    Ok(elapsed_ms(start))
 }
 
 fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> Result<f64, BenchError> {
@@ -41,7 +41,7 @@ fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> R
     let commands = raw.begin()?;
     let push: Push = [scene.image.index(); 16];
     let access = vk::AccessFlags2::SHADER_READ | vk::AccessFlags2::SHADER_WRITE;
-    // SAFETY: everything named is alive, and the command buffer is given up, never submitted.
+    // SAFETY: everything named is alive, and the command buffer is discarded, never submitted.
     unsafe {
         let (compute, set) = (vk::PipelineBindPoint::COMPUTE, [ctx.raw_descriptor_set()]);
         device.cmd_bind_pipeline(commands, compute, pipeline);
@@ -59,8 +59,8 @@ fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> R
             device.cmd_pipeline_barrier2(commands, &barrier);
             device.cmd_dispatch(commands, 1, 1, 1);
         }
-        let taken = since(start);
-        raw.give_up()?;
+        let taken = elapsed_ms(start);
+        raw.discard()?;
         Ok(taken)
     }
 }

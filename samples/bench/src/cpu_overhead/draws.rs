@@ -1,4 +1,4 @@
-//! Push constants and a draw, many times in one pass.
+//! Many pairs of push constants and a draw in one render pass.
 
 use std::rc::Rc;
 use std::time::Instant;
@@ -6,22 +6,22 @@ use std::time::Instant;
 use lvk::Context;
 use lvk::ash::vk;
 
-use super::Amount;
-use super::recorded::{Limits, recorded};
+use super::Workload;
+use super::recording::{Limits, measure_recording};
 use super::row::Row;
 use super::scene::{Push, Scene};
 use crate::error::BenchError;
 use crate::hand_written::RawRecorder;
-use crate::measure::since;
+use crate::measure::elapsed_ms;
 
-pub(super) fn measure(ctx: &Context, silent: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
-    let count = amount.draws;
+pub(super) fn measure(ctx: &Context, silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+    let count = workload.draws;
     let what = format!("push constants + draw, {count} pairs recorded");
-    let limits = Limits { ratio: 1.10, own_ns: 7.0 };
-    recorded(ctx, silent, (amount.runs, count), (ours, by_hand), (what, limits))
+    let limits = Limits { ratio: 1.10, library_ns: 7.0 };
+    measure_recording(ctx, silent, (workload.runs, count), (ours, by_hand), (what, limits))
 }
 
-/// Milliseconds to record them.
+/// Returns the milliseconds of the recording.
 fn ours(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
     let mut cmd = ctx.acquire_command_buffer()?;
     let mut pass = scene.pass(&mut cmd)?;
@@ -32,7 +32,7 @@ fn ours(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
         pass.push_constants(&push)?;
         pass.draw(0..3, 0..1)?;
     }
-    Ok(since(start))
+    Ok(elapsed_ms(start))
 }
 
 fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> Result<f64, BenchError> {
@@ -49,7 +49,7 @@ fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> R
         .store_op(vk::AttachmentStoreOp::STORE)];
     let pass = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);
     let mut push: Push = [1; 16];
-    // SAFETY: everything named is alive, and the command buffer is given up, never submitted.
+    // SAFETY: everything named is alive, and the command buffer is discarded, never submitted.
     unsafe {
         let (graphics, set) = (vk::PipelineBindPoint::GRAPHICS, [ctx.raw_descriptor_set()]);
         device.cmd_begin_rendering(commands, &pass);
@@ -64,9 +64,9 @@ fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> R
             device.cmd_push_constants(commands, layout, vk::ShaderStageFlags::ALL, 0, bytes);
             device.cmd_draw(commands, 3, 1, 0, 0);
         }
-        let taken = since(start);
+        let taken = elapsed_ms(start);
         device.cmd_end_rendering(commands);
-        raw.give_up()?;
+        raw.discard()?;
         Ok(taken)
     }
 }

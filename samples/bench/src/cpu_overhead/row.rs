@@ -1,28 +1,28 @@
-//! A figure with its limit.
+//! One measured figure with its limit.
 
 use crate::table::Table;
 
-/// One measured figure, beside what it is compared with and what it should be at most.
+/// One measured figure with a reference figure and a limit.
 pub(super) struct Row {
     pub(super) what: String,
     /// The library's figure, in `unit`.
     pub(super) ours: f64,
-    /// What it is compared with, in the same unit.
+    /// The reference figure, in the same unit.
     pub(super) other: Option<f64>,
     pub(super) unit: &'static str,
     pub(super) limit: Limit,
 }
 
-/// What a figure should be.
+/// Limit of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Limit {
-    /// At most so many units.
-    Most(f64),
-    /// At most so many times the other.
-    Ratio(f64),
-    /// The other takes at least so many times as long.
-    Faster(f64),
-    /// Nobody has asked for one.
+    /// The figure is at most this value.
+    AtMost(f64),
+    /// The ratio to the reference is at most this value.
+    RatioAtMost(f64),
+    /// The reference is at least this many times the figure.
+    FasterThan(f64),
+    /// No limit.
     None,
 }
 
@@ -31,30 +31,30 @@ impl Row {
         self.other.map(|other| self.ours / other)
     }
 
-    /// Whether the limit is kept; `None` without one.
-    fn is_kept(&self) -> Option<bool> {
+    /// Returns true if the limit is met; `None` without a limit.
+    fn is_met(&self) -> Option<bool> {
         match self.limit {
-            Limit::Most(most) => Some(self.ours <= most),
-            Limit::Ratio(most) => self.ratio().map(|ratio| ratio <= most),
-            Limit::Faster(least) => self.ratio().map(|ratio| ratio.recip() >= least),
+            Limit::AtMost(most) => Some(self.ours <= most),
+            Limit::RatioAtMost(most) => self.ratio().map(|ratio| ratio <= most),
+            Limit::FasterThan(least) => self.ratio().map(|ratio| ratio.recip() >= least),
             Limit::None => None,
         }
     }
 
     fn limit_text(&self) -> String {
         match self.limit {
-            Limit::Most(most) => format!("{most} {}", self.unit),
-            Limit::Ratio(most) => format!("{most:.2}x"),
-            Limit::Faster(least) => format!("1/{least:.0}x"),
+            Limit::AtMost(most) => format!("{most} {}", self.unit),
+            Limit::RatioAtMost(most) => format!("{most:.2}x"),
+            Limit::FasterThan(least) => format!("1/{least:.0}x"),
             Limit::None => String::new(),
         }
     }
 
-    /// Adds the row to a table of six columns.
+    /// Adds the row to a table with six columns.
     pub(super) fn print(&self, table: &mut Table) {
         let figure = |value: f64| format!("{value:.2} {}", self.unit);
-        let kept = self.is_kept().map_or("", |kept| if kept { "kept" } else { "MISSED" });
-        table.row(
+        let kept = self.is_met().map_or("", |kept| if kept { "kept" } else { "MISSED" });
+        table.add_row(
             self.what.clone(),
             [
                 figure(self.ours),
@@ -72,13 +72,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limits_are_kept_up_to_themselves() {
+    fn a_figure_equal_to_its_limit_is_met() {
         let row = |ours, other, limit| Row { what: String::new(), ours, other, unit: "ns", limit };
-        assert_eq!(row(7.0, None, Limit::Most(7.0)).is_kept(), Some(true));
-        assert_eq!(row(7.1, None, Limit::Most(7.0)).is_kept(), Some(false));
-        assert_eq!(row(3.0, Some(2.0), Limit::Ratio(1.25)).is_kept(), Some(false));
-        assert_eq!(row(1.0, Some(10.0), Limit::Faster(10.0)).is_kept(), Some(true));
-        assert_eq!(row(1.0, Some(9.0), Limit::Faster(10.0)).is_kept(), Some(false));
-        assert_eq!(row(1.0, None, Limit::None).is_kept(), None);
+        assert_eq!(row(7.0, None, Limit::AtMost(7.0)).is_met(), Some(true));
+        assert_eq!(row(7.1, None, Limit::AtMost(7.0)).is_met(), Some(false));
+        assert_eq!(row(3.0, Some(2.0), Limit::RatioAtMost(1.25)).is_met(), Some(false));
+        assert_eq!(row(1.0, Some(10.0), Limit::FasterThan(10.0)).is_met(), Some(true));
+        assert_eq!(row(1.0, Some(9.0), Limit::FasterThan(10.0)).is_met(), Some(false));
+        assert_eq!(row(1.0, None, Limit::None).is_met(), None);
     }
 }

@@ -1,4 +1,4 @@
-//! A small target with a pipeline that draws to it, and a storage image with one that writes it.
+//! A small render target with a render pipeline, and a storage image with a compute pipeline.
 
 use lvk::{
     ColorAttachment, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Format, Holder,
@@ -6,7 +6,7 @@ use lvk::{
     ShaderModuleHandle, ShaderSource, ShaderStage, TextureDesc, TextureHandle, TextureUsage,
 };
 
-/// What draws and dispatches push.
+/// Push constants of draws and dispatches.
 pub(super) type Push = [u32; 16];
 
 const VERTEX: &str = "
@@ -21,6 +21,7 @@ const COMPUTE: &str = "
     layout(push_constant) uniform Push { uint words[16]; };
     void main() { imageStore(kImages2D[words[0]], ivec2(gl_LocalInvocationID.xy), vec4(1.0)); }";
 
+/// The objects that draws and dispatches use.
 pub(super) struct Scene {
     pub(super) target: Holder<TextureHandle>,
     pub(super) image: Holder<TextureHandle>,
@@ -63,7 +64,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// A pass over the target with the pipeline bound.
+    /// Begins a render pass on the target and binds the pipeline.
     pub(super) fn pass<'a>(&self, cmd: &'a mut CommandBuffer) -> lvk::Result<RenderPass<'a>> {
         let color = [ColorAttachment::clear(*self.target, [0.0; 4])];
         let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..RenderPassDesc::default() })?;

@@ -1,10 +1,10 @@
-//! How long a context takes to make, and how much memory it holds.
+//! Time and resident memory of a context creation.
 
 use std::time::Instant;
 
 use super::row::{Limit, Row};
 use crate::error::BenchError;
-use crate::measure::{median_of, since};
+use crate::measure::{elapsed_ms, median_of};
 use crate::setup::Setup;
 
 pub(super) fn measure(setup: &Setup) -> Result<Vec<Row>, BenchError> {
@@ -17,16 +17,17 @@ pub(super) fn measure(setup: &Setup) -> Result<Vec<Row>, BenchError> {
     for _ in 0..RUNS {
         let start = Instant::now();
         let ctx = setup.open()?;
-        samples.push(since(start));
+        samples.push(elapsed_ms(start));
         drop(ctx);
     }
     let row = |what: &str, ours, unit, limit| Row { what: what.to_owned(), ours, other: None, unit, limit };
-    let created = row("context created", median_of(&samples, |ms| *ms), "ms", Limit::Most(60.0));
-    let held = resident.map(|mb| row("resident with the first context", mb, "MB", Limit::Most(90.0)));
+    let created = row("context created", median_of(&samples, |ms| *ms), "ms", Limit::AtMost(60.0));
+    let held =
+        resident.map(|mb| row("resident memory with the first context", mb, "MB", Limit::AtMost(90.0)));
     Ok(std::iter::once(created).chain(held).collect())
 }
 
-/// Megabytes of the process in memory; `None` where the system does not say.
+/// Returns the resident memory of the process in megabytes; `None` without `/proc/self/status`.
 pub(super) fn resident_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;

@@ -4,18 +4,18 @@ use std::time::Instant;
 
 use lvk::{BufferDesc, BufferHandle, Context};
 
-use super::Amount;
+use super::Workload;
 use super::row::{Limit, Row};
 use crate::error::BenchError;
 use crate::hand_written::{RawCommands, RawDevice};
-use crate::measure::{median_of, since, take_turns};
+use crate::measure::{elapsed_ms, interleave, median_of};
 
 const UPLOAD_BYTES: usize = 4096;
 
-pub(super) fn measure(ctx: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(ctx: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
     let raw = RawCommands::new(&RawDevice::new(ctx))?;
-    let count = (amount.many / 10).max(1);
-    let samples: [Vec<f64>; 3] = take_turns(amount.runs, |which| {
+    let count = (workload.many / 10).max(1);
+    let samples: [Vec<f64>; 3] = interleave(workload.runs, |which| {
         let start = Instant::now();
         for _ in 0..count {
             match which {
@@ -24,29 +24,29 @@ pub(super) fn measure(ctx: &Context, amount: Amount) -> Result<Vec<Row>, BenchEr
                 _ => raw.submit_empty_on_timeline()?,
             }
         }
-        Ok(since(start) * 1e3 / f64::from(count))
+        Ok(elapsed_ms(start) * 1e3 / f64::from(count))
     })?;
     let [ours, fence, timeline] = samples.map(|samples| median_of(&samples, |us| *us));
     let row =
         |what: &str, other, limit| Row { what: what.to_owned(), ours, other: Some(other), unit: "us", limit };
     Ok(vec![
-        row("empty submission + wait, by hand with a fence", fence, Limit::Ratio(1.0)),
+        row("empty submission + wait, by hand with a fence", fence, Limit::RatioAtMost(1.0)),
         row("- by hand with a timeline semaphore", timeline, Limit::None),
-        uploads(ctx, amount)?,
+        uploads(ctx, workload)?,
     ])
 }
 
-fn uploads(ctx: &Context, amount: Amount) -> Result<Row, BenchError> {
-    let size_bytes = u64::from(amount.many) * UPLOAD_BYTES as u64;
+fn uploads(ctx: &Context, workload: Workload) -> Result<Row, BenchError> {
+    let size_bytes = u64::from(workload.many) * UPLOAD_BYTES as u64;
     let buffer = ctx.create_buffer(&BufferDesc { size_bytes, ..BufferDesc::default() })?;
     let samples: [Vec<f64>; 2] =
-        take_turns(amount.runs.div_ceil(5), |which| upload(ctx, *buffer, amount.many, which == 1))?;
+        interleave(workload.runs.div_ceil(5), |which| upload(ctx, *buffer, workload.many, which == 1))?;
     let [ours, other] = samples.map(|samples| median_of(&samples, |ms| *ms));
-    let what = format!("{} uploads of 4 KiB, compared with a submission each", amount.many);
-    Ok(Row { what, ours, other: Some(other), unit: "ms", limit: Limit::Faster(10.0) })
+    let what = format!("{} uploads of 4 KiB, compared with one submission each", workload.many);
+    Ok(Row { what, ours, other: Some(other), unit: "ms", limit: Limit::FasterThan(10.0) })
 }
 
-/// Milliseconds until all are there.
+/// Returns the milliseconds until all uploads are done.
 fn upload(ctx: &Context, buffer: BufferHandle, count: u32, one_by_one: bool) -> Result<f64, BenchError> {
     let bytes = [7_u8; UPLOAD_BYTES];
     let start = Instant::now();
@@ -57,5 +57,5 @@ fn upload(ctx: &Context, buffer: BufferHandle, count: u32, one_by_one: bool) -> 
         }
     }
     ctx.wait_idle()?;
-    Ok(since(start))
+    Ok(elapsed_ms(start))
 }

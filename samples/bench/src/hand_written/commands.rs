@@ -1,4 +1,4 @@
-//! A command buffer that is recorded, submitted and waited for, again and again, with its times.
+//! A command buffer that is recorded, submitted and waited for repeatedly, with timestamps.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -8,15 +8,15 @@ use lvk::ash::vk;
 
 use super::RawDevice;
 use crate::error::BenchError;
-use crate::measure::{Timed, since};
+use crate::measure::{SubmissionTimes, elapsed_ms};
 
-/// A command buffer that is recorded, submitted and waited for, again and again.
+/// A command buffer that is recorded, submitted and waited for repeatedly.
 pub(crate) struct RawCommands {
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
     fence: vk::Fence,
     timeline: vk::Semaphore,
-    /// What the timeline has reached.
+    /// Last value of the timeline semaphore.
     reached: Cell<u64>,
     queries: vk::QueryPool,
     device: Rc<RawDevice>,
@@ -47,44 +47,46 @@ impl RawCommands {
         let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
         // SAFETY: the descriptions are valid; the queue family is that of the device.
         unsafe {
-            self.pool =
-                device.create_command_pool(&pool, None).map_err(BenchError::of("vkCreateCommandPool"))?;
+            self.pool = device
+                .create_command_pool(&pool, None)
+                .map_err(BenchError::hand_written("vkCreateCommandPool"))?;
             let info =
                 vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
             let allocated = device.allocate_command_buffers(&info);
-            self.commands = allocated.map_err(BenchError::of("vkAllocateCommandBuffers"))?[0];
+            self.commands = allocated.map_err(BenchError::hand_written("vkAllocateCommandBuffers"))?[0];
             let fence = vk::FenceCreateInfo::default();
-            self.fence = device.create_fence(&fence, None).map_err(BenchError::of("vkCreateFence"))?;
+            self.fence =
+                device.create_fence(&fence, None).map_err(BenchError::hand_written("vkCreateFence"))?;
             let made = device.create_semaphore(&timeline, None);
-            self.timeline = made.map_err(BenchError::of("vkCreateSemaphore"))?;
+            self.timeline = made.map_err(BenchError::hand_written("vkCreateSemaphore"))?;
             let made = device.create_query_pool(&queries, None);
-            self.queries = made.map_err(BenchError::of("vkCreateQueryPool"))?;
+            self.queries = made.map_err(BenchError::hand_written("vkCreateQueryPool"))?;
         }
         Ok(())
     }
 
-    /// Submits what `record` records, between timestamps, and waits for it.
-    pub(crate) fn time(&self, record: impl FnOnce(vk::CommandBuffer)) -> Result<Timed, BenchError> {
+    /// Submits the commands that `record` records, between timestamps, and waits for them.
+    pub(crate) fn time(&self, record: impl FnOnce(vk::CommandBuffer)) -> Result<SubmissionTimes, BenchError> {
         let start = Instant::now();
         self.begin()?;
         let before = Instant::now();
         record(self.commands);
-        let record = since(before);
+        let record = elapsed_ms(before);
         self.end_and_submit()?;
-        let cpu = since(start);
+        let cpu = elapsed_ms(start);
         self.wait()?;
-        let total = since(start);
-        Ok(Timed { gpu: self.read()?, cpu, record, total })
+        let total = elapsed_ms(start);
+        Ok(SubmissionTimes { gpu: self.read_timestamps_ms()?, cpu, record, total })
     }
 
-    /// Submits nothing and waits for it by a fence.
+    /// Submits an empty command buffer and waits for a fence.
     pub(crate) fn submit_empty(&self) -> Result<(), BenchError> {
         self.begin_bare()?;
         self.submit()?;
         self.wait()
     }
 
-    /// Submits nothing and waits for it by a timeline semaphore.
+    /// Submits an empty command buffer and waits for a timeline semaphore.
     pub(crate) fn submit_empty_on_timeline(&self) -> Result<(), BenchError> {
         let next = self.reached.get() + 1;
         let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.timeline).value(next);
@@ -95,7 +97,7 @@ impl RawCommands {
         self.submit_with(&signals, vk::Fence::null())?;
         // SAFETY: the semaphore is a timeline, and its next value was submitted.
         let waited = unsafe { self.device.device.wait_semaphores(&wait, u64::MAX) };
-        waited.map_err(BenchError::of("vkWaitSemaphores"))?;
+        waited.map_err(BenchError::hand_written("vkWaitSemaphores"))?;
         self.reached.set(next);
         Ok(())
     }
@@ -114,9 +116,11 @@ impl RawCommands {
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last submission was waited for, so nothing uses the pool or the queries.
         unsafe {
-            device.reset_command_pool(self.pool, flags).map_err(BenchError::of("vkResetCommandPool"))?;
+            device
+                .reset_command_pool(self.pool, flags)
+                .map_err(BenchError::hand_written("vkResetCommandPool"))?;
             let begun = device.begin_command_buffer(self.commands, &info);
-            begun.map_err(BenchError::of("vkBeginCommandBuffer"))
+            begun.map_err(BenchError::hand_written("vkBeginCommandBuffer"))
         }
     }
 
@@ -146,9 +150,11 @@ impl RawCommands {
         let submits = [submit.signal_semaphore_infos(signals)];
         // SAFETY: recording ends here; the fence is not signalled; the context holds the queue's lock for the call.
         unsafe {
-            device.end_command_buffer(self.commands).map_err(BenchError::of("vkEndCommandBuffer"))?;
+            device
+                .end_command_buffer(self.commands)
+                .map_err(BenchError::hand_written("vkEndCommandBuffer"))?;
             let submit = |queue| device.queue_submit2(queue, &submits, fence);
-            self.device.ctx.with_raw_queue(submit).map_err(BenchError::of("vkQueueSubmit2"))
+            self.device.ctx.with_raw_queue(submit).map_err(BenchError::hand_written("vkQueueSubmit2"))
         }
     }
 
@@ -157,18 +163,18 @@ impl RawCommands {
         // SAFETY: the fence was submitted, and once it is signalled nothing uses it.
         unsafe {
             let waited = self.device.device.wait_for_fences(&fences, true, u64::MAX);
-            waited.map_err(BenchError::of("vkWaitForFences"))?;
-            self.device.device.reset_fences(&fences).map_err(BenchError::of("vkResetFences"))
+            waited.map_err(BenchError::hand_written("vkWaitForFences"))?;
+            self.device.device.reset_fences(&fences).map_err(BenchError::hand_written("vkResetFences"))
         }
     }
 
-    /// Milliseconds between the timestamps.
-    fn read(&self) -> Result<f64, BenchError> {
+    /// Returns the milliseconds between the timestamps.
+    fn read_timestamps_ms(&self) -> Result<f64, BenchError> {
         let mut ticks = [0_u64; 2];
         let flags = vk::QueryResultFlags::TYPE_64;
         // SAFETY: both queries were written by the submission that was waited for.
         unsafe { self.device.device.get_query_pool_results(self.queries, 0, &mut ticks, flags) }
-            .map_err(BenchError::of("vkGetQueryPoolResults"))?;
+            .map_err(BenchError::hand_written("vkGetQueryPoolResults"))?;
         let limits = &self.device.ctx.capabilities().limits;
         let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
         let passed = ticks[1].wrapping_sub(ticks[0]) & mask;
@@ -179,7 +185,7 @@ impl RawCommands {
 impl Drop for RawCommands {
     fn drop(&mut self) {
         let device = &self.device.device;
-        // SAFETY: the last submission was waited for; what was never made is null, which is allowed.
+        // SAFETY: the last submission was waited for; objects that were never created are null, which is allowed.
         unsafe {
             device.destroy_query_pool(self.queries, None);
             device.destroy_semaphore(self.timeline, None);

@@ -1,11 +1,11 @@
-//! The device of a context, with the extensions that tracing needs.
+//! The device of a context, with the ray tracing extensions.
 
 use std::rc::Rc;
 
 use lvk::Context;
 use lvk::ash::{self, khr, vk};
 
-/// The device of a context, with the extensions that tracing needs.
+/// The device of a context, with the ray tracing extensions.
 pub(crate) struct RawDevice {
     pub(super) device: ash::Device,
     pub(super) accel: khr::acceleration_structure::Device,
@@ -16,7 +16,7 @@ pub(crate) struct RawDevice {
 }
 
 impl RawDevice {
-    /// For a context that can build acceleration structures.
+    /// Takes the device of a context that can build acceleration structures.
     pub(crate) fn new(ctx: &Context) -> Rc<Self> {
         let (instance, device) = (ctx.raw_instance(), ctx.raw_device());
         // SAFETY: the physical device belongs to the instance.
@@ -30,7 +30,7 @@ impl RawDevice {
         })
     }
 
-    /// A type of memory among the `allowed` bits with these properties.
+    /// Returns a memory type among the `allowed` bits with these properties.
     pub(super) fn memory_type(&self, allowed: u32, wanted: vk::MemoryPropertyFlags) -> Option<u32> {
         let types = (0..).zip(self.memory.memory_types_as_slice());
         let fits = |(index, ty): &(u32, &vk::MemoryType)| {

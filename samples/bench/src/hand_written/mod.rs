@@ -1,19 +1,19 @@
-//! What `lvk` does, by hand: the same Vulkan calls without it, on the same device, as the measure of its cost.
+//! Hand-written Vulkan: the calls that `lvk` makes, without `lvk`, on the same device, as the reference for its cost.
 //!
-//! Memory is one allocation for each buffer, but for what measures memory itself, and every submission is waited for: fine for
-//! a benchmark that keeps few objects and times single frames.
+//! Each buffer has its own allocation, except in the benchmark of allocations. The code waits for every submission. Both are
+//! sufficient for a benchmark with few objects and single frames.
 
+mod accel_struct;
 mod buffer;
 mod commands;
 mod device;
 mod objects;
-mod pipeline;
 mod recorder;
-mod structure;
+mod rt_pipeline;
 
+pub(super) use accel_struct::{RawAccelStruct, instance_geometry, triangle_geometry};
 pub(super) use commands::RawCommands;
 pub(super) use device::RawDevice;
 pub(super) use objects::{Memory, RawObjects};
-pub(super) use pipeline::RawTracing;
 pub(super) use recorder::RawRecorder;
-pub(super) use structure::{RawStructure, instance_geometry, triangle_geometry};
+pub(super) use rt_pipeline::RawTracing;

@@ -1,4 +1,4 @@
-//! Buffers and pictures that come and go, by the calls that have to be made for them.
+//! Creates and destroys buffers and images by the minimal Vulkan calls.
 
 use std::time::Instant;
 
@@ -10,34 +10,34 @@ use lvk::Context;
 use lvk::ash::{self, vk};
 
 use crate::error::BenchError;
-use crate::measure::since;
+use crate::measure::elapsed_ms;
 
-/// How many are there before all of them are destroyed: as many as wait to be freed in the library.
+/// Objects that exist before all of them are destroyed: as many as the library's deferred free list holds.
 const AT_ONCE: usize = 256;
 
-/// Where objects get their memory.
+/// Memory of the objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Memory {
-    /// A piece of the allocator for each.
+    /// A suballocation per object.
     Allocated,
-    /// All the same piece, which is there already: what is left is the driver's part.
-    There,
+    /// One preallocated suballocation for all objects: the driver's part remains.
+    Preallocated,
 }
 
-/// Makes and destroys objects.
+/// Creates and destroys objects.
 pub(crate) struct RawObjects {
-    /// In which objects lie whose memory does not count.
-    there: Allocation,
+    /// Memory of objects with [`Memory::Preallocated`].
+    preallocated: Allocation,
     allocator: Allocator,
     device: ash::Device,
     /// Keeps the device alive.
     _ctx: Context,
 }
 
-/// What is to be destroyed.
-enum Made {
+/// An object to destroy.
+enum RawObject {
     Buffer(vk::Buffer),
-    Picture(vk::Image, vk::ImageView),
+    TracedImage(vk::Image, vk::ImageView),
 }
 
 impl RawObjects {
@@ -53,25 +53,26 @@ impl RawObjects {
             allocation_sizes: AllocationSizes::default(),
         })
         .map_err(no_memory)?;
-        let there = vk::MemoryRequirements { size: 1 << 20, alignment: 1 << 16, memory_type_bits: u32::MAX };
-        let there = allocate(&mut allocator, there, true)?;
-        Ok(Self { there, allocator, device: ctx.raw_device().clone(), _ctx: ctx.clone() })
+        let preallocated =
+            vk::MemoryRequirements { size: 1 << 20, alignment: 1 << 16, memory_type_bits: u32::MAX };
+        let preallocated = allocate(&mut allocator, preallocated, true)?;
+        Ok(Self { preallocated, allocator, device: ctx.raw_device().clone(), _ctx: ctx.clone() })
     }
 
-    /// Milliseconds for so many buffers of so many bytes.
+    /// Returns the milliseconds to create and destroy `count` buffers of `bytes` bytes.
     pub(crate) fn buffers(&mut self, count: u32, bytes: u64, memory: Memory) -> Result<f64, BenchError> {
-        self.come_and_go(count, |objects| objects.buffer(bytes, memory))
+        self.create_and_destroy(count, |objects| objects.buffer(bytes, memory))
     }
 
-    /// Milliseconds for so many sampled pictures of 4 x 4 texels with their views.
-    pub(crate) fn pictures(&mut self, count: u32, memory: Memory) -> Result<f64, BenchError> {
-        self.come_and_go(count, |objects| objects.picture(memory))
+    /// Returns the milliseconds to create and destroy `count` sampled images of 4 x 4 texels with their views.
+    pub(crate) fn textures(&mut self, count: u32, memory: Memory) -> Result<f64, BenchError> {
+        self.create_and_destroy(count, |objects| objects.texture(memory))
     }
 
-    fn come_and_go(
+    fn create_and_destroy(
         &mut self,
         count: u32,
-        make: impl Fn(&mut Self) -> Result<(Made, Option<Allocation>), BenchError>,
+        make: impl Fn(&mut Self) -> Result<(RawObject, Option<Allocation>), BenchError>,
     ) -> Result<f64, BenchError> {
         let start = Instant::now();
         let mut made = Vec::with_capacity(AT_ONCE);
@@ -82,31 +83,31 @@ impl RawObjects {
             }
         }
         self.destroy(&mut made)?;
-        Ok(since(start))
+        Ok(elapsed_ms(start))
     }
 
-    fn buffer(&mut self, bytes: u64, memory: Memory) -> Result<(Made, Option<Allocation>), BenchError> {
+    fn buffer(&mut self, bytes: u64, memory: Memory) -> Result<(RawObject, Option<Allocation>), BenchError> {
         use vk::BufferUsageFlags as Usage;
         let usage = Usage::TRANSFER_SRC | Usage::TRANSFER_DST | Usage::STORAGE_BUFFER;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage | Usage::SHADER_DEVICE_ADDRESS);
         // SAFETY: the description is valid and its usage belongs to features that are on.
-        let raw =
-            unsafe { self.device.create_buffer(&info, None) }.map_err(BenchError::of("vkCreateBuffer"))?;
+        let raw = unsafe { self.device.create_buffer(&info, None) }
+            .map_err(BenchError::hand_written("vkCreateBuffer"))?;
         // SAFETY: the buffer is alive.
         let needed = unsafe { self.device.get_buffer_memory_requirements(raw) };
         let own = self.memory(needed, true, memory)?;
-        let place = own.as_ref().unwrap_or(&self.there);
-        // SAFETY: the memory fits the buffer, is bound once, and nobody uses either.
+        let place = own.as_ref().unwrap_or(&self.preallocated);
+        // SAFETY: the memory fits the buffer, is bound once, and no command uses either.
         unsafe {
             let bound = self.device.bind_buffer_memory(raw, place.memory(), place.offset());
-            bound.map_err(BenchError::of("vkBindBufferMemory"))?;
+            bound.map_err(BenchError::hand_written("vkBindBufferMemory"))?;
             let info = vk::BufferDeviceAddressInfo::default().buffer(raw);
             std::hint::black_box(self.device.get_buffer_device_address(&info));
         }
-        Ok((Made::Buffer(raw), own))
+        Ok((RawObject::Buffer(raw), own))
     }
 
-    fn picture(&mut self, memory: Memory) -> Result<(Made, Option<Allocation>), BenchError> {
+    fn texture(&mut self, memory: Memory) -> Result<(RawObject, Option<Allocation>), BenchError> {
         use vk::ImageUsageFlags as Usage;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
@@ -117,12 +118,12 @@ impl RawObjects {
             .samples(vk::SampleCountFlags::TYPE_1)
             .usage(Usage::TRANSFER_SRC | Usage::TRANSFER_DST | Usage::SAMPLED);
         // SAFETY: every device has sampled images of this format.
-        let raw =
-            unsafe { self.device.create_image(&info, None) }.map_err(BenchError::of("vkCreateImage"))?;
+        let raw = unsafe { self.device.create_image(&info, None) }
+            .map_err(BenchError::hand_written("vkCreateImage"))?;
         // SAFETY: the image is alive.
         let needed = unsafe { self.device.get_image_memory_requirements(raw) };
         let own = self.memory(needed, false, memory)?;
-        let place = own.as_ref().unwrap_or(&self.there);
+        let place = own.as_ref().unwrap_or(&self.preallocated);
         let view = vk::ImageViewCreateInfo::default()
             .image(raw)
             .view_type(vk::ImageViewType::TYPE_2D)
@@ -133,13 +134,15 @@ impl RawObjects {
                 layer_count: 1,
                 ..Default::default()
             });
-        // SAFETY: the memory fits the image, is bound once, and nobody uses either; the view shows all of the image.
+        // SAFETY: the memory fits the image, is bound once, and no command uses either; the view covers the whole image.
         let view = unsafe {
             let bound = self.device.bind_image_memory(raw, place.memory(), place.offset());
-            bound.map_err(BenchError::of("vkBindImageMemory"))?;
-            self.device.create_image_view(&view, None).map_err(BenchError::of("vkCreateImageView"))?
+            bound.map_err(BenchError::hand_written("vkBindImageMemory"))?;
+            self.device
+                .create_image_view(&view, None)
+                .map_err(BenchError::hand_written("vkCreateImageView"))?
         };
-        Ok((Made::Picture(raw, view), own))
+        Ok((RawObject::TracedImage(raw, view), own))
     }
 
     fn memory(
@@ -150,17 +153,17 @@ impl RawObjects {
     ) -> Result<Option<Allocation>, BenchError> {
         match memory {
             Memory::Allocated => allocate(&mut self.allocator, needed, linear).map(Some),
-            Memory::There => Ok(None),
+            Memory::Preallocated => Ok(None),
         }
     }
 
-    fn destroy(&mut self, made: &mut Vec<(Made, Option<Allocation>)>) -> Result<(), BenchError> {
+    fn destroy(&mut self, made: &mut Vec<(RawObject, Option<Allocation>)>) -> Result<(), BenchError> {
         for (object, own) in made.drain(..) {
             // SAFETY: nothing was ever submitted that uses the objects.
             unsafe {
                 match object {
-                    Made::Buffer(raw) => self.device.destroy_buffer(raw, None),
-                    Made::Picture(raw, view) => {
+                    RawObject::Buffer(raw) => self.device.destroy_buffer(raw, None),
+                    RawObject::TracedImage(raw, view) => {
                         self.device.destroy_image_view(view, None);
                         self.device.destroy_image(raw, None);
                     }
@@ -190,5 +193,5 @@ fn allocate(
 }
 
 fn no_memory(_: gpu_allocator::AllocationError) -> BenchError {
-    BenchError::of("allocating memory")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)
+    BenchError::hand_written("allocating memory")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)
 }

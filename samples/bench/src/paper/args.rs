@@ -1,4 +1,4 @@
-//! The command line of the experiment.
+//! The command line of `bench paper`.
 
 use std::path::PathBuf;
 
@@ -8,10 +8,10 @@ use lvk_samples::app::frames::Frames;
 use lvk_samples::app::ray_args::RayTracing;
 use lvk_samples::app::run_args::MAX_SIZE;
 
-/// The paper's experiment.
+/// Arguments of the paper's experiment.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct PaperArgs {
-    /// Wavefront OBJ files, or names in the folder of LVK_SCENES
+    /// Wavefront OBJ files, or scene names in the folder LVK_SCENES
     /// [default: living_room, conference and kitchen of that folder, else the built-in courtyard]
     #[arg(long, value_name = "FILE|NAME", num_args = 1..)]
     pub scenes: Vec<PathBuf>,
@@ -20,28 +20,28 @@ pub struct PaperArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Frames::MAX_COUNT)))]
     pub frames: Option<u32>,
 
-    /// Frames of each camera whose pictures are compared, at most as many as there are [default: 5; 2 with --quick]
+    /// Frames per camera whose images are compared, at most --frames [default: 5; 2 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub compared: Option<u32>,
 
-    /// By which path to trace rays: auto, which measures every one that the device has, pipeline, query, or software for
-    /// ray queries that the library walks itself
+    /// Ray tracing path: auto (every path of the device), pipeline, query, or software (the library's software ray
+    /// queries)
     #[arg(long, value_enum, default_value_t = RayTracing::Auto, hide_possible_values = true)]
     pub rt: RayTracing,
 
-    /// How often a ray may be reflected or refracted, 0 to 16
+    /// Maximum number of reflections and refractions of a ray, 0 to 16
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(0..=16))]
     pub depth: u32,
 
-    /// Width of the pictures in pixels [default: 1280; 640 on a driver that runs on the CPU, 256 with --quick]
+    /// Image width in pixels [default: 1280; 640 on a driver that runs on the CPU, 256 with --quick]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)))]
     pub width: Option<u32>,
 
-    /// Height of the pictures in pixels [default: 720; 360 on a driver that runs on the CPU, 144 with --quick]
+    /// Image height in pixels [default: 720; 360 on a driver that runs on the CPU, 144 with --quick]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)))]
     pub height: Option<u32>,
 
-    /// Folder for the report, which is made: report.md, CSV, SVG plots and pictures
+    /// Folder for the report, created if missing: report.md, CSV files, SVG plots and images
     #[arg(long, value_name = "FOLDER", default_value = "paper")]
     pub out: PathBuf,
 }

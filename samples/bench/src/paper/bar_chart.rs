@@ -1,44 +1,44 @@
-//! Groups of bars, as SVG.
+//! A grouped bar chart as SVG.
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::error::PaperError;
-use super::legend::{Area, Hue, headed};
+use super::legend::{Area, Rgb, draw_title_and_legend};
 
-/// Groups of bars side by side.
+/// A grouped bar chart.
 pub(super) struct BarChart {
     pub(super) title: String,
-    /// What is drawn upwards.
+    /// Label of the y axis.
     pub(super) axis: &'static str,
-    /// What the colours mean.
-    pub(super) legend: Vec<(String, Hue)>,
-    /// Levels to compare with.
-    pub(super) levels: Vec<(f64, Hue)>,
+    /// Names of the colours.
+    pub(super) legend: Vec<(String, Rgb)>,
+    /// Horizontal reference lines.
+    pub(super) levels: Vec<(f64, Rgb)>,
     pub(super) groups: Vec<Group>,
 }
 
-/// Bars that belong together.
+/// A group of bars.
 pub(super) struct Group {
-    /// Written below.
+    /// Label below the group.
     pub(super) name: String,
     pub(super) bars: Vec<Bar>,
 }
 
-/// Parts on top of each other, from the bottom.
-pub(super) type Bar = Vec<(f64, Hue)>;
+/// A stacked bar: its segments from the bottom.
+pub(super) type Bar = Vec<(f64, Rgb)>;
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// Pixels of a chart.
+/// Height of the chart in pixels.
 const HEIGHT: u32 = 460;
 const MARGIN: u32 = 150;
 const BAR_WIDTH: u32 = 11;
 const GROUP_GAP: u32 = 16;
 
 impl BarChart {
-    /// Draws it.
+    /// Renders the chart as SVG.
     pub(super) fn svg(&self) -> Result<String, PaperError> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|what| PaperError::Plot { name: self.title.clone(), what })?;
@@ -49,7 +49,7 @@ impl BarChart {
         let slots: usize = self.groups.iter().map(|group| group.bars.len()).sum();
         let width = MARGIN + slots as u32 * BAR_WIDTH + self.groups.len() as u32 * GROUP_GAP;
         let root = SVGBackend::with_string(text, (width.max(640), HEIGHT)).into_drawing_area();
-        let area = headed(&root, &self.title, &self.legend)?;
+        let area = draw_title_and_legend(&root, &self.title, &self.legend)?;
         let across = slots as f64 * f64::from(BAR_WIDTH) + self.groups.len() as f64 * f64::from(GROUP_GAP);
         let mut chart = ChartBuilder::on(&area)
             .margin(12)
@@ -65,7 +65,7 @@ impl BarChart {
         root.present().map_err(|error| error.to_string())
     }
 
-    /// The upper end of the axis.
+    /// Returns the upper end of the y axis.
     fn top(&self) -> f64 {
         let bars =
             self.groups.iter().flat_map(|group| &group.bars).map(|bar| bar.iter().map(|part| part.0).sum());
@@ -83,8 +83,8 @@ impl BarChart {
             for bar in &group.bars {
                 let mut bottom = 0.0;
                 for &(value, (r, g, b)) in bar.iter().filter(|part| part.0.is_finite()) {
-                    let corners = [(x + 1.0, bottom), (x + f64::from(BAR_WIDTH) - 1.0, bottom + value)];
-                    let part = Rectangle::new(corners, RGBColor(r, g, b).filled());
+                    let bounds = [(x + 1.0, bottom), (x + f64::from(BAR_WIDTH) - 1.0, bottom + value)];
+                    let part = Rectangle::new(bounds, RGBColor(r, g, b).filled());
                     chart.draw_series(std::iter::once(part)).map_err(|error| error.to_string())?;
                     bottom += value;
                 }

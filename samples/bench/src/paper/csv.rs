@@ -1,29 +1,29 @@
-//! All numbers as comma-separated values, for other programs.
+//! Writes all results as CSV.
 
 use std::fmt::Write as _;
 
-use super::measured::SceneResult;
+use super::measure::SceneResult;
 use super::times::{Statistic, Times};
 
-/// The statistics by the names that they have in files.
+/// Names of the statistics in CSV files.
 const STATISTICS: [(&str, Statistic); 5] = [
     ("average", Statistic::Average),
     ("best", Statistic::BEST),
     ("median", Statistic::MEDIAN),
-    ("p99", Statistic::NEARLY_WORST),
+    ("p99", Statistic::PERCENTILE_99),
     ("worst", Statistic::WORST),
 ];
 
-/// The columns of [`numbers`].
+/// Columns that [`numbers`] writes.
 const NUMBERS: &str = "T_ms,t_a_ms,t_b_ms,t_ms,T_span_ms,t_span_ms";
 
-/// A line for each scene, path, camera and statistic.
+/// Writes one line per scene, path, camera and statistic.
 pub(super) fn times(scenes: &[SceneResult]) -> String {
     let mut text = format!("scene,path,camera,statistic,{NUMBERS},t_over_T,t_span_over_T_span,rasteriser\n");
     for scene in scenes {
         for cell in &scene.cells {
             for (name, statistic) in STATISTICS {
-                let times = statistic.of(&cell.frames);
+                let times = statistic.evaluate(&cell.frames);
                 let (path, camera) = (cell.path.name(), cell.camera + 1);
                 let numbers = numbers(&times);
                 let _ = writeln!(
@@ -40,7 +40,7 @@ pub(super) fn times(scenes: &[SceneResult]) -> String {
     text
 }
 
-/// A line for each frame.
+/// Writes one line per frame.
 pub(super) fn frames(scenes: &[SceneResult]) -> String {
     let mut text = format!("scene,path,camera,frame,{NUMBERS}\n");
     for scene in scenes {
@@ -55,17 +55,17 @@ pub(super) fn frames(scenes: &[SceneResult]) -> String {
     text
 }
 
-/// A line for each scene, path and camera.
-pub(super) fn likeness(scenes: &[SceneResult]) -> String {
+/// Writes one line per scene, path and camera.
+pub(super) fn image_metrics(scenes: &[SceneResult]) -> String {
     let mut text = "scene,path,camera,psnr_db,lowest_psnr_db,ssim,differing_share\n".to_owned();
     for scene in scenes {
         for cell in &scene.cells {
-            let alike = &cell.likeness;
+            let metrics = &cell.metrics;
             let (name, path, camera) = (quoted(&scene.name), cell.path.name(), cell.camera + 1);
             let _ = writeln!(
                 text,
                 "{name},{path},{camera},{:.4},{:.4},{:.6},{:.8}",
-                alike.psnr, alike.lowest_psnr, alike.ssim, alike.differing_share
+                metrics.psnr, metrics.lowest_psnr, metrics.ssim, metrics.differing_share
             );
         }
     }
@@ -78,7 +78,7 @@ fn numbers(times: &Times) -> String {
     passes.into_iter().chain(spans).map(|ms| format!("{ms:.6}")).collect::<Vec<_>>().join(",")
 }
 
-/// Names come from files and may hold anything.
+/// Quotes a name if it contains a CSV separator: names come from files.
 fn quoted(name: &str) -> String {
     match name.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", name.replace('"', "\"\"")),

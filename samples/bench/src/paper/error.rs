@@ -1,4 +1,4 @@
-//! Why the experiment did not end.
+//! Errors of the experiment.
 
 use std::path::{Path, PathBuf};
 
@@ -6,17 +6,17 @@ use lvk_samples::app::metrics::SizeError;
 use lvk_samples::app::png::PngError;
 use lvk_samples::hybrid::HybridError;
 
-/// Why the experiment did not end.
+/// An error of the experiment.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PaperError {
-    /// A method could not render.
+    /// A renderer failed.
     #[error(transparent)]
     Hybrid(#[from] HybridError),
-    /// A picture could not be written.
+    /// An image could not be written.
     #[error(transparent)]
     Png(#[from] PngError),
-    /// Two pictures could not be compared.
+    /// Two images could not be compared.
     #[error(transparent)]
     Size(#[from] SizeError),
     /// A file of the report could not be written.
@@ -24,7 +24,7 @@ pub enum PaperError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A plot could not be drawn.
@@ -32,34 +32,34 @@ pub enum PaperError {
     Plot {
         /// Name of the plot.
         name: String,
-        /// What the drawing library said.
+        /// Message of the drawing library.
         what: String,
     },
-    /// Without timestamps there is nothing to measure with.
-    #[error("{device} has no timestamps, by which the experiment measures; choose another one with --device")]
+    /// The device has no timestamp queries, which the experiment requires.
+    #[error(
+        "{device} has no timestamp queries, which the experiment requires; choose another device with --device"
+    )]
     NoTimestamps {
         /// Name of the device.
         device: String,
     },
-    /// The device was opened with other ray queries than are to be measured.
-    #[error(
-        "the plan is to trace by {planned}, but the device was opened to trace by {found}; see ContextDesc::ray_query"
-    )]
+    /// The context uses another implementation of ray queries than the plan.
+    #[error("the plan requires {planned}, but the context uses {found}; see ContextDesc::ray_query")]
     OtherPath {
         /// Name of the path in the plan.
         planned: &'static str,
-        /// Name of what the device does.
+        /// Name of the path of the context.
         found: &'static str,
     },
 }
 
 impl PaperError {
-    /// For `map_err` of what writes `path`.
+    /// Returns a closure for `map_err` of an operation that writes `path`.
     pub(super) fn write(path: &Path) -> impl Fn(std::io::Error) -> Self {
         move |source| Self::Write { path: path.to_owned(), source }
     }
 
-    /// Whether the user can mend it by other arguments.
+    /// True if other arguments can avoid the error.
     #[must_use]
     pub fn is_input(&self) -> bool {
         matches!(self, Self::Png(_) | Self::Write { .. })

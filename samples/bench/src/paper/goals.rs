@@ -1,26 +1,26 @@
-//! What the hybrid method is to reach, and whether it does.
+//! The goals of the hybrid method, and the measured values.
 
 use super::super::table::Table;
-use super::measured::{Cell, SceneResult};
+use super::measure::{CameraResult, SceneResult};
 use super::published::PublishedScene;
 use super::tables::decibels;
 use super::times::{Statistic, Times};
 use super::trace_path::TracePath;
 
-/// Largest t/T on average.
+/// Maximum average t/T.
 pub(super) const AVERAGE_RATIO: f64 = 0.75;
-/// Largest t/T of a camera.
+/// Maximum t/T of a camera.
 const CELL_RATIO: f64 = 1.0;
-/// Largest time of the worst frame over the average.
+/// Maximum ratio of the worst frame to the average frame.
 const WORST_OVER_AVERAGE: f64 = 1.5;
-/// Least SSIM of both methods.
+/// Minimum SSIM between both methods.
 const SSIM: f64 = 0.999;
-/// Largest share of pixels that differ.
+/// Maximum share of differing pixels.
 const DIFFERING_SHARE: f64 = 0.0002;
-/// Least PSNR between two paths, in dB.
+/// Minimum PSNR between two paths, in dB.
 const PATHS_PSNR: f64 = 50.0;
 
-/// A goal, what was measured, and whether that is enough.
+/// A goal and its measured value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Goal {
     what: String,
@@ -28,20 +28,22 @@ struct Goal {
     is_met: bool,
 }
 
-/// All goals of the paths that were measured.
+/// Returns the table of all goals of the measured paths.
 pub(super) fn table(scenes: &[SceneResult], paths: &[TracePath]) -> Table {
     let mut table = Table::new("## Goals".to_owned(), &["goal", "measured", "met"]);
-    for goal in paths.iter().flat_map(|&path| of_path(scenes, path)).chain(paths_agree(scenes, paths)) {
-        table.row(goal.what, [goal.found, if goal.is_met { "yes" } else { "no" }.to_owned()]);
+    for goal in
+        paths.iter().flat_map(|&path| path_goals(scenes, path)).chain(path_agreement_goal(scenes, paths))
+    {
+        table.add_row(goal.what, [goal.found, if goal.is_met { "yes" } else { "no" }.to_owned()]);
     }
     table
 }
 
-fn of_path(scenes: &[SceneResult], path: TracePath) -> Vec<Goal> {
+fn path_goals(scenes: &[SceneResult], path: TracePath) -> Vec<Goal> {
     let name = path.name();
-    let cells: Vec<(&SceneResult, &Cell)> =
-        scenes.iter().flat_map(|scene| scene.of(path).map(move |cell| (scene, cell))).collect();
-    let below = |what: &str, limit: f64, number: &dyn Fn(&SceneResult, &Cell) -> f64, unit: Unit| {
+    let cells: Vec<(&SceneResult, &CameraResult)> =
+        scenes.iter().flat_map(|scene| scene.cameras_by(path).map(move |cell| (scene, cell))).collect();
+    let below = |what: &str, limit: f64, number: &dyn Fn(&SceneResult, &CameraResult) -> f64, unit: Unit| {
         let (found, at) = worst(&cells, |scene, cell| number(scene, cell));
         Goal {
             what: format!("{name}: {what} at most {}", unit.text(limit)),
@@ -49,7 +51,7 @@ fn of_path(scenes: &[SceneResult], path: TracePath) -> Vec<Goal> {
             is_met: found <= limit,
         }
     };
-    let average = |cell: &Cell| Statistic::Average.of(&cell.frames);
+    let average = |cell: &CameraResult| Statistic::Average.evaluate(&cell.frames);
     vec![
         average_ratio("t/T", scenes, path, Times::ratio),
         average_ratio("t/T of whole frames as one span", scenes, path, Times::span_ratio),
@@ -57,13 +59,13 @@ fn of_path(scenes: &[SceneResult], path: TracePath) -> Vec<Goal> {
         below(
             "worst frame over the average",
             WORST_OVER_AVERAGE,
-            &|_, cell| Statistic::WORST.of(&cell.frames).hybrid() / average(cell).hybrid(),
+            &|_, cell| Statistic::WORST.evaluate(&cell.frames).hybrid() / average(cell).hybrid(),
             Unit::Times,
         ),
         below(
             "share of differing pixels",
             DIFFERING_SHARE,
-            &|_, cell| cell.likeness.differing_share,
+            &|_, cell| cell.metrics.differing_share,
             Unit::Share,
         ),
         lowest_ssim(name, &cells),
@@ -71,7 +73,7 @@ fn of_path(scenes: &[SceneResult], path: TracePath) -> Vec<Goal> {
     ]
 }
 
-/// How a number is written.
+/// Unit of a number in the table.
 #[derive(Debug, Clone, Copy)]
 enum Unit {
     Percent,
@@ -89,8 +91,11 @@ impl Unit {
     }
 }
 
-/// The largest number of all cells, and where it is.
-fn worst(cells: &[(&SceneResult, &Cell)], number: impl Fn(&SceneResult, &Cell) -> f64) -> (f64, String) {
+/// Returns the largest number of all cameras, and the name of that camera.
+fn worst(
+    cells: &[(&SceneResult, &CameraResult)],
+    number: impl Fn(&SceneResult, &CameraResult) -> f64,
+) -> (f64, String) {
     let numbers = cells.iter().map(|(scene, cell)| (number(scene, cell), scene, cell));
     let found = numbers.max_by(|a, b| a.0.total_cmp(&b.0));
     found.map_or((f64::NAN, String::new()), |(value, scene, cell)| {
@@ -98,7 +103,7 @@ fn worst(cells: &[(&SceneResult, &Cell)], number: impl Fn(&SceneResult, &Cell) -
     })
 }
 
-/// Every scene counts as much as any other, however long it takes.
+/// Returns the goal of an average ratio. All scenes have equal weight.
 fn average_ratio(what: &str, scenes: &[SceneResult], path: TracePath, ratio: fn(&Times) -> f64) -> Goal {
     let ratios = scenes.iter().map(|scene| ratio(&scene.mean(path, Statistic::Average)));
     let found = ratios.sum::<f64>() / scenes.len().max(1) as f64;
@@ -110,8 +115,8 @@ fn average_ratio(what: &str, scenes: &[SceneResult], path: TracePath, ratio: fn(
     }
 }
 
-fn lowest_ssim(name: &str, cells: &[(&SceneResult, &Cell)]) -> Goal {
-    let (found, at) = worst(cells, |_, cell| -cell.likeness.ssim);
+fn lowest_ssim(name: &str, cells: &[(&SceneResult, &CameraResult)]) -> Goal {
+    let (found, at) = worst(cells, |_, cell| -cell.metrics.ssim);
     Goal {
         what: format!("{name}: SSIM of both methods at least {SSIM}"),
         found: format!("{:.5}{at}", -found),
@@ -119,11 +124,11 @@ fn lowest_ssim(name: &str, cells: &[(&SceneResult, &Cell)]) -> Goal {
     }
 }
 
-/// PSNR against the average that the paper has for the scene, where it has one, else for all its scenes.
-fn psnr_margin(name: &str, cells: &[(&SceneResult, &Cell)]) -> Goal {
-    let margin = |scene: &SceneResult, cell: &Cell| {
-        let published = PublishedScene::named(&scene.name);
-        cell.likeness.psnr - published.map_or(MEAN_PSNR, |theirs| theirs.mean_likeness().0)
+/// Returns the goal of PSNR above the paper's average for the scene, or for all its scenes if the scene is not in the paper.
+fn psnr_margin(name: &str, cells: &[(&SceneResult, &CameraResult)]) -> Goal {
+    let margin = |scene: &SceneResult, cell: &CameraResult| {
+        let published = PublishedScene::find(&scene.name);
+        cell.metrics.psnr - published.map_or(MEAN_PSNR, |theirs| theirs.mean_metrics().0)
     };
     let (found, at) = worst(cells, |scene, cell| -margin(scene, cell));
     Goal {
@@ -132,19 +137,19 @@ fn psnr_margin(name: &str, cells: &[(&SceneResult, &Cell)]) -> Goal {
         ),
         found: match -found {
             margin if margin.is_finite() => format!("{margin:+.2} dB{at}"),
-            _ => "equal pictures".to_owned(),
+            _ => "equal images".to_owned(),
         },
         is_met: -found > 0.0,
     }
 }
 
-/// The paper's average over its scenes, in dB.
+/// The paper's average PSNR over its scenes, in dB.
 const MEAN_PSNR: f64 = 46.71;
 
-fn paths_agree(scenes: &[SceneResult], paths: &[TracePath]) -> Option<Goal> {
+fn path_agreement_goal(scenes: &[SceneResult], paths: &[TracePath]) -> Option<Goal> {
     let [first, second, ..] = paths else { return None };
-    let alike = scenes.iter().flat_map(|scene| &scene.paths_alike);
-    let lowest = alike.flat_map(|(a, b)| [a.psnr, b.psnr]).reduce(f64::min)?;
+    let metrics = scenes.iter().flat_map(|scene| &scene.path_metrics);
+    let lowest = metrics.flat_map(|(a, b)| [a.psnr, b.psnr]).reduce(f64::min)?;
     Some(Goal {
         what: format!("{} and {}: PSNR at least {PATHS_PSNR} dB", first.name(), second.name()),
         found: decibels(lowest),
@@ -155,17 +160,17 @@ fn paths_agree(scenes: &[SceneResult], paths: &[TracePath]) -> Option<Goal> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paper::Likeness;
+    use crate::paper::ImageMetrics;
 
     fn scene(name: &str, standalone: f64, psnr: f64) -> SceneResult {
-        let alike = Likeness { psnr, lowest_psnr: psnr, ssim: 0.9995, differing_share: 1e-4 };
+        let alike = ImageMetrics { psnr, lowest_psnr: psnr, ssim: 0.9995, differing_share: 1e-4 };
         let spans = Times { standalone_span: standalone, hybrid_span: 0.7, ..Times::default() };
         let frames = vec![Times { standalone, rays: 0.4, geometry: 0.2, ..spans }; 3];
-        let cells = (0..5).map(|camera| Cell {
+        let cells = (0..5).map(|camera| CameraResult {
             path: TracePath::Query,
             camera,
             frames: frames.clone(),
-            likeness: alike,
+            metrics: alike,
         });
         let cells = cells.collect();
         SceneResult {
@@ -174,12 +179,12 @@ mod tests {
             triangles: 1,
             cells,
             rasterisers: Vec::new(),
-            paths_alike: Vec::new(),
+            path_metrics: Vec::new(),
         }
     }
 
     fn missed(scenes: &[SceneResult]) -> Vec<String> {
-        let goals = of_path(scenes, TracePath::Query).into_iter().filter(|goal| !goal.is_met);
+        let goals = path_goals(scenes, TracePath::Query).into_iter().filter(|goal| !goal.is_met);
         goals.map(|goal| goal.what).collect()
     }
 
@@ -198,7 +203,7 @@ mod tests {
         let mut uneven = scene("courtyard", 1.0, f64::INFINITY);
         uneven.cells[2].frames[1].geometry = 9.0;
         uneven.cells[2].frames[0].standalone = 9.0;
-        uneven.cells[1].likeness = Likeness { ssim: 0.9, differing_share: 0.1, ..uneven.cells[1].likeness };
+        uneven.cells[1].metrics = ImageMetrics { ssim: 0.9, differing_share: 0.1, ..uneven.cells[1].metrics };
         let missed = missed(&[uneven]);
         assert_eq!(missed.len(), 4, "all but that of each camera's t/T and the PSNR: {missed:?}");
     }

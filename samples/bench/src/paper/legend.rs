@@ -1,19 +1,23 @@
-//! A title and what the colours mean, above a chart.
+//! Draws the title and the legend above a chart.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-/// A colour, red, green and blue.
-pub(super) type Hue = (u8, u8, u8);
+/// A colour: red, green and blue.
+pub(super) type Rgb = (u8, u8, u8);
 
-/// Where a chart is drawn.
+/// Drawing area of a chart.
 pub(super) type Area<'b> = DrawingArea<SVGBackend<'b>, Shift>;
 
-/// Pixels that the legend is high.
+/// Height of the legend in pixels.
 const HEIGHT: i32 = 22;
 
-/// Writes title and legend into the upper part of `root`, on white, and answers the rest.
-pub(super) fn headed<'b>(root: &Area<'b>, title: &str, legend: &[(String, Hue)]) -> Result<Area<'b>, String> {
+/// Draws title and legend in the upper part of `root`, on white, and returns the remaining area.
+pub(super) fn draw_title_and_legend<'b>(
+    root: &Area<'b>,
+    title: &str,
+    legend: &[(String, Rgb)],
+) -> Result<Area<'b>, String> {
     root.fill(&WHITE).map_err(|error| error.to_string())?;
     let below = root.titled(title, ("sans-serif", 17)).map_err(|error| error.to_string())?;
     let (strip, rest) = below.split_vertically(HEIGHT);

@@ -1,7 +1,7 @@
-//! The experiment of Kim and Baek's paper: stand-alone and hybrid ray tracing along the paths of five cameras of each scene,
-//! what their passes take on the device, and how alike their pictures are - with the paper's own numbers beside.
+//! The experiment of Kim and Baek's paper: GPU times and image metrics of stand-alone and hybrid ray tracing along five camera
+//! paths per scene, compared with the paper's numbers.
 //!
-//! `bench paper` is the program. For others there are [`measure`], which measures a scene on a device that is open, and
+//! `bench paper` runs the experiment. Other programs can call [`measure`], which measures a scene on an open context, and
 //! [`Experiment`], which writes the report.
 
 mod args;
@@ -11,14 +11,14 @@ mod csv;
 mod date;
 mod error;
 mod goals;
+mod image_metrics;
 mod legend;
-mod likeness;
 mod line_chart;
-mod measured;
-mod pictures;
+mod measure;
 mod plots;
 mod published;
 mod report;
+mod report_images;
 mod tables;
 mod times;
 mod trace_path;
@@ -26,9 +26,9 @@ mod trace_path;
 pub use args::PaperArgs;
 pub(super) use command::run;
 pub use error::PaperError;
-pub use likeness::Likeness;
-pub use measured::{CAMERA_COUNT, Cell, Plan, SceneResult, measure};
-pub use pictures::Pictures;
-pub use report::{Experiment, PICTURES};
+pub use image_metrics::ImageMetrics;
+pub use measure::{CAMERA_COUNT, CameraResult, ExperimentPlan, SceneResult, measure};
+pub use report::{Experiment, IMAGE_FOLDER};
+pub use report_images::ReportImages;
 pub use times::{Statistic, Times};
 pub use trace_path::TracePath;

@@ -1,27 +1,27 @@
-//! The numbers that Kim and Baek published, to stand beside one's own: "A Hybrid Approach for Vulkan-Based Ray Tracing
+//! The numbers that Kim and Baek published, for comparison: "A Hybrid Approach for Vulkan-Based Ray Tracing
 //! Implementations", Revista Internacional de Métodos Numéricos para Cálculo y Diseño en Ingeniería, 2026,
-//! doi:10.23967/j.rimni.2026.10.72287, Tables 1 to 8. Pictures of 1280 x 720, 4000 frames.
+//! doi:10.23967/j.rimni.2026.10.72287, Tables 1 to 8. Images of 1280 x 720, 4000 frames.
 
 use super::times::Times;
 
 /// A scene of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PublishedScene {
-    /// What the paper calls it.
+    /// Name in the paper.
     pub(super) name: &'static str,
-    /// Of Table 1.
+    /// Number in Table 1.
     pub(super) vertices: u64,
-    /// Of Table 1.
+    /// Number in Table 1.
     pub(super) faces: u64,
     index: usize,
 }
 
-/// Which of the paper's tables of times.
+/// One of the paper's tables of times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TimesTable {
-    /// Its number.
+    /// Number of the table.
     pub(super) number: u32,
-    /// The card.
+    /// Name of the GPU.
     pub(super) card: &'static str,
     rows: &'static [[[f64; 3]; 5]; 3],
     means: &'static [[f64; 3]; 3],
@@ -42,12 +42,12 @@ pub(super) const RTX_2080: TimesTable =
 /// Table 7, averages.
 pub(super) const RX_6600: TimesTable =
     TimesTable { number: 7, card: "RX 6600", rows: &TABLE_7, means: &MEANS_7 };
-/// What Table 8 compares.
+/// The tables that Table 8 compares.
 pub(super) const CARDS: [TimesTable; 3] = [AVERAGE, RTX_2080, RX_6600];
 
 impl PublishedScene {
-    /// The scene of the paper that the scene called `name` is, or stands for: the kitchen stands for the gallery.
-    pub(super) fn named(name: &str) -> Option<Self> {
+    /// Finds the paper's scene by `name`. The kitchen replaces the gallery.
+    pub(super) fn find(name: &str) -> Option<Self> {
         let index = match name {
             "living_room" => 0,
             "conference" => 1,
@@ -57,13 +57,13 @@ impl PublishedScene {
         Some(SCENES[index])
     }
 
-    /// PSNR in dB and SSIM of Table 2 for the camera with this index, 0 to 4.
-    pub(super) fn likeness(&self, camera: usize) -> Option<(f64, f64)> {
+    /// Returns PSNR in dB and SSIM of Table 2 for a camera, 0 to 4.
+    pub(super) fn metrics(&self, camera: usize) -> Option<(f64, f64)> {
         TABLE_2[self.index].get(camera).copied()
     }
 
-    /// The averages of both over the cameras.
-    pub(super) fn mean_likeness(&self) -> (f64, f64) {
+    /// Returns the averages of PSNR in dB and SSIM over the cameras.
+    pub(super) fn mean_metrics(&self) -> (f64, f64) {
         let rows = &TABLE_2[self.index];
         let mean = |number: fn(&(f64, f64)) -> f64| rows.iter().map(number).sum::<f64>() / rows.len() as f64;
         (mean(|row| row.0), mean(|row| row.1))
@@ -71,13 +71,13 @@ impl PublishedScene {
 }
 
 impl TimesTable {
-    /// The row of a camera, 0 to 4.
+    /// Returns the row of a camera, 0 to 4.
     pub(super) fn times(&self, scene: &PublishedScene, camera: usize) -> Option<Times> {
         let &[standalone, rays, geometry] = self.rows[scene.index].get(camera)?;
         Some(Times { standalone, rays, geometry, ..Times::default() })
     }
 
-    /// The average over the cameras, as printed.
+    /// Returns the average over the cameras, as printed in the paper.
     pub(super) fn mean(&self, scene: &PublishedScene) -> Times {
         let [standalone, rays, geometry] = self.means[scene.index];
         Times { standalone, rays, geometry, ..Times::default() }
@@ -226,7 +226,7 @@ mod tests {
 
     /// The columns t and t/T are not transcribed.
     #[test]
-    fn what_the_paper_prints_is_consistent_with_these_numbers() {
+    fn these_numbers_are_consistent_with_the_papers_averages() {
         for table in [AVERAGE, BEST, WORST, RTX_2080, RX_6600] {
             for scene in &SCENES {
                 let rows: Vec<Times> = (0..5).filter_map(|camera| table.times(scene, camera)).collect();
@@ -247,7 +247,7 @@ mod tests {
             assert!((found - ratio).abs() < 0.0015, "{found} {ratio}");
         }
         for (scene, psnr, ssim) in [(0, 46.2963, 0.9892), (1, 55.1011, 0.9964), (2, 38.7412, 0.9521)] {
-            let (found_psnr, found_ssim) = SCENES[scene].mean_likeness();
+            let (found_psnr, found_ssim) = SCENES[scene].mean_metrics();
             assert!(
                 (found_psnr - psnr).abs() < 1e-3 && (found_ssim - ssim).abs() < 1e-3,
                 "{found_psnr} {found_ssim}"
@@ -256,8 +256,8 @@ mod tests {
     }
 
     #[test]
-    fn the_kitchen_stands_for_the_gallery_and_others_for_nothing() {
-        assert_eq!(PublishedScene::named("kitchen").unwrap().name, "Gallery");
-        assert_eq!(PublishedScene::named("courtyard"), None);
+    fn the_kitchen_replaces_the_gallery_and_other_names_are_unknown() {
+        assert_eq!(PublishedScene::find("kitchen").unwrap().name, "Gallery");
+        assert_eq!(PublishedScene::find("courtyard"), None);
     }
 }

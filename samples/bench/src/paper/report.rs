@@ -1,4 +1,4 @@
-//! The report as a folder: one page of markdown, numbers for other programs, plots and pictures.
+//! Writes the report folder: a Markdown page, CSV files, plots and images.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,40 +6,40 @@ use std::path::Path;
 use lvk::Capabilities;
 
 use super::error::PaperError;
-use super::measured::{Plan, SceneResult};
-use super::pictures::sheet_name;
+use super::measure::{ExperimentPlan, SceneResult};
 use super::published::{self, TimesTable};
+use super::report_images::sheet_name;
 use super::times::Statistic;
 use super::trace_path::TracePath;
 use super::{csv, goals, plots, tables};
 use lvk_samples::app::device::{driver_text, query_text};
 
-/// What was measured, on what and how.
+/// The experiment: device, settings and results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// Name of the device.
     pub device: String,
-    /// Its driver and Vulkan.
+    /// Driver and Vulkan version of the device.
     pub driver: String,
-    /// Day of the measurement, as 2026-02-03, in UTC.
+    /// Date of the measurement in UTC, for example 2026-02-03.
     pub date: String,
-    /// How to repeat it.
+    /// Command line that repeats the experiment.
     pub command: String,
-    /// How much was measured.
-    pub plan: Plan,
-    /// How long the whole run took so far, in seconds.
+    /// Settings of the experiment.
+    pub plan: ExperimentPlan,
+    /// Duration of the run so far, in seconds.
     pub wall_seconds: f64,
-    /// What was found.
+    /// Results of the scenes.
     pub scenes: Vec<SceneResult>,
-    /// What else the reader has to know.
+    /// Further notes for the reader.
     pub notes: Vec<String>,
 }
 
-/// Folder of the pictures inside the report's.
-pub const PICTURES: &str = "pictures";
+/// Image folder inside the report folder.
+pub const IMAGE_FOLDER: &str = "pictures";
 
-/// The paper's tables of times: what they are of, and which one stands beside. The last two show the first again, beside
-/// other cards.
+/// The statistic of each table of times, with the paper's table. The last two repeat the averages with other GPUs of the
+/// paper.
 const TIMES: [((&str, Statistic), TimesTable); 5] = [
     (("averages", Statistic::Average), published::AVERAGE),
     (("best frames", Statistic::BEST), published::BEST),
@@ -49,9 +49,9 @@ const TIMES: [((&str, Statistic), TimesTable); 5] = [
 ];
 
 impl Experiment {
-    /// An experiment that nothing was measured of yet.
+    /// Creates an experiment without results.
     #[must_use]
-    pub fn new(capabilities: &Capabilities, command: String, plan: Plan) -> Self {
+    pub fn new(capabilities: &Capabilities, command: String, plan: ExperimentPlan) -> Self {
         let profile = capabilities.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
         let notes = software_note(capabilities, &plan).into_iter().collect();
         Self {
@@ -66,32 +66,32 @@ impl Experiment {
         }
     }
 
-    /// Writes the report into `folder`, which is there: `report.md`, `times.csv`, `frames.csv`, `likeness.csv` and
-    /// plots as SVG. Pictures are written while measuring.
+    /// Writes the report into the existing `folder`: `report.md`, `times.csv`, `frames.csv`, `image_metrics.csv` and
+    /// plots as SVG. [`measure`](super::measure) writes the images.
     ///
     /// # Errors
-    /// [`PaperError::Write`] and [`PaperError::Plot`].
+    /// [`PaperError::Write`] if a file cannot be written, [`PaperError::Plot`] if a plot cannot be drawn.
     pub fn write(&self, folder: &Path) -> Result<(), PaperError> {
         let mut files = plots::all(&self.scenes, &self.plan.paths)?;
         files.extend([
             ("times.csv".to_owned(), csv::times(&self.scenes)),
             ("frames.csv".to_owned(), csv::frames(&self.scenes)),
-            ("likeness.csv".to_owned(), csv::likeness(&self.scenes)),
+            ("image_metrics.csv".to_owned(), csv::image_metrics(&self.scenes)),
             ("report.md".to_owned(), self.page()),
         ]);
         for (name, text) in files {
             let path = folder.join(name);
-            write_whole(&path, &text).map_err(PaperError::write(&path))?;
+            write_atomically(&path, &text).map_err(PaperError::write(&path))?;
         }
         Ok(())
     }
 
-    /// The page.
+    /// Returns the Markdown page.
     #[must_use]
     pub fn page(&self) -> String {
         let mut page = self.head();
         let _ = writeln!(page, "{}", goals::table(&self.scenes, &self.plan.paths));
-        page.push_str("![Hybrid over stand-alone](ratio.svg)\n\n## Tables\n\n");
+        page.push_str("![Hybrid / stand-alone](ratio.svg)\n\n## Tables\n\n");
         let _ = writeln!(page, "{}", tables::geometry(&self.scenes));
         for &path in &self.plan.paths {
             self.add_path(&mut page, path);
@@ -100,16 +100,16 @@ impl Experiment {
         if let Some(table) = tables::paths(&self.scenes, &self.plan.paths) {
             let _ = writeln!(page, "{table}");
         }
-        self.add_pictures(&mut page);
+        self.add_images(&mut page);
         page
     }
 
     fn head(&self) -> String {
-        let Plan { size: [width, height], frames, runs, compared, max_depth, .. } = &self.plan;
+        let ExperimentPlan { size: [width, height], frames, runs, compared, max_depth, .. } = &self.plan;
         let mut text = format!(
             "# The paper's experiment\n\nKim and Baek, \"A Hybrid Approach for Vulkan-Based Ray Tracing \
              Implementations\", 2026, repeated.\n\n- device: {}\n- driver: {}\n- date: {}\n- command: `{}`\n- \
-             pictures: {width}x{height}, up to {max_depth} bounces; {frames} frames along a path around each of five \
+             images: {width}x{height}, up to {max_depth} bounces; {frames} frames along a path around each of five \
              cameras, each rendered {runs} times by each method, of which the median counts; {compared} frames of \
              each camera compared\n",
             self.device, self.driver, self.date, self.command
@@ -127,13 +127,13 @@ impl Experiment {
         self.notes.iter().for_each(|note| {
             let _ = writeln!(text, "- {note}");
         });
-        text.push_str(HOW);
+        text.push_str(METHOD_NOTES);
         text
     }
 
     fn add_path(&self, page: &mut String, path: TracePath) {
         let _ = writeln!(page, "## By {}\n\n![Times]({})\n", path.name(), plots::times_name(path));
-        let _ = writeln!(page, "{}", tables::likeness(&self.scenes, path));
+        let _ = writeln!(page, "{}", tables::image_metrics(&self.scenes, path));
         let shown = if tables::has_published(&self.scenes) { TIMES.len() } else { 3 };
         for (what, published) in &TIMES[..shown] {
             let _ = writeln!(page, "{}", tables::times(&self.scenes, path, *what, published));
@@ -141,43 +141,43 @@ impl Experiment {
         let _ = writeln!(page, "{}", tables::spans(&self.scenes, path));
         let _ = writeln!(page, "{}", tables::spread(&self.scenes, path));
         for scene in &self.scenes {
-            let _ = writeln!(page, "![Every frame of {}]({})\n", scene.name, plots::frames_name(scene, path));
+            let _ = writeln!(page, "![Frame times of {}]({})\n", scene.name, plots::frames_name(scene, path));
         }
     }
 
-    fn add_pictures(&self, page: &mut String) {
-        page.push_str("## Pictures (Figures 8 to 10)\n\nStand-alone, hybrid, and their difference, inverted and times 32.\n");
+    fn add_images(&self, page: &mut String) {
+        page.push_str("## Images (Figures 8 to 10)\n\nStand-alone, hybrid, and their difference, inverted and multiplied by 32.\n");
         for scene in &self.scenes {
             for &path in &self.plan.paths {
                 let _ = write!(page, "\n{} by {}:\n\n", scene.name, path.name());
-                let _ = writeln!(page, "![{}]({PICTURES}/{})", scene.name, sheet_name(&scene.name, path));
+                let _ = writeln!(page, "![{}]({IMAGE_FOLDER}/{})", scene.name, sheet_name(&scene.name, path));
             }
         }
     }
 }
 
-/// Who walks the trees, and why, where it is not the device.
-fn software_note(capabilities: &Capabilities, plan: &Plan) -> Option<String> {
+/// Returns the reason for software ray queries if the plan uses them.
+fn software_note(capabilities: &Capabilities, plan: &ExperimentPlan) -> Option<String> {
     let is_planned = plan.paths.contains(&TracePath::SoftwareQuery);
     let text = || format!("software query: {}", query_text(capabilities, "a compute shader"));
     is_planned.then(text)
 }
 
-/// What the symbols mean.
-const HOW: &str = "
-T is the stand-alone method's time, t_a that of the hybrid method's ray pass, t_b that of its geometry pass, t = t_a + t_b,
-all from timestamps on the device around the commands. A span is a whole frame, from the first timestamp before the geometry
-pass to the last one after the ray pass, so that what lies between the passes counts too: barriers. Where a frame is rendered in
-several bands of rows the span is the sum of theirs, without the host, which waits for each. The paper adds its passes up, so t is the sum here as well,
-and the spans have a table of their own. Both methods take turns frame by frame. The best and the worst frame
-are those of each method by itself, t_a, t_b and the span those of the hybrid method's frame. Rows called average are averages over the
-cameras, as in the paper. The paper rendered 1280x720 on its cards; its scenes are other exports of the same models, the
-kitchen stands beside its gallery, and its camera positions are not known, so columns compare like with similar.
+/// Explanation of symbols and method in the report.
+const METHOD_NOTES: &str = "
+T is the time of the stand-alone method, t_a of the hybrid method's ray pass, t_b of its geometry pass, and t = t_a + t_b.
+All times come from GPU timestamps around the commands. A span is a whole frame, from the first timestamp before the geometry
+pass to the last timestamp after the ray pass. It therefore includes the barriers between the passes. The span of a frame that
+is rendered in several tiles is the sum of the tiles' spans, without the CPU, which waits for each tile. The paper adds the
+times of its passes, so t is a sum here, too; the spans have their own table. Both methods alternate frame by frame. The best
+and the worst frame are selected per method; t_a, t_b and the span belong to the same frame of the hybrid method. Rows named
+average are averages over the cameras, as in the paper. The paper rendered 1280x720 on its GPUs. Its scenes are other exports of
+the same models, the kitchen replaces its gallery, and its camera positions are unknown, so the columns are similar, not equal.
 
 ";
 
-/// Under its name there is the old file or the whole new one.
-fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
+/// Writes a file through a temporary file and a rename, so that readers see the old or the new content.
+fn write_atomically(path: &Path, text: &str) -> std::io::Result<()> {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".part");
     std::fs::write(&partial, text)?;
@@ -187,10 +187,10 @@ fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paper::{Cell, Likeness, Times};
+    use crate::paper::{CameraResult, ImageMetrics, Times};
 
     fn experiment(names: &[&str], paths: &[TracePath]) -> Experiment {
-        let alike = Likeness { psnr: 50.0, lowest_psnr: 49.0, ssim: 0.9995, differing_share: 1e-4 };
+        let alike = ImageMetrics { psnr: 50.0, lowest_psnr: 49.0, ssim: 0.9995, differing_share: 1e-4 };
         let frames = |slow: f64| {
             (0..2500)
                 .map(|i| Times {
@@ -203,11 +203,11 @@ mod tests {
                 .collect()
         };
         let cells = |&path: &TracePath| {
-            (0..5).map(move |camera| Cell {
+            (0..5).map(move |camera| CameraResult {
                 path,
                 camera,
                 frames: frames(1.0 + camera as f64),
-                likeness: alike,
+                metrics: alike,
             })
         };
         let scene = |name: &&str| SceneResult {
@@ -216,11 +216,18 @@ mod tests {
             triangles: 54_321,
             cells: paths.iter().flat_map(cells).collect(),
             rasterisers: paths.iter().map(|path| (*path, "compute rasteriser (exact)".to_owned())).collect(),
-            paths_alike: if paths.len() > 1 { vec![(alike, alike); 5] } else { Vec::new() },
+            path_metrics: if paths.len() > 1 { vec![(alike, alike); 5] } else { Vec::new() },
         };
         let paths = paths.to_vec();
-        let plan =
-            Plan { size: [32, 18], frames: 2500, runs: 1, warm_up: 0, compared: 1, max_depth: 1, paths };
+        let plan = ExperimentPlan {
+            size: [32, 18],
+            frames: 2500,
+            runs: 1,
+            warm_up: 0,
+            compared: 1,
+            max_depth: 1,
+            paths,
+        };
         let capabilities = Capabilities { device_name: "Thing 3000".to_owned(), ..Capabilities::default() };
         let scenes = names.iter().map(scene).collect();
         Experiment { scenes, ..Experiment::new(&capabilities, "bench paper".to_owned(), plan) }

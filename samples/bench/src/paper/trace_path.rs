@@ -1,24 +1,24 @@
-//! How rays are traced, for the report.
+//! Ray tracing paths in the report.
 
 use lvk::{Capabilities, RayQueryPath};
 
 use lvk_samples::hybrid::RayPath;
 
-/// How rays are traced: by which part of Vulkan, and whether the library walks the trees of ray queries.
+/// A ray tracing path: the Vulkan feature, and the implementation of ray queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TracePath {
     /// A ray tracing pipeline.
     Pipeline,
-    /// The device's own ray queries in a compute shader.
+    /// The driver's ray queries in a compute shader.
     Query,
-    /// Ray queries that the library walks in the compute shader.
+    /// The library's software ray queries in a compute shader.
     SoftwareQuery,
 }
 
 impl TracePath {
-    /// What `path` is on the device with `capabilities`.
+    /// Returns the path that `path` selects on a device with `capabilities`.
     #[must_use]
-    pub fn of(path: RayPath, capabilities: &Capabilities) -> Self {
+    pub fn new(path: RayPath, capabilities: &Capabilities) -> Self {
         match (path, capabilities.ray_query_path) {
             (RayPath::Pipeline, _) => Self::Pipeline,
             (RayPath::Query, RayQueryPath::Software) => Self::SoftwareQuery,
@@ -26,7 +26,7 @@ impl TracePath {
         }
     }
 
-    /// By which part of Vulkan.
+    /// Returns the Vulkan feature of the path.
     #[must_use]
     pub fn ray_path(self) -> RayPath {
         match self {
@@ -35,7 +35,7 @@ impl TracePath {
         }
     }
 
-    /// For tables and plots.
+    /// Returns the name for tables and plots.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -45,7 +45,7 @@ impl TracePath {
         }
     }
 
-    /// For names of files.
+    /// Returns the name for file names.
     #[must_use]
     pub fn file_name(self) -> &'static str {
         match self {
@@ -60,10 +60,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn queries_are_named_by_who_walks() {
+    fn queries_are_named_by_their_implementation() {
         use RayQueryPath::{Hardware, None, Software};
         let found = |path, ray_query_path| {
-            TracePath::of(path, &Capabilities { ray_query_path, ..Capabilities::default() })
+            TracePath::new(path, &Capabilities { ray_query_path, ..Capabilities::default() })
         };
         assert_eq!(found(RayPath::Query, Software).name(), "software query");
         assert_eq!([Hardware, None].map(|path| found(RayPath::Query, path).name()), ["query"; 2]);

@@ -1,4 +1,4 @@
-//! Top-level structures that the GPU builds, of instances in a buffer.
+//! TLAS builds by the GPU from instances in a buffer.
 
 use lvk::{
     AccelStructHandle, BufferDesc, BufferHandle, BuildFlags, BuildMode, Context, DeviceInstances, Holder,
@@ -10,14 +10,14 @@ use super::super::instance_record::InstanceRecord;
 use super::super::measure::Stopwatch;
 use super::super::mesh::MeshBuffers;
 use super::super::synthetic::spheres;
-use super::super::tlas::transform_of;
+use super::super::tlas::instance_transform;
 
-/// Instances of the structure.
+/// Instances of the TLAS.
 pub(super) const COUNT: u32 = 10_000;
-/// Triangles of the mesh that all show.
+/// Triangles of the mesh that all instances reference.
 const MESH_TRIANGLES: u32 = 1000;
 
-/// Many instances of one mesh.
+/// A TLAS with many instances of one mesh.
 pub(super) struct Instances {
     tlas: Holder<AccelStructHandle>,
     blas: Holder<AccelStructHandle>,
@@ -29,7 +29,7 @@ impl Instances {
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
         let buffers = MeshBuffers::new(ctx, &spheres(MESH_TRIANGLES))?;
         let blas = buffers.blas(ctx, BuildFlags::FAST_TRACE, PrimitiveOrder::Given)?;
-        let transforms: Vec<_> = (0..COUNT).map(|number| transform_of(number, COUNT)).collect();
+        let transforms: Vec<_> = (0..COUNT).map(|number| instance_transform(number, COUNT)).collect();
         let records: Vec<_> = transforms.iter().map(|rows| InstanceRecord::new(*rows, 0)).collect();
         let records = ctx.create_buffer(&BufferDesc {
             data: Some(bytemuck::cast_slice(&records)),
@@ -43,7 +43,7 @@ impl Instances {
         Ok(Self { tlas, blas, records, _buffers: buffers })
     }
 
-    /// Milliseconds of a rebuild on the GPU.
+    /// Returns the GPU milliseconds of a rebuild.
     pub(super) fn rebuild(&self, stopwatch: &Stopwatch) -> Result<f64, BenchError> {
         let blas = [*self.blas];
         let instances = DeviceInstances { buffer: *self.records, offset: 0, count: COUNT, blas: &blas };

@@ -1,14 +1,14 @@
-//! How alike pictures of the same frames are.
+//! Image metrics between frames of two renderers.
 
 use super::error::PaperError;
 use lvk_samples::app::metrics::{Difference, SizeError, compare};
 
-/// How alike pictures of the same frames by two ways of rendering are, as in the paper's Table 2.
+/// Image metrics between the same frames of two renderers, as in the paper's Table 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Likeness {
-    /// Peak signal-to-noise ratio in dB of the mean square error over all frames; infinite for equal pictures.
+pub struct ImageMetrics {
+    /// Peak signal-to-noise ratio in dB of the mean square error over all frames; infinite for equal images.
     pub psnr: f64,
-    /// The lowest of a single frame.
+    /// The lowest PSNR of a single frame in dB.
     pub lowest_psnr: f64,
     /// Mean structural similarity.
     pub ssim: f64,
@@ -16,18 +16,21 @@ pub struct Likeness {
     pub differing_share: f64,
 }
 
-impl Likeness {
-    /// Of pairs of pictures of 4 bytes a pixel, each pair compared on a thread of its own.
-    pub(super) fn of(pairs: &[[Vec<u8>; 2]], [width, height]: [u32; 2]) -> Result<Self, PaperError> {
+impl ImageMetrics {
+    /// Compares pairs of images with 4 bytes per pixel, each pair on its own thread.
+    pub(super) fn compare_pairs(
+        pairs: &[[Vec<u8>; 2]],
+        [width, height]: [u32; 2],
+    ) -> Result<Self, PaperError> {
         let compared: Result<Vec<Difference>, SizeError> = std::thread::scope(|scope| {
             let work = |[first, second]: &'_ [Vec<u8>; 2]| compare(first, second, width, height);
             let threads: Vec<_> = pairs.iter().map(|pair| (pair, scope.spawn(move || work(pair)))).collect();
             threads.into_iter().map(|(pair, thread)| thread.join().unwrap_or_else(|_| work(pair))).collect()
         });
-        Ok(Self::over(&compared?))
+        Ok(Self::from_frames(&compared?))
     }
 
-    /// Of several cameras as of one: squared errors are averaged, not decibels.
+    /// Averages the metrics of several cameras. Averages squared errors, not decibels.
     pub(super) fn mean(cells: &[Self]) -> Self {
         let mean =
             |number: &dyn Fn(&Self) -> f64| cells.iter().map(number).sum::<f64>() / cells.len().max(1) as f64;
@@ -39,7 +42,7 @@ impl Likeness {
         }
     }
 
-    fn over(frames: &[Difference]) -> Self {
+    fn from_frames(frames: &[Difference]) -> Self {
         let mean = |number: &dyn Fn(&Difference) -> f64| {
             frames.iter().map(number).sum::<f64>() / frames.len().max(1) as f64
         };
@@ -61,15 +64,15 @@ mod tests {
     fn equal_frames_do_not_hide_different_ones() {
         let flat = |level: u8| vec![level; 12 * 12 * 4];
         let pairs = [[flat(100), flat(100)], [flat(100), flat(110)]];
-        let likeness = Likeness::of(&pairs, [12, 12]).unwrap();
+        let metrics = ImageMetrics::compare_pairs(&pairs, [12, 12]).unwrap();
         let single = 20.0 * 25.5_f64.log10();
-        assert!((likeness.lowest_psnr - single).abs() < 1e-9, "{likeness:?}");
-        assert!((likeness.psnr - single - 10.0 * 2.0_f64.log10()).abs() < 1e-9, "{likeness:?}");
-        assert_eq!(likeness.differing_share, 0.5);
-        let same = Likeness::of(&pairs[..1], [12, 12]).unwrap();
+        assert!((metrics.lowest_psnr - single).abs() < 1e-9, "{metrics:?}");
+        assert!((metrics.psnr - single - 10.0 * 2.0_f64.log10()).abs() < 1e-9, "{metrics:?}");
+        assert_eq!(metrics.differing_share, 0.5);
+        let same = ImageMetrics::compare_pairs(&pairs[..1], [12, 12]).unwrap();
         assert_eq!((same.psnr, same.lowest_psnr, same.differing_share), (f64::INFINITY, f64::INFINITY, 0.0));
-        assert!(Likeness::of(&pairs, [13, 12]).is_err());
-        let other = Likeness::of(&pairs[1..], [12, 12]).unwrap();
-        assert_eq!(Likeness::mean(&[same, other]), likeness, "an equal camera counts as no error");
+        assert!(ImageMetrics::compare_pairs(&pairs, [13, 12]).is_err());
+        let other = ImageMetrics::compare_pairs(&pairs[1..], [12, 12]).unwrap();
+        assert_eq!(ImageMetrics::mean(&[same, other]), metrics, "an equal camera counts as no error");
     }
 }

@@ -1,4 +1,4 @@
-//! A ray tracing pipeline with its binding table and a descriptor set for one structure.
+//! A ray tracing pipeline with its shader binding table and a descriptor set with one TLAS.
 
 use std::rc::Rc;
 
@@ -9,7 +9,7 @@ use super::buffer::RawBuffer;
 use crate::error::BenchError;
 use crate::tracer::View;
 
-/// Where the shaders expect structures: set 0, this binding.
+/// Binding of acceleration structures in set 0 of the shaders.
 const BINDING: u32 = 4;
 /// Stages of the pipeline.
 const STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
@@ -26,7 +26,7 @@ const KINDS: [vk::ShaderStageFlags; 5] = [
     vk::ShaderStageFlags::CLOSEST_HIT_KHR,
 ];
 
-/// A ray tracing pipeline with its binding table and a descriptor set for one structure.
+/// A ray tracing pipeline with its shader binding table and a descriptor set with one TLAS.
 pub(crate) struct RawTracing {
     set_layout: vk::DescriptorSetLayout,
     layout: vk::PipelineLayout,
@@ -35,13 +35,13 @@ pub(crate) struct RawTracing {
     set: vk::DescriptorSet,
     /// The first ray generation shader, the miss shaders, the hit group, no callable shader.
     regions: [vk::StridedDeviceAddressRegionKHR; 4],
-    table: Option<RawBuffer>,
+    sbt: Option<RawBuffer>,
     device: Rc<RawDevice>,
 }
 
 impl RawTracing {
-    /// Makes everything for a trace of `tlas`, which the shaders find at `element` of their array. `words` are the
-    /// SPIR-V of the stages.
+    /// Creates all objects for a trace of `tlas`, which is `element` of the shaders' array. `words` are the SPIR-V of the
+    /// stages.
     pub(crate) fn new(
         device: &Rc<RawDevice>,
         words: &[Vec<u32>],
@@ -55,14 +55,14 @@ impl RawTracing {
             pool: vk::DescriptorPool::null(),
             set: vk::DescriptorSet::null(),
             regions: [vk::StridedDeviceAddressRegionKHR::default(); 4],
-            table: None,
+            sbt: None,
             device: Rc::clone(device),
         };
         made.create_layouts(element + 1)?;
         made.create_set(element + 1)?;
         made.write_set(tlas, element);
         made.create_pipeline(words)?;
-        made.create_table()?;
+        made.create_sbt()?;
         Ok(made)
     }
 
@@ -92,14 +92,14 @@ impl RawTracing {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings).push_next(&mut flags);
         // SAFETY: the description is valid; the context has turned partially bound descriptors on.
         self.set_layout = unsafe { device.create_descriptor_set_layout(&info, None) }
-            .map_err(BenchError::of("vkCreateDescriptorSetLayout"))?;
+            .map_err(BenchError::hand_written("vkCreateDescriptorSetLayout"))?;
         let sets = [self.set_layout];
         let ranges =
             [vk::PushConstantRange { stage_flags: STAGES, offset: 0, size: size_of::<View>() as u32 }];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&ranges);
         // SAFETY: the set layout is alive, and every device has room for so few push constants.
         self.layout = unsafe { device.create_pipeline_layout(&info, None) }
-            .map_err(BenchError::of("vkCreatePipelineLayout"))?;
+            .map_err(BenchError::hand_written("vkCreatePipelineLayout"))?;
         Ok(())
     }
 
@@ -111,12 +111,12 @@ impl RawTracing {
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: the description is valid.
         self.pool = unsafe { device.create_descriptor_pool(&info, None) }
-            .map_err(BenchError::of("vkCreateDescriptorPool"))?;
+            .map_err(BenchError::hand_written("vkCreateDescriptorPool"))?;
         let layouts = [self.set_layout];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
         // SAFETY: pool and layout are alive, and the pool has room for the set.
         let sets = unsafe { device.allocate_descriptor_sets(&info) };
-        self.set = sets.map_err(BenchError::of("vkAllocateDescriptorSets"))?[0];
+        self.set = sets.map_err(BenchError::hand_written("vkAllocateDescriptorSets"))?[0];
         Ok(())
     }
 
@@ -141,10 +141,10 @@ impl RawTracing {
             let info = vk::ShaderModuleCreateInfo::default().code(words);
             // SAFETY: the words come from the compiler.
             let module = unsafe { self.device.device.create_shader_module(&info, None) };
-            modules.push(module.map_err(BenchError::of("vkCreateShaderModule"))?);
+            modules.push(module.map_err(BenchError::hand_written("vkCreateShaderModule"))?);
             Ok(())
         });
-        let linked = made.and_then(|()| self.link(&modules));
+        let linked = made.and_then(|()| self.create_pipeline_from(&modules));
         for module in modules {
             // SAFETY: no pipeline is being made of it.
             unsafe { self.device.device.destroy_shader_module(module, None) };
@@ -153,7 +153,7 @@ impl RawTracing {
         Ok(())
     }
 
-    fn link(&self, modules: &[vk::ShaderModule]) -> Result<vk::Pipeline, BenchError> {
+    fn create_pipeline_from(&self, modules: &[vk::ShaderModule]) -> Result<vk::Pipeline, BenchError> {
         let stage = |(module, kind): (&vk::ShaderModule, &vk::ShaderStageFlags)| {
             vk::PipelineShaderStageCreateInfo::default().stage(*kind).module(*module).name(c"main")
         };
@@ -168,11 +168,11 @@ impl RawTracing {
         // SAFETY: modules and layout are alive and fit each other.
         let made = unsafe { self.device.tracing.create_ray_tracing_pipelines(none, cache, &[info], None) };
         made.map(|pipelines| pipelines[0])
-            .map_err(|(_, result)| BenchError::of("vkCreateRayTracingPipelinesKHR")(result))
+            .map_err(|(_, result)| BenchError::hand_written("vkCreateRayTracingPipelinesKHR")(result))
     }
 
-    /// Handles of the first ray generation shader, both miss shaders and the hit group, each at the base alignment.
-    fn create_table(&mut self) -> Result<(), BenchError> {
+    /// Creates the SBT: handles of the first ray generation shader, both miss shaders and the hit group, each at the base alignment.
+    fn create_sbt(&mut self) -> Result<(), BenchError> {
         let limits = &self.device.ctx.capabilities().limits;
         let handle = limits.sbt_handle_bytes as usize;
         let stride = limits.sbt_handle_bytes.next_multiple_of(limits.sbt_handle_alignment.max(1)) as usize;
@@ -183,15 +183,15 @@ impl RawTracing {
             let tracing = &self.device.tracing;
             tracing.get_ray_tracing_shader_group_handles(self.pipeline, 0, groups as u32, handle * groups)
         };
-        let handles = handles.map_err(BenchError::of("vkGetRayTracingShaderGroupHandlesKHR"))?;
+        let handles = handles.map_err(BenchError::hand_written("vkGetRayTracingShaderGroupHandlesKHR"))?;
         let miss_at = stride.next_multiple_of(base);
         let hit_at = (miss_at + 2 * stride).next_multiple_of(base);
         let usage = vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR;
-        let table = RawBuffer::writable(&self.device, (hit_at + stride + base) as u64, usage)?;
-        let first = table.address.next_multiple_of(base as u64);
+        let sbt = RawBuffer::writable(&self.device, (hit_at + stride + base) as u64, usage)?;
+        let first = sbt.address.next_multiple_of(base as u64);
         for (group, place) in [(0, 0), (2, miss_at), (3, miss_at + stride), (4, hit_at)] {
-            let offset = first - table.address + place as u64;
-            table.write(offset, &handles[group * handle..(group + 1) * handle])?;
+            let offset = first - sbt.address + place as u64;
+            sbt.write(offset, &handles[group * handle..(group + 1) * handle])?;
         }
         let region = |offset: usize, count: usize| vk::StridedDeviceAddressRegionKHR {
             device_address: first + offset as u64,
@@ -199,7 +199,7 @@ impl RawTracing {
             size: (stride * count) as u64,
         };
         self.regions = [region(0, 1), region(miss_at, 2), region(hit_at, 1), Default::default()];
-        self.table = Some(table);
+        self.sbt = Some(sbt);
         Ok(())
     }
 }
@@ -207,7 +207,7 @@ impl RawTracing {
 impl Drop for RawTracing {
     fn drop(&mut self) {
         let device = &self.device.device;
-        // SAFETY: the last submission was waited for; what was never made is null, which is allowed.
+        // SAFETY: the last submission was waited for; objects that were never created are null, which is allowed.
         unsafe {
             device.destroy_pipeline(self.pipeline, None);
             device.destroy_pipeline_layout(self.layout, None);

@@ -1,21 +1,21 @@
-//! One device opened three times: for the driver and software together, and for each alone.
+//! Three contexts of one device: driver and software together, and each alone.
 
 use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
 
 use super::super::error::BenchError;
 use super::super::setup::Setup;
 
-/// One device opened three times.
-pub(super) struct Devices {
-    /// Pipelines by the driver, if it has them, and queries in software.
+/// Three contexts of one device.
+pub(super) struct Contexts {
+    /// The driver's ray tracing pipelines, if any, and software ray queries.
     pub(super) both: Context,
-    /// Software alone, so that structures are its own and nothing else.
+    /// Software ray queries alone: acceleration structures have no part of the driver.
     pub(super) software: Context,
-    /// The driver alone.
+    /// The driver's ray tracing alone.
     driver: Context,
 }
 
-impl Devices {
+impl Contexts {
     pub(super) fn open(setup: &Setup) -> Result<Self, BenchError> {
         use FeatureRequest::{Off, Optional};
         use RayQueryRequest::{HardwareIfPresent, Software};
@@ -26,19 +26,19 @@ impl Devices {
         })
     }
 
-    /// The driver alone, if it traces anything.
+    /// Returns the driver's context if it supports ray tracing.
     pub(super) fn driver(&self) -> Option<&Context> {
         let caps = self.driver.capabilities();
         (caps.ray_tracing_pipeline || caps.ray_query).then_some(&self.driver)
     }
 
-    /// The driver alone, if it has ray queries.
+    /// Returns the driver's context if it has ray queries.
     pub(super) fn driver_with_queries(&self) -> Option<&Context> {
         (self.driver.capabilities().ray_query_path == RayQueryPath::Hardware).then_some(&self.driver)
     }
 
-    /// What is not measured, as the device lacks it.
-    pub(super) fn missing(&self) -> Vec<String> {
+    /// Returns notes on what is not measured because the device lacks it.
+    pub(super) fn missing_notes(&self) -> Vec<String> {
         let caps = self.driver.capabilities();
         let device = &caps.device_name;
         let lacks = [("ray tracing pipelines", caps.ray_tracing_pipeline), ("ray queries", caps.ray_query)];

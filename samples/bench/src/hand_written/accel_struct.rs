@@ -1,4 +1,4 @@
-//! Acceleration structures: one geometry each.
+//! Acceleration structures with one geometry.
 
 use std::rc::Rc;
 
@@ -9,10 +9,10 @@ use super::buffer::RawBuffer;
 use crate::error::BenchError;
 use crate::mesh::MeshBuffers;
 
-/// A structure of one geometry, with scratch memory of its own.
-pub(crate) struct RawStructure {
+/// An acceleration structure with one geometry and its own scratch buffer.
+pub(crate) struct RawAccelStruct {
     pub(crate) raw: vk::AccelerationStructureKHR,
-    /// As instances refer to it.
+    /// Address for instance records.
     pub(crate) address: u64,
     pub(crate) bytes: u64,
     ty: vk::AccelerationStructureTypeKHR,
@@ -25,38 +25,39 @@ pub(crate) struct RawStructure {
     device: Rc<RawDevice>,
 }
 
-/// All triangles of a mesh that `lvk` holds in memory, opaque.
+/// Returns the opaque geometry of a mesh in buffers of `lvk`.
 pub(crate) fn triangle_geometry(
     device: &RawDevice,
     mesh: &MeshBuffers,
 ) -> lvk::Result<vk::AccelerationStructureGeometryKHR<'static>> {
     let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
         .vertex_format(vk::Format::R32G32B32_SFLOAT)
-        .vertex_data(at(device.ctx.buffer_address(*mesh.positions)?))
+        .vertex_data(device_address(device.ctx.buffer_address(*mesh.positions)?))
         .vertex_stride(12)
         .max_vertex(mesh.vertex_count.saturating_sub(1))
         .index_type(vk::IndexType::UINT32)
-        .index_data(at(device.ctx.buffer_address(*mesh.indices)?));
+        .index_data(device_address(device.ctx.buffer_address(*mesh.indices)?));
     Ok(vk::AccelerationStructureGeometryKHR::default()
         .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
         .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
         .flags(vk::GeometryFlagsKHR::OPAQUE))
 }
 
-/// Instances as Vulkan reads them, from an address that is a multiple of 16.
+/// Returns the geometry of instance records at an address that is a multiple of 16.
 pub(crate) fn instance_geometry(address: u64) -> vk::AccelerationStructureGeometryKHR<'static> {
-    let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(at(address));
+    let instances =
+        vk::AccelerationStructureGeometryInstancesDataKHR::default().data(device_address(address));
     vk::AccelerationStructureGeometryKHR::default()
         .geometry_type(vk::GeometryTypeKHR::INSTANCES)
         .geometry(vk::AccelerationStructureGeometryDataKHR { instances })
 }
 
-fn at(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
+fn device_address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
     vk::DeviceOrHostAddressConstKHR { device_address }
 }
 
-impl RawStructure {
-    /// Makes room for `count` primitives or instances; nothing is built yet.
+impl RawAccelStruct {
+    /// Creates an acceleration structure for `count` primitives or instances. Does not build it.
     pub(crate) fn new(
         device: &Rc<RawDevice>,
         geometry: vk::AccelerationStructureGeometryKHR<'static>,
@@ -94,12 +95,12 @@ impl RawStructure {
         })
     }
 
-    /// Records a build from the present contents of the inputs, and a barrier behind it.
+    /// Records a build and a barrier after it.
     pub(crate) fn build(&self, commands: vk::CommandBuffer) {
         self.record(commands, vk::BuildAccelerationStructureModeKHR::BUILD);
     }
 
-    /// Records a refit, for structures with `ALLOW_UPDATE` that are built, and a barrier behind it.
+    /// Records a refit and a barrier after it. The structure must be built with `ALLOW_UPDATE`.
     pub(crate) fn refit(&self, commands: vk::CommandBuffer) {
         self.record(commands, vk::BuildAccelerationStructureModeKHR::UPDATE);
     }
@@ -132,20 +133,20 @@ impl RawStructure {
         }
     }
 
-    /// Asks how many bytes the built structure needs once it is compacted, for `ALLOW_COMPACTION`. Waits.
+    /// Queries the compacted size in bytes of a structure that was built with `ALLOW_COMPACTION`. Waits for the query.
     pub(crate) fn compacted_bytes(&self, commands: &super::RawCommands) -> Result<u64, BenchError> {
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
         let info = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(1);
         // SAFETY: the description is valid.
         let pool = unsafe { self.device.device.create_query_pool(&info, None) }
-            .map_err(BenchError::of("vkCreateQueryPool"))?;
-        let answer = self.ask(commands, ty, pool);
+            .map_err(BenchError::hand_written("vkCreateQueryPool"))?;
+        let answer = self.run_size_query(commands, ty, pool);
         // SAFETY: the submission was waited for.
         unsafe { self.device.device.destroy_query_pool(pool, None) };
         answer
     }
 
-    fn ask(
+    fn run_size_query(
         &self,
         commands: &super::RawCommands,
         ty: vk::QueryType,
@@ -161,12 +162,12 @@ impl RawStructure {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the query was written.
         unsafe { device.get_query_pool_results(pool, 0, &mut bytes, flags) }
-            .map_err(BenchError::of("vkGetQueryPoolResults"))?;
+            .map_err(BenchError::hand_written("vkGetQueryPoolResults"))?;
         Ok(bytes[0])
     }
 }
 
-impl Drop for RawStructure {
+impl Drop for RawAccelStruct {
     fn drop(&mut self) {
         // SAFETY: every submission of the benchmarks is waited for, so the GPU is done with it.
         unsafe { self.device.accel.destroy_acceleration_structure(self.raw, None) };
@@ -199,5 +200,5 @@ fn create(
     let info = vk::AccelerationStructureCreateInfoKHR::default().buffer(storage.raw).size(bytes).ty(ty);
     // SAFETY: the buffer is large enough and has the usage.
     unsafe { device.accel.create_acceleration_structure(&info, None) }
-        .map_err(BenchError::of("vkCreateAccelerationStructureKHR"))
+        .map_err(BenchError::hand_written("vkCreateAccelerationStructureKHR"))
 }

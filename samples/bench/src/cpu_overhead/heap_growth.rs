@@ -1,9 +1,9 @@
-//! The same frame again and again: what it takes from the heap, and whether memory grows.
+//! Repeats the same frame, and measures heap allocations and the growth of resident memory.
 
 use lvk::{Context, Dependencies};
 
-use super::Amount;
-use super::allocations::count;
+use super::Workload;
+use super::allocations::allocation_count;
 use super::row::{Limit, Row};
 use super::scene::{Push, Scene};
 use super::start::resident_mb;
@@ -11,24 +11,24 @@ use crate::error::BenchError;
 
 const DRAWS: u32 = 100;
 
-pub(super) fn measure(silent: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
     let scene = Scene::new(silent)?;
-    let warm_up = (amount.many / 10).max(1);
+    let warm_up = (workload.many / 10).max(1);
     frames(silent, &scene, warm_up, DRAWS)?;
-    let (before, memory) = (count(), resident_mb());
-    frames(silent, &scene, amount.many, DRAWS)?;
-    let (middle, after) = (count(), resident_mb());
-    frames(silent, &scene, amount.many, 0)?;
-    let each = |from: u64, to: u64| (to - from) as f64 / f64::from(amount.many);
-    let (full, empty) = (each(before, middle), each(middle, count()));
+    let (before, memory) = (allocation_count(), resident_mb());
+    frames(silent, &scene, workload.many, DRAWS)?;
+    let (middle, after) = (allocation_count(), resident_mb());
+    frames(silent, &scene, workload.many, 0)?;
+    let each = |from: u64, to: u64| (to - from) as f64 / f64::from(workload.many);
+    let (full, empty) = (each(before, middle), each(middle, allocation_count()));
     let row = |what: &str, ours, unit, limit| Row { what: what.to_owned(), ours, other: None, unit, limit };
     let mut rows = vec![
-        row("heap allocations a draw", (full - empty) / f64::from(DRAWS), "", Limit::Most(0.005)),
-        row("heap allocations a frame of one pass and one dispatch", empty, "", Limit::None),
+        row("heap allocations per draw", (full - empty) / f64::from(DRAWS), "", Limit::AtMost(0.005)),
+        row("heap allocations per frame of one pass and one dispatch", empty, "", Limit::None),
     ];
     let grown = memory.zip(after).map(|(before, after)| after - before);
-    let what = format!("resident memory grown over {} frames", amount.many);
-    rows.extend(grown.map(|grown| row(&what, grown, "MB", Limit::Most(0.5))));
+    let what = format!("resident memory growth over {} frames", workload.many);
+    rows.extend(grown.map(|grown| row(&what, grown, "MB", Limit::AtMost(0.5))));
     Ok(rows)
 }
 

@@ -1,36 +1,36 @@
-//! How far rays find the same by software and by the driver.
+//! Compares the hits of software ray queries with those of the driver.
 
 use super::super::table::Table;
-use super::super::tracer::{Hit, Picture};
-use super::sides::Shape;
-use super::walk::Walked;
+use super::super::tracer::{Hit, TracedImage};
+use super::tracers::Layout;
+use super::traversal::TraversalResult;
 
-/// Distances count as the same within this part of them.
-const CLOSE: f32 = 1e-4;
+/// Relative tolerance for equal distances.
+const TOLERANCE: f32 = 1e-4;
 
-/// Numbers of pixels.
+/// Pixel counts of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Agreement {
+pub(super) struct HitAgreement {
     pixels: usize,
-    /// With the same triangle, or none in both.
+    /// Pixels with the same triangle, or a miss in both images.
     primitives: usize,
-    /// With distances that are the same but for rounding, or none in both.
+    /// Pixels with equal distances up to rounding, or a miss in both images.
     distances: usize,
-    /// With a shadow ray in both.
+    /// Pixels with a shadow ray in both images.
     shadow_rays: usize,
-    /// Of those, with the same answer.
+    /// Pixels of `shadow_rays` with the same result.
     shadows: usize,
 }
 
-impl Agreement {
-    /// Waits for both pictures.
-    pub(super) fn of(reference: &Picture, other: &Picture) -> lvk::Result<Self> {
+impl HitAgreement {
+    /// Downloads and compares two images.
+    pub(super) fn compare(reference: &TracedImage, other: &TracedImage) -> lvk::Result<Self> {
         let hits: Vec<_> = reference.hits()?.into_iter().zip(other.hits()?).collect();
         let lit: Vec<_> = reference.lit()?.into_iter().zip(other.lit()?).collect();
-        Ok(Self::of_pixels(&hits, &lit))
+        Ok(Self::compare_pixels(&hits, &lit))
     }
 
-    fn of_pixels(hits: &[(Hit, Hit)], lit: &[(u32, u32)]) -> Self {
+    fn compare_pixels(hits: &[(Hit, Hit)], lit: &[(u32, u32)]) -> Self {
         let both_hit = |(a, b): &(Hit, Hit)| a.t >= 0.0 && b.t >= 0.0;
         let both_missed = |(a, b): &(Hit, Hit)| a.t < 0.0 && b.t < 0.0;
         let count = |same: fn(&(Hit, Hit)) -> bool| {
@@ -40,13 +40,13 @@ impl Agreement {
         Self {
             pixels: hits.len(),
             primitives: count(|(a, b)| a.primitive == b.primitive),
-            distances: count(|(a, b)| (a.t - b.t).abs() <= CLOSE * a.t),
+            distances: count(|(a, b)| (a.t - b.t).abs() <= TOLERANCE * a.t),
             shadow_rays: shadows().count(),
             shadows: shadows().filter(|(_, (a, b))| a == b).count(),
         }
     }
 
-    /// Counts the pixels of both.
+    /// Adds the counts of another comparison.
     pub(super) fn add(&mut self, other: &Self) {
         self.pixels += other.pixels;
         self.primitives += other.primitives;
@@ -56,29 +56,29 @@ impl Agreement {
     }
 }
 
-/// A row for each way of tracing that there is something to compare with.
-pub(super) fn table(walked: &[Walked]) -> Table {
-    let columns = ["the same as by pipeline, as given", "triangle", "distance", "shadow"];
-    let mut table = Table::new("### Agreement".to_owned(), &columns);
-    if walked.iter().all(|side| side.agreement.is_none()) {
-        table.note("not compared: the device has no ray tracing pipelines");
+/// Returns a table with a row for each tracer that has a reference.
+pub(super) fn table(results: &[TraversalResult]) -> Table {
+    let columns = ["equal to pipeline, given order", "triangle", "distance", "shadow"];
+    let mut table = Table::new("### Hit agreement".to_owned(), &columns);
+    if results.iter().all(|case| case.agreement.is_none()) {
+        table.add_note("not compared: the device has no ray tracing pipelines");
         return table;
     }
-    for side in walked {
-        let Some(found) = side.agreement else { continue };
-        let shape = if side.shape == Shape::Cut { ", overlapping instances" } else { "" };
+    for case in results {
+        let Some(found) = case.agreement else { continue };
+        let layout = if case.layout == Layout::Chunks { ", overlapping instances" } else { "" };
         let shares = [
             share(found.primitives, found.pixels),
             share(found.distances, found.pixels),
             share(found.shadows, found.shadow_rays),
         ];
-        table.row(format!("{}{shape}", side.name), shares);
+        table.add_row(format!("{}{layout}", case.name), shares);
     }
-    table.note(format!(
-        "shares of pixels of all cameras: the same triangle or none, distances within {CLOSE:e} of them, and the answer of \
-         shadow rays where both primary rays hit"
+    table.add_note(format!(
+        "shares of pixels of all cameras: the same triangle or two misses, relative distances within {TOLERANCE:e}, and equal shadow \
+         rays where both primary rays hit"
     ));
-    table.note("which of two triangles is hit may differ where they share an edge, or lie upon each other");
+    table.add_note("the hit triangle may differ at a shared edge and for coplanar triangles");
     table
 }
 
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn misses_agree_with_misses_and_hits_with_hits_of_the_same() {
+    fn misses_agree_with_misses_and_hits_with_equal_hits() {
         let hit = |t, primitive| Hit { t, primitive };
         let hits = [
             (hit(-1.0, 0), hit(-1.0, 0)),
@@ -101,8 +101,8 @@ mod tests {
             (hit(2.0, 5), hit(2.1, 5)),
         ];
         let lit = [(0, 0), (0, 1), (1, 1), (1, 0), (0, 0)];
-        let found = Agreement::of_pixels(&hits, &lit);
-        let expected = Agreement { pixels: 5, primitives: 3, distances: 3, shadow_rays: 3, shadows: 2 };
+        let found = HitAgreement::compare_pixels(&hits, &lit);
+        let expected = HitAgreement { pixels: 5, primitives: 3, distances: 3, shadow_rays: 3, shadows: 2 };
         assert_eq!(found, expected);
         let mut twice = found;
         twice.add(&found);

@@ -1,81 +1,81 @@
-//! Renders a scene along its five paths by both methods, and keeps what each frame took and how the pictures differ.
+//! Renders a scene along its five camera paths by both methods, and records frame times and image metrics.
 
 use lvk::{Capabilities, Context};
 
 use super::error::PaperError;
-use super::likeness::Likeness;
-use super::pictures::Pictures;
+use super::image_metrics::ImageMetrics;
+use super::report_images::ReportImages;
 use super::times::{Statistic, Times};
 use super::trace_path::TracePath;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, Method};
 use lvk_samples::scene::{Camera, CameraPath, Scene};
 
-/// Cameras of a scene.
+/// Number of cameras of a scene.
 pub const CAMERA_COUNT: usize = 5;
 
-/// How much to measure.
+/// Settings of the experiment.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Plan {
-    /// Width and height of the pictures in pixels.
+pub struct ExperimentPlan {
+    /// Width and height of the images in pixels.
     pub size: [u32; 2],
     /// Frames along the path of each camera.
     pub frames: u32,
-    /// How often each frame is rendered by each method; the median counts.
+    /// Renderings of each frame by each method; the median counts.
     pub runs: u32,
-    /// Frames that are rendered by each method before any is timed.
+    /// Unmeasured frames of each method before the first measured frame.
     pub warm_up: u32,
-    /// Frames of each camera, evenly along its path, whose pictures are compared.
+    /// Frames per camera, evenly along its path, whose images are compared.
     pub compared: u32,
-    /// How often a ray may be reflected or refracted.
+    /// Maximum number of reflections and refractions of a ray.
     pub max_depth: u32,
-    /// The paths of ray tracing.
+    /// The measured ray tracing paths.
     pub paths: Vec<TracePath>,
 }
 
-/// What was measured of a camera by one path of ray tracing.
+/// Results of one camera and one ray tracing path.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cell {
-    /// By which path rays were traced.
+pub struct CameraResult {
+    /// The ray tracing path.
     pub path: TracePath,
-    /// Which of the five cameras, from 0.
+    /// Index of the camera, 0 to 4.
     pub camera: usize,
-    /// Each frame.
+    /// Times of each frame.
     pub frames: Vec<Times>,
-    /// How alike the pictures of both methods are.
-    pub likeness: Likeness,
+    /// Image metrics between both methods.
+    pub metrics: ImageMetrics,
 }
 
-/// What was measured of a scene.
+/// Results of one scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneResult {
-    /// Its name.
+    /// Name of the scene.
     pub name: String,
-    /// Vertices, those that differ in normal or texture coordinate counted apart.
+    /// Number of vertices, distinct by position, normal and texture coordinate.
     pub vertices: u64,
-    /// Triangles.
+    /// Number of triangles.
     pub triangles: u64,
-    /// Five for each path of ray tracing, in the order of the plan.
-    pub cells: Vec<Cell>,
-    /// Which rasteriser found the visible triangles by each path, and why.
+    /// Five results per ray tracing path, in the order of the plan.
+    pub cells: Vec<CameraResult>,
+    /// The rasteriser of the visibility pass for each path, with the reason.
     pub rasterisers: Vec<(TracePath, String)>,
-    /// How alike pictures by pipeline and by query are, for each camera and both methods; empty where there is one path.
-    pub paths_alike: Vec<(Likeness, Likeness)>,
+    /// Image metrics between the first two paths, for each camera, stand-alone and hybrid; empty for a single path.
+    pub path_metrics: Vec<(ImageMetrics, ImageMetrics)>,
 }
 
-impl Plan {
-    /// The frame's place on its path, 0 to below 1.
+impl ExperimentPlan {
+    /// Returns the position of a frame on its camera path, from 0 to below 1.
     fn phase(&self, frame: u32) -> f32 {
         (f64::from(frame) / f64::from(self.frames.max(1))) as f32
     }
 
-    /// Frames whose pictures are compared; the first is frame 0.
+    /// Returns the frames whose images are compared; the first is frame 0.
     fn compared_frames(&self) -> Vec<u32> {
         let count = self.compared.clamp(1, self.frames.max(1));
         (0..count).map(|i| (u64::from(i) * u64::from(self.frames) / u64::from(count)) as u32).collect()
     }
 
-    /// How many frames are rendered for each path of ray tracing.
+    /// Returns the number of rendered frames per ray tracing path.
     fn steps(&self) -> u64 {
         let each = 2 * (u64::from(self.warm_up) + u64::from(self.frames) * u64::from(self.runs));
         CAMERA_COUNT as u64 * (each + 2 * self.compared_frames().len() as u64)
@@ -83,33 +83,33 @@ impl Plan {
 }
 
 impl SceneResult {
-    /// The cells of a path, by camera.
-    pub fn of(&self, path: TracePath) -> impl Iterator<Item = &Cell> {
+    /// Returns the results of a path, by camera.
+    pub fn cameras_by(&self, path: TracePath) -> impl Iterator<Item = &CameraResult> {
         self.cells.iter().filter(move |cell| cell.path == path)
     }
 
-    /// Which rasteriser found the visible triangles by a path, and why.
+    /// Returns the rasteriser of the visibility pass for a path, with the reason.
     pub(super) fn rasteriser(&self, path: TracePath) -> &str {
         self.rasterisers.iter().find(|(known, _)| *known == path).map_or("", |(_, choice)| choice)
     }
 
-    /// The average of a statistic over the cameras.
+    /// Returns the average of a statistic over the cameras.
     #[must_use]
     pub fn mean(&self, path: TracePath, statistic: Statistic) -> Times {
-        let rows: Vec<Times> = self.of(path).map(|cell| statistic.of(&cell.frames)).collect();
+        let rows: Vec<Times> = self.cameras_by(path).map(|cell| statistic.evaluate(&cell.frames)).collect();
         Times::mean(&rows)
     }
 }
 
-/// Measures `scene`, whose textures fit the device, and gives `pictures` the first frame of each camera.
+/// Measures `scene` and writes the first frame of each camera to `images`. The textures must fit the device limits.
 ///
 /// # Errors
-/// [`PaperError`].
+/// [`PaperError`] if the context does not match the plan, rendering fails, or an image cannot be written.
 pub fn measure(
     ctx: &Context,
     scene: &Scene,
-    plan: &Plan,
-    pictures: &Pictures,
+    plan: &ExperimentPlan,
+    images: &ReportImages,
     progress: &mut Progress,
 ) -> Result<SceneResult, PaperError> {
     let capabilities = ctx.capabilities();
@@ -122,18 +122,18 @@ pub fn measure(
     for &path in &plan.paths {
         let name = format!("{} by {}", scene.name, path.name());
         progress.stage(&format!("{name}: building"), 0);
-        let mut pair = Pair::new(ctx, scene, plan, path)?;
+        let mut pair = MethodPair::new(ctx, scene, plan, path)?;
         rasterisers.push((path, pair.rasteriser.clone()));
         progress.stage(&name, plan.steps());
-        let mut shown = Vec::new();
+        let mut images_of_path = Vec::new();
         for camera in 0..CAMERA_COUNT {
-            let (cell, first) = pair.measure_camera(scene, camera, progress)?;
-            pictures.write(&scene.name, path, camera, &first)?;
-            shown.push(first);
-            cells.push(cell);
+            let (result, first) = pair.measure_camera(scene, camera, progress)?;
+            images.write(&scene.name, path, camera, &first)?;
+            images_of_path.push(first);
+            cells.push(result);
         }
-        pictures.write_sheet(&scene.name, path, &shown)?;
-        firsts.push(shown);
+        images.write_sheet(&scene.name, path, &images_of_path)?;
+        firsts.push(images_of_path);
     }
     Ok(SceneResult {
         name: scene.name.clone(),
@@ -141,22 +141,22 @@ pub fn measure(
         triangles: scene.triangles.len() as u64,
         cells,
         rasterisers,
-        paths_alike: compare_paths(&firsts, plan)?,
+        path_metrics: compare_paths(&firsts, plan)?,
     })
 }
 
-/// So that no figure bears the name of another path.
+/// Checks that the context traces by the planned paths, so that results have the right name.
 fn check_paths(paths: &[TracePath], capabilities: &Capabilities) -> Result<(), PaperError> {
-    let other = paths.iter().map(|&path| [path, TracePath::of(path.ray_path(), capabilities)]);
+    let other = paths.iter().map(|&path| [path, TracePath::new(path.ray_path(), capabilities)]);
     match other.into_iter().find(|[planned, found]| planned != found) {
         Some([planned, found]) => Err(PaperError::OtherPath { planned: planned.name(), found: found.name() }),
         None => Ok(()),
     }
 }
 
-/// Both methods, ready to take turns.
-struct Pair<'a> {
-    plan: &'a Plan,
+/// The renderers of both methods.
+struct MethodPair<'a> {
+    plan: &'a ExperimentPlan,
     path: TracePath,
     standalone: HybridRenderer,
     hybrid: HybridRenderer,
@@ -164,8 +164,13 @@ struct Pair<'a> {
     done: u64,
 }
 
-impl<'a> Pair<'a> {
-    fn new(ctx: &Context, scene: &Scene, plan: &'a Plan, path: TracePath) -> Result<Self, PaperError> {
+impl<'a> MethodPair<'a> {
+    fn new(
+        ctx: &Context,
+        scene: &Scene,
+        plan: &'a ExperimentPlan,
+        path: TracePath,
+    ) -> Result<Self, PaperError> {
         let [width, height] = plan.size;
         let renderer = |method| {
             let max_depth = plan.max_depth;
@@ -185,38 +190,38 @@ impl<'a> Pair<'a> {
         Ok(Self { plan, path, standalone, hybrid, rasteriser, done: 0 })
     }
 
-    /// The camera's cell, and its first picture by both methods.
+    /// Measures a camera. Returns its results, and its first image by both methods.
     fn measure_camera(
         &mut self,
         scene: &Scene,
         camera: usize,
         progress: &mut Progress,
-    ) -> Result<(Cell, [Vec<u8>; 2]), PaperError> {
-        let way = CameraPath::sway(scene, camera);
+    ) -> Result<(CameraResult, [Vec<u8>; 2]), PaperError> {
+        let path = CameraPath::sway(scene, camera);
         for _ in 0..self.plan.warm_up {
-            self.frame(&way.at(0.0), 0)?;
+            self.render_frame(&path.at(0.0), 0)?;
         }
         let mut frames = Vec::with_capacity(self.plan.frames as usize);
         for frame in 0..self.plan.frames {
-            let view = way.at(self.plan.phase(frame));
+            let view = path.at(self.plan.phase(frame));
             let runs: Result<Vec<Times>, PaperError> =
-                (0..self.plan.runs.max(1)).map(|run| self.frame(&view, frame + run)).collect();
-            frames.push(Statistic::MEDIAN.of(&runs?));
+                (0..self.plan.runs.max(1)).map(|run| self.render_frame(&view, frame + run)).collect();
+            frames.push(Statistic::MEDIAN.evaluate(&runs?));
             progress.set(self.done);
         }
         let mut pairs = Vec::new();
         for frame in self.plan.compared_frames() {
-            self.frame(&way.at(self.plan.phase(frame)), 0)?;
+            self.render_frame(&path.at(self.plan.phase(frame)), 0)?;
             pairs.push([self.standalone.read_image()?, self.hybrid.read_image()?]);
         }
         progress.set(self.done);
-        let likeness = Likeness::of(&pairs, self.plan.size)?;
+        let metrics = ImageMetrics::compare_pairs(&pairs, self.plan.size)?;
         let first = pairs.swap_remove(0);
-        Ok((Cell { path: self.path, camera, frames, likeness }, first))
+        Ok((CameraResult { path: self.path, camera, frames, metrics }, first))
     }
 
-    /// A frame by both methods. They take turns at being first, so that neither has the warmer device.
-    fn frame(&mut self, view: &Camera, turn: u32) -> Result<Times, PaperError> {
+    /// Renders a frame by both methods. They alternate in order, so that neither benefits from a warmer device.
+    fn render_frame(&mut self, view: &Camera, turn: u32) -> Result<Times, PaperError> {
         let (alone, hybrid) = if turn.is_multiple_of(2) {
             let alone = self.standalone.render(view)?;
             (alone, self.hybrid.render(view)?)
@@ -235,12 +240,16 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// For each camera how alike the first two paths are, stand-alone and hybrid.
-fn compare_paths(firsts: &[Vec<[Vec<u8>; 2]>], plan: &Plan) -> Result<Vec<(Likeness, Likeness)>, PaperError> {
+/// Compares the images of the first two paths for each camera, stand-alone and hybrid.
+fn compare_paths(
+    firsts: &[Vec<[Vec<u8>; 2]>],
+    plan: &ExperimentPlan,
+) -> Result<Vec<(ImageMetrics, ImageMetrics)>, PaperError> {
     let [first, second, ..] = firsts else { return Ok(Vec::new()) };
     let compared = first.iter().zip(second).map(|(a, b)| {
-        let alike = |method: usize| Likeness::of(&[[a[method].clone(), b[method].clone()]], plan.size);
-        Ok((alike(0)?, alike(1)?))
+        let compare =
+            |method: usize| ImageMetrics::compare_pairs(&[[a[method].clone(), b[method].clone()]], plan.size);
+        Ok((compare(0)?, compare(1)?))
     });
     compared.collect()
 }
@@ -249,12 +258,20 @@ fn compare_paths(firsts: &[Vec<[Vec<u8>; 2]>], plan: &Plan) -> Result<Vec<(Liken
 mod tests {
     use super::*;
 
-    fn plan(frames: u32, compared: u32) -> Plan {
-        Plan { size: [8, 8], frames, runs: 2, warm_up: 1, compared, max_depth: 1, paths: Vec::new() }
+    fn plan(frames: u32, compared: u32) -> ExperimentPlan {
+        ExperimentPlan {
+            size: [8, 8],
+            frames,
+            runs: 2,
+            warm_up: 1,
+            compared,
+            max_depth: 1,
+            paths: Vec::new(),
+        }
     }
 
     #[test]
-    fn a_device_with_other_queries_than_planned_is_refused() {
+    fn a_context_with_other_ray_queries_than_planned_is_rejected() {
         use TracePath::{Pipeline, Query, SoftwareQuery};
         let software =
             Capabilities { ray_query_path: lvk::RayQueryPath::Software, ..Capabilities::default() };
