@@ -1,10 +1,8 @@
 //! Samples of `lvk`: each is a type that renders headless, with a small main in `src/bin`.
 
 pub mod app;
-pub mod bench;
 pub mod catalogue;
 pub mod deferred;
-pub mod driver;
 pub mod hello_triangle;
 pub mod hybrid;
 pub mod hybrid_oit;

@@ -4,7 +4,7 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
-use crate::{app, bench, catalogue};
+use crate::{app, catalogue};
 
 /// The stage whose GLSL is `shaders/<sample>/<name>.glsl`; its name says the kind of the stage, as in `sky.frag`.
 macro_rules! shader {
@@ -133,51 +133,5 @@ impl SamplePipeline {
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
     let samples = catalogue::SAMPLES.iter().flat_map(|sample| (sample.pipelines)());
-    samples.chain(bench::pipelines()).chain(app::ui::pipelines()).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::{Path, PathBuf};
-
-    use super::*;
-
-    const STAGES: [&str; 10] =
-        ["vert", "frag", "comp", "rgen", "rmiss", "rchit", "rahit", "rint", "mesh", "task"];
-
-    fn stage_files(folder: &Path) -> Vec<PathBuf> {
-        let mut found = Vec::new();
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            let name = path.file_name().unwrap().to_string_lossy().into_owned();
-            if path.is_dir() {
-                found.extend(stage_files(&path));
-            } else if STAGES.iter().any(|stage| name.ends_with(&format!(".{stage}.glsl"))) {
-                found.push(path);
-            }
-        }
-        found
-    }
-
-    #[test]
-    fn every_stage_below_shaders_is_in_a_pipeline() {
-        let files = stage_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"));
-        assert!(files.len() >= 7, "{files:?}");
-        let pipelines = all();
-        for file in files {
-            let text = std::fs::read_to_string(&file).unwrap();
-            let listed =
-                pipelines.iter().flat_map(|pipeline| &pipeline.stages).any(|stage| stage.text == text);
-            assert!(listed, "{} is in no pipeline of `pipelines::all`", file.display());
-        }
-    }
-
-    #[test]
-    fn names_tell_pipelines_apart() {
-        let mut names: Vec<_> = all().iter().map(|pipeline| pipeline.name).collect();
-        let count = names.len();
-        names.sort_unstable();
-        names.dedup();
-        assert_eq!(names.len(), count);
-    }
+    samples.chain(app::ui::pipelines()).collect()
 }

@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use std::sync::Once;
 use std::time::{Duration, Instant};
 
-use lvk_samples::driver::{DriverRequest, prepare, swiftshader_icd};
+use lvk_dev_driver::{DriverRequest, prepare, swiftshader_icd};
 use tempfile::TempDir;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use lvk_samples::driver::{DriverRequest, prepare};
+use lvk_dev_driver::{DriverRequest, prepare};
 
 /// A program, and the arguments that make it quick.
 struct Program {

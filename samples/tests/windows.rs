@@ -12,7 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use image::RgbaImage;
-use lvk_samples::driver::{VirtualDisplay, virtual_display};
+use lvk_dev_driver::{VirtualDisplay, virtual_display};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     ConfigureWindowAux, ConnectionExt as _, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
@@ -94,7 +94,7 @@ fn prints_what_it_writes(program: &str, args: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let windowed = [&["--window", "--frames", "3", "--validate", "--out", "window.png"], args].concat();
     let mut shown = sample(program, &windowed, folder.path());
-    desktop.show(&mut shown);
+    desktop.attach(&mut shown);
     let output = shown.output().unwrap();
     assert_success(&output);
     assert!(texts(&output).0.contains("validation messages: 0"), "{}", texts(&output).0);
@@ -219,7 +219,7 @@ impl Session {
         let (keys, screen) = RustConnection::connect(Some(desktop.name())).unwrap();
         let root = keys.setup().roots[screen].root;
         let mut command = sample(program, &[&["--window", "--validate"], args].concat(), folder);
-        desktop.show(&mut command);
+        desktop.attach(&mut command);
         command.envs(variables.iter().copied());
         let mut program = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(program.stderr.take().unwrap()).lines();
@@ -435,7 +435,7 @@ fn what_cannot_be_loaded_is_said_as_without_a_window() {
         let run = |window: &[&str]| {
             let mut command =
                 sample(env!("CARGO_BIN_EXE_large_scene"), &[window, args].concat(), folder.path());
-            desktop.show(&mut command);
+            desktop.attach(&mut command);
             let output = command.output().unwrap();
             let (_, err) = texts(&output);
             let error = err.lines().find(|line| line.starts_with("error: ")).map(str::to_owned);

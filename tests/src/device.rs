@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use lvk::ash::{Entry, vk};
 use lvk::{Context, ContextDesc, RayQueryRequest, ValidationMode, ValidationSink};
-use lvk_samples::driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
+use lvk_dev_driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Its drop fails the test on any message, those of the
 /// context's destruction included.

@@ -16,6 +16,7 @@ pub mod local_read;
 pub mod meshes;
 pub mod noise;
 pub mod oit_reference;
+pub mod pipelines;
 pub mod queues;
 pub mod radv;
 pub mod random;

@@ -11,7 +11,7 @@ use lvk::raw_window_handle::{
     DisplayHandle, HandleError, HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle,
     WindowHandle, XcbDisplayHandle, XcbWindowHandle,
 };
-use lvk_samples::driver::{VirtualDisplay, virtual_display};
+use lvk_dev_driver::{VirtualDisplay, virtual_display};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass};
 use x11rb::xcb_ffi::{XCBConnection, load_libxcb};

@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use lvk::{Context, ContextDesc, ShaderStage};
-use lvk_samples::pipelines::{self, SamplePipeline, SampleStage};
+use lvk_samples::pipelines::{SamplePipeline, SampleStage};
 use lvk_tests::device::vulkan;
+use lvk_tests::pipelines;
 use lvk_tests::radv::Radv;
 use lvk_tests::subprocess::on_radv;
 

@@ -23,7 +23,7 @@ use super::run_error::RunError;
 use super::sample::Sample;
 use super::sequence::{RenderJob, RenderReport, render_frames};
 use super::{library_warnings, png, print_line, window};
-use crate::driver::{DriverRequest, prepare};
+use lvk_dev_driver::{DriverRequest, prepare};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::rtx::RtxConfig;
 use crate::scene::Scene;

@@ -12,7 +12,7 @@ use super::print_line;
 use super::ray_args::RayTracing;
 use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
-use crate::driver::{self, Driver, DriverRequest};
+use lvk_dev_driver::{self as driver, Driver, DriverRequest};
 
 /// Requirements of a sample on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -104,8 +104,11 @@ fn choice(capabilities: &Capabilities) -> String {
     }
 }
 
-/// Prints the devices, one a line, as they are under the profile.
-pub(crate) fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
+/// Prints the devices, one per line, as `profile` limits them.
+///
+/// # Errors
+/// [`RunError`] if no driver can be prepared or Vulkan cannot list its devices.
+pub fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
     let driver = driver::prepare(&DriverRequest::default())?;
     for (number, mut device) in Context::devices(driver.loader.as_deref())?.into_iter().enumerate() {
         if let Some(profile) = profile {

@@ -3,8 +3,8 @@
 use super::interrupt;
 use super::png::PngError;
 use super::sample_error::SampleError;
-use crate::driver::DriverError;
 use crate::scene::SceneError;
+use lvk_dev_driver::DriverError;
 
 /// Errors of a sample's program.
 #[derive(Debug, thiserror::Error)]

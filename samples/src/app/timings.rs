@@ -93,8 +93,9 @@ impl fmt::Display for Timings {
     }
 }
 
-/// Smallest, middle and largest of some values; `None` where there are none.
-pub(crate) fn spread(mut values: Vec<f64>) -> Option<Spread> {
+/// Returns the minimum, median and maximum of the values; `None` for no values.
+#[must_use]
+pub fn spread(mut values: Vec<f64>) -> Option<Spread> {
     values.sort_unstable_by(f64::total_cmp);
     let (&min, &max) = (values.first()?, values.last()?);
     let middle = values.len() / 2;

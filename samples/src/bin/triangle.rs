@@ -1,6 +1,6 @@
 //! The smallest ray traced triangle: `cargo run --bin triangle` writes `triangle.png`.
 use lvk::*;
-use lvk_samples::driver::{DriverRequest, prepare};
+use lvk_dev_driver::{DriverRequest, prepare};
 
 const RAY_GEN: &str = r"
     layout(push_constant) uniform Push { uint tlas; uint image; };

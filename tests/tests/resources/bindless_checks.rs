@@ -8,8 +8,8 @@ use lvk::{
     SamplerDesc, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage, SlotState, TextureDesc,
     TextureHandle, TextureUsage, TlasDesc, TlasInstance, Triangles,
 };
-use lvk_samples::pipelines;
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
+use lvk_tests::pipelines;
 use lvk_tests::raster::{pixels, target};
 use lvk_tests::{TestDevice, device, device_with};
 

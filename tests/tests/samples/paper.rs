@@ -4,10 +4,10 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use lvk_samples::app::progress::Progress;
-use lvk_samples::bench::paper::{
-    CAMERA_COUNT, Experiment, PICTURES, Pictures, Plan, Statistic, TracePath, measure,
+use lvk_bench::paper::{
+    CAMERA_COUNT, Experiment, ExperimentPlan, IMAGE_FOLDER, ReportImages, Statistic, TracePath, measure,
 };
+use lvk_samples::app::progress::Progress;
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
 use lvk_tests::scene_obj::obj_scene;
@@ -20,9 +20,10 @@ fn experiment(folder: &Path) -> Option<Experiment> {
     let ctx = device()?;
     let mut scene = obj_scene();
     scene.name = "conference".to_owned();
-    let paths = paths(&ctx).into_iter().map(|path| TracePath::of(path, ctx.capabilities())).collect();
-    let plan = Plan { size: SIZE, frames: FRAMES, runs: 1, warm_up: 0, compared: 2, max_depth: 2, paths };
-    let images = Pictures::new(&folder.join(PICTURES), SIZE).unwrap();
+    let paths = paths(&ctx).into_iter().map(|path| TracePath::new(path, ctx.capabilities())).collect();
+    let plan =
+        ExperimentPlan { size: SIZE, frames: FRAMES, runs: 1, warm_up: 0, compared: 2, max_depth: 2, paths };
+    let images = ReportImages::new(&folder.join(IMAGE_FOLDER), SIZE).unwrap();
     let found = measure(&ctx, &scene, &plan, &images, &mut Progress::hidden()).unwrap();
     let mut experiment = Experiment::new(ctx.capabilities(), "bench paper".to_owned(), plan);
     experiment.scenes.push(found);
@@ -122,22 +123,22 @@ fn assert_report_is_whole(folder: &Path, experiment: &Experiment) {
 fn assert_images_are_similar(folder: &Path, experiment: &Experiment) {
     let scene = &experiment.scenes[0];
     for cell in &scene.cells {
-        let alike = &cell.likeness;
+        let alike = &cell.metrics;
         // The goals of the experiment.
         assert!(alike.psnr >= 60.0 && alike.lowest_psnr >= 60.0, "{alike:?}");
         assert!(alike.ssim >= 0.999 && alike.ssim <= 1.0 + 1e-9, "{alike:?}");
         assert!(alike.differing_share < 2e-4, "{alike:?}");
-        assert!(Statistic::WORST.of(&cell.frames).hybrid() > 0.0);
+        assert!(Statistic::WORST.evaluate(&cell.frames).hybrid() > 0.0);
     }
     for (path, choice) in &scene.rasterisers {
         assert!(experiment.plan.paths.contains(path) && choice.contains("rasteriser ("), "{choice}");
     }
-    for (standalone, hybrid) in &scene.paths_alike {
+    for (standalone, hybrid) in &scene.path_metrics {
         assert!(standalone.psnr >= 50.0 && hybrid.psnr >= 50.0, "{standalone:?} {hybrid:?}");
     }
     for path in &experiment.plan.paths {
         let name = path.file_name();
-        let file = |what: &str| folder.join(PICTURES).join(format!("conference_{name}_cam3_{what}.png"));
+        let file = |what: &str| folder.join(IMAGE_FOLDER).join(format!("conference_{name}_cam3_{what}.png"));
         let image = |what: &str| image::open(file(what)).unwrap().into_rgba8();
         let (standalone, difference) = (image("standalone"), image("difference"));
         assert_eq!((standalone.dimensions(), difference.dimensions()), ((96, 54), (98, 56)));

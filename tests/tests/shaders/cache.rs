@@ -9,8 +9,8 @@ use lvk::{
     ComputePipelineDesc, Context, Dependencies, Error, ShaderCacheStats, ShaderModuleDesc, ShaderSource,
     ShaderStage,
 };
-use lvk_samples::pipelines;
 use lvk_tests::compute::{read_words, words_buffer};
+use lvk_tests::pipelines;
 use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 

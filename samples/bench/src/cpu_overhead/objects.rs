@@ -1,0 +1,116 @@
+//! Creation and destruction of buffers and textures.
+
+use std::time::Instant;
+
+use lvk::{BufferDesc, Context, Format, TextureDesc, TextureUsage};
+
+use super::row::{Limit, Row};
+use super::{Workload, each_ns};
+use crate::error::BenchError;
+use crate::hand_written::{Memory, RawObjects};
+use crate::measure::{elapsed_ms, interleave, median_of};
+use crate::setup::Setup;
+
+const AT_ONCE: u32 = 1_000;
+const BUFFER_BYTES: u64 = 256;
+const FEW: u32 = 10;
+
+pub(super) fn measure(setup: &Setup, ctx: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+    let mut raw = RawObjects::new(ctx)?;
+    let buffers = interleave(workload.runs, |which| match memory(which) {
+        None => create_and_destroy(ctx, || buffer(ctx).map(drop)),
+        Some(memory) => raw.buffers(AT_ONCE, BUFFER_BYTES, memory),
+    })?;
+    let textures = interleave(workload.runs, |which| match memory(which) {
+        None => create_and_destroy(ctx, || texture(ctx).map(drop)),
+        Some(memory) => raw.textures(AT_ONCE, memory),
+    })?;
+    let [thousand] = interleave(workload.runs, |_| many_buffers(ctx))?;
+    let mut rows = Vec::new();
+    rows.extend(comparison_rows("buffer created + destroyed, with frees", &buffers, 0.6));
+    rows.extend(comparison_rows("texture created + destroyed, with frees", &textures, 1.8));
+    rows.push(Row {
+        what: "1,000 buffers of 256 B created, without a submission".to_owned(),
+        ours: median_of(&thousand, |ms| *ms),
+        other: None,
+        unit: "ms",
+        limit: Limit::None,
+    });
+    rows.extend(crowded_rows(setup, workload)?);
+    Ok(rows)
+}
+
+/// Returns the memory of the hand-written variant; `None` for the library's turn.
+fn memory(turn: usize) -> Option<Memory> {
+    [None, Some(Memory::Allocated), Some(Memory::Preallocated)].get(turn).copied().flatten()
+}
+
+/// Returns the rows of the library, compared with hand-written Vulkan. The third sample uses preallocated memory and so
+/// measures the driver's part.
+fn comparison_rows(what: &str, samples: &[Vec<f64>; 3], limit: f64) -> [Row; 2] {
+    let [ours, by_hand, driver] =
+        samples.each_ref().map(|samples| each_ns(median_of(samples, |ms| *ms), AT_ONCE) * 1e-3);
+    let row = |what: &str, ours, other, limit| Row { what: what.to_owned(), ours, other, unit: "us", limit };
+    [
+        row(what, ours, Some(by_hand), Limit::AtMost(limit)),
+        row("- library share", ours - driver, None, Limit::None),
+    ]
+}
+
+fn buffer(ctx: &Context) -> lvk::Result<lvk::Holder<lvk::BufferHandle>> {
+    ctx.create_buffer(&BufferDesc { size_bytes: BUFFER_BYTES, ..BufferDesc::default() })
+}
+
+fn texture(ctx: &Context) -> lvk::Result<lvk::Holder<lvk::TextureHandle>> {
+    ctx.create_texture(&TextureDesc {
+        format: Format::Rgba8Unorm,
+        extent: [4, 4],
+        usage: TextureUsage::SAMPLED,
+        ..TextureDesc::default()
+    })
+}
+
+/// Returns the milliseconds to create and destroy a thousand objects and their memory.
+fn create_and_destroy(ctx: &Context, each: impl Fn() -> lvk::Result<()>) -> Result<f64, BenchError> {
+    ctx.wait_idle()?;
+    let start = Instant::now();
+    for _ in 0..AT_ONCE {
+        each()?;
+    }
+    ctx.wait(ctx.flush()?)?;
+    Ok(elapsed_ms(start))
+}
+
+/// Returns the milliseconds to create a thousand buffers.
+fn many_buffers(ctx: &Context) -> Result<f64, BenchError> {
+    let before = ctx.flush()?;
+    let start = Instant::now();
+    let buffers: lvk::Result<Vec<_>> = (0..AT_ONCE).map(|_| buffer(ctx)).collect();
+    let taken = elapsed_ms(start);
+    drop(buffers?);
+    assert_eq!(ctx.flush()?, before, "creating a buffer submitted something");
+    Ok(taken)
+}
+
+/// Returns the row of a texture creation with few and with many live textures.
+fn crowded_rows(setup: &Setup, workload: Workload) -> Result<Vec<Row>, BenchError> {
+    let (few, many) =
+        (setup.open_for_textures(workload.crowd + 100)?, setup.open_for_textures(workload.crowd + 100)?);
+    let crowd = |ctx: &Context, count| (0..count).map(|_| texture(ctx)).collect::<lvk::Result<Vec<_>>>();
+    let held = (crowd(&few, FEW)?, crowd(&many, workload.crowd)?);
+    few.wait_idle()?;
+    many.wait_idle()?;
+    let samples: [Vec<f64>; 2] = interleave(workload.runs * 10, |which| {
+        let ctx = [&many, &few][which];
+        let start = Instant::now();
+        let one = texture(ctx)?;
+        let taken = elapsed_ms(start);
+        drop(one);
+        ctx.wait(ctx.flush()?)?;
+        Ok(taken)
+    })?;
+    drop(held);
+    let [ours, other] = samples.map(|samples| median_of(&samples, |ms| *ms) * 1e3);
+    let what = format!("texture created among {}, compared with among {FEW}", workload.crowd);
+    Ok(vec![Row { what, ours, other: Some(other), unit: "us", limit: Limit::RatioAtMost(1.10) }])
+}

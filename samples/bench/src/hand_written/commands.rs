@@ -1,0 +1,196 @@
+//! A command buffer that is recorded, submitted and waited for repeatedly, with timestamps.
+
+use std::cell::Cell;
+use std::rc::Rc;
+use std::time::Instant;
+
+use lvk::ash::vk;
+
+use super::RawDevice;
+use crate::error::BenchError;
+use crate::measure::{SubmissionTimes, elapsed_ms};
+
+/// A command buffer that is recorded, submitted and waited for repeatedly.
+pub(crate) struct RawCommands {
+    pool: vk::CommandPool,
+    commands: vk::CommandBuffer,
+    fence: vk::Fence,
+    timeline: vk::Semaphore,
+    /// Last value of the timeline semaphore.
+    reached: Cell<u64>,
+    queries: vk::QueryPool,
+    device: Rc<RawDevice>,
+}
+
+impl RawCommands {
+    pub(crate) fn new(device: &Rc<RawDevice>) -> Result<Self, BenchError> {
+        let mut made = Self {
+            pool: vk::CommandPool::null(),
+            commands: vk::CommandBuffer::null(),
+            fence: vk::Fence::null(),
+            timeline: vk::Semaphore::null(),
+            reached: Cell::new(0),
+            queries: vk::QueryPool::null(),
+            device: Rc::clone(device),
+        };
+        made.create()?;
+        Ok(made)
+    }
+
+    fn create(&mut self) -> Result<(), BenchError> {
+        let device = &self.device.device;
+        let pool = vk::CommandPoolCreateInfo::default()
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
+            .queue_family_index(self.device.ctx.raw_queue_family());
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let timeline = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
+        // SAFETY: the descriptions are valid; the queue family is that of the device.
+        unsafe {
+            self.pool = device
+                .create_command_pool(&pool, None)
+                .map_err(BenchError::hand_written("vkCreateCommandPool"))?;
+            let info =
+                vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
+            let allocated = device.allocate_command_buffers(&info);
+            self.commands = allocated.map_err(BenchError::hand_written("vkAllocateCommandBuffers"))?[0];
+            let fence = vk::FenceCreateInfo::default();
+            self.fence =
+                device.create_fence(&fence, None).map_err(BenchError::hand_written("vkCreateFence"))?;
+            let made = device.create_semaphore(&timeline, None);
+            self.timeline = made.map_err(BenchError::hand_written("vkCreateSemaphore"))?;
+            let made = device.create_query_pool(&queries, None);
+            self.queries = made.map_err(BenchError::hand_written("vkCreateQueryPool"))?;
+        }
+        Ok(())
+    }
+
+    /// Submits the commands that `record` records, between timestamps, and waits for them.
+    pub(crate) fn time(&self, record: impl FnOnce(vk::CommandBuffer)) -> Result<SubmissionTimes, BenchError> {
+        let start = Instant::now();
+        self.begin()?;
+        let before = Instant::now();
+        record(self.commands);
+        let record = elapsed_ms(before);
+        self.end_and_submit()?;
+        let cpu = elapsed_ms(start);
+        self.wait()?;
+        let total = elapsed_ms(start);
+        Ok(SubmissionTimes { gpu: self.read_timestamps_ms()?, cpu, record, total })
+    }
+
+    /// Submits an empty command buffer and waits for a fence.
+    pub(crate) fn submit_empty(&self) -> Result<(), BenchError> {
+        self.begin_bare()?;
+        self.submit()?;
+        self.wait()
+    }
+
+    /// Submits an empty command buffer and waits for a timeline semaphore.
+    pub(crate) fn submit_empty_on_timeline(&self) -> Result<(), BenchError> {
+        let next = self.reached.get() + 1;
+        let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.timeline).value(next);
+        let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let (semaphores, values) = ([self.timeline], [next]);
+        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        self.begin_bare()?;
+        self.submit_with(&signals, vk::Fence::null())?;
+        // SAFETY: the semaphore is a timeline, and its next value was submitted.
+        let waited = unsafe { self.device.device.wait_semaphores(&wait, u64::MAX) };
+        waited.map_err(BenchError::hand_written("vkWaitSemaphores"))?;
+        self.reached.set(next);
+        Ok(())
+    }
+
+    fn begin(&self) -> Result<(), BenchError> {
+        self.begin_bare()?;
+        // SAFETY: the command buffer is being recorded, and the last submission was waited for.
+        unsafe { self.device.device.cmd_reset_query_pool(self.commands, self.queries, 0, 2) };
+        self.write_timestamp(0);
+        Ok(())
+    }
+
+    fn begin_bare(&self) -> Result<(), BenchError> {
+        let device = &self.device.device;
+        let flags = vk::CommandPoolResetFlags::empty();
+        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the last submission was waited for, so nothing uses the pool or the queries.
+        unsafe {
+            device
+                .reset_command_pool(self.pool, flags)
+                .map_err(BenchError::hand_written("vkResetCommandPool"))?;
+            let begun = device.begin_command_buffer(self.commands, &info);
+            begun.map_err(BenchError::hand_written("vkBeginCommandBuffer"))
+        }
+    }
+
+    fn write_timestamp(&self, query: u32) {
+        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        // SAFETY: the command buffer is being recorded, and the query was reset in it.
+        unsafe { self.device.device.cmd_write_timestamp2(self.commands, stage, self.queries, query) };
+    }
+
+    fn end_and_submit(&self) -> Result<(), BenchError> {
+        self.write_timestamp(1);
+        self.submit()
+    }
+
+    fn submit(&self) -> Result<(), BenchError> {
+        self.submit_with(&[], self.fence)
+    }
+
+    fn submit_with(
+        &self,
+        signals: &[vk::SemaphoreSubmitInfo<'_>],
+        fence: vk::Fence,
+    ) -> Result<(), BenchError> {
+        let device = &self.device.device;
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
+        let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
+        let submits = [submit.signal_semaphore_infos(signals)];
+        // SAFETY: recording ends here; the fence is not signalled; the context holds the queue's lock for the call.
+        unsafe {
+            device
+                .end_command_buffer(self.commands)
+                .map_err(BenchError::hand_written("vkEndCommandBuffer"))?;
+            let submit = |queue| device.queue_submit2(queue, &submits, fence);
+            self.device.ctx.with_raw_queue(submit).map_err(BenchError::hand_written("vkQueueSubmit2"))
+        }
+    }
+
+    fn wait(&self) -> Result<(), BenchError> {
+        let fences = [self.fence];
+        // SAFETY: the fence was submitted, and once it is signalled nothing uses it.
+        unsafe {
+            let waited = self.device.device.wait_for_fences(&fences, true, u64::MAX);
+            waited.map_err(BenchError::hand_written("vkWaitForFences"))?;
+            self.device.device.reset_fences(&fences).map_err(BenchError::hand_written("vkResetFences"))
+        }
+    }
+
+    /// Returns the milliseconds between the timestamps.
+    fn read_timestamps_ms(&self) -> Result<f64, BenchError> {
+        let mut ticks = [0_u64; 2];
+        let flags = vk::QueryResultFlags::TYPE_64;
+        // SAFETY: both queries were written by the submission that was waited for.
+        unsafe { self.device.device.get_query_pool_results(self.queries, 0, &mut ticks, flags) }
+            .map_err(BenchError::hand_written("vkGetQueryPoolResults"))?;
+        let limits = &self.device.ctx.capabilities().limits;
+        let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
+        let passed = ticks[1].wrapping_sub(ticks[0]) & mask;
+        Ok(passed as f64 * f64::from(limits.timestamp_period_ns) * 1e-6)
+    }
+}
+
+impl Drop for RawCommands {
+    fn drop(&mut self) {
+        let device = &self.device.device;
+        // SAFETY: the last submission was waited for; objects that were never created are null, which is allowed.
+        unsafe {
+            device.destroy_query_pool(self.queries, None);
+            device.destroy_semaphore(self.timeline, None);
+            device.destroy_fence(self.fence, None);
+            device.destroy_command_pool(self.pool, None);
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! A ray traced frame by `lvk` and by hand-written Vulkan: same shaders, same triangles, same device.
+
+use std::rc::Rc;
+
+use lvk::ash::vk;
+use lvk::{BufferDesc, BufferHandle, BufferUsage};
+use lvk::{Context, Holder, MemoryKind, PrimitiveOrder};
+
+use super::args::TraceArgs;
+use super::error::BenchError;
+use super::hand_written::{
+    RawAccelStruct, RawCommands, RawDevice, RawTracing, instance_geometry, triangle_geometry,
+};
+use super::instance_record::InstanceRecord;
+use super::measure::{Stopwatch, interleave, median};
+use super::mesh::{BuiltMesh, Mesh, MeshBuffers};
+use super::pipelines::stages;
+use super::setup::{DefaultBy, Setup};
+use super::table::{Table, format_ms, format_ratio};
+use super::tracer::{RayKind, TracedImage, Tracer};
+use lvk_samples::shaders::bench::BUILT_IN_NUMBERS;
+
+/// Compares frames of primary rays.
+pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchError> {
+    let ctx = setup.open()?;
+    let default_triangles = setup.default_for(&ctx, DefaultBy { quick: 2000, cpu: 20_000, gpu: 1_000_000 });
+    let runs = setup.runs(&ctx, DefaultBy { quick: 2, cpu: 20, gpu: 500 });
+    let mesh = Mesh::new(&args.mesh, args.camera, default_triangles)?;
+    let size = setup.image_size(&ctx, &args.image);
+    let what = format!("overhead: {}, {}x{} primary rays by pipeline", mesh.describe(), size[0], size[1]);
+    let mut table = Table::new(setup.headline(&ctx, &what), &["", "lvk", "hand-written", "ratio"]);
+    if ctx.capabilities().ray_tracing_pipeline {
+        add_comparison_rows(&ctx, &mesh, size, runs, &mut table)?;
+    } else {
+        let device = &ctx.capabilities().device_name;
+        table.add_note(format!("not measured: {device} has no ray tracing pipelines"));
+    }
+    table.add_note(format!("medians of {runs} interleaved frames, each followed by a wait; same SPIR-V"));
+    table.add_note("limit: the trace within 2 % on the H200");
+    Ok(table)
+}
+
+fn add_comparison_rows(
+    ctx: &Context,
+    mesh: &Mesh,
+    size: [u32; 2],
+    runs: u32,
+    table: &mut Table,
+) -> Result<(), BenchError> {
+    let stages = stages(BUILT_IN_NUMBERS);
+    let words: lvk::Result<Vec<_>> =
+        stages.iter().map(|stage| lvk::compile_glsl(&stage.module(), ctx.capabilities())).collect();
+    let words = words?;
+    let scene = BuiltMesh::new(ctx, MeshBuffers::new(ctx, mesh)?, PrimitiveOrder::Given)?;
+    let image = TracedImage::new(ctx, mesh, size, scene.tlas.index())?;
+    let raw_image = TracedImage::new(ctx, mesh, size, scene.tlas.index())?;
+    let tracer = Tracer::from_spirv(ctx, &stages, &words)?;
+    let raw = RawScene::new(ctx, mesh)?;
+    let raw_tracer = RawTracing::new(&raw.device, &words, raw.tlas.raw, scene.tlas.index())?;
+    let stopwatch = Stopwatch::new(ctx)?;
+    let samples: [Vec<_>; 2] = interleave(runs, |which| match which {
+        0 => stopwatch.time(|cmd| tracer.record(cmd, &image, RayKind::Primary)),
+        _ => raw.commands.time(|commands| raw_tracer.trace(commands, &raw_image.view, size)),
+    })?;
+    let [ours, theirs] = samples.map(|samples| median(&samples));
+    let mut row = |name: &str, ours: f64, theirs: f64| {
+        table.add_row(name, [format_ms(ours), format_ms(theirs), format_ratio(ours / theirs)]);
+    };
+    row("trace (GPU)", ours.gpu, theirs.gpu);
+    row("record and submit (CPU)", ours.cpu, theirs.cpu);
+    row("recording the trace (CPU)", ours.record, theirs.record);
+    row("until the GPU is done", ours.total, theirs.total);
+    let differing = image.count_differing_pixels(&raw_image)?;
+    table.add_row("differing pixels", [String::new(), format!("{differing} of {}", size[0] * size[1])]);
+    Ok(())
+}
+
+/// The same triangles under one untransformed instance, built by hand-written Vulkan.
+struct RawScene {
+    device: Rc<RawDevice>,
+    commands: RawCommands,
+    tlas: RawAccelStruct,
+    _blas: RawAccelStruct,
+    _instance: Holder<BufferHandle>,
+    _buffers: MeshBuffers,
+}
+
+impl RawScene {
+    fn new(ctx: &Context, mesh: &Mesh) -> Result<Self, BenchError> {
+        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE;
+        let device = RawDevice::new(ctx);
+        let commands = RawCommands::new(&device)?;
+        let buffers = MeshBuffers::new(ctx, mesh)?;
+        ctx.wait(ctx.flush()?)?;
+        let geometry = triangle_geometry(&device, &buffers)?;
+        let blas = RawAccelStruct::new(&device, geometry, buffers.triangle_count, flags)?;
+        let instance = create_instance_buffer(ctx, &blas)?;
+        let geometry = instance_geometry(ctx.buffer_address(*instance)?);
+        let tlas = RawAccelStruct::new(&device, geometry, 1, flags)?;
+        commands.time(|commands| {
+            blas.build(commands);
+            tlas.build(commands);
+        })?;
+        Ok(Self { device, commands, tlas, _blas: blas, _instance: instance, _buffers: buffers })
+    }
+}
+
+/// Creates a buffer with one instance of the BLAS.
+fn create_instance_buffer(ctx: &Context, blas: &RawAccelStruct) -> lvk::Result<Holder<BufferHandle>> {
+    let identity = lvk::transform_rows(&glam::Affine3A::IDENTITY);
+    let record = InstanceRecord::new(identity, blas.address);
+    ctx.create_buffer(&BufferDesc {
+        usage: BufferUsage::ACCEL_INPUT,
+        memory: MemoryKind::HostVisible,
+        data: Some(bytemuck::bytes_of(&record)),
+        debug_name: "instance",
+        ..BufferDesc::default()
+    })
+}

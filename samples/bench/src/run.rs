@@ -1,0 +1,57 @@
+//! Runs the benchmark that the command line selects.
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use super::args::{BenchArgs, Benchmark};
+use super::error::BenchError;
+use super::setup::Setup;
+use super::table::Table;
+use super::{batch, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
+use lvk_samples::app::{device, scene_list};
+
+/// Runs the selected benchmark. Prints tables to standard output, and an error in one line to standard error. The exit status
+/// is 0 on success, 1 for a device error, 2 for wrong input, 130 after Ctrl-C.
+#[must_use]
+pub fn run(args: &BenchArgs) -> ExitCode {
+    match execute(args) {
+        Ok(text) => {
+            let _ = write!(std::io::stdout(), "{text}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.status())
+        }
+    }
+}
+
+fn execute(args: &BenchArgs) -> Result<String, BenchError> {
+    if let Some(folder) = &args.list_scenes {
+        return Ok(scene_list::listing(Some(std::path::Path::new(folder))) + "\n");
+    }
+    if args.list_devices {
+        device::list(args.profile.as_ref())?;
+        return Ok(String::new());
+    }
+    let benchmark = args.benchmark.as_ref().ok_or(BenchError::NoBenchmark)?;
+    let tables = measure(args, benchmark)?;
+    Ok(tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n"))
+}
+
+fn measure(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchError> {
+    let setup = Setup::new(args)?;
+    let tables = match benchmark {
+        Benchmark::Batch(args) => vec![batch::measure(&setup, args)?],
+        Benchmark::Compaction(args) => vec![compaction::measure(&setup, args)?],
+        Benchmark::Core => vec![cpu_overhead::measure(&setup)?],
+        Benchmark::Split(args) => vec![split::measure(&setup, args)?],
+        Benchmark::Tlas(args) => vec![tlas::measure(&setup, args)?],
+        Benchmark::Order(args) => vec![order::measure(&setup, args)?],
+        Benchmark::Queries(args) => queries::measure(&setup, args)?,
+        Benchmark::Overhead(args) => vec![overhead::measure(&setup, args)?],
+        Benchmark::Paper(args) => vec![paper::run(&setup, args)?],
+    };
+    let messages = setup.validation_messages();
+    if messages.is_empty() { Ok(tables) } else { Err(BenchError::Validation(messages)) }
+}

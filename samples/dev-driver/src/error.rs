@@ -1,0 +1,129 @@
+//! Errors of [`prepare`](super::prepare) and of downloads.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// An error of [`prepare`](super::prepare) and of the other functions of this crate.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DriverError {
+    /// The system has no driver with ray tracing, and the software driver could not be downloaded.
+    #[error(
+        "no Vulkan driver with ray tracing was found and none can be downloaded because {cause}; install a GPU driver \
+         with ray tracing, or on Debian and Ubuntu `apt install mesa-vulkan-drivers libvulkan1` (Mesa 24.1 or newer)"
+    )]
+    NoDriver {
+        /// Error of the download.
+        #[source]
+        cause: DownloadError,
+    },
+    /// Validation was requested, the system has no current layer, and the layer could not be downloaded.
+    #[error(
+        "no current Vulkan validation layer was found and none can be downloaded because {cause}; install \
+         VK_LAYER_KHRONOS_validation 1.3.296 or newer (package `vulkan-validationlayers`, or the Vulkan SDK), \
+         or run without validation"
+    )]
+    NoValidationLayer {
+        /// Error of the download.
+        #[source]
+        cause: DownloadError,
+    },
+    /// RADV, the driver for AMD GPUs, could not be downloaded.
+    #[error("the driver for AMD GPUs (RADV) cannot be downloaded because {cause}")]
+    NoRadv {
+        /// Error of the download.
+        #[source]
+        cause: DownloadError,
+    },
+    /// Xvfb is not installed and could not be downloaded.
+    #[error(
+        "no Xvfb was found and none can be downloaded because {cause}; install the packages xvfb and x11-xkb-utils"
+    )]
+    NoDisplay {
+        /// Error of the download.
+        #[source]
+        cause: DownloadError,
+    },
+    /// `LVK_DRIVER=system` is set, but the system has no Vulkan loader.
+    #[error(
+        "LVK_DRIVER=system, but this system has no Vulkan loader ({reason}); install `libvulkan1` and a driver, or \
+         unset LVK_DRIVER"
+    )]
+    NoSystemLoader {
+        /// The dynamic linker's message.
+        reason: String,
+    },
+    /// An environment variable has an unknown value.
+    #[error("{name}={value} is not valid; expected {expected}")]
+    Variable {
+        /// Name of the variable.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// The accepted values.
+        expected: &'static str,
+    },
+    /// A downloaded file cannot be used.
+    #[error("the downloaded {} cannot be used: {reason}; delete its folder and start again", path.display())]
+    Broken {
+        /// The downloaded file.
+        path: PathBuf,
+        /// Cause of the failure.
+        reason: String,
+    },
+}
+
+/// Reason why a download failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DownloadError {
+    /// `LVK_NO_DOWNLOAD` is set.
+    #[error("LVK_NO_DOWNLOAD is set")]
+    Forbidden,
+    /// The packages exist for another platform only.
+    #[error("downloadable drivers exist for 64-bit x86 Linux with glibc only")]
+    Platform,
+    /// A program or file of the package system is missing.
+    #[error("{what} is missing; it is part of Debian's package system")]
+    MissingTool {
+        /// The program or file.
+        what: String,
+    },
+    /// A command of the package system failed: no network, a glibc that is too old, or an invalid signature.
+    #[error("`{command}` failed: {message}")]
+    PackageTool {
+        /// The command that failed.
+        command: String,
+        /// The first error line of its output.
+        message: String,
+    },
+    /// The packages lack an expected file.
+    #[error("the downloaded packages are not as expected: {reason}")]
+    Content {
+        /// The missing file or the cause.
+        reason: String,
+    },
+    /// None of the folders is writable.
+    #[error("no writable folder for the download (tried {tried}); set LVK_VULKAN_DIR to a writable folder")]
+    NoFolder {
+        /// The folders tried.
+        tried: String,
+    },
+    /// A file operation failed.
+    #[error("cannot {action} {}: {source}", path.display())]
+    File {
+        /// The attempted operation, as a verb.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+}
+
+impl DownloadError {
+    /// Returns a closure for `map_err` that adds the file and the attempted operation.
+    pub(super) fn file<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> Self + 'a {
+        move |source| Self::File { action, path: path.to_path_buf(), source }
+    }
+}

@@ -1,0 +1,26 @@
+//! File operations whose errors name the file.
+
+use std::fs;
+use std::path::Path;
+
+use super::error::DownloadError;
+
+/// Creates `folder` and its parents.
+pub(super) fn create_dir_all(folder: &Path) -> Result<(), DownloadError> {
+    fs::create_dir_all(folder).map_err(DownloadError::file("create", folder))
+}
+
+/// Writes `text` to the file `path`.
+pub(super) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), DownloadError> {
+    fs::write(path, text).map_err(DownloadError::file("write", path))
+}
+
+/// Moves the file or folder `from` to `to`.
+pub(super) fn rename(from: &Path, to: &Path) -> Result<(), DownloadError> {
+    fs::rename(from, to).map_err(DownloadError::file("move", from))
+}
+
+/// Reads the file `path`.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, DownloadError> {
+    fs::read(path).map_err(DownloadError::file("read", path))
+}

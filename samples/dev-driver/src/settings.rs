@@ -1,0 +1,184 @@
+//! Settings from environment variables, and the folders that result from them.
+
+use std::env;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use super::error::{DownloadError, DriverError};
+use super::layout::Component;
+
+/// The driver that the user prefers, from `LVK_DRIVER`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DriverPreference {
+    /// The system driver if it supports ray tracing, otherwise the downloaded driver.
+    Auto,
+    /// The system driver, with or without ray tracing.
+    System,
+    /// The downloaded software driver.
+    Software,
+}
+
+impl DriverPreference {
+    /// Reads the value of `LVK_DRIVER`; unset and empty mean [`DriverPreference::Auto`].
+    pub(super) fn parse(value: Option<&str>) -> Result<Self, DriverError> {
+        match value {
+            None | Some("") => Ok(Self::Auto),
+            Some("system") => Ok(Self::System),
+            Some("software") => Ok(Self::Software),
+            Some(other) => Err(DriverError::Variable {
+                name: "LVK_DRIVER",
+                value: other.to_owned(),
+                expected: "`system` or `software`",
+            }),
+        }
+    }
+}
+
+/// The environment variables that concern drivers, read once.
+#[derive(Clone, Debug)]
+pub(super) struct Settings {
+    /// From `LVK_DRIVER`.
+    pub(super) preference: DriverPreference,
+    /// From `LVK_NO_DOWNLOAD`.
+    pub(super) download_allowed: bool,
+    /// Folders for downloaded drivers, the preferred one first.
+    pub(super) folders: Vec<PathBuf>,
+    /// `VK_DRIVER_FILES` or `VK_ICD_FILENAMES` as the user set it.
+    pub(super) driver_files: Option<OsString>,
+}
+
+impl Settings {
+    /// Reads the environment of this process.
+    pub(super) fn from_env() -> Result<Self, DriverError> {
+        let text = |name| env::var_os(name).map(|value| value.to_string_lossy().into_owned());
+        let preference = DriverPreference::parse(text("LVK_DRIVER").as_deref())?;
+        let download_allowed = matches!(text("LVK_NO_DOWNLOAD").as_deref(), None | Some("" | "0"));
+        let path = |name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+        let folders = candidate_folders(
+            path("LVK_VULKAN_DIR"),
+            Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2),
+            path("XDG_CACHE_HOME"),
+            path("HOME"),
+        );
+        let driver_files = path("VK_DRIVER_FILES").or_else(|| path("VK_ICD_FILENAMES")).map(Into::into);
+        Ok(Self { preference, download_allowed, folders, driver_files })
+    }
+
+    /// Returns the user's driver list; `None` if a parent process of this project set the variable.
+    pub(super) fn user_driver_files(&self) -> Option<&OsString> {
+        let ours = |files: &OsString| {
+            self.folders.iter().any(|folder| {
+                Component::Driver.folder(folder).join(super::layout::DRIVER_JSON) == Path::new(files)
+            })
+        };
+        self.driver_files.as_ref().filter(|files| !ours(files))
+    }
+
+    /// Returns the first folder that is writable, or can be created.
+    pub(super) fn writable_folder(&self) -> Result<&Path, DownloadError> {
+        self.folders.iter().map(PathBuf::as_path).find(|folder| is_writable(folder)).ok_or_else(|| {
+            let tried = self.folders.iter().map(|folder| folder.display().to_string());
+            DownloadError::NoFolder { tried: tried.collect::<Vec<_>>().join(", ") }
+        })
+    }
+}
+
+/// Returns the folders for downloaded drivers, the preferred one first. A folder that the user names is the only one.
+fn candidate_folders(
+    named: Option<PathBuf>,
+    project: Option<&Path>,
+    cache: Option<PathBuf>,
+    home: Option<PathBuf>,
+) -> Vec<PathBuf> {
+    if let Some(named) = named {
+        return vec![std::path::absolute(&named).unwrap_or(named)];
+    }
+    let project = project.filter(|folder| folder.is_dir()).map(|folder| folder.join(".vulkan"));
+    let cache = cache.filter(|folder| folder.is_absolute()).or_else(|| home.map(|home| home.join(".cache")));
+    project.into_iter().chain(cache.map(|folder| folder.join("lvk/vulkan"))).collect()
+}
+
+/// True if `folder`, or its nearest existing ancestor, is a writable folder.
+fn is_writable(folder: &Path) -> bool {
+    let existing = folder.ancestors().find(|ancestor| ancestor.exists());
+    existing.is_some_and(|folder| {
+        folder.is_dir()
+            && rustix::fs::access(folder, rustix::fs::Access::WRITE_OK | rustix::fs::Access::EXEC_OK).is_ok()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn preference_accepts_its_two_words_only() {
+        assert_eq!(DriverPreference::parse(None).unwrap(), DriverPreference::Auto);
+        assert_eq!(DriverPreference::parse(Some("")).unwrap(), DriverPreference::Auto);
+        assert_eq!(DriverPreference::parse(Some("system")).unwrap(), DriverPreference::System);
+        assert_eq!(DriverPreference::parse(Some("software")).unwrap(), DriverPreference::Software);
+        let message = DriverPreference::parse(Some("Software ")).unwrap_err().to_string();
+        assert!(message.contains("LVK_DRIVER") && message.contains("Software "), "{message}");
+    }
+
+    #[test]
+    fn a_named_folder_is_the_only_candidate() {
+        let project = std::env::temp_dir();
+        let found = candidate_folders(
+            Some("/a/b".into()),
+            Some(&project),
+            Some("/cache".into()),
+            Some("/home/u".into()),
+        );
+        assert_eq!(found, [PathBuf::from("/a/b")]);
+        assert!(candidate_folders(Some("b".into()), None, None, None)[0].is_absolute());
+    }
+
+    #[test]
+    fn the_project_comes_before_the_cache() {
+        let project = tempfile::tempdir().unwrap();
+        let cache = Some(PathBuf::from("/cache"));
+        let found = candidate_folders(None, Some(project.path()), cache, Some("/home/u".into()));
+        assert_eq!(found, [project.path().join(".vulkan"), "/cache/lvk/vulkan".into()]);
+    }
+
+    #[test]
+    fn a_moved_project_falls_back_to_the_cache() {
+        let gone = Path::new("/no/such/project");
+        let home = Some(PathBuf::from("/home/u"));
+        let expected = [PathBuf::from("/home/u/.cache/lvk/vulkan")];
+        assert_eq!(candidate_folders(None, Some(gone), None, home.clone()), expected);
+        assert_eq!(candidate_folders(None, Some(gone), Some("relative".into()), home), expected);
+        assert!(candidate_folders(None, Some(gone), None, None).is_empty());
+    }
+
+    #[test]
+    fn unwritable_folders_are_skipped() {
+        let good = tempfile::tempdir().unwrap();
+        let file = good.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let settings = |folders| Settings {
+            preference: DriverPreference::Auto,
+            download_allowed: true,
+            folders,
+            driver_files: None,
+        };
+        let chosen = settings(vec![file.join("below a file"), good.path().join("new/deep")]);
+        assert_eq!(chosen.writable_folder().unwrap(), good.path().join("new/deep"));
+        let message = settings(vec![file.join("x")]).writable_folder().unwrap_err().to_string();
+        assert!(message.contains("LVK_VULKAN_DIR"), "{message}");
+    }
+
+    #[test]
+    fn drivers_listed_by_a_parent_process_are_not_the_users() {
+        let ours = Path::new("/p/.vulkan").join("driver").join(super::super::layout::DRIVER_JSON);
+        let settings = |files: &Path| Settings {
+            preference: DriverPreference::Auto,
+            download_allowed: true,
+            folders: vec!["/p/.vulkan".into()],
+            driver_files: Some(files.into()),
+        };
+        assert_eq!(settings(&ours).user_driver_files(), None);
+        assert!(settings(Path::new("/etc/vulkan/icd.d/other.json")).user_driver_files().is_some());
+    }
+}
