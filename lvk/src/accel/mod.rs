@@ -12,7 +12,6 @@ pub(crate) mod desc;
 pub(crate) mod flags;
 pub(crate) mod geometry;
 pub(crate) mod instance;
-pub(crate) mod instance_plan;
 pub(crate) mod partition;
 pub(crate) mod primitive_bounds;
 pub(crate) mod primitive_map;

@@ -3,8 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use super::blas_refs::{AccelGeneration, BlasRefSet};
+use super::instance::InstanceSource;
 use super::raw_accel_struct::RawAccelStruct;
-use crate::error::{Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::software_ray_query::tlas::SoftwareTlas;
@@ -46,39 +46,6 @@ pub(crate) struct TlasContents {
     pub(crate) hit_table_address: u64,
     /// From what the instances can be written again once a structure they refer to has moved.
     pub(crate) source: Option<Arc<InstanceSource>>,
-}
-
-/// Instances that name structures by number, for the kernel that puts addresses in.
-#[derive(Clone)]
-pub(crate) struct InstanceSource {
-    /// `VkAccelerationStructureInstanceKHR` with a number in place of the address.
-    pub(crate) instances: InstanceBytes,
-    /// How many there are.
-    pub(crate) count: u32,
-    /// Of further parts: the caller's instance each belongs to.
-    pub(crate) owners: Option<InstanceBytes>,
-    /// Instances of the caller.
-    pub(crate) user_count: u32,
-    /// How often the whole list is written: once for each part that a structure may have.
-    pub(crate) copies: u32,
-    pub(crate) indexing: BlasIndexing,
-}
-
-/// What the numbers of an [`InstanceSource`] count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum BlasIndexing {
-    /// Parts of everything shown.
-    ByPart,
-    /// Structures shown, with all their parts.
-    ByBlas,
-}
-
-/// Bytes the kernel reads.
-#[derive(Clone)]
-pub(crate) struct InstanceBytes {
-    pub(crate) address: u64,
-    /// What holds them; `None` for staging memory, which keeps them until the command buffer is done.
-    pub(crate) buffer: Option<Arc<Buffer>>,
 }
 
 impl Tlas {
@@ -130,36 +97,5 @@ impl TlasContents {
     #[inline]
     pub(crate) fn counts(&self) -> Option<(u32, u32)> {
         self.instance_count.map(|count| (count, self.built_count))
-    }
-}
-
-impl InstanceSource {
-    /// Instances Vulkan is given for it.
-    pub(crate) fn built_count(&self, name: &str) -> Result<u32> {
-        let count = u64::from(self.count) * u64::from(self.copies);
-        check_limit(name, "number of instances, parts of split meshes included", count, u32::MAX.into())?;
-        Ok(count as u32)
-    }
-}
-
-impl BlasIndexing {
-    /// How many numbers mean something.
-    pub(crate) fn entry_count(self, blas_refs: &BlasRefSet) -> usize {
-        match self {
-            Self::ByPart => blas_refs.part_addresses().len(),
-            Self::ByBlas => blas_refs.part_spans().len(),
-        }
-    }
-
-    /// Writes what they mean: first part and number of parts for each.
-    pub(crate) fn write_entries(self, blas_refs: &BlasRefSet, out: &mut [u8]) {
-        match self {
-            Self::ByBlas => out.copy_from_slice(bytemuck::cast_slice(blas_refs.part_spans())),
-            Self::ByPart => {
-                for (part, out) in (0_u32..).zip(out.chunks_exact_mut(size_of::<[u32; 2]>())) {
-                    out.copy_from_slice(bytemuck::bytes_of(&[part, 1]));
-                }
-            }
-        }
     }
 }

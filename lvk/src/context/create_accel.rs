@@ -14,7 +14,7 @@ use crate::accel::blas::{Blas, BlasPart, BlasStructures};
 use crate::accel::build::BuildInput;
 use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
-use crate::accel::instance_plan::{InstancePlan, PlanMemory};
+use crate::accel::instance::{InstancePlan, PlanMemory};
 use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::accel::split::PartLimits;
 use crate::accel::tlas::Tlas;
