@@ -3,11 +3,17 @@
 use std::sync::{Arc, OnceLock};
 
 use super::blas_refs::{AccelGeneration, BlasRefSet};
-use super::instance::InstanceSource;
+use super::instance::{InstanceSource, instance_bytes};
 use super::raw_accel_struct::RawAccelStruct;
+use crate::error::Result;
+use crate::gpu::Gpu;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::tlas::SoftwareTlas;
+
+/// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
+const REMAP_ENTRY_BYTES: u64 = 16;
 
 /// A top-level structure.
 pub(crate) struct Tlas {
@@ -73,6 +79,16 @@ impl Tlas {
         self.contents.lock()
     }
 
+    /// Returns the buffer for instances that a kernel writes; makes it the first time.
+    pub(crate) fn records_buffer(&self, gpu: &Arc<Gpu>, name: &str) -> Result<Arc<Buffer>> {
+        get_or_create(&self.records, gpu, name, u64::from(self.built_capacity) * instance_bytes(1))
+    }
+
+    /// Returns the buffer of the hit remap table; makes it the first time.
+    pub(crate) fn hit_table_buffer(&self, gpu: &Arc<Gpu>, name: &str) -> Result<Arc<Buffer>> {
+        get_or_create(&self.hit_table, gpu, name, u64::from(self.built_capacity) * REMAP_ENTRY_BYTES)
+    }
+
     /// Bytes of the structure.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let hardware = self.structure.as_ref().map_or(0, RawAccelStruct::memory_bytes);
@@ -98,4 +114,23 @@ impl TlasContents {
     pub(crate) fn counts(&self) -> Option<(u32, u32)> {
         self.instance_count.map(|count| (count, self.built_count))
     }
+}
+
+fn get_or_create(
+    place: &OnceLock<Arc<Buffer>>,
+    gpu: &Arc<Gpu>,
+    name: &str,
+    bytes: u64,
+) -> Result<Arc<Buffer>> {
+    if let Some(buffer) = place.get() {
+        return Ok(Arc::clone(buffer));
+    }
+    let desc = BufferDesc {
+        size_bytes: bytes.max(1),
+        usage: BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
+        debug_name: name,
+        ..Default::default()
+    };
+    let buffer = Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?);
+    Ok(Arc::clone(place.get_or_init(|| buffer)))
 }

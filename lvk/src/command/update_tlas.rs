@@ -1,7 +1,7 @@
 //! Updates of a TLAS: its list of instances is written by the host where it knows the addresses, and by a kernel where
 //! BLAS have parts or maps, or may move.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use super::CommandBuffer;
 use super::build_tlas::{TlasBuildRequest, VulkanInstances, check_capacity};
@@ -28,9 +28,6 @@ use crate::upload::staging::StagingChunk;
 
 /// Addresses of instances must be a multiple of this.
 const INSTANCE_ALIGNMENT: u64 = 16;
-
-/// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
-pub(crate) const REMAP_ENTRY_BYTES: u64 = 16;
 
 /// Instances that the host has written as Vulkan reads them.
 struct StagedInstances {
@@ -531,17 +528,10 @@ impl CommandBuffer {
         source: InstanceSource,
         built_count: u32,
     ) -> Result<KernelInstances> {
-        let records = self.get_or_create_buffer(
-            &tlas.records,
-            target,
-            u64::from(tlas.built_capacity) * instance_bytes(1),
-        )?;
+        let (gpu, name) = (&self.shared.gpu, &target.name);
+        let records = tlas.records_buffer(gpu, name)?;
         let rows = match blas_refs.needs_hit_remap || tlas.hit_table.get().is_some() {
-            true => Some(self.get_or_create_buffer(
-                &tlas.hit_table,
-                target,
-                u64::from(tlas.built_capacity) * REMAP_ENTRY_BYTES,
-            )?),
+            true => Some(tlas.hit_table_buffer(gpu, name)?),
             false => None,
         };
         // A refit may neither add nor remove instances, but records may come to name meshes of other parts.
@@ -604,25 +594,5 @@ impl CommandBuffer {
         let (address, ()) =
             self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, fill)?;
         Ok(address)
-    }
-
-    /// A buffer that lives as long as the structure, made when it is first needed.
-    fn get_or_create_buffer(
-        &self,
-        place: &OnceLock<Arc<Buffer>>,
-        target: &AccelStruct,
-        bytes: u64,
-    ) -> Result<Arc<Buffer>> {
-        if let Some(buffer) = place.get() {
-            return Ok(Arc::clone(buffer));
-        }
-        let desc = BufferDesc {
-            size_bytes: bytes.max(1),
-            usage: BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
-            debug_name: &target.name,
-            ..Default::default()
-        };
-        let buffer = Arc::new(Buffer::new(&self.shared.gpu, &desc, InternalUsage::NONE)?);
-        Ok(Arc::clone(place.get_or_init(|| buffer)))
     }
 }
