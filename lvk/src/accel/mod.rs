@@ -24,6 +24,7 @@ mod size_model;
 pub(crate) mod split;
 pub(crate) mod storage;
 pub(crate) mod tlas;
+pub(crate) mod tlas_desc;
 pub(crate) mod tlas_tracker;
 
 pub(crate) use accel_struct::AccelStruct;
