@@ -150,10 +150,11 @@ pub use ash;
 pub use glam;
 
 pub use accel::culling::InstanceCulling;
-pub use accel::desc::{BlasDesc, PrimitiveOrder, TlasDesc};
+pub use accel::desc::{BlasDesc, PrimitiveOrder};
 pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
+pub use accel::tlas_desc::TlasDesc;
 pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
 pub use command::dependencies::Dependencies;

@@ -7,7 +7,6 @@ use ash::vk;
 
 use super::flags::{AccelStructSizes, BuildFlags};
 use super::geometry::{BlasGeometry, VulkanGeometry, check_geometries, host_or_device_address};
-use super::instance::INSTANCE_BYTES;
 use super::primitive_map::PrimitiveMap;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -231,10 +230,4 @@ pub(crate) fn transform_matrices(geometries: &[BlasGeometry]) -> Option<Vec<f32>
     any.then(|| {
         geometries.iter().flat_map(|geometry| geometry.transform_rows().unwrap_or(IDENTITY)).collect()
     })
-}
-
-/// Bytes of `count` instances.
-#[inline]
-pub(crate) fn instance_bytes(count: u32) -> u64 {
-    u64::from(count) * INSTANCE_BYTES as u64
 }

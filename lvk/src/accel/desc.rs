@@ -1,8 +1,7 @@
-//! Descriptions of acceleration structures.
+//! The description of a BLAS.
 
 use super::flags::BuildFlags;
 use super::geometry::BlasGeometry;
-use super::instance::TlasInstance;
 
 /// In which order the driver's builder gets the primitives of a mesh.
 ///
@@ -37,29 +36,5 @@ impl Default for BlasDesc<'_> {
     fn default() -> Self {
         let (flags, order) = (BuildFlags::default(), PrimitiveOrder::default());
         Self { geometries: &[], flags, order, debug_name: "blas" }
-    }
-}
-
-/// Describes a top-level structure.
-#[derive(Debug, Clone, Copy)]
-pub struct TlasDesc<'a> {
-    /// Its first instances; may be empty.
-    pub instances: &'a [TlasInstance],
-    /// Room for instances in later updates; at least the number of the first ones.
-    pub capacity: u32,
-    /// Most parts that a mesh shown may have been split into ([`AccelStructInfo::parts`](crate::AccelStructInfo)), on
-    /// the average of all instances. 1 unless phones' limits or [`DeviceProfile`](crate::DeviceProfile)s split meshes; the
-    /// average of the first instances where that is more.
-    pub parts_per_instance: u32,
-    /// What the build is optimised for.
-    pub flags: BuildFlags,
-    /// Name in error messages, validation messages and debuggers.
-    pub debug_name: &'a str,
-}
-
-impl Default for TlasDesc<'_> {
-    fn default() -> Self {
-        let flags = BuildFlags::default();
-        Self { instances: &[], capacity: 0, parts_per_instance: 1, flags, debug_name: "tlas" }
     }
 }

@@ -12,7 +12,6 @@ pub(crate) mod desc;
 pub(crate) mod flags;
 pub(crate) mod geometry;
 pub(crate) mod instance;
-pub(crate) mod instance_plan;
 pub(crate) mod partition;
 pub(crate) mod primitive_bounds;
 pub(crate) mod primitive_map;
@@ -25,6 +24,7 @@ mod size_model;
 pub(crate) mod split;
 pub(crate) mod storage;
 pub(crate) mod tlas;
+pub(crate) mod tlas_desc;
 pub(crate) mod tlas_tracker;
 
 pub(crate) use accel_struct::AccelStruct;

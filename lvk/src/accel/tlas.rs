@@ -3,11 +3,17 @@
 use std::sync::{Arc, OnceLock};
 
 use super::blas_refs::{AccelGeneration, BlasRefSet};
+use super::instance::{InstanceSource, instance_bytes};
 use super::raw_accel_struct::RawAccelStruct;
-use crate::error::{Result, check_limit};
+use crate::error::Result;
+use crate::gpu::Gpu;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::tlas::SoftwareTlas;
+
+/// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
+const REMAP_ENTRY_BYTES: u64 = 16;
 
 /// A top-level structure.
 pub(crate) struct Tlas {
@@ -48,39 +54,6 @@ pub(crate) struct TlasContents {
     pub(crate) source: Option<Arc<InstanceSource>>,
 }
 
-/// Instances that name structures by number, for the kernel that puts addresses in.
-#[derive(Clone)]
-pub(crate) struct InstanceSource {
-    /// `VkAccelerationStructureInstanceKHR` with a number in place of the address.
-    pub(crate) instances: InstanceBytes,
-    /// How many there are.
-    pub(crate) count: u32,
-    /// Of further parts: the caller's instance each belongs to.
-    pub(crate) owners: Option<InstanceBytes>,
-    /// Instances of the caller.
-    pub(crate) user_count: u32,
-    /// How often the whole list is written: once for each part that a structure may have.
-    pub(crate) copies: u32,
-    pub(crate) indexing: BlasIndexing,
-}
-
-/// What the numbers of an [`InstanceSource`] count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum BlasIndexing {
-    /// Parts of everything shown.
-    ByPart,
-    /// Structures shown, with all their parts.
-    ByBlas,
-}
-
-/// Bytes the kernel reads.
-#[derive(Clone)]
-pub(crate) struct InstanceBytes {
-    pub(crate) address: u64,
-    /// What holds them; `None` for staging memory, which keeps them until the command buffer is done.
-    pub(crate) buffer: Option<Arc<Buffer>>,
-}
-
 impl Tlas {
     pub(crate) fn new(
         slot: u32,
@@ -104,6 +77,16 @@ impl Tlas {
     #[inline]
     pub(crate) fn contents(&self) -> Guard<'_, TlasContents> {
         self.contents.lock()
+    }
+
+    /// Returns the buffer for instances that a kernel writes; makes it the first time.
+    pub(crate) fn records_buffer(&self, gpu: &Arc<Gpu>, name: &str) -> Result<Arc<Buffer>> {
+        get_or_create(&self.records, gpu, name, u64::from(self.built_capacity) * instance_bytes(1))
+    }
+
+    /// Returns the buffer of the hit remap table; makes it the first time.
+    pub(crate) fn hit_table_buffer(&self, gpu: &Arc<Gpu>, name: &str) -> Result<Arc<Buffer>> {
+        get_or_create(&self.hit_table, gpu, name, u64::from(self.built_capacity) * REMAP_ENTRY_BYTES)
     }
 
     /// Bytes of the structure.
@@ -133,33 +116,21 @@ impl TlasContents {
     }
 }
 
-impl InstanceSource {
-    /// Instances Vulkan is given for it.
-    pub(crate) fn built_count(&self, name: &str) -> Result<u32> {
-        let count = u64::from(self.count) * u64::from(self.copies);
-        check_limit(name, "number of instances, parts of split meshes included", count, u32::MAX.into())?;
-        Ok(count as u32)
+fn get_or_create(
+    place: &OnceLock<Arc<Buffer>>,
+    gpu: &Arc<Gpu>,
+    name: &str,
+    bytes: u64,
+) -> Result<Arc<Buffer>> {
+    if let Some(buffer) = place.get() {
+        return Ok(Arc::clone(buffer));
     }
-}
-
-impl BlasIndexing {
-    /// How many numbers mean something.
-    pub(crate) fn entry_count(self, blas_refs: &BlasRefSet) -> usize {
-        match self {
-            Self::ByPart => blas_refs.part_addresses().len(),
-            Self::ByBlas => blas_refs.part_spans().len(),
-        }
-    }
-
-    /// Writes what they mean: first part and number of parts for each.
-    pub(crate) fn write_entries(self, blas_refs: &BlasRefSet, out: &mut [u8]) {
-        match self {
-            Self::ByBlas => out.copy_from_slice(bytemuck::cast_slice(blas_refs.part_spans())),
-            Self::ByPart => {
-                for (part, out) in (0_u32..).zip(out.chunks_exact_mut(size_of::<[u32; 2]>())) {
-                    out.copy_from_slice(bytemuck::bytes_of(&[part, 1]));
-                }
-            }
-        }
-    }
+    let desc = BufferDesc {
+        size_bytes: bytes.max(1),
+        usage: BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
+        debug_name: name,
+        ..Default::default()
+    };
+    let buffer = Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?);
+    Ok(Arc::clone(place.get_or_init(|| buffer)))
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::AccelStruct;
 use super::blas_refs::{AccelGeneration, BlasRefSet};
-use super::instance_plan::PlanMemory;
-use super::tlas::{InstanceSource, Tlas, TlasContents};
+use super::instance::{InstanceSource, PlanMemory};
+use super::tlas::{Tlas, TlasContents};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::handle_cache::HandleCache;

@@ -4,6 +4,7 @@ pub(crate) mod accesses;
 pub(crate) mod barriers;
 pub(crate) mod bind;
 pub(crate) mod build_blas;
+mod build_tlas;
 pub(crate) mod compute;
 mod copy_accel;
 pub(crate) mod dependencies;
@@ -22,11 +23,11 @@ pub(crate) mod render;
 #[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
 pub(crate) mod software_ray_query;
 mod subresource_accesses;
+mod tlas_table;
 pub(crate) mod trace;
 pub(crate) mod transfer;
 pub(crate) mod update_tlas;
 mod upload;
-mod write_instances;
 
 use std::mem::ManuallyDrop;
 use std::sync::Arc;

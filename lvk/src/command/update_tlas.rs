@@ -1,53 +1,65 @@
-//! What top-level structures show: instances from the host or from a buffer, and their builds.
+//! Updates of a TLAS: its list of instances is written by the host where it knows the addresses, and by a kernel where
+//! BLAS have parts or maps, or may move.
 
 use std::sync::Arc;
 
-use ash::vk;
-
 use super::CommandBuffer;
+use super::build_tlas::{TlasBuildRequest, VulkanInstances, check_capacity};
 use super::open_build::OpenBuild;
 use super::recording_state::RecordingState;
-use super::write_instances::{KernelInstances, StagedInstances, VulkanInstances};
+use super::transfer::BufferCopy;
 use crate::accel::AccelStruct;
-use crate::accel::blas_refs::{AccelGeneration, BlasRefSet};
-use crate::accel::build::TlasBuild;
-use crate::accel::flags::BuildMode;
-use crate::accel::instance::{DeviceInstances, TlasInstance};
-use crate::accel::instance_plan::PlanMemory;
-use crate::accel::scratch::aligned_scratch_address;
-use crate::accel::tlas::{InstanceSource, Tlas};
-use crate::accel::tlas_tracker::{RecordedTlasBuild, TlasChange, TlasEntry, TlasTracker, TlasTrackers};
-use crate::barrier::{ResourceId, Stages, Use};
-use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
-use crate::error::{Error, Result, check_limit};
+use crate::accel::blas_refs::{BitSet, BlasRefSet};
+use crate::accel::flags::{BuildFlags, BuildMode};
+use crate::accel::instance::{
+    BlasIndexing, DeviceInstances, INSTANCE_BYTES, InstanceBytes, InstancePlan, InstanceSource, PlanMemory,
+    TlasInstance, WrittenRefs, first_needs_only_address, instance_bytes, write_addresses, write_unchanged,
+};
+use crate::accel::tlas::Tlas;
+use crate::accel::tlas_tracker::{RecordedTlasBuild, TlasChange, TlasEntry, TlasTrackers};
+use crate::barrier::{Stages, Use};
+use crate::device_state::DeferredObject;
+use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
+use crate::kernels::{InstancesPushConstants, Kernel};
 use crate::resource::Buffer;
-use crate::software_ray_query::tlas::SoftwareTlas;
-use crate::submit::ownership::QueueAccess;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+use crate::upload::staging::StagingChunk;
 
-/// What is known of a structure before the next command.
-struct PreviousState<'a> {
-    /// Instances of the caller and of Vulkan, `None` before the first build.
-    counts: Option<(u32, u32)>,
-    refits: u32,
-    /// Whether this command buffer has not updated it.
-    is_first: bool,
-    /// What it shows, or nothing where some of that is gone or has moved.
-    blas_refs: &'a Arc<BlasRefSet>,
-    /// Whether it shows that.
-    is_current: bool,
-    /// When that was looked at.
-    generation: AccelGeneration,
+/// Addresses of instances must be a multiple of this.
+const INSTANCE_ALIGNMENT: u64 = 16;
+
+/// Instances that the host has written as Vulkan reads them.
+struct StagedInstances {
+    address: u64,
+    /// What they refer to; `None` for what was known.
+    blas_refs: Option<Arc<BlasRefSet>>,
 }
 
-/// Instances on their way into the build of one structure.
-#[derive(Clone, Copy)]
-struct TlasBuildRequest<'a> {
-    target: &'a AccelStruct,
-    tlas: &'a Tlas,
-    previous: &'a PreviousState<'a>,
-    mode: BuildMode,
+/// Instances that a kernel writes.
+struct KernelInstances {
+    address: u64,
+    built_count: u32,
+    blas_refs: Arc<BlasRefSet>,
+    /// Kept where they may have to be written again.
+    source: Option<Arc<InstanceSource>>,
 }
+
+impl KernelInstances {
+    /// What Vulkan is given.
+    fn build_instances(&self) -> VulkanInstances {
+        VulkanInstances { address: self.address, count: self.built_count, is_from_kernel: true }
+    }
+
+    /// What a structure shows with them.
+    fn into_change(self, count: u32, refit: bool) -> TlasChange {
+        let Self { built_count, blas_refs, source, .. } = self;
+        TlasChange { count, built_count, blas_refs: Some(blas_refs), source, refit }
+    }
+}
+
+/// So many instances are written without a list of what they refer to.
+const MAX_UNCHANGED_INSTANCES: usize = StagingChunk::MAX_BYTES as usize / INSTANCE_BYTES;
 
 impl CommandBuffer {
     /// Shows other instances in a top-level structure: at most its capacity, and for a refit as many as before
@@ -179,7 +191,8 @@ impl CommandBuffer {
         if previous.is_first {
             self.reference_blas(previous.blas_refs);
         }
-        let hit_table_address = self.write_hit_table_entry(tlas, previous, previous.blas_refs);
+        let hit_table_address =
+            self.write_hit_table_entry(tlas, previous.counts.is_some(), previous.blas_refs);
         Ok(RecordedTlasBuild {
             counts: (count, count),
             refit,
@@ -247,7 +260,8 @@ impl CommandBuffer {
     ) -> Result<TlasChange> {
         let TlasBuildRequest { target, tlas, previous, .. } = update;
         let count = instances.len() as u32;
-        let plan = self.plan_instances(&target.name, instances, previous.blas_refs, memory)?;
+        let find = |handle| self.shared.blas_ref(handle);
+        let plan = InstancePlan::new(&target.name, instances, previous.blas_refs, memory, &find)?;
         if tlas.structure.is_none() {
             let blas_refs = Some(Arc::clone(&plan.blas_refs));
             memory.ref_indices = plan.into_ref_indices();
@@ -328,30 +342,6 @@ impl CommandBuffer {
         }
     }
 
-    /// What is known of a structure before the next command.
-    #[inline(always)]
-    fn previous_state<'a>(
-        &self,
-        tlas: &Tlas,
-        update: &'a mut TlasTracker,
-        no_refs: &'a Arc<BlasRefSet>,
-    ) -> PreviousState<'a> {
-        let generation = self.shared.accel_generation();
-        let is_first = !update.is_recorded();
-        let contents = update.current(tlas);
-        let find = |handle| self.shared.blas_ref(handle);
-        let is_current = contents.generation == generation || contents.blas_refs.is_current(&find);
-        let blas_refs = if is_current { &contents.blas_refs } else { no_refs };
-        PreviousState {
-            counts: contents.counts(),
-            refits: contents.refits,
-            is_first,
-            blas_refs,
-            is_current,
-            generation,
-        }
-    }
-
     /// Builds from what a kernel writes, which is recorded.
     fn build_from_kernel(
         &mut self,
@@ -371,194 +361,238 @@ impl CommandBuffer {
         if tlas.structure.is_some() { self.poison(&target.name, error) } else { error }
     }
 
-    /// Records the build of what the device traces.
+    /// Writes a few instances of just what is `previous`, which still stands. Answers their address; `None` for any others, wrong
+    /// ones among them.
     #[inline(always)]
-    fn build_tlas(
+    fn try_stage_unchanged(
         &mut self,
-        target: &AccelStruct,
-        tlas: &Tlas,
-        instances: VulkanInstances,
-        is_first: bool,
-        refit: bool,
-    ) -> Result<()> {
-        let sizes = &target.sizes;
-        let scratch_bytes = if refit { sizes.update_scratch_bytes } else { sizes.build_scratch_bytes };
-        let records = if instances.is_from_kernel { tlas.records.get() } else { None };
-        let scratch = self.join_build_run(target.id, scratch_bytes, records.map(|records| &**records))?;
-        let build = TlasBuild {
-            flags: target.flags,
-            instances: instances.address,
-            count: instances.count,
-            refit,
-            target: tlas.structure.as_ref().map_or(vk::AccelerationStructureKHR::null(), |of| of.raw),
-            scratch,
-        };
-        // SAFETY: instances, structure and scratch memory are alive, checked, aligned and large enough; barriers keep them
-        // apart from other commands.
-        unsafe { build.record(self.shared.gpu.accel_functions()?, self.raw()) };
-        if is_first {
-            self.reference_resource(target.id, QueueAccess::Write);
+        instances: &[TlasInstance],
+        previous: &BlasRefSet,
+    ) -> Result<Option<u64>> {
+        if previous.needs_kernel || instances.is_empty() || instances.len() > MAX_UNCHANGED_INSTANCES {
+            return Ok(None);
         }
+        let sequence = self.recording.staging_key();
+        let bytes = (instances.len() * INSTANCE_BYTES) as u64;
+        let (address, alike) =
+            self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
+                write_unchanged(instances, previous, out)
+            })?;
+        Ok(alike.then_some(address))
+    }
+
+    /// Writes instances with addresses; `None` where a kernel is needed. `previous` is what was shown before, if that still stands.
+    fn stage_instances(
+        &mut self,
+        name: &str,
+        instances: &[TlasInstance],
+        previous: &BlasRefSet,
+        seen_refs: &mut BitSet,
+    ) -> Result<Option<StagedInstances>> {
+        let (shared, sequence) = (&self.shared, self.recording.staging_key());
+        let find = |handle| shared.blas_ref(handle);
+        if previous.needs_kernel
+            || (previous.refs().is_empty() && !first_needs_only_address(instances, &find)?)
+        {
+            return Ok(None);
+        }
+        let bytes = instance_bytes(instances.len().max(1) as u32);
+        let (address, written) =
+            shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
+                write_addresses(name, instances, previous, seen_refs, &find, out)
+            })?;
+        Ok(match written? {
+            WrittenRefs::Unchanged => Some(StagedInstances { address, blas_refs: None }),
+            WrittenRefs::Changed(blas_refs) => Some(StagedInstances { address, blas_refs: Some(blas_refs) }),
+            WrittenRefs::NeedsKernel => None,
+        })
+    }
+
+    /// Instances for the kernel, and the owners of those for further parts.
+    fn host_source(
+        &mut self,
+        name: &str,
+        instances: &[TlasInstance],
+        plan: InstancePlan,
+        memory: &mut PlanMemory,
+    ) -> Result<(InstanceSource, Arc<BlasRefSet>)> {
+        let keep = plan.blas_refs.may_move;
+        let mut written = Ok(());
+        let records = self.source_bytes(name, instance_bytes(plan.built_count), keep, |out| {
+            written = plan.write_part_indices(name, instances, out);
+        })?;
+        written?;
+        let owners = match plan.extra_part_count() {
+            0 => None,
+            count => {
+                let bytes = u64::from(count) * size_of::<u32>() as u64;
+                Some(self.source_bytes(name, bytes, keep, |out| plan.write_extra_part_owners(out))?)
+            }
+        };
+        let source = InstanceSource {
+            instances: records,
+            count: plan.built_count,
+            owners,
+            user_count: instances.len() as u32,
+            copies: 1,
+            indexing: BlasIndexing::ByPart,
+        };
+        let blas_refs = Arc::clone(&plan.blas_refs);
+        memory.ref_indices = plan.into_ref_indices();
+        Ok((source, blas_refs))
+    }
+
+    /// Bytes for the kernel to read: in a buffer of their own if they are to be kept, else in staging memory.
+    fn source_bytes(
+        &mut self,
+        name: &str,
+        size_bytes: u64,
+        keep: bool,
+        fill: impl FnOnce(&mut [u8]),
+    ) -> Result<InstanceBytes> {
+        if !keep {
+            return Ok(InstanceBytes { address: self.stage_bytes(size_bytes, fill)?, buffer: None });
+        }
+        let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
+        let buffer = self.shared.instance_buffers.acquire(&self.shared.gpu, name, size_bytes)?;
+        buffer.fill_with(fill);
+        self.shared.free_later(DeferredObject::BufferRef(Arc::clone(&buffer)));
+        Ok(InstanceBytes { address: buffer.address, buffer: Some(buffer) })
+    }
+
+    /// The caller's buffer as a source.
+    fn device_source(
+        &self,
+        name: &str,
+        instances: &DeviceInstances<'_>,
+        previous: &Arc<BlasRefSet>,
+    ) -> Result<(Arc<BlasRefSet>, InstanceSource)> {
+        let buffer = self.shared.store.buffers.get(instances.buffer)?;
+        buffer.check_usage(BufferUsage::STORAGE)?;
+        if !instances.offset.is_multiple_of(INSTANCE_ALIGNMENT) {
+            let message = format!("instances start at a multiple of 16 bytes, not at {}", instances.offset);
+            return Err(Error::usage(name, message));
+        }
+        let bytes = instance_bytes(instances.count);
+        buffer.check_range(instances.offset, bytes)?;
+        let blas_refs = if previous.has_handles(instances.blas) {
+            Arc::clone(previous)
+        } else {
+            let find = |handle: &_| self.shared.blas_ref(*handle);
+            Arc::new(BlasRefSet::new(instances.blas.iter().map(find).collect::<Result<_>>()?))
+        };
+        let own = InstanceBytes { address: buffer.address + instances.offset, buffer: Some(buffer) };
+        let source = InstanceSource {
+            instances: own,
+            count: instances.count,
+            owners: None,
+            user_count: instances.count,
+            copies: blas_refs.part_spans().iter().map(|[_, parts]| *parts).max().unwrap_or(1),
+            indexing: BlasIndexing::ByBlas,
+        };
+        Ok((blas_refs, source))
+    }
+
+    /// Copies the caller's buffer where structures may move later, since it may have other contents by then.
+    fn keep_source_copy(
+        &mut self,
+        name: &str,
+        instances: &DeviceInstances<'_>,
+        blas_refs: &BlasRefSet,
+        source: &mut InstanceSource,
+    ) -> Result<()> {
+        let bytes = instance_bytes(instances.count);
+        if bytes == 0 || !blas_refs.may_move {
+            return Ok(());
+        }
+        let shared = Arc::clone(&self.shared);
+        let buffer = shared.store.buffers.get(instances.buffer)?;
+        let desc = BufferDesc { size_bytes: bytes, debug_name: name, ..Default::default() };
+        let copy = Arc::new(Buffer::new(&shared.gpu, &desc, InternalUsage::NONE)?);
+        self.copy_buffer_objects(
+            &buffer,
+            &copy,
+            &[BufferCopy { source_offset: instances.offset, target_offset: 0, size: bytes }],
+        )?;
+        shared.free_later(DeferredObject::BufferRef(Arc::clone(&copy)));
+        source.instances = InstanceBytes { address: copy.address, buffer: Some(copy) };
         Ok(())
     }
 
-    /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the commands
-    /// before were such builds too, of other structures, and there is memory left beside theirs; then all may run at once.
-    #[inline(always)]
-    fn join_build_run(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
-        let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
-        if records.is_none()
-            && let Some(scratch) = self.state.build_run.try_add(target, bytes, alignment)
-        {
-            return Ok(scratch);
-        }
-        self.begin_build_run(target, bytes, alignment, records)
-    }
-
-    /// The same for a build that waits for those before.
-    #[inline(never)]
-    fn begin_build_run(
+    /// Has the kernel write the instances and their rows.
+    fn record_instances(
         &mut self,
-        target: ResourceId,
-        bytes: u64,
-        alignment: u64,
-        records: Option<&Buffer>,
-    ) -> Result<u64> {
-        let shared = &self.shared;
-        let own = &shared.scratch[self.recording.queue_index];
-        let (buffer, replaced) = own.get_or_grow(&shared.gpu, bytes)?;
-        self.free_replaced_scratch(replaced);
-        self.state.accesses.add_id(own.id, Use::accel_build_write());
-        self.state.accesses.add_accumulating(shared.all_tlas, Use::accel_build_write());
-        self.use_all_blas(Use::accel_read(Stages::ACCEL_BUILD));
-        if let Some(records) = records {
-            self.use_buffer(records, Use::accel_build_input());
-        }
-        self.flush_barriers();
-        let (start, end) =
-            (aligned_scratch_address(buffer.address, alignment), buffer.address + buffer.size_bytes);
-        self.state.build_run.start(target, start..end, bytes, alignment);
-        Ok(start)
-    }
-
-    /// Tells queues and shaders what the structure shows from now on; `None` for what is shown the same as before.
-    fn publish(
-        &mut self,
+        target: &AccelStruct,
         tlas: &Tlas,
-        previous: &PreviousState<'_>,
-        change: TlasChange,
-    ) -> (RecordedTlasBuild, Option<Arc<BlasRefSet>>, Option<Arc<InstanceSource>>) {
-        let TlasChange { count, built_count, blas_refs: new, source, refit } = change;
-        let new = new.or_else(|| (!previous.is_current).then(|| Arc::clone(previous.blas_refs)));
-        let blas_refs = new.as_ref().unwrap_or(previous.blas_refs);
-        if previous.is_first || new.is_some() {
-            self.reference_blas(blas_refs);
-        }
-        let hit_table_address = self.write_hit_table_entry(tlas, previous, blas_refs);
-        let counts = (count, built_count);
-        (RecordedTlasBuild { counts, refit, hit_table_address, generation: previous.generation }, new, source)
+        blas_refs: Arc<BlasRefSet>,
+        source: InstanceSource,
+        built_count: u32,
+    ) -> Result<KernelInstances> {
+        let (gpu, name) = (&self.shared.gpu, &target.name);
+        let records = tlas.records_buffer(gpu, name)?;
+        let rows = match blas_refs.needs_hit_remap || tlas.hit_table.get().is_some() {
+            true => Some(tlas.hit_table_buffer(gpu, name)?),
+            false => None,
+        };
+        // A refit may neither add nor remove instances, but records may come to name meshes of other parts.
+        let keep_active = source.copies > 1 && target.flags.contains(BuildFlags::ALLOW_UPDATE);
+        self.record_instance_kernel(&source, &blas_refs, &records, rows.as_deref(), keep_active)?;
+        let source = blas_refs.may_move.then(|| Arc::new(source));
+        Ok(KernelInstances { address: records.address, built_count, blas_refs, source })
     }
 
-    /// Has other queues be done with what is shown, which may come from them.
-    fn reference_blas(&mut self, blas_refs: &BlasRefSet) {
-        if self.shared.gpu.queues.has_several() {
-            blas_refs
-                .refs()
-                .iter()
-                .for_each(|blas_refs| self.reference_resource(blas_refs.id, QueueAccess::Read));
-        }
-    }
-
-    /// Tells shaders where the rows of the structure lie, unless they know. Answers what it tells.
-    #[inline(always)]
-    fn write_hit_table_entry(
+    fn record_instance_kernel(
         &mut self,
-        tlas: &Tlas,
-        previous: &PreviousState<'_>,
+        source: &InstanceSource,
         blas_refs: &BlasRefSet,
-    ) -> Option<u64> {
-        // At first the entry is that of the slot's last owner.
-        if previous.counts.is_some() && tlas.hit_table.get().is_none() {
-            return None;
+        records: &Buffer,
+        rows: Option<&Buffer>,
+        keep_active: bool,
+    ) -> Result<()> {
+        let numbers = source.indexing;
+        let entry_count = numbers.entry_count(blas_refs);
+        let entries = self.stage_bytes((entry_count * size_of::<[u32; 2]>()) as u64, |out| {
+            numbers.write_entries(blas_refs, out)
+        })?;
+        let parts: &[u8] = bytemuck::cast_slice(blas_refs.part_addresses());
+        let parts = self.stage_bytes(parts.len() as u64, |out| out.copy_from_slice(parts))?;
+        let push = InstancesPushConstants {
+            source: source.instances.address,
+            target: records.address,
+            rows: rows.map_or(0, |rows| rows.address),
+            entries,
+            parts,
+            owners: source.owners.as_ref().map_or(0, |owners| owners.address),
+            count: source.count,
+            copies: source.copies,
+            entry_count: entry_count as u32,
+            user_count: source.user_count,
+            keep_active: keep_active.into(),
+            unused: 0,
+        };
+        if let Some(buffer) = &source.instances.buffer {
+            self.use_buffer(buffer, Use::shader_read(Stages::COMPUTE));
         }
-        let rows = tlas.hit_table.get().filter(|_| blas_refs.needs_hit_remap).map_or(0, |rows| rows.address);
-        self.write_tlas_table(tlas.slot, tlas_table_entry(tlas, rows));
-        Some(rows)
-    }
-
-    /// Structures that this command buffer takes to have no rows, though a submission since it was recorded has given them some:
-    /// their slots, with what the table has to say of them first.
-    pub(crate) fn entries_without_hit_table(&self) -> Vec<(u32, [u64; 2])> {
-        let Some(updates) = &self.state.tlas_trackers else { return Vec::new() };
-        updates.with_unexpected_hit_table().map(|tlas| (tlas.slot, tlas_table_entry(tlas, 0))).collect()
-    }
-
-    /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.
-    pub(crate) fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
-        let shared = Arc::clone(&self.shared);
-        let Some(table) = shared.tlas_table.as_ref() else { return };
-        self.state.accesses.add_id(shared.hit_tables_id, Use::transfer_write());
+        self.use_buffer(records, Use::shader_write(Stages::COMPUTE));
+        if rows.is_some() {
+            self.state.accesses.add_id(self.shared.hit_tables_id, Use::shader_write(Stages::COMPUTE));
+        }
         self.flush_barriers();
-        let offset = u64::from(slot) * TLAS_TABLE_ENTRY_BYTES;
-        // SAFETY: the table has an entry for every slot.
-        unsafe {
-            shared.gpu.device.cmd_update_buffer(self.raw(), table.raw, offset, bytemuck::bytes_of(&entry));
+        let invocations = source.count.saturating_mul(source.copies);
+        if invocations == 0 {
+            return Ok(());
         }
+        self.dispatch_kernel_runs(
+            Kernel::Instances,
+            std::iter::once((bytemuck::bytes_of(&push), invocations)),
+        )
     }
 
-    /// Has shaders see nothing in slots whose structures are gone.
-    pub(crate) fn clear_tlas_entries(&mut self, slots: &[u32]) {
-        slots.iter().for_each(|slot| self.write_tlas_table(*slot, [0; 2]));
+    /// The address of bytes that the GPU may read until the command buffer is done.
+    fn stage_bytes(&mut self, bytes: u64, fill: impl FnOnce(&mut [u8])) -> Result<u64> {
+        let sequence = self.recording.staging_key();
+        let (address, ()) =
+            self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, fill)?;
+        Ok(address)
     }
-
-    /// Empties the table that says where rows lie.
-    pub(crate) fn clear_tlas_table(&mut self) {
-        let shared = Arc::clone(&self.shared);
-        let Some(table) = shared.tlas_table.as_ref() else { return };
-        self.state.accesses.add_id(shared.hit_tables_id, Use::transfer_write());
-        self.flush_barriers();
-        // SAFETY: the whole buffer is filled.
-        unsafe { shared.gpu.device.cmd_fill_buffer(self.raw(), table.raw, 0, vk::WHOLE_SIZE, 0) };
-    }
-}
-
-impl TlasBuildRequest<'_> {
-    /// Checks the counts; answers whether it is a refit.
-    #[inline(always)]
-    fn check_counts(&self, count: u32, built: u32) -> Result<bool> {
-        let Self { target, tlas, previous, mode } = self;
-        if built > tlas.built_capacity {
-            return Err(capacity_error(target, tlas, count, built));
-        }
-        let same = previous.counts == Some((count, built));
-        let refit = mode.refits(same && target.allows_refit(), previous.refits);
-        if refit {
-            target.check_refit()?;
-        }
-        if refit && !same {
-            let message = format!("a refit keeps the number of instances; {count} are new, so rebuild");
-            return Err(Error::usage(&target.name, message));
-        }
-        Ok(refit)
-    }
-}
-
-/// What the table says of a structure with these rows.
-fn tlas_table_entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
-    [rows, tlas.software.as_ref().map_or(0, SoftwareTlas::address)]
-}
-
-/// Fails where there are more instances of the caller than the structure was made for.
-fn check_capacity(target: &AccelStruct, tlas: &Tlas, count: u64) -> Result<()> {
-    check_limit(&target.name, "instance count", count, tlas.capacity.into())
-}
-
-#[cold]
-fn capacity_error(target: &AccelStruct, tlas: &Tlas, count: u32, built: u32) -> Error {
-    let message = format!(
-        "its {count} instances of split meshes stand for {built}, but there is room for {}; create it with a larger \
-         capacity or more TlasDesc::parts_per_instance",
-        tlas.built_capacity
-    );
-    Error::usage(&target.name, message)
 }

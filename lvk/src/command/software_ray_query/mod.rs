@@ -12,8 +12,9 @@ use super::CommandBuffer;
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::blas_refs::{BlasRef, BlasRefSet};
-use crate::accel::build::instance_bytes;
-use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check_instance, to_raw};
+use crate::accel::instance::{
+    DeviceInstances, INSTANCE_BYTES, TlasInstance, check_instance, instance_bytes, to_raw,
+};
 use crate::software_ray_query::blas::{BvhOrigin, SoftwareBlas};
 use crate::software_ray_query::gpu_build::geometry::{GpuGeometry, gpu_geometries};
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan};

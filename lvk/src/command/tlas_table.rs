@@ -1,0 +1,71 @@
+//! The table of all TLAS: the addresses of their hit remap tables and of what software traces.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::accel::blas_refs::BlasRefSet;
+use crate::accel::tlas::Tlas;
+use crate::barrier::Use;
+use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
+use crate::software_ray_query::tlas::SoftwareTlas;
+
+impl CommandBuffer {
+    /// Tells shaders where the rows of the structure lie, unless they know. Answers what it tells.
+    #[inline(always)]
+    pub(super) fn write_hit_table_entry(
+        &mut self,
+        tlas: &Tlas,
+        is_built: bool,
+        blas_refs: &BlasRefSet,
+    ) -> Option<u64> {
+        // At first the entry is that of the slot's last owner.
+        if is_built && tlas.hit_table.get().is_none() {
+            return None;
+        }
+        let rows = tlas.hit_table.get().filter(|_| blas_refs.needs_hit_remap).map_or(0, |rows| rows.address);
+        self.write_tlas_table(tlas.slot, tlas_table_entry(tlas, rows));
+        Some(rows)
+    }
+
+    /// Structures that this command buffer takes to have no rows, though a submission since it was recorded has given them some:
+    /// their slots, with what the table has to say of them first.
+    pub(crate) fn entries_without_hit_table(&self) -> Vec<(u32, [u64; 2])> {
+        let Some(updates) = &self.state.tlas_trackers else { return Vec::new() };
+        updates.with_unexpected_hit_table().map(|tlas| (tlas.slot, tlas_table_entry(tlas, 0))).collect()
+    }
+
+    /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.
+    pub(crate) fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
+        let shared = Arc::clone(&self.shared);
+        let Some(table) = shared.tlas_table.as_ref() else { return };
+        self.state.accesses.add_id(shared.hit_tables_id, Use::transfer_write());
+        self.flush_barriers();
+        let offset = u64::from(slot) * TLAS_TABLE_ENTRY_BYTES;
+        // SAFETY: the table has an entry for every slot.
+        unsafe {
+            shared.gpu.device.cmd_update_buffer(self.raw(), table.raw, offset, bytemuck::bytes_of(&entry));
+        }
+    }
+
+    /// Has shaders see nothing in slots whose structures are gone.
+    pub(crate) fn clear_tlas_entries(&mut self, slots: &[u32]) {
+        slots.iter().for_each(|slot| self.write_tlas_table(*slot, [0; 2]));
+    }
+
+    /// Empties the table that says where rows lie.
+    pub(crate) fn clear_tlas_table(&mut self) {
+        let shared = Arc::clone(&self.shared);
+        let Some(table) = shared.tlas_table.as_ref() else { return };
+        self.state.accesses.add_id(shared.hit_tables_id, Use::transfer_write());
+        self.flush_barriers();
+        // SAFETY: the whole buffer is filled.
+        unsafe { shared.gpu.device.cmd_fill_buffer(self.raw(), table.raw, 0, vk::WHOLE_SIZE, 0) };
+    }
+}
+
+/// What the table says of a structure with these rows.
+fn tlas_table_entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
+    [rows, tlas.software.as_ref().map_or(0, SoftwareTlas::address)]
+}
