@@ -132,7 +132,7 @@ mod pool;
 mod queue;
 mod resource;
 mod shader;
-#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
+#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled/mod.rs")]
 mod software_ray_query;
 mod store;
 mod submit;

@@ -108,7 +108,7 @@ impl CommandBuffer {
 
     /// Records the barriers in front of the next command.
     #[inline(never)]
-    pub(super) fn flush_barriers(&mut self) {
+    pub(crate) fn flush_barriers(&mut self) {
         self.end_rendering();
         let Recording { commands, tracker, images, .. } = &mut **self.recording;
         let RecordingState {

@@ -8,7 +8,6 @@ use ash::vk;
 use super::CommandBuffer;
 use super::open_build::{CpuBvhUpdate, OpenBuild};
 use super::queue_support::BUILD_ON_QUEUE;
-use super::software_ray_query::{SoftwareBuilds, check_unmoved};
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasStructures};
 use crate::accel::build::BuildInput;
@@ -19,6 +18,7 @@ use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
+use crate::software_ray_query::record::{SoftwareBuilds, check_unmoved};
 
 /// Builds and refits of BLAS, to be recorded together.
 pub(crate) struct BlasBuildPlan {
@@ -212,19 +212,19 @@ impl CommandBuffer {
     }
 
     /// Finds the buffers that builds of the BLAS read.
-    pub(super) fn build_input_buffers(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
+    pub(crate) fn build_input_buffers(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
         let buffers = blas.geometries.iter().flat_map(|geometry| geometry.buffers());
         buffers.map(|handle| self.shared.store.buffers.get(handle)).collect()
     }
 
     /// The next command reads bottom-level structures, whichever it may be.
-    pub(super) fn use_all_blas(&mut self, read: Use) {
+    pub(crate) fn use_all_blas(&mut self, read: Use) {
         self.state.accesses.add_id(self.shared.all_blas, read);
         self.state.accesses.add_id(self.shared.new_blas[self.recording.queue_index], read);
     }
 
     /// Keeps a scratch buffer that a larger one has replaced until the GPU is done with it.
-    pub(super) fn free_replaced_scratch(&self, replaced: Option<Arc<Buffer>>) {
+    pub(crate) fn free_replaced_scratch(&self, replaced: Option<Arc<Buffer>>) {
         if let Some(buffer) = replaced {
             self.shared.free_later(DeferredObject::Buffer(buffer));
         }

@@ -106,14 +106,14 @@ impl CommandBuffer {
     }
 
     /// The pipeline of a kernel.
-    pub(super) fn kernel_pipeline(&self, kernel: Kernel) -> Result<Arc<ComputePipeline>> {
+    pub(crate) fn kernel_pipeline(&self, kernel: Kernel) -> Result<Arc<ComputePipeline>> {
         let shared = &self.shared;
         shared.kernels.pipeline_of(&shared.gpu, &shared.layout, shared.pipeline_base().cache, kernel)
     }
 
     /// Runs a kernel that is bound, or is to be bound first. Barriers are in place;
     /// [`restore_compute`](Self::restore_compute) comes after the last.
-    pub(super) fn dispatch_kernel(
+    pub(crate) fn dispatch_kernel(
         &self,
         pipeline: Option<&Arc<ComputePipeline>>,
         push: &[u8],
@@ -133,7 +133,7 @@ impl CommandBuffer {
     }
 
     /// Has the caller's pipeline and push constants as they were before the kernels.
-    pub(super) fn restore_compute(&self) {
+    pub(crate) fn restore_compute(&self) {
         let (device, raw) = (&self.shared.gpu.device, self.raw());
         // SAFETY: the pipeline is alive, and the bytes lie inside the push constants of the layout.
         unsafe {

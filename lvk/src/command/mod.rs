@@ -20,8 +20,6 @@ mod query_usage;
 pub(crate) mod queue_support;
 mod recording_state;
 pub(crate) mod render;
-#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
-pub(crate) mod software_ray_query;
 mod subresource_accesses;
 mod tlas_table;
 pub(crate) mod trace;
@@ -56,11 +54,11 @@ pub(crate) use recording_state::RecordingStatePool;
 /// builds that run out of memory half way: they say so, and [`Context::submit`](crate::Context::submit) refuses the command buffer.
 /// Dropping a command buffer gives it up.
 pub struct CommandBuffer {
-    shared: Arc<DeviceState>,
+    pub(crate) shared: Arc<DeviceState>,
     queue: Queue,
     finished: bool,
-    recording: ManuallyDrop<Box<Recording>>,
-    state: ManuallyDrop<Box<RecordingState>>,
+    pub(crate) recording: ManuallyDrop<Box<Recording>>,
+    pub(crate) state: ManuallyDrop<Box<RecordingState>>,
     compute: Option<Arc<ComputePipeline>>,
     ray_tracing: Option<Arc<RayTracingPipeline>>,
     open_labels: u32,
@@ -75,7 +73,7 @@ pub struct CommandBuffer {
     /// Present where the command buffer is profiled.
     scopes: Option<Box<Scopes>>,
     /// Whether structures are built that nothing can show yet.
-    first_builds: bool,
+    pub(crate) first_builds: bool,
 }
 
 /// What is left of a command buffer once it is complete.

@@ -99,15 +99,6 @@ impl CommandBuffer {
             self.recording.references.push((id, access));
         }
     }
-
-    /// What stands for bottom-level structures that are built now: all of them, or the new ones, which nothing shows.
-    pub(super) fn built_group(&self) -> ResourceId {
-        if self.first_builds {
-            self.shared.new_blas[self.recording.queue_index]
-        } else {
-            self.shared.all_blas
-        }
-    }
 }
 
 /// Fails for the transfer queue.

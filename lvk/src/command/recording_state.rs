@@ -27,7 +27,7 @@ use crate::submit::emit_barriers::LastBarrier;
 pub(crate) struct RecordingState {
     pub(super) buffer_cache: HandleCache<BufferHandle, Buffer>,
     pub(super) texture_cache: HandleCache<TextureHandle, Texture>,
-    pub(super) accesses: CommandAccesses,
+    pub(crate) accesses: CommandAccesses,
     pub(super) barriers: Barriers,
     pub(super) last_barrier: LastBarrier,
     pub(super) sets_bound: Vec<vk::PipelineBindPoint>,
@@ -44,9 +44,9 @@ pub(crate) struct RecordingState {
     pub(super) size_queries: Vec<Arc<CompactedSizeQuery>>,
     pub(super) queries: QueryUsage,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
-    pub(super) moved_blas: HashSet<u64>,
+    pub(crate) moved_blas: HashSet<u64>,
     /// Bottom-level structures that the host placed in top-level ones where it knew them to lie, by their ids.
-    pub(super) placed_blas: HashMap<u64, Arc<AccelStruct>>,
+    pub(crate) placed_blas: HashMap<u64, Arc<AccelStruct>>,
     /// What a command failed on with only a part of it recorded.
     pub(super) poisoned: Option<String>,
 }

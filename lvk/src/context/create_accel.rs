@@ -7,7 +7,6 @@ use ash::vk;
 use super::Context;
 use super::holder::Holder;
 use super::plan_blas::{BlasInputs, part_limits};
-use super::software_ray_query::software_tlas;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::{Blas, BlasPart, BlasStructures};
@@ -25,6 +24,7 @@ use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
 use crate::queue::Queue;
 use crate::software_ray_query::blas::SoftwareBlas;
+use crate::software_ray_query::create::software_tlas;
 use crate::submit::SubmitHandle;
 
 impl Context {
@@ -167,7 +167,7 @@ impl Context {
 type NewBatch = (Vec<Holder<AccelStructHandle>>, Vec<Arc<AccelStruct>>);
 
 /// Makes the object behind the handle of a BLAS.
-pub(super) fn new_blas_object(
+pub(crate) fn new_blas_object(
     desc: &BlasDesc<'_>,
     inputs: BlasInputs,
     body: BlasStructures,

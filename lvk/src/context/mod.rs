@@ -4,7 +4,7 @@ pub(crate) mod accel_info;
 mod compact;
 pub(crate) mod config;
 mod create;
-mod create_accel;
+pub(crate) mod create_accel;
 mod create_pipelines;
 mod create_ray_tracing;
 mod create_texture;
@@ -19,15 +19,13 @@ mod index_faults;
 mod interop;
 mod live_objects;
 mod new;
-mod plan_blas;
+pub(crate) mod plan_blas;
 mod profiling;
 mod prologue;
 mod query_results;
-mod read_bounds;
+pub(crate) mod read_bounds;
 pub(crate) mod readback;
 pub(crate) mod serialize;
-#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
-mod software_ray_query;
 mod submit;
 mod transfer;
 #[cfg(feature = "window")]

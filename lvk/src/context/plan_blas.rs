@@ -22,10 +22,10 @@ use crate::software_ray_query::blas::max_sizes;
 const MIN_REORDERED_PRIMITIVES: u64 = 64;
 
 /// The input of a BLAS: the matrices that are given by value, and the parts to build.
-pub(super) struct BlasInputs {
-    pub(super) transforms: Option<Buffer>,
+pub(crate) struct BlasInputs {
+    pub(crate) transforms: Option<Buffer>,
     /// None where only software traces.
-    pub(super) parts: Vec<BlasPart>,
+    pub(crate) parts: Vec<BlasPart>,
 }
 
 /// What becomes of a mesh.
@@ -110,7 +110,7 @@ impl Context {
 
 /// Checks the geometries of a BLAS and converts them, once for all of its size queries and builds. Makes the buffer of the
 /// matrices that are given by value.
-pub(super) fn convert_geometries(
+pub(crate) fn convert_geometries(
     shared: &DeviceState,
     desc: &BlasDesc<'_>,
 ) -> Result<(Option<Buffer>, BuildInput)> {

@@ -26,7 +26,7 @@ pub(super) struct Prologue {
 impl Context {
     /// Records into the command buffer that runs before the next submission. What it holds stays there whatever
     /// becomes of `new_command_buffer`.
-    pub(super) fn record_in_prologue<T>(
+    pub(crate) fn record_in_prologue<T>(
         &self,
         record: impl FnOnce(&mut CommandBuffer) -> Result<T>,
     ) -> Result<T> {

@@ -24,7 +24,7 @@ type InputRange = (BufferHandle, u64, u64);
 
 /// Pieces of buffers that are read together, each once.
 #[derive(Default)]
-pub(super) struct InputBytes {
+pub(crate) struct InputBytes {
     index_by_range: HashMap<InputRange, usize>,
     /// Buffer and first byte in it.
     buffers: Vec<(Arc<Buffer>, u64)>,
@@ -43,7 +43,7 @@ impl Context {
     }
 
     /// The inputs of meshes. Waits for the GPU.
-    pub(super) fn read_inputs(&self, descs: &[&BlasDesc<'_>]) -> Result<InputBytes> {
+    pub(crate) fn read_inputs(&self, descs: &[&BlasDesc<'_>]) -> Result<InputBytes> {
         let mut pieces = InputBytes::default();
         for geometry in descs.iter().flat_map(|desc| desc.geometries) {
             for piece in input_ranges(geometry) {
@@ -158,7 +158,7 @@ fn geometry_bounds(geometry: &BlasGeometry, pieces: &InputBytes) -> Vec<Bounds> 
 }
 
 /// A geometry as it was read.
-pub(super) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a InputBytes) -> GeometryBytes<'a> {
+pub(crate) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a InputBytes) -> GeometryBytes<'a> {
     match geometry {
         BlasGeometry::Aabbs(boxes) => {
             let bytes = input_ranges(geometry).next().map_or(&[][..], |piece| pieces.bytes_of(piece));

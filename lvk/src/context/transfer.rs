@@ -93,7 +93,7 @@ impl Context {
 
     /// Runs a copy into a readback buffer, waits, and reads it. For `record` the same goes as in
     /// [`read_later`](Self::read_later).
-    pub(super) fn read_back(
+    pub(crate) fn read_back(
         &self,
         size: u64,
         bytes: &mut [u8],

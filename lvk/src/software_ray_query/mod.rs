@@ -1,15 +1,21 @@
-//! What software traces: how structures lie in memory, how builds and refits of them on the GPU are planned, and what
-//! stands behind a handle. Trees that the CPU builds are made in [`crate::software_ray_query::bvh`].
+//! Software ray queries: the BVHs that the library builds and traverses where a device has no ray queries, or slow ones.
 //!
-//! `disabled.rs` has the names that the rest of the crate uses, for builds without the feature `software-ray-query`. The
-//! folders `command/software_ray_query` and `context/software_ray_query` record and create, each in its layer.
+//! - `bvh` builds and encodes BVHs on the CPU; `bvh_cache` keeps them on disk, and `validate_blob` checks them.
+//! - `gpu_build` plans builds and refits on the GPU, by the compute shaders in `kernels/`.
+//! - `layout`, `blas`, `tlas` and `storage` describe the memory that shaders traverse with the GLSL in `glsl/`.
+//! - `create` and `record` are the methods of `Context` and `CommandBuffer` that create and build them.
+//!
+//! Without the feature `software-ray-query` the folder `disabled` takes the place of this module: it has the names that the rest
+//! of the crate uses.
 
 pub(crate) mod blas;
 pub(crate) mod bvh;
 pub(crate) mod bvh_cache;
+pub(crate) mod create;
 pub(crate) mod gpu_build;
 pub(crate) mod layout;
 pub(crate) mod rebraid_parts;
+pub(crate) mod record;
 pub(crate) mod storage;
 pub(crate) mod tlas;
 pub(crate) mod validate_blob;

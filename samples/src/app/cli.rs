@@ -23,11 +23,11 @@ use super::run_error::RunError;
 use super::sample::Sample;
 use super::sequence::{RenderJob, RenderReport, render_frames};
 use super::{library_warnings, png, print_line, window};
-use lvk_dev_driver::{DriverRequest, prepare};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::rtx::RtxConfig;
 use crate::scene::Scene;
 use crate::shader_folder;
+use lvk_dev_driver::{DriverRequest, prepare};
 
 /// Frames to time where none are asked for, on a GPU.
 const GPU_FRAMES: u32 = 60;

@@ -7,7 +7,6 @@ use std::sync::Arc;
 pub use super::collapse_model::{BelowNode, Bvh2Child, Bvh2Reference, Bvh8Child, Bvh8Reference, any_tree};
 pub use super::gpu_build_check::{CheckBounds, EMPTY, StructureFacts, check_structure};
 use crate::accel::geometry::BlasGeometry;
-use crate::command::software_ray_query::gpu_build::{GpuBuild, GpuRefit};
 use crate::context::Context;
 use crate::context::holder::Holder;
 use crate::error::Result;
@@ -18,6 +17,7 @@ use crate::software_ray_query::gpu_build::geometry::gpu_geometries;
 use crate::software_ray_query::gpu_build::layout::{BlasShape, BlobOffsets, BuildSource, GpuBuildPlan};
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
+use crate::software_ray_query::record::gpu_build::{GpuBuild, GpuRefit};
 
 const ALIGNMENT: u64 = 256;
 

@@ -3,12 +3,12 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use super::Context;
-use super::holder::Holder;
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::blas_file::BlasFile;
 use crate::accel::desc::BlasDesc;
+use crate::context::Context;
+use crate::context::holder::Holder;
 use crate::device_state::DeviceState;
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
@@ -16,11 +16,11 @@ use crate::software_ray_query::blas::{SoftwareBlas, missing};
 use crate::software_ray_query::tlas::SoftwareTlas;
 
 impl Context {
-    pub(super) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<Infallible>>> {
+    pub(crate) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<Infallible>>> {
         Ok(descs.iter().map(|_| None).collect())
     }
 
-    pub(super) fn software_blas(
+    pub(crate) fn software_blas(
         &self,
         _: &BlasDesc<'_>,
         _: Option<&Infallible>,
@@ -28,15 +28,15 @@ impl Context {
         Ok(None)
     }
 
-    pub(super) fn upload_software_blob(&self, _: &Arc<AccelStruct>, blob: &Infallible) -> Result<()> {
+    pub(crate) fn upload_software_blob(&self, _: &Arc<AccelStruct>, blob: &Infallible) -> Result<()> {
         match *blob {}
     }
 
-    pub(super) fn read_software_bytes(&self, _: &Blas) -> Result<Vec<u8>> {
+    pub(crate) fn read_software_bytes(&self, _: &Blas) -> Result<Vec<u8>> {
         Ok(Vec::new())
     }
 
-    pub(super) fn load_software_blas(
+    pub(crate) fn load_software_blas(
         &self,
         desc: &BlasDesc<'_>,
         _: &BlasFile,
@@ -46,6 +46,6 @@ impl Context {
 }
 
 /// The software half of a TLAS: none.
-pub(super) fn software_tlas(_: &DeviceState, _: &str, _: u32) -> Result<Option<SoftwareTlas>> {
+pub(crate) fn software_tlas(_: &DeviceState, _: &str, _: u32) -> Result<Option<SoftwareTlas>> {
     Ok(None)
 }

@@ -5,17 +5,17 @@
 
 use std::sync::Arc;
 
-use super::Context;
-use super::create_accel::new_blas_object;
-use super::holder::Holder;
-use super::plan_blas::{BlasInputs, convert_geometries};
-use super::read_bounds::geometry_bytes;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasStructures};
 use crate::accel::blas_file::BlasFile;
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::BuildMode;
 use crate::command::transfer::BufferCopy;
+use crate::context::Context;
+use crate::context::create_accel::new_blas_object;
+use crate::context::holder::Holder;
+use crate::context::plan_blas::{BlasInputs, convert_geometries};
+use crate::context::read_bounds::geometry_bytes;
 use crate::device_state::{DeferredObject, DeviceState};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
@@ -41,7 +41,7 @@ const SOFTWARE_BLOB_UUID: [u8; 32] = *b"lvk software structure, form 3\0\0";
 impl Context {
     /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
     /// the device traces queries itself. Waits for the GPU to read the inputs back.
-    pub(super) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<BlasBlob>>> {
+    pub(crate) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<BlasBlob>>> {
         if !self.device_state().gpu.caps.software_ray_query() {
             return Ok(descs.iter().map(|_| None).collect());
         }
@@ -71,7 +71,7 @@ impl Context {
 
     /// Memory for a structure that the CPU built, or that the GPU is to build; nothing where the device traces queries
     /// itself.
-    pub(super) fn software_blas(
+    pub(crate) fn software_blas(
         &self,
         desc: &BlasDesc<'_>,
         blob: Option<&BlasBlob>,
@@ -96,7 +96,7 @@ impl Context {
     }
 
     /// The bytes of what software traces, behind a mark that no driver writes. Waits for the GPU.
-    pub(super) fn read_software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
+    pub(crate) fn read_software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
         let Some(software) = &blas.software else { return Ok(Vec::new()) };
         let body = software.moved_storage().unwrap_or(&software.storage);
         let size = body.memory_bytes();
@@ -114,7 +114,7 @@ impl Context {
     }
 
     /// A structure of what [`read_software_bytes`](Self::read_software_bytes) answered.
-    pub(super) fn load_software_blas(
+    pub(crate) fn load_software_blas(
         &self,
         desc: &BlasDesc<'_>,
         blob: &BlasFile,
@@ -148,7 +148,7 @@ impl Context {
     }
 
     /// Copies what the CPU built.
-    pub(super) fn upload_software_blob(&self, target: &Arc<AccelStruct>, blob: &BlasBlob) -> Result<()> {
+    pub(crate) fn upload_software_blob(&self, target: &Arc<AccelStruct>, blob: &BlasBlob) -> Result<()> {
         let Some(software) = target.blas()?.software.as_ref() else { return Ok(()) };
         let body = &software.storage;
         self.record_in_prologue(|cmd| {
@@ -159,7 +159,7 @@ impl Context {
 }
 
 /// Room for what software traces, where it does.
-pub(super) fn software_tlas(shared: &DeviceState, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
+pub(crate) fn software_tlas(shared: &DeviceState, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
     if !shared.gpu.caps.software_ray_query() {
         return Ok(None);
     }

@@ -3,27 +3,27 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use super::CommandBuffer;
 use crate::accel::AccelStruct;
 use crate::accel::blas_refs::BlasRefSet;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
+use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::software_ray_query::blas::SoftwareBlas;
 use crate::software_ray_query::tlas::SoftwareTlas;
 
 /// Builds to record: none.
-pub(super) struct SoftwareBuilds;
+pub(crate) struct SoftwareBuilds;
 
 impl CommandBuffer {
-    pub(super) fn plan_first_software_builds(&self, _: &[Arc<AccelStruct>]) -> Result<SoftwareBuilds> {
+    pub(crate) fn plan_first_software_builds(&self, _: &[Arc<AccelStruct>]) -> Result<SoftwareBuilds> {
         Ok(SoftwareBuilds)
     }
 
-    pub(super) fn plan_software_builds(&self, _: &[Arc<AccelStruct>], _: &[bool]) -> Result<SoftwareBuilds> {
+    pub(crate) fn plan_software_builds(&self, _: &[Arc<AccelStruct>], _: &[bool]) -> Result<SoftwareBuilds> {
         Ok(SoftwareBuilds)
     }
 
-    pub(super) fn record_software_builds(&mut self, _: SoftwareBuilds) -> Result<()> {
+    pub(crate) fn record_software_builds(&mut self, _: SoftwareBuilds) -> Result<()> {
         Ok(())
     }
 
@@ -31,7 +31,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    pub(super) fn moved_storage<'a>(
+    pub(crate) fn moved_storage<'a>(
         &self,
         _: &AccelStruct,
         software: &'a SoftwareBlas,
@@ -39,7 +39,7 @@ impl CommandBuffer {
         match *software {}
     }
 
-    pub(super) fn build_software_tlas(
+    pub(crate) fn build_software_tlas(
         &mut self,
         _: &AccelStruct,
         software: &SoftwareTlas,
@@ -48,7 +48,7 @@ impl CommandBuffer {
         match *software {}
     }
 
-    pub(super) fn build_software_tlas_from_buffer(
+    pub(crate) fn build_software_tlas_from_buffer(
         &mut self,
         _: &AccelStruct,
         software: &SoftwareTlas,
@@ -60,6 +60,6 @@ impl CommandBuffer {
 }
 
 /// Succeeds: no build moves a tree.
-pub(super) fn check_unmoved(_: &AccelStruct) -> Result<()> {
+pub(crate) fn check_unmoved(_: &AccelStruct) -> Result<()> {
     Ok(())
 }

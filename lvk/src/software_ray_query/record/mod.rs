@@ -8,13 +8,13 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::CommandBuffer;
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::blas_refs::{BlasRef, BlasRefSet};
 use crate::accel::instance::{
     DeviceInstances, INSTANCE_BYTES, TlasInstance, check_instance, instance_bytes, to_raw,
 };
+use crate::command::CommandBuffer;
 use crate::software_ray_query::blas::{BvhOrigin, SoftwareBlas};
 use crate::software_ray_query::gpu_build::geometry::{GpuGeometry, gpu_geometries};
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan};
@@ -40,7 +40,7 @@ const ALIGNMENT: u64 = 16;
 
 /// Builds and refits to record side by side.
 #[derive(Default)]
-pub(super) struct SoftwareBuilds {
+pub(crate) struct SoftwareBuilds {
     targets: Vec<ResourceId>,
     builds: Vec<GpuBuild>,
     refits: Vec<GpuRefit>,
@@ -55,6 +55,15 @@ struct BlobMove {
 }
 
 impl CommandBuffer {
+    /// The pseudo-resource of the BLAS under construction: all BLAS, or the new ones that no TLAS references yet.
+    fn built_group(&self) -> ResourceId {
+        if self.first_builds {
+            self.shared.new_blas[self.recording.queue_index]
+        } else {
+            self.shared.all_blas
+        }
+    }
+
     /// Copies what the CPU built into a bottom-level structure.
     pub(crate) fn fill_software_blas(
         &mut self,
@@ -93,7 +102,7 @@ impl CommandBuffer {
     }
 
     /// What has to be built on the GPU of structures that have nothing yet; what the CPU built is ready.
-    pub(super) fn plan_first_software_builds(
+    pub(crate) fn plan_first_software_builds(
         &self,
         structures: &[Arc<AccelStruct>],
     ) -> Result<SoftwareBuilds> {
@@ -113,7 +122,7 @@ impl CommandBuffer {
     }
 
     /// Makes room for builds or refits of what software traces of these structures; records nothing.
-    pub(super) fn plan_software_builds(
+    pub(crate) fn plan_software_builds(
         &self,
         structures: &[Arc<AccelStruct>],
         refits: &[bool],
@@ -130,7 +139,7 @@ impl CommandBuffer {
     }
 
     /// Records what was planned.
-    pub(super) fn record_software_builds(&mut self, work: SoftwareBuilds) -> Result<()> {
+    pub(crate) fn record_software_builds(&mut self, work: SoftwareBuilds) -> Result<()> {
         let SoftwareBuilds { targets, builds, refits, moves } = work;
         if builds.is_empty() && refits.is_empty() {
             return Ok(());
@@ -200,7 +209,7 @@ impl CommandBuffer {
     }
 
     /// Where a structure that the CPU built lies at the next command, if it was rebuilt.
-    pub(super) fn moved_storage<'a>(
+    pub(crate) fn moved_storage<'a>(
         &self,
         target: &AccelStruct,
         software: &'a SoftwareBlas,
@@ -237,7 +246,7 @@ impl CommandBuffer {
     }
 
     /// Builds a top-level structure of the library's own from instances of the host.
-    pub(super) fn build_software_tlas(
+    pub(crate) fn build_software_tlas(
         &mut self,
         target: &AccelStruct,
         software: &SoftwareTlas,
@@ -263,7 +272,7 @@ impl CommandBuffer {
     }
 
     /// As [`build_software_tlas`](Self::build_software_tlas), from records in a buffer that name structures by place.
-    pub(super) fn build_software_tlas_from_buffer(
+    pub(crate) fn build_software_tlas_from_buffer(
         &mut self,
         target: &AccelStruct,
         software: &SoftwareTlas,
@@ -372,7 +381,7 @@ impl CommandBuffer {
 }
 
 /// Fails if a submission has moved the tree of a structure that the host placed when it recorded an update.
-pub(super) fn check_unmoved(blas: &AccelStruct) -> Result<()> {
+pub(crate) fn check_unmoved(blas: &AccelStruct) -> Result<()> {
     let software = blas.blas()?.software.as_ref();
     if software.is_none_or(|software| software.moved_storage().is_none()) {
         return Ok(());

@@ -1,6 +1,9 @@
 //! The names of this folder in a build without the feature `software-ray-query`. No context takes the software path then:
 //! the types of a BLAS and a TLAS have no values, so that every `Option` of them is `None`.
 
+pub(crate) mod create;
+pub(crate) mod record;
+
 /// The files behind `#include <lvk/software_*.glsl>`: none.
 #[cfg(feature = "glsl")]
 pub(crate) const GLSL: &[(&str, &str)] = &[];
