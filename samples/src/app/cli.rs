@@ -38,8 +38,7 @@ const WARM_UP_FRAMES: u32 = 5;
 const EXAMPLE_WIDTH: usize = 55;
 /// Exit statuses of every sample, as the help tells them.
 const EXIT_STATUS: &str = "\
-Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments or input, 130 after
-Ctrl-C.";
+Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments, 130 after Ctrl-C.";
 
 /// The command line of a sample: its own arguments, and those of every sample.
 #[derive(Debug, Clone, PartialEq, Parser)]
