@@ -6,6 +6,7 @@ use ash::vk;
 
 use super::Context;
 use super::create_texture::default_views;
+use super::destroy::Destroy;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::device_state::DeferredFree;
