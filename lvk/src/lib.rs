@@ -156,14 +156,13 @@ pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform,
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
 pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
-pub use command::attachment_desc::{
-    ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, DepthResolve, Resolve, ShadingRateAttachment,
-    StencilLoadOp,
-};
 pub use command::dependencies::Dependencies;
-pub use command::indirect_count::IndirectCount;
-pub use command::render_pass::RenderPass;
-pub use command::render_pass_desc::RenderPassDesc;
+pub use command::render::desc::{
+    ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, DepthResolve, RenderPassDesc, Resolve,
+    ShadingRateAttachment, StencilLoadOp,
+};
+pub use command::render::indirect_count::IndirectCount;
+pub use command::render::pass::RenderPass;
 pub use command::transfer::{BufferCopy, ClearValue};
 pub use context::Context;
 pub use context::accel_info::{AccelMemory, AccelStructInfo, BuildProgress, Compaction};
@@ -201,7 +200,7 @@ pub use pipeline::compute::ComputePipelineDesc;
 pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};
 pub use pipeline::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
 pub use pipeline::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
-pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc, record_bytes};
+pub use pipeline::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc, record_bytes};
 pub use pipeline::ray_tracing_library::RayTracingLibraryDesc;
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use queue::Queue;

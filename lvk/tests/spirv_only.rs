@@ -66,7 +66,7 @@ fn words_run_and_texts_are_refused() {
 /// Builds by kernels, which come as words.
 #[cfg(feature = "software-ray-query")]
 #[test]
-fn structures_are_built_by_kernels() {
+fn accel_structs_are_built_by_kernels() {
     use lvk::{
         BlasDesc, BlasGeometry, BufferUsage, BuildFlags, MemoryKind, TlasDesc, TlasInstance, Triangles,
     };

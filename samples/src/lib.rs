@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod bench;
+pub mod catalogue;
 pub mod deferred;
 pub mod driver;
 pub mod hello_triangle;

@@ -1,28 +1,52 @@
-//! Every pipeline of the samples as data, for those who compile them without running them.
+//! Every pipeline of the samples as data, for programs that compile them without running them.
 
 use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
 
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
-use crate::{
-    app, bench, deferred, hello_triangle, hybrid, hybrid_oit, large_scene, mesh_shaders, omni_shadows,
-    reflections, render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, sponza, triplanar, yuv,
-};
+use crate::{app, bench, catalogue};
+
+/// The stage whose GLSL is `shaders/<sample>/<name>.glsl`; its name says the kind of the stage, as in `sky.frag`.
+macro_rules! shader {
+    ($sample:literal, $name:literal) => {
+        $crate::pipelines::SampleStage::from_glsl(
+            include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../shaders/", $sample, "/", $name, ".glsl")),
+            $name,
+        )
+    };
+}
+pub(crate) use shader;
 
 /// A stage of a [`SamplePipeline`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SampleStage {
-    /// Which stage.
+    /// Kind of the stage.
     pub stage: ShaderStage,
-    /// Its GLSL.
+    /// GLSL of the stage.
     pub text: &'static str,
     /// Names and values of macros.
     pub defines: &'static [(&'static str, &'static str)],
-    /// For messages.
+    /// Name of the file without `.glsl`, for messages and for folders of shaders.
     pub name: &'static str,
 }
 
 impl SampleStage {
+    /// A stage without macros. The end of `name` says its kind: `.vert`, `.frag`, `.comp`, `.rgen`, `.rmiss`, `.rchit`,
+    /// `.rahit`, `.rint`, `.task` or `.mesh`.
+    ///
+    /// # Panics
+    /// If `name` ends otherwise; in a constant this is an error of the compiler.
+    #[must_use]
+    pub const fn from_glsl(text: &'static str, name: &'static str) -> Self {
+        Self { stage: kind_of(name), text, defines: &[], name }
+    }
+
+    /// The same stage with macros: names and values.
+    #[must_use]
+    pub const fn with_defines(self, defines: &'static [(&'static str, &'static str)]) -> Self {
+        Self { defines, ..self }
+    }
+
     /// The description of its module.
     #[must_use]
     pub fn module(&self) -> ShaderModuleDesc<'static> {
@@ -45,6 +69,32 @@ impl SampleStage {
     }
 }
 
+/// The kind of a stage by the end of its name.
+#[expect(
+    clippy::panic,
+    reason = "names are literals in constants, where a panic is an error of the compiler"
+)]
+const fn kind_of(name: &str) -> ShaderStage {
+    let bytes = name.as_bytes();
+    let mut dot = bytes.len();
+    while dot > 0 && bytes[dot - 1] != b'.' {
+        dot -= 1;
+    }
+    match bytes.split_at(dot).1 {
+        b"vert" => ShaderStage::Vertex,
+        b"frag" => ShaderStage::Fragment,
+        b"comp" => ShaderStage::Compute,
+        b"rgen" => ShaderStage::RayGen,
+        b"rmiss" => ShaderStage::Miss,
+        b"rchit" => ShaderStage::ClosestHit,
+        b"rahit" => ShaderStage::AnyHit,
+        b"rint" => ShaderStage::Intersection,
+        b"task" => ShaderStage::Task,
+        b"mesh" => ShaderStage::Mesh,
+        _ => panic!("the name of a stage ends as .vert or .frag do"),
+    }
+}
+
 /// A pipeline that a sample creates. Its stages tell its kind: one compute stage, ray tracing stages, or stages that
 /// draw. Each closest-hit stage is a hit group for triangles; an intersection stage begins a hit group for boxes, which an
 /// any-hit stage behind it belongs to. Nothing traces more than one ray deep.
@@ -60,30 +110,30 @@ pub struct SamplePipeline {
     pub depth: Option<Format>,
 }
 
-/// All of them.
+impl SamplePipeline {
+    /// A pipeline without targets: one compute stage, or stages that trace rays.
+    #[must_use]
+    pub fn new(name: &'static str, stages: &[SampleStage]) -> Self {
+        Self { name, stages: stages.to_vec(), color: Vec::new(), depth: None }
+    }
+
+    /// A pipeline that draws to targets of these formats.
+    #[must_use]
+    pub fn raster(
+        name: &'static str,
+        stages: &[SampleStage],
+        color: &[Format],
+        depth: Option<Format>,
+    ) -> Self {
+        Self { name, stages: stages.to_vec(), color: color.to_vec(), depth }
+    }
+}
+
+/// Returns every pipeline of the samples, of `bench` and of the user interface.
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
-    [
-        deferred::pipelines(),
-        hello_triangle::pipelines(),
-        hybrid::pipelines(),
-        hybrid_oit::pipelines(),
-        large_scene::pipelines(),
-        omni_shadows::pipelines(),
-        mesh_shaders::pipelines(),
-        reflections::pipelines(),
-        render_to_cube_map::pipelines(),
-        rtx_ao::pipelines(),
-        rtx_hello::pipelines(),
-        rtx_pipeline::pipelines(),
-        rtx_textures::pipelines(),
-        yuv::pipelines(),
-        triplanar::pipelines(),
-        sponza::pipelines(),
-        bench::pipelines(),
-        app::ui::pipelines(),
-    ]
-    .concat()
+    let samples = catalogue::SAMPLES.iter().flat_map(|sample| (sample.pipelines)());
+    samples.chain(bench::pipelines()).chain(app::ui::pipelines()).collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Where the samples' GLSL comes from: the binary, or the folder that `LVK_SHADERS` names, so that a shader can be changed
+//! The source of the samples' GLSL: the binary, or the folder that `LVK_SHADERS` names, so that a shader can be changed
 //! and tried without a build; or the one that `--hot-reload` names, which is watched too.
 
 use std::cell::RefCell;
@@ -10,11 +10,11 @@ use lvk::{Context, Error, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSo
 /// Names a folder with what `shaders/` of the project holds; its texts are taken instead of those in the binary.
 pub const VARIABLE: &str = "LVK_SHADERS";
 
-/// What `--hot-reload` names.
+/// The folder that `--hot-reload` names.
 static TAKEN: OnceLock<PathBuf> = OnceLock::new();
 
 /// Takes texts from `folder` from now on. Answers the folder where it is none.
-pub(crate) fn take(folder: &Path) -> Result<(), PathBuf> {
+pub(crate) fn set_folder(folder: &Path) -> Result<(), PathBuf> {
     if !folder.is_dir() {
         return Err(folder.to_owned());
     }
@@ -24,7 +24,7 @@ pub(crate) fn take(folder: &Path) -> Result<(), PathBuf> {
 }
 
 thread_local! {
-    /// What [`with`] names.
+    /// The folder that [`with`] names.
     static LENT: RefCell<Option<PathBuf>> = const { RefCell::new(None) };
 }
 

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use lvk_samples::app::metrics::compare;
 
 /// Standard output of the program, which must succeed, with a silent validation layer.
-fn table(args: &[&str]) -> String {
+fn parse_table(args: &[&str]) -> String {
     let args = [args, &["--validate"]].concat();
     let (status, out, err) = outcome(&args);
     assert_eq!(status, Some(0), "{args:?}: {out}{err}");
@@ -34,7 +34,7 @@ fn devices_and_scenes_are_listed_without_a_benchmark() {
 }
 
 /// The cells of the row that begins with `name`, the name left out.
-fn row(table: &str, name: &str) -> Vec<String> {
+fn columns_of_row(table: &str, name: &str) -> Vec<String> {
     let line = table.lines().find(|line| line.trim_start_matches("| ").starts_with(name));
     let line = line.unwrap_or_else(|| panic!("no row '{name}' in\n{table}"));
     let cells: Vec<String> = line.split('|').skip(2).map(|cell| cell.trim().to_owned()).collect();
@@ -48,7 +48,7 @@ fn number(cell: &str) -> f64 {
 }
 
 fn assert_positive(table: &str, name: &str, cells: std::ops::Range<usize>) {
-    for cell in &row(table, name)[cells] {
+    for cell in &columns_of_row(table, name)[cells] {
         let value = number(cell);
         assert!(value > 0.0 && value.is_finite(), "{name}: {cell} in\n{table}");
     }
@@ -56,34 +56,34 @@ fn assert_positive(table: &str, name: &str, cells: std::ops::Range<usize>) {
 
 #[test]
 fn a_batch_is_timed_and_its_scratch_memory_within_the_budget() {
-    let table = table(&["batch", "--quick"]);
+    let table = parse_table(&["batch", "--quick"]);
     for name in ["one batch", "a submission and a wait for each", "one batch, scratch budget"] {
         assert_positive(&table, name, 0..2);
     }
     assert_positive(&table, "ratio", 0..1);
     for name in ["peak of scratch memory ", "peak of scratch memory then"] {
-        assert!(number(&row(&table, name)[1]) <= 100.0, "{table}");
+        assert!(number(&columns_of_row(&table, name)[1]) <= 100.0, "{table}");
     }
 }
 
 #[test]
-fn builds_and_sizes_stand_beside_hand_written_ones() {
-    let table = table(&["compaction", "--quick"]);
+fn builds_and_sizes_are_printed_beside_hand_written_ones() {
+    let table = parse_table(&["compaction", "--quick"]);
     for name in
         ["build, fast trace", "build, fast build", "rebuild, updates allowed", "refit", "before compaction"]
     {
         assert_positive(&table, name, 0..3);
     }
     let [before, after] =
-        ["before compaction ", "after compaction "].map(|name| number(&row(&table, name)[0]));
+        ["before compaction ", "after compaction "].map(|name| number(&columns_of_row(&table, name)[0]));
     assert!(after <= before, "{table}");
-    let freed = number(&row(&table, "given back to the allocator")[0]);
+    let freed = number(&columns_of_row(&table, "given back to the allocator")[0]);
     assert!((freed - (before - after)).abs() < 1.0, "what compaction saves is given back\n{table}");
 }
 
 #[test]
-fn a_split_mesh_shows_the_same_picture() {
-    let table = table(&["split", "--quick", "--parts", "12"]);
+fn a_split_mesh_renders_the_same_image() {
+    let table = parse_table(&["split", "--quick", "--parts", "12"]);
     let head = table.lines().find(|line| line.contains(" parts |")).unwrap();
     let parts = number(head.split('|').nth(3).unwrap().trim());
     assert!(parts >= 12.0, "{table}");
@@ -96,7 +96,7 @@ fn a_split_mesh_shows_the_same_picture() {
 
 #[test]
 fn updates_of_instances_are_timed_for_every_number_asked_for() {
-    let table = table(&["tlas", "--quick", "--instances", "1", "--instances", "300"]);
+    let table = parse_table(&["tlas", "--quick", "--instances", "1", "--instances", "300"]);
     for count in ["1", "300"] {
         for mode in ["rebuild", "refit"] {
             for what in ["plain copy + driver", "lvk, from the host", "lvk, from a buffer"] {
@@ -107,8 +107,8 @@ fn updates_of_instances_are_timed_for_every_number_asked_for() {
 }
 
 #[test]
-fn orders_are_timed_and_show_the_same_picture() {
-    let table = table(&["order", "--quick"]);
+fn orders_are_timed_and_render_the_same_image() {
+    let table = parse_table(&["order", "--quick"]);
     assert!(table.lines().any(|line| line.starts_with("| primary rays by")), "{table}");
     for line in table.lines().filter(|line| line.starts_with("| pixels that differ")) {
         assert!(line.contains(" 0 |"), "{table}");
@@ -117,7 +117,7 @@ fn orders_are_timed_and_show_the_same_picture() {
 
 #[test]
 fn queries_in_software_are_timed_and_agree_with_the_devices_pipeline() {
-    let tables = table(&["queries", "--quick", "--camera", "1", "--instances", "5"]);
+    let tables = parse_table(&["queries", "--quick", "--camera", "1", "--instances", "5"]);
     let [rates, cut, agreement, structures]: [&str; 4] =
         tables.split("\n##").collect::<Vec<_>>().try_into().unwrap_or_else(|_| panic!("{tables}"));
     for name in ["software, fast trace", "software, low memory", "software, fast build"] {
@@ -138,15 +138,15 @@ fn queries_in_software_are_timed_and_agree_with_the_devices_pipeline() {
 }
 
 #[test]
-fn a_frame_is_timed_by_both_hands_and_shows_the_same_picture() {
-    let table = table(&["overhead", "--quick"]);
+fn a_frame_is_timed_by_both_hands_and_renders_the_same_image() {
+    let table = parse_table(&["overhead", "--quick"]);
     if table.contains("not measured") {
         return eprintln!("NOT TESTED, no ray tracing pipelines");
     }
     for name in ["trace (GPU)", "record and submit (CPU)", "until done"] {
         assert_positive(&table, name, 0..3);
     }
-    assert_eq!(row(&table, "pixels that differ")[1], "0 of 576");
+    assert_eq!(columns_of_row(&table, "pixels that differ")[1], "0 of 576");
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn the_papers_experiment_writes_its_report() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("made/report");
     let size = ["--width", "32", "--height", "18", "--frames", "2", "--depth", "1"];
-    let table = table(&[&["paper", "--quick", "--out", out.to_str().unwrap()], &size[..]].concat());
+    let table = parse_table(&[&["paper", "--quick", "--out", out.to_str().unwrap()], &size[..]].concat());
     assert!(table.contains("| courtyard, "), "{table}");
     let page = std::fs::read_to_string(out.join("report.md")).unwrap();
     assert!(page.contains("--width 32") && page.contains("a rehearsal"), "{page}");
@@ -178,7 +178,7 @@ fn small_paper(rt: &str) -> Option<(String, tempfile::TempDir)> {
 }
 
 #[test]
-fn the_papers_experiment_in_software_says_so_and_shows_the_same() {
+fn the_papers_experiment_in_software_says_so_and_renders_the_same() {
     let (table, software) = small_paper("software").unwrap();
     assert!(table.contains("| courtyard, software query "), "{table}");
     let text = |name: &str| std::fs::read_to_string(software.path().join(name)).unwrap();
@@ -202,17 +202,25 @@ fn the_papers_experiment_in_software_says_so_and_shows_the_same() {
 
 #[test]
 fn what_a_device_lacks_is_said_and_no_failure() {
-    let without_query = table(&["order", "--quick", "--profile", "no-ray-query"]);
+    let without_query = parse_table(&["order", "--quick", "--profile", "no-ray-query"]);
     assert!(without_query.contains("ray queries not measured"), "{without_query}");
     assert!(!without_query.contains("| primary rays by query"), "{without_query}");
-    let alone =
-        table(&["queries", "--quick", "--camera", "1", "--instances", "2", "--profile", "no-ray-tracing"]);
+    let alone = parse_table(&[
+        "queries",
+        "--quick",
+        "--camera",
+        "1",
+        "--instances",
+        "2",
+        "--profile",
+        "no-ray-tracing",
+    ]);
     assert!(
         alone.contains("ray tracing pipelines not measured") && alone.contains("ray queries not measured"),
         "{alone}"
     );
     assert!(alone.contains("| software, fast trace") && !alone.contains("| pipeline, as given"), "{alone}");
-    let without_pipeline = table(&["overhead", "--quick", "--profile", "no-rt-pipeline"]);
+    let without_pipeline = parse_table(&["overhead", "--quick", "--profile", "no-rt-pipeline"]);
     assert!(without_pipeline.contains("not measured"), "{without_pipeline}");
 }
 
@@ -226,7 +234,7 @@ fn wrong_input_and_no_ray_tracing_have_statuses_of_their_own() {
 
 #[test]
 fn what_the_core_costs_stands_beside_its_limits() {
-    let table = table(&["core", "--quick"]);
+    let table = parse_table(&["core", "--quick"]);
     assert_positive(&table, "push constants + draw", 0..2);
     assert_positive(&table, "- own share", 0..1);
     assert_positive(&table, "dispatch behind", 0..2);

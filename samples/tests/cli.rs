@@ -39,14 +39,14 @@ impl Desk {
         path.display().to_string()
     }
 
-    fn picture(&self) -> PathBuf {
+    fn output_path(&self) -> PathBuf {
         self.output.path().join("picture.png")
     }
 
     /// The program with a small picture as its output.
     fn command(&self, args: &[&str]) -> Command {
         let mut command = hybrid(args);
-        command.arg("--out").arg(self.picture());
+        command.arg("--out").arg(self.output_path());
         command.args(["--width", &WIDTH.to_string(), "--height", &HEIGHT.to_string()]);
         command
     }
@@ -67,7 +67,7 @@ impl Desk {
     }
 
     fn run(&self, args: &[&str]) -> Outcome {
-        Outcome::of(self.command(args))
+        Outcome::from_command(self.command(args))
     }
 
     fn output_files(&self) -> Vec<String> {
@@ -76,14 +76,14 @@ impl Desk {
     }
 
     /// The size of the picture, which is the only file that was written.
-    fn picture_size(&self) -> (u32, u32) {
+    fn image_size(&self) -> (u32, u32) {
         assert_eq!(self.output_files(), ["picture.png"]);
-        image::open(self.picture()).unwrap().into_rgba8().dimensions()
+        image::open(self.output_path()).unwrap().into_rgba8().dimensions()
     }
 }
 
 impl Outcome {
-    fn of(mut command: Command) -> Self {
+    fn from_command(mut command: Command) -> Self {
         let Output { status, stdout, stderr } = command.output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Self { status: status.code(), out: text(stdout), err: text(stderr) }
@@ -126,7 +126,7 @@ fn hybrid(args: &[&str]) -> Command {
         let scene = desk.file("triangle.obj", TRIANGLE);
         let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid"));
         command.args(["--scene", &scene, "--validate", "--width", "8", "--height", "8", "--out"]);
-        command.arg(desk.picture()).output().unwrap();
+        command.arg(desk.output_path()).output().unwrap();
     });
     let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid"));
     command.args(args).env_remove("LVK_DEVICE").env("LVK_CACHE", "");
@@ -186,25 +186,26 @@ fn a_bad_camera_file_is_named_and_leaves_nothing() {
 }
 
 #[test]
-fn a_picture_that_cannot_be_written_is_refused_before_any_work() {
+fn an_image_that_cannot_be_written_is_refused_before_any_work() {
     let desk = Desk::new();
     let absent = desk.input.path().join("absent.obj");
     for place in [desk.output.path().join("no/such/folder.png"), desk.output.path().to_path_buf()] {
         let mut command = hybrid(&["--scene", &absent.display().to_string()]);
         command.arg("--out").arg(&place);
-        Outcome::of(command).assert_error(2, &[&place.display().to_string()]);
+        Outcome::from_command(command).assert_error(2, &[&place.display().to_string()]);
     }
     assert_eq!(desk.output_files(), Vec::<String>::new());
 }
 
 #[test]
-fn a_picture_never_replaces_what_is_read() {
+fn an_image_never_replaces_what_is_read() {
     let desk = Desk::new();
     let scene = desk.file("scene.png", TRIANGLE);
     let cameras = desk.file("cameras.png", "scene a 0 1 2\n");
     let detour = |name: &str| desk.input.path().join(".").join(name).display().to_string();
     for (out, option) in [(&scene, "--scene"), (&detour("scene.png"), "--scene"), (&cameras, "--cameras")] {
-        let outcome = Outcome::of(hybrid(&["--scene", &scene, "--cameras", &cameras, "--out", out]));
+        let outcome =
+            Outcome::from_command(hybrid(&["--scene", &scene, "--cameras", &cameras, "--out", out]));
         outcome.assert_error(2, &["--out", option, "same file"]);
     }
     assert_eq!(fs::read_to_string(scene).unwrap(), TRIANGLE);
@@ -221,9 +222,9 @@ fn caches_are_kept_dropped_when_damaged_and_never_needed() {
     let run = |cache: &Path, more: &[&str]| {
         let mut command = desk.command(&[&["--scene", scene.as_str(), "--rt", "software"], more].concat());
         command.env("LVK_CACHE", cache);
-        let outcome = Outcome::of(command);
+        let outcome = Outcome::from_command(command);
         outcome.assert_success();
-        (fs::read(desk.picture()).unwrap(), outcome.err)
+        (fs::read(desk.output_path()).unwrap(), outcome.err)
     };
     let (picture, _) = run(&cache, &["--no-cache"]);
     assert!(!cache.exists(), "nothing is kept unasked");
@@ -242,16 +243,17 @@ fn caches_are_kept_dropped_when_damaged_and_never_needed() {
 }
 
 #[test]
-fn a_picture_that_is_not_named_as_a_png_is_refused() {
+fn an_image_that_is_not_named_as_a_png_is_refused() {
     let desk = Desk::new();
     for name in ["picture.jpg", "picture", "png"] {
         let out = desk.output.path().join(name).display().to_string();
-        Outcome::of(hybrid(&["--out", &out])).assert_error(2, &[name, "the picture is a PNG", ".png"]);
+        Outcome::from_command(hybrid(&["--out", &out]))
+            .assert_error(2, &[name, "the picture is a PNG", ".png"]);
     }
     // These names pass, so the scene is what is wrong.
     let scene = desk.file("nothing.obj", "");
     for out in [desk.output.path().join("PICTURE.PNG").display().to_string(), "/dev/null".to_owned()] {
-        Outcome::of(hybrid(&["--scene", &scene, "--out", &out])).assert_error(2, &["nothing.obj"]);
+        Outcome::from_command(hybrid(&["--scene", &scene, "--out", &out])).assert_error(2, &["nothing.obj"]);
     }
     assert_eq!(desk.output_files(), Vec::<String>::new());
 }
@@ -261,16 +263,16 @@ fn a_driver_wish_that_is_not_understood_is_wrong_input() {
     let desk = Desk::new();
     let mut command = desk.command(&["--scene", &desk.file("triangle.obj", TRIANGLE)]);
     command.env("LVK_DRIVER", "fast");
-    Outcome::of(command).assert_error(2, &["LVK_DRIVER=fast", "`system` or `software`"]);
+    Outcome::from_command(command).assert_error(2, &["LVK_DRIVER=fast", "`system` or `software`"]);
     assert_eq!(desk.output_files(), Vec::<String>::new());
 }
 
 #[test]
-fn an_earlier_picture_survives_an_error() {
+fn an_earlier_image_survives_an_error() {
     let desk = Desk::new();
-    fs::write(desk.picture(), "earlier").unwrap();
+    fs::write(desk.output_path(), "earlier").unwrap();
     desk.run(&["--scene", &desk.file("nothing.obj", "")]).assert_error(2, &["nothing.obj"]);
-    assert_eq!(fs::read(desk.picture()).unwrap(), b"earlier");
+    assert_eq!(fs::read(desk.output_path()).unwrap(), b"earlier");
     assert_eq!(desk.output_files(), ["picture.png"]);
 }
 
@@ -294,14 +296,14 @@ fn wrong_arguments_are_named() {
     ] {
         let mut command = hybrid(&line.split(' ').collect::<Vec<_>>());
         command.current_dir(folder.path());
-        Outcome::of(command).assert_usage_error(&parts);
+        Outcome::from_command(command).assert_usage_error(&parts);
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]
-fn the_help_tells_every_option() {
-    let help = Outcome::of(hybrid(&["--help"]));
+fn the_help_lists_every_option() {
+    let help = Outcome::from_command(hybrid(&["--help"]));
     help.assert_success();
     assert_names(
         &help.out,
@@ -327,7 +329,7 @@ fn the_help_tells_every_option() {
 }
 
 #[test]
-fn every_way_writes_the_picture_and_reports_its_times() {
+fn every_method_writes_the_image_and_reports_its_times() {
     if !has_device() {
         return;
     }
@@ -342,8 +344,8 @@ fn every_way_writes_the_picture_and_reports_its_times() {
             assert_eq!(outcome.err, "", "{method} {rt}");
             assert_names(&outcome.out, &["device  ", said, path, "1 triangles", "validation messages: 0"]);
             assert_table(&outcome.out, method == "hybrid");
-            assert_names(&outcome.out, &["wrote ", &desk.picture().display().to_string()]);
-            assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+            assert_names(&outcome.out, &["wrote ", &desk.output_path().display().to_string()]);
+            assert_eq!(desk.image_size(), (WIDTH, HEIGHT));
         }
     }
 }
@@ -376,7 +378,7 @@ fn missing_textures_and_materials_are_warnings_with_names() {
     assert_eq!(warnings.clone().count(), 2, "{}", outcome.err);
     assert!(warnings.clone().all(|line| line.starts_with("warning: ")), "{}", outcome.err);
     assert_names(&outcome.err, &["absent.png", "no such file", "`nowhere` is not defined"]);
-    assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+    assert_eq!(desk.image_size(), (WIDTH, HEIGHT));
 }
 
 #[test]
@@ -384,7 +386,7 @@ fn devices_are_listed_a_line_each() {
     if !has_device() {
         return;
     }
-    let outcome = Outcome::of(hybrid(&["--list-devices"]));
+    let outcome = Outcome::from_command(hybrid(&["--list-devices"]));
     outcome.assert_success();
     assert!(!outcome.out.is_empty());
     for (number, line) in outcome.out.lines().enumerate() {
@@ -404,12 +406,12 @@ fn samples_with_one_scene_list_it_and_all_list_devices() {
     ] {
         let mut command = Command::new(program);
         command.arg("--list-scenes");
-        let outcome = Outcome::of(command);
+        let outcome = Outcome::from_command(command);
         outcome.assert_success();
         assert!(outcome.out.starts_with(scene), "{}", outcome.out);
         let mut command = Command::new(program);
         command.arg("--list-devices");
-        let outcome = Outcome::of(command);
+        let outcome = Outcome::from_command(command);
         outcome.assert_success();
         assert!(outcome.out.starts_with("[0] "), "{}", outcome.out);
     }
@@ -428,7 +430,7 @@ fn a_device_that_is_not_there_is_device_trouble() {
 }
 
 #[test]
-fn a_device_without_ray_tracing_is_told_what_it_lacks() {
+fn a_device_without_ray_tracing_gets_a_message_of_what_it_lacks() {
     if !has_device() {
         return;
     }
@@ -438,7 +440,7 @@ fn a_device_without_ray_tracing_is_told_what_it_lacks() {
         [("pipeline", "lacks ray tracing pipelines", ""), ("query", "lacks ray queries", "--rt software")];
     for (rt, lack, remedy) in lacks {
         let Some(command) = desk.without_ray_tracing(&["--scene", &scene, "--rt", rt]) else { return };
-        Outcome::of(command).assert_error(1, &["SwiftShader", lack, remedy]);
+        Outcome::from_command(command).assert_error(1, &["SwiftShader", lack, remedy]);
     }
     let other = desk.run(&["--scene", &scene, "--rt", "query", "--device", "voodoo"]);
     assert!(!other.err.contains("--rt software"), "{}", other.err);
@@ -455,15 +457,16 @@ fn a_device_that_finds_no_visible_triangles_traces_everything() {
     for named in [&["--method", "hybrid"][..], &["--raster", "compute"], &["--bounces", "first"]] {
         let args = [&["--scene", &scene, "--rt", "software"], named].concat();
         let Some(command) = desk.without_ray_tracing(&args) else { return };
-        Outcome::of(command).assert_error(1, &["SwiftShader", "64-bit atomics", "--method standalone"]);
+        Outcome::from_command(command)
+            .assert_error(1, &["SwiftShader", "64-bit atomics", "--method standalone"]);
     }
     for rt in ["auto", "software"] {
         let Some(command) = desk.without_ray_tracing(&["--scene", &scene, "--rt", rt]) else { return };
-        let Outcome { status, out, err } = Outcome::of(command);
+        let Outcome { status, out, err } = Outcome::from_command(command);
         assert_eq!(status, Some(0), "{out}{err}");
         assert!(out.contains("stand-alone ray tracing") && out.contains("in software"), "{out}");
         assert!(err.contains("warning: SwiftShader") && err.contains("--method standalone"), "{err}");
-        assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+        assert_eq!(desk.image_size(), (WIDTH, HEIGHT));
     }
 }
 
@@ -476,7 +479,7 @@ fn without_a_driver_and_a_way_to_one_the_user_learns_what_to_install() {
     command.env("LVK_NO_DOWNLOAD", "1").env("LVK_VULKAN_DIR", empty.path()).env("LVK_DRIVER", "software");
     command.env_remove("VK_DRIVER_FILES").env_remove("VK_ICD_FILENAMES");
     let start = Instant::now();
-    Outcome::of(command).assert_error(1, &["LVK_NO_DOWNLOAD", "apt install mesa-vulkan-drivers"]);
+    Outcome::from_command(command).assert_error(1, &["LVK_NO_DOWNLOAD", "apt install mesa-vulkan-drivers"]);
     assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
     assert_eq!(desk.output_files(), Vec::<String>::new());
     assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0, "nothing was begun");
@@ -484,7 +487,7 @@ fn without_a_driver_and_a_way_to_one_the_user_learns_what_to_install() {
 
 /// The path follows from what the profile leaves, and the first lines say which profile and which path.
 #[test]
-fn a_profile_decides_the_path_and_is_told() {
+fn a_profile_decides_the_path_and_is_printed() {
     if !has_device() {
         return;
     }
@@ -512,7 +515,7 @@ fn a_profile_decides_the_path_and_is_told() {
 
 /// The phone takes the courtyard in parts only, and the picture is made all the same.
 #[test]
-fn a_scene_too_large_for_the_profile_is_split_and_told() {
+fn a_scene_too_large_for_the_profile_is_split_and_reported() {
     if !has_device() {
         return;
     }
@@ -525,12 +528,12 @@ fn a_scene_too_large_for_the_profile_is_split_and_told() {
     let parts = outcome.out.split_once("2 BLAS, split into ").and_then(|(_, rest)| rest.split_once(" parts"));
     let parts: u32 = parts.and_then(|(number, _)| number.parse().ok()).unwrap_or_default();
     assert!(parts >= 4, "{}", outcome.out);
-    assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+    assert_eq!(desk.image_size(), (WIDTH, HEIGHT));
 }
 
 /// `hybrid | head -1` must not keep the picture from being written.
 #[test]
-fn a_reader_that_goes_away_does_not_cost_the_picture() {
+fn a_closed_pipe_does_not_cost_the_image() {
     if !has_device() {
         return;
     }
@@ -541,5 +544,5 @@ fn a_reader_that_goes_away_does_not_cost_the_picture() {
     let mut command = desk.command(&["--scene", &scene]);
     let status = command.stdout(writer).status().unwrap();
     assert_eq!(status.code(), Some(0));
-    assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+    assert_eq!(desk.image_size(), (WIDTH, HEIGHT));
 }

@@ -194,7 +194,7 @@ impl Program {
 }
 
 impl Outcome {
-    fn of(mut command: Command) -> Self {
+    fn from_command(mut command: Command) -> Self {
         let Output { status, stdout, stderr } = command.output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Self { status: status.code(), out: text(stdout), err: text(stderr) }
@@ -246,7 +246,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 #[test]
 fn the_help_teaches() {
     for program in PROGRAMS {
-        let help = Outcome::of(program.command(&["--help"]));
+        let help = Outcome::from_command(program.command(&["--help"]));
         help.assert_success();
         assert_names(&help.out, &SHARED);
         assert_names(&help.out, program.own);
@@ -261,18 +261,18 @@ fn wrong_arguments_are_named() {
         for (line, part) in [("--frames 3..3", "--frames"), ("--width 0", "--width"), ("x", "Usage")] {
             let mut command = program.command(&line.split(' ').collect::<Vec<_>>());
             command.current_dir(folder.path());
-            let outcome = Outcome::of(command);
+            let outcome = Outcome::from_command(command);
             assert_eq!(outcome.status, Some(2), "{}", outcome.err);
             assert_names(&outcome.err, &["error: ", part]);
         }
-        let unnumbered = Outcome::of(program.small(folder.path(), "a.png", &["--frames", "0..2"]));
+        let unnumbered = Outcome::from_command(program.small(folder.path(), "a.png", &["--frames", "0..2"]));
         assert_eq!(unnumbered.status, Some(2), "{}", unnumbered.err);
     }
     assert!(files(folder.path()).is_empty());
 }
 
 #[test]
-fn every_way_writes_a_picture_under_validation() {
+fn every_method_writes_an_image_under_validation() {
     if !has_device() {
         return;
     }
@@ -280,7 +280,7 @@ fn every_way_writes_a_picture_under_validation() {
         for way in program.ways {
             let folder = tempfile::tempdir().unwrap();
             let args = [&["--frames", "1", "--validate"], *way].concat();
-            let outcome = Outcome::of(program.small(folder.path(), "a.png", &args));
+            let outcome = Outcome::from_command(program.small(folder.path(), "a.png", &args));
             outcome.assert_success();
             assert_names(&outcome.out, &["device  ", "GPU ms", "total", "validation messages: 0", "wrote "]);
             assert_names(&outcome.out, program.said);
@@ -292,7 +292,7 @@ fn every_way_writes_a_picture_under_validation() {
 
 /// What the other tests leave a program out for.
 #[test]
-fn a_device_without_mesh_shaders_is_told_from_other_trouble() {
+fn a_device_without_mesh_shaders_is_distinguished_from_other_errors() {
     if !has_device() {
         return;
     }
@@ -300,7 +300,7 @@ fn a_device_without_mesh_shaders_is_told_from_other_trouble() {
     let program = PROGRAMS.iter().find(|program| program.path == MESH_SHADERS).unwrap();
     let small = |args: &[&str]| program.small(folder.path(), "a.png", args);
     let without = ["--frames", "1", "--profile", "core-only"];
-    let outcome = Outcome::of(small(&without));
+    let outcome = Outcome::from_command(small(&without));
     assert_eq!(outcome.status, Some(1), "{}", outcome.err);
     let lack = lacking::mesh_shaders(small(&without)).unwrap();
     assert_names(&lack, &["mesh shaders", "--device"]);
@@ -309,12 +309,12 @@ fn a_device_without_mesh_shaders_is_told_from_other_trouble() {
 }
 
 #[test]
-fn what_culling_saves_is_told() {
+fn what_culling_saves_is_printed() {
     if !has_device() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let outcome = Outcome::of(PROGRAMS[0].small(folder.path(), "a.png", &["--compare-culling"]));
+    let outcome = Outcome::from_command(PROGRAMS[0].small(folder.path(), "a.png", &["--compare-culling"]));
     outcome.assert_success();
     assert_names(&outcome.out, &["culling   ", "TLAS build ", " ms instead of ", "rays of a sample "]);
 }
@@ -329,7 +329,7 @@ fn sequences_repeat_and_can_be_shared_among_processes() {
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let play = |folder: &Path, frames: &str| {
             let args = ["--round", "3", "--frames", frames];
-            Outcome::of(program.small(folder, "frame_##.png", &args)).assert_success();
+            Outcome::from_command(program.small(folder, "frame_##.png", &args)).assert_success();
         };
         play(whole.path(), "0..4");
         play(parts.path(), "2..4");
@@ -346,7 +346,7 @@ fn sequences_repeat_and_can_be_shared_among_processes() {
 }
 
 #[test]
-fn ctrl_c_leaves_whole_pictures_that_can_be_resumed() {
+fn ctrl_c_leaves_whole_images_that_can_be_resumed() {
     if !has_device() {
         return;
     }
@@ -375,8 +375,11 @@ fn ctrl_c_leaves_whole_pictures_that_can_be_resumed() {
             );
         }
         let range = format!("0..{}", written.len() + 1);
-        let resumed =
-            Outcome::of(program.small(folder.path(), "frame_######.png", &["--resume", "--frames", &range]));
+        let resumed = Outcome::from_command(program.small(
+            folder.path(),
+            "frame_######.png",
+            &["--resume", "--frames", &range],
+        ));
         resumed.assert_success();
         assert_names(&resumed.out, &["wrote 1 frames", &format!("{} were there", written.len())]);
     }
@@ -384,7 +387,7 @@ fn ctrl_c_leaves_whole_pictures_that_can_be_resumed() {
 
 /// Two OBJ files along a street: built by the first start, loaded by the second, and again what is damaged.
 #[test]
-fn structures_are_kept_from_one_start_to_the_next() {
+fn accel_structs_are_kept_from_one_start_to_the_next() {
     if !has_device() {
         return;
     }
@@ -402,7 +405,7 @@ fn structures_are_kept_from_one_start_to_the_next() {
     let start = |expected: &str| {
         let mut command = program.small(folder.path(), "a.png", &["--archive", "--copies", "3"]);
         command.env("LVK_CACHE", folder.path().join("cache")).env("LVK_SCENES", folder.path());
-        let outcome = Outcome::of(command);
+        let outcome = Outcome::from_command(command);
         outcome.assert_success();
         assert_names(&outcome.out, &["instances 7", expected]);
         assert_names(&outcome.err, &[" s] uploading the scene", " s] loading acceleration structures"]);
@@ -431,7 +434,7 @@ fn scenes_that_are_not_there_are_named() {
     ] {
         let mut command = program.small(folder.path(), "a.png", args);
         command.env_remove("LVK_SCENES");
-        let outcome = Outcome::of(command);
+        let outcome = Outcome::from_command(command);
         assert_eq!(outcome.status, Some(2), "{args:?}: {}", outcome.err);
         assert_names(&outcome.err, &[part]);
     }

@@ -68,7 +68,7 @@ fn assert_success(output: &Output) {
     assert_eq!(output.status.code(), Some(0), "{out}{err}");
 }
 
-fn picture(path: &Path) -> RgbaImage {
+fn read_image(path: &Path) -> RgbaImage {
     image::open(path).unwrap().into_rgba8()
 }
 
@@ -89,7 +89,7 @@ fn differing_by(steps: u8, one: &RgbaImage, other: &RgbaImage, first: u32) -> f6
 }
 
 /// Shows a few frames, and compares the last with the same frame of a sequence without a window.
-fn shows_what_it_writes(program: &str, args: &[&str]) {
+fn prints_what_it_writes(program: &str, args: &[&str]) {
     let Some(desktop) = desktop() else { return };
     let folder = tempfile::tempdir().unwrap();
     let windowed = [&["--window", "--frames", "3", "--validate", "--out", "window.png"], args].concat();
@@ -101,7 +101,7 @@ fn shows_what_it_writes(program: &str, args: &[&str]) {
     let headless = [&["--frames", "2..3", "--out", "frame_#.png"], args].concat();
     assert_success(&sample(program, &headless, folder.path()).output().unwrap());
     let (window, frame) =
-        (picture(&folder.path().join("window.png")), picture(&folder.path().join("frame_2.png")));
+        (read_image(&folder.path().join("window.png")), read_image(&folder.path().join("frame_2.png")));
     assert_eq!(window.dimensions(), (SIZE[0], SIZE[1]));
     let beside = differing(&window, &frame, BESIDE_PANEL);
     assert!(beside < 1e-3, "{beside} of the picture beside the panel");
@@ -110,22 +110,22 @@ fn shows_what_it_writes(program: &str, args: &[&str]) {
 
 #[test]
 fn deferred_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_deferred"), &["--lights", "60"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_deferred"), &["--lights", "60"]);
 }
 
 #[test]
 fn hello_triangle_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_hello_triangle"), &[]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_hello_triangle"), &[]);
 }
 
 #[test]
 fn render_to_cube_map_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_render_to_cube_map"), &["--face-size", "64"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_render_to_cube_map"), &["--face-size", "64"]);
 }
 
 #[test]
 fn omni_shadows_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_omni_shadows"), &["--show-cube"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_omni_shadows"), &["--show-cube"]);
 }
 
 #[test]
@@ -133,65 +133,65 @@ fn mesh_shaders_has_a_window() {
     let program = env!("CARGO_BIN_EXE_mesh_shaders");
     let folder = tempfile::tempdir().unwrap();
     match lacking::mesh_shaders(sample(program, &["--frames", "1"], folder.path())) {
-        None => shows_what_it_writes(program, &[]),
+        None => prints_what_it_writes(program, &[]),
         Some(lack) => eprintln!("NOT TESTED, {lack}"),
     }
 }
 
 #[test]
 fn yuv_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_yuv"), &[]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_yuv"), &[]);
 }
 
 #[test]
 fn triplanar_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_triplanar"), &[]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_triplanar"), &[]);
 }
 
 #[test]
 fn rtx_hello_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
 }
 
 #[test]
 fn rtx_textures_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_textures"), &[]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_textures"), &[]);
 }
 
 #[test]
 fn rtx_pipeline_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_pipeline"), &[]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_pipeline"), &[]);
 }
 
 #[test]
 fn rtx_ao_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_ao"), &["--passes", "1"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_ao"), &["--passes", "1"]);
 }
 
 #[test]
 fn sponza_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_sponza"), &["--shadow-size", "512"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_sponza"), &["--shadow-size", "512"]);
 }
 
 #[test]
 fn large_scene_has_a_window() {
     let args = ["--triangles", "20000", "--copies", "30", "--samples", "1"];
-    shows_what_it_writes(env!("CARGO_BIN_EXE_large_scene"), &args);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_large_scene"), &args);
 }
 
 #[test]
 fn hybrid_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_hybrid"), &["--depth", "1"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_hybrid"), &["--depth", "1"]);
 }
 
 #[test]
 fn hybrid_oit_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_hybrid_oit"), &["--supersampling", "1"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_hybrid_oit"), &["--supersampling", "1"]);
 }
 
 #[test]
 fn reflections_has_a_window() {
-    shows_what_it_writes(env!("CARGO_BIN_EXE_reflections"), &["--samples", "1"]);
+    prints_what_it_writes(env!("CARGO_BIN_EXE_reflections"), &["--samples", "1"]);
 }
 
 /// A sample with a window of its own, somebody at its keys, and what it says on standard error.
@@ -279,7 +279,7 @@ impl Session {
     fn shoot(&mut self, path: &Path) -> RgbaImage {
         self.press(F12);
         self.wait("a screenshot", |_| path.exists());
-        picture(path)
+        read_image(path)
     }
 
     fn resize(&self, [width, height]: [u32; 2]) {
@@ -321,7 +321,7 @@ impl Drop for Session {
 }
 
 #[test]
-fn keys_hide_the_panel_and_fly_and_the_picture_follows_the_window() {
+fn keys_hide_the_panel_and_fly_and_the_image_follows_the_window() {
     let folder = tempfile::tempdir().unwrap();
     let program = env!("CARGO_BIN_EXE_rtx_textures");
     let Some(mut session) = Session::new(program, &[], folder.path()) else { return };
@@ -375,7 +375,7 @@ fn frames_while_loading(session: &mut Session) -> u32 {
 }
 
 #[test]
-fn a_window_shows_how_far_loading_is_and_answers_keys_meanwhile() {
+fn a_window_displays_loading_progress_and_answers_keys_meanwhile() {
     let folder = tempfile::tempdir().unwrap();
     let program = env!("CARGO_BIN_EXE_large_scene");
     let args = ["--triangles", "400000", "--samples", "1", "--depth", "0"];
@@ -466,7 +466,7 @@ impl Session {
             self.key(F12, true);
             self.key(F12, false);
             self.wait("a screenshot", |_| path.exists());
-            let shot = picture(path);
+            let shot = read_image(path);
             fs::remove_file(path).unwrap();
             if is_right(self, &shot) {
                 return;
@@ -563,7 +563,7 @@ fn a_key_goes_through_the_formats() {
 }
 
 #[test]
-fn shaders_are_compiled_as_they_change_and_wrong_ones_are_told() {
+fn shaders_are_compiled_as_they_change_and_wrong_ones_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let shaders = folder.path().join("shaders");
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders");

@@ -1,4 +1,4 @@
-// What the stages of the user interface are told.
+// The push constants of the user interface.
 
 // Corners as egui has them: place in points, place in the texture, colour multiplied with its alpha, sRGB.
 struct UiVertex {

@@ -1,4 +1,4 @@
-// From where the primary ray of the pixel hit towards the light.
+// A shadow ray from the hit of the pixel's primary ray to the light.
 #include "bench/view.glsl"
 
 layout(location = 0) rayPayloadEXT uint reached;

@@ -1,4 +1,4 @@
-// What every stage of the benchmarks' tracer reads: where results go, and the camera.
+// The inputs of every stage of the benchmarks' tracer: the target of results, and the camera.
 #ifndef BENCH_VIEW_GLSL
 #define BENCH_VIEW_GLSL
 
@@ -31,7 +31,7 @@ vec3 pixelDirection(uvec2 pixel) {
     return normalize(forward + place.x * right + place.y * down);
 }
 
-// Where the ray of a pixel hit, a little towards the eye.
+// Hit position of a pixel's ray, a little towards the eye.
 vec3 pixelPoint(uvec2 pixel, float t) { return eye + pixelDirection(pixel) * (t * 0.9995); }
 
 #endif

@@ -1,4 +1,4 @@
-// How much of the light a boundary reflects.
+// Reflectance of a boundary (Fresnel).
 #ifndef COMMON_FRESNEL
 #define COMMON_FRESNEL
 

@@ -7,7 +7,7 @@
 #include "common/ray_offset.glsl"
 #include "common/surface.glsl"
 
-// What adds less than this to a pixel is not followed.
+// Rays that would add less than this to a pixel are not traced.
 const float kSmallestWeight = 1.0 / 512.0;
 const float kFar = 1e30;
 
@@ -30,7 +30,7 @@ Facing faceRay(SurfacePoint point, vec3 direction) {
     return facing;
 }
 
-// What a ray sees that leaves the scene.
+// The sky, for rays that leave the scene.
 vec3 skyColor(vec3 direction) {
     return textureBindlessCubeLod(frame.sky, frame.skySampler, direction, 0.0).rgb;
 }
@@ -49,7 +49,7 @@ vec3 arrivingLight(Light light, vec3 position, out vec3 toLight, out float dista
     return light.color / (1.0 + relative * relative);
 }
 
-// What the surface sends towards `view` by itself: emission, ambient light and that of the sources it sees.
+// Light that the surface sends towards `view` by itself: emission, ambient light and that of visible sources.
 vec3 shadeLocally(SurfacePoint point, Facing facing, Material material, vec3 view) {
     float above = 0.5 + 0.5 * facing.normal.y;
     vec3 color = material.emission + point.albedo * mix(frame.ambientBelow, frame.ambientAbove, above);

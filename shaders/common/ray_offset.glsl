@@ -1,4 +1,4 @@
-// Where a ray that leaves a surface starts, so that it does not meet the same surface again.
+// Origin of a ray that leaves a surface, offset so that it does not meet the same surface again.
 #ifndef COMMON_RAY_OFFSET
 #define COMMON_RAY_OFFSET
 

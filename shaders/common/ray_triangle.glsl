@@ -3,7 +3,7 @@
 #ifndef COMMON_RAY_TRIANGLE
 #define COMMON_RAY_TRIANGLE
 
-// How a ray passes a triangle.
+// The intersection of a ray with a triangle.
 struct RayPassage {
     // Twice the signed areas that the ray spans with the edges across from each corner, looking along the ray: all of
     // one sign where it passes through. Their shares in the sum are the barycentrics.

@@ -2,6 +2,8 @@
 #ifndef COMMON_SCENE_BUFFERS
 #define COMMON_SCENE_BUFFERS
 
+#include "common/arrays.glsl"
+
 const uint kNoTexture = 0xffffffffu;
 
 struct Material {
@@ -26,18 +28,6 @@ struct Light {
     float isDistant; // 0 or 1
     vec3 color;
     float reach; // distance at which a point light has fallen to half
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vec3Array {
-    vec3 at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vec2Array {
-    vec2 at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleArray {
-    uvec3 at[];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleInfoArray {

@@ -17,7 +17,7 @@ struct SurfacePoint {
     uint triangle;
 };
 
-// Where a ray meets a triangle that is known to be in its way. The result is pulled into the triangle: a rasteriser
+// Intersection of a ray with a triangle that is known to be in its way. The result is pulled into the triangle: a rasteriser
 // also covers pixels whose centre misses it by a rounding error.
 vec2 barycentricsAlong(uint triangle, vec3 origin, vec3 direction) {
     uvec3 corner = frame.scene.triangles.at[triangle];

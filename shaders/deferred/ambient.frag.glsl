@@ -1,11 +1,7 @@
 // Light from nowhere in particular and of the moon, and the night sky where there is no surface.
+#include "deferred/light_output.glsl"
 #include "deferred/targets.glsl"
 
-#ifdef ONE_PASS
-layout(location = 2) out vec4 lit;
-#else
-layout(location = 0) out vec4 lit;
-#endif
 
 const vec3 kToMoon = normalize(vec3(0.35, 0.8, 0.45));
 
@@ -13,7 +9,7 @@ vec3 sky(float height) {
     return mix(vec3(0.017, 0.023, 0.046), vec3(0.0016, 0.0028, 0.009), sqrt(clamp(height, 0.0, 1.0)));
 }
 
-// What mirrors see of the hall, roughly: the glimmer of all lights near the ground, and the sky above.
+// An approximation of the hall for mirrors: the glimmer of all lights near the ground, and the sky above.
 vec3 surroundings(vec3 direction) {
     vec3 hall = mix(vec3(0.05, 0.034, 0.026), vec3(0.1, 0.072, 0.066), smoothstep(-0.9, 0.0, direction.y));
     return mix(hall, sky(direction.y), smoothstep(0.0, 0.55, direction.y));

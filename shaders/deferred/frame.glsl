@@ -1,4 +1,4 @@
-// What all stages know of a frame, and where its lights are.
+// The frame constants of all stages, and positions of the lights.
 #ifndef DEFERRED_FRAME
 #define DEFERRED_FRAME
 

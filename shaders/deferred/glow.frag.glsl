@@ -1,11 +1,7 @@
 // The shine around a light, in front of all that is behind it.
+#include "deferred/light_output.glsl"
 layout(location = 0) in vec2 place;
 layout(location = 1) flat in vec3 color;
-#ifdef ONE_PASS
-layout(location = 2) out vec4 lit;
-#else
-layout(location = 0) out vec4 lit;
-#endif
 
 void main() {
     float from = dot(place, place);

@@ -1,13 +1,9 @@
-// What a surface sends to the eye of one light.
+// Light of one lamp that a surface reflects to the eye.
+#include "deferred/light_output.glsl"
 #include "deferred/targets.glsl"
 
 layout(location = 0) flat in vec4 place;
 layout(location = 1) flat in vec3 color;
-#ifdef ONE_PASS
-layout(location = 2) out vec4 lit;
-#else
-layout(location = 0) out vec4 lit;
-#endif
 
 void main() {
     Surface surface = surfaceAt(depthHere());

@@ -1,4 +1,4 @@
-// What surfaces are like, for those who light them.
+// Surface data for the lighting shaders.
 #include "deferred/frame.glsl"
 
 layout(location = 0) in vec3 position;

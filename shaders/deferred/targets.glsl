@@ -1,4 +1,4 @@
-// What is drawn of surfaces, as lighting reads it at its own pixel: from the targets of the pass itself, or in a pass behind
+// The surface data that lighting reads at its own pixel: from the attachments of the pass itself, or in a later pass
 // it from textures.
 #ifndef DEFERRED_TARGETS
 #define DEFERRED_TARGETS
@@ -51,7 +51,7 @@ Surface surfaceAt(float depth) {
     return surface;
 }
 
-// What a surface sends to the eye of light from a direction: a diffuse part and GGX highlights.
+// Reflection of light from a direction to the eye: a diffuse part and GGX highlights.
 vec3 reflected(Surface surface, vec3 toLight) {
     float facing = dot(surface.normal, toLight);
     if (facing <= 0.0) {

@@ -1,6 +1,6 @@
 // Writes the vertices and numbers of the surviving triangles without gaps and in their order, so that the picture
 // does not depend on which workgroup comes first; the last workgroup writes how many to draw.
-#include "hybrid/survivors.glsl"
+#include "hybrid/unculled_triangles.glsl"
 
 layout(local_size_x = 256) in;
 

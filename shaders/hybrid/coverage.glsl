@@ -1,4 +1,4 @@
-// Whether the ray through a pixel's centre meets a triangle, and how far away: by planes through the eye and the
+// True if the ray through a pixel's centre meets a triangle, and how far away: by planes through the eye and the
 // triangle's edges for what is clearly outside, by the arithmetic of a tracer for the rest. So a pixel shows what its
 // ray would have met. There is no grid that corners snap to, and no side is culled.
 #ifndef HYBRID_COVERAGE
@@ -33,7 +33,7 @@ vec3 edgeVolume(vec3 p, vec3 q) {
     return vec3(dot(normal, frame.camera.forward), dot(normal, frame.camera.right), dot(normal, frame.camera.down));
 }
 
-// How far the volumes of a tracer may be off, for a triangle whose corners are `away` and whose edges are `size` long.
+// Error bound of a tracer's volumes, for a triangle whose vertices are `away` and whose edges are `size` long.
 float doubtOf(float away, float size) {
     return kDoubt * away * size;
 }
@@ -60,14 +60,14 @@ vec3 volumesAt(Edges edges, vec2 pixel) {
     return edges.volumes + edges.along * pixel.x + edges.down * pixel.y;
 }
 
-// Whether no pixel from `first` to `last` is covered; may be false where that is so.
+// True if no pixel from `first` to `last` is covered; may be false where that is so.
 bool isRectangleOutside(Edges edges, ivec2 first, ivec2 last) {
     vec2 reach = 0.5 * vec2(last - first);
     vec3 most = volumesAt(edges, 0.5 * vec2(first + last)) + abs(edges.along) * reach.x + abs(edges.down) * reach.y;
     return edges.isSided && any(lessThan(most, vec3(0.0)));
 }
 
-// Whether the ray of `pixel` may meet the triangle.
+// True if the ray of `pixel` may meet the triangle.
 bool isNearby(Edges edges, ivec2 pixel) {
     vec3 volumes = volumesAt(edges, vec2(pixel));
     bool isInside = all(greaterThanEqual(volumes, vec3(0.0)));
@@ -75,7 +75,7 @@ bool isNearby(Edges edges, ivec2 pixel) {
     return isInside || (!edges.isSided && isInsideBackwards);
 }
 
-// Where a pixel's ray, which has this direction, meets a triangle.
+// Intersection of a pixel's ray, which has this direction, with a triangle.
 struct Crossing {
     float distance; // negative where it misses it, or meets it before the near plane
     bool isDoubtful; // whether it is so close to an edge that another tracer may decide otherwise

@@ -1,5 +1,5 @@
 // Culling for the hardware rasteriser: a bit for each triangle that may cover the centre of a pixel.
-#include "hybrid/survivors.glsl"
+#include "hybrid/unculled_triangles.glsl"
 
 layout(local_size_x = 256) in;
 

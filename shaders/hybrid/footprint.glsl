@@ -1,4 +1,4 @@
-// Which pixels a triangle may cover.
+// The pixels that a triangle may cover.
 #ifndef HYBRID_FOOTPRINT
 #define HYBRID_FOOTPRINT
 

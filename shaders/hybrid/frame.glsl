@@ -1,10 +1,10 @@
-// What every shader of the sample is told: one block of constants by address, the rest by push constants.
+// The frame constants of the sample: one block by address, the rest by push constants.
 #ifndef HYBRID_FRAME
 #define HYBRID_FRAME
 
 #include "common/camera.glsl"
 #include "common/scene_buffers.glsl"
-#include "hybrid/bounce_queue.glsl"
+#include "hybrid/reflective_pixels.glsl"
 #include "hybrid/pixel_order.glsl"
 #include "hybrid/visibility.glsl"
 
@@ -35,7 +35,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
 
 layout(push_constant, scalar) uniform PushConstants {
     Frame frame;
-    uint first; // row of the band of the image that this launch renders, or place in the order of pixels
+    uint first; // row of the rows of the image that this launch renders, or place in the order of pixels
     uint end; // of it
 };
 

@@ -1,4 +1,4 @@
-// What the hardware rasteriser says about a pixel, and whether the pixel's ray must be asked. Hardware places corners on
+// The result of the hardware rasteriser for a pixel, and whether the pixel's ray must decide. Hardware places vertices on
 // a grid, so near an edge it may show another triangle than the ray meets. Such pixels give themselves away: the ray
 // misses the triangle or passes close to its edge, or it meets one that a pixel beside shows.
 #ifndef HYBRID_HARDWARE_VISIBILITY
@@ -24,7 +24,7 @@ Crossing triangleCrossing(vec3 direction, uint triangle) {
     return crossingAlong(direction, corners, doubtOf(away, size));
 }
 
-// Whether the ray along `direction` meets one of the triangles beside `pixel` no farther away than `limit`.
+// True if the ray along `direction` meets one of the triangles beside `pixel` no farther away than `limit`.
 bool meetsNeighbour(ivec2 pixel, vec3 direction, uint triangle, float limit) {
     ivec2 last = ivec2(frame.camera.width, frame.camera.height) - 1;
     uint seen = kNoTriangle;

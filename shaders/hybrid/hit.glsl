@@ -1,4 +1,4 @@
-// What a ray found: the integrator asks traceClosest() and traceOccluded(), which trace_pipeline.glsl and
+// The hit of a ray: the integrator calls traceClosest() and traceOccluded(), which trace_pipeline.glsl and
 // trace_query.glsl answer.
 #ifndef HYBRID_HIT
 #define HYBRID_HIT

@@ -42,7 +42,7 @@ Ray refractedRay(Ray ray, SurfacePoint point, Facing facing, float eta, vec3 wei
     return Ray(origin, 0.0, refractedDirection(ray.direction, facing, eta), width, weight, ray.depth + 1u);
 }
 
-// What goes on from a surface: the weights of the mirrored and of the refracted ray, 0 where none is followed.
+// The rays that continue from a surface: weights of the mirrored and of the refracted ray, 0 for none.
 struct Branches {
     vec3 reflected;
     vec3 refracted;
@@ -83,7 +83,7 @@ Encounter encounterAt(Ray ray, SurfacePoint point) {
     return Encounter(point, facing, material, branchesAt(ray, facing, material));
 }
 
-// What the surface sends along the ray by itself.
+// Light that the surface sends along the ray by itself.
 vec3 localLight(Ray ray, Encounter met) {
     float share = max(1.0 - met.material.reflectivity - met.material.transmission, 0.0);
     return share > 0.0 ? ray.weight * share * shadeLocally(met.point, met.facing, met.material, -ray.direction)

@@ -77,7 +77,7 @@ SurfacePoint primarySurface(uvec2 pixel, Ray ray, Hit hit) {
 #if defined(HYBRID_VISIBILITY)
 #include "hybrid/hardware_visibility.glsl"
 
-// Where the pixel's ray meets the triangle that the visibility pass found.
+// Intersection of the pixel's ray with the triangle that the visibility pass found.
 Hit primaryHit(uvec2 pixel, Ray ray) {
     bool isInDoubt;
     bool byHardware = frame.visibility.image != kNoImage;

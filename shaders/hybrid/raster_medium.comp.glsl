@@ -25,7 +25,7 @@ void rasterMedium(SetTriangle triangle, int thread) {
     }
 }
 
-// Whether the tile found room.
+// True if the tile found room.
 bool isQueued(Tile tile) {
     Tiles tiles = Tiles(frame.visibility.tiles);
     uint place = atomicAdd(tiles.count, 1u);

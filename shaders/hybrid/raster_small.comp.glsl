@@ -14,7 +14,7 @@ void rasterFootprint(Edges edges, Corners corners, Footprint footprint, uint tri
     }
 }
 
-// Whether the list had room for the triangle.
+// True if the list had room for the triangle.
 bool isSetAside(SetTriangles list, SetTriangle triangle) {
     uint place = atomicAdd(list.count, 1u);
     if (place >= frame.visibility.setCapacity) {

@@ -1,4 +1,4 @@
-// Which triangle each pixel shows, and what the two rasterisers that find it keep on the way.
+// The visible triangle of each pixel, and intermediate data of the two rasterisers that find it.
 #ifndef HYBRID_VISIBILITY_BUFFERS
 #define HYBRID_VISIBILITY_BUFFERS
 

@@ -1,4 +1,4 @@
-// What the visibility pass found, whichever rasteriser it was by.
+// The result of the visibility pass, of either rasteriser.
 #ifndef HYBRID_VISIBLE_TRIANGLE
 #define HYBRID_VISIBLE_TRIANGLE
 

@@ -1,10 +1,10 @@
-// What every shader of the sample is told: one block of constants by address, the time by push constants.
+// The frame constants of the sample: one block by address, the time by push constants.
 #ifndef HYBRID_OIT_FRAME
 #define HYBRID_OIT_FRAME
 
 #include "common/camera.glsl"
 
-// How a sphere moves and looks; see `Sphere` in the sample's scene. Angles in radians, rates in turns a second.
+// Motion and colour of a sphere; see `Sphere` in the sample's scene. Angles in radians, rates in turns a second.
 struct Motion {
     vec3 anchor; // for a ball the lowest place of its centre
     float radius;

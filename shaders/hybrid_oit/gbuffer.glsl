@@ -1,4 +1,4 @@
-// What the raster passes leave of a pixel's opaque surface.
+// The g-buffer of a pixel's opaque surface.
 #ifndef HYBRID_OIT_GBUFFER
 #define HYBRID_OIT_GBUFFER
 

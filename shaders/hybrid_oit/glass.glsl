@@ -1,4 +1,4 @@
-// How a sphere of tinted glass looks: a mirror at its rim, a dye that absorbs and scatters a little inside, a highlight
+// Shading of a sphere of tinted glass: a mirror at its rim, a dye that absorbs and scatters a little inside, a highlight
 // in front and the focused sun at the back. Rays go straight through it.
 #ifndef HYBRID_OIT_GLASS
 #define HYBRID_OIT_GLASS
@@ -15,7 +15,7 @@ const float kHighlight = 900.0;
 const float kFocus = 26.0;
 const float kScatter = 0.4;
 
-// Where the ray enters, with all that happens along `inside` units of its way in the glass.
+// The entry of the ray, with the effects of `inside` units of its way in the glass.
 Layer frontLayer(Sphere sphere, vec3 direction, Crossing crossing, float inside, vec3 sunlight) {
     vec3 normal = normalize(frame.camera.eye + crossing.entry * direction - sphere.center);
     vec3 mirrored = reflect(direction, normal);
@@ -30,7 +30,7 @@ Layer frontLayer(Sphere sphere, vec3 direction, Crossing crossing, float inside,
     return Layer(reflectance * mirror + (1.0 - reflectance) * scattered, (1.0 - reflectance) * passed);
 }
 
-// Where the ray leaves: the sun, gathered by the front of the sphere, shines on the side away from it.
+// The exit of the ray: the sun, gathered by the front of the sphere, shines on the side away from it.
 Layer backLayer(Sphere sphere, vec3 direction, Crossing crossing, vec3 sunlight) {
     vec3 normal = normalize(frame.camera.eye + crossing.exit * direction - sphere.center);
     float reflectance = glassReflectance(crossing.cosine);

@@ -89,7 +89,7 @@ Batch nearestNodes(uint head, Place last) {
     return batch;
 }
 
-// What is seen of `background` through the nodes of a list, and of the nodes themselves, nearest first.
+// Blends the nodes of a list over `background`, nearest first.
 vec3 throughNodes(uint head, vec3 background) {
     vec3 radiance = vec3(0.0);
     vec3 transmittance = vec3(1.0);

@@ -1,4 +1,4 @@
-// How much of the sky a point sees past spheres and blocks, in closed form: form factors instead of rays.
+// Sky visibility of a point past spheres and blocks, in closed form: form factors instead of rays.
 #ifndef HYBRID_OIT_OCCLUSION
 #define HYBRID_OIT_OCCLUSION
 
@@ -70,10 +70,10 @@ float blockShare(vec3 position, vec3 normal, Block block) {
     return share;
 }
 
-// What blocks give back of the light that they keep away, for their albedo and that of the floor between them.
+// Light that occluding blocks reflect, for their albedo and that of the floor between them.
 const float kGivenBack = 0.3;
 
-// What is left of the sky's light, by colour: balls and blocks take it, glass tints it.
+// Transmitted share of the sky's light, by colour: balls and blocks occlude it, glass tints it.
 vec3 skyVisibility(vec3 position, vec3 normal) {
     vec3 visible = vec3(1.0);
     for (uint i = 0u; i < frame.ballCount + frame.glassCount; i++) {

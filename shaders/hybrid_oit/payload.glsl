@@ -1,4 +1,4 @@
-// What a shadow ray gathers.
+// The payload of a shadow ray.
 #ifndef HYBRID_OIT_PAYLOAD
 #define HYBRID_OIT_PAYLOAD
 

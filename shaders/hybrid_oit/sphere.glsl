@@ -1,4 +1,4 @@
-// Where a ray crosses a sphere, and what glass leaves of its light.
+// Intersection of a ray with a sphere, and the transmittance of glass.
 //
 // No ray of this sample needs a gap behind its origin. A point on a ball sends rays only to the outer side, and from
 // there they move away from the centre of a convex body: its own sphere is behind them, and crossSphere() says so
@@ -14,7 +14,7 @@ struct Crossing {
     float cosine; // between the ray and the surface's normal, at both ends
 };
 
-// Whether a ray of unit direction crosses the sphere in front of its origin. The discriminant is taken from the
+// True if a ray of unit direction crosses the sphere in front of its origin. The discriminant is taken from the
 // closest point's distance, which stays exact for far and small spheres.
 bool crossSphere(vec3 center, float radius, vec3 origin, vec3 direction, out Crossing crossing) {
     precise vec3 toCenter = center - origin;
@@ -49,7 +49,7 @@ float glassReflectance(float cosine) {
 const float kDepthUnits = 65536.0;
 const float kLargestDepth = 64.0;
 
-// What a sphere of glass takes from a shadow ray that starts `start` behind the origin of the crossing.
+// Absorption of a sphere of glass along a shadow ray that starts `start` behind the origin of the crossing.
 uvec3 glassOpticalDepth(Crossing crossing, vec3 absorption, float start) {
     float inside = crossing.exit - max(crossing.entry, start);
     float boundaries = crossing.entry >= start ? 2.0 : 1.0;

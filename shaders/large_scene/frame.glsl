@@ -1,4 +1,4 @@
-// What every shader of the sample is told.
+// The frame constants of the sample.
 #ifndef LARGE_SCENE_FRAME
 #define LARGE_SCENE_FRAME
 
@@ -18,7 +18,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Fir
     uint at[]; // first triangle of each piece
 };
 
-// What pixels show.
+// The quantity that pixels show.
 const uint kShowPicture = 0u;
 const uint kShowInstances = 1u;
 const uint kShowTriangles = 2u;

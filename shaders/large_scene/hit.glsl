@@ -1,4 +1,4 @@
-// What a ray met.
+// The hit of a ray.
 #ifndef LARGE_SCENE_HIT
 #define LARGE_SCENE_HIT
 

@@ -32,12 +32,5 @@ bool occludedBy(uint mask, vec3 origin, float tmin, vec3 direction, float tmax) 
 
 #include "large_scene/picture.glsl"
 
-void main() {
-    uvec2 first = groupPixel();
-    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
-        uvec2 pixel = first + groupStep(i);
-        if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
-            storePixel(pixel);
-        }
-    }
-}
+#define PIXEL_FUNCTION storePixel
+#include "common/for_each_pixel.glsl"

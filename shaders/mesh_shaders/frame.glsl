@@ -1,4 +1,4 @@
-// What every shader of the sample is told.
+// The frame constants of the sample.
 #ifndef MESH_SHADERS_FRAME
 #define MESH_SHADERS_FRAME
 
@@ -62,7 +62,7 @@ vec3 turned(vec3 direction) {
     return vec3(cos(angle) * direction.x + sin(angle) * direction.z, direction.y, cos(angle) * direction.z - sin(angle) * direction.x);
 }
 
-// How far a meshlet has moved: waves run along the knot.
+// Displacement of a meshlet: waves run along the knot.
 vec3 movedBy(uint number) {
     float wave = 0.5 + 0.5 * sin(6.2831853 * (2.0 * float(number) / float(frame.count) - 2.0 * frame.phase));
     return frame.apart * wave * wave * wave * frame.meshlets.at[number].axis;

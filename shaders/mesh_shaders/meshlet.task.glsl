@@ -6,13 +6,13 @@ layout(local_size_x = kMeshletsPerTask) in;
 taskPayloadSharedEXT Chosen chosen;
 shared uint count;
 
-// Whether all triangles turn their backs.
+// True if all triangles turn their backs.
 bool looksAway(Meshlet meshlet, vec3 middle, vec3 eye) {
     vec3 seen = middle - eye;
     return dot(seen, turned(meshlet.axis)) >= meshlet.cutoff * length(seen) + meshlet.radius;
 }
 
-// Whether the sphere lies beyond one of the picture's edges, or before the near plane.
+// True if the sphere lies beyond one of the picture's edges, or before the near plane.
 bool isOutside(vec3 middle, float radius, Camera camera) {
     vec3 offset = middle - camera.eye;
     float depth = dot(offset, camera.forward);

@@ -1,4 +1,4 @@
-// What a task workgroup hands to its mesh workgroups.
+// The payload from a task workgroup to its mesh workgroups.
 const uint kMeshletsPerTask = 32u;
 
 struct Chosen {

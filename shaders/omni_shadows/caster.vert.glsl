@@ -1,10 +1,10 @@
-// What throws shadows, as the lamp sees it through a face of the cube around it.
+// Shadow casters, as the lamp sees them through a face of the cube around it.
 #ifdef OMNI_MULTIVIEW
 #extension GL_EXT_multiview : require
 #endif
 #include "omni_shadows/frame.glsl"
 
-// Where a direction meets a face, times the distance along the face's axis, which is the third: the faces as Vulkan turns
+// Intersection of a direction with a face, times the distance along the face's axis, which is the third: the faces as Vulkan turns
 // them ("Cube Map Face Selection and Transformations").
 vec3 onFace(uint side, vec3 d) {
     switch (side) {

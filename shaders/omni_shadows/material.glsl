@@ -1,4 +1,4 @@
-// What surfaces are made of.
+// Materials of surfaces.
 #ifndef OMNI_SHADOWS_MATERIAL
 #define OMNI_SHADOWS_MATERIAL
 

@@ -1,4 +1,4 @@
-// How much of the lamp a place sees, by the cube of depths around it.
+// Visibility of the lamp from a position, by the cube map of depths.
 #ifndef OMNI_SHADOWS_SHADOW
 #define OMNI_SHADOWS_SHADOW
 

@@ -9,7 +9,7 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) flat in uint number;
 layout(location = 0) out vec4 color;
 
-// How open the corner of the room is that a place lies in.
+// Ambient visibility of a position in the corner of the room.
 float openness(vec3 n) {
     vec3 aside = frame.room - abs(position - vec3(0.0, 0.5 * frame.room.y, 0.0)) * vec3(1.0, 2.0, 1.0);
     vec3 shade = exp(-2.5 * max(aside * vec3(1.0, 0.5, 1.0), 0.0)) * (1.0 - abs(n));

@@ -29,7 +29,7 @@ vec3 skyRadiance(vec3 direction) {
     return textureBindlessCubeLod(frame.sky, frame.skySampler, direction, 0.0).rgb;
 }
 
-// What is far away fades into the sky at the horizon behind it.
+// Distant surfaces fade into the sky at the horizon.
 vec3 hazed(vec3 color, vec3 direction, float distance) {
     const float kBegin = 34.0; // scene units
     const float kDepth = 75.0; // in which all but 1/e fades

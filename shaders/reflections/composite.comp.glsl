@@ -29,7 +29,7 @@ void main() {
         vec4 visibility = textureBindlessFetch2D(frame.visibility, pixel, 0);
         float open = visibility.a;
         vec3 diffuse = surface.albedo * (1.0 - surface.metalness) * ambientIrradiance(surface.normal) * open;
-        // What is too rough to be traced sees the ambient light, which the surroundings hide as they do for diffuse.
+        // Surfaces too rough for rays reflect the ambient light, occluded by the surroundings as diffuse light is.
         vec4 reflection = textureBindlessFetch2D(frame.reflection, pixel, 0);
         vec3 mirrored = reflection.rgb * (reflection.a > 0.0 ? 1.0 : open);
         vec3 share = environmentReflectance(surface, max(-dot(direction, surface.normal), 0.0));

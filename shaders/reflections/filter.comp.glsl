@@ -2,7 +2,7 @@
 // depth, normal or roughness. Two passes with different turns of the same spiral.
 #include "reflections/neighbour.glsl"
 #include "reflections/noise.glsl"
-#include "reflections/range.glsl"
+#include "reflections/ray_range.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -1,4 +1,4 @@
-// What both passes over transparent surfaces, and that over opaque ones, know of a fragment.
+// The inputs of a fragment in the passes over opaque and transparent surfaces.
 #ifndef REFLECTIONS_FRAGMENT
 #define REFLECTIONS_FRAGMENT
 

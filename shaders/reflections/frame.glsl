@@ -1,4 +1,4 @@
-// What every shader of the sample is told: one block of constants by address, the rest by push constants.
+// The frame constants of the sample: one block by address, the rest by push constants.
 #ifndef REFLECTIONS_FRAME
 #define REFLECTIONS_FRAME
 
@@ -25,7 +25,7 @@ struct Material {
 
 const uint kNoTexture = 0xffffffffu;
 
-// How vertices of a geometry lie in memory.
+// Memory layout of the vertices of a geometry.
 const uint kKindStatic = 0u; // 16 bytes: snorm16 position, octahedral normal, half texture coordinates
 const uint kKindSkinned = 1u; // float positions in the world, octahedral normals in an array of their own
 const uint kKindLeaf = 2u; // float positions in the world, four for each quad

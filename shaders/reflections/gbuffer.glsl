@@ -19,12 +19,12 @@ vec3 packedNormal(uvec4 texel) {
     return unitFromOctahedral(unpackSnorm2x16(texel.x));
 }
 
-// How far from the surface rays start: beyond what depth and normals are rounded by.
+// Offset of rays from the surface: beyond the rounding of depth and normals.
 float liftAt(float distance) {
     return 1.5e-3 + 2.5e-4 * distance;
 }
 
-// What the pixel shows in the g-buffer of `depthTexture` and `surfaceTexture`; false where that is nothing.
+// Reads the surface of the pixel from the g-buffer of `depthTexture` and `surfaceTexture`; false where there is none.
 bool readSurface(uint depthTexture, uint surfaceTexture, uvec2 pixel, vec3 direction, out Surface surface, out float distance) {
     float depth = textureBindlessFetch2D(depthTexture, ivec2(pixel), 0).r;
     if (depth <= 0.0) {

@@ -3,7 +3,7 @@
 #define REFLECTIONS_LIGHTS
 
 #include "reflections/noise.glsl"
-#include "reflections/range.glsl"
+#include "reflections/ray_range.glsl"
 #include "reflections/reflectance.glsl"
 
 struct Arriving {
@@ -31,13 +31,13 @@ vec2 discPlace(vec2 noise) {
     return sqrt(noise.x) * vec2(cos(2.0 * kPi * noise.y), sin(2.0 * kPi * noise.y));
 }
 
-// What leaves the surface towards `view` of light that nothing blocks.
+// Reflection of unoccluded light towards `view`.
 vec3 leaving(Surface surface, vec3 view, Arriving arriving) {
     bool above = dot(arriving.toLight, surface.geometricNormal) > 0.0 && dot(arriving.toLight, surface.normal) > 0.0;
     return above ? arriving.color * scatter(surface, view, arriving.toLight) : vec3(0.0);
 }
 
-// Whether light is worth a ray that asks what blocks it.
+// True if light is worth a ray that asks what blocks it.
 bool isWorthARay(vec3 light) {
     return max(light.r, max(light.g, light.b)) > 2e-3;
 }

@@ -1,4 +1,4 @@
-// What both filters ask of a pixel's neighbours, and the spiral in which they look for them.
+// Weights of a pixel's neighbours for both filters, and the spiral of samples.
 #ifndef REFLECTIONS_NEIGHBOUR
 #define REFLECTIONS_NEIGHBOUR
 
@@ -37,7 +37,7 @@ float spiralTurn(ivec2 pixel, uint purpose) {
     return 6.2831853 * spreadNoise(uvec2(pixel), purpose).x;
 }
 
-// How far out tap `i` of `count` is, 0 to 1.
+// Distance of tap `i` of `count` from the centre, 0 to 1.
 float spiralSpoke(int i, int count) {
     return sqrt((float(i) + 0.5) / float(count));
 }

@@ -1,14 +1,7 @@
-// What opaque surfaces reflect, by ray queries.
+// Reflections of opaque surfaces, by ray queries.
 #include "common/group_pixel.glsl"
 #include "reflections/trace_query.glsl"
 #include "reflections/reflect.glsl"
 
-void main() {
-    uvec2 first = groupPixel();
-    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
-        uvec2 pixel = first + groupStep(i);
-        if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
-            opaquePixel(pixel);
-        }
-    }
-}
+#define PIXEL_FUNCTION opaquePixel
+#include "common/for_each_pixel.glsl"

@@ -1,4 +1,4 @@
-// What opaque surfaces reflect, by the ray tracing pipeline.
+// Reflections of opaque surfaces, by the ray tracing pipeline.
 #include "reflections/trace_pipeline.glsl"
 #include "reflections/reflect.glsl"
 

@@ -5,7 +5,7 @@
 
 #include "reflections/gbuffer.glsl"
 #include "reflections/lighting.glsl"
-#include "reflections/range.glsl"
+#include "reflections/ray_range.glsl"
 #include "reflections/visibility.glsl"
 
 // Panes and leaves of water that a reflected ray may pass.

@@ -1,4 +1,4 @@
-// How surfaces scatter light: Lambert and GGX by metalness and roughness.
+// The BRDF of surfaces: Lambert and GGX by metalness and roughness.
 #ifndef REFLECTIONS_REFLECTANCE
 #define REFLECTIONS_REFLECTANCE
 

@@ -87,7 +87,7 @@ vec3 leafTint(uint quad) {
     return mix(vec3(1.0, 0.25, 0.06), vec3(1.0, 0.72, 0.18), k);
 }
 
-// Whether the leaf's texture is solid at a hit: the test of the any-hit shader, and of queries.
+// True if the leaf's texture is solid at a hit: the test of the any-hit shader, and of queries.
 bool isSolid(uint instance, uint geometry, uint primitive, vec2 b) {
     Geometry leaf = frame.geometries.at[frame.instances.at[instance].firstGeometry + geometry];
     Material material = frame.materials.at[leaf.material];

@@ -1,4 +1,4 @@
-// What transparent surfaces reflect, by the ray tracing pipeline.
+// Reflections of transparent surfaces, by the ray tracing pipeline.
 #include "reflections/trace_pipeline.glsl"
 #include "reflections/reflect.glsl"
 

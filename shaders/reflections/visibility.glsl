@@ -1,4 +1,4 @@
-// How much of each light the surface of a pixel sees, one ray each, and how open its surroundings are. Colours are
+// Visibility of each light from the surface of a pixel, one ray each, and ambient visibility. Colours are
 // put to it after it was smoothed (smooth.comp.glsl, composite.comp.glsl): so textures and highlights stay sharp.
 // The including file provides traceOccluder() and traceOccluded().
 #ifndef REFLECTIONS_VISIBILITY

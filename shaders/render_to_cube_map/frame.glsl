@@ -1,4 +1,4 @@
-// What every shader of the sample is told.
+// The frame constants of the sample.
 #ifndef RENDER_TO_CUBE_MAP_FRAME
 #define RENDER_TO_CUBE_MAP_FRAME
 

@@ -1,4 +1,4 @@
-// Which camera a vertex is seen by: that of its face where one pass draws all of them, else the one that the pass is told.
+// The camera of a vertex: that of its face where one pass draws all faces, else that of the push constants.
 #ifdef ALL_FACES
 #extension GL_EXT_multiview : require
 #endif

@@ -1,7 +1,8 @@
-// What every shader of the sample is told.
+// The frame constants of the sample.
 #ifndef RTX_AO_FRAME
 #define RTX_AO_FRAME
 
+#include "common/arrays.glsl"
 #include "common/camera.glsl"
 
 const uint kNoTexture = 0xffffffffu;
@@ -9,18 +10,6 @@ const uint kNoTexture = 0xffffffffu;
 struct Paint {
     vec3 albedo; // linear, multiplied with the texture
     uint tex; // index into kTextures2D, or kNoTexture
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vec3Array {
-    vec3 at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vec2Array {
-    vec2 at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleArray {
-    uvec3 at[];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PaintArray {

@@ -1,4 +1,4 @@
-// How much of the sun a surface sees, and how open its surroundings are, by some rays.
+// Visibility of the sun from a surface, and ambient visibility, by some rays.
 // The including file provides isBlocked().
 #ifndef RTX_AO_LIGHT
 #define RTX_AO_LIGHT

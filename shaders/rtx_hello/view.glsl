@@ -1,4 +1,4 @@
-// What the stages share: where rays go, and what they find.
+// Shared by the stages: directions of rays, and their hits.
 #include "common/camera.glsl"
 
 layout(push_constant, scalar) uniform Push { Camera camera; uint tlas; uint image; };

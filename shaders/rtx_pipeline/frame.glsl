@@ -1,4 +1,4 @@
-// What every shader of the sample is told.
+// The frame constants of the sample.
 #ifndef RTX_PIPELINE_FRAME
 #define RTX_PIPELINE_FRAME
 

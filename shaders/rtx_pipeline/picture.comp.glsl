@@ -17,7 +17,7 @@ bool traceOccluded(vec3 origin, float tmin, vec3 direction, float tmax) {
 
 #include "rtx_pipeline/shade.glsl"
 
-// What the ray meets; false where it leaves the scene.
+// The hit of the ray; false where the ray leaves the scene.
 bool meets(Onward ray, out Shaded shaded) {
     LvkRayQuery query;
     lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_OPAQUE, kMaskAll, ray.origin, 0.0, ray.direction, kFar);

@@ -1,4 +1,4 @@
-// What the hit groups make of a surface: the light it sends by itself, and the one ray that goes on from there.
+// Shading in the hit groups: the light that the surface sends by itself, and the one ray that continues from there.
 // The including file provides traceOccluded().
 #ifndef RTX_PIPELINE_SHADE
 #define RTX_PIPELINE_SHADE

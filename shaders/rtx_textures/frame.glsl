@@ -1,7 +1,8 @@
-// What every shader of the sample is told.
+// The frame constants of the sample.
 #ifndef RTX_TEXTURES_FRAME
 #define RTX_TEXTURES_FRAME
 
+#include "common/arrays.glsl"
 #include "common/camera.glsl"
 
 struct Vertex {
@@ -21,10 +22,6 @@ struct Record {
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray {
     Vertex at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleArray {
-    uvec3 at[];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer RecordArray {

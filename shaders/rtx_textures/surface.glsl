@@ -1,4 +1,4 @@
-// What a ray found, textures included.
+// The surface at a hit, textures included.
 #ifndef RTX_TEXTURES_SURFACE
 #define RTX_TEXTURES_SURFACE
 

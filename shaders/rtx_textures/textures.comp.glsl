@@ -1,4 +1,4 @@
-// Rays of a pixel, by ray queries. What the hit groups do is chosen by the offset that leads to them.
+// Rays of a pixel, by ray queries. The hit group offset selects the shading, as hit groups do.
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 
@@ -32,12 +32,5 @@ bool reachesSky(vec3 origin, vec3 direction) {
 
 #include "rtx_textures/shade.glsl"
 
-void main() {
-    uvec2 first = groupPixel();
-    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
-        uvec2 pixel = first + groupStep(i);
-        if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
-            renderPixel(pixel);
-        }
-    }
-}
+#define PIXEL_FUNCTION renderPixel
+#include "common/for_each_pixel.glsl"

@@ -19,7 +19,7 @@ bool isSeen(uint view, uint number) {
     return seen;
 }
 
-// How many up to and with this thread have a 1.
+// Number of threads up to and including this one that have a 1.
 uint countUpToHere(uint one) {
     uint here = gl_LocalInvocationID.x;
     sums[here] = one;

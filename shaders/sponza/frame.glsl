@@ -1,4 +1,4 @@
-// What every shader of the sample is told.
+// The frame constants of the sample.
 #ifndef SPONZA_FRAME
 #define SPONZA_FRAME
 
@@ -26,7 +26,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CountArray {
     uint at[]; // of each view
 };
 
-// What the sample has of a material beside what all samples have.
+// Material data of this sample beside those of all samples.
 struct Finish {
     uint isMasked; // whether its texture's alpha cuts holes
     uint normalMap; // or kNoTexture

@@ -2,7 +2,7 @@
 #include "common/phong.glsl"
 #include "common/tonemap.glsl"
 #include "sponza/mask.glsl"
-#include "sponza/relief.glsl"
+#include "sponza/normal_mapping.glsl"
 
 layout(location = 0) in vec3 inPosition;
 layout(location = 1) in vec3 inNormal;

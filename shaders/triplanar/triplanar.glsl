@@ -13,7 +13,7 @@ vec3 byPlanes(Body body, vec3 position, vec3 normal) {
         weights.z * texel(body.sides, position.xy);
 }
 
-// What models with coordinates of their own often get: stretched, and with seams and poles.
+// Texture coordinates by longitude and latitude, as models often have: stretched, and with seams and poles.
 vec3 byAngles(Body body, vec3 position, vec3 normal) {
     vec2 angles = vec2(atan(position.z, position.x), asin(normalize(position).y));
     return texel(body.sides, 1.2732395 * angles);

@@ -1,4 +1,4 @@
-// What the stages of the sample are told.
+// The push constants of the sample.
 #ifndef YUV_PUSH
 #define YUV_PUSH
 

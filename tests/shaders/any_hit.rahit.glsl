@@ -1,4 +1,4 @@
-// IGNORE, TERMINATE or ACCEPT says what becomes of the candidate.
+// The decision about a candidate: IGNORE, TERMINATE or ACCEPT.
 #include "any_hit_payload.glsl"
 
 layout(location = 0) rayPayloadInEXT Seen seen;

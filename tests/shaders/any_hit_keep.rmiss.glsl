@@ -1,2 +1,2 @@
-// Leaves what the any-hit shader counted.
+// Keeps the counts of the any-hit shader.
 void main() {}

@@ -1,4 +1,4 @@
-// What rays carry past any-hit shaders.
+// The payload of any-hit shaders.
 #include "ray_records.glsl"
 
 struct Seen {

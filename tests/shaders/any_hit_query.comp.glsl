@@ -1,18 +1,10 @@
-// The same counts by ray query.
-#include <lvk/ray_query.glsl>
+// The counts of candidates by ray query.
+#include "ray_query_start.glsl"
 #include "any_hit_payload.glsl"
 
-layout(local_size_x = 64) in;
-
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
+    START_RAY_QUERY;
     Seen seen = Seen(kNoHit, 0, 0);
-    LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
     while (lvkRayQueryProceed(rq)) {
         seen.count += 1;
         seen.sum += tagOf(lvkRayQueryInstanceId(rq, LVK_CANDIDATE, tlas), lvkRayQueryGeometryIndex(rq, LVK_CANDIDATE),

@@ -14,11 +14,7 @@
 layout(location = 0) rayPayloadEXT HitRecord record;
 
 void main() {
-    uint index = gl_LaunchIDEXT.y * gl_LaunchSizeEXT.x + gl_LaunchIDEXT.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
+    START_RAY_GEN;
     record = kNoHit;
     traceRayEXT(kTLAS[tlas], flags, mask, SBT_OFFSET, SBT_STRIDE, MISS_INDEX, ray.origin, ray.tMin, ray.direction,
                 ray.tMax, 0);

@@ -1,4 +1,4 @@
-// Looks through triangles whose middle lies at a negative x.
+// Ignores triangles whose middle is at a negative x.
 void main() {
     vec3 xs = vec3(gl_HitTriangleVertexPositionsEXT[0].x, gl_HitTriangleVertexPositionsEXT[1].x,
                    gl_HitTriangleVertexPositionsEXT[2].x);

@@ -1,4 +1,4 @@
-// Corner number CORNER of what was hit, in place of distance and weights.
+// Reports vertex CORNER of the hit triangle, in place of distance and weights.
 #include "ray_records.glsl"
 
 layout(location = 0) rayPayloadInEXT HitRecord record;

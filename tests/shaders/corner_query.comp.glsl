@@ -1,18 +1,9 @@
-// The same by ray query.
-#include <lvk/ray_query.glsl>
-#include "ray_records.glsl"
-
-layout(local_size_x = 64) in;
+// Reports a vertex of the hit triangle by ray query.
+#include "ray_query_start.glsl"
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
+    START_RAY_QUERY;
     vec3 corners[3];
-    LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
     while (lvkRayQueryProceed(rq)) {
         lvkRayQueryTrianglePositions(rq, LVK_CANDIDATE, corners);
         if (corners[0].x + corners[1].x + corners[2].x >= 0.0) {

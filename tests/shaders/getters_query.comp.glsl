@@ -1,13 +1,10 @@
-// Everything a query tells of its ray, of the closest hit and of the last candidate. Triangles with odd numbers are looked
-// through where they are not opaque. OPAQUE_ONLY is a module without candidates. OF_MISSES asks of a hit whether there is one or
-// not, and takes the corners of the triangle, added up, for the origin in the candidate's space.
+// Every value that a query reports of its ray, of the closest hit and of the last candidate. Triangles with odd numbers are
+// ignored unless they are opaque. OPAQUE_ONLY is a module without candidates. OF_MISSES reads the values of a hit whether
+// there is one or not, and stores the sum of the triangle's vertices as the origin in the candidate's space.
 #ifdef OPAQUE_ONLY
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #endif
-#include <lvk/ray_query.glsl>
-#include "ray_records.glsl"
-
-layout(local_size_x = 64) in;
+#include "ray_query_start.glsl"
 
 struct Found {
     HitRecord hit;
@@ -42,16 +39,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Al
           lvkRayQueryObjectToWorld(rq, which), lvkRayQueryWorldToObject(rq, which))
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
+    START_RAY_QUERY;
     Found none = Found(kNoHit, 0u, 0u, vec3(0.0), vec3(0.0), mat4x3(0.0), mat4x3(0.0));
     Found committed = none;
     Found candidate = none;
-    LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
     while (lvkRayQueryProceed(rq)) {
         candidate = FOUND(rq, LVK_CANDIDATE);
         if ((candidate.hit.primitive & 1u) == 0u) {

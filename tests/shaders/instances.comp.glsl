@@ -1,5 +1,5 @@
-// Writes instance records as Vulkan reads them, with the place of a structure instead of its address: a grid of
-// instances that are turned about the x axis. WIDTH is that of the grid.
+// Writes instance records as Vulkan reads them, with the number of a BLAS instead of its address: a grid of
+// instances that are rotated about the x axis. WIDTH is that of the grid.
 layout(local_size_x = 64) in;
 
 struct Record {

@@ -1,4 +1,4 @@
-// Looks through every second primitive.
+// Ignores every second primitive.
 #include "ray_records.glsl"
 void main() {
     if ((lvkPrimitiveIndex(tlas) & 1) != 0) {

@@ -1,17 +1,8 @@
-// The same records by ray query. KEEP_EVEN looks through every second primitive.
-#include <lvk/ray_query.glsl>
-#include "ray_records.glsl"
-
-layout(local_size_x = 64) in;
+// Hit records by ray query. KEEP_EVEN ignores every second primitive.
+#include "ray_query_start.glsl"
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
-    LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    START_RAY_QUERY;
     while (lvkRayQueryProceed(rq)) {
         if (lvkRayQueryType(rq, LVK_CANDIDATE) != LVK_CANDIDATE_TRIANGLE) {
             continue;

@@ -1,4 +1,4 @@
-// Rays in, hit records out.
+// Push constants of all tests: rays in, hit records out.
 #ifndef RAY_RECORDS
 #define RAY_RECORDS
 
@@ -39,6 +39,14 @@ layout(push_constant, scalar) uniform Push {
     uint mask;
     uint flags;
 };
+
+// Declares the index of a launched ray generation shader and its ray, and returns beyond the last ray.
+#define START_RAY_GEN                                                      \
+    uint index = gl_LaunchIDEXT.y * gl_LaunchSizeEXT.x + gl_LaunchIDEXT.x; \
+    if (index >= count) {                                                  \
+        return;                                                            \
+    }                                                                      \
+    Ray ray = rays.at[index]
 
 const HitRecord kNoHit = HitRecord(0.0, vec2(0.0), kMissed, 0u, 0u, 0u, 0u);
 

@@ -1,4 +1,4 @@
-// Looks through the near side of what is not opaque.
+// Ignores the near side of spheres that are not opaque.
 void main() {
     if (gl_HitKindEXT >= 126u) {
         ignoreIntersectionEXT;

@@ -1,5 +1,5 @@
-// Reports both places where a ray passes through a sphere, the far one first, and one beyond the ray's end. The kind
-// of the near side is 127 behind an accepted far side, and 126 else.
+// Reports both crossings of a ray with a sphere, the far one first, and one beyond the end of the ray. The kind of the near
+// side is 127 after an accepted far side, and 126 otherwise.
 #include "ray_records.glsl"
 #include "sphere_object.glsl"
 

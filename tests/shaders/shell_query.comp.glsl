@@ -1,22 +1,15 @@
-// The same by ray query, which knows no kinds and no attributes of boxes: the shader keeps them. Triangles count too.
+// Both sides of spheres by ray query. Queries have no kinds and no attributes of AABBs, so the shader stores them. Triangles
+// count too.
 #include <lvk/ray_query.glsl>
 #ifdef PRIMITIVE_CULLING
 #extension GL_EXT_ray_flags_primitive_culling : require
 layout(primitive_culling);
 #endif
-#include "ray_records.glsl"
+#include "ray_query_start.glsl"
 #include "sphere_object.glsl"
 
-layout(local_size_x = 64) in;
-
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
-    LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    START_RAY_QUERY;
     float end = ray.tMax;
     HitRecord record = kNoHit;
     while (lvkRayQueryProceed(rq)) {

@@ -1,5 +1,5 @@
-// Spheres in object space, where the boxes of the test are. SPHERE_STEP and SPHERE_COUNT, which have no common divisor,
-// put neighbours far from each other in the list.
+// Spheres in object space, within the AABBs of the test. SPHERE_STEP and SPHERE_COUNT, which have no common divisor, put
+// neighbours far from each other in the list.
 #ifndef SPHERE_OBJECT
 #define SPHERE_OBJECT
 
@@ -13,7 +13,7 @@ vec3 sphereCenter(int geometry, int primitive) {
     return vec3(place % 3, place / 3, geometry) * 2.0;
 }
 
-// Both places where a ray passes through the surface; false if it passes the sphere.
+// Both crossings of a ray with the surface; false if the ray misses the sphere.
 bool crossSphere(vec3 center, float radius, vec3 origin, vec3 direction, out vec2 places) {
     vec3 toCenter = center - origin;
     float middle = dot(toCenter, direction) / dot(direction, direction);

@@ -1,21 +1,12 @@
-// The instance's offset into the shader binding table, which queries do not use otherwise, chooses the radius.
-#include <lvk/ray_query.glsl>
-#include "ray_records.glsl"
+// Spheres by ray query. The instance's hit group offset, which queries do not use otherwise, chooses the radius.
+#include "ray_query_start.glsl"
 #include "sphere_object.glsl"
-
-layout(local_size_x = 64) in;
 
 const float kRadius[2] = float[](0.9, 0.5);
 const uint kTag[2] = uint[](17, 99);
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
-    LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    START_RAY_QUERY;
     float end = ray.tMax;
     while (lvkRayQueryProceed(rq)) {
         if (lvkRayQueryType(rq, LVK_CANDIDATE) != LVK_CANDIDATE_AABB) {

@@ -1,5 +1,5 @@
-//! Shaders broken on purpose, to show that somebody would notice: in a process of its own, whose samples take their GLSL
-//! from a copy of `shaders/` that is changed and mended again (`LVK_SHADERS`).
+//! Shaders broken on purpose, to show that a test would notice. The test runs in a process of its own, whose samples
+//! take their GLSL from a copy of `shaders/` that is changed and restored (`LVK_SHADERS`).
 #![expect(clippy::expect_used, reason = "a test that cannot change its shaders has failed")]
 
 use std::ffi::OsStr;
@@ -10,23 +10,23 @@ use image::RgbaImage;
 use lvk::{ClearValue, Context, TextureHandle, TextureRange};
 use lvk_samples::shader_folder::VARIABLE;
 
-use crate::child::in_child;
-use crate::picture::{Likeness, Tolerance};
+use crate::image_comparison::{ImageSimilarity, Tolerance};
+use crate::subprocess::in_subprocess;
 
 /// A change that breaks a shader.
 #[derive(Debug, Clone, Copy)]
 pub struct Mistake {
-    /// What is wrong then.
+    /// Description of the mistake.
     pub what: &'static str,
-    /// The file below `shaders/`.
+    /// File below `shaders/`.
     pub file: &'static str,
-    /// What the file says, once.
+    /// Text to replace, which the file has once.
     pub right: &'static str,
-    /// What it says instead.
+    /// Replacement.
     pub wrong: &'static str,
 }
 
-/// Shorter than naming all fields.
+/// Creates a [`Mistake`].
 #[must_use]
 pub const fn mistake(
     what: &'static str,
@@ -37,18 +37,18 @@ pub const fn mistake(
     Mistake { what, file, right, wrong }
 }
 
-/// The copy of `shaders/`.
+/// Copy of `shaders/`.
 pub struct BrokenShaders {
     folder: PathBuf,
 }
 
 impl BrokenShaders {
-    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_child`]. Most of the time goes
-    /// into compiling, so lavapipe is told not to optimise, and keeps what it compiles apart from what is optimised.
+    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_subprocess`]. Compiling
+    /// takes most of the time, so lavapipe is told not to optimise, and has a shader cache of its own.
     ///
     /// # Panics
-    /// As [`in_child`], and when the files cannot be copied.
-    pub fn in_child(test: impl Fn(), body: impl FnOnce(&Self)) {
+    /// As [`in_subprocess`], and when the files cannot be copied.
+    pub fn in_subprocess(test: impl Fn(), body: impl FnOnce(&Self)) {
         let folder = tempfile::tempdir().expect("temporary folders can be made");
         let [shaders, compiled] = ["shaders", "compiled"].map(|name| folder.path().join(name));
         copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"), &shaders)
@@ -58,48 +58,48 @@ impl BrokenShaders {
             ("MESA_SHADER_CACHE_DIR", Some(compiled.as_os_str())),
             ("GALLIVM_PERF", Some(OsStr::new("nopt"))),
         ];
-        in_child(test, &variables, || {
+        in_subprocess(test, &variables, || {
             let folder = std::env::var_os(VARIABLE).expect("the parent has named the folder");
             body(&Self { folder: PathBuf::from(folder) });
         });
     }
 
-    /// Breaks the shaders in each way, one after the other, and takes a picture that must not be within `tolerance` of
-    /// the expected one, as the first picture, by whole shaders, must.
+    /// Breaks the shaders in each way, one after the other, and renders an image that must not be within `tolerance`
+    /// of the expected one. The first image, by whole shaders, must be.
     ///
     /// # Panics
     /// When a mistake goes unnoticed, or does not fit its file.
-    pub fn assert_each_shows(
+    pub fn assert_each_changes_image(
         &self,
         by: &str,
         expected: &RgbaImage,
         tolerance: &Tolerance,
         mistakes: &[Mistake],
-        picture: impl Fn() -> RgbaImage,
+        image: impl Fn() -> RgbaImage,
     ) {
-        let whole = Likeness::of(&picture(), expected);
+        let whole = ImageSimilarity::measure(&image(), expected);
         eprintln!("{by}, whole: {whole}");
-        assert!(whole.is_within(tolerance), "{by}: whole shaders give another picture: {whole}");
+        assert!(whole.is_within(tolerance), "{by}: whole shaders give another image: {whole}");
         let mut complaints = Vec::new();
         for mistake in mistakes {
-            let broken = match self.with(mistake, &picture) {
+            let broken = match self.image_with(mistake, &image) {
                 Ok(broken) => broken,
                 Err(misfit) => {
                     complaints.push(misfit);
                     continue;
                 }
             };
-            let likeness = Likeness::of(&broken, expected);
-            eprintln!("{by}, {}: {likeness}", mistake.what);
-            if likeness.is_within(tolerance) {
-                complaints.push(format!("unnoticed: {}: {likeness}", mistake.what));
+            let similarity = ImageSimilarity::measure(&broken, expected);
+            eprintln!("{by}, {}: {similarity}", mistake.what);
+            if similarity.is_within(tolerance) {
+                complaints.push(format!("unnoticed: {}: {similarity}", mistake.what));
             }
         }
         assert!(complaints.is_empty(), "{by}:\n{}", complaints.join("\n"));
     }
 
-    /// The picture by shaders with that mistake, or why it does not fit its file.
-    fn with(&self, mistake: &Mistake, picture: &impl Fn() -> RgbaImage) -> Result<RgbaImage, String> {
+    /// Renders the image by shaders with that mistake, or returns why the mistake does not fit its file.
+    fn image_with(&self, mistake: &Mistake, image: &impl Fn() -> RgbaImage) -> Result<RgbaImage, String> {
         let Mistake { what, file, right, wrong } = mistake;
         let path = self.folder.join(file);
         let text = fs::read_to_string(&path).expect("the file of a mistake is there");
@@ -108,20 +108,20 @@ impl BrokenShaders {
             return Err(format!("{what}: {right} is {count} times in {file}"));
         }
         fs::write(&path, text.replace(right, wrong)).expect("the copy can be written");
-        let broken = picture();
+        let broken = image();
         fs::write(&path, text).expect("the copy can be written");
         Ok(broken)
     }
 }
 
-/// Fills a picture with a colour that no sample shows. Memory keeps what was there before, and a pixel that a broken shader
-/// leaves out would else be right where the picture before was.
+/// Fills an image with a colour that no sample renders. Memory keeps its contents, so a pixel that a broken shader
+/// leaves out could have the colour of an earlier image.
 ///
 /// # Panics
 /// When the device fails.
-pub fn paint_over(ctx: &Context, picture: TextureHandle) {
+pub fn paint_over(ctx: &Context, image: TextureHandle) {
     let mut cmd = ctx.acquire_command_buffer().expect("a command buffer can be had");
-    cmd.clear_texture(picture, ClearValue::Color([1.0, 0.0, 1.0, 1.0]), &TextureRange::default())
+    cmd.clear_texture(image, ClearValue::Color([1.0, 0.0, 1.0, 1.0]), &TextureRange::default())
         .expect("pictures can be cleared");
     let submitted = ctx.submit(cmd).expect("the device works");
     ctx.wait(submitted).expect("the device works");

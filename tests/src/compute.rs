@@ -1,4 +1,4 @@
-//! Small compute shaders of tests: compile them, run them, read what they wrote.
+//! Small compute shaders: compiles them, runs them and reads their results.
 #![expect(clippy::expect_used, reason = "a test whose set-up fails has failed")]
 
 use lvk::{
@@ -6,28 +6,44 @@ use lvk::{
     Dependencies, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage,
 };
 
-/// A module of GLSL text that must compile.
+/// Creates a module of GLSL text that must compile.
 pub fn module(ctx: &Context, stage: ShaderStage, text: &str) -> Holder<ShaderModuleHandle> {
     let source = ShaderSource::Glsl(text);
     let desc = ShaderModuleDesc { stage, source, debug_name: "test shader", ..Default::default() };
     ctx.create_shader_module(&desc).expect("the shader of a test compiles")
 }
 
-/// A compute pipeline of GLSL text.
+/// Creates a compute pipeline of GLSL text.
 pub fn compute_pipeline(ctx: &Context, text: &str) -> Holder<ComputePipelineHandle> {
     let module = module(ctx, ShaderStage::Compute, text);
     let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
     ctx.create_compute_pipeline(&desc).expect("the pipeline of a test can be made")
 }
 
-/// A buffer in device memory that holds `words`.
+/// Creates a pipeline that keeps the GPU busy: each invocation iterates a random number generator, and runs the GLSL
+/// statement `store` with the result, `sum`, and the words at the address in its push constants, `words.at`.
+pub fn busy_pipeline(ctx: &Context, iterations: u32, store: &str) -> Holder<ComputePipelineHandle> {
+    let text = format!(
+        "layout(local_size_x = 64) in;
+         layout(buffer_reference, scalar) buffer Words {{ uint at[]; }};
+         layout(push_constant, scalar) uniform Push {{ Words words; }};
+         void main() {{
+             uint sum = gl_GlobalInvocationID.x;
+             for (uint i = 0; i < {iterations}; ++i) sum = sum * 1664525 + 1013904223;
+             {store}
+         }}"
+    );
+    compute_pipeline(ctx, &text)
+}
+
+/// Creates a buffer in device memory that holds `words`.
 pub fn words_buffer(ctx: &Context, words: &[u32]) -> Holder<BufferHandle> {
     let desc =
         BufferDesc { data: Some(bytemuck::cast_slice(words)), debug_name: "words", ..Default::default() };
     ctx.create_buffer(&desc).expect("a small buffer can be made")
 }
 
-/// The first `count` words of a buffer, after everything submitted so far.
+/// Returns the first `count` words of a buffer, after all earlier submissions.
 pub fn read_words(ctx: &Context, buffer: BufferHandle, count: usize) -> Vec<u32> {
     let mut words = vec![0_u32; count];
     ctx.download_buffer(buffer, 0, bytemuck::cast_slice_mut(&mut words)).expect("the buffer can be read");
@@ -41,7 +57,7 @@ pub struct Evaluator {
     pipeline: Holder<ComputePipelineHandle>,
 }
 
-/// What the shader of an [`Evaluator`] is pushed.
+/// Push constants of an [`Evaluator`].
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct Push {
@@ -83,7 +99,7 @@ impl Evaluator {
         cmd.dispatch([count, 1, 1], &dependencies).expect("the dispatch is valid");
     }
 
-    /// Runs `count` invocations in a submission of their own and answers what they wrote.
+    /// Runs `count` invocations in a submission of their own and returns their results.
     pub fn run(
         &self,
         ctx: &Context,
@@ -99,13 +115,13 @@ impl Evaluator {
     }
 }
 
-/// A buffer for the results of `count` invocations of an [`Evaluator`].
+/// Creates a buffer for the results of `count` invocations of an [`Evaluator`].
 pub fn vec4_buffer(ctx: &Context, count: u32) -> Holder<BufferHandle> {
     let desc = BufferDesc { size_bytes: 16 * u64::from(count), debug_name: "result", ..Default::default() };
     ctx.create_buffer(&desc).expect("a small buffer can be made")
 }
 
-/// What an [`Evaluator`] wrote.
+/// Returns the results of an [`Evaluator`].
 pub fn read_vec4(ctx: &Context, result: BufferHandle, count: u32) -> Vec<[f32; 4]> {
     let mut values = vec![[0.0; 4]; count as usize];
     ctx.download_buffer(result, 0, bytemuck::cast_slice_mut(&mut values)).expect("the result can be read");

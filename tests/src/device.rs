@@ -1,4 +1,4 @@
-//! A context for a test, whose end fails the test if the validation layer said anything.
+//! A context for a test. Its drop fails the test if the validation layer sent a message.
 
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -8,20 +8,20 @@ use lvk::ash::{Entry, vk};
 use lvk::{Context, ContextDesc, RayQueryRequest, ValidationMode, ValidationSink};
 use lvk_samples::driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
-/// A context under core and synchronization validation. Dropping it fails the test on any message, those of the
-/// context's own end included.
+/// A context under core and synchronization validation. Its drop fails the test on any message, those of the
+/// context's destruction included.
 pub struct TestDevice {
     context: Option<Context>,
     sink: ValidationSink,
 }
 
 impl TestDevice {
-    /// Takes the messages a test provoked on purpose.
+    /// Takes the messages that a test provoked on purpose.
     pub fn take_messages(&self) -> Vec<lvk::ValidationMessage> {
         self.sink.take()
     }
 
-    /// The bare context, whose end waits for nothing, and the messages, which the caller has to check.
+    /// Returns the bare context, whose drop does not wait, and the messages, which the caller has to check.
     pub fn into_context(mut self) -> (Option<Context>, ValidationSink) {
         (self.context.take(), self.sink.clone())
     }
@@ -56,15 +56,15 @@ impl Drop for TestDevice {
     }
 }
 
-/// A context with everything optional on. See [`device_with`].
+/// Creates a context with every optional feature. See [`device_with`].
 pub fn device() -> Option<TestDevice> {
     device_with(|_| {})
 }
 
-/// A context whose description `adjust` has changed.
+/// Creates a context from a description that `adjust` has changed.
 ///
-/// `None`, with a line on standard error, only when the user asked with `LVK_SKIP_GPU_TESTS=1` to go on without a
-/// device and there is none; `LVK_REQUIRE_GPU=1` forbids even that.
+/// Returns `None`, and prints a line, only if there is no device and the user set `LVK_SKIP_GPU_TESTS=1`.
+/// `LVK_REQUIRE_GPU=1` forbids even that.
 ///
 /// # Panics
 /// When there is no device, or the context cannot be made.
@@ -87,8 +87,8 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
     }
 }
 
-/// As [`device_with`], with no structures but the device's own, whatever `LVK_TEST_RAY_QUERY` says: for tests of what the
-/// driver's take.
+/// As [`device_with`], without software BVHs, whatever `LVK_TEST_RAY_QUERY` says: for tests of the driver's memory
+/// and time.
 pub fn without_software<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<TestDevice> {
     device_with(|desc| {
         desc.ray_query = RayQueryRequest::HardwareIfPresent;
@@ -96,8 +96,8 @@ pub fn without_software<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option
     })
 }
 
-/// Who walks ray queries unless a test says otherwise: the device, where it can, or what `LVK_TEST_RAY_QUERY` says
-/// (`hardware`, `software`, `auto`).
+/// Returns the implementation of ray queries for tests that do not choose one: the device's where it has them, or the
+/// value of `LVK_TEST_RAY_QUERY` (`hardware`, `software`, `auto`).
 fn ray_query() -> RayQueryRequest {
     match std::env::var("LVK_TEST_RAY_QUERY").as_deref() {
         Ok("software") => RayQueryRequest::Software,
@@ -106,7 +106,7 @@ fn ray_query() -> RayQueryRequest {
     }
 }
 
-/// What `LVK_TEST_VALIDATION` says: `gpu`, `off`, or core and synchronization validation.
+/// Returns the value of `LVK_TEST_VALIDATION`: `gpu`, `off`, or core and synchronization validation.
 fn validation() -> ValidationMode {
     match std::env::var("LVK_TEST_VALIDATION").as_deref() {
         Ok("gpu") => ValidationMode::GpuAssisted,
@@ -115,7 +115,7 @@ fn validation() -> ValidationMode {
     }
 }
 
-/// The Vulkan loader to open, `Some(None)` for the system's own; `None` as for [`device_with`].
+/// Returns the Vulkan loader to open, `Some(None)` for the system's own; `None` as for [`device_with`].
 ///
 /// # Panics
 /// When there is no driver.
@@ -130,8 +130,8 @@ pub fn vulkan() -> Option<Option<&'static Path>> {
     }
 }
 
-/// Whether the driver builds boxes that are not numbers around what lies beside inactive primitives, so that rays miss
-/// it, as lavapipe 25.0 does. Says so on standard error.
+/// True if the driver computes NaN bounds around primitives beside inactive ones, so that rays miss them, as lavapipe
+/// 25.0 does. Prints a line if so.
 pub fn loses_neighbours_of_inactive(ctx: &Context) -> bool {
     let name = &ctx.capabilities().device_name;
     let loses = name.contains("llvmpipe");
@@ -141,7 +141,8 @@ pub fn loses_neighbours_of_inactive(ctx: &Context) -> bool {
     loses
 }
 
-/// The description file of the device without ray tracing; `None`, loudly, where it cannot be fetched.
+/// Returns the driver manifest of SwiftShader, a device without ray tracing. Prints a line and returns `None` where
+/// it cannot be fetched.
 ///
 /// # Panics
 /// When it cannot be fetched although `LVK_REQUIRE_GPU=1` demands every test.
@@ -149,8 +150,8 @@ pub fn swiftshader() -> Option<PathBuf> {
     fetched(swiftshader_icd(), "device without ray tracing")
 }
 
-/// The description file of the driver for AMD cards, with its libraries open in this process; `None`, loudly, where it
-/// cannot be fetched.
+/// Returns the driver manifest of RADV, for AMD GPUs, with its libraries open in this process. Prints a line and
+/// returns `None` where it cannot be fetched.
 ///
 /// # Panics
 /// As [`swiftshader`].
@@ -158,7 +159,7 @@ pub fn radv() -> Option<PathBuf> {
     fetched(radv_icd(), "driver for AMD cards")
 }
 
-/// What could be fetched; `None`, loudly, where it cannot be.
+/// Returns the fetched driver. Prints a line and returns `None` where it cannot be fetched.
 ///
 /// # Panics
 /// As [`swiftshader`].
@@ -173,20 +174,20 @@ pub(crate) fn fetched<T>(found: Result<T, DriverError>, what: &str) -> Option<T>
     }
 }
 
-/// The Vulkan loader to open, found or fetched once.
+/// Returns the Vulkan loader to open, found or fetched once.
 fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
     static LOADER: OnceLock<Result<Option<PathBuf>, String>> = OnceLock::new();
     let found = LOADER.get_or_init(|| {
         let driver = prepare(&DriverRequest { validation: true }).map_err(|error| error.to_string())?;
-        keep_driver(driver.loader.as_deref());
+        set_driver_variables(driver.loader.as_deref());
         Ok(driver.loader)
     });
     found.as_ref().map_err(String::as_str)
 }
 
-/// Keeps the driver loaded as long as the process runs, by an instance that is never destroyed: NVIDIA's can be loaded some
-/// thirty times by one, and no more. Where there is no driver, contexts say so.
-fn keep_driver(library: Option<&Path>) {
+/// Keeps the driver loaded until the process ends, by an instance that is never destroyed: a process can load
+/// NVIDIA's driver only some thirty times. Without a driver the first context reports the error.
+fn set_driver_variables(library: Option<&Path>) {
     // SAFETY: the library is a Vulkan loader, and stays open.
     let entry = unsafe { library.map_or_else(|| Entry::load(), |path| Entry::load_from(path)) };
     let Ok(entry) = entry else { return };

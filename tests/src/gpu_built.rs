@@ -1,4 +1,4 @@
-//! Meshes whose software structures tests build on the GPU, and what the structures then have to hold.
+//! Meshes whose software BVHs tests build on the GPU, and the contents that the BVHs must have.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test whose set-up fails has failed")]
 
 use lvk::test_hooks::{
@@ -10,11 +10,11 @@ use lvk::{
 
 use crate::random::Random;
 
-/// Geometry and primitive, and corners.
+/// Geometry number, primitive number, and vertices.
 pub type Content = ((u32, u32), Vec<[f32; 3]>);
 
-/// A buffer that builds read.
-pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
+/// Creates a buffer that builds read.
+pub fn build_input_buffer<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let device = ctx.capabilities();
     let traces = device.ray_tracing_pipeline || device.ray_query;
@@ -29,8 +29,8 @@ pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferH
     ctx.create_buffer(&desc).expect("a buffer can be made")
 }
 
-/// Corners of small triangles all over a room, the same for the same seed.
-pub fn scattered(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
+/// Returns the vertices of small triangles at random positions, equal for equal seeds.
+pub fn scattered_triangles(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
     let mut random = Random::new(seed);
     let mut point = |reach: f32| [(); 3].map(|()| random.between(-reach, reach));
     let mut triangle = || {
@@ -43,9 +43,9 @@ pub fn scattered(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
     (0..count).map(|_| triangle()).collect()
 }
 
-/// Triangles whose codes make a tree of paths that lose one at a time: wide nodes of it have only eight triangles, for which
-/// there is no room.
-pub fn uneven(side: u16) -> Vec<[[f32; 3]; 3]> {
+/// Returns triangles whose Morton codes give a chain: each level of the tree splits off one triangle. BVH8 nodes of
+/// such a tree have only eight triangles, for which the node pool has no memory.
+pub fn uneven_triangles(side: u16) -> Vec<[[f32; 3]; 3]> {
     const LONG: u16 = 24;
     const SIZE: f32 = 0.25;
     let mut triangles = Vec::new();
@@ -61,28 +61,28 @@ pub fn uneven(side: u16) -> Vec<[[f32; 3]; 3]> {
     triangles
 }
 
-/// One geometry of triangles without indices.
-pub fn triangles(vertices: BufferHandle, count: usize) -> BlasGeometry {
+/// Returns a geometry of triangles without indices.
+pub fn triangle_geometry(vertices: BufferHandle, count: usize) -> BlasGeometry {
     BlasGeometry::Triangles(Triangles::packed(vertices, count as u32 * 3))
 }
 
-/// One geometry of boxes.
-pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
+/// Returns a geometry of AABBs.
+pub fn aabb_geometry(buffer: BufferHandle, count: usize) -> BlasGeometry {
     let flags = GeometryFlags::default();
     BlasGeometry::Aabbs(Aabbs { buffer, offset: 0, stride: 0, count: count as u32, flags })
 }
 
-/// Builds one structure.
+/// Builds one BLAS on the GPU.
 pub fn build(ctx: &Context, geometries: &[BlasGeometry]) -> GpuStructure {
     let desc = GpuBlasDesc { geometries, improvements: 1, leaves: LeafEncoding::Corners };
     build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
 }
 
-/// What a bottom-level structure holds.
+/// Validates a BLAS and returns a summary of its contents.
 ///
 /// # Panics
-/// When it is not sound, or higher than its plan says.
-pub fn facts(ctx: &Context, structure: &GpuStructure) -> StructureFacts {
+/// When it is invalid, or higher than planned.
+pub fn check_and_summarize(ctx: &Context, structure: &GpuStructure) -> StructureFacts {
     let words = read(ctx, structure).expect("the structure can be read");
     let facts =
         check_structure(&words, &|_| panic!("no instances here")).unwrap_or_else(|what| panic!("{what}"));
@@ -90,7 +90,7 @@ pub fn facts(ctx: &Context, structure: &GpuStructure) -> StructureFacts {
     facts
 }
 
-/// Fails unless the structure holds these primitives, each once, with these corners.
+/// Asserts that the BLAS holds these primitives, each once, with these vertices.
 ///
 /// # Panics
 /// When it does not.
@@ -107,7 +107,7 @@ pub fn check_contents(facts: &StructureFacts, expected: &[Content]) {
     }
 }
 
-/// The triangles of geometry 0 as [`check_contents`] takes them.
-pub fn numbered(triangles: &[[[f32; 3]; 3]]) -> Vec<Content> {
+/// Returns the triangles of geometry 0 as [`check_contents`] expects them.
+pub fn with_primitive_numbers(triangles: &[[[f32; 3]; 3]]) -> Vec<Content> {
     (0..).zip(triangles).map(|(index, corners)| ((0, index), corners.to_vec())).collect()
 }

@@ -1,6 +1,6 @@
-//! Numbers of half precision, as textures hold them.
+//! Half precision numbers, as in textures.
 
-/// The value of IEEE 754 binary16 bits.
+/// Returns the value of IEEE 754 binary16 bits.
 #[must_use]
 pub fn from_half(bits: u16) -> f32 {
     let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };

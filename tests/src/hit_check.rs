@@ -1,54 +1,54 @@
-//! Whether a scene on the GPU is hit as the reference says, by every method the device has.
+//! Checks of closest hits against the reference, by every method of the device.
 
 use lvk::{AccelStructHandle, Context, Holder, Result};
 
-use crate::agreement::Agreement;
+use crate::hit_comparison::HitComparison;
 use crate::ray_scene::RayScene;
 use crate::ray_tracer::{CULL_NO_OPAQUE, CULL_OPAQUE, HitRecord, How, MISSED, Method, NO_OPAQUE, RayTracer};
 use crate::rays::{Ray, random_rays};
 use crate::reference::{Answer, Reference};
 
-/// Relative to the distance, or to 1 where that is larger.
+/// Tolerance of distances, relative to the distance, or absolute below 1.
 const DISTANCE: f32 = 1e-5;
 
-/// Flags that exclude [`OPAQUE`](crate::ray_tracer::OPAQUE), which a module that takes all triangles for opaque adds.
+/// Flags that exclude [`OPAQUE`](crate::ray_tracer::OPAQUE), which a module of opaque triangles adds.
 const NOT_WITH_OPAQUE: u32 = NO_OPAQUE | CULL_OPAQUE | CULL_NO_OPAQUE;
 
-/// The pipelines of every method.
+/// Pipelines of every method.
 pub struct HitCheck {
     tracers: Vec<(Method, RayTracer)>,
-    /// Where all triangles may be taken for opaque, unless the ray says otherwise.
+    /// By a module that treats all triangles as opaque.
     opaque: Option<RayTracer>,
 }
 
 impl HitCheck {
-    /// Hits of triangles count as the geometry and the ray say. Nothing is looked through, so a module that takes all of them
-    /// for opaque has to find the same.
+    /// Creates the pipelines of the usual shaders: opacity is that of geometry and ray. No shader ignores a hit, so a
+    /// module that treats all triangles as opaque must find the same hits.
     pub fn new(ctx: &Context) -> Result<Self> {
         let opaque =
             ctx.capabilities().ray_query.then(|| RayTracer::for_opaque_triangles(ctx)).transpose()?;
-        Ok(Self { opaque, ..Self::with(ctx, RayTracer::new)? })
+        Ok(Self { opaque, ..Self::with_tracers(ctx, RayTracer::new)? })
     }
 
-    /// Looks through triangles with odd numbers, where they are not opaque.
-    pub fn keeping_even(ctx: &Context) -> Result<Self> {
-        Self::with(ctx, RayTracer::keeping_even)
+    /// Creates pipelines that ignore triangles with odd numbers, unless they are opaque.
+    pub fn with_even_primitives(ctx: &Context) -> Result<Self> {
+        Self::with_tracers(ctx, RayTracer::with_even_primitives)
     }
 
-    /// Traces with what `make` answers for every method.
-    pub fn with(ctx: &Context, make: impl Fn(&Context, Method) -> Result<RayTracer>) -> Result<Self> {
+    /// Creates pipelines by `make`, for every method.
+    pub fn with_tracers(ctx: &Context, make: impl Fn(&Context, Method) -> Result<RayTracer>) -> Result<Self> {
         let tracer = |method| Ok((method, make(ctx, method)?));
         let tracers = Method::available(ctx).into_iter().map(tracer).collect::<Result<_>>()?;
         Ok(Self { tracers, opaque: None })
     }
 
-    /// The pipelines.
+    /// Returns the pipelines.
     pub fn tracers(&self) -> impl Iterator<Item = (Method, &RayTracer)> {
         self.tracers.iter().map(|(method, tracer)| (*method, tracer))
     }
 
-    /// The pipeline that takes all triangles for opaque, if rays with such flags have to hit the same by it: none for checks
-    /// that look through triangles or meet other shapes.
+    /// Returns the pipeline that treats all triangles as opaque, if rays with such flags must have the same hits by
+    /// it. There is none for checks that ignore triangles or hit other shapes.
     pub fn opaque_tracer(&self, flags: u32) -> Option<&RayTracer> {
         self.opaque.as_ref().filter(|_| flags & NOT_WITH_OPAQUE == 0)
     }
@@ -56,17 +56,17 @@ impl HitCheck {
     /// Traces rays through and around the scene, and compares closest hits.
     ///
     /// # Panics
-    /// Where they differ.
+    /// When they differ.
     pub fn scene(&self, what: &str, tlas: &Holder<AccelStructHandle>, scene: &RayScene) -> Result<()> {
         let reference = scene.reference();
         let rays = rays_for(&reference);
         self.closest(what, tlas, &rays, How::default(), |ray| reference.closest(ray, 0xff))
     }
 
-    /// Compares closest hits with what `answer` says of each ray.
+    /// Compares closest hits with `answer` for each ray.
     ///
     /// # Panics
-    /// Where they differ.
+    /// When they differ.
     pub fn closest(
         &self,
         what: &str,
@@ -77,27 +77,28 @@ impl HitCheck {
     ) -> Result<()> {
         for (method, tracer) in self.tracers() {
             let records = tracer.trace(tlas, rays, how)?;
-            Agreement::of_triangles(rays, &records, &answer).assert(&format!("{what}, by {method:?}"));
+            HitComparison::of_triangles(rays, &records, &answer).assert(&format!("{what}, by {method:?}"));
         }
         if let Some(tracer) = self.opaque_tracer(how.flags) {
             let records = tracer.trace(tlas, rays, how)?;
-            Agreement::of_triangles(rays, &records, &answer).assert(&format!("{what}, all taken for opaque"));
+            HitComparison::of_triangles(rays, &records, &answer)
+                .assert(&format!("{what}, all taken for opaque"));
         }
         Ok(())
     }
 }
 
-/// Rays through and around everything.
+/// Returns rays through and around the whole scene.
 pub fn rays_for(reference: &Reference) -> Vec<Ray> {
     let (low, high) = reference.bounds();
     random_rays(61, 1_200, low.as_vec3(), high.as_vec3())
 }
 
-/// Compares hits of the same rays in two structures that are to be the same: ids, and distances within 1e-5 relative.
-/// Where the reference is in doubt (at edges) they may differ; answers how many do.
+/// Compares hits of the same rays in two acceleration structures of one scene: ids, and distances within 1e-5
+/// relative. They may differ where the reference is uncertain (at edges). Returns the number of such differences.
 ///
 /// # Panics
-/// Where they differ although there is no doubt.
+/// When they differ and the reference is certain.
 pub fn same_hits(
     what: &str,
     rays: &[Ray],

@@ -1,23 +1,25 @@
-//! Pictures by the `hybrid` sample.
-#![expect(clippy::expect_used, reason = "a test without its picture has failed")]
+//! Images of the `hybrid` sample.
+#![expect(clippy::expect_used, reason = "a test without its image has failed")]
 
 use image::RgbaImage;
 use lvk::Context;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::{Camera, Scene};
 
-/// The sample with one configuration, ready to take pictures of a scene.
-pub struct Studio {
+use crate::ray_tracer::Method as TraceMethod;
+
+/// The sample with one configuration of a scene.
+pub struct HybridHarness {
     /// The sample.
     pub renderer: HybridRenderer,
     size: [u32; 2],
 }
 
-impl Studio {
-    /// A studio for pictures of `size` pixels and rays of up to `max_depth` bounces.
+impl HybridHarness {
+    /// Creates the sample for images of `size` pixels and rays of up to `max_depth` bounces.
     ///
     /// # Panics
-    /// When the sample refuses.
+    /// When the sample cannot be created.
     pub fn new(
         ctx: &Context,
         scene: &Scene,
@@ -27,40 +29,37 @@ impl Studio {
     ) -> Self {
         let [width, height] = size;
         let config = HybridConfig { method, path, width, height, max_depth, ..HybridConfig::default() };
-        Self::with(ctx, scene, &config)
+        Self::with_config(ctx, scene, &config)
     }
 
-    /// A studio for pictures as `config` has them.
+    /// Creates the sample with `config`.
     ///
     /// # Panics
-    /// When the sample refuses.
-    pub fn with(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Self {
+    /// When the sample cannot be created.
+    pub fn with_config(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Self {
         let renderer = HybridRenderer::new(ctx, scene, config).expect("the sample can be set up");
         Self { renderer, size: [config.width, config.height] }
     }
 
-    /// Takes a picture.
+    /// Renders an image.
     ///
     /// # Panics
     /// When rendering fails.
-    pub fn picture(&mut self, camera: &Camera) -> RgbaImage {
+    pub fn render(&mut self, camera: &Camera) -> RgbaImage {
         self.renderer.render(camera).expect("the sample renders");
-        let pixels = self.renderer.read_image().expect("the picture can be read");
-        RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("a picture has four bytes a pixel")
+        let pixels = self.renderer.read_image().expect("the image can be read");
+        RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("an image has four bytes a pixel")
     }
 }
 
-/// The paths the device has; says loudly which one is not tested.
+/// Returns the ray paths of the device. Prints which one is not tested.
 ///
 /// # Panics
 /// When it has none.
 pub fn paths(ctx: &Context) -> Vec<RayPath> {
-    let caps = ctx.capabilities();
-    let all = [(RayPath::Pipeline, caps.ray_tracing_pipeline), (RayPath::Query, caps.ray_query)];
-    for (path, _) in all.iter().filter(|(_, available)| !available) {
-        eprintln!("NOT TESTED, {} cannot trace by {path:?}", caps.device_name);
-    }
-    let found: Vec<_> = all.iter().filter(|(_, available)| *available).map(|(path, _)| *path).collect();
-    assert!(!found.is_empty(), "{} cannot trace rays", caps.device_name);
-    found
+    let path = |method| match method {
+        TraceMethod::Pipeline => RayPath::Pipeline,
+        TraceMethod::Query => RayPath::Query,
+    };
+    TraceMethod::available(ctx).into_iter().map(path).collect()
 }

@@ -1,22 +1,21 @@
-//! Harness of the tests: a device with silent validation, or a loud failure.
+//! Harness of the tests: contexts under validation, scenes, reference ray tracers and image comparison.
 
-pub mod agreement;
-pub mod bender;
-pub mod binary_tree;
-pub mod board;
+pub mod accel_backend;
 pub mod broken_shaders;
-pub mod child;
+pub mod bvh2;
+pub mod bvh8;
 pub mod compute;
 pub mod device;
-pub mod glass_room;
 pub mod gpu_built;
 pub mod half;
 pub mod hit_check;
+pub mod hit_comparison;
 pub mod hybrid;
+pub mod image_comparison;
 pub mod local_read;
 pub mod meshes;
 pub mod noise;
-pub mod picture;
+pub mod oit_reference;
 pub mod queues;
 pub mod radv;
 pub mod random;
@@ -26,13 +25,15 @@ pub mod ray_scene;
 pub mod ray_tracer;
 pub mod rays;
 pub mod reference;
-pub mod relief;
+pub mod rtx_sample;
+pub mod scene_normal_map;
+pub mod scene_obj;
+pub mod scene_shadow_mask;
 pub mod shader_groups;
 pub mod sphere_scene;
-pub mod still_life;
-pub mod structures;
+pub mod subprocess;
+pub mod vertex_deform;
 pub mod warnings;
-pub mod wide_tree;
 pub mod windows;
 
 pub use device::{TestDevice, device, device_with, without_software};

@@ -1,12 +1,11 @@
-//! Small meshes made by formulas.
+//! Small procedural meshes.
 
 use std::f32::consts::{PI, TAU};
 use std::fmt::Write;
 
 use lvk::glam::Vec3;
 
-/// Triangles, three vertices each. Neighbours in the list are neighbours in space, which drivers that do not sort
-/// need.
+/// A triangle mesh. Neighbours in the list are neighbours in space, as drivers that do not sort need.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     /// Positions of the vertices.
@@ -16,7 +15,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// A sphere of radius 1 around the origin, `rings` high and twice as many quads around.
+    /// Returns a sphere of radius 1 around the origin, `rings` high and twice as many quads around.
     pub fn sphere(rings: u32) -> Self {
         let columns = rings * 2;
         Self::grid(rings, columns, |v, u| {
@@ -26,7 +25,7 @@ impl Mesh {
         .without_slivers()
     }
 
-    /// A ring around the y axis: radius 1, thickness 0.4, `sides` quads around its tube.
+    /// Returns a torus around the y axis: radius 1, thickness 0.4, `sides` quads around its tube.
     pub fn torus(sides: u32) -> Self {
         Self::grid(sides * 2, sides, |v, u| {
             let (around, tube) = (v * TAU, u * TAU);
@@ -35,7 +34,7 @@ impl Mesh {
         })
     }
 
-    /// Hills over the square from -1 to 1 in x and z, `side` quads a side, heights within 0.3.
+    /// Returns hills over the square from -1 to 1 in x and z, `side` quads a side, heights within 0.3.
     pub fn terrain(side: u32) -> Self {
         Self::grid(side, side, |v, u| {
             let (x, z) = (u * 2.0 - 1.0, v * 2.0 - 1.0);
@@ -44,7 +43,7 @@ impl Mesh {
         })
     }
 
-    /// `side`^3 cubes of edge 0.5, one unit apart, centred on the origin.
+    /// Returns `side`^3 cubes of edge 0.5, one unit apart, centred on the origin.
     pub fn cube_grid(side: u32) -> Self {
         let mut mesh = Self { positions: Vec::new(), triangles: Vec::new() };
         let place = |index: u32| index as f32 - (side as f32 - 1.0) * 0.5;
@@ -55,7 +54,7 @@ impl Mesh {
         mesh
     }
 
-    /// Every triangle with three vertices of its own.
+    /// Returns the mesh with three vertices of its own for every triangle.
     pub fn unshared(&self) -> Self {
         let positions = self.triangles.iter().flatten().map(|index| self.positions[*index as usize]);
         let triangles =
@@ -63,7 +62,7 @@ impl Mesh {
         Self { positions: positions.collect(), triangles: triangles.collect() }
     }
 
-    /// The text of a Wavefront OBJ file.
+    /// Returns the text of a Wavefront OBJ file.
     pub fn obj_text(&self) -> String {
         let mut text = String::new();
         for [x, y, z] in &self.positions {
@@ -76,7 +75,7 @@ impl Mesh {
         text
     }
 
-    /// Two triangles for each of `rows` by `columns` quads of a surface over the unit square.
+    /// Returns two triangles for each of `rows` by `columns` quads of a surface over the unit square.
     fn grid(rows: u32, columns: u32, surface: impl Fn(f32, f32) -> Vec3) -> Self {
         let width = columns + 1;
         let point = |index: u32| {
@@ -92,7 +91,7 @@ impl Mesh {
         }
     }
 
-    /// Leaves out triangles that have next to no area, as those at the poles of a sphere.
+    /// Removes triangles of almost no area, as those at the poles of a sphere.
     fn without_slivers(mut self) -> Self {
         let at = |index: u32| Vec3::from(self.positions[index as usize]);
         let area = |[a, b, c]: &[u32; 3]| (at(*b) - at(*a)).cross(at(*c) - at(*a)).length() * 0.5;

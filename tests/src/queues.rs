@@ -1,4 +1,4 @@
-//! Tests of queues: each runs with queues of the device's own, with queues that are rehearsed on one, and with one for all.
+//! Tests of queues: each runs with the device's own queues, with emulated queues, and with one queue for all.
 #![expect(clippy::unwrap_used, reason = "a test whose set-up fails has failed")]
 
 use lvk::{
@@ -9,14 +9,14 @@ use lvk::{
 use crate::compute::compute_pipeline;
 use crate::{TestDevice, device_with};
 
-/// Each way to have queues.
+/// Every queue request.
 pub const REQUESTS: [QueueRequest; 3] =
     [QueueRequest::OwnHardware, QueueRequest::Emulated, QueueRequest::Shared];
-/// Words of the buffers that steps go through.
+/// Words of the buffers of steps.
 pub const WORDS: usize = 64;
 
-/// Runs a test with each request, and says what stands behind the queues.
-pub fn each(test: impl Fn(&TestDevice)) {
+/// Runs a test with each request, and prints which hardware the queues have.
+pub fn for_each_queue_request(test: impl Fn(&TestDevice)) {
     for queues in REQUESTS {
         let Some(ctx) = device_with(|desc| desc.queues = queues) else { return };
         describe(&ctx, queues);
@@ -33,11 +33,11 @@ fn describe(ctx: &Context, queues: QueueRequest) {
     }
 }
 
-/// Records and submits to a queue.
+/// Records a command buffer and submits it to a queue.
 ///
 /// # Panics
 /// When anything is refused.
-pub fn on(ctx: &Context, queue: Queue, record: impl FnOnce(&mut CommandBuffer)) -> SubmitHandle {
+pub fn submit_on(ctx: &Context, queue: Queue, record: impl FnOnce(&mut CommandBuffer)) -> SubmitHandle {
     let mut cmd = ctx.acquire_command_buffer_on(queue).unwrap();
     assert_eq!(cmd.queue(), queue);
     record(&mut cmd);
@@ -66,7 +66,7 @@ struct Push {
     pad: u32,
 }
 
-/// Records a step without naming its buffers.
+/// Records a step without declaring its buffers.
 ///
 /// # Panics
 /// When it is refused.
@@ -98,7 +98,7 @@ pub fn step(
     bare_step(ctx, cmd, pipeline, [from, to], (number, &deps));
 }
 
-/// What a step makes of words.
+/// Returns the words after a step.
 pub fn stepped(words: &[u32], number: u32) -> Vec<u32> {
     (0..WORDS).map(|i| words[(i + 1) % WORDS].wrapping_mul(3).wrapping_add(number)).collect()
 }

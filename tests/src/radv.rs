@@ -1,5 +1,5 @@
-//! Pipelines compiled by the driver of AMD cards with no card in the machine: Vulkan by hand, because a device without
-//! memory makes no context.
+//! Pipelines compiled by RADV, the driver of AMD GPUs, without such a GPU in the machine. They are created by plain
+//! Vulkan, as a device without memory supports no context.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use lvk_samples::pipelines::{SamplePipeline, SampleStage};
 
 use crate::device::vulkan;
 
-/// Bindings of the library's one descriptor set: number, type, how many.
+/// Bindings of the library's one descriptor set: number, type, count.
 const BINDINGS: [(u32, vk::DescriptorType, u32); 6] = [
     (0, vk::DescriptorType::SAMPLED_IMAGE, 16_384),
     (1, vk::DescriptorType::SAMPLER, 1_024),
@@ -36,7 +36,7 @@ const EXTENSIONS: [&std::ffi::CStr; 7] = [
 
 /// Compiles for the chip that `RADV_FORCE_FAMILY` names.
 pub struct Radv {
-    /// What the chip can do.
+    /// Capabilities of the chip.
     pub capabilities: Capabilities,
     layout: vk::PipelineLayout,
     set_layouts: [vk::DescriptorSetLayout; 2],
@@ -45,11 +45,11 @@ pub struct Radv {
     _entry: ash::Entry,
 }
 
-/// Instructions of each program that the driver made of a pipeline, by the driver's name for it.
+/// Instruction count of each program of a pipeline, by the driver's name for it.
 pub type Programs = BTreeMap<String, u64>;
 
 impl Radv {
-    /// The null device of the driver. Its libraries must be open.
+    /// Opens the null device of the driver. Its libraries must be open.
     ///
     /// # Panics
     /// When the driver offers no such device.
@@ -73,7 +73,7 @@ impl Radv {
         }
     }
 
-    /// Compiles a pipeline and tells what came out.
+    /// Compiles a pipeline and returns its programs.
     ///
     /// # Panics
     /// When the compiler of the library or that of the driver refuses.
@@ -233,7 +233,7 @@ impl Drop for Radv {
 
 const FLAGS: vk::PipelineCreateFlags = vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR;
 
-/// A group for each stage, but that an any-hit stage belongs to the hit group before it.
+/// Returns a group for each stage. An any-hit stage belongs to the hit group before it.
 fn groups(
     stages: &[vk::PipelineShaderStageCreateInfo<'_>],
 ) -> Vec<vk::RayTracingShaderGroupCreateInfoKHR<'static>> {
@@ -272,7 +272,7 @@ fn raw(format: Format) -> vk::Format {
     }
 }
 
-/// A device with every feature that the shaders may ask for and the chip has.
+/// Creates a device with every feature that the shaders may need and the chip has.
 fn open_device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::Device {
     let mut v11 = vk::PhysicalDeviceVulkan11Features::default();
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
@@ -291,7 +291,7 @@ fn open_device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::D
         .push_next(&mut query)
         .push_next(&mut positions)
         .push_next(&mut executables);
-    // SAFETY: the driver knows all structures of the chain, which lives until the end of the function.
+    // SAFETY: the driver knows all acceleration structures of the chain, which lives until the end of the function.
     unsafe { instance.get_physical_device_features2(physical, &mut all) };
     let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default().task_shader(true).mesh_shader(true);
     let names = EXTENSIONS.map(std::ffi::CStr::as_ptr);

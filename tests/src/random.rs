@@ -9,12 +9,12 @@ pub struct Random {
 }
 
 impl Random {
-    /// The sequence of `seed`.
+    /// Starts the sequence of `seed`.
     pub fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
-    /// The next 64 random bits.
+    /// Returns the next 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.state ^ (self.state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -22,18 +22,18 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// A number in `low..high`.
+    /// Returns a number in `low..high`.
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         let unit = (self.bits() >> 40) as f32 / (1_u64 << 24) as f32;
         low + (high - low) * unit
     }
 
-    /// A point in the box between two corners.
+    /// Returns a point in the AABB from `low` to `high`.
     pub fn point(&mut self, low: Vec3, high: Vec3) -> Vec3 {
         Vec3::new(self.between(low.x, high.x), self.between(low.y, high.y), self.between(low.z, high.z))
     }
 
-    /// A unit vector, all directions alike.
+    /// Returns a unit vector. All directions are equally likely.
     pub fn direction(&mut self) -> Vec3 {
         loop {
             let point = self.point(Vec3::NEG_ONE, Vec3::ONE);

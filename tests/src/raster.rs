@@ -1,12 +1,13 @@
-//! Pipelines and targets of tests that draw, and what a rasteriser must do with a triangle.
+//! Pipelines and targets of tests that draw, and the coverage of triangles.
 #![expect(clippy::expect_used, reason = "a test whose set-up fails has failed")]
 
 use lvk::{
-    Context, Error, Format, Holder, OptionalFeature, RenderPass, RenderPassDesc, RenderPipelineDesc,
-    RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
+    ColorAttachment, Context, Dependencies, Error, Format, Holder, OptionalFeature, RenderPass,
+    RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle,
+    TextureRegion, TextureUsage,
 };
 
-use crate::compute::module;
+use crate::compute::{Evaluator, module};
 
 /// A triangle over all pixels, at the depth behind the colour in the push constants.
 pub const COVER: &str = "
@@ -22,7 +23,7 @@ pub const PAINT: &str = "
     layout(location = 0) out vec4 result;
     void main() { result = color; }";
 
-/// A pipeline of two GLSL texts; an empty `fragment` stands for none.
+/// Creates a pipeline of two GLSL texts; an empty `fragment` stands for none.
 pub fn render_pipeline(
     ctx: &Context,
     vertex: &str,
@@ -35,14 +36,14 @@ pub fn render_pipeline(
     ctx.create_render_pipeline(&desc).expect("the pipeline of a test can be made")
 }
 
-/// A texture to draw to and to sample.
+/// Creates a texture to draw to and to sample.
 pub fn target(ctx: &Context, format: Format, extent: [u32; 2]) -> Holder<TextureHandle> {
     let usage = TextureUsage::TARGET | TextureUsage::SAMPLED;
     let desc = TextureDesc { format, extent, usage, debug_name: "target", ..Default::default() };
     ctx.create_texture(&desc).expect("a small target can be made")
 }
 
-/// The texels of a target's first mip and layer.
+/// Returns the texels of a target's first mip and layer.
 pub fn pixels<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
     ctx: &Context,
     target: TextureHandle,
@@ -51,7 +52,7 @@ pub fn pixels<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
     bytemuck::pod_collect_to_vec(&bytes)
 }
 
-/// Which pixels of a picture a triangle with these corners, in pixels, covers.
+/// Returns, for each pixel of an image, whether a triangle covers it. Vertices are in pixels.
 ///
 /// # Panics
 /// When a pixel's centre is so close to an edge that devices may differ.
@@ -75,7 +76,7 @@ pub fn coverage(corners: [[f64; 2]; 3], [width, height]: [u32; 2]) -> Vec<bool> 
         .collect()
 }
 
-/// A pipeline of GLSL texts for whichever stages.
+/// Creates a pipeline of GLSL texts for any stages.
 ///
 /// # Errors
 /// Those of the pipeline; the shaders must compile.
@@ -112,7 +113,33 @@ pub fn run_pass(
     ctx.submit(cmd).expect("the commands are taken");
 }
 
-/// The pushed colour and depth of [`COVER`] and [`PAINT`], drawn over the scissor.
+/// Asserts that compute, textures and draws work: draws a colour, samples it, and reads both back.
+///
+/// # Panics
+/// When anything is refused, or a colour is another one.
+pub fn expect_drawing(ctx: &Context) {
+    let drawn = target(ctx, Format::Rgba8Unorm, [4, 4]);
+    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
+    let pipeline = render_pipeline(ctx, COVER, PAINT, &desc);
+    let mut cmd = ctx.acquire_command_buffer().expect("the device can draw and sample");
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    let mut pass = cmd
+        .begin_rendering(&RenderPassDesc { color: &color, ..Default::default() })
+        .expect("the device can draw and sample");
+    pass.bind_render_pipeline(*pipeline).expect("the device can draw and sample");
+    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).expect("the device can draw and sample");
+    pass.draw(0..3, 0..1).expect("the device can draw and sample");
+    drop(pass);
+    ctx.submit(cmd).expect("the device can draw and sample");
+    assert_eq!(pixels::<[u8; 4]>(ctx, *drawn), [[0, 255, 0, 255]; 16]);
+    let sampler = ctx.create_sampler(&Default::default()).expect("the device can draw and sample");
+    let sample = Evaluator::new(ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
+    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
+    let found = sample.run(ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
+    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
+}
+
+/// Draws the colour and the depth of [`COVER`] and [`PAINT`] over the scissor.
 ///
 /// # Errors
 /// Those of the draw.
@@ -122,7 +149,7 @@ pub fn paint(pass: &mut RenderPass<'_>, color: [f32; 4], depth: f32) -> lvk::Res
     pass.draw(0..3, 0..1)
 }
 
-/// Asserts that a call was refused as wrong, with these words.
+/// Asserts that a call returned `Error::InvalidUsage` with these words.
 ///
 /// # Panics
 /// Otherwise.
@@ -136,7 +163,7 @@ pub fn usage_error<T>(result: lvk::Result<T>, words: &str) {
     }
 }
 
-/// Asserts that a call was refused because the device lacks something, with these words.
+/// Asserts that a call returned `Error::Unsupported` with these words.
 ///
 /// # Panics
 /// Otherwise.
@@ -150,7 +177,7 @@ pub fn unsupported<T>(result: lvk::Result<T>, words: &str) {
     }
 }
 
-/// Whether the device has a feature; says so on standard error where it lacks it.
+/// True if the device has a feature. Prints what is not tested if it has not.
 pub fn has(ctx: &Context, feature: OptionalFeature) -> bool {
     let there = ctx.capabilities().has(feature);
     if !there {

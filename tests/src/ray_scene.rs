@@ -1,4 +1,4 @@
-//! A scene described once, for the GPU and for the reference.
+//! A scene for the GPU and for the reference.
 
 use lvk::glam::{Affine3A, DAffine3, Quat, Vec3};
 use lvk::{
@@ -10,7 +10,7 @@ use lvk::{
 use crate::meshes::Mesh;
 use crate::reference::{self, Reference};
 
-/// Flags of builds in software: trees of the CPU and of the GPU, all kinds of leaves.
+/// Flags of software builds: by the CPU and by the GPU, with all kinds of leaves.
 pub const BUILD_FLAGS: [BuildFlags; 6] = [
     BuildFlags::FAST_TRACE,
     BuildFlags::FAST_BUILD,
@@ -20,7 +20,7 @@ pub const BUILD_FLAGS: [BuildFlags; 6] = [
     BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD).union(BuildFlags::ALLOW_UPDATE),
 ];
 
-/// How the vertices and indices of a geometry lie in memory.
+/// Memory layout of the vertices and indices of a geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Layout {
     /// Three packed vertices for each triangle, no indices.
@@ -30,7 +30,7 @@ pub enum Layout {
     Indexed16,
     /// Packed vertices with 32-bit indices.
     Indexed32,
-    /// Vertices behind 8 bytes of something else each, 16-bit indices behind 6 bytes of something else.
+    /// 8 unused bytes before each vertex, 16-bit indices after 6 unused bytes.
     Interleaved,
 }
 
@@ -39,18 +39,18 @@ pub enum Layout {
 pub struct Part {
     /// Its triangles.
     pub mesh: Mesh,
-    /// How they lie in memory.
+    /// Their memory layout.
     pub layout: Layout,
-    /// Moves the vertices before the build.
+    /// Transform of the vertices before the build.
     pub transform: Option<Affine3A>,
-    /// The matrix lies in a buffer, behind another one.
+    /// True if the transform is read from a buffer, after another one.
     pub transform_in_buffer: bool,
-    /// How rays treat it.
+    /// Flags.
     pub flags: GeometryFlags,
 }
 
 impl Part {
-    /// Opaque, and where the mesh says.
+    /// Returns an opaque geometry without a transform.
     pub fn new(mesh: Mesh, layout: Layout) -> Self {
         let (transform_in_buffer, flags) = (false, GeometryFlags::OPAQUE);
         Self { mesh, layout, transform: None, transform_in_buffer, flags }
@@ -60,22 +60,22 @@ impl Part {
 /// One instance of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
-    /// Which model.
+    /// Number of the model.
     pub model: usize,
-    /// Object to world.
+    /// Transform from object space to world space.
     pub transform: Affine3A,
-    /// What hits of it report.
+    /// Custom index that hits report.
     pub custom_index: u32,
-    /// Rays see it if this and their mask have a bit in common.
+    /// Mask: rays see the instance if their mask has one of its bits.
     pub mask: u8,
-    /// Added to the hit-group index.
+    /// Hit group offset.
     pub hit_group_offset: u32,
-    /// How rays treat it.
+    /// Flags.
     pub flags: InstanceFlags,
 }
 
 impl Placed {
-    /// A model at a place; everything else as it is by default.
+    /// Returns an instance of a model with default mask, flags and numbers.
     pub fn new(model: usize, transform: Affine3A) -> Self {
         Self {
             model,
@@ -88,13 +88,13 @@ impl Placed {
     }
 }
 
-/// Where a matrix lies in its buffer, in bytes.
+/// Offset of a transform in its buffer, in bytes.
 pub const MATRIX_OFFSET: u64 = 48;
 
-/// Models and where they stand.
+/// Models and their instances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayScene {
-    /// Each the list of its geometries.
+    /// Geometries of each model.
     pub models: Vec<Vec<Part>>,
     /// The instances.
     pub placed: Vec<Placed>,
@@ -102,33 +102,33 @@ pub struct RayScene {
 
 /// A scene on the GPU.
 pub struct GpuScene {
-    /// A structure for each model.
+    /// BLAS of each model.
     pub models: Vec<Holder<AccelStructHandle>>,
-    /// The structure that rays are traced in.
+    /// TLAS of all instances.
     pub tlas: Holder<AccelStructHandle>,
     /// The buffers of every part: vertices, indices.
     pub buffers: Vec<PartBuffers>,
 }
 
-/// What a geometry is built from.
+/// Buffers of a geometry.
 pub struct PartBuffers {
     /// Holds the positions.
     pub vertices: Holder<BufferHandle>,
     /// Holds the indices, if there are any.
     pub indices: Option<Holder<BufferHandle>>,
-    /// Holds the matrix at [`MATRIX_OFFSET`], if it lies in a buffer.
+    /// Holds the transform at [`MATRIX_OFFSET`], if it is in a buffer.
     pub matrix: Option<Holder<BufferHandle>>,
 }
 
 impl RayScene {
-    /// One geometry at its own place.
+    /// Returns a scene of one geometry and one instance without a transform.
     pub fn single(mesh: Mesh, layout: Layout) -> Self {
         let placed = vec![Placed::new(0, Affine3A::IDENTITY)];
         Self { models: vec![vec![Part::new(mesh, layout)]], placed }
     }
 
-    /// Instances that reach into each other, turned, mirrored and of several masks, of eight geometries each with much room
-    /// between them: a structure that software may show in parts.
+    /// Returns overlapping instances, rotated, mirrored and of several masks. Each has eight geometries far apart
+    /// from each other, so that re-braiding may open it.
     pub fn scattered(flags: GeometryFlags) -> Self {
         let meshes = [Mesh::sphere(6), Mesh::cube_grid(2)];
         let part = |mesh: &Mesh, corner: u32| {
@@ -148,7 +148,7 @@ impl RayScene {
         Self { models, placed: (0..10).map(place).collect() }
     }
 
-    /// The scene for the CPU.
+    /// Returns the reference of the scene.
     pub fn reference(&self) -> Reference {
         let models: Vec<Vec<_>> =
             self.models.iter().map(|parts| parts.iter().map(reference_geometry).collect()).collect();
@@ -164,12 +164,13 @@ impl RayScene {
         Reference::new(&self.placed.iter().map(instance).collect::<Vec<_>>())
     }
 
-    /// The scene for the GPU: all models in one batch, and a TLAS of all instances.
+    /// Uploads the scene: all BLASes in one batch, and a TLAS of all instances.
     pub fn upload(&self, ctx: &Context) -> Result<GpuScene> {
         self.upload_with(ctx, BuildFlags::default(), BuildFlags::default(), 0)
     }
 
-    /// As [`upload`](Self::upload), with flags of the models and of the TLAS, and room for more instances.
+    /// As [`upload`](Self::upload), with build flags of the BLASes and of the TLAS, and a capacity of additional
+    /// instances.
     pub fn upload_with(
         &self,
         ctx: &Context,
@@ -184,7 +185,7 @@ impl RayScene {
     }
 }
 
-/// Instances as the library takes them.
+/// Returns the instances for a TLAS.
 pub fn instances(placed: &[Placed], models: &[Holder<AccelStructHandle>]) -> Vec<TlasInstance> {
     let instance = |placed: &Placed| TlasInstance {
         transform: transform_rows(&placed.transform),
@@ -197,7 +198,7 @@ pub fn instances(placed: &[Placed], models: &[Holder<AccelStructHandle>]) -> Vec
     placed.iter().map(instance).collect()
 }
 
-/// The bytes of positions, as `layout` wants them.
+/// Returns the bytes of the positions in a layout.
 pub fn vertex_bytes(mesh: &Mesh, layout: Layout) -> Vec<u8> {
     let mesh = if layout == Layout::Unshared { mesh.unshared() } else { mesh.clone() };
     match layout {
@@ -209,7 +210,7 @@ pub fn vertex_bytes(mesh: &Mesh, layout: Layout) -> Vec<u8> {
     }
 }
 
-/// The geometries of one model, and the buffers they lie in.
+/// Uploads the geometries of one model and returns their buffers.
 pub fn upload_geometries(ctx: &Context, parts: &[Part]) -> Result<(Vec<PartBuffers>, Vec<BlasGeometry>)> {
     let mut buffers = Vec::with_capacity(parts.len());
     let mut geometries = Vec::with_capacity(parts.len());

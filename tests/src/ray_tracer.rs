@@ -8,6 +8,7 @@ use lvk::{
 };
 
 use crate::rays::Ray;
+use crate::{TestDevice, device};
 
 /// [`HitRecord::kind`] of a ray that hit nothing.
 pub const MISSED: u32 = 0;
@@ -16,28 +17,29 @@ pub const FRONT: u32 = 0xfe;
 /// [`HitRecord::kind`] of a hit from the back of a triangle.
 pub const BACK: u32 = 0xff;
 
-/// Ray flag: every hit counts, without any-hit shader.
+/// Ray flag: every geometry is opaque, so that no any-hit shader runs.
 pub const OPAQUE: u32 = 1;
-/// Ray flag: nothing is opaque.
+/// Ray flag: no geometry is opaque.
 pub const NO_OPAQUE: u32 = 2;
 /// Ray flag: the first hit found ends the ray.
 pub const TERMINATE_ON_FIRST_HIT: u32 = 4;
-/// Ray flag: hits from behind do not count.
+/// Ray flag: back faces are culled.
 pub const CULL_BACK: u32 = 0x10;
-/// Ray flag: hits from the front do not count.
+/// Ray flag: front faces are culled.
 pub const CULL_FRONT: u32 = 0x20;
-/// Ray flag: what is opaque is not hit.
+/// Ray flag: opaque geometries are culled.
 pub const CULL_OPAQUE: u32 = 0x40;
-/// Ray flag: what is not opaque is not hit.
+/// Ray flag: geometries that are not opaque are culled.
 pub const CULL_NO_OPAQUE: u32 = 0x80;
-/// Ray flag: triangles are not hit. Shaders declare `primitive_culling`.
+/// Ray flag: triangles are skipped. Shaders declare `primitive_culling`.
 pub const SKIP_TRIANGLES: u32 = 0x100;
-/// Ray flag: boxes are not hit. Shaders declare `primitive_culling`.
+/// Ray flag: AABBs are skipped. Shaders declare `primitive_culling`.
 pub const SKIP_AABBS: u32 = 0x200;
 
 /// The files that shaders may include; `ray_records.glsl` has the push constants.
-pub const INCLUDES: [(&str, &str); 3] = [
+pub const INCLUDES: [(&str, &str); 4] = [
     ("any_hit_payload.glsl", include_str!("../shaders/any_hit_payload.glsl")),
+    ("ray_query_start.glsl", include_str!("../shaders/ray_query_start.glsl")),
     ("ray_records.glsl", include_str!("../shaders/ray_records.glsl")),
     ("sphere_object.glsl", include_str!("../shaders/sphere_object.glsl")),
 ];
@@ -45,27 +47,27 @@ pub const INCLUDES: [(&str, &str); 3] = [
 const THREADS: u32 = 64;
 const LAUNCH_WIDTH: u32 = 48;
 
-/// What a ray hit, as the shaders write it.
+/// Hit of a ray, as shaders write it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct HitRecord {
-    /// Multiple of the ray's direction.
+    /// Distance as a multiple of the ray's direction.
     pub t: f32,
-    /// Weights of a triangle's second and third corner.
+    /// Weights of a triangle's second and third vertex.
     pub barycentrics: [f32; 2],
     /// [`MISSED`], [`FRONT`], [`BACK`], or what an intersection shader reported.
     pub kind: u32,
-    /// Place in the list of instances.
+    /// Instance number.
     pub instance: u32,
     /// The instance's custom index.
     pub custom_index: u32,
-    /// Place in the list of geometries.
+    /// Geometry number.
     pub geometry: u32,
-    /// Place in the list of primitives.
+    /// Primitive number.
     pub primitive: u32,
 }
 
-/// Who walks the tree.
+/// Vulkan's way to trace rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// A ray tracing pipeline.
@@ -75,10 +77,10 @@ pub enum Method {
 }
 
 impl Method {
-    /// What the device can do, never nothing. Says on standard error what it cannot.
+    /// Returns the methods of the device, at least one. Prints which one is not tested.
     ///
     /// # Panics
-    /// If the device can do neither.
+    /// When the device has neither.
     pub fn available(ctx: &Context) -> Vec<Self> {
         let caps = ctx.capabilities();
         let pairs = [(Self::Pipeline, caps.ray_tracing_pipeline), (Self::Query, caps.ray_query)];
@@ -91,19 +93,28 @@ impl Method {
     }
 }
 
-/// How rays are traced.
+/// True if shaders can query rays. Prints what is not tested if they cannot.
+pub fn requires_ray_queries(ctx: &Context) -> bool {
+    let has = ctx.capabilities().ray_query;
+    if !has {
+        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
+    }
+    has
+}
+
+/// Parameters of a trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct How {
     /// Cull mask.
     pub mask: u8,
     /// Ray flags.
     pub flags: u32,
-    /// Place of the ray generation shader; queries have none.
+    /// Number of the ray generation shader; queries have none.
     pub ray_gen: u32,
 }
 
 impl How {
-    /// Asks whether there is any hit: of the record only `kind` means something.
+    /// Returns parameters of shadow rays: only `kind` of the records is valid.
     pub fn shadows() -> Self {
         Self { flags: TERMINATE_ON_FIRST_HIT, ray_gen: 1, ..Self::default() }
     }
@@ -115,7 +126,7 @@ impl Default for How {
     }
 }
 
-/// The pipeline of one method.
+/// A pipeline that traces rays by one method.
 pub struct RayTracer {
     ctx: Context,
     pipeline: AnyPipeline,
@@ -126,7 +137,7 @@ enum AnyPipeline {
     Compute(Holder<ComputePipelineHandle>),
 }
 
-/// Rays on the GPU and room for their records.
+/// Rays on the GPU, and the buffer of their hit records.
 pub struct Job {
     rays: Holder<BufferHandle>,
     hits: Holder<BufferHandle>,
@@ -145,34 +156,57 @@ struct Push {
 }
 
 impl RayTracer {
-    /// Hits count as the geometry and the ray say.
+    /// Creates a tracer whose opacity is that of geometry and ray.
     pub fn new(ctx: &Context, method: Method) -> Result<Self> {
-        Self::with(ctx, method, false)
+        Self::with_shaders(ctx, method, false)
     }
 
-    /// Looks through triangles with odd numbers, where they are not opaque.
-    pub fn keeping_even(ctx: &Context, method: Method) -> Result<Self> {
-        Self::with(ctx, method, true)
+    /// Creates a tracer that ignores triangles with odd numbers, unless they are opaque.
+    pub fn with_even_primitives(ctx: &Context, method: Method) -> Result<Self> {
+        Self::with_shaders(ctx, method, true)
     }
 
-    /// By query, in a module without candidates: all triangles are opaque.
+    /// Creates a tracer by query, in a module without candidates: all triangles are opaque.
     pub fn for_opaque_triangles(ctx: &Context) -> Result<Self> {
         let pipeline = AnyPipeline::Compute(compute(ctx, &[("LVK_OPAQUE_TRIANGLES_ONLY", "")])?);
         Ok(Self { ctx: ctx.clone(), pipeline })
     }
 
-    /// Traces with a pipeline of the caller's own, whose ray generation shaders take the push constants of
+    /// Creates a tracer with a given pipeline, whose ray generation shaders have the push constants of
     /// `ray_records.glsl`.
-    pub fn of_pipeline(ctx: &Context, pipeline: Holder<RayTracingPipelineHandle>) -> Self {
+    pub fn from_pipeline(ctx: &Context, pipeline: Holder<RayTracingPipelineHandle>) -> Self {
         Self { ctx: ctx.clone(), pipeline: AnyPipeline::RayTracing(pipeline) }
     }
 
-    /// As [`of_pipeline`](Self::of_pipeline), with a compute shader of 64 threads that traces by query.
-    pub fn of_query(ctx: &Context, pipeline: Holder<ComputePipelineHandle>) -> Self {
+    /// As [`from_pipeline`](Self::from_pipeline), with a compute shader of 64 invocations that traces by query.
+    pub fn from_query(ctx: &Context, pipeline: Holder<ComputePipelineHandle>) -> Self {
         Self { ctx: ctx.clone(), pipeline: AnyPipeline::Compute(pipeline) }
     }
 
-    fn with(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
+    /// As [`from_query`](Self::from_query), of GLSL text with macros.
+    pub fn from_query_text(ctx: &Context, text: &str, defines: &[(&str, &str)]) -> Result<Self> {
+        let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
+        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+        Ok(Self::from_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    }
+
+    /// As [`from_pipeline`](Self::from_pipeline), of a pipeline with these hit groups.
+    pub fn from_groups(
+        ctx: &Context,
+        ray_gen: ShaderModuleHandle,
+        miss: ShaderModuleHandle,
+        hit_groups: &[HitGroup<'_>],
+    ) -> Result<Self> {
+        let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+            ray_gen: &[ray_gen],
+            miss: &[miss],
+            hit_groups,
+            ..Default::default()
+        })?;
+        Ok(Self::from_pipeline(ctx, pipeline))
+    }
+
+    fn with_shaders(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
         let pipeline = match method {
             Method::Pipeline => AnyPipeline::RayTracing(ray_tracing(ctx, keep_even)?),
             Method::Query => {
@@ -182,7 +216,7 @@ impl RayTracer {
         Ok(Self { ctx: ctx.clone(), pipeline })
     }
 
-    /// Where it traces.
+    /// Returns the context.
     pub fn context(&self) -> &Context {
         &self.ctx
     }
@@ -210,7 +244,7 @@ impl RayTracer {
         self.record_at(cmd, tlas.index(), job, how)
     }
 
-    /// As [`record`](Self::record), whoever is at this index.
+    /// As [`record`](Self::record), for the TLAS of a bindless index.
     pub fn record_at(&self, cmd: &mut CommandBuffer, tlas: u32, job: &Job, how: How) -> Result<()> {
         let push = Push {
             rays: self.ctx.buffer_address(*job.rays)?,
@@ -236,7 +270,7 @@ impl RayTracer {
         }
     }
 
-    /// Waits, and reads the records of a job that was submitted.
+    /// Waits for a submitted job and reads its records.
     pub fn read(&self, job: &Job) -> Result<Vec<HitRecord>> {
         let mut records = vec![HitRecord::zeroed(); job.count as usize];
         self.ctx.download_buffer(*job.hits, 0, bytemuck::cast_slice_mut(&mut records))?;
@@ -251,6 +285,18 @@ impl RayTracer {
         self.ctx.submit(cmd)?;
         self.read(&job)
     }
+}
+
+/// Runs a test on the usual device by each of its methods, with a tracer of closest hits.
+///
+/// # Errors
+/// Those of the test and of the tracer.
+pub fn for_each_method(mut test: impl FnMut(&TestDevice, Method, &RayTracer) -> Result<()>) -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        test(&ctx, method, &RayTracer::new(&ctx, method)?)?;
+    }
+    Ok(())
 }
 
 /// Compiles a shader that may include [`INCLUDES`].

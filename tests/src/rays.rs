@@ -1,32 +1,32 @@
-//! Rays to trace, as the GPU reads them.
+//! Rays in the layout that shaders read.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::glam::Vec3;
 
 use crate::random::Random;
 
-/// One ray: points `origin + t * direction` with `t_min < t < t_max`. The direction need not have unit length.
+/// A ray: points `origin + t * direction` with `t_min < t < t_max`. The direction need not have unit length.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Ray {
-    /// Where the ray starts.
+    /// Origin.
     pub origin: [f32; 3],
-    /// Hits lie behind this multiple of the direction.
+    /// Least distance, as a multiple of the direction.
     pub t_min: f32,
-    /// Where the ray goes.
+    /// Direction.
     pub direction: [f32; 3],
-    /// Hits lie before this multiple of the direction.
+    /// Largest distance, as a multiple of the direction.
     pub t_max: f32,
 }
 
 impl Ray {
-    /// A ray that is long enough for every scene of the tests.
+    /// Returns a ray that is long enough for every scene of the tests.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self { origin: origin.into(), t_min: 0.0, direction: direction.into(), t_max: 1e4 }
     }
 }
 
-/// One ray through each pixel of a `side` by `side` picture that a camera at `eye` takes of `target`.
+/// Returns one ray through each pixel of a `side` by `side` image of a camera at `eye` that looks at `target`.
 pub fn camera_rays(side: u32, eye: Vec3, target: Vec3) -> Vec<Ray> {
     let forward = (target - eye).normalize();
     let right = forward.cross(Vec3::Y).normalize();
@@ -36,8 +36,8 @@ pub fn camera_rays(side: u32, eye: Vec3, target: Vec3) -> Vec<Ray> {
     pixels.map(|(x, y)| Ray::new(eye, (forward + right * x + up * y).normalize())).collect()
 }
 
-/// Rays from around and inside of a box towards points of it. Their directions are half to twice unit length; a
-/// third each start late, end early, and do neither. Those that do not end early reach through the box.
+/// Returns rays from around and inside of an AABB towards points of it. Their directions have half to twice unit
+/// length. A third each start late, end early, and do neither. Those that do not end early leave the AABB.
 pub fn random_rays(seed: u64, count: usize, low: Vec3, high: Vec3) -> Vec<Ray> {
     let mut random = Random::new(seed);
     let (center, reach) = ((low + high) * 0.5, (high - low).length());

@@ -1,4 +1,5 @@
-//! A scene whose launches run each shader of a ray tracing pipeline once: hit groups, miss shaders, then callables.
+//! A scene whose launches run each shader of a ray tracing pipeline once: hit groups, then miss shaders, then
+//! callables.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -10,11 +11,11 @@ use lvk::{
 use crate::compute::{read_words, words_buffer};
 use crate::ray_tracer::shader_with;
 
-/// Most hit groups of a pipeline that [`GroupScene::run`] can tell apart.
+/// Largest number of hit groups that [`GroupScene::run`] distinguishes.
 pub const MOST_HIT_GROUPS: u32 = 8;
 
-/// Launch `i` traces to instance `i`, which names hit group `i`; launches behind them go astray to each miss shader,
-/// and those behind call each callable. `ADD` goes on top of what the shader answers.
+/// Launch `i` traces to instance `i`, which has hit group `i`. Later launches miss everything and run each miss
+/// shader, and the last ones call each callable. `ADD` is added to the shader's result.
 const RAY_GEN: &str = "
     layout(buffer_reference, scalar) buffer Words { uint at[]; };
     layout(push_constant, scalar) uniform Push { Words results; uint tlas; uint hits; uint misses; };
@@ -35,7 +36,7 @@ const RAY_GEN: &str = "
         }
     }";
 
-/// Numbers of the shaders of a pipeline, those of its libraries included.
+/// Shader counts of a pipeline, those of its libraries included.
 #[derive(Debug, Clone, Copy)]
 pub struct Counts {
     /// Hit groups.
@@ -47,7 +48,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// All shaders: the width of a launch that runs each.
+    /// Returns the number of all shaders: the width of a launch that runs each.
     pub fn all(&self) -> u32 {
         self.hits + self.misses + self.callables
     }
@@ -64,7 +65,7 @@ struct Push {
     pad: u32,
 }
 
-/// One triangle for each hit group, and where launches write.
+/// One triangle for each hit group, and the buffer of results.
 pub struct GroupScene {
     ctx: Context,
     _model: Holder<AccelStructHandle>,
@@ -110,7 +111,7 @@ impl GroupScene {
         })
     }
 
-    /// What each shader of a pipeline answers, by ray generation shader `ray_gen`.
+    /// Returns the result of each shader of a pipeline, by ray generation shader `ray_gen`.
     pub fn run(&self, pipeline: RayTracingPipelineHandle, ray_gen: u32, counts: Counts) -> Result<Vec<u32>> {
         let results = words_buffer(&self.ctx, &vec![u32::MAX; counts.all() as usize]);
         let mut cmd = self.ctx.acquire_command_buffer()?;
@@ -122,12 +123,12 @@ impl GroupScene {
     }
 }
 
-/// A ray generation shader that adds the value of the GLSL expression `add` to every answer. `globals` go before it.
+/// Creates a ray generation shader that adds the GLSL expression `add` to every result. `globals` go before it.
 pub fn ray_gen(ctx: &Context, globals: &str, add: &str) -> Result<Holder<ShaderModuleHandle>> {
     shader_with(ctx, ShaderStage::RayGen, &format!("{globals}\n{RAY_GEN}"), &[("ADD", add)])
 }
 
-/// A closest-hit, miss or callable shader that answers the value of the GLSL expression `answer`. `globals` go before
+/// Creates a closest-hit, miss or callable shader whose result is the GLSL expression `answer`. `globals` go before
 /// it.
 pub fn answering(
     ctx: &Context,

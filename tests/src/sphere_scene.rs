@@ -1,39 +1,42 @@
-//! Spheres in boxes, which `sphere.rint.glsl` and `sphere_query.comp.glsl` know how to hit.
+//! Spheres in AABBs, which `sphere.rint.glsl` and `sphere_query.comp.glsl` intersect.
 
 use lvk::glam::Vec3;
 use lvk::{
-    Aabbs, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, ComputePipelineDesc, Context, GeometryFlags,
-    HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderStage,
+    Aabbs, AccelStructHandle, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context, GeometryFlags,
+    HitGroup, Holder, Result, ShaderStage,
 };
 
+use crate::hit_check::HitCheck;
+use crate::hit_comparison::HitComparison;
 use crate::ray_scene::Placed;
-use crate::ray_tracer::{Method, RayTracer, shader, shader_with};
+use crate::ray_tracer::{HitRecord, How, Method, RayTracer, shader, shader_with};
+use crate::rays::Ray;
 use crate::reference::{HitIds, Sphere};
 
 /// Radius in object space and tag of each hit group of spheres; an instance's hit-group offset chooses one.
 pub const GROUPS: [(f32, u32); 2] = [(0.9, 17), (0.5, 99)];
 
-/// Geometries of a model of spheres.
+/// Number of geometries of a model.
 const GEOMETRIES: u32 = 2;
 
-/// A model of two geometries of boxes with a sphere in each.
+/// A model of two geometries of AABBs with a sphere in each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SphereModel {
-    /// Boxes of a geometry.
+    /// AABBs of a geometry.
     pub count: u32,
-    /// From one box of the list to the next, round and round the places; 1 is neighbour after neighbour. Shares no
-    /// divisor with `count`.
+    /// Step between AABBs of the list, cyclic over the positions; 1 gives neighbours. It has no common divisor with
+    /// `count`.
     pub step: u32,
 }
 
 impl SphereModel {
-    /// Neighbour after neighbour.
+    /// Returns a model whose list has neighbours after each other.
     pub fn new(count: u32) -> Self {
         Self { count, step: 1 }
     }
 
-    /// The boxes, and the buffers they lie in. The second list starts late and has gaps.
-    pub fn boxes(&self, ctx: &Context) -> Result<(Vec<Holder<BufferHandle>>, Vec<BlasGeometry>)> {
+    /// Uploads the AABBs and returns their buffers. The second list has an offset and a stride.
+    pub fn aabb_geometries(&self, ctx: &Context) -> Result<(Vec<Holder<BufferHandle>>, Vec<BlasGeometry>)> {
         let mut buffers = Vec::new();
         let mut geometries = Vec::new();
         for (geometry, offset, stride) in [(0, 0, 0), (1, 16, 32)] {
@@ -52,7 +55,7 @@ impl SphereModel {
         Ok((buffers, geometries))
     }
 
-    /// The spheres of instances of the model, for the reference.
+    /// Returns the spheres of instances of the model, for the reference.
     pub fn spheres(&self, placed: &[Placed]) -> Vec<Sphere> {
         let mut spheres = Vec::new();
         for (instance, placed) in (0..).zip(placed) {
@@ -68,7 +71,7 @@ impl SphereModel {
         spheres
     }
 
-    /// Hits spheres by either method.
+    /// Creates a tracer of spheres.
     pub fn tracer(&self, ctx: &Context, method: Method) -> Result<RayTracer> {
         let numbers = [self.step, self.count].map(|number| number.to_string());
         let defines = [("SPHERE_STEP", &numbers[0][..]), ("SPHERE_COUNT", &numbers[1][..])];
@@ -78,7 +81,29 @@ impl SphereModel {
         }
     }
 
-    /// Where the shaders look for a sphere, in object space.
+    /// Traces rays through a TLAS of this model by each method, asserts that their hits equal the reference, and calls
+    /// `check` with their records.
+    pub fn check_hits(
+        &self,
+        ctx: &Context,
+        tlas: &Holder<AccelStructHandle>,
+        placed: &[Placed],
+        rays: &[Ray],
+        what: &str,
+        check: impl Fn(&[HitRecord]),
+    ) -> Result<()> {
+        let expected = self.spheres(placed);
+        for (method, tracer) in HitCheck::with_tracers(ctx, |ctx, method| self.tracer(ctx, method))?.tracers()
+        {
+            let records = tracer.trace(tlas, rays, How::default())?;
+            HitComparison::of_shapes(rays, &records, |ray| Sphere::closest(&expected, ray))
+                .assert(&format!("{what} by {method:?}"));
+            check(&records);
+        }
+        Ok(())
+    }
+
+    /// Returns the centre of a sphere in object space, as the shaders compute it.
     fn center(&self, geometry: u32, primitive: u32) -> Vec3 {
         let place = primitive * self.step % self.count;
         Vec3::new((place % 3) as f32, (place / 3) as f32, geometry as f32) * 2.0
@@ -98,18 +123,10 @@ fn sphere_pipeline(ctx: &Context, defines: &[(&str, &str)]) -> Result<RayTracer>
         record,
         ..Default::default()
     });
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &groups,
-        ..Default::default()
-    })?;
-    Ok(RayTracer::of_pipeline(ctx, pipeline))
+    RayTracer::from_groups(ctx, *ray_gen, *miss, &groups)
 }
 
 fn sphere_query(ctx: &Context, defines: &[(&str, &str)]) -> Result<RayTracer> {
     let text = include_str!("../shaders/sphere_query.comp.glsl");
-    let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
-    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    RayTracer::from_query_text(ctx, text, defines)
 }

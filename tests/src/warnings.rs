@@ -1,44 +1,45 @@
-//! Hears what the library warns of.
+//! Warnings of the library.
 
 use std::sync::{Mutex, Once, PoisonError};
 
 use log::{LevelFilter, Log, Metadata, Record};
 
-/// Keeps every warning of the process.
-struct Ear;
+/// Collects every warning of the process.
+struct WarningLog;
 
-static EAR: Ear = Ear;
-static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+static LOG: WarningLog = WarningLog;
+static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-impl Log for Ear {
+impl Log for WarningLog {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
         metadata.level() <= LevelFilter::Warn
     }
 
     fn log(&self, record: &Record<'_>) {
         if self.enabled(record.metadata()) {
-            HEARD.lock().unwrap_or_else(PoisonError::into_inner).push(record.args().to_string());
+            WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).push(record.args().to_string());
         }
     }
 
     fn flush(&self) {}
 }
 
-/// Starts listening. Warnings from before are lost.
+/// Starts to collect warnings. Earlier warnings are lost.
 ///
 /// # Panics
-/// When another logger listens already.
+/// When another logger is installed.
 #[expect(clippy::expect_used, reason = "a test that cannot hear has failed")]
-pub fn listen() {
+pub fn capture_warnings() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        log::set_logger(&EAR).expect("no other logger is installed");
+        log::set_logger(&LOG).expect("no other logger is installed");
         log::set_max_level(LevelFilter::Warn);
     });
 }
 
-/// Takes the warnings so far that contain `words`; those of other tests in the process do not, if the words are rare.
+/// Removes and returns the collected warnings that contain `words`. Rare words leave out those of other tests in the
+/// process.
 pub fn take_warnings(words: &str) -> Vec<String> {
-    let mut heard = HEARD.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut heard = WARNINGS.lock().unwrap_or_else(PoisonError::into_inner);
     heard.extract_if(.., |warning| warning.contains(words)).collect()
 }

@@ -1,4 +1,4 @@
-//! Windows for tests, on an X server of their own that has no screen.
+//! Windows for tests, on an X server of their own without a screen.
 #![expect(clippy::expect_used, reason = "a test whose X server fails has failed")]
 
 use std::ffi::c_void;
@@ -25,13 +25,14 @@ pub struct Desktop {
     _server: VirtualDisplay,
 }
 
-/// Pixels of a side of the place that a window has for itself.
+/// Side in pixels of the area of one window.
 pub const ROOM: u32 = 200;
 
-/// Places side by side.
+/// Areas side by side.
 const COLUMNS: u32 = 10;
 
-/// The desktop of this program; `None`, loudly, where there is no X server and none can be fetched.
+/// Returns the desktop of this program. Prints a line and returns `None` where there is no X server and none can be
+/// fetched.
 ///
 /// # Panics
 /// When there is none although `LVK_REQUIRE_GPU=1` demands every test.
@@ -53,8 +54,8 @@ impl Desktop {
         Some(Self { connection, screen, _server: server })
     }
 
-    /// A visible window, of at most [`ROOM`] pixels a side: the first ones do not lie on each other, as a screen forgets
-    /// what lies beneath.
+    /// Opens a visible window of at most [`ROOM`] pixels a side. The first windows do not overlap, as a screen
+    /// forgets hidden pixels.
     pub fn window(&'static self, extent: [u32; 2]) -> Arc<TestWindow> {
         static WINDOWS: AtomicU32 = AtomicU32::new(0);
         let place = WINDOWS.fetch_add(1, Ordering::Relaxed);
@@ -81,7 +82,7 @@ impl Desktop {
         Arc::new(TestWindow { desktop: self, id })
     }
 
-    /// Waits until the server has done everything asked so far.
+    /// Waits until the server has processed all requests.
     fn sync(&self) {
         let reply = self.connection.get_input_focus().expect("the connection is up").reply();
         reply.expect("the server answers");
@@ -95,20 +96,20 @@ pub struct TestWindow {
 }
 
 impl TestWindow {
-    /// Gives it another size, at once.
+    /// Resizes the window at once.
     pub fn resize(&self, extent: [u32; 2]) {
         let size = ConfigureWindowAux::new().width(extent[0]).height(extent[1]);
         self.desktop.connection.configure_window(self.id, &size).expect("the connection is up");
         self.desktop.sync();
     }
 
-    /// Closes it although others still use it.
+    /// Closes the window although it is still in use.
     pub fn close(&self) {
         self.desktop.connection.destroy_window(self.id).expect("the connection is up");
         self.desktop.sync();
     }
 
-    /// Red, green and blue of a pixel, as the screen would show it.
+    /// Returns red, green and blue of a pixel of the window.
     pub fn pixel(&self, x: i16, y: i16) -> [u8; 3] {
         let image = self.desktop.connection.get_image(ImageFormat::Z_PIXMAP, self.id, x, y, 1, 1, u32::MAX);
         let data = image.expect("the connection is up").reply().expect("the pixel lies in the window").data;

@@ -1,13 +1,13 @@
-//! Whether validation in shaders sees anything: its silence elsewhere says nothing where it does not. And whether it shows what
-//! shaders print.
+//! GPU-assisted validation: it reports an access out of bounds, so that its silence in other tests means something.
+//! It also prints what shaders print.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::OsStr;
 
 use lvk::{ComputePipelineHandle, Context, Dependencies, Result, ValidationMode};
-use lvk_tests::child::said_in_child;
 use lvk_tests::compute::{compute_pipeline, words_buffer};
 use lvk_tests::device_with;
+use lvk_tests::subprocess::output_of_subprocess;
 
 /// Writes the word of one buffer at a place to another.
 const COPY: &str = r#"
@@ -50,10 +50,10 @@ const PRINT: &str = r#"
     void main() { debugPrintfEXT("sheep %u of %u", gl_LocalInvocationID.x + 1u, gl_WorkGroupSize.x); }"#;
 
 #[test]
-fn the_layer_shows_what_shaders_print() {
+fn the_layer_prints_what_shaders_print() {
     let on = Some(OsStr::new("1"));
     let variables = [("VK_LAYER_PRINTF_ENABLE", on), ("VK_LAYER_PRINTF_TO_STDOUT", on)];
-    let said = said_in_child(the_layer_shows_what_shaders_print, &variables, || {
+    let said = output_of_subprocess(the_layer_prints_what_shaders_print, &variables, || {
         let Some(ctx) = device_with(|desc| desc.validation = ValidationMode::Standard) else { return };
         let pipeline = compute_pipeline(&ctx, PRINT);
         dispatch_once(&ctx, *pipeline).unwrap();

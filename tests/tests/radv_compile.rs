@@ -1,13 +1,13 @@
-//! Every pipeline of the library and of the samples compiles for AMD cards, with no card in the machine.
+//! Every pipeline of the library and of the samples compiles for AMD GPUs, without such a GPU in the machine.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;
 
 use lvk::{Context, ContextDesc, ShaderStage};
 use lvk_samples::pipelines::{self, SamplePipeline, SampleStage};
-use lvk_tests::child::on_radv;
 use lvk_tests::device::vulkan;
 use lvk_tests::radv::Radv;
+use lvk_tests::subprocess::on_radv;
 
 /// The compute shaders that the library runs by itself.
 const KERNELS: [(&str, &str); 2] = [

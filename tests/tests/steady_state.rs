@@ -1,5 +1,5 @@
-//! The same frame again and again: it takes nothing from the heap for a draw, and no memory grows, neither the library's nor
-//! the driver's nor the process's.
+//! Repeated frames: a draw allocates nothing on the heap, and no memory grows, neither the library's nor the driver's
+//! nor the process's.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -11,11 +11,12 @@ use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BuildFlags, BuildMode,
     ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies, DeviceInstances, Format,
     Holder, OptionalFeature, PrimitiveOrder, RayQueryRequest, RenderPassDesc, RenderPipelineDesc,
-    RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage, TlasDesc, TlasInstance,
-    Triangles, ValidationMode,
+    RenderPipelineHandle, TextureDesc, TextureHandle, TextureUsage, TlasDesc, TlasInstance, Triangles,
+    ValidationMode,
 };
-use lvk_tests::compute::{compute_pipeline, module};
+use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::vulkan;
+use lvk_tests::raster::render_pipeline;
 use lvk_tests::{device, device_with};
 
 static COUNT: AtomicU64 = AtomicU64::new(0);
@@ -61,29 +62,15 @@ impl Frame {
             let format = Format::Rgba8Unorm;
             ctx.create_texture(&TextureDesc { format, extent: [8, 8], usage, ..Default::default() }).unwrap()
         };
-        let vertex = module(
-            ctx,
-            ShaderStage::Vertex,
-            "layout(push_constant) uniform Push { uint words[2]; };
-             void main() { gl_Position = vec4(words[gl_VertexIndex & 1]); }",
-        );
-        let fragment = module(
-            ctx,
-            ShaderStage::Fragment,
-            "layout(location = 0) out vec4 color; void main() { color = vec4(1.0); }",
-        );
-        let color = [Format::Rgba8Unorm.into()];
-        let desc = RenderPipelineDesc {
-            vertex: Some(*vertex),
-            fragment: Some(*fragment),
-            color: &color,
-            ..Default::default()
-        };
+        let vertex = "layout(push_constant) uniform Push { uint words[2]; };
+             void main() { gl_Position = vec4(words[gl_VertexIndex & 1]); }";
+        let fragment = "layout(location = 0) out vec4 color; void main() { color = vec4(1.0); }";
+        let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
         Self {
             target: texture(TextureUsage::TARGET | TextureUsage::SAMPLED),
             image: texture(TextureUsage::STORAGE | TextureUsage::SAMPLED),
             uploaded: ctx.create_buffer(&BufferDesc { size_bytes: 4096, ..Default::default() }).unwrap(),
-            draw: ctx.create_render_pipeline(&desc).unwrap(),
+            draw: render_pipeline(ctx, vertex, fragment, &desc),
             compute: compute_pipeline(
                 ctx,
                 "layout(local_size_x = 8, local_size_y = 8) in;
@@ -153,9 +140,9 @@ fn draws_take_nothing_from_the_heap_and_frames_leave_nothing_there() {
     assert_eq!((staging_bytes(&ctx), waiting_objects(&ctx).unwrap()), (staging, 0));
 }
 
-/// Top-level structures that show the same meshes in every frame, by instances of the host or from a buffer.
+/// TLASes that show the same meshes in every frame, by instances of the host or from a buffer.
 #[test]
-fn refits_that_show_the_same_take_nothing_from_the_heap() {
+fn refits_of_unchanged_references_take_nothing_from_the_heap() {
     const MESHES: usize = 100;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(vulkan_library) = vulkan() else { return };
@@ -198,7 +185,7 @@ fn refits_that_show_the_same_take_nothing_from_the_heap() {
     }
 }
 
-/// A bottom-level structure of one triangle, and the buffer it is built from.
+/// A BLAS of one triangle, and the buffer it is built from.
 struct Mesh {
     blas: Holder<AccelStructHandle>,
     _vertices: Holder<BufferHandle>,
@@ -239,7 +226,8 @@ fn frames_that_create_and_destroy_keep_no_memory() {
     assert_eq!(early.1, late.1);
 }
 
-/// What the heap of the process holds, the driver's own included; `None` where the C library does not tell it as glibc does.
+/// Returns the bytes on the heap of the process, the driver's included; `None` where the C library does not report
+/// them as glibc does.
 fn heap_bytes() -> Option<i64> {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
@@ -251,15 +239,15 @@ fn heap_bytes() -> Option<i64> {
     None
 }
 
-/// What of the process is in memory, `None` on systems that do not tell it as Linux does.
+/// Returns the resident bytes of the process; `None` on systems that do not report them as Linux does.
 fn resident_bytes() -> Option<i64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
     Some(1024 * line.split_whitespace().nth(1)?.parse::<i64>().ok()?)
 }
 
-/// What the driver says the process uses of all heaps, where it says that. Software drivers tell what all processes of the
-/// machine use, which changes at any time, and theirs is memory of the process anyway.
+/// Returns the bytes of all heaps that the process uses, by the driver's report. Software drivers report the memory
+/// of all processes of the machine, which changes at any time, and their memory is the process's anyway.
 fn driver_bytes(ctx: &Context) -> Option<i64> {
     let budget = ctx.memory_budget();
     let used = budget.heaps.iter().map(|heap| heap.used_bytes as i64).sum();
@@ -280,7 +268,7 @@ fn frames_that_run_grow_neither_the_process_nor_what_the_driver_counts() {
         bytes().zip(before).map_or(0, |(after, before)| after - before)
     };
     frame.run_many(&ctx, 3_000, 10);
-    // What is leaked grows every time; threads and allocators that take some pages more do so once.
+    // A leak grows every time; threads and allocators that take some pages more do so once.
     let heap = [0; 3].map(|_| grown(3_000, &heap_bytes));
     assert!(heap.iter().any(|grown| *grown < SLACK[0]), "the heap grows by {heap:?} bytes");
     let process = [0; 3].map(|_| grown(1_000, &resident_bytes));
@@ -290,7 +278,7 @@ fn frames_that_run_grow_neither_the_process_nor_what_the_driver_counts() {
 }
 
 #[test]
-fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_gone() {
+fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_freed() {
     const SIZE: u64 = 3 << 20;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let profile = lvk::DeviceProfile::core_only();
@@ -319,7 +307,7 @@ fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_gone() {
 
 /// Also where the instances are kept for the time when a mesh has moved.
 #[test]
-fn top_level_structures_leave_nothing_on_the_heap() {
+fn tlases_leave_nothing_on_the_heap() {
     const EACH: usize = 300;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(ctx) = device() else { return };

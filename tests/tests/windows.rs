@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use lvk::*;
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::device::vulkan;
 use lvk_tests::random::Random;
-use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::subprocess::on_swiftshader;
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::windows::{TestWindow, desktop};
 use lvk_tests::{TestDevice, device, device_with};
 
@@ -46,17 +46,17 @@ fn fill(ctx: &Context, texture: TextureHandle, color: [f32; 4]) -> Result<Comman
 }
 
 /// One frame of one colour; `None` where nothing could be shown.
-fn show(ctx: &Context, swapchain: SwapchainHandle, color: [f32; 4]) -> Result<Option<SubmitHandle>> {
+fn present_color(ctx: &Context, swapchain: SwapchainHandle, color: [f32; 4]) -> Result<Option<SubmitHandle>> {
     let Some(image) = ctx.next_image(swapchain)? else { return Ok(None) };
     let cmd = fill(ctx, image.texture(), color)?;
     ctx.present(cmd, image).map(Some)
 }
 
 /// Shows frames until the window has the colour: presents come to the screen in their own time.
-fn show_until_seen(ctx: &Context, swapchain: SwapchainHandle, window: &TestWindow, color: [f32; 4]) {
+fn present_until_visible(ctx: &Context, swapchain: SwapchainHandle, window: &TestWindow, color: [f32; 4]) {
     let wanted = [color[0], color[1], color[2]].map(|part| (part * 255.0) as u8);
     for _ in 0..200 {
-        show(ctx, swapchain, color).unwrap();
+        present_color(ctx, swapchain, color).unwrap();
         ctx.wait_idle().unwrap();
         if window.pixel(3, 2) == wanted {
             return;
@@ -90,7 +90,7 @@ fn contexts_without_a_window_use_no_extension_of_window_systems() {
 }
 
 #[test]
-fn pictures_come_to_the_window_and_can_be_read_before() {
+fn images_come_to_the_window_and_can_be_read_before() {
     let Some((window, ctx)) = window() else { return };
     assert!(ctx.capabilities().has(OptionalFeature::Swapchain));
     let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
@@ -106,7 +106,7 @@ fn pictures_come_to_the_window_and_can_be_read_before() {
     // Drawn by an earlier submission, so this one has nothing to do but to present.
     ctx.present(ctx.acquire_command_buffer().unwrap(), image).unwrap();
     for color in [RED, GREEN, BLUE] {
-        show_until_seen(&ctx, *swapchain, &window, color);
+        present_until_visible(&ctx, *swapchain, &window, color);
     }
 }
 
@@ -115,29 +115,29 @@ fn resize_often(window: &TestWindow, ctx: &Context, times: u32) {
     let swapchain = ctx.create_swapchain(&SwapchainDesc { image_count: 3, ..Default::default() }).unwrap();
     let mut random = Random::new(7);
     let (mut resized, mut shown) = (0, 0);
-    // How many sizes a driver notices of those that follow each other fast depends on what else the machine does.
+    // The number of sizes that a driver notices of a fast sequence depends on the load of the machine.
     while resized < times || ctx.swapchain_info(*swapchain).unwrap().rebuilds <= u64::from(times) / 3 {
         assert!(resized < 20 * times, "{:?}", ctx.swapchain_info(*swapchain));
         resized += 1;
         window.resize([1 + random.bits() as u32 % 190, 1 + random.bits() as u32 % 190]);
         ctx.next_frame().unwrap();
         for _ in 0..random.bits() % 3 {
-            shown += u32::from(show(ctx, *swapchain, BLUE).unwrap().is_some());
+            shown += u32::from(present_color(ctx, *swapchain, BLUE).unwrap().is_some());
         }
     }
     assert!(shown > times / 2, "{shown} of {resized}");
     window.resize([33, 21]);
-    // Drivers may notice one picture too late.
+    // Drivers may notice one image too late.
     let fits = |_: &u32| {
-        show(ctx, *swapchain, BLUE).unwrap();
+        present_color(ctx, *swapchain, BLUE).unwrap();
         ctx.swapchain_info(*swapchain).unwrap().extent == [33, 21]
     };
     assert!((0..50).find(fits).is_some(), "{:?}", ctx.swapchain_info(*swapchain));
-    show_until_seen(ctx, *swapchain, window, RED);
+    present_until_visible(ctx, *swapchain, window, RED);
     let info = ctx.swapchain_info(*swapchain).unwrap();
     // Left alone, it stays.
     for _ in 0..5 {
-        show(ctx, *swapchain, GREEN).unwrap();
+        present_color(ctx, *swapchain, GREEN).unwrap();
     }
     assert_eq!(ctx.swapchain_info(*swapchain).unwrap().rebuilds, info.rebuilds);
 }
@@ -162,7 +162,7 @@ fn resizes_are_followed_without_fences_of_presents() {
 
 #[test]
 fn resizes_are_followed_on_another_driver() {
-    without_ray_tracing(resizes_are_followed_on_another_driver, || {
+    on_swiftshader(resizes_are_followed_on_another_driver, || {
         let Some((window, ctx)) = window_with(|desc| desc.max_textures = 64) else { return };
         resize_often(&window, &ctx, 60);
     });
@@ -178,7 +178,7 @@ fn a_lost_surface_is_replaced() {
         let stale = fill(&ctx, image.texture(), RED).unwrap();
         let stale = if lost == 2 { None } else { Some(stale) };
         lvk::test_hooks::lose_surface(&ctx, *swapchain).unwrap();
-        show_until_seen(&ctx, *swapchain, &window, color);
+        present_until_visible(&ctx, *swapchain, &window, color);
         assert_eq!(ctx.swapchain_info(*swapchain).unwrap().rebuilds, lost);
         let late = ctx.present(ctx.acquire_command_buffer().unwrap(), image);
         assert!(message(late).contains("made anew"));
@@ -194,15 +194,15 @@ fn a_lost_surface_is_replaced_though_a_present_never_ends() {
     let Some((window, ctx)) = window() else { return };
     let desc = SwapchainDesc { debug_name: "stalling window", ..Default::default() };
     let swapchain = ctx.create_swapchain(&desc).unwrap();
-    show(&ctx, *swapchain, RED).unwrap().unwrap();
+    present_color(&ctx, *swapchain, RED).unwrap().unwrap();
     if !lvk::test_hooks::stall_present(&ctx, *swapchain).unwrap() {
         return eprintln!("NOT TESTED, {} tells of no presents", ctx.capabilities().device_name);
     }
-    listen();
+    capture_warnings();
     lvk::test_hooks::lose_surface(&ctx, *swapchain).unwrap();
-    show(&ctx, *swapchain, GREEN).unwrap().unwrap();
+    present_color(&ctx, *swapchain, GREEN).unwrap().unwrap();
     assert_eq!(take_warnings("stalling window").len(), 1);
-    show_until_seen(&ctx, *swapchain, &window, BLUE);
+    present_until_visible(&ctx, *swapchain, &window, BLUE);
     // Nor does its end.
     assert!(lvk::test_hooks::stall_present(&ctx, *swapchain).unwrap());
     drop(swapchain);
@@ -211,7 +211,7 @@ fn a_lost_surface_is_replaced_though_a_present_never_ends() {
 }
 
 #[test]
-fn three_windows_show_their_own_pictures() {
+fn three_windows_render_their_own_images() {
     let Some((first, ctx)) = window() else { return };
     let Some(desktop) = desktop() else { return };
     let windows = [first, desktop.window([40, 30]), desktop.window([20, 50])];
@@ -232,7 +232,7 @@ fn three_windows_show_their_own_pictures() {
         }
     }
     for ((swapchain, window), color) in swapchains.iter().zip(&windows).zip([RED, GREEN, BLUE]) {
-        show_until_seen(&ctx, **swapchain, window, color);
+        present_until_visible(&ctx, **swapchain, window, color);
     }
     for ((swapchain, window), extent) in swapchains.iter().zip(&windows).zip([[64, 48], [40, 30], [20, 50]]) {
         assert_eq!(ctx.swapchain_info(**swapchain).unwrap().extent, extent);
@@ -248,13 +248,13 @@ fn switch_modes(ctx: &Context) -> (u64, usize) {
     for mode in modes.iter().rev().chain(&modes) {
         ctx.set_present_mode(*swapchain, &[*mode]).unwrap();
         for color in [RED, GREEN, BLUE] {
-            show(ctx, *swapchain, color).unwrap().unwrap();
+            present_color(ctx, *swapchain, color).unwrap().unwrap();
         }
         assert_eq!(ctx.swapchain_info(*swapchain).unwrap().present_mode, *mode);
     }
     let all = [PresentMode::Mailbox, PresentMode::Immediate, PresentMode::FifoRelaxed, PresentMode::Fifo];
     ctx.set_present_mode(*swapchain, &all).unwrap();
-    show(ctx, *swapchain, RED).unwrap().unwrap();
+    present_color(ctx, *swapchain, RED).unwrap().unwrap();
     let info = ctx.swapchain_info(*swapchain).unwrap();
     assert_eq!(Some(info.present_mode), all.into_iter().find(|mode| info.present_modes.contains(mode)));
     (info.rebuilds, modes.len())
@@ -305,7 +305,7 @@ fn images_that_are_dropped_or_forgotten_come_again() {
     ctx.next_image(*swapchain).unwrap().unwrap();
     ctx.resize_swapchain(*swapchain, [50, 50]).unwrap();
     window.resize([50, 50]);
-    show_until_seen(&ctx, *swapchain, &window, BLUE);
+    present_until_visible(&ctx, *swapchain, &window, BLUE);
     let taken = ctx.next_image(*swapchain).unwrap().unwrap();
     let cmd = fill(&ctx, taken.texture(), RED).unwrap();
     drop(swapchain);
@@ -363,7 +363,7 @@ fn views_of_images_may_outlive_the_swapchain() {
     let view = ctx.create_texture_view(&view).unwrap();
     let cmd = fill(&ctx, *view, GREEN).unwrap();
     ctx.present(cmd, image).unwrap();
-    show_until_seen(&ctx, *swapchain, &window, GREEN);
+    present_until_visible(&ctx, *swapchain, &window, GREEN);
     drop(swapchain);
     ctx.wait_idle().unwrap();
     assert!(message(ctx.submit(fill(&ctx, *view, RED).unwrap())).contains("made anew"));
@@ -378,12 +378,12 @@ fn minimised_windows_have_no_images() {
     assert_eq!(ctx.swapchain_info(*swapchain).unwrap().extent, [0, 0]);
     assert!(ctx.next_image(*swapchain).unwrap().is_none());
     ctx.resize_swapchain(*swapchain, [64, 48]).unwrap();
-    show_until_seen(&ctx, *swapchain, &window, RED);
+    present_until_visible(&ctx, *swapchain, &window, RED);
     for extent in [[0, 48], [64, 0], [0, 0]] {
         ctx.resize_swapchain(*swapchain, extent).unwrap();
-        assert!(show(&ctx, *swapchain, BLUE).unwrap().is_none());
+        assert!(present_color(&ctx, *swapchain, BLUE).unwrap().is_none());
         ctx.resize_swapchain(*swapchain, [64, 48]).unwrap();
-        assert!(show(&ctx, *swapchain, BLUE).unwrap().is_some());
+        assert!(present_color(&ctx, *swapchain, BLUE).unwrap().is_some());
     }
 }
 
@@ -395,7 +395,7 @@ fn neither_an_image_nor_a_new_swapchain_waits_for_the_gpu() {
     let desc = TextureDesc { extent: [2048, 2048], usage: TextureUsage::TARGET, ..Default::default() };
     let heavy = ctx.create_texture(&desc).unwrap();
     for _ in 0..3 {
-        show(&ctx, *swapchain, RED).unwrap().unwrap();
+        present_color(&ctx, *swapchain, RED).unwrap().unwrap();
     }
     ctx.wait_idle().unwrap();
     let slow = || {
@@ -419,7 +419,7 @@ fn neither_an_image_nor_a_new_swapchain_waits_for_the_gpu() {
     assert!(!ctx.is_done(first).unwrap(), "a new swapchain waited for the GPU");
     let second = ctx.present(fill(&ctx, image.texture(), BLUE).unwrap(), image).unwrap();
     assert!(second > drawn);
-    show_until_seen(&ctx, *swapchain, &window, BLUE);
+    present_until_visible(&ctx, *swapchain, &window, BLUE);
 }
 
 #[test]
@@ -438,18 +438,18 @@ fn frames_in_flight_overlap_with_one_image_each() {
         ctx.present(fill(&ctx, image.texture(), color).unwrap(), image).unwrap();
     }
     assert!(textures.len() > 1 && textures.len() <= count, "{textures:?}");
-    show_until_seen(&ctx, *swapchain, &window, BLUE);
+    present_until_visible(&ctx, *swapchain, &window, BLUE);
 }
 
 #[test]
 fn a_window_that_is_closed_too_early_is_an_error_and_no_more() {
     let Some((window, ctx)) = window() else { return };
     let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
-    show_until_seen(&ctx, *swapchain, &window, RED);
+    present_until_visible(&ctx, *swapchain, &window, RED);
     window.close();
     let mut told = None;
     for _ in 0..8 {
-        match show(&ctx, *swapchain, RED) {
+        match present_color(&ctx, *swapchain, RED) {
             Ok(_) => {}
             Err(error) => told = Some(error),
         }
@@ -462,7 +462,7 @@ fn a_window_that_is_closed_too_early_is_an_error_and_no_more() {
     let other = desktop.window([16, 16]);
     let desc = SwapchainDesc { window: Some(other.clone()), ..Default::default() };
     let swapchain = ctx.create_swapchain(&desc).unwrap();
-    show_until_seen(&ctx, *swapchain, &other, GREEN);
+    present_until_visible(&ctx, *swapchain, &other, GREEN);
 }
 
 #[test]
@@ -489,7 +489,7 @@ fn what_windows_cannot_have_is_refused() {
         ..Default::default()
     };
     let swapchain = ctx.create_swapchain(&wishes).unwrap();
-    show(&ctx, *swapchain, RED).unwrap();
+    present_color(&ctx, *swapchain, RED).unwrap();
     let handle = *swapchain;
     drop(swapchain);
     assert!(matches!(ctx.next_image(handle), Err(Error::StaleHandle { kind: "swapchain" })));

@@ -1,6 +1,9 @@
-//! The binding numbers of the bindless descriptor set, for Rust and for GLSL.
+//! The binding numbers of the bindless descriptor set, for Rust and for GLSL, and its numbers of descriptors.
 //!
 //! The shader preamble and the check of foreign SPIR-V are both generated from these constants.
+
+use crate::gpu::Gpu;
+use crate::gpu::caps::descriptor_limits::ReservedDescriptors;
 
 /// The descriptor set that holds everything.
 pub(crate) const SET: u32 = 0;
@@ -33,3 +36,30 @@ pub(crate) const BINDINGS: [(u32, &str, &str); 6] = [
     (ACCEL_STRUCTS, "LVK_BINDING_ACCEL_STRUCTS", "top-level acceleration structures"),
     (TLAS_TABLE, "LVK_BINDING_TLAS_TABLE", "the table of top-level structures"),
 ];
+
+/// Numbers of descriptors of the bindless set beside textures and samplers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DescriptorCounts {
+    /// Top-level acceleration structures, of either form.
+    pub(super) tlas_slots: u32,
+    /// Top-level acceleration structures of the device.
+    pub(super) hardware_tlas: u32,
+    /// Tables of top-level acceleration structures.
+    pub(super) tlas_tables: u32,
+    /// What they count for together, with the set of a pass's own targets.
+    pub(super) reserved: ReservedDescriptors,
+}
+
+impl DescriptorCounts {
+    pub(super) fn new(gpu: &Gpu) -> Self {
+        let limits = &gpu.caps.limits;
+        let tlas_slots = if gpu.has_acceleration_structures() { limits.max_bindless_tlas } else { 0 };
+        let hardware_tlas = if gpu.accel.is_some() { limits.max_bindless_tlas } else { 0 };
+        let tlas_tables = tlas_slots.min(1);
+        let reserved = ReservedDescriptors {
+            in_set: hardware_tlas + tlas_tables,
+            targets: limits.max_color_targets + limits.max_input_attachments,
+        };
+        Self { tlas_slots, hardware_tlas, tlas_tables, reserved }
+    }
+}

@@ -3,7 +3,6 @@
 pub(crate) mod index_checks;
 pub(crate) mod input_attachments;
 pub(crate) mod layout;
-mod room;
 pub(crate) mod slot_allocator;
 mod slot_array;
 pub(crate) mod table;

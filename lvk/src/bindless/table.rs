@@ -5,8 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::index_checks::{BindlessArray, CheckPlan, IndexChecks};
-use super::layout;
-use super::room;
+use super::layout::{self, DescriptorCounts};
 use super::slot_allocator::Slots;
 use super::slot_array::{SlotArray, WrittenDescriptors};
 use super::yuv_slots::{YuvSlot, YuvSlots};
@@ -69,14 +68,14 @@ pub(crate) const TEXTURE_ARRAYS: [BindlessArray; 2] = [BindlessArray::Textures, 
 
 impl Bindless {
     pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, yuv: YuvSlots, check_indices: bool) -> Result<Self> {
-        let left = gpu.descriptor_limits().budget(&room::reserved_descriptors(gpu), yuv.descriptors());
+        let others = DescriptorCounts::new(gpu);
+        let left = gpu.descriptor_limits().budget(&others.reserved, yuv.descriptors());
         let conversions = yuv.samplers();
         let textures = largest_fitting(left.texture_count(max_textures)?, |textures| {
             is_supported(gpu, &binding_counts(gpu, textures, left.samplers), &conversions)
         })?;
-        let slots = room::tlas_slot_count(gpu);
         let counts = binding_counts(gpu, textures, left.samplers);
-        let capacities = [textures, left.samplers, textures, slots];
+        let capacities = [textures, left.samplers, textures, others.tlas_slots];
         let checks = if check_indices { Some(IndexChecks::new(gpu, capacities)?) } else { None };
         let set_layout = create_layout(gpu, &counts, &conversions)?;
         let (pool, set) = match create_set(gpu, set_layout, &counts, yuv.descriptors()) {
@@ -92,7 +91,7 @@ impl Bindless {
             textures: SlotArray::new("number of textures", textures),
             shown: [WrittenDescriptors::new(textures), WrittenDescriptors::new(textures)],
             samplers: SlotArray::new("number of samplers", left.samplers),
-            tlas: SlotArray::new("number of top-level acceleration structures", slots),
+            tlas: SlotArray::new("number of top-level acceleration structures", others.tlas_slots),
             yuv,
         };
         let entries = Mutex::new(Rank::Bindless, entries);
@@ -403,16 +402,13 @@ type BindingCount = (u32, vk::DescriptorType, u32);
 
 /// The bindings with so many textures and samplers, without those of Y'CbCr.
 fn binding_counts(gpu: &Gpu, textures: u32, samplers: u32) -> [BindingCount; 5] {
+    let others = DescriptorCounts::new(gpu);
     [
         (layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE, textures),
         (layout::SAMPLERS, vk::DescriptorType::SAMPLER, samplers),
         (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
-        (
-            layout::ACCEL_STRUCTS,
-            vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
-            room::hardware_tlas_count(gpu),
-        ),
-        (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, room::tlas_table_count(gpu)),
+        (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, others.hardware_tlas),
+        (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, others.tlas_tables),
     ]
 }
 
@@ -427,7 +423,7 @@ fn is_supported(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> bool
 }
 
 fn create_layout(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> Result<vk::DescriptorSetLayout> {
-    // SAFETY: the counts are within the limits of descriptors beside everything else that they count for (`room`), and the
+    // SAFETY: the counts are within the limits of descriptors beside everything else that they count for (`DescriptorCounts`), and the
     // device was asked whether it supports the layout.
     with_layout_info(counts, yuv, |info| unsafe { gpu.device.create_descriptor_set_layout(info, None) })
         .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::room;
+use super::layout::DescriptorCounts;
 use super::slot_array::SlotArray;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -55,7 +55,7 @@ impl YuvSlots {
             textures: textures.min(Self::MAX_TEXTURES) + 1,
             descriptors: made().map(|sampler| sampler.descriptors).max().unwrap_or(1),
         };
-        let room = gpu.descriptor_limits().yuv_textures(&room::reserved_descriptors(gpu), &wish)?;
+        let room = gpu.descriptor_limits().yuv_textures(&DescriptorCounts::new(gpu).reserved, &wish)?;
         let (mut ranges, mut first) = (Vec::with_capacity(descs.len()), 0);
         for (desc, sampler) in samplers {
             let own = if sampler.is_ok() { room } else { 0 };

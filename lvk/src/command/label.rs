@@ -1,7 +1,7 @@
 //! Labels: what debuggers show of a command buffer, and the scopes of a profile.
 
 use super::CommandBuffer;
-use super::render_pass::RenderPass;
+use super::render::pass::RenderPass;
 
 impl CommandBuffer {
     /// Opens a labelled range that debuggers show (`vkCmdBeginDebugUtilsLabelEXT`), a scope of

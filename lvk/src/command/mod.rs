@@ -1,22 +1,15 @@
 //! Command buffers. Every command checks its arguments, places the barriers it needs and records itself.
 
 pub(crate) mod accesses;
-pub(crate) mod attachment_desc;
-mod attachments;
 pub(crate) mod barriers;
 pub(crate) mod bind;
 pub(crate) mod build_blas;
 pub(crate) mod compute;
 mod copy_accel;
 pub(crate) mod dependencies;
-mod draw_mesh;
-mod dynamic_state;
-pub(crate) mod indirect_count;
 mod kernel_dispatch;
 mod label;
-mod local_read;
 mod open_build;
-mod pass_area;
 mod pending_visibility;
 #[cfg(feature = "window")]
 mod present;
@@ -25,10 +18,7 @@ pub(crate) mod query;
 mod query_usage;
 pub(crate) mod queue_support;
 mod recording_state;
-pub(crate) mod render_pass;
-pub(crate) mod render_pass_desc;
-mod resolve;
-mod shading_rate;
+pub(crate) mod render;
 #[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
 pub(crate) mod software_ray_query;
 mod subresource_accesses;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::render_pass::RenderPass;
+use super::render::pass::RenderPass;
 use crate::error::{Error, Result};
 use crate::handle::QueryPoolHandle;
 use crate::resource::QueryPool;

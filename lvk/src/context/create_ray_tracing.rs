@@ -7,7 +7,7 @@ use super::create::NO_SLOT;
 use super::holder::Holder;
 use crate::error::{Error, Result};
 use crate::handle::{RayTracingLibraryHandle, RayTracingPipelineHandle};
-use crate::pipeline::ray_tracing::RayTracingPipelineDesc;
+use crate::pipeline::ray_tracing_desc::RayTracingPipelineDesc;
 use crate::pipeline::ray_tracing_library::RayTracingLibraryDesc;
 use crate::pipeline::{RayTracingLibrary, RayTracingPipeline};
 

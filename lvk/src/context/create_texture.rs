@@ -82,7 +82,8 @@ impl Context {
     /// Writes the first contents at once, which nothing has to wait for then.
     fn fill_with_host_copy(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
         let (shared, image) = (self.device_state(), &texture.image);
-        host_copy::fill_from_host(&shared.gpu, image, contents)?;
+        let range = image.barrier_image().range(image.shape.all_subresources());
+        host_copy::fill_from_host(&shared.gpu, image.raw, range, contents)?;
         shared.submitter.mark_host_written(image.id, image.shape);
         Ok(())
     }

@@ -10,9 +10,11 @@ use super::graphics_check::{check_modules, check_stages};
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute};
 use super::local_read::{InputIndices, inputs_read, inputs_written, writes_color};
 use super::pipeline_layout::PipelineBase;
-use super::rasterization::{DepthBias, multisampling, rasterization};
+use super::rasterization::DepthBias;
+use super::rasterization_state::{multisampling, rasterization};
+use super::render_modules::RenderModules;
 use super::rendering_formats::RenderingFormats;
-use super::shader_module::ShaderModule;
+use super::shader_module::ModuleLookup;
 use super::stage::{Specialization, stage_info};
 use crate::barrier::Stages;
 use crate::bindless::input_attachments::InputAttachmentMask;
@@ -20,51 +22,6 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::gpu::caps::shading_rate::ShadingRate;
-use crate::handle::ShaderModuleHandle;
-use crate::shader::ShaderStage;
-
-/// The shader modules of a graphics pipeline.
-pub(super) struct RenderModules {
-    pub(super) vertex: Option<Arc<ShaderModule>>,
-    pub(super) task: Option<Arc<ShaderModule>>,
-    pub(super) mesh: Option<Arc<ShaderModule>>,
-    pub(super) tess_control: Option<Arc<ShaderModule>>,
-    pub(super) tess_eval: Option<Arc<ShaderModule>>,
-    pub(super) geometry: Option<Arc<ShaderModule>>,
-    pub(super) fragment: Option<Arc<ShaderModule>>,
-}
-
-impl RenderModules {
-    fn resolve(desc: &RenderPipelineDesc<'_>, find: FindModule<'_>) -> Result<Self> {
-        let find = |handle: Option<ShaderModuleHandle>| handle.map(find).transpose();
-        Ok(Self {
-            vertex: find(desc.vertex)?,
-            task: find(desc.task)?,
-            mesh: find(desc.mesh)?,
-            tess_control: find(desc.tess_control)?,
-            tess_eval: find(desc.tess_eval)?,
-            geometry: find(desc.geometry)?,
-            fragment: find(desc.fragment)?,
-        })
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = &ShaderModule> + Clone {
-        let before = [&self.vertex, &self.task, &self.mesh, &self.tess_control, &self.tess_eval];
-        before.into_iter().chain([&self.geometry, &self.fragment]).filter_map(Option::as_deref)
-    }
-
-    /// Stages of the pipeline in which rays are queried.
-    fn query_stages(&self) -> Stages {
-        let stage = |module: &ShaderModule| match module.stage {
-            ShaderStage::Fragment => Stages::FRAGMENT,
-            _ => Stages::PRE_RASTER,
-        };
-        self.iter().filter(|module| module.reflection.ray_query).map(stage).collect()
-    }
-}
-
-/// Looks a module up.
-type FindModule<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>;
 
 /// Where a pipeline gets its primitives from, which decides how it is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -146,7 +103,7 @@ impl RenderPipeline {
         gpu: &Arc<Gpu>,
         base: PipelineBase,
         desc: &RenderPipelineDesc<'_>,
-        find: FindModule<'_>,
+        find: ModuleLookup<'_>,
     ) -> Result<Self> {
         check_stages(gpu, desc)?;
         let modules = RenderModules::resolve(desc, find)?;

@@ -2,10 +2,10 @@
 
 use ash::vk;
 
-use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
 use super::local_read::check_inputs;
 use super::rasterization::Topology;
+use super::render_modules::RenderModules;
 use super::state_check::check_state;
 use super::workgroup_memory::{WorkgroupMemoryLimits, check_workgroup_memory};
 use super::workgroup_size::{WorkgroupLimits, check_workgroup_size};

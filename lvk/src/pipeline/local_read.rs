@@ -2,8 +2,8 @@
 
 use ash::vk;
 
-use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
+use super::render_modules::RenderModules;
 use crate::bindless::input_attachments::{InputAttachment, InputAttachmentMask};
 use crate::error::{Error, Result};
 use crate::format::{Format, NumericFormat};

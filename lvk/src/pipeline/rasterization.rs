@@ -2,7 +2,6 @@
 
 use ash::vk;
 
-use super::graphics_desc::RenderPipelineDesc;
 use crate::shader::Primitive;
 
 /// What vertices make.
@@ -111,42 +110,4 @@ impl DepthBias {
     pub(crate) fn is_finite(&self) -> bool {
         [self.constant, self.slope, self.clamp].iter().all(|part| part.is_finite())
     }
-}
-
-/// What Vulkan takes for the way from primitives to fragments.
-pub(super) fn rasterization(
-    desc: &RenderPipelineDesc<'_>,
-) -> vk::PipelineRasterizationStateCreateInfo<'static> {
-    let cull = match desc.cull {
-        CullMode::None => vk::CullModeFlags::NONE,
-        CullMode::Front => vk::CullModeFlags::FRONT,
-        CullMode::Back => vk::CullModeFlags::BACK,
-    };
-    let front = match desc.front_face {
-        FrontFace::CounterClockwise => vk::FrontFace::COUNTER_CLOCKWISE,
-        FrontFace::Clockwise => vk::FrontFace::CLOCKWISE,
-    };
-    let polygon = match desc.polygon {
-        PolygonMode::Fill => vk::PolygonMode::FILL,
-        PolygonMode::Line => vk::PolygonMode::LINE,
-        PolygonMode::Point => vk::PolygonMode::POINT,
-    };
-    vk::PipelineRasterizationStateCreateInfo::default()
-        .cull_mode(cull)
-        .front_face(front)
-        .polygon_mode(polygon)
-        .line_width(desc.line_width)
-        .depth_clamp_enable(desc.depth_clamp)
-        .depth_bias_enable(desc.depth_bias.is_some())
-}
-
-/// What Vulkan takes for samples. A number of samples is its own bit.
-pub(super) fn multisampling(
-    desc: &RenderPipelineDesc<'_>,
-) -> vk::PipelineMultisampleStateCreateInfo<'static> {
-    vk::PipelineMultisampleStateCreateInfo::default()
-        .rasterization_samples(vk::SampleCountFlags::from_raw(desc.samples))
-        .sample_shading_enable(desc.sample_shading > 0.0)
-        .min_sample_shading(desc.sample_shading)
-        .alpha_to_coverage_enable(desc.alpha_to_coverage)
 }

@@ -4,104 +4,22 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::deferred_operation::compile;
 use super::pipeline_layout::PipelineBase;
+use super::ray_tracing_compile::{LinkedLibraries, check_interface, compile_groups};
+use super::ray_tracing_desc::RayTracingPipelineDesc;
 use super::ray_tracing_library::RayTracingLibrary;
 use super::ray_tracing_stack::StackSizes;
 use super::sbt::{GroupHandles, SbtLimits, SbtPlan, SbtRegion, plan_sbt, sbt_buffer_bytes, write_sbt};
 use super::sbt_order::{PerRegion, sbt_order};
-use super::shader_groups::{CompiledGroups, ModuleLookup, ShaderGroups};
-use super::shader_module::ShaderModule;
-use super::stage::{Specialization, SpecializationConstant, stage_info};
-use crate::error::{Error, Result, check_limit};
+use super::shader_groups::{CompiledGroups, ShaderGroups};
+use super::shader_module::ModuleLookup;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
 use crate::gpu::start::driver_workarounds::with_shared_device_lock;
-use crate::handle::{RayTracingLibraryHandle, ShaderModuleHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shader::ShaderStage;
-
-/// Shaders that run when a ray meets a geometry. With an intersection shader the group is for boxes, without for
-/// triangles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct HitGroup<'a> {
-    /// Runs for the closest hit.
-    pub closest_hit: Option<ShaderModuleHandle>,
-    /// Runs for hits of geometry that is not opaque, and may ignore them.
-    pub any_hit: Option<ShaderModuleHandle>,
-    /// Decides whether a ray hits what is in a box.
-    pub intersection: Option<ShaderModuleHandle>,
-    /// Bytes the group's shaders read through `shaderRecordEXT`; see [`record_bytes`].
-    pub record: &'a [u8],
-}
-
-/// The bytes of a shader record: what a shader reads as a block `layout(shaderRecordEXT, scalar) buffer`.
-///
-/// The struct must be laid out as the block: `#[repr(C)]` and `scalar` agree where every member is aligned to its
-/// largest scalar.
-pub fn record_bytes<T: bytemuck::NoUninit>(record: &T) -> &[u8] {
-    bytemuck::bytes_of(record)
-}
-
-/// Describes a ray tracing pipeline. The order of the lists is the order of the shader binding table.
-///
-/// The shaders of `libraries` stand behind the pipeline's own in each of the four lists, library by library: with two
-/// own miss shaders, the first miss shader of the first library has the miss index 2.
-#[derive(Debug, Clone, Copy)]
-pub struct RayTracingPipelineDesc<'a> {
-    /// Ray generation shaders; traces name one by its place, the first by default. At least one.
-    pub ray_gen: &'a [ShaderModuleHandle],
-    /// Miss shaders, by the miss index of `traceRayEXT`.
-    pub miss: &'a [ShaderModuleHandle],
-    /// Hit groups, by the instance's hit-group offset and the arguments of `traceRayEXT`.
-    pub hit_groups: &'a [HitGroup<'a>],
-    /// Callable shaders, by the index of `executeCallableEXT`.
-    pub callable: &'a [ShaderModuleHandle],
-    /// Bytes the ray generation shaders read through `shaderRecordEXT`, in the order of `ray_gen`; see
-    /// [`record_bytes`]. Shaders beyond the end of the list have no record.
-    pub ray_gen_records: &'a [&'a [u8]],
-    /// As `ray_gen_records`, for `miss`.
-    pub miss_records: &'a [&'a [u8]],
-    /// As `ray_gen_records`, for `callable`.
-    pub callable_records: &'a [&'a [u8]],
-    /// Libraries whose shaders belong to the pipeline too. They may be destroyed before it.
-    pub libraries: &'a [RayTracingLibraryHandle],
-    /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays.
-    pub max_recursion: u32,
-    /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others.
-    pub max_callable_depth: u32,
-    /// Largest payload of any shader in bytes. Counts only with libraries: see
-    /// [`RayTracingLibraryDesc`](crate::RayTracingLibraryDesc).
-    pub max_payload_bytes: u32,
-    /// Largest hit attributes of any shader in bytes, as `max_payload_bytes`; those of triangles have 8.
-    pub max_hit_attribute_bytes: u32,
-    /// Values of specialization constants, of the pipeline's own shaders.
-    pub specialization: &'a [SpecializationConstant],
-    /// Name in error messages, validation messages and debuggers.
-    pub debug_name: &'a str,
-}
-
-impl Default for RayTracingPipelineDesc<'_> {
-    fn default() -> Self {
-        Self {
-            ray_gen: &[],
-            miss: &[],
-            hit_groups: &[],
-            callable: &[],
-            ray_gen_records: &[],
-            miss_records: &[],
-            callable_records: &[],
-            libraries: &[],
-            max_recursion: 1,
-            max_callable_depth: 1,
-            max_payload_bytes: 64,
-            max_hit_attribute_bytes: 8,
-            specialization: &[],
-            debug_name: "ray tracing pipeline",
-        }
-    }
-}
 
 /// A ray tracing pipeline with its shader binding table, destroyed on drop.
 pub(crate) struct RayTracingPipeline {
@@ -157,7 +75,14 @@ impl RayTracingPipeline {
         let records = linked_records(&parts);
         let plan = plan_sbt(name, &limits, &records)?;
         let table = create_sbt_buffer(gpu, name, sbt_buffer_bytes(&plan, limits.base_alignment))?;
-        let raw = compile_groups(gpu, base, desc, &groups, libraries, vk::PipelineCreateFlags::empty())?;
+        let raw = compile_groups(
+            gpu,
+            base,
+            desc,
+            &groups,
+            &linked_libraries(libraries),
+            vk::PipelineCreateFlags::empty(),
+        )?;
         gpu.name(raw, name);
         let pipeline = Self {
             raw,
@@ -223,66 +148,11 @@ impl Drop for RayTracingPipeline {
     }
 }
 
-/// Fails unless the device takes the depth of recursion, and what libraries have to agree on.
-pub(super) fn check_interface(gpu: &Gpu, desc: &RayTracingPipelineDesc<'_>) -> Result<()> {
-    let (name, limits) = (desc.debug_name, &gpu.caps.limits);
-    if desc.max_recursion == 0 {
-        return Err(Error::usage(name, "a recursion depth of 0 traces no ray; 1 is the least"));
+fn linked_libraries(libraries: &[Arc<RayTracingLibrary>]) -> LinkedLibraries {
+    LinkedLibraries {
+        raw: libraries.iter().map(|library| library.raw).collect(),
+        ray_gen: libraries.iter().find_map(|library| library.ray_gen.clone()),
     }
-    check_limit(name, "recursion depth", desc.max_recursion.into(), limits.max_ray_recursion.into())?;
-    let attributes = desc.max_hit_attribute_bytes.into();
-    check_limit(name, "hit attributes in bytes", attributes, limits.max_hit_attribute_bytes.into())
-}
-
-/// Compiles groups as a pipeline that is linked with `libraries`, or as a library, as `flags` say.
-pub(super) fn compile_groups(
-    gpu: &Gpu,
-    base: PipelineBase,
-    desc: &RayTracingPipelineDesc<'_>,
-    groups: &ShaderGroups,
-    libraries: &[Arc<RayTracingLibrary>],
-    flags: vk::PipelineCreateFlags,
-) -> Result<vk::Pipeline> {
-    let modules = groups.modules.iter().map(|module| &**module);
-    let constants = Specialization::new(desc.debug_name, desc.specialization, modules.clone())?;
-    let constants = constants.info();
-    let stand_in = placeholder_stage(gpu, groups, libraries);
-    let modules = modules.chain(stand_in.as_deref());
-    let stages: Vec<_> = modules.map(|module| stage_info(module, &constants)).collect();
-    let dynamic = [vk::DynamicState::RAY_TRACING_PIPELINE_STACK_SIZE_KHR];
-    let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-    let libraries: Vec<_> = libraries.iter().map(|library| library.raw).collect();
-    let linked = vk::PipelineLibraryCreateInfoKHR::default().libraries(&libraries);
-    let interface = vk::RayTracingPipelineInterfaceCreateInfoKHR::default()
-        .max_pipeline_ray_payload_size(desc.max_payload_bytes)
-        .max_pipeline_ray_hit_attribute_size(desc.max_hit_attribute_bytes);
-    let mut info = vk::RayTracingPipelineCreateInfoKHR::default()
-        .flags(flags)
-        .stages(&stages)
-        .groups(&groups.infos)
-        .max_pipeline_ray_recursion_depth(desc.max_recursion)
-        .dynamic_state(&dynamic)
-        .layout(base.layout);
-    if flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) || !libraries.is_empty() {
-        groups.check_sizes(desc)?;
-        info = info.library_info(&linked).library_interface(&interface);
-    }
-    // SAFETY: modules, layout and libraries are alive, the recursion depth is within the limit, and the libraries
-    // were made with the same layout and agree on the interface.
-    unsafe { compile(gpu, base.cache, &info) }
-}
-
-/// A stage in no group, for lavapipe: it hands push constants only to pipelines that were given a ray generation shader
-/// outside of their libraries.
-fn placeholder_stage(
-    gpu: &Gpu,
-    groups: &ShaderGroups,
-    libraries: &[Arc<RayTracingLibrary>],
-) -> Option<Arc<ShaderModule>> {
-    if gpu.caps.driver_name != "llvmpipe" || groups.list.counts().ray_gen > 0 {
-        return None;
-    }
-    libraries.iter().find_map(|library| library.ray_gen.clone())
 }
 
 /// The records of all parts of a pipeline, as its table has them.

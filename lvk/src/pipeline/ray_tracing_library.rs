@@ -5,9 +5,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::pipeline_layout::PipelineBase;
-use super::ray_tracing::{HitGroup, RayTracingPipelineDesc, check_interface, compile_groups};
-use super::shader_groups::{CompiledGroups, ModuleLookup, ShaderGroups};
-use super::shader_module::ShaderModule;
+use super::ray_tracing_compile::{LinkedLibraries, check_interface, compile_groups};
+use super::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
+use super::shader_groups::{CompiledGroups, ShaderGroups};
+use super::shader_module::{ModuleLookup, ShaderModule};
 use super::stage::SpecializationConstant;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -145,7 +146,14 @@ impl RayTracingLibrary {
         if groups.infos.is_empty() {
             return Err(Error::usage(name, "a library needs at least one shader or hit group"));
         }
-        let raw = compile_groups(gpu, base, desc, &groups, &[], vk::PipelineCreateFlags::LIBRARY_KHR)?;
+        let raw = compile_groups(
+            gpu,
+            base,
+            desc,
+            &groups,
+            &LinkedLibraries::default(),
+            vk::PipelineCreateFlags::LIBRARY_KHR,
+        )?;
         gpu.name(raw, name);
         let ray_gen = groups.modules.iter().find(|module| module.stage == ShaderStage::RayGen).cloned();
         Ok(Self {

@@ -5,15 +5,12 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::ray_tracing::{HitGroup, RayTracingPipelineDesc};
+use super::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
 use super::sbt_order::PerRegion;
-use super::shader_module::ShaderModule;
+use super::shader_module::{ModuleLookup, ShaderModule};
 use crate::error::{Error, Result};
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
-
-/// Finds the module of a handle.
-pub(crate) type ModuleLookup<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>;
 
 /// What a pipeline needs to know of shader groups once they are compiled, its own or a library's.
 #[derive(Debug, Default)]

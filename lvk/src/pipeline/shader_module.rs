@@ -8,9 +8,13 @@ use crate::bindless::Bindless;
 use crate::bindless::index_checks::CheckPlan;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::handle::ShaderModuleHandle;
 use crate::shader::spirv::reflect::reflect;
 use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};
 use crate::shader::{check_capabilities, check_stage, compile, with_checked_indices};
+
+/// Finds the module of a handle.
+pub(crate) type ModuleLookup<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>;
 
 /// A compiled module, destroyed on drop.
 pub(crate) struct ShaderModule {

@@ -3,9 +3,9 @@
 use ash::vk;
 use spirv::Capability;
 
-use super::graphics::RenderModules;
 use super::graphics_desc::RenderPipelineDesc;
 use super::rasterization::PolygonMode;
+use super::render_modules::RenderModules;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;

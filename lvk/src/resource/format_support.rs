@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::image::raw_usage;
+use super::image_usage::raw_usage;
 use super::texture_desc::TextureUsage;
 use crate::format::Format;
 use crate::gpu::Gpu;

@@ -2,7 +2,6 @@
 
 use ash::vk;
 
-use super::image::Image;
 use super::region::Region;
 use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
 use crate::error::Result;
@@ -31,7 +30,13 @@ fn is_plain(desc: &TextureDesc<'_>) -> bool {
 }
 
 /// Writes the first contents of a new image that [`can_fill_from_host`], region by region, each with all of its bytes.
-pub(crate) fn fill_from_host(gpu: &Gpu, image: &Image, contents: &[(Region, &[u8])]) -> Result<()> {
+/// `range` is the whole image.
+pub(crate) fn fill_from_host(
+    gpu: &Gpu,
+    image: vk::Image,
+    range: vk::ImageSubresourceRange,
+    contents: &[(Region, &[u8])],
+) -> Result<()> {
     let Some(copies) = &gpu.host_copies else { return Ok(()) };
     let copy = |(region, bytes): &(Region, &[u8])| {
         debug_assert_eq!(region.bytes(), bytes.len() as u64);
@@ -43,9 +48,8 @@ pub(crate) fn fill_from_host(gpu: &Gpu, image: &Image, contents: &[(Region, &[u8
         copy
     };
     let copies_to_make: Vec<_> = contents.iter().map(copy).collect();
-    let range = image.barrier_image().range(image.shape.all_subresources());
     // SAFETY: the image is new and made for it; the regions are different mips of it and have all their bytes.
-    unsafe { copies.write_image(image.raw, range, &copies_to_make) }
+    unsafe { copies.write_image(image, range, &copies_to_make) }
 }
 
 #[cfg(test)]

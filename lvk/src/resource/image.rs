@@ -8,6 +8,7 @@ use ash::vk;
 
 use super::host_copy;
 use super::image_check::{ImagePlan, check_image};
+use super::image_usage::usage_from_features;
 use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
 use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
@@ -246,36 +247,4 @@ pub(crate) fn raw_range(aspect_mask: vk::ImageAspectFlags, part: Subresources) -
         base_array_layer: part.base_layer,
         layer_count: part.layer_count,
     }
-}
-
-/// A usage by its Vulkan name.
-pub(crate) fn raw_usage(usage: TextureUsage, format: Format) -> vk::ImageUsageFlags {
-    let target = if format.is_color() {
-        vk::ImageUsageFlags::COLOR_ATTACHMENT
-    } else {
-        vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
-    };
-    let pairs = [
-        (TextureUsage::SAMPLED, vk::ImageUsageFlags::SAMPLED),
-        (TextureUsage::STORAGE, vk::ImageUsageFlags::STORAGE),
-        (TextureUsage::TARGET, target),
-        (TextureUsage::INPUT, vk::ImageUsageFlags::INPUT_ATTACHMENT),
-        (TextureUsage::SHADING_RATE, vk::ImageUsageFlags::FRAGMENT_SHADING_RATE_ATTACHMENT_KHR),
-    ];
-    let none = vk::ImageUsageFlags::empty();
-    pairs.iter().filter(|(bit, _)| usage.contains(*bit)).fold(none, |all, (_, raw)| all | *raw)
-}
-
-/// What a format with these features can be used for.
-pub(crate) fn usage_from_features(features: vk::FormatFeatureFlags) -> TextureUsage {
-    use vk::FormatFeatureFlags as Features;
-    let attachment = Features::COLOR_ATTACHMENT | Features::DEPTH_STENCIL_ATTACHMENT;
-    let pairs = [
-        (TextureUsage::SAMPLED, Features::SAMPLED_IMAGE),
-        (TextureUsage::STORAGE, Features::STORAGE_IMAGE),
-        (TextureUsage::TARGET, attachment),
-        (TextureUsage::INPUT, attachment),
-        (TextureUsage::SHADING_RATE, Features::FRAGMENT_SHADING_RATE_ATTACHMENT_KHR),
-    ];
-    pairs.iter().filter(|(_, any)| features.intersects(*any)).map(|(usage, _)| *usage).collect()
 }

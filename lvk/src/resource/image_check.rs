@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::image::{raw_usage, usage_from_features};
+use super::image_usage::{raw_usage, usage_from_features};
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 use crate::error::{Error, Result, check_limit};

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::image::{Image, raw_usage};
+use super::image::Image;
 use super::image_check::check_cube_arrays;
+use super::image_usage::raw_usage;
 use super::region::{Region, TextureBounds, TextureRange, TextureRegion};
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};

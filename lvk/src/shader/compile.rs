@@ -2,48 +2,13 @@
 
 #[cfg(feature = "glsl")]
 use super::front_end::compile_cached;
+use super::options::{CompileOptions, compile_error};
 use super::spirv::passes::strip_primitive_culling::strip_primitive_culling;
 use super::spirv::words;
 use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
-use crate::error::{Error, Result};
-use crate::gpu::caps::capabilities::Capabilities;
-use crate::gpu::caps::ray_query_path::RayQueryPath;
-
-/// What the preamble must know of the device.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct CompileOptions {
-    /// The device loads from storage images without a format (`shaderStorageImageReadWithoutFormat`).
-    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
-    pub(crate) formatless_read: bool,
-    /// The device fetches the corners of triangles that were hit (`VK_KHR_ray_tracing_position_fetch`).
-    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
-    pub(crate) position_fetch: bool,
-    /// The library walks ray queries itself.
-    pub(crate) software_ray_query: bool,
-    /// Helper invocations of fragment shaders have no arrays that work.
-    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
-    pub(crate) helpers_lose_arrays: bool,
-    /// The device is a CPU.
-    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
-    pub(crate) is_cpu: bool,
-    /// It gathers 64 bits for each lane as fast as 32.
-    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
-    pub(crate) gathers_pairs: bool,
-}
-
-impl CompileOptions {
-    /// For a device with these capabilities.
-    pub(crate) fn from_capabilities(device: &Capabilities) -> Self {
-        Self {
-            formatless_read: device.formatless_storage_read,
-            position_fetch: device.position_fetch,
-            software_ray_query: device.ray_query_path == RayQueryPath::Software,
-            helpers_lose_arrays: device.helpers_lose_arrays,
-            is_cpu: device.is_cpu,
-            gathers_pairs: device.is_cpu && device.shader_int64,
-        }
-    }
-}
+#[cfg(not(feature = "glsl"))]
+use crate::error::Error;
+use crate::error::Result;
 
 /// The module's SPIR-V: version 1.6 for GLSL, the caller's own words, checked for their structure, otherwise.
 ///
@@ -63,10 +28,6 @@ pub(crate) fn compile(
             Ok(words.to_vec())
         }
     }
-}
-
-pub(super) fn compile_error(name: &str, log: impl Into<String>) -> Error {
-    Error::Shader { name: name.to_owned(), log: log.into() }
 }
 
 #[cfg(not(feature = "glsl"))]

@@ -1,7 +1,8 @@
 //! GLSL to SPIR-V without a context.
 
 use super::ShaderModuleDesc;
-use super::compile::{CompileOptions, compile};
+use super::compile::compile;
+use super::options::CompileOptions;
 use super::spirv::reflect::reflect;
 use crate::error::Result;
 use crate::gpu::caps::capabilities::Capabilities;

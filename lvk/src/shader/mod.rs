@@ -13,6 +13,7 @@ mod disk_file;
 mod front_end;
 #[cfg(feature = "glsl")]
 mod include;
+mod options;
 #[cfg(feature = "glsl")]
 mod preamble;
 #[cfg(feature = "glsl")]
@@ -20,11 +21,12 @@ mod sanitize;
 pub(crate) mod spirv;
 mod stage;
 
-pub(crate) use compile::{CompileOptions, compile};
+pub(crate) use compile::compile;
 #[cfg(feature = "glsl")]
 pub use compile_glsl::compile_glsl;
 pub(crate) use disk_cache::ShaderCache;
 pub use disk_cache::ShaderCacheStats;
+pub(crate) use options::CompileOptions;
 pub(crate) use spirv::capabilities::{check_capabilities, check_stage};
 pub(crate) use spirv::hit_builtins::find_raw_hit_builtin;
 pub(crate) use spirv::input_attachments::InputRead;

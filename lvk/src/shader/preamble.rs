@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use super::{CompileOptions, ShaderStage};
+use super::ShaderStage;
+use super::options::CompileOptions;
 use crate::bindless::input_attachments::InputAttachment;
 use crate::bindless::layout;
 use crate::software_ray_query;

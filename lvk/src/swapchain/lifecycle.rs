@@ -4,7 +4,8 @@
 use super::choose::Failure;
 use crate::error::Result;
 
-/// What a swapchain lives on.
+/// The presentation engine of a swapchain. It has one implementor beside tests, where a scripted engine takes its place: the
+/// order of recreations after failures can be had from no real one.
 pub(crate) trait PresentBackend {
     /// Size that images would have now; `None` where nothing can be shown.
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure>;

@@ -1,4 +1,4 @@
-//! Pictures in windows. `decide` knows what to do, without a device; the rest does it.
+//! Images in windows. `choose` and `lifecycle` decide without a device; the other files carry it out.
 
 pub(crate) mod chain;
 pub(crate) mod choose;

@@ -1,13 +1,13 @@
-//! Buffers on the device, for plain elements.
+//! Creates buffers of plain elements.
 
 use lvk::{BufferDesc, BufferHandle, BufferUsage, Context, Holder};
 
-/// Room for this many bytes, which shaders reach.
+/// Creates a storage buffer of `size_bytes` bytes.
 pub(crate) fn buffer(ctx: &Context, debug_name: &str, size_bytes: u64) -> lvk::Result<Holder<BufferHandle>> {
     ctx.create_buffer(&BufferDesc { size_bytes, debug_name, ..BufferDesc::default() })
 }
 
-/// A buffer with these elements.
+/// Creates a buffer that holds `elements`.
 pub(crate) fn array<T: bytemuck::NoUninit>(
     ctx: &Context,
     debug_name: &str,

@@ -1,5 +1,5 @@
-//! Where a sample keeps what takes long to make, from one start to the next: compiled shaders, pipelines, the trees that
-//! software walks, and acceleration structures.
+//! The caches of a sample between two starts: compiled shaders, pipelines, the BVHs that
+//! software traverses, and acceleration structures.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

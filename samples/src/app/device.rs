@@ -1,4 +1,4 @@
-//! Opens the device the user names, and lists what there is.
+//! Opens the device that the user names, and lists all devices.
 
 use std::sync::Arc;
 
@@ -8,16 +8,16 @@ use lvk::{
 };
 
 use super::caches::Caches;
+use super::print_line;
 use super::ray_args::RayTracing;
 use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
-use super::say;
 use crate::driver::{self, Driver, DriverRequest};
 
-/// What a sample needs beyond the part of the command line that all share.
+/// Requirements of a sample on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DeviceNeeds {
-    /// How rays are traced; `None` where none are.
+    /// The ray tracing path; `None` without rays.
     pub rays: Option<RayTracing>,
     /// Features that the sample cannot do without: only devices that have them all are considered.
     pub features: &'static [OptionalFeature],
@@ -93,7 +93,7 @@ fn without_queries(error: lvk::Error) -> RunError {
     }
 }
 
-/// What rays are traced by, and why.
+/// Describes the chosen path, and the reason.
 fn choice(capabilities: &Capabilities) -> String {
     match (capabilities.ray_tracing_pipeline, capabilities.ray_query_path) {
         (true, _) => "the ray tracing pipelines that the device has".to_owned(),
@@ -111,12 +111,12 @@ pub(crate) fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
         if let Some(profile) = profile {
             profile.apply(&mut device);
         }
-        say(&device_line(number, &device));
+        print_line(&device_line(number, &device));
     }
     Ok(())
 }
 
-/// What a sample's program says of its device, in a line or two, each with its end.
+/// Describes the device for the log, in one or two lines with their ends.
 #[must_use]
 pub fn device_text(capabilities: &Capabilities) -> String {
     let text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
@@ -134,7 +134,7 @@ pub fn driver_text(capabilities: &Capabilities) -> String {
     format!("{}, Vulkan {major}.{minor}.{patch}", driver.trim_end())
 }
 
-/// What ray queries in `stages` are, and why where software walks.
+/// Describes ray queries in `stages`, and the reason for software traversal.
 #[must_use]
 pub fn query_text(capabilities: &Capabilities, stages: &str) -> String {
     match capabilities.ray_query_path {
@@ -151,7 +151,7 @@ pub(super) fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
     for message in &messages {
         eprintln!("validation: {message}");
     }
-    say(&format!("validation messages: {}", messages.len()));
+    print_line(&format!("validation messages: {}", messages.len()));
     if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }
 }
 

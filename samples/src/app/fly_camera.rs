@@ -4,19 +4,19 @@ use glam::{Quat, Vec3};
 
 use crate::scene::Camera;
 
-/// How close to straight up and straight down the view may come, in radians.
+/// Smallest angle between the view and the vertical, in radians.
 const POLE: f32 = 0.02;
-/// How far it flies in a second, as a share of the distance of what the first camera looks at.
+/// Speed per second, as a share of the first camera's distance to its target.
 const SPEED_SHARE: f32 = 0.5;
-/// How much faster it is in a hurry.
+/// Factor of the speed while Shift is held.
 const HURRY: f32 = 4.0;
-/// How much faster one step makes it, and the slowest and fastest it gets.
+/// Factor of one step of speed, and the limits of the factor.
 const SPEED_STEP: f32 = 1.2;
 const SPEED_RANGE: [f32; 2] = [1e-3, 1e3];
 /// Longest time of a step in seconds, so that a pause is no leap.
 const LONGEST_STEP: f32 = 0.1;
 
-/// What a person wants of a camera at the moment.
+/// The current input of the user for the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Steering {
     /// To the right, up and forward, -1 to 1 each.
@@ -65,7 +65,7 @@ impl FlyCamera {
         self
     }
 
-    /// How fast it flies, as a multiple of the usual speed.
+    /// Speed as a multiple of the usual speed.
     #[must_use]
     pub fn pace(&self) -> f32 {
         self.speed / self.first_speed

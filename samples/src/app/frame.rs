@@ -10,13 +10,13 @@ use super::pass_times::PassTimes;
 /// place before the next submission. So a sample needs one buffer of constants and not one for each frame in flight: a
 /// frame's upload waits on the GPU for what the frame before still reads.
 pub struct Frame<'a> {
-    /// Where the frame is recorded.
+    /// The command buffer of the frame.
     pub cmd: CommandBuffer,
     ctx: Context,
     pace: Pace<'a>,
 }
 
-/// What happens between the steps of a frame.
+/// The action between the steps of a frame.
 enum Pace<'a> {
     /// The host waits for each, tells how many are done, and asks what its passes took.
     Waited { done: u64, after_step: &'a mut dyn FnMut(u64), times: PassTimes },
@@ -28,21 +28,21 @@ impl<'a> Frame<'a> {
     /// A frame whose steps are waited for and whose passes are measured; `after_step` is told how many steps are done.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn waited(ctx: &Context, after_step: &'a mut dyn FnMut(u64)) -> lvk::Result<Self> {
         ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
-        Self::of(ctx, Pace::Waited { done: 0, after_step, times: PassTimes::default() })
+        Self::with_pace(ctx, Pace::Waited { done: 0, after_step, times: PassTimes::default() })
     }
 
-    /// A frame that nobody waits for.
+    /// A frame that the host does not wait for.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn free(ctx: &Context) -> lvk::Result<Self> {
-        Self::of(ctx, Pace::Free)
+        Self::with_pace(ctx, Pace::Free)
     }
 
-    fn of(ctx: &Context, pace: Pace<'a>) -> lvk::Result<Self> {
+    fn with_pace(ctx: &Context, pace: Pace<'a>) -> lvk::Result<Self> {
         Ok(Self { cmd: ctx.acquire_command_buffer()?, ctx: ctx.clone(), pace })
     }
 
@@ -65,7 +65,7 @@ impl<'a> Frame<'a> {
     /// the last step.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn next_step(&mut self) -> lvk::Result<()> {
         let next = self.ctx.acquire_command_buffer()?;
         let step = std::mem::replace(&mut self.cmd, next);
@@ -75,7 +75,7 @@ impl<'a> Frame<'a> {
     /// Ends the last step: submits it, and answers what the passes took if the frame was waited for.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn finish(mut self) -> lvk::Result<PassTimes> {
         self.pace.submit(&self.ctx, self.cmd)?;
         Ok(match self.pace {
@@ -84,7 +84,7 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// What is recorded of the last step, for who submits it by other means, to present it for one.
+    /// Returns the commands of the last step, for callers that submit them otherwise, as to present them.
     #[must_use]
     pub fn into_commands(self) -> CommandBuffer {
         self.cmd

@@ -33,7 +33,7 @@ impl FrameName {
         Self { path: path.to_owned(), place }
     }
 
-    /// Whether frames have names of their own.
+    /// True if frames have names of their own.
     #[must_use]
     pub fn has_number(&self) -> bool {
         self.place.is_some()
@@ -47,7 +47,7 @@ impl FrameName {
 
     /// The path of `frame`, with leading zeros; a number with more digits than there are `#` is written in full.
     #[must_use]
-    pub fn of(&self, frame: u32) -> PathBuf {
+    pub fn path_for(&self, frame: u32) -> PathBuf {
         match &self.place {
             None => self.path.clone(),
             Some(Place { before, digits, after }) => {
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     fn name(path: &str, frame: u32) -> String {
-        FrameName::new(Path::new(path)).of(frame).display().to_string()
+        FrameName::new(Path::new(path)).path_for(frame).display().to_string()
     }
 
     #[test]

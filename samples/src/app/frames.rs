@@ -1,12 +1,12 @@
-//! Which frames to render.
+//! The frames to render.
 
 use std::ops::Range;
 use std::str::FromStr;
 
-/// Which frames to render.
+/// The frames to render.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Frames {
-    /// Frame 0, so many times, to time it.
+    /// Frame 0, rendered this many times to time it.
     Still(u32),
     /// The frames from the first number to before the last one, each once.
     Sequence(Range<u32>),
@@ -16,7 +16,7 @@ impl Frames {
     /// Most frames at a time.
     pub const MAX_COUNT: u32 = 1_000_000;
 
-    /// How many frames that makes.
+    /// Number of frames.
     #[must_use]
     pub fn count(&self) -> u32 {
         match self {

@@ -4,16 +4,16 @@ use lvk::{TextureHandle, TextureRegion};
 
 use super::frame::Frame;
 use super::pass_times::PassTimes;
-use super::play::Player;
 use super::run_error::RunError;
-use super::sample::{Moment, Sample};
+use super::sample::{FrameTime, Sample};
+use super::sequence::FrameSource;
 
 /// A frame that the GPU has finished.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rendered {
     /// The picture, as [`Sample::record`] has it.
     pub picture: TextureHandle,
-    /// What its passes took.
+    /// GPU times of the passes.
     pub times: PassTimes,
 }
 
@@ -52,9 +52,9 @@ impl<'a, S: Sample> Headless<'a, S> {
     }
 }
 
-impl<S: Sample> Player for Headless<'_, S> {
-    fn update(&mut self, moment: Moment) -> Result<(), RunError> {
-        self.sample.update(moment).map_err(Into::into)
+impl<S: Sample> FrameSource for Headless<'_, S> {
+    fn update(&mut self, time: FrameTime) -> Result<(), RunError> {
+        self.sample.update(time).map_err(Into::into)
     }
 
     fn steps_per_frame(&self) -> u64 {

@@ -1,4 +1,4 @@
-//! Notices that shaders have changed, and compiles them anew.
+//! Watches shaders, and recompiles them when they change.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::ui::Painter;
 /// Time between two looks at the folder.
 const PERIOD: Duration = Duration::from_millis(300);
 
-/// What tells a file from its earlier self.
+/// The time and length of a file, which reveal changes.
 type Stamp = (Option<SystemTime>, u64);
 
 /// Watches the GLSL files of a folder, those in folders below it included, by their times and lengths.
@@ -29,7 +29,7 @@ impl ShaderWatch {
         Self { folder: folder.to_owned(), files: stamps(folder), looked: Instant::now() }
     }
 
-    /// Whether anything has changed, come or gone since the last time that this was so. Looks a few times a second only.
+    /// True if anything has changed, come or gone since the last time that this was so. Looks a few times a second only.
     pub fn poll(&mut self, now: Instant) -> bool {
         if now.duration_since(self.looked) < PERIOD {
             return false;
@@ -53,7 +53,7 @@ pub fn reload<S: Sample>(sample: &mut S, painter: &mut Painter) -> Result<(), Ru
     Ok(())
 }
 
-/// What cannot be read is left out: whoever compiles it says so.
+/// Leaves out files that cannot be read; their compilation reports the error.
 fn stamps(folder: &Path) -> BTreeMap<PathBuf, Stamp> {
     let mut found = BTreeMap::new();
     let Ok(entries) = std::fs::read_dir(folder) else { return found };

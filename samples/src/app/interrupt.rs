@@ -9,7 +9,7 @@ use signal_hook::flag;
 /// Exit status of a program that was interrupted, by the custom of shells.
 pub const STATUS: u8 = 130;
 
-/// Whether the user has pressed Ctrl-C, or a batch system has asked the process to end. The first time only raises the
+/// True if the user has pressed Ctrl-C, or a batch system has asked the process to end. The first time only raises the
 /// flag, so that the frame under way becomes a whole picture; the second time ends the process at once, with status
 /// 130. Either way no picture is left in part, because pictures get their names when they are complete.
 #[derive(Debug, Clone, Default)]
@@ -33,7 +33,7 @@ impl Interrupt {
         interrupt
     }
 
-    /// One that nobody raises but [`Interrupt::raise`].
+    /// A flag without signal handlers; only [`Interrupt::raise`] raises it.
     #[must_use]
     pub fn deaf() -> Self {
         Self::default()
@@ -44,7 +44,7 @@ impl Interrupt {
         self.is_raised.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the work is to end after the present frame.
+    /// True if the work is to end after the present frame.
     #[must_use]
     pub fn is_raised(&self) -> bool {
         self.is_raised.load(Ordering::Relaxed)

@@ -1,8 +1,8 @@
-//! What the library warns of reaches the user: damaged caches, features that were refused, objects left behind.
+//! Prints warnings of the library: damaged caches, refused features, leaked objects.
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
 
-/// Where the library logs validation messages, which programs count and print themselves.
+/// Log target of validation messages, which programs count and print themselves.
 const VALIDATION: &str = "lvk::gpu::debug";
 
 struct ToStandardError;

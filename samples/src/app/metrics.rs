@@ -1,6 +1,6 @@
-//! How much two pictures differ.
+//! Image metrics: the difference of two images.
 
-/// How much two pictures differ.
+/// The difference of two images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
     /// Peak signal-to-noise ratio over the red, green and blue channels, in dB; infinite for equal pictures.

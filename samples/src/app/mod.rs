@@ -1,10 +1,10 @@
-//! What the samples share around a frame: command line, device, frames, pictures, measures, timings and progress.
+//! Shared by the samples around a frame: command line, device, frames, images, image metrics, timings and progress.
 //!
-//! [`sample`] tells what a sample is and how its program is written.
+//! [`sample`] defines a sample, [`sample_info`] the description that its program follows from.
 
-pub mod args;
 pub(crate) mod array_buffer;
 pub mod caches;
+pub mod cli;
 pub mod device;
 pub mod fly_camera;
 pub mod frame;
@@ -17,25 +17,29 @@ pub(crate) mod library_warnings;
 pub mod loading;
 pub mod metrics;
 pub mod pass_times;
-pub mod play;
 pub mod png;
 pub mod progress;
 pub mod ray_args;
-pub mod run;
+pub mod render_target;
 pub mod run_args;
 pub mod run_error;
 pub mod sample;
+pub mod sample_error;
+pub mod sample_info;
 pub mod scene_args;
 pub mod scene_list;
 pub(crate) mod scene_textures;
 pub mod screenshot;
+pub mod sequence;
+pub(crate) mod summary;
 pub mod timings;
 pub mod ui;
+pub(crate) mod value_parsers;
 mod window;
 
 use std::io::Write as _;
 
-/// Prints to standard output. A reader that has gone, as that of `hybrid | head -1`, does not cost the picture.
-pub(crate) fn say(text: &str) {
+/// Prints a line to standard output. Ignores a closed pipe, as in `hybrid | head -1`, so that the image is still written.
+pub(crate) fn print_line(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }

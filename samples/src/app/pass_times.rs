@@ -1,10 +1,10 @@
-//! What the passes of a frame took.
+//! GPU times of the passes of a frame.
 
 use std::sync::Arc;
 
 use lvk::GpuProfile;
 
-/// What the passes of a frame took on the GPU: a profile for each step that the frame was cut into. Empty where the device
+/// GPU times of the passes of a frame: a profile for each step that the frame was cut into. Empty where the device
 /// has no timestamps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PassTimes {
@@ -36,7 +36,7 @@ impl PassTimes {
         self.steps.iter().filter_map(span).sum()
     }
 
-    /// Whether nothing is known.
+    /// True if nothing is known.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty()

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Why a picture could not be written.
+/// Errors of writing an image.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
     /// The folder does not exist, is no folder, or may not be written to.
@@ -12,7 +12,7 @@ pub enum PngError {
     Unwritable {
         /// The path of the picture.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The name says that the file is no PNG.
@@ -46,7 +46,7 @@ pub enum PngError {
     Encode {
         /// The path of the picture.
         path: PathBuf,
-        /// What the encoder said.
+        /// Error of the encoder.
         source: image::ImageError,
     },
 }
@@ -110,7 +110,7 @@ pub fn write(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), Pn
     written.map_err(|source| PngError::Unwritable { path: path.into(), source })
 }
 
-/// Whether `path` is there and neither a file nor a folder, such as `/dev/null`.
+/// True if `path` is there and neither a file nor a folder, such as `/dev/null`.
 fn is_special(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::loading::{Status, Stopped};
 
-/// How long work may take before anything is shown.
+/// Delay before the progress is displayed.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time between two looks at the clock, and two steps of the spinner.
 const TICK: Duration = Duration::from_millis(100);
@@ -57,7 +57,7 @@ impl Progress {
         Self { lines: (!visible.is_seen).then(Lines::default), ..visible }
     }
 
-    /// Progress that nobody sees.
+    /// Progress without output.
     pub fn hidden() -> Self {
         let timing = Timing { start: Instant::now(), patience: PATIENCE, tick: TICK };
         let target = ProgressDrawTarget::stderr;
@@ -84,7 +84,7 @@ impl Progress {
             status.begin(name, total);
         }
         if let Some(line) = self.lines.as_mut().map(|lines| lines.begin(name, total)) {
-            self.say(&line);
+            self.print_line(&line);
         }
         if !self.is_seen {
             return;
@@ -103,7 +103,7 @@ impl Progress {
             status.set(done);
         }
         if let Some(line) = self.lines.as_mut().and_then(|lines| lines.set(done, Instant::now())) {
-            self.say(&line);
+            self.print_line(&line);
         }
         if let Some(Shown { bar, .. }) = &self.shown {
             bar.set_position(done);
@@ -117,7 +117,7 @@ impl Progress {
     }
 
     /// Prints a line, with the seconds since the beginning.
-    fn say(&self, line: &str) {
+    fn print_line(&self, line: &str) {
         eprintln!("[{:6.1} s] {line}", self.timing.start.elapsed().as_secs_f32());
     }
 }

@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-/// By what rays are traced.
+/// The choice of the ray tracing path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct RayArgs {
     /// How to trace rays
@@ -10,7 +10,7 @@ pub struct RayArgs {
     pub rt: RayTracing,
 }
 
-/// How to trace rays.
+/// The ray tracing path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RayTracing {
     /// A ray tracing pipeline where the device has one, else ray queries; on a CPU ray queries in software, the fastest.

@@ -126,7 +126,7 @@ impl RunArgs {
     }
 }
 
-/// What Vulkan validation checks.
+/// The kind of Vulkan validation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ValidationArg {
     /// Correct use and synchronisation.

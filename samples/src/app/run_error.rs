@@ -1,15 +1,16 @@
-//! Why a sample's program ended without its picture.
+//! Errors of a sample's program.
 
 use super::interrupt;
 use super::png::PngError;
+use super::sample_error::SampleError;
 use crate::driver::DriverError;
 use crate::scene::SceneError;
 
-/// Why a sample's program ended without its picture.
+/// Errors of a sample's program.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// What the user can mend by other arguments or input.
+    /// Wrong arguments or input.
     #[error("{0}")]
     Input(Box<dyn std::error::Error + Send + Sync>),
     /// Trouble with the device.
@@ -23,7 +24,10 @@ pub enum RunError {
         /// Each device with what it lacks.
         reasons: String,
     },
-    /// Nobody waits for the sample any more.
+    /// The sample cannot render.
+    #[error(transparent)]
+    Sample(#[from] SampleError),
+    /// Loading was stopped before the sample was ready.
     #[error(transparent)]
     Stopped(#[from] super::loading::Stopped),
     /// The scene could not be loaded.
@@ -59,7 +63,7 @@ pub enum RunError {
     /// There is no window to be had.
     #[error("no window can be opened: {reason}; without --window the sample writes its picture")]
     NoWindow {
-        /// What the window system said.
+        /// Error of the window system.
         reason: String,
     },
     /// The window holds its pixels in a way that no picture is made of.
@@ -83,7 +87,7 @@ pub enum RunError {
         done: u32,
         /// Frames that were asked for.
         count: u32,
-        /// How to go on.
+        /// The command that continues.
         hint: &'static str,
     },
 }
@@ -112,6 +116,7 @@ impl RunError {
             Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
             Self::SequenceInWindow | Self::NoShaders { .. } => 2,
+            Self::Sample(error) => error.status(),
             Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
             Self::NoScreenshot { .. } => 1,

@@ -1,55 +1,40 @@
-//! What a sample is to the program around it: a type with two verbs, and some more where it has a window.
+//! The interface of a sample: a type that updates and records frames, with further methods for windows.
 //!
-//! - **new** is the sample's own: from a context, a scene and a configuration. All that is slow happens here: uploads,
+//! - **new** is the sample's own constructor: from a context, a scene and a configuration. All slow work happens here: uploads,
 //!   acceleration structures, every pipeline.
-//! - [`Sample::update`] puts it at a [`Moment`] of its animation: cameras, lights, bones. What it shows afterwards
-//!   depends on the moment alone and not on the moments before, so that a sequence can be cut into ranges that several
-//!   processes share. Something that has to be simulated step by step is evaluated in closed form, or from frame 0.
-//! - [`Sample::record`] uploads what the frame needs, records it, and answers the texture that shows it. It neither
-//!   submits nor waits; [`Frame::next_step`](super::frame::Frame::next_step) cuts frames that take long.
+//! - [`Sample::update`] moves the animation to a [`FrameTime`]: cameras, lights, bones. The frame depends on the time alone and
+//!   not on earlier frames, so that processes can share a sequence in ranges. A step-by-step simulation is evaluated in closed
+//!   form, or from frame 0.
+//! - [`Sample::record`] uploads the frame's data, records its commands, and returns the texture of the image. It neither
+//!   submits nor waits; [`Frame::next_step`](super::frame::Frame::next_step) splits long frames.
 //!
-//! [`run`](super::run::run) does all the rest: device, validation, `--frames`, pictures, progress, Ctrl-C, timings. A
-//! sample's `run.rs` is then
-//!
-//! ```ignore
-//! pub fn run(args: &CloudArgs) -> ExitCode {
-//!     app::run::run("cloud", &args.run, |opening| {
-//!         let ctx = opening.device(&DeviceNeeds::default())?;
-//!         let cloud = Cloud::new(&ctx, &args.config(&ctx)?)?;
-//!         Ok(Opened { headline: cloud.headline(), sample: cloud })
-//!     })
-//! }
-//! ```
-//!
-//! where `CloudArgs` holds `#[command(flatten)] pub run: RunArgs`, `CloudError: Into<RunError>` says which errors the
-//! user can mend, and `Cloud` implements [`Sample`]. Samples that trace rays have [`RayArgs`](super::ray_args::RayArgs) beside
-//! it, and ask for a device by `DeviceNeeds::tracing`; those that only rasterise share `crate::raster`.
+//! [`cli`](super::cli) does the rest: device, validation, `--frames`, images, progress, Ctrl-C, timings. The program follows
+//! from [`SampleInfo`](super::sample_info::SampleInfo).
 //!
 //! ```ignore
 //! impl Sample for Cloud {
-//!     type Error = CloudError;
+//!     type Error = SampleError;
 //!
 //!     fn context(&self) -> &Context {
 //!         &self.ctx
 //!     }
 //!
-//!     fn update(&mut self, moment: Moment) -> Result<(), CloudError> {
-//!         self.constants.phase = moment.phase();
+//!     fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+//!         self.constants.phase = time.phase();
 //!         Ok(())
 //!     }
 //!
-//!     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, CloudError> {
+//!     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
 //!         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
 //!         frame.pass("cloud", |cmd| self.draw(cmd))?;
-//!         Ok(*self.picture)
+//!         Ok(self.target.image())
 //!     }
 //! }
 //! ```
 //!
-//! For a window it also says how to [`resize`](Sample::resize), to be looked at from elsewhere
-//! ([`view`](Sample::view), [`set_view`](Sample::set_view)), which switches it has ([`panel`](Sample::panel)), and to compile its
-//! shaders again ([`reload`](Sample::reload)). One that takes long to make is [`Loading`](super::loading::Loading) there: a thread
-//! makes it while the window shows how far that is.
+//! For a window, a sample also implements [`resize`](Sample::resize), [`camera_mut`](Sample::camera_mut),
+//! [`panel`](Sample::panel) and [`reload`](Sample::reload). A sample that takes long to create is
+//! [`Loading`](super::loading::Loading) there: a thread creates it while the window displays the progress.
 
 use lvk::{Context, TextureHandle};
 
@@ -60,9 +45,9 @@ use crate::scene::Camera;
 /// Frames a second of every animation.
 pub const FRAMES_PER_SECOND: u32 = 30;
 
-/// A moment of an animation that repeats itself after some frames.
+/// The time of a frame in an animation that repeats itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Moment {
+pub struct FrameTime {
     /// Number of the frame, from 0.
     pub frame: u32,
     /// Frames of one round of whatever goes round; at least 1.
@@ -71,22 +56,22 @@ pub struct Moment {
     pub frames_per_second: u32,
 }
 
-impl Moment {
+impl FrameTime {
     /// Frame `frame` of a sequence, whose time step is fixed.
     #[must_use]
-    pub fn of_frame(frame: u32, frames_per_round: u32) -> Self {
+    pub fn from_frame(frame: u32, frames_per_round: u32) -> Self {
         Self { frame, frames_per_round, frames_per_second: FRAMES_PER_SECOND }
     }
 
-    /// So many milliseconds after frame 0 of a sequence with rounds of `frames_per_round` frames.
+    /// The time `milliseconds` after frame 0 of a sequence with rounds of `frames_per_round` frames.
     #[must_use]
-    pub fn after(milliseconds: u32, frames_per_round: u32) -> Self {
+    pub fn from_millis(milliseconds: u32, frames_per_round: u32) -> Self {
         let round = u64::from(frames_per_round) * 1000 / u64::from(FRAMES_PER_SECOND);
         let frames_per_round = u32::try_from(round).unwrap_or(u32::MAX);
         Self { frame: milliseconds, frames_per_round, frames_per_second: 1000 }
     }
 
-    /// Where in its round the animation is, from 0 to below 1.
+    /// Phase of the round, from 0 to below 1.
     #[must_use]
     pub fn phase(&self) -> f32 {
         let round = self.frames_per_round.max(1);
@@ -102,7 +87,7 @@ impl Moment {
 
 /// A sample, ready to render.
 pub trait Sample {
-    /// What can go wrong while it renders.
+    /// Errors of rendering.
     type Error: From<lvk::Error> + Into<RunError>;
 
     /// The device.
@@ -112,9 +97,9 @@ pub trait Sample {
     ///
     /// # Errors
     /// The sample's own.
-    fn update(&mut self, moment: Moment) -> Result<(), Self::Error>;
+    fn update(&mut self, time: FrameTime) -> Result<(), Self::Error>;
 
-    /// Records a frame, and answers the texture that shows it: red, green, blue and alpha of each pixel, 8 bits each, sRGB. It
+    /// Records a frame, and returns the texture of its image: red, green, blue and alpha of each pixel, 8 bits each, sRGB. It
     /// can be sampled, which gives the numbers as they are encoded: its format is `Rgba8Unorm`, or it is a view of that format.
     /// It holds the frame until the next one is recorded.
     ///
@@ -122,7 +107,7 @@ pub trait Sample {
     /// The sample's own.
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, Self::Error>;
 
-    /// Into how many steps [`record`](Self::record) cuts a frame.
+    /// Number of steps into which [`record`](Self::record) splits a frame.
     fn steps_per_frame(&self) -> u64 {
         1
     }
@@ -136,12 +121,12 @@ pub trait Sample {
         Ok(())
     }
 
-    /// What is to be said below the timings when the last frame is done.
+    /// Returns the text below the timings after the last frame.
     fn remark(&self) -> Option<String> {
         None
     }
 
-    /// Renders pictures of `extent` pixels from now on. Where a sample does not, its pictures are stretched.
+    /// Resizes the images to `extent` pixels. Images of samples without this method are stretched.
     ///
     /// # Errors
     /// The sample's own. It must still be able to render, with the old extent.
@@ -149,18 +134,27 @@ pub trait Sample {
         Ok(())
     }
 
-    /// Whether the animation of its window waits for the space key: for pictures that get better while nothing moves.
+    /// True if the animation of its window waits for the space key: for pictures that get better while nothing moves.
     fn stands_at_first(&self) -> bool {
         false
     }
 
-    /// From where the next frame is seen; `None` where the sample has no camera that could be elsewhere.
-    fn view(&self) -> Option<Camera> {
+    /// The camera of the next frame, which windows move; `None` where the sample has no camera that could be elsewhere.
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
         None
     }
 
-    /// Looks from another place than the animation's, until the next [`update`](Self::update).
-    fn set_view(&mut self, _camera: &Camera) {}
+    /// Returns the camera of the next frame.
+    fn view(&mut self) -> Option<Camera> {
+        self.camera_mut().copied()
+    }
+
+    /// Moves the camera until the next [`update`](Self::update).
+    fn set_view(&mut self, camera: &Camera) {
+        if let Some(own) = self.camera_mut() {
+            *own = *camera;
+        }
+    }
 
     /// Lays out the sample's own switches in the panel of its window.
     fn panel(&mut self, _ui: &mut egui::Ui) {}
@@ -168,19 +162,19 @@ pub trait Sample {
     /// Lays out what stands over the picture and beside the panel, seen or not.
     fn overlay(&mut self, _ui: &egui::Context) {}
 
-    /// Whether it is still being loaded by another thread, asked before every frame of a window: then its frames are no
+    /// True if it is still being loaded by another thread, asked before every frame of a window: then its frames are no
     /// pictures of it yet, and are not counted.
     ///
     /// # Errors
-    /// What kept it from being loaded.
+    /// Errors of loading.
     fn is_loading(&mut self) -> Result<bool, Self::Error> {
         Ok(false)
     }
 
-    /// Goes on to the next of what the sample can show, from the next frame on: what the key N of its window asks.
+    /// Switches to the next variant that the sample can show, from the next frame on: the action of the key N.
     fn next(&mut self) {}
 
-    /// Makes all pipelines anew, of shaders that have changed.
+    /// Recreates all pipelines from changed shaders.
     ///
     /// # Errors
     /// The sample's own. It must still be able to render, by the old pipelines.
@@ -195,22 +189,23 @@ mod tests {
 
     #[test]
     fn a_round_ends_where_it_began() {
-        let at = |frame| Moment::of_frame(frame, 240);
+        let at = |frame| FrameTime::from_frame(frame, 240);
         assert_eq!(at(0).phase(), 0.0);
         assert_eq!(at(60).phase(), 0.25);
         assert_eq!(at(240).phase(), 0.0);
         assert_eq!(at(u32::MAX - 15).phase(), at((u32::MAX - 15) % 240).phase());
         assert_eq!(at(240).seconds(), 8.0);
-        assert_eq!(Moment::of_frame(3, 0).phase(), 0.0);
+        assert_eq!(FrameTime::from_frame(3, 0).phase(), 0.0);
     }
 
     #[test]
     fn frames_are_moments_by_the_clock() {
         for (milliseconds, frame) in [(0, 0), (1000, 30), (2500, 75), (9000, 270)] {
-            let (by_clock, by_frame) = (Moment::after(milliseconds, 240), Moment::of_frame(frame, 240));
+            let (by_clock, by_frame) =
+                (FrameTime::from_millis(milliseconds, 240), FrameTime::from_frame(frame, 240));
             assert_eq!(by_clock.seconds(), by_frame.seconds());
             assert_eq!(by_clock.phase(), by_frame.phase());
         }
-        assert_eq!(Moment::after(5, 0).phase(), 0.0);
+        assert_eq!(FrameTime::from_millis(5, 0).phase(), 0.0);
     }
 }

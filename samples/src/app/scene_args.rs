@@ -7,7 +7,9 @@ use clap::Args;
 
 use super::png::{self, PngError};
 use super::progress::Progress;
+use super::ray_args::RayArgs;
 use super::scene_list;
+use super::value_parsers::positive;
 use crate::scene::{ObjOptions, Scene, SceneError};
 
 /// Which scene, and from where it is seen.
@@ -119,7 +121,7 @@ impl SceneArgs {
 impl CameraArgs {
     /// Place of the camera among the scene's five, 0 to 4.
     #[must_use]
-    pub fn place(&self) -> usize {
+    pub fn index(&self) -> usize {
         self.number.clamp(1, 5) as usize - 1
     }
 }
@@ -130,6 +132,24 @@ impl ListArgs {
     pub fn listing(&self) -> Option<String> {
         self.list_scenes.as_ref().map(|folder| scene_list::listing(Some(Path::new(folder))))
     }
+
+    /// The same after the line of a scene that is the sample's default.
+    pub(crate) fn listing_after(&self, default: &str) -> Option<String> {
+        let others = self.listing()?.replace("; the default", "");
+        Some(format!("{default}; the default\n{others}"))
+    }
+}
+
+/// For samples that trace rays and show one scene made by code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct BuiltInSceneRayArgs {
+    /// The built-in scene
+    #[command(flatten)]
+    pub scene: BuiltInSceneArgs,
+
+    /// By what rays are traced
+    #[command(flatten)]
+    pub tracing: RayArgs,
 }
 
 /// For samples that show one scene made by code.
@@ -145,12 +165,5 @@ impl BuiltInSceneArgs {
     #[must_use]
     pub fn listing(&self, name: &str, what: &str) -> Option<String> {
         self.list_scenes.then(|| format!("{name}  built in: {what}; the only one"))
-    }
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("a positive number is needed".to_owned()),
     }
 }

@@ -1,4 +1,4 @@
-//! Which scenes there are: the built-in one and the OBJ files in a folder.
+//! The list of scenes: the built-in one and the OBJ files in a folder.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ pub const FOLDER_VARIABLE: &str = "LVK_SCENES";
 /// Name of the scene made by code.
 pub const BUILT_IN: &str = "courtyard";
 
-/// How many folders deep scenes are looked for.
+/// Depth of folders that are searched for scenes.
 const DEPTH: u32 = 3;
 
 /// A scene that was found.
@@ -38,7 +38,7 @@ pub fn folder() -> Option<PathBuf> {
     std::env::var_os(FOLDER_VARIABLE).filter(|folder| !folder.is_empty()).map(PathBuf::from)
 }
 
-/// What `--list-scenes` prints: the built-in scene, and those in `folder`, else in that of [`FOLDER_VARIABLE`].
+/// Returns the text of `--list-scenes`: the built-in scene, and those in `folder`, else in that of [`FOLDER_VARIABLE`].
 #[must_use]
 pub fn listing(folder: Option<&Path>) -> String {
     let folder =

@@ -24,7 +24,7 @@ pub struct Screenshot {
     texels: Texels,
 }
 
-/// How a pixel lies in memory.
+/// Memory layout of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Texels {
     /// A byte a channel, red first.
@@ -42,7 +42,7 @@ impl Screenshot {
     /// [`RunError::NoScreenshot`] of formats that no PNG is made of, and what Vulkan answers.
     pub fn record(ctx: &Context, cmd: &mut CommandBuffer, image: &SwapchainImage) -> Result<Self, RunError> {
         let (extent, format) = (image.extent(), image.format());
-        let texels = Texels::of(format).ok_or(RunError::NoScreenshot { format })?;
+        let texels = Texels::from_format(format).ok_or(RunError::NoScreenshot { format })?;
         let copy = ctx.create_texture(&TextureDesc {
             format,
             extent,
@@ -69,7 +69,7 @@ impl Screenshot {
 }
 
 impl Texels {
-    fn of(format: Format) -> Option<Self> {
+    fn from_format(format: Format) -> Option<Self> {
         match format {
             Format::Rgba8Unorm | Format::Rgba8Srgb => Some(Self::RedFirst),
             Format::Bgra8Unorm | Format::Bgra8Srgb => Some(Self::BlueFirst),
@@ -111,13 +111,13 @@ mod tests {
     #[test]
     fn channels_are_found_in_every_format_that_windows_of_samples_have() {
         for format in [Format::Rgba8Unorm, Format::Rgba8Srgb] {
-            assert_eq!(Texels::of(format).unwrap().rgba([1, 2, 3, 4]), [1, 2, 3, 255]);
+            assert_eq!(Texels::from_format(format).unwrap().rgba([1, 2, 3, 4]), [1, 2, 3, 255]);
         }
         for format in [Format::Bgra8Unorm, Format::Bgra8Srgb] {
-            assert_eq!(Texels::of(format).unwrap().rgba([1, 2, 3, 4]), [3, 2, 1, 255]);
+            assert_eq!(Texels::from_format(format).unwrap().rgba([1, 2, 3, 4]), [3, 2, 1, 255]);
         }
         let packed = (1 << 30 | 1023 << 20 | 512 << 10 | 4_u32).to_le_bytes();
-        assert_eq!(Texels::of(Format::Rgb10A2Unorm).unwrap().rgba(packed), [1, 128, 255, 255]);
+        assert_eq!(Texels::from_format(Format::Rgb10A2Unorm).unwrap().rgba(packed), [1, 128, 255, 255]);
     }
 
     #[test]
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn other_formats_are_refused_by_name() {
-        assert_eq!(Texels::of(Format::Rgba16Float), None);
+        assert_eq!(Texels::from_format(Format::Rgba16Float), None);
         let told = RunError::NoScreenshot { format: Format::Rgba16Float }.to_string();
         assert!(told.contains("Rgba16Float"), "{told}");
     }

@@ -20,7 +20,7 @@ struct Sample {
     milliseconds: f64,
 }
 
-/// What a pass took, in milliseconds.
+/// The time of a pass, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
     /// Fastest frame.
@@ -59,13 +59,13 @@ impl Timings {
         self.passes.iter().map(|pass| pass.name.as_str())
     }
 
-    /// What `pass` took; `None` for a pass that was never pushed.
+    /// Returns the time of `pass`; `None` for a pass that was never pushed.
     pub fn spread(&self, pass: &str) -> Option<Spread> {
         let pass = self.passes.iter().find(|known| known.name == pass)?;
         spread(pass.samples.iter().map(|sample| sample.milliseconds).collect())
     }
 
-    /// What whole frames took: the spread of the sums over all passes of a frame.
+    /// Returns the time of whole frames: the spread of the sums over all passes of a frame.
     pub fn total(&self) -> Option<Spread> {
         let mut sums = std::collections::BTreeMap::new();
         for sample in self.passes.iter().flat_map(|pass| &pass.samples) {

@@ -1,10 +1,5 @@
-//! Lights a hall by hundreds of small lights, deferred; `--help` tells the rest.
+//! The program of the `deferred` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::deferred::{DeferredArgs, run};
-
-fn main() -> ExitCode {
-    run(&DeferredArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::deferred::Deferred>()
 }

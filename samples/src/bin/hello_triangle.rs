@@ -1,10 +1,5 @@
-//! Rasterises a turning triangle; `--help` tells the rest.
+//! The program of the `hello_triangle` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::hello_triangle::{HelloTriangleArgs, run};
-
-fn main() -> ExitCode {
-    run(&HelloTriangleArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::hello_triangle::HelloTriangle>()
 }

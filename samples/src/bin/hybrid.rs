@@ -1,10 +1,5 @@
-//! Renders a scene with ray traced shadows, reflections and refractions; `--help` tells the rest.
+//! The program of the `hybrid` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::app::args::HybridArgs;
-
-fn main() -> ExitCode {
-    lvk_samples::hybrid::run(&HybridArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::hybrid::HybridSequence>()
 }

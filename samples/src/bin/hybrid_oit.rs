@@ -1,10 +1,5 @@
-//! Renders blocks and spheres of tinted glass with coloured ray traced shadows; `--help` tells the rest.
+//! The program of the `hybrid_oit` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::hybrid_oit::{HybridOitArgs, run};
-
-fn main() -> ExitCode {
-    run(&HybridOitArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::hybrid_oit::HybridOit>()
 }

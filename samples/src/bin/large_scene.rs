@@ -1,10 +1,5 @@
-//! Renders millions of triangles, split, compacted and kept on disk; `--help` tells the rest.
+//! The program of the `large_scene` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::large_scene::{LargeSceneArgs, run};
-
-fn main() -> ExitCode {
-    run(&LargeSceneArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::large_scene::LargeScene>()
 }

@@ -1,10 +1,5 @@
-//! Draws a knot of meshlets by task and mesh shaders; `--help` tells the rest.
+//! The program of the `mesh_shaders` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::mesh_shaders::{MeshShadersArgs, run};
-
-fn main() -> ExitCode {
-    run(&MeshShadersArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::mesh_shaders::MeshShaders>()
 }

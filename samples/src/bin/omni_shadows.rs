@@ -1,10 +1,5 @@
-//! Rasterises a lamp in a lattice and the shadows all around it; `--help` tells the rest.
+//! The program of the `omni_shadows` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::omni_shadows::{OmniShadowsArgs, run};
-
-fn main() -> ExitCode {
-    run(&OmniShadowsArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::omni_shadows::OmniShadows>()
 }

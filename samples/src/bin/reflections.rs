@@ -1,10 +1,5 @@
-//! Renders a hall full of ray traced reflections; `--help` tells the rest.
+//! The program of the `reflections` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::reflections::ReflectionsArgs;
-
-fn main() -> ExitCode {
-    lvk_samples::reflections::run(&ReflectionsArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::reflections::Reflections>()
 }

@@ -1,10 +1,5 @@
-//! Draws the surroundings of a drop into a cube map, which it mirrors; `--help` tells the rest.
+//! The program of the `render_to_cube_map` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::render_to_cube_map::{RenderToCubeMapArgs, run};
-
-fn main() -> ExitCode {
-    run(&RenderToCubeMapArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::render_to_cube_map::RenderToCubeMap>()
 }

@@ -1,10 +1,5 @@
-//! Renders a rasterised scene with ray traced sunlight and ambient occlusion; `--help` tells the rest.
+//! The program of the `rtx_ao` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::rtx_ao::{RtxAoArgs, run};
-
-fn main() -> ExitCode {
-    run(&RtxAoArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::rtx_ao::RtxAo>()
 }

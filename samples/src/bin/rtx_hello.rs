@@ -1,10 +1,5 @@
-//! Renders turning triangles by ray tracing; `--help` tells the rest.
+//! The program of the `rtx_hello` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::rtx_hello::{RtxHelloArgs, run};
-
-fn main() -> ExitCode {
-    run(&RtxHelloArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::rtx_hello::RtxHello>()
 }

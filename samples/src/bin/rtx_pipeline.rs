@@ -1,10 +1,5 @@
-//! Renders a textured scene by a ray tracing pipeline whose hit shaders trace on; `--help` tells the rest.
+//! The program of the `rtx_pipeline` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::rtx_pipeline::{RtxPipelineArgs, run};
-
-fn main() -> ExitCode {
-    run(&RtxPipelineArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::rtx_pipeline::RtxPipeline>()
 }

@@ -1,10 +1,5 @@
-//! Renders textured things that a compute shader moves, by ray tracing; `--help` tells the rest.
+//! The program of the `rtx_textures` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::rtx_textures::{RtxTexturesArgs, run};
-
-fn main() -> ExitCode {
-    run(&RtxTexturesArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::rtx_textures::RtxTextures>()
 }

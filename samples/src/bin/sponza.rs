@@ -1,10 +1,5 @@
-//! Rasterises a large textured scene with shadows, culled on the GPU; `--help` tells the rest.
+//! The program of the `sponza` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::sponza::{SponzaArgs, run};
-
-fn main() -> ExitCode {
-    run(&SponzaArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::sponza::Sponza>()
 }

@@ -1,10 +1,5 @@
-//! Draws bodies without texture coordinates; `--help` tells the rest.
+//! The program of the `triplanar` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::triplanar::{TriplanarArgs, run};
-
-fn main() -> ExitCode {
-    run(&TriplanarArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::triplanar::Triplanar>()
 }

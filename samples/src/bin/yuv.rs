@@ -1,10 +1,5 @@
-//! Shows a moving picture in Y'CbCr; `--help` tells the rest.
+//! The program of the `yuv` sample.
 
-use std::process::ExitCode;
-
-use clap::Parser;
-use lvk_samples::yuv::{YuvArgs, run};
-
-fn main() -> ExitCode {
-    run(&YuvArgs::parse())
+fn main() -> std::process::ExitCode {
+    lvk_samples::app::cli::main::<lvk_samples::yuv::Yuv>()
 }

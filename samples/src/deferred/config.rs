@@ -1,11 +1,10 @@
-//! What to render, and how.
+//! The configuration of the sample.
 
+use crate::app::sample_error::SampleError;
 use clap::ValueEnum;
 use lvk::{Context, OptionalFeature};
 
-use crate::raster::RasterError;
-
-/// How surfaces come to those who light them.
+/// The path of surface data to the lighting shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Passes {
     /// In one pass, whose shaders read its own targets
@@ -17,22 +16,22 @@ pub enum Passes {
 impl Passes {
     /// All of them that a device can do, the best first.
     #[must_use]
-    pub fn of(ctx: &Context) -> &'static [Self] {
+    pub fn supported(ctx: &Context) -> &'static [Self] {
         let one = ctx.capabilities().has(OptionalFeature::LocalRead);
         if one { &[Self::One, Self::Several] } else { &[Self::Several] }
     }
 
-    /// What was asked for, or the best.
-    pub(super) fn choose(asked: Option<Self>, ctx: &Context) -> Result<Self, RasterError> {
-        let there = Self::of(ctx);
+    /// Returns the requested passes, or the best.
+    pub(super) fn choose(asked: Option<Self>, ctx: &Context) -> Result<Self, SampleError> {
+        let there = Self::supported(ctx);
         let passes = asked.unwrap_or(there[0]);
         let what = "shaders that read what their own pass has drawn (dynamicRenderingLocalRead)";
-        RasterError::unless(there.contains(&passes), ctx, what, "--passes several shows the same picture")?;
+        SampleError::require(there.contains(&passes), ctx, what, "--passes several shows the same picture")?;
         Ok(passes)
     }
 }
 
-/// What pictures show.
+/// The quantity that images show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum View {
     /// Surfaces in the light
@@ -53,7 +52,7 @@ impl View {
     pub const ALL: [Self; 5] = [Self::Picture, Self::Albedo, Self::Normals, Self::Roughness, Self::Depth];
 }
 
-/// What to render, and how.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeferredConfig {
     /// Width and height of the picture in pixels.
@@ -62,7 +61,7 @@ pub struct DeferredConfig {
     pub passes: Option<Passes>,
     /// Number of lights, 1 to [`DeferredConfig::MAX_LIGHTS`].
     pub lights: u32,
-    /// What the picture shows.
+    /// The quantity that the image shows.
     pub view: View,
 }
 

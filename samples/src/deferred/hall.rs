@@ -26,7 +26,7 @@ pub(super) struct Material {
     tiles: f32,
 }
 
-/// What the hall is made of, by its place in [`MATERIALS`].
+/// Materials of the hall, by their index in [`MATERIALS`].
 #[derive(Debug, Clone, Copy)]
 enum Made {
     Paving,
@@ -51,7 +51,7 @@ pub(super) const MATERIALS: [Material; 6] = [
 const STRIDE: f32 = 4.0;
 /// Columns of a row.
 const COLUMNS: u8 = 9;
-/// Where rows of columns stand.
+/// Positions of the rows of columns.
 const ROWS: [f32; 4] = [-8.2, -4.1, 4.1, 8.2];
 
 /// Everything solid, in one list of corners and one of triangles.

@@ -3,18 +3,15 @@
 //! targets, nothing but the picture leaves the tiles of a phone's GPU; where there is no such reading, passes follow each
 //! other and sample what the ones before have drawn. Both pictures are the same.
 //!
-//! [`Deferred`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`Deferred`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
 mod config;
 mod hall;
+mod info;
 mod pipelines;
 mod renderer;
-mod run;
 mod targets;
 
-pub use args::DeferredArgs;
 pub use config::{DeferredConfig, Passes, View};
-pub use pipelines::pipelines;
+pub use info::DeferredArgs;
 pub use renderer::Deferred;
-pub use run::run;

@@ -6,9 +6,7 @@ use lvk::{
 };
 
 use super::Passes;
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::raster::{fragment_stage, vertex_stage};
-use crate::shaders::deferred as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
 
 /// The sample's folder of `shaders/`.
 const SAMPLE: &str = "deferred";
@@ -22,16 +20,16 @@ const ONE_PASS: &[(&str, &str)] = &[("ONE_PASS", "1")];
 /// The same of the shine around lights.
 const GLOW: &[(&str, &str)] = &[("GLOW", "1")];
 
-/// What a frame is made of, in its order.
+/// The draws of a frame, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Draw {
-    /// What everything solid is like.
+    /// Material of all solid surfaces.
     Surfaces,
     /// The lights themselves.
     Orbs,
     /// Light from nowhere in particular.
     Ambient,
-    /// What the lights do to surfaces.
+    /// Light of the lamps on surfaces.
     Lights,
     /// The shine around them.
     Glow,
@@ -61,23 +59,15 @@ impl Draw {
     }
 
     fn stages(self, passes: Passes) -> [SampleStage; 2] {
-        let screen = vertex_stage(texts::SCREEN_VERT, "screen.vert");
-        let orbs = vertex_stage(texts::ORBS_VERT, "orbs.vert");
+        let screen = shader!("deferred", "screen.vert");
+        let orbs = shader!("deferred", "orbs.vert");
         let [vertex, fragment] = match self {
-            Self::Surfaces => [
-                vertex_stage(texts::SURFACES_VERT, "surfaces.vert"),
-                fragment_stage(texts::SURFACES_FRAG, "surfaces.frag"),
-            ],
-            Self::Orbs => [orbs, fragment_stage(texts::ORBS_FRAG, "orbs.frag")],
-            Self::Ambient => [screen, fragment_stage(texts::AMBIENT_FRAG, "ambient.frag")],
-            Self::Lights => [
-                vertex_stage(texts::LIGHT_VERT, "light.vert"),
-                fragment_stage(texts::LIGHT_FRAG, "light.frag"),
-            ],
-            Self::Glow => {
-                [SampleStage { defines: GLOW, ..orbs }, fragment_stage(texts::GLOW_FRAG, "glow.frag")]
-            }
-            Self::Resolve => [screen, fragment_stage(texts::RESOLVE_FRAG, "resolve.frag")],
+            Self::Surfaces => [shader!("deferred", "surfaces.vert"), shader!("deferred", "surfaces.frag")],
+            Self::Orbs => [orbs, shader!("deferred", "orbs.frag")],
+            Self::Ambient => [screen, shader!("deferred", "ambient.frag")],
+            Self::Lights => [shader!("deferred", "light.vert"), shader!("deferred", "light.frag")],
+            Self::Glow => [SampleStage { defines: GLOW, ..orbs }, shader!("deferred", "glow.frag")],
+            Self::Resolve => [screen, shader!("deferred", "resolve.frag")],
         };
         let defines = if passes == Passes::One { ONE_PASS } else { &[] };
         [vertex, SampleStage { defines, ..fragment }]
@@ -165,14 +155,13 @@ impl Pipelines {
         Ok(Self([surfaces?, orbs?, ambient?, lights?, glow?, resolve?]))
     }
 
-    pub(super) fn of(&self, draw: Draw) -> RenderPipelineHandle {
+    pub(super) fn get(&self, draw: Draw) -> RenderPipelineHandle {
         *self.0[draw as usize]
     }
 }
 
-/// Every pipeline of the sample.
-#[must_use]
-pub fn pipelines() -> Vec<SamplePipeline> {
+/// Returns every pipeline of the sample.
+pub(super) fn pipelines() -> Vec<SamplePipeline> {
     let ways = [Passes::One, Passes::Several];
     ways.into_iter().flat_map(|passes| Draw::ALL.map(|draw| draw.data(passes))).collect()
 }

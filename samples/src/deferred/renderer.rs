@@ -1,5 +1,6 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
@@ -14,8 +15,7 @@ use super::targets::Targets;
 use super::{DeferredConfig, Passes, View};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::raster::RasterError;
+use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
 
 /// Distance of the near plane.
@@ -25,7 +25,7 @@ const NEAR: f32 = 0.1;
 pub struct Deferred {
     ctx: Context,
     config: DeferredConfig,
-    way: Way,
+    resources: PassResources,
     vertices: Holder<BufferHandle>,
     materials: Holder<BufferHandle>,
     triangles: Holder<BufferHandle>,
@@ -39,15 +39,15 @@ pub struct Deferred {
     exposure: f32,
 }
 
-/// What is different by [`Passes`].
-struct Way {
+/// Resources that depend on [`Passes`].
+struct PassResources {
     passes: Passes,
     targets: Targets,
     pipelines: Pipelines,
 }
 
-impl Way {
-    fn new(ctx: &Context, passes: Passes, extent: [u32; 2]) -> Result<Self, RasterError> {
+impl PassResources {
+    fn new(ctx: &Context, passes: Passes, extent: [u32; 2]) -> Result<Self, SampleError> {
         let targets = Targets::new(ctx, passes, extent)?;
         Ok(Self { passes, targets, pipelines: Pipelines::new(ctx, passes)? })
     }
@@ -75,8 +75,8 @@ impl Deferred {
     /// Makes the hall, targets and pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &DeferredConfig) -> Result<Self, RasterError> {
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &DeferredConfig) -> Result<Self, SampleError> {
         let passes = Passes::choose(config.passes, ctx)?;
         let hall = Hall::new();
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
@@ -88,7 +88,7 @@ impl Deferred {
         Ok(Self {
             ctx: ctx.clone(),
             config: *config,
-            way: Way::new(ctx, passes, config.extent)?,
+            resources: PassResources::new(ctx, passes, config.extent)?,
             vertices: array(ctx, "vertices", BufferUsage::STORAGE, &hall.vertices)?,
             materials: array(ctx, "materials", BufferUsage::STORAGE, &MATERIALS)?,
             triangles: array(ctx, "triangles", BufferUsage::INDEX, &hall.triangles)?,
@@ -103,9 +103,9 @@ impl Deferred {
         })
     }
 
-    /// How surfaces come to those who light them: in the last frame, or in the first where there was none yet.
+    /// The passes of the last frame, or of the first where none was rendered yet.
     pub fn passes(&self) -> Passes {
-        self.way.passes
+        self.resources.passes
     }
 
     /// The next frames go by `passes`, or by what the device has.
@@ -120,7 +120,7 @@ impl Deferred {
 
     fn constants(&self) -> lvk::Result<FrameConstants> {
         let [width, height] = self.config.extent;
-        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.way.targets;
+        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.resources.targets;
         Ok(FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, NEAR),
             vertices: self.ctx.buffer_address(*self.vertices)?,
@@ -139,8 +139,8 @@ impl Deferred {
     /// All of it in one pass: nothing but the picture is kept.
     fn draw_at_once(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &self.way.targets.begun(0..4),
-            depth: Some(self.way.targets.far_away()),
+            color: &self.resources.targets.begun(0..4),
+            depth: Some(self.resources.targets.far_away()),
             local_read: true,
             debug_name: "deferred",
             ..RenderPassDesc::default()
@@ -152,17 +152,17 @@ impl Deferred {
 
     fn surfaces_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &self.way.targets.begun(0..3),
-            depth: Some(self.way.targets.far_away()),
+            color: &self.resources.targets.begun(0..3),
+            depth: Some(self.resources.targets.far_away()),
             ..RenderPassDesc::default()
         })?;
         self.draw_solid(&mut pass)
     }
 
     fn light_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        let Targets { colors: [albedo, normal, ..], depth, .. } = &self.way.targets;
+        let Targets { colors: [albedo, normal, ..], depth, .. } = &self.resources.targets;
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &[self.way.targets.light()],
+            color: &[self.resources.targets.light()],
             depth: Some(DepthAttachment::read_only(**depth)),
             dependencies: Dependencies {
                 sampled_images: &[**albedo, **normal, **depth],
@@ -174,10 +174,10 @@ impl Deferred {
     }
 
     fn picture_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.way.targets;
+        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.resources.targets;
         let sampled = [**albedo, **normal, **light, **depth];
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &self.way.targets.begun(3..4),
+            color: &self.resources.targets.begun(3..4),
             dependencies: Dependencies { sampled_images: &sampled, ..Dependencies::default() },
             ..RenderPassDesc::default()
         })?;
@@ -185,7 +185,7 @@ impl Deferred {
     }
 
     fn draw_solid(&self, pass: &mut RenderPass<'_>) -> lvk::Result<()> {
-        pass.bind_render_pipeline(self.way.pipelines.of(Draw::Surfaces))?;
+        pass.bind_render_pipeline(self.resources.pipelines.get(Draw::Surfaces))?;
         pass.push_constants(&self.frame_address)?;
         pass.bind_index_buffer(*self.triangles, 0, IndexFormat::U32)?;
         pass.draw_indexed(0..3 * self.triangle_count, 0, 0..1)?;
@@ -199,29 +199,29 @@ impl Deferred {
     }
 
     fn draw(&self, pass: &mut RenderPass<'_>, draw: Draw, vertices: u32, instances: u32) -> lvk::Result<()> {
-        pass.bind_render_pipeline(self.way.pipelines.of(draw))?;
+        pass.bind_render_pipeline(self.resources.pipelines.get(draw))?;
         pass.push_constants(&self.frame_address)?;
         pass.draw(0..vertices, 0..instances)
     }
 }
 
 impl Sample for Deferred {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.phase = time.phase();
         self.camera = camera(self.phase);
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         let passes = Passes::choose(self.config.passes, &self.ctx)?;
-        if passes != self.way.passes {
-            self.way = Way::new(&self.ctx, passes, self.config.extent)?;
+        if passes != self.resources.passes {
+            self.resources = PassResources::new(&self.ctx, passes, self.config.extent)?;
         }
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants()?))?;
         match passes {
@@ -232,25 +232,21 @@ impl Sample for Deferred {
                 frame.pass("picture", |cmd| self.picture_pass(cmd))?;
             }
         }
-        Ok(self.way.targets.picture())
+        Ok(self.resources.targets.picture())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.way.targets = Targets::new(&self.ctx, self.way.passes, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.resources.targets = Targets::new(&self.ctx, self.resources.passes, extent)?;
         self.config.extent = extent;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        let there = Passes::of(&self.ctx);
+        let there = Passes::supported(&self.ctx);
         if there.len() > 1 {
             let mut passes = self.config.passes.unwrap_or(there[0]);
             ui.horizontal(|ui| {
@@ -270,13 +266,13 @@ impl Sample for Deferred {
         ui.add(egui::Slider::new(&mut self.exposure, 0.1..=8.0).logarithmic(true).text("exposure"));
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
-        self.way.pipelines = Pipelines::new(&self.ctx, self.way.passes)?;
+    fn reload(&mut self) -> Result<(), SampleError> {
+        self.resources.pipelines = Pipelines::new(&self.ctx, self.resources.passes)?;
         Ok(())
     }
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let (sine, cosine) = (TAU * phase).sin_cos();
     Camera::looking_at([1.5 + 0.9 * sine, 1.75, 9.6 + 0.5 * cosine], [-0.55 - 0.5 * sine, 1.95, -12.0], 50.0)

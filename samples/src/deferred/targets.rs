@@ -1,5 +1,6 @@
-//! What the sample draws to.
+//! The render targets of the sample.
 
+use crate::app::sample_error::SampleError;
 use lvk::{
     ColorAttachment, ColorLoadOp, Context, DepthAttachment, Holder, TextureDesc, TextureHandle,
     TextureMemory, TextureUsage,
@@ -7,7 +8,6 @@ use lvk::{
 
 use super::Passes;
 use super::pipelines::{COLORS, DEPTH};
-use crate::raster::{RasterError, check_size};
 
 /// Names of the targets, in the order of [`COLORS`].
 const NAMES: [&str; 4] = ["albedo and roughness", "normal and metalness", "light", "picture"];
@@ -21,8 +21,8 @@ pub(super) struct Targets {
 }
 
 impl Targets {
-    pub(super) fn new(ctx: &Context, passes: Passes, extent: [u32; 2]) -> Result<Self, RasterError> {
-        check_size(ctx, extent)?;
+    pub(super) fn new(ctx: &Context, passes: Passes, extent: [u32; 2]) -> Result<Self, SampleError> {
+        SampleError::check_size(extent, ctx.capabilities())?;
         let one_pass = passes == Passes::One;
         let (usage, memory) = match passes {
             Passes::One => (TextureUsage::TARGET | TextureUsage::INPUT, TextureMemory::Transient),

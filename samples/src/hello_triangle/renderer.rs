@@ -1,16 +1,24 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
+use crate::pipelines::shader;
+use crate::raster::RasterPipeline;
 use lvk::{Context, Dependencies, Holder, RenderPipelineHandle, TextureHandle};
 
-use super::pipelines::TRIANGLE;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::raster::{Canvas, RasterError};
+use crate::app::sample::{FrameTime, Sample};
+
+pub(super) const TRIANGLE: RasterPipeline = RasterPipeline::flat(
+    "hello_triangle",
+    "hello_triangle: triangle",
+    &[shader!("hello_triangle", "triangle.vert"), shader!("hello_triangle", "triangle.frag")],
+);
 
 /// Draws the triangle.
 pub struct HelloTriangle {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     pipeline: Holder<RenderPipelineHandle>,
     backdrop: [f32; 3],
     turn: f32,
@@ -20,11 +28,11 @@ impl HelloTriangle {
     /// Makes a picture of `extent` pixels and the pipeline that draws on it.
     ///
     /// # Errors
-    /// [`RasterError`] when the picture is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, extent: [u32; 2]) -> Result<Self, RasterError> {
+    /// [`SampleError`] when the picture is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, extent: [u32; 2]) -> Result<Self, SampleError> {
         Ok(Self {
             ctx: ctx.clone(),
-            canvas: Canvas::flat(ctx, extent)?,
+            target: RenderTarget::flat(ctx, extent)?,
             pipeline: TRIANGLE.create(ctx)?,
             backdrop: [0.012, 0.014, 0.022],
             turn: 0.0,
@@ -33,28 +41,28 @@ impl HelloTriangle {
 }
 
 impl Sample for HelloTriangle {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.turn = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.turn = time.phase();
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         let nothing = Dependencies::default();
-        let mut pass = self.canvas.begin(&mut frame.cmd, "triangle", self.backdrop, &nothing)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "triangle", self.backdrop, &nothing)?;
         pass.bind_render_pipeline(*self.pipeline)?;
-        pass.push_constants(&[self.turn, self.canvas.aspect()])?;
+        pass.push_constants(&[self.turn, self.target.aspect()])?;
         pass.draw(0..3, 0..1)?;
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::flat(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::flat(&self.ctx, extent)?;
         Ok(())
     }
 
@@ -63,7 +71,7 @@ impl Sample for HelloTriangle {
         ui.color_edit_button_rgb(&mut self.backdrop);
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.pipeline = TRIANGLE.create(&self.ctx)?;
         Ok(())
     }

@@ -1,17 +1,18 @@
 //! Visibility by a rasteriser of compute shaders, in three passes: small triangles, each by a thread; medium ones, each by
 //! some threads; large ones in tiles, each by a workgroup. The nearest triangle of each pixel wins, by 64-bit atomic minimum.
 
+use super::pipelines;
+use crate::pipelines::SampleStage;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     BufferDesc, BufferHandle, BufferUsage, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle,
-    Context, Dependencies, Holder, ShaderStage, SpecializationConstant, SpecializationValue,
+    Context, Dependencies, Holder, SpecializationConstant, SpecializationValue,
 };
 
 use super::config::RasterTuning;
-use super::frame::{Push, VisibilityPlaces};
+use super::frame::{Push, VisibilityAddresses};
 use super::shader_module::module;
 use crate::app::array_buffer::buffer;
-use crate::shaders::hybrid as texts;
 
 /// Triangles of a workgroup of the first pass (`shaders/hybrid/raster_small.comp.glsl`).
 const GROUP: u32 = 128;
@@ -67,9 +68,9 @@ impl ComputeRaster {
         let set_capacity = tuning.set_aside.min(RasterTuning::MOST_SET_ASIDE);
         let words_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<u64>() as u64;
         Ok(Self {
-            small: pipeline(ctx, texts::RASTER_SMALL_COMP, &small_pixels, "raster_small.comp")?,
-            medium: pipeline(ctx, texts::RASTER_MEDIUM_COMP, &medium_pixels, "raster_medium.comp")?,
-            tiles: pipeline(ctx, texts::RASTER_TILE_COMP, &[], "raster_tile.comp")?,
+            small: pipeline(ctx, &pipelines::RASTER_SMALL_COMP, &small_pixels)?,
+            medium: pipeline(ctx, &pipelines::RASTER_MEDIUM_COMP, &medium_pixels)?,
+            tiles: pipeline(ctx, &pipelines::RASTER_TILE_COMP, &[])?,
             words: buffer(ctx, "visibility words", words_bytes)?,
             words_bytes,
             set_triangles: list(ctx, u64::from(set_capacity) * TRIANGLE_BYTES, "triangles set aside")?,
@@ -81,7 +82,7 @@ impl ComputeRaster {
     }
 
     /// Tells the shaders where its buffers are.
-    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityPlaces) -> lvk::Result<()> {
+    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityAddresses) -> lvk::Result<()> {
         places.words = ctx.buffer_address(*self.words)?;
         places.set_triangles = ctx.buffer_address(*self.set_triangles)?;
         places.set_capacity = self.set_capacity;
@@ -90,7 +91,7 @@ impl ComputeRaster {
         Ok(())
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn words(&self) -> BufferHandle {
         self.words.handle()
     }
@@ -131,11 +132,10 @@ pub(super) fn groups_for(count: u32, size: u32) -> [u32; 3] {
 
 fn pipeline(
     ctx: &Context,
-    text: &str,
+    stage: &SampleStage,
     specialization: &[SpecializationConstant],
-    debug_name: &str,
 ) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let shader = module(ctx, ShaderStage::Compute, text, &[], debug_name)?;
+    let (shader, debug_name) = (module(ctx, stage, &[])?, stage.name);
     ctx.create_compute_pipeline(&ComputePipelineDesc { module: Some(*shader), specialization, debug_name })
 }
 

@@ -1,12 +1,12 @@
-//! What to render, and by which means of the device.
+//! The configuration of the sample.
 
+use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, RayQueryPath};
 
-use super::HybridError;
-use crate::app::args;
+use super::args;
 use crate::app::ray_args::RayTracing;
 
-/// How primary visibility is found.
+/// The method that finds primary visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
     /// Every pixel's ray is traced.
@@ -16,7 +16,7 @@ pub enum Method {
     Hybrid,
 }
 
-/// What the hybrid method's geometry pass leaves for the ray pass.
+/// The output of the hybrid method's geometry pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Geometry {
     /// Position, normals, albedo and triangle of each pixel, as in the paper.
@@ -68,7 +68,7 @@ impl Default for RasterTuning {
     }
 }
 
-/// When the rays of mirrors and glass are followed.
+/// The time at which rays of mirrors and glass are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bounces {
     /// At once, by the thread of the pixel.
@@ -89,10 +89,10 @@ pub enum RayPath {
     Query,
 }
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HybridConfig {
-    /// How primary visibility is found.
+    /// The method that finds primary visibility.
     pub method: Method,
     /// By which part of Vulkan rays are traced.
     pub path: RayPath,
@@ -100,13 +100,13 @@ pub struct HybridConfig {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// How often a ray may be reflected or refracted, 0 to [`HybridConfig::MAX_DEPTH`].
+    /// Largest number of reflections and refractions of a ray, 0 to [`HybridConfig::MAX_DEPTH`].
     pub max_depth: u32,
-    /// When reflected and refracted rays are followed; `None` for what suits the device.
+    /// The time at which reflected and refracted rays are traced; `None` for the one that suits the device.
     pub bounces: Option<Bounces>,
     /// Views of each pixel, evenly spread over it, whose average it shows: 1 to [`HybridConfig::MAX_SAMPLES`].
     pub samples: u32,
-    /// What the geometry pass leaves; nothing where the method has none.
+    /// The output of the geometry pass; unused where the method has none.
     pub geometry: Geometry,
     /// Numbers of the compute rasteriser.
     pub tuning: RasterTuning,
@@ -135,34 +135,26 @@ impl HybridConfig {
     /// The largest number of samples.
     pub const MAX_SAMPLES: u32 = args::MAX_SAMPLES;
 
-    /// Whether the triangles that pixels show are known before any ray is traced.
+    /// True if the triangles that pixels show are known before any ray is traced.
     pub(super) fn knows_triangles(&self) -> bool {
         self.method == Method::Hybrid && matches!(self.geometry, Geometry::Visibility(_))
     }
 
     /// Checks sizes and depth against what the device with `capabilities` can do.
-    pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), HybridError> {
-        let limit = capabilities.limits.max_texture_2d;
-        let (width, height) = (self.width, self.height);
-        if width == 0 || height == 0 || width > limit || height > limit {
-            return Err(HybridError::BadSize { width, height, limit });
-        }
-        if self.max_depth > Self::MAX_DEPTH {
-            return Err(HybridError::TooDeep { depth: self.max_depth, limit: Self::MAX_DEPTH });
-        }
-        if self.samples == 0 || self.samples > Self::MAX_SAMPLES {
-            return Err(HybridError::BadSamples { samples: self.samples, limit: Self::MAX_SAMPLES });
-        }
+    pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), SampleError> {
+        SampleError::check_size([self.width, self.height], capabilities)?;
+        SampleError::check_range("--depth", self.max_depth, [0, Self::MAX_DEPTH])?;
+        SampleError::check_range("--samples", self.samples, [1, Self::MAX_SAMPLES])?;
         if self.bounces == Some(Bounces::First) && !self.knows_triangles() {
-            return Err(HybridError::NothingFirst);
+            return Err(SampleError::NothingFirst);
         }
         let numbers_fragments =
             matches!(self.geometry, Geometry::Paper | Geometry::Visibility(Some(Raster::Hardware)));
         if self.method == Method::Hybrid && numbers_fragments && !capabilities.primitive_id {
-            return Err(HybridError::NoPrimitiveId { device: capabilities.device_name.clone() });
+            return Err(SampleError::NoPrimitiveId { device: capabilities.device_name.clone() });
         }
         if self.knows_triangles() && Method::choose(None, capabilities) == Method::Standalone {
-            return Err(HybridError::NoRasteriser { device: capabilities.device_name.clone() });
+            return Err(SampleError::NoRasteriser { device: capabilities.device_name.clone() });
         }
         self.path.check(capabilities)
     }
@@ -185,7 +177,7 @@ impl Method {
 impl RayPath {
     /// The path that the command line names, if it does.
     #[must_use]
-    pub fn wished(wish: RayTracing) -> Option<Self> {
+    pub fn from_args(wish: RayTracing) -> Option<Self> {
         match wish {
             RayTracing::Auto => None,
             RayTracing::Pipeline => Some(Self::Pipeline),
@@ -197,8 +189,8 @@ impl RayPath {
     /// a CPU queries in software, if those are on, which are faster there for every scene.
     ///
     /// # Errors
-    /// [`HybridError::NoRayTracing`] and [`HybridError::PathMissing`] say what the device lacks.
-    pub fn choose(wish: Option<Self>, capabilities: &Capabilities) -> Result<Self, HybridError> {
+    /// [`SampleError::NoRayTracing`] and [`SampleError::PathMissing`] say what the device lacks.
+    pub fn choose(wish: Option<Self>, capabilities: &Capabilities) -> Result<Self, SampleError> {
         let path = match wish {
             Some(path) => path,
             None if capabilities.is_cpu && capabilities.ray_query_path == RayQueryPath::Software => {
@@ -210,7 +202,7 @@ impl RayPath {
         path.check(capabilities).map(|()| path)
     }
 
-    fn check(self, capabilities: &Capabilities) -> Result<(), HybridError> {
+    fn check(self, capabilities: &Capabilities) -> Result<(), SampleError> {
         let Capabilities { ray_tracing_pipeline: pipeline, ray_query: query, .. } = *capabilities;
         let device = capabilities.device_name.clone();
         match self {
@@ -220,13 +212,13 @@ impl RayPath {
                 let hidden = || Some(format!("under the profile '{}'", capabilities.profile.as_ref()?));
                 let reason = capabilities.ray_tracing_fallback.clone().or_else(hidden);
                 let reason = reason.map_or_else(String::new, |reason| format!(" ({reason})"));
-                Err(HybridError::NoRayTracing { device, reason })
+                Err(SampleError::NoRayTracing { device, reason })
             }
             Self::Pipeline => {
-                Err(HybridError::PathMissing { device, lacks: "ray tracing pipelines", instead: "query" })
+                Err(SampleError::PathMissing { device, lacks: "ray tracing pipelines", instead: "query" })
             }
             Self::Query => {
-                Err(HybridError::PathMissing { device, lacks: "ray queries", instead: "pipeline" })
+                Err(SampleError::PathMissing { device, lacks: "ray queries", instead: "pipeline" })
             }
         }
     }
@@ -263,7 +255,7 @@ mod tests {
         assert_eq!(RayPath::choose(None, &cpu).unwrap(), RayPath::Query);
         assert!(matches!(
             RayPath::choose(None, &device(false, false)),
-            Err(HybridError::NoRayTracing { .. })
+            Err(SampleError::NoRayTracing { .. })
         ));
     }
 
@@ -290,13 +282,13 @@ mod tests {
         assert!(config().check(&capabilities).is_ok());
         for (width, height) in [(0, 64), (64, 0), (5000, 64), (64, u32::MAX)] {
             let error = HybridConfig { width, height, ..config() }.check(&capabilities).unwrap_err();
-            assert!(matches!(error, HybridError::BadSize { .. }), "{error}");
+            assert!(matches!(error, SampleError::BadSize { .. }), "{error}");
         }
         let deep = HybridConfig { max_depth: HybridConfig::MAX_DEPTH + 1, ..config() };
-        assert!(matches!(deep.check(&capabilities), Err(HybridError::TooDeep { .. })));
+        assert!(matches!(deep.check(&capabilities), Err(SampleError::OutOfRange { .. })));
         for samples in [0, HybridConfig::MAX_SAMPLES + 1] {
             let error = HybridConfig { samples, ..config() }.check(&capabilities).unwrap_err();
-            assert!(matches!(error, HybridError::BadSamples { .. }), "{error}");
+            assert!(matches!(error, SampleError::OutOfRange { .. }), "{error}");
         }
     }
 
@@ -306,10 +298,10 @@ mod tests {
         capabilities.primitive_id = false;
         for geometry in [Geometry::Paper, Geometry::Visibility(Some(Raster::Hardware))] {
             let config = HybridConfig { geometry, ..config() };
-            assert!(matches!(config.check(&capabilities), Err(HybridError::NoPrimitiveId { .. })));
+            assert!(matches!(config.check(&capabilities), Err(SampleError::NoPrimitiveId { .. })));
             assert!(HybridConfig { method: Method::Standalone, ..config }.check(&capabilities).is_ok());
         }
-        assert!(matches!(config().check(&capabilities), Err(HybridError::NoRasteriser { .. })));
+        assert!(matches!(config().check(&capabilities), Err(SampleError::NoRasteriser { .. })));
         (capabilities.shader_int64, capabilities.buffer_int64_atomics) = (true, true);
         assert!(config().check(&capabilities).is_ok());
     }

@@ -73,7 +73,7 @@ impl Lighting {
         }
     }
 
-    /// How many lights there are.
+    /// Number of lights.
     pub(crate) fn light_count(&self) -> u32 {
         self.light_count
     }
@@ -106,7 +106,7 @@ pub(super) struct Indices {
 /// Addresses and indices of the visibility pass (`Visibility` in `shaders/hybrid/visibility.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct VisibilityPlaces {
+pub(super) struct VisibilityAddresses {
     pub(super) words: u64,
     pub(super) set_triangles: u64,
     pub(super) tiles: u64,
@@ -121,10 +121,10 @@ pub(super) struct VisibilityPlaces {
     pub(super) tile_capacity: u32,
 }
 
-/// Addresses of the queue of mirrors and glass (`BounceQueue` in `shaders/hybrid/bounce_queue.glsl`).
+/// Addresses of the queue of mirrors and glass (`ReflectivePixels` in `shaders/hybrid/reflective_pixels.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct BouncePlaces {
+pub(super) struct ReflectivePixelAddresses {
     pub(super) head: u64,
     pub(super) pixels: u64,
 }
@@ -137,8 +137,8 @@ pub(super) struct FrameConstants {
     pub(super) scene: SceneAddresses,
     pub(super) lighting: Lighting,
     pub(super) indices: Indices,
-    pub(super) visibility: VisibilityPlaces,
-    pub(super) bounces: BouncePlaces,
+    pub(super) visibility: VisibilityAddresses,
+    pub(super) bounces: ReflectivePixelAddresses,
     pub(super) order: u64,
     pub(super) sums: u64,
     pub(super) sample_number: u32,

@@ -1,4 +1,4 @@
-//! What the passes of a frame took on the GPU.
+//! GPU times of the passes of a frame.
 
 use crate::app::pass_times::PassTimes;
 
@@ -11,7 +11,7 @@ pub(super) const RAYS: &str = "ray pass";
 pub struct FrameTimings {
     /// The geometry pass; 0 where the method has none.
     pub geometry_ms: f64,
-    /// The ray pass, all bands together.
+    /// The ray pass, all launch_tiles together.
     pub rays_ms: f64,
     /// From the begin of the first pass to the end of the last, so that what lies between counts too; where the frame is cut
     /// into steps, without what lies between those.
@@ -19,7 +19,7 @@ pub struct FrameTimings {
 }
 
 impl FrameTimings {
-    pub(super) fn of(times: &PassTimes) -> Self {
+    pub(super) fn from_pass_times(times: &PassTimes) -> Self {
         Self { geometry_ms: times.ms(&[GEOMETRY]), rays_ms: times.ms(&[RAYS]), span_ms: times.span_ms() }
     }
 

@@ -1,21 +1,21 @@
 //! The geometry pass as the paper has it: every triangle once through the rasteriser into a G-buffer (algorithms 4
 //! and 5). It is the reference that the visibility pass is measured against.
 
+use super::pipelines;
 use lvk::{
     BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer,
     CompareOp, Context, CullMode, DepthAttachment, DepthTest, Format, Holder, IndexFormat, RenderPassDesc,
-    RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage,
+    RenderPipelineDesc, RenderPipelineHandle, TextureDesc, TextureHandle, TextureUsage,
 };
 
 use super::frame::{Indices, Push};
 use super::gpu_scene::GpuScene;
 use super::shader_module::module;
-use crate::shaders::hybrid as texts;
 
 /// Triangle number of pixels that show the sky (`kNoTriangle` in `shaders/hybrid/hit.glsl`).
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
-/// What the geometry pass leaves for the ray pass, a texel a pixel.
+/// The output of the geometry pass, a texel a pixel.
 pub(super) struct GBuffer {
     /// Position in scene units, and distance from the eye.
     position: Holder<TextureHandle>,
@@ -56,7 +56,7 @@ impl GBuffer {
         })
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn textures(&self) -> [TextureHandle; 3] {
         [&self.position, &self.surface, &self.albedo].map(Holder::handle)
     }
@@ -88,8 +88,8 @@ impl GBuffer {
 impl GeometryPass {
     /// The pass over `scene` for a picture of `extent` pixels.
     pub(super) fn new(ctx: &Context, scene: &GpuScene, extent: [u32; 2]) -> lvk::Result<Self> {
-        let vertex = module(ctx, ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert")?;
-        let fragment = module(ctx, ShaderStage::Fragment, texts::GEOMETRY_FRAG, &[], "geometry.frag")?;
+        let vertex = module(ctx, &pipelines::GEOMETRY_VERT, &[])?;
+        let fragment = module(ctx, &pipelines::GEOMETRY_FRAG, &[])?;
         let color = GBuffer::COLOR.map(ColorTarget::from);
         let pipeline = ctx.create_render_pipeline(&RenderPipelineDesc {
             vertex: Some(*vertex),

@@ -1,16 +1,16 @@
-//! What comes before the ray pass, if anything does.
+//! The geometry stage, before the ray pass.
 
 use lvk::{CommandBuffer, Context};
 
 use super::config::{Geometry, HybridConfig, Method};
-use super::frame::{Indices, Push, VisibilityPlaces};
+use super::frame::{Indices, Push, VisibilityAddresses};
 use super::geometry_pass::GeometryPass;
 use super::gpu_scene::GpuScene;
 use super::raster_choice::RasterChoice;
 use super::ray_pass::GeometryLeft;
 use super::visibility_pass::VisibilityPass;
 
-/// What comes before the ray pass.
+/// The geometry stage, before the ray pass.
 pub(super) enum GeometryStage {
     None,
     Paper(GeometryPass),
@@ -40,7 +40,7 @@ impl GeometryStage {
         }
     }
 
-    /// What it leaves for the ray pass.
+    /// Resources that the stage leaves for the ray pass.
     pub(super) fn left(&self) -> GeometryLeft {
         match self {
             Self::None => GeometryLeft::default(),
@@ -51,10 +51,10 @@ impl GeometryStage {
         }
     }
 
-    /// Where the shaders find everything.
-    pub(super) fn places(&self) -> VisibilityPlaces {
+    /// Addresses and indices for the shaders.
+    pub(super) fn addresses(&self) -> VisibilityAddresses {
         match self {
-            Self::Visibility(pass) => pass.places(),
+            Self::Visibility(pass) => pass.addresses(),
             _ => bytemuck::Zeroable::zeroed(),
         }
     }
@@ -66,7 +66,7 @@ impl GeometryStage {
         }
     }
 
-    /// Which rasteriser is in use, and why.
+    /// The rasteriser in use, and the reason.
     pub(super) fn choice(&self) -> Option<RasterChoice> {
         match self {
             Self::Visibility(pass) => Some(pass.choice()),
@@ -74,7 +74,7 @@ impl GeometryStage {
         }
     }
 
-    /// Whether there is a choice of rasterisers.
+    /// True if there is a choice of rasterisers.
     pub(super) fn has_both(&self) -> bool {
         matches!(self, Self::Visibility(pass) if pass.has_both())
     }

@@ -1,5 +1,6 @@
 //! A scene on the GPU: arrays, textures, sky and acceleration structures.
 
+use crate::app::sample_error::SampleError;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -8,7 +9,6 @@ use lvk::{
     SamplerHandle, TextureHandle, TlasDesc, TlasInstance,
 };
 
-use super::HybridError;
 use super::frame::SceneAddresses;
 use super::scene_arrays::SceneArrays;
 use super::scene_check::check;
@@ -49,7 +49,7 @@ pub(crate) struct HitGroups {
 
 impl GpuScene {
     /// Uploads `scene` and builds its acceleration structures.
-    pub(crate) fn new(ctx: &Context, scene: &Scene, hit_groups: HitGroups) -> Result<Self, HybridError> {
+    pub(crate) fn new(ctx: &Context, scene: &Scene, hit_groups: HitGroups) -> Result<Self, SampleError> {
         check(scene)?;
         let textures: Vec<_> = scene
             .textures
@@ -82,7 +82,7 @@ impl GpuScene {
         })
     }
 
-    /// Where the shaders find the arrays.
+    /// Addresses of the arrays.
     pub(crate) fn addresses(&self) -> SceneAddresses {
         self.arrays.addresses()
     }
@@ -92,7 +92,7 @@ impl GpuScene {
         self.arrays.triangles()
     }
 
-    /// How many bottom-level structures there are: one for opaque and one for refractive triangles.
+    /// Number of BLASes: one for opaque and one for refractive triangles.
     pub(crate) fn blas_count(&self) -> usize {
         self.blas.len()
     }

@@ -1,20 +1,21 @@
 //! Visibility by the device's rasteriser: triangles that cover no pixel's centre are culled by compute shaders, the
 //! others drawn by one indirect draw into a target of triangle numbers.
 
+use super::pipelines;
+use crate::pipelines::SampleStage;
 use lvk::{
     BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer,
     CompareOp, ComputePipelineDesc, ComputePipelineHandle, Context, CullMode, Dependencies, DepthAttachment,
     DepthTest, Format, Holder, IndexFormat, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
-    ShaderStage, TextureDesc, TextureHandle, TextureUsage,
+    TextureDesc, TextureHandle, TextureUsage,
 };
 
 use super::compute_raster::groups_for;
-use super::frame::{Push, VisibilityPlaces};
+use super::frame::{Push, VisibilityAddresses};
 use super::geometry_pass::NO_TRIANGLE;
 use super::shader_module::module;
-use crate::shaders::hybrid as texts;
 
-/// Triangles of a workgroup (`kTrianglesPerGroup` in `shaders/hybrid/survivors.glsl`).
+/// Triangles of a workgroup (`kTrianglesPerGroup` in `shaders/hybrid/unculled_triangles.glsl`).
 const GROUP: u32 = 256;
 /// Bytes of the arguments of an indexed draw.
 const DRAW_BYTES: u32 = 20;
@@ -30,7 +31,7 @@ pub(super) struct HardwareRaster {
     groups: [u32; 3],
 }
 
-/// What culling leaves.
+/// Triangles that remain after culling.
 struct Survivors {
     bits: Holder<BufferHandle>,
     counts: Holder<BufferHandle>,
@@ -52,8 +53,8 @@ impl HardwareRaster {
             ctx.create_texture(&TextureDesc { format, extent, usage, debug_name, ..TextureDesc::default() })
         };
         Ok(Self {
-            cull: compute(ctx, texts::CULL_COMP, "cull.comp")?,
-            compact: compute(ctx, texts::COMPACT_COMP, "compact.comp")?,
+            cull: compute(ctx, &pipelines::CULL_COMP)?,
+            compact: compute(ctx, &pipelines::COMPACT_COMP)?,
             draw: draw(ctx)?,
             image: target(Self::IMAGE, "visible triangles")?,
             depth: target(Self::DEPTH, "visibility depth")?,
@@ -63,7 +64,7 @@ impl HardwareRaster {
     }
 
     /// Tells the shaders where its buffers are.
-    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityPlaces) -> lvk::Result<()> {
+    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityAddresses) -> lvk::Result<()> {
         let left = &self.survivors;
         places.survivor_bits = ctx.buffer_address(*left.bits)?;
         places.survivor_counts = ctx.buffer_address(*left.counts)?;
@@ -73,7 +74,7 @@ impl HardwareRaster {
         Ok(())
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn image(&self) -> &Holder<TextureHandle> {
         &self.image
     }
@@ -149,18 +150,18 @@ impl Survivors {
     }
 }
 
-fn compute(ctx: &Context, text: &str, debug_name: &str) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let shader = module(ctx, ShaderStage::Compute, text, &[], debug_name)?;
+fn compute(ctx: &Context, stage: &SampleStage) -> lvk::Result<Holder<ComputePipelineHandle>> {
+    let shader = module(ctx, stage, &[])?;
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module: Some(*shader),
-        debug_name,
+        debug_name: stage.name,
         ..ComputePipelineDesc::default()
     })
 }
 
 fn draw(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
-    let vertex = module(ctx, ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert")?;
-    let fragment = module(ctx, ShaderStage::Fragment, texts::VISIBILITY_FRAG, &[], "visibility.frag")?;
+    let vertex = module(ctx, &pipelines::GEOMETRY_VERT, &[])?;
+    let fragment = module(ctx, &pipelines::VISIBILITY_FRAG, &[])?;
     ctx.create_render_pipeline(&RenderPipelineDesc {
         vertex: Some(*vertex),
         fragment: Some(*fragment),

@@ -5,48 +5,46 @@
 //! what a pixel shows with a rasteriser and traces from there ([`Geometry`] says how). Both run by a ray tracing
 //! pipeline and by ray queries ([`RayPath`]), from one text of shading code (`shaders/hybrid/integrator.glsl`).
 //!
-//! [`HybridRenderer`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`HybridRenderer`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod bands;
-mod bounce_queue;
+mod accumulation;
+mod args;
 mod compute_raster;
 mod config;
-mod error;
-mod film;
 mod frame;
+mod frame_passes;
 mod frame_timings;
 mod geometry_pass;
 mod geometry_stage;
 mod gpu_scene;
 pub(crate) mod half_float;
 mod hardware_raster;
-mod passes;
+mod info;
+mod launch_tiles;
+mod panel;
 mod pipelines;
 mod pixel_order;
 mod raster_choice;
 mod ray_pass;
+mod reflective_pixels;
 mod renderer;
-mod run;
 mod scene_arrays;
 mod scene_check;
 mod sequence;
 mod shader_module;
-mod switches;
 mod texture_density;
 mod texture_fit;
 mod visibility_pass;
 
+pub use args::HybridArgs;
 pub use config::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
-pub use error::HybridError;
 pub(crate) use frame::{Lighting, SceneAddresses, near_plane};
 pub use frame_timings::FrameTimings;
 pub(crate) use gpu_scene::{GpuScene, HitGroups};
-pub use pipelines::pipelines;
+pub(crate) use panel::path_switch;
 pub use raster_choice::RasterChoice;
 pub use renderer::HybridRenderer;
-pub use run::run;
 pub(crate) use scene_arrays::SceneArrays;
 pub(crate) use scene_check::check_promises;
 pub use sequence::HybridSequence;
-pub(crate) use switches::show_path;
 pub use texture_fit::{fit_textures, textures_needed};

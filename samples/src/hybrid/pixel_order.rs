@@ -1,15 +1,14 @@
 //! The order in which pixels are rendered: those with mirrors and glass first.
 
+use super::pipelines;
 use lvk::{
     BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Holder,
-    ShaderStage,
 };
 
 use super::frame::Push;
 use super::ray_pass::GeometryLeft;
 use super::shader_module::module;
 use crate::app::array_buffer::buffer;
-use crate::shaders::hybrid as texts;
 
 /// Side in pixels of the square of a workgroup (`shaders/hybrid/order.comp.glsl`).
 const SQUARE: u32 = 16;
@@ -27,7 +26,7 @@ pub(super) struct PixelOrder {
 impl PixelOrder {
     /// An order of the pixels of a picture of `extent` pixels.
     pub(super) fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
-        let shader = module(ctx, ShaderStage::Compute, texts::ORDER_COMP, &[], "order.comp")?;
+        let shader = module(ctx, &pipelines::ORDER_COMP, &[])?;
         let pixels = u64::from(extent[0]) * u64::from(extent[1]);
         Ok(Self {
             pipeline: ctx.create_compute_pipeline(&ComputePipelineDesc {
@@ -40,12 +39,12 @@ impl PixelOrder {
         })
     }
 
-    /// Where the shaders find it.
+    /// Address of the buffer.
     pub(super) fn address(&self, ctx: &Context) -> lvk::Result<u64> {
         ctx.buffer_address(*self.order)
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn buffer(&self) -> BufferHandle {
         *self.order
     }

@@ -1,15 +1,15 @@
-//! Which rasteriser finds the visible triangles.
+//! The choice of the rasteriser that finds visible triangles.
 
 use std::fmt;
 
 use super::config::Raster;
 
-/// A rasteriser and the reason for it; displayed as part of the headline.
+/// A rasteriser and the reason for it; displayed as part of the summary.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RasterChoice {
     /// The rasteriser.
     pub raster: Raster,
-    /// Why it was taken.
+    /// The reason for the choice.
     pub why: String,
 }
 

@@ -1,19 +1,20 @@
 //! The ray pass: shading, shadows, reflection and refraction of every pixel, by a ray tracing pipeline or by compute
 //! shaders with ray queries; at once, or first surfaces first and mirrors and glass in a launch of their own.
 
+use super::pipelines;
+use crate::pipelines::SampleStage;
 use lvk::{
     BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
-    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderStage, SpecializationConstant,
-    SpecializationValue, TextureHandle,
+    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, SpecializationConstant, SpecializationValue,
+    TextureHandle,
 };
 
-use super::bounce_queue::BounceQueue;
+use super::accumulation::Accumulation;
 use super::compute_raster::groups_for;
 use super::config::{Bounces, Geometry, HybridConfig, Method, RayPath};
-use super::film::Film;
-use super::frame::{BouncePlaces, Push};
+use super::frame::{Push, ReflectivePixelAddresses};
+use super::reflective_pixels::ReflectivePixels;
 use super::shader_module::module;
-use crate::shaders::hybrid as texts;
 
 /// Side of a work group in pixels (`shaders/hybrid/render.comp.glsl`).
 const GROUP: u32 = 8;
@@ -26,12 +27,12 @@ const BOUNCES: u32 = 1;
 /// The pass: its pipelines and all they touch.
 pub(super) struct RayPass {
     pipeline: Pipeline,
-    queue: Option<BounceQueue>,
-    /// Whether pixels are taken in their order and not by rows.
+    queue: Option<ReflectivePixels>,
+    /// True if pixels are taken in their order and not by rows.
     ordered: bool,
 }
 
-/// What a geometry pass leaves for the ray pass to read.
+/// The resources that a geometry pass leaves for the ray pass.
 #[derive(Debug, Default)]
 pub(super) struct GeometryLeft {
     pub(super) textures: Vec<TextureHandle>,
@@ -44,40 +45,38 @@ enum Pipeline {
 }
 
 impl RayPass {
-    /// The pass that `config` asks for, of bands of `band_pixels` pixels.
-    pub(super) fn new(ctx: &Context, config: &HybridConfig, band_pixels: u32) -> lvk::Result<Self> {
+    /// The pass that `config` asks for, of launches of `tile_pixels` pixels.
+    pub(super) fn new(ctx: &Context, config: &HybridConfig, tile_pixels: u32) -> lvk::Result<Self> {
         let bounces = config.bounces.filter(|_| config.max_depth > 0);
         let (queued, ordered) = (bounces == Some(Bounces::Queued), bounces == Some(Bounces::First));
-        let stages = Stages::of(config, queued, ordered);
+        let stages = Stages::from_config(config, queued, ordered);
         let pipeline = match config.path {
             RayPath::Pipeline => Pipeline::Tracing(tracing_pipeline(ctx, &stages)?),
             RayPath::Query => Pipeline::Compute {
-                render: stages.compute(ctx, texts::RENDER_COMP, "render.comp")?,
-                bounces: queued
-                    .then(|| stages.compute(ctx, texts::BOUNCES_COMP, "bounces.comp"))
-                    .transpose()?,
+                render: stages.compute(ctx, &pipelines::RENDER_COMP)?,
+                bounces: queued.then(|| stages.compute(ctx, &pipelines::BOUNCES_COMP)).transpose()?,
             },
         };
-        let queue = queued.then(|| BounceQueue::new(ctx, band_pixels)).transpose()?;
+        let queue = queued.then(|| ReflectivePixels::new(ctx, tile_pixels)).transpose()?;
         Ok(Self { pipeline, queue, ordered })
     }
 
-    /// Where the shaders find the queue.
-    pub(super) fn bounce_places(&self, ctx: &Context) -> lvk::Result<BouncePlaces> {
-        self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.places(ctx))
+    /// Addresses of the queue.
+    pub(super) fn reflective_pixel_addresses(&self, ctx: &Context) -> lvk::Result<ReflectivePixelAddresses> {
+        self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.addresses(ctx))
     }
 
-    /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left onto `film`.
+    /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left onto `accumulation`.
     pub(super) fn record(
         &self,
         cmd: &mut CommandBuffer,
         width: u32,
         push: &Push,
         left: &GeometryLeft,
-        film: &Film,
+        accumulation: &Accumulation,
     ) -> lvk::Result<()> {
         let (push, launch) = self.launch(width, push);
-        let mut buffers: Vec<_> = film.sums().into_iter().collect();
+        let mut buffers: Vec<_> = accumulation.sums().into_iter().collect();
         if let Some(queue) = &self.queue {
             queue.record_reset(cmd)?;
             buffers.extend(queue.buffers());
@@ -85,7 +84,7 @@ impl RayPass {
         let dependencies = Dependencies {
             sampled_images: &left.textures,
             read_buffers: &left.buffers,
-            storage_images: &[*film.picture],
+            storage_images: &[*accumulation.picture],
             buffers: &buffers,
             ..Dependencies::default()
         };
@@ -96,7 +95,7 @@ impl RayPass {
                 cmd.push_constants(push)?;
                 cmd.trace_rays_with(RENDER, launch, &dependencies)?;
                 if let Some(queue) = &self.queue {
-                    cmd.trace_rays_indirect(BOUNCES, queue.head(), BounceQueue::RAYS, &dependencies)?;
+                    cmd.trace_rays_indirect(BOUNCES, queue.head(), ReflectivePixels::RAYS, &dependencies)?;
                 }
             }
             Pipeline::Compute { render, bounces } => {
@@ -106,14 +105,14 @@ impl RayPass {
                 if let (Some(queue), Some(bounces)) = (&self.queue, bounces) {
                     cmd.bind_compute_pipeline(**bounces)?;
                     cmd.push_constants(push)?;
-                    cmd.dispatch_indirect(queue.head(), BounceQueue::GROUPS, &dependencies)?;
+                    cmd.dispatch_indirect(queue.head(), ReflectivePixels::GROUPS, &dependencies)?;
                 }
             }
         }
         Ok(())
     }
 
-    /// What shaders are told of the rows that `push` names, and how many threads that takes along each axis.
+    /// Push constants for the rows that `push` names, and the number of threads along each axis.
     fn launch(&self, width: u32, push: &Push) -> (Push, [u32; 3]) {
         let rows = push.end.saturating_sub(push.first);
         if self.ordered {
@@ -132,7 +131,7 @@ impl RayPass {
     }
 }
 
-/// What all stages are compiled with.
+/// Macros and constants of all stages.
 struct Stages {
     defines: Vec<(&'static str, &'static str)>,
     specialization: [SpecializationConstant; 1],
@@ -140,14 +139,14 @@ struct Stages {
 }
 
 impl Stages {
-    fn of(config: &HybridConfig, queued: bool, ordered: bool) -> Self {
+    fn from_config(config: &HybridConfig, queued: bool, ordered: bool) -> Self {
         let first = match (config.method, config.geometry) {
             (Method::Standalone, _) => &[],
-            (Method::Hybrid, Geometry::Paper) => texts::WITH_GBUFFER,
-            (Method::Hybrid, Geometry::Visibility(_)) if ordered => texts::WITH_VISIBILITY_AND_ORDER,
-            (Method::Hybrid, Geometry::Visibility(_)) => texts::WITH_VISIBILITY,
+            (Method::Hybrid, Geometry::Paper) => pipelines::WITH_GBUFFER,
+            (Method::Hybrid, Geometry::Visibility(_)) if ordered => pipelines::WITH_VISIBILITY_AND_ORDER,
+            (Method::Hybrid, Geometry::Visibility(_)) => pipelines::WITH_VISIBILITY,
         };
-        let queue = if queued { texts::WITH_QUEUE } else { &[] };
+        let queue = if queued { pipelines::WITH_QUEUE } else { &[] };
         let value = SpecializationValue::U32(config.max_depth);
         Self {
             defines: [first, queue].concat(),
@@ -156,24 +155,24 @@ impl Stages {
         }
     }
 
-    fn compute(&self, ctx: &Context, text: &str, name: &str) -> lvk::Result<Holder<ComputePipelineHandle>> {
-        let shader = module(ctx, ShaderStage::Compute, text, &self.defines, name)?;
+    fn compute(&self, ctx: &Context, stage: &SampleStage) -> lvk::Result<Holder<ComputePipelineHandle>> {
+        let shader = module(ctx, stage, &self.defines)?;
         ctx.create_compute_pipeline(&ComputePipelineDesc {
             module: Some(*shader),
             specialization: &self.specialization,
-            debug_name: name,
+            debug_name: stage.name,
         })
     }
 }
 
 fn tracing_pipeline(ctx: &Context, stages: &Stages) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let ray_gen = |text, name| module(ctx, ShaderStage::RayGen, text, &stages.defines, name);
-    let render = ray_gen(texts::RENDER_RGEN, "render.rgen")?;
-    let bounces = stages.queued.then(|| ray_gen(texts::BOUNCES_RGEN, "bounces.rgen")).transpose()?;
+    let ray_gen = |stage| module(ctx, stage, &stages.defines);
+    let render = ray_gen(&pipelines::RENDER_RGEN)?;
+    let bounces = stages.queued.then(|| ray_gen(&pipelines::BOUNCES_RGEN)).transpose()?;
     let ray_gens: Vec<_> = std::iter::once(&render).chain(&bounces).map(Holder::handle).collect();
-    let closest_miss = module(ctx, ShaderStage::Miss, texts::CLOSEST_RMISS, &[], "closest.rmiss")?;
-    let shadow_miss = module(ctx, ShaderStage::Miss, texts::SHADOW_RMISS, &[], "shadow.rmiss")?;
-    let closest_hit = module(ctx, ShaderStage::ClosestHit, texts::CLOSEST_RCHIT, &[], "closest.rchit")?;
+    let closest_miss = module(ctx, &pipelines::CLOSEST_RMISS, &[])?;
+    let shadow_miss = module(ctx, &pipelines::SHADOW_RMISS, &[])?;
+    let closest_hit = module(ctx, &pipelines::CLOSEST_RCHIT, &[])?;
     ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &ray_gens,
         miss: &[*closest_miss, *shadow_miss],

@@ -1,13 +1,13 @@
 //! The sample as a type: give it a scene and a camera, get a picture.
 
+use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, Context, TextureHandle, TextureRegion};
 
-use super::HybridError;
 use super::config::{Bounces, HybridConfig, Method, Raster, RayPath};
 use super::frame::{Lighting, near_plane};
+use super::frame_passes::FramePasses;
 use super::frame_timings::{FrameTimings, GEOMETRY, RAYS};
 use super::gpu_scene::{GpuScene, HitGroups};
-use super::passes::Passes;
 use super::raster_choice::RasterChoice;
 use crate::app::frame::Frame;
 use crate::scene::{Camera, GpuCamera, Scene};
@@ -20,7 +20,7 @@ pub struct HybridRenderer {
     ctx: Context,
     config: HybridConfig,
     scene: GpuScene,
-    passes: Passes,
+    passes: FramePasses,
     lighting: Lighting,
     near_plane: f32,
 }
@@ -29,13 +29,13 @@ impl HybridRenderer {
     /// Uploads `scene`, builds its acceleration structures and compiles the pipelines.
     ///
     /// # Errors
-    /// [`HybridError`] when the configuration or the scene is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, HybridError> {
+    /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
         let config = suited(config, scene, ctx.capabilities());
         let gpu_scene = GpuScene::new(ctx, scene, HitGroups::default())?;
         Ok(Self {
-            passes: Passes::new(ctx, &gpu_scene, &config)?,
+            passes: FramePasses::new(ctx, &gpu_scene, &config)?,
             lighting: Lighting::new(scene),
             near_plane: near_plane(scene),
             ctx: ctx.clone(),
@@ -52,44 +52,44 @@ impl HybridRenderer {
     /// Renders one frame and waits for it.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn render(&mut self, camera: &Camera) -> Result<FrameTimings, HybridError> {
+    /// [`SampleError::Device`].
+    pub fn render(&mut self, camera: &Camera) -> Result<FrameTimings, SampleError> {
         let mut ignore = |_| {};
         let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
         self.record(&mut frame, camera)?;
-        Ok(FrameTimings::of(&frame.finish()?))
+        Ok(FrameTimings::from_pass_times(&frame.finish()?))
     }
 
-    /// Records a frame, a step for each band of rows of each sample, and answers the texture that shows it: 8 bits a
+    /// Records a frame, a step for each tile of rows of each sample, and answers the texture that shows it: 8 bits a
     /// channel, sRGB.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn record(&mut self, frame: &mut Frame<'_>, camera: &Camera) -> Result<TextureHandle, HybridError> {
+    /// [`SampleError::Device`].
+    pub fn record(&mut self, frame: &mut Frame<'_>, camera: &Camera) -> Result<TextureHandle, SampleError> {
         self.upload_constants(camera)?;
         for sample in 0..self.config.samples {
-            for band in 0..self.passes.bands.len() {
-                if (sample, band) != (0, 0) {
+            for tile in 0..self.passes.launch_tiles.len() {
+                if (sample, tile) != (0, 0) {
                     frame.next_step()?;
                 }
-                if band == 0 && self.config.method == Method::Hybrid {
+                if tile == 0 && self.config.method == Method::Hybrid {
                     frame.pass(GEOMETRY, |cmd| self.passes.record_geometry(cmd, sample))?;
                 }
-                frame.pass(RAYS, |cmd| self.passes.record_band(cmd, sample, band))?;
+                frame.pass(RAYS, |cmd| self.passes.record_tile(cmd, sample, tile))?;
             }
         }
-        Ok(*self.passes.film.picture)
+        Ok(*self.passes.accumulation.picture)
     }
 
     /// Renders pictures of `extent` pixels from now on.
     ///
     /// # Errors
-    /// [`HybridError`] when that is beyond the device; the extent is then what it was.
-    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), HybridError> {
+    /// [`SampleError`] when that is beyond the device; the extent is then what it was.
+    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), SampleError> {
         self.change(&HybridConfig { width, height, ..self.config })
     }
 
-    /// What is rendered, with all that the configuration left open decided.
+    /// The configuration with all its open choices decided.
     pub fn config(&self) -> &HybridConfig {
         &self.config
     }
@@ -97,8 +97,8 @@ impl HybridRenderer {
     /// Renders by another configuration from now on.
     ///
     /// # Errors
-    /// [`HybridError`] when that is beyond the device; the configuration is then what it was.
-    pub fn change(&mut self, config: &HybridConfig) -> Result<(), HybridError> {
+    /// [`SampleError`] when that is beyond the device; the configuration is then what it was.
+    pub fn change(&mut self, config: &HybridConfig) -> Result<(), SampleError> {
         config.check(self.ctx.capabilities())?;
         self.make_passes(*config)
     }
@@ -106,13 +106,13 @@ impl HybridRenderer {
     /// Makes all pipelines anew, of shaders that have changed.
     ///
     /// # Errors
-    /// [`HybridError::Device`]; the pipelines are then those that were.
-    pub fn reload(&mut self) -> Result<(), HybridError> {
+    /// [`SampleError::Device`]; the pipelines are then those that were.
+    pub fn reload(&mut self) -> Result<(), SampleError> {
         self.make_passes(self.config)
     }
 
-    fn make_passes(&mut self, config: HybridConfig) -> Result<(), HybridError> {
-        let mut passes = Passes::new(&self.ctx, &self.scene, &config)?;
+    fn make_passes(&mut self, config: HybridConfig) -> Result<(), SampleError> {
+        let mut passes = FramePasses::new(&self.ctx, &self.scene, &config)?;
         if let Some(choice) = self.passes.geometry.choice() {
             passes.geometry.choose(choice);
         }
@@ -124,8 +124,8 @@ impl HybridRenderer {
     /// compute then. Returns which one is in use, why, and both times; `None` where no visibility is rasterised.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn choose_raster(&mut self, camera: &Camera) -> Result<Option<RasterChoice>, HybridError> {
+    /// [`SampleError::Device`].
+    pub fn choose_raster(&mut self, camera: &Camera) -> Result<Option<RasterChoice>, SampleError> {
         if self.passes.geometry.has_both() {
             let compute = self.measure_raster(camera, Raster::Compute)?;
             let hardware = self.measure_raster(camera, Raster::Hardware)?;
@@ -139,7 +139,7 @@ impl HybridRenderer {
         self.passes.geometry.choice().map(|choice| choice.raster)
     }
 
-    /// Whether another one could be.
+    /// True if another one could be.
     pub(super) fn can_choose_raster(&self) -> bool {
         self.passes.geometry.has_both()
     }
@@ -151,20 +151,20 @@ impl HybridRenderer {
 
     /// The texture that shows the last frame.
     pub fn picture(&self) -> TextureHandle {
-        *self.passes.film.picture
+        *self.passes.accumulation.picture
     }
 
     /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn read_image(&self) -> Result<Vec<u8>, HybridError> {
-        Ok(self.ctx.download_texture(*self.passes.film.picture, &TextureRegion::default())?)
+    /// [`SampleError::Device`].
+    pub fn read_image(&self) -> Result<Vec<u8>, SampleError> {
+        Ok(self.ctx.download_texture(*self.passes.accumulation.picture, &TextureRegion::default())?)
     }
 
-    /// How many bands a frame is rendered in, those of all samples counted.
+    /// Number of launches of a frame, over all samples.
     pub fn band_count(&self) -> u64 {
-        self.passes.bands.len() as u64 * u64::from(self.config.samples)
+        self.passes.launch_tiles.len() as u64 * u64::from(self.config.samples)
     }
 
     /// Milliseconds that building the bottom-level acceleration structures took, submission and wait included.
@@ -172,7 +172,7 @@ impl HybridRenderer {
         self.scene.blas_build_ms
     }
 
-    /// How many bottom-level acceleration structures the scene has.
+    /// Number of BLASes of the scene.
     pub fn blas_count(&self) -> usize {
         self.scene.blas_count()
     }
@@ -228,7 +228,7 @@ fn suited(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> 
     }
 }
 
-/// Whether anything in the scene mirrors or refracts.
+/// True if anything in the scene mirrors or refracts.
 pub(super) fn goes_on(scene: &Scene) -> bool {
     scene.materials.iter().any(|material| material.reflectivity > 0.0 || material.is_refractive())
 }

@@ -16,7 +16,7 @@ use crate::scene::{Material, Scene};
 /// `kNoTexture` in `shaders/common/scene_buffers.glsl`.
 const NO_TEXTURE: u32 = u32::MAX;
 
-/// What shaders reach of a scene by address; some of it is only held for them.
+/// Buffers of a scene that shaders read by address.
 pub(crate) struct SceneArrays {
     positions: Holder<BufferHandle>,
     triangles: Holder<BufferHandle>,
@@ -74,7 +74,7 @@ impl SceneArrays {
         Ok(Self { positions, triangles, _held: [normals, texcoords, triangle_infos, materials], addresses })
     }
 
-    /// Where the shaders find the arrays.
+    /// Addresses of the arrays.
     pub(crate) fn addresses(&self) -> SceneAddresses {
         self.addresses
     }

@@ -1,6 +1,6 @@
-//! Whether a scene keeps the promises that the shaders rely on.
+//! True if a scene keeps the promises that the shaders rely on.
 
-use super::HybridError;
+use crate::app::sample_error::SampleError;
 use crate::scene::Scene;
 
 /// Custom indices, which carry the first triangle of an instance, have 24 bits.
@@ -8,17 +8,17 @@ const CUSTOM_INDEX_LIMIT: u32 = 1 << 24;
 
 /// Fails where drawing `scene` would read outside of its arrays. Scenes that were loaded always pass, but for
 /// their size.
-pub(super) fn check(scene: &Scene) -> Result<(), HybridError> {
+pub(super) fn check(scene: &Scene) -> Result<(), SampleError> {
     check_promises(scene)?;
     let count = scene.opaque_triangle_count;
     if count >= CUSTOM_INDEX_LIMIT {
-        return Err(HybridError::TooManyTriangles { count, limit: CUSTOM_INDEX_LIMIT });
+        return Err(SampleError::TooManyTriangles { count, limit: CUSTOM_INDEX_LIMIT });
     }
     Ok(())
 }
 
 /// As [`check`], for any number of triangles that 32 bits count.
-pub(crate) fn check_promises(scene: &Scene) -> Result<(), HybridError> {
+pub(crate) fn check_promises(scene: &Scene) -> Result<(), SampleError> {
     let vertices = scene.positions.len();
     let triangles = scene.triangles.len();
     let is_vertex = |&vertex: &u32| (vertex as usize) < vertices;
@@ -45,7 +45,7 @@ pub(crate) fn check_promises(scene: &Scene) -> Result<(), HybridError> {
         ),
     ];
     match promises.into_iter().find(|(is_kept, _)| !is_kept) {
-        Some((_, what)) => Err(HybridError::BrokenScene(what)),
+        Some((_, what)) => Err(SampleError::BrokenScene(what)),
         None => Ok(()),
     }
 }
@@ -72,7 +72,7 @@ mod tests {
         for breaker in breakers {
             let mut scene = whole.clone();
             breaker(&mut scene);
-            assert!(matches!(check(&scene), Err(HybridError::BrokenScene(_))));
+            assert!(matches!(check(&scene), Err(SampleError::BrokenScene(_))));
         }
     }
 }

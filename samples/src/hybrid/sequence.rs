@@ -1,13 +1,14 @@
 //! The sample as an animation: a tour through the scene's cameras, and a lamp that may move.
 
+use crate::app::sample_error::SampleError;
 use glam::Vec3;
 use lvk::{Context, TextureHandle};
 
 use super::renderer::goes_on;
-use super::{HybridConfig, HybridError, HybridRenderer, Raster, switches};
+use super::{HybridConfig, HybridRenderer, Raster, panel};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::app::ui::Wanted;
+use crate::app::sample::{FrameTime, Sample};
+use crate::app::ui::PendingSettings;
 use crate::scene::{Camera, CameraPath, Scene};
 
 /// Radius of the lamp's circle, as a share of the diagonal of the scene's bounding box.
@@ -20,9 +21,9 @@ pub struct HybridSequence {
     lamp: LampCircle,
     lamp_moves: bool,
     camera: Camera,
-    wanted: Wanted<HybridConfig>,
+    wanted: PendingSettings<HybridConfig>,
     goes_on: bool,
-    /// Which scene it is, as the panel tells.
+    /// Description of the scene for the panel.
     scene: String,
 }
 
@@ -40,13 +41,13 @@ impl HybridSequence {
     pub fn new(renderer: HybridRenderer, scene: &Scene, first: usize, lamp_moves: bool) -> Self {
         let path = CameraPath::tour(scene, first);
         Self {
-            wanted: Wanted::new(*renderer.config()),
+            wanted: PendingSettings::new(*renderer.config()),
             goes_on: goes_on(scene),
             scene: format!("{}: {} triangles", scene.name, scene.triangles.len()),
             renderer,
             camera: path.at(0.0),
             path,
-            lamp: LampCircle::of(scene),
+            lamp: LampCircle::from_scene(scene),
             lamp_moves,
         }
     }
@@ -63,23 +64,23 @@ impl HybridSequence {
         }
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn wanted(&mut self) -> &mut HybridConfig {
         &mut self.wanted.config
     }
 }
 
 impl Sample for HybridSequence {
-    type Error = HybridError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         self.renderer.context()
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), HybridError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.camera = self.path.at(time.phase());
         if self.lamp_moves {
-            self.renderer.move_lamp(self.lamp.at(moment.phase()));
+            self.renderer.move_lamp(self.lamp.at(time.phase()));
         }
         Ok(())
     }
@@ -88,26 +89,22 @@ impl Sample for HybridSequence {
         self.renderer.band_count()
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridError> {
-        if let Some(config) = self.wanted.news(*self.renderer.config()) {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+        if let Some(config) = self.wanted.changed_from(*self.renderer.config()) {
             let done = self.renderer.change(&config);
-            self.wanted.settle(done, *self.renderer.config());
+            self.wanted.finish(done, *self.renderer.config());
         }
         self.renderer.record(frame, &self.camera)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), HybridError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         self.renderer.resize(extent)?;
         [self.wanted.config.width, self.wanted.config.height] = extent;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -115,20 +112,20 @@ impl Sample for HybridSequence {
             self.renderer.move_lamp(self.lamp.at(0.0));
         }
         let capabilities = self.renderer.context().capabilities();
-        self.wanted.show(ui, |ui, config| switches::show(ui, config, capabilities, self.goes_on));
+        self.wanted.show(ui, |ui, config| panel::show_settings(ui, config, capabilities, self.goes_on));
         if let Some(raster) = self.renderer.raster() {
             self.show_rasters(ui, raster);
         }
         ui.label(&self.scene);
     }
 
-    fn reload(&mut self) -> Result<(), HybridError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.renderer.reload()
     }
 }
 
 impl LampCircle {
-    fn of(scene: &Scene) -> Self {
+    fn from_scene(scene: &Scene) -> Self {
         let (low, high) = scene.bounds();
         let radius = LAMP_SHARE * Vec3::from(low).distance(Vec3::from(high));
         Self { place: Vec3::from(scene.light.position), radius }

@@ -1,4 +1,4 @@
-//! How many texels of its texture a triangle shows per unit of length, the constant of a ray cone's level of
+//! The texel density of a triangle: texels of its texture per unit of length, the constant of a ray cone's level of
 //! detail (see `shaders/common/texture_lod.glsl`).
 
 use glam::{Vec2, Vec3};

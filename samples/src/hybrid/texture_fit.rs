@@ -1,10 +1,10 @@
 //! Makes a scene's textures fit the device.
 
+use crate::app::sample_error::SampleError;
 use image::RgbaImage;
 use image::imageops::{self, FilterType};
 use lvk::Limits;
 
-use super::HybridError;
 use crate::scene::{Scene, Texture};
 
 /// Textures that the sample has beside those of the scene: sky, picture, G-buffer, and what `lvk` keeps for itself.
@@ -13,19 +13,19 @@ const OWN_TEXTURES: u32 = 16;
 /// Shrinks the textures and normal maps of `scene` that are larger than `limits` allow, and returns a warning for each.
 ///
 /// # Errors
-/// [`HybridError::TooManyTextures`].
-pub fn fit_textures(scene: &mut Scene, limits: &Limits) -> Result<Vec<String>, HybridError> {
+/// [`SampleError::TooManyTextures`].
+pub fn fit_textures(scene: &mut Scene, limits: &Limits) -> Result<Vec<String>, SampleError> {
     let limit = limits.max_bindless_textures.saturating_sub(OWN_TEXTURES);
     let count = scene.textures.len() + scene.normal_maps.len();
     if count > limit as usize {
-        return Err(HybridError::TooManyTextures { count, limit });
+        return Err(SampleError::TooManyTextures { count, limit });
     }
     let side = limits.max_texture_2d.max(1);
     let all = scene.textures.iter_mut().chain(&mut scene.normal_maps);
     Ok(all.filter_map(|texture| fit(texture, side)).collect())
 }
 
-/// How many textures the context for `scene` must have room for.
+/// Number of descriptor slots for textures that `scene` needs.
 pub fn textures_needed(scene: &Scene) -> u32 {
     u32::try_from(scene.textures.len() + scene.normal_maps.len())
         .unwrap_or(u32::MAX)
@@ -95,6 +95,6 @@ mod tests {
         assert_eq!(textures_needed(&scene), OWN_TEXTURES + 5);
         assert!(fit_textures(&mut scene, &limits(16, OWN_TEXTURES + 5)).unwrap().is_empty());
         let error = fit_textures(&mut scene, &limits(16, OWN_TEXTURES + 4)).unwrap_err();
-        assert!(matches!(error, HybridError::TooManyTextures { count: 5, limit: 4 }));
+        assert!(matches!(error, SampleError::TooManyTextures { count: 5, limit: 4 }));
     }
 }

@@ -5,10 +5,12 @@ use lvk::{BufferHandle, CommandBuffer, Context, Error, Holder, TextureHandle};
 
 use super::compute_raster::ComputeRaster;
 use super::config::{HybridConfig, Raster};
-use super::frame::{Push, VisibilityPlaces};
+use super::frame::{Push, VisibilityAddresses};
 use super::hardware_raster::HardwareRaster;
 use super::raster_choice::RasterChoice;
-use crate::shaders::hybrid::NO_IMAGE;
+
+/// `kNoImage` in `shaders/hybrid/visibility.glsl`.
+const NO_IMAGE: u32 = u32::MAX;
 
 /// The pass with the rasterisers that are to be had, of which one is chosen.
 pub(super) struct VisibilityPass {
@@ -16,7 +18,7 @@ pub(super) struct VisibilityPass {
     hardware: Option<HardwareRaster>,
     chosen: Raster,
     why: String,
-    places: VisibilityPlaces,
+    places: VisibilityAddresses,
 }
 
 impl VisibilityPass {
@@ -54,7 +56,8 @@ impl VisibilityPass {
             (None, _, None) => "the device cannot number triangles in fragment shaders",
             (None, Some(_), Some(_)) => "not measured",
         };
-        let mut places = VisibilityPlaces { triangle_count, image: NO_IMAGE, ..bytemuck::Zeroable::zeroed() };
+        let mut places =
+            VisibilityAddresses { triangle_count, image: NO_IMAGE, ..bytemuck::Zeroable::zeroed() };
         if let Some(compute) = &compute {
             compute.name_in(ctx, &mut places)?;
         }
@@ -64,10 +67,10 @@ impl VisibilityPass {
         Ok(Self { compute, hardware, chosen, why: why.to_owned(), places })
     }
 
-    /// Where the shaders find everything, for the chosen rasteriser.
-    pub(super) fn places(&self) -> VisibilityPlaces {
+    /// Addresses and indices for the shaders, of the chosen rasteriser.
+    pub(super) fn addresses(&self) -> VisibilityAddresses {
         let image = self.target().map_or(NO_IMAGE, Holder::index);
-        VisibilityPlaces { image, ..self.places }
+        VisibilityAddresses { image, ..self.places }
     }
 
     /// The textures that the ray pass reads.
@@ -81,12 +84,12 @@ impl VisibilityPass {
         compute.map(ComputeRaster::words).into_iter().collect()
     }
 
-    /// Which rasteriser is in use, and why.
+    /// The rasteriser in use, and the reason.
     pub(super) fn choice(&self) -> RasterChoice {
         RasterChoice { raster: self.chosen, why: self.why.clone() }
     }
 
-    /// Whether there is a choice.
+    /// True if there is a choice.
     pub(super) fn has_both(&self) -> bool {
         self.compute.is_some() && self.hardware.is_some()
     }

@@ -20,7 +20,7 @@ pub(super) const OTHER_INSTANCES: u32 = 2;
 /// Everything that shaders reach by address.
 pub(super) struct Buffers {
     pub(super) motions: Holder<BufferHandle>,
-    /// Where the spheres are; written every frame.
+    /// Positions of the spheres, written every frame.
     pub(super) spheres: Holder<BufferHandle>,
     pub(super) faces: Holder<BufferHandle>,
     pub(super) positions: Holder<BufferHandle>,
@@ -55,7 +55,7 @@ struct Solids {
 impl Buffers {
     /// The buffers for a raster of `samples` samples and a pool of `nodes` nodes.
     pub(super) fn new(ctx: &Context, scene: &OitScene, samples: u64, nodes: u32) -> lvk::Result<Self> {
-        let solids = Solids::of(scene);
+        let solids = Solids::from_scene(scene);
         let blocks: Vec<[f32; 6]> = scene.blocks.iter().map(|block| corners(block.low, block.high)).collect();
         let motions = GpuMotion::of_scene(scene);
         let sphere_count = motions.len() as u64;
@@ -85,7 +85,7 @@ impl Buffers {
         Ok(())
     }
 
-    /// Where the shaders find them.
+    /// Addresses of the buffers.
     pub(super) fn addresses(&self, ctx: &Context) -> lvk::Result<Addresses> {
         let of = |buffer: &Holder<BufferHandle>| ctx.buffer_address(**buffer);
         Ok(Addresses {
@@ -105,7 +105,7 @@ impl Buffers {
 }
 
 impl Solids {
-    fn of(scene: &OitScene) -> Self {
+    fn from_scene(scene: &OitScene) -> Self {
         let mut solids = Self::default();
         let [x, z] = [Vec3::X, Vec3::Z].map(|axis| axis * FLOOR_EXTENT);
         solids.add_face(Vec3::ZERO, x, -z, scene.floor_albedo);
@@ -171,7 +171,7 @@ mod tests {
     #[test]
     fn faces_look_outwards() {
         let scene = OitScene::default();
-        let solids = Solids::of(&scene);
+        let solids = Solids::from_scene(&scene);
         assert_eq!(solids.faces.len(), 1 + 5 * scene.blocks.len());
         assert_eq!(solids.positions.len(), 6 * solids.faces.len());
         assert_eq!(solids.faces[0].normal, [0.0, 1.0, 0.0]);

@@ -1,11 +1,11 @@
-//! What to render, and by which means of the device.
+//! The configuration of the sample.
 
+use crate::app::sample_error::SampleError;
 use lvk::Capabilities;
 
-use super::HybridOitError;
 use crate::hybrid::RayPath;
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HybridOitConfig {
     /// By which part of Vulkan rays are traced.
@@ -51,33 +51,22 @@ impl HybridOitConfig {
     }
 
     /// Checks everything against what the device with `capabilities` can do, for `glass_count` spheres of glass.
-    pub(super) fn check(
-        &self,
-        capabilities: &Capabilities,
-        glass_count: usize,
-    ) -> Result<(), HybridOitError> {
-        in_range("supersampling", self.supersampling, Self::MAX_SUPERSAMPLING, "1 to 4")?;
-        in_range("the number of shadow rays", self.shadow_rays, Self::MAX_SHADOW_RAYS, "1 to 64")?;
+    pub(super) fn check(&self, capabilities: &Capabilities, glass_count: usize) -> Result<(), SampleError> {
+        SampleError::check_range("supersampling", self.supersampling, [1, Self::MAX_SUPERSAMPLING])?;
+        SampleError::check_range("the number of shadow rays", self.shadow_rays, [1, Self::MAX_SHADOW_RAYS])?;
         let limit = capabilities.limits.max_texture_2d;
         let [wide, high] = self.extent();
         if wide == 0 || high == 0 || wide > limit || high > limit {
             let Self { width, height, supersampling, .. } = *self;
-            return Err(HybridOitError::BadSize { width, height, supersampling, limit });
+            return Err(SampleError::BadSampleCount { width, height, supersampling, limit });
         }
         let samples = u64::from(wide) * u64::from(high);
         if samples.saturating_mul(2 * glass_count as u64) > u64::from(u32::MAX) {
-            return Err(HybridOitError::TooManyFragments { samples, spheres: glass_count });
+            return Err(SampleError::TooManyFragments { samples, spheres: glass_count });
         }
         RayPath::choose(Some(self.path), capabilities)?;
         Ok(())
     }
-}
-
-fn in_range(what: &'static str, value: u32, most: u32, range: &'static str) -> Result<(), HybridOitError> {
-    if (1..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(HybridOitError::OutOfRange { what, value, range })
 }
 
 #[cfg(test)]
@@ -102,10 +91,10 @@ mod tests {
         for (width, height, supersampling) in [(0, 9, 1), (9, 0, 2), (16_384, 9, 2), (u32::MAX, u32::MAX, 4)]
         {
             let bad = HybridOitConfig { width, height, supersampling, ..good };
-            assert!(matches!(bad.check(&device(), 12), Err(HybridOitError::BadSize { .. })), "{bad:?}");
+            assert!(matches!(bad.check(&device(), 12), Err(SampleError::BadSampleCount { .. })), "{bad:?}");
         }
         let vast = HybridOitConfig { width: 16_384, height: 16_384, supersampling: 1, ..good };
-        assert!(matches!(vast.check(&device(), 8), Err(HybridOitError::TooManyFragments { .. })));
+        assert!(matches!(vast.check(&device(), 8), Err(SampleError::TooManyFragments { .. })));
         assert!(vast.check(&device(), 7).is_ok());
     }
 
@@ -118,9 +107,9 @@ mod tests {
             HybridOitConfig { shadow_rays: 0, ..good },
             HybridOitConfig { shadow_rays: 65, ..good },
         ] {
-            assert!(matches!(bad.check(&device(), 1), Err(HybridOitError::OutOfRange { .. })), "{bad:?}");
+            assert!(matches!(bad.check(&device(), 1), Err(SampleError::OutOfRange { .. })), "{bad:?}");
         }
         let pipeline = HybridOitConfig { path: RayPath::Pipeline, ..good };
-        assert!(matches!(pipeline.check(&device(), 1), Err(HybridOitError::Path(_))));
+        assert!(matches!(pipeline.check(&device(), 1), Err(SampleError::PathMissing { .. })));
     }
 }

@@ -63,7 +63,7 @@ pub(super) struct Push {
     pub(super) padding: u32,
 }
 
-/// How a sphere moves and looks (`Motion` in the shaders).
+/// Motion and colour of a sphere (`Motion` in the shaders).
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct GpuMotion {

@@ -18,14 +18,14 @@ pub struct NodeUse {
     pub capacity: u32,
 }
 
-/// What a node says, in any order within its pixel.
+/// A node of a list; nodes of a pixel have no order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GlassNode {
     /// Along the pixel's ray, in scene units.
     pub distance: f32,
-    /// What the surface adds, linear.
+    /// Light that the surface adds, linear.
     pub radiance: [f32; 3],
-    /// What is left of the light from behind, 0 to 1.
+    /// Transmitted share of the light from behind, 0 to 1.
     pub transmittance: [f32; 3],
 }
 
@@ -69,7 +69,7 @@ impl GlassLists {
     /// The nodes of a sample, those added last first; none where the sample does not exist. A list that leads out of
     /// the pool or in circles, which would be a defect, ends there.
     #[must_use]
-    pub fn of(&self, sample: usize) -> Vec<GlassNode> {
+    pub fn nodes_of(&self, sample: usize) -> Vec<GlassNode> {
         let mut nodes = Vec::new();
         let mut next = self.heads.get(sample).copied().unwrap_or(NO_NODE);
         while let Some(words) = self.words.get(next as usize).filter(|_| nodes.len() < self.words.len()) {
@@ -82,7 +82,7 @@ impl GlassLists {
     /// Nodes in all lists together, by following them.
     #[must_use]
     pub fn linked_count(&self) -> usize {
-        (0..self.heads.len()).map(|sample| self.of(sample).len()).sum()
+        (0..self.heads.len()).map(|sample| self.nodes_of(sample).len()).sum()
     }
 }
 
@@ -136,11 +136,11 @@ mod tests {
             heads: vec![2, NO_NODE, 0, 3],
             words: vec![node(NO_NODE, 1.0), node(0, 2.0), node(1, 3.0), node(3, 4.0)],
         };
-        let distances = |sample| lists.of(sample).iter().map(|node| node.distance).collect::<Vec<_>>();
+        let distances = |sample| lists.nodes_of(sample).iter().map(|node| node.distance).collect::<Vec<_>>();
         assert_eq!(distances(0), [3.0, 2.0, 1.0]);
-        assert!(lists.of(1).is_empty() && lists.of(9).is_empty());
+        assert!(lists.nodes_of(1).is_empty() && lists.nodes_of(9).is_empty());
         assert_eq!(distances(3).len(), 4);
-        assert_eq!(lists.of(2)[0].transmittance, [1.0, 1.0, 0.5]);
+        assert_eq!(lists.nodes_of(2)[0].transmittance, [1.0, 1.0, 0.5]);
     }
 
     #[test]

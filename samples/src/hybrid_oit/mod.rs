@@ -14,18 +14,16 @@
 //! exactly (`shaders/hybrid_oit/sphere.glsl`); what rounding could spoil, an offset of a few units in the last place
 //! along the normal mends. So spheres may touch, and contact shadows are whole.
 //!
-//! [`HybridOit`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`HybridOit`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
 mod buffers;
 mod config;
-mod error;
 mod frame;
 mod glass_lists;
 mod image_passes;
+mod info;
 mod pipelines;
 mod raster_passes;
-mod run;
 mod sample;
 mod scene;
 mod sequence;
@@ -33,12 +31,9 @@ mod shadow_pass;
 mod structures;
 mod targets;
 
-pub use args::HybridOitArgs;
 pub use config::HybridOitConfig;
-pub use error::HybridOitError;
 pub use glass_lists::{GlassLists, GlassNode, NodeUse};
-pub use pipelines::pipelines;
-pub use run::run;
+pub use info::HybridOitArgs;
 pub use sample::HybridOit;
 pub use scene::{Ball, Block, Glass, Motion, OitScene, PERIOD_SECONDS, Sun};
 pub use sequence::HybridOitSequence;

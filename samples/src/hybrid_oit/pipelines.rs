@@ -1,38 +1,31 @@
-//! The stages of the sample's pipelines, as its passes use them and as data for those who compile them only.
+//! The stages of the sample's pipelines, for its passes and as data.
 
-use lvk::{Context, Format, Holder, ShaderModuleHandle, ShaderStage};
+use lvk::{Context, Format, Holder, ShaderModuleHandle};
 
 use super::targets::Targets;
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::shaders::hybrid_oit as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
 
-pub(super) const ANIMATE: SampleStage = stage(ShaderStage::Compute, texts::ANIMATE_COMP, "animate.comp");
-pub(super) const COMPOSITE: SampleStage =
-    stage(ShaderStage::Compute, texts::COMPOSITE_COMP, "composite.comp");
+pub(super) const ANIMATE: SampleStage = shader!("hybrid_oit", "animate.comp");
+pub(super) const COMPOSITE: SampleStage = shader!("hybrid_oit", "composite.comp");
 pub(super) const SOLID_DEPTH: [SampleStage; 1] = [SOLID_VERT];
-pub(super) const BALL_DEPTH: [SampleStage; 2] =
-    [SPHERE_VERT, stage(ShaderStage::Fragment, texts::BALL_DEPTH_FRAG, "ball_depth.frag")];
-pub(super) const SOLID: [SampleStage; 2] =
-    [SOLID_VERT, stage(ShaderStage::Fragment, texts::SOLID_FRAG, "solid.frag")];
-pub(super) const BALL: [SampleStage; 2] =
-    [SPHERE_VERT, stage(ShaderStage::Fragment, texts::BALL_FRAG, "ball.frag")];
-pub(super) const GLASS: [SampleStage; 2] =
-    [SPHERE_VERT, stage(ShaderStage::Fragment, texts::GLASS_FRAG, "glass.frag")];
-pub(super) const SHADOW_QUERY: SampleStage = stage(ShaderStage::Compute, texts::SHADOW_COMP, "shadow.comp");
+pub(super) const BALL_DEPTH: [SampleStage; 2] = [SPHERE_VERT, shader!("hybrid_oit", "ball_depth.frag")];
+pub(super) const SOLID: [SampleStage; 2] = [SOLID_VERT, shader!("hybrid_oit", "solid.frag")];
+pub(super) const BALL: [SampleStage; 2] = [SPHERE_VERT, shader!("hybrid_oit", "ball.frag")];
+pub(super) const GLASS: [SampleStage; 2] = [SPHERE_VERT, shader!("hybrid_oit", "glass.frag")];
+pub(super) const SHADOW_QUERY: SampleStage = shader!("hybrid_oit", "shadow.comp");
 /// Ray generation, miss, then the hit group of glass: intersection and any-hit.
 pub(super) const SHADOW_TRACING: [SampleStage; 4] = [
-    stage(ShaderStage::RayGen, texts::SHADOW_RGEN, "shadow.rgen"),
-    stage(ShaderStage::Miss, texts::SHADOW_RMISS, "shadow.rmiss"),
-    stage(ShaderStage::Intersection, texts::SPHERE_RINT, "sphere.rint"),
-    stage(ShaderStage::AnyHit, texts::GLASS_RAHIT, "glass.rahit"),
+    shader!("hybrid_oit", "shadow.rgen"),
+    shader!("hybrid_oit", "shadow.rmiss"),
+    shader!("hybrid_oit", "sphere.rint"),
+    shader!("hybrid_oit", "glass.rahit"),
 ];
 
-const SOLID_VERT: SampleStage = stage(ShaderStage::Vertex, texts::SOLID_VERT, "solid.vert");
-const SPHERE_VERT: SampleStage = stage(ShaderStage::Vertex, texts::SPHERE_VERT, "sphere.vert");
+const SOLID_VERT: SampleStage = shader!("hybrid_oit", "solid.vert");
+const SPHERE_VERT: SampleStage = shader!("hybrid_oit", "sphere.vert");
 
-/// Every pipeline of the sample.
-#[must_use]
-pub fn pipelines() -> Vec<SamplePipeline> {
+/// Returns every pipeline of the sample.
+pub(super) fn pipelines() -> Vec<SamplePipeline> {
     let gbuffer = &Targets::GBUFFER;
     vec![
         compute("oit: placing the spheres", ANIMATE),
@@ -50,10 +43,6 @@ pub fn pipelines() -> Vec<SamplePipeline> {
 /// Compiles a stage.
 pub(super) fn module(ctx: &Context, stage: &SampleStage) -> lvk::Result<Holder<ShaderModuleHandle>> {
     stage.create(ctx, "hybrid_oit")
-}
-
-const fn stage(stage: ShaderStage, text: &'static str, name: &'static str) -> SampleStage {
-    SampleStage { stage, text, defines: &[], name }
 }
 
 fn compute(name: &'static str, stage: SampleStage) -> SamplePipeline {

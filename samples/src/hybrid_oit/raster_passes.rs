@@ -1,4 +1,4 @@
-//! What the rasteriser does: depth and G-buffer of what is opaque, and the lists of glass.
+//! Raster passes: depth and G-buffer of opaque geometry, and the lists of glass.
 
 use lvk::{
     ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer, CompareOp, Context, Dependencies,

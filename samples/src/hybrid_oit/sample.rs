@@ -1,10 +1,10 @@
 //! The sample as a type: give it a scene and a time, get a picture.
 
+use crate::app::sample_error::SampleError;
 use lvk::{BufferHandle, Context, Holder, TextureHandle, TextureRegion};
 
 use super::buffers::Buffers;
 use super::config::HybridOitConfig;
-use super::error::HybridOitError;
 use super::frame::{FrameConstants, Numbers, Push};
 use super::glass_lists::{GlassLists, NodeUse};
 use super::image_passes::ImagePasses;
@@ -37,8 +37,8 @@ impl HybridOit {
     /// Uploads `scene`, builds what does not move and compiles the pipelines. The time is 0.
     ///
     /// # Errors
-    /// [`HybridOitError`] when the configuration or the scene is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> Result<Self, HybridOitError> {
+    /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> Result<Self, SampleError> {
         scene.check()?;
         config.check(ctx.capabilities(), scene.glass.len())?;
         let extent = config.extent();
@@ -70,23 +70,23 @@ impl HybridOit {
     }
 
     /// Looks at the scene from elsewhere than it says.
-    pub fn look(&mut self, camera: &Camera) {
+    pub fn set_camera(&mut self, camera: &Camera) {
         self.scene.camera = *camera;
     }
 
-    /// From where the scene is seen.
+    /// The camera.
     #[must_use]
     pub fn camera(&self) -> &Camera {
         &self.scene.camera
     }
 
-    /// What is rendered.
+    /// The configuration.
     #[must_use]
     pub fn config(&self) -> &HybridOitConfig {
         &self.config
     }
 
-    /// Whether the device can render by `config`.
+    /// True if the device can render by `config`.
     pub(super) fn can_be(&self, config: &HybridOitConfig) -> bool {
         config.check(self.ctx.capabilities(), self.scene.glass.len()).is_ok()
     }
@@ -94,8 +94,8 @@ impl HybridOit {
     /// Renders by another configuration from now on.
     ///
     /// # Errors
-    /// [`HybridOitError`] when that is beyond the device; the configuration is then what it was.
-    pub fn change(&mut self, config: &HybridOitConfig) -> Result<(), HybridOitError> {
+    /// [`SampleError`] when that is beyond the device; the configuration is then what it was.
+    pub fn change(&mut self, config: &HybridOitConfig) -> Result<(), SampleError> {
         config.check(self.ctx.capabilities(), self.scene.glass.len())?;
         let other_path = config.path != self.config.path;
         let shadows = other_path.then(|| ShadowPass::new(&self.ctx, config.path)).transpose()?;
@@ -111,8 +111,8 @@ impl HybridOit {
     /// Renders a frame, waits for it and answers the texture that shows it: 8 bits a channel, sRGB.
     ///
     /// # Errors
-    /// [`HybridOitError::Device`].
-    pub fn render(&mut self) -> Result<TextureHandle, HybridOitError> {
+    /// [`SampleError::Device`].
+    pub fn render(&mut self) -> Result<TextureHandle, SampleError> {
         let mut ignore = |_| {};
         let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
         let picture = self.record(&mut frame)?;
@@ -123,8 +123,8 @@ impl HybridOit {
     /// Records a frame, and answers the texture that shows it: 8 bits a channel, sRGB.
     ///
     /// # Errors
-    /// [`HybridOitError::Device`].
-    pub fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridOitError> {
+    /// [`SampleError::Device`].
+    pub fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         let constants = self.constants()?;
         self.ctx.upload_buffer(*self.constants, 0, bytemuck::bytes_of(&constants))?;
         let Self { buffers, targets, push, .. } = &*self;
@@ -143,16 +143,16 @@ impl HybridOit {
     /// Renders pictures of `extent` pixels from now on.
     ///
     /// # Errors
-    /// [`HybridOitError`] when that is beyond the device; the extent is then what it was.
-    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), HybridOitError> {
+    /// [`SampleError`] when that is beyond the device; the extent is then what it was.
+    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), SampleError> {
         self.change(&HybridOitConfig { width, height, ..self.config })
     }
 
     /// Makes all pipelines anew, of shaders that have changed.
     ///
     /// # Errors
-    /// [`HybridOitError::Device`]; the pipelines are then those that were.
-    pub fn reload(&mut self) -> Result<(), HybridOitError> {
+    /// [`SampleError::Device`]; the pipelines are then those that were.
+    pub fn reload(&mut self) -> Result<(), SampleError> {
         let images = ImagePasses::new(&self.ctx)?;
         let raster = RasterPasses::new(&self.ctx, &self.scene, &self.buffers)?;
         self.shadows = ShadowPass::new(&self.ctx, self.config.path)?;
@@ -175,16 +175,16 @@ impl HybridOit {
     /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
     ///
     /// # Errors
-    /// [`HybridOitError::Device`].
-    pub fn picture(&self) -> Result<Vec<u8>, HybridOitError> {
+    /// [`SampleError::Device`].
+    pub fn picture(&self) -> Result<Vec<u8>, SampleError> {
         self.download(&self.targets.picture)
     }
 
-    /// How many nodes the glass of the last frame asked for, and how many there are.
+    /// Returns the number of nodes that the glass of the last frame asked for, and the number in the pool.
     ///
     /// # Errors
-    /// [`HybridOitError::Device`].
-    pub fn node_use(&self) -> Result<NodeUse, HybridOitError> {
+    /// [`SampleError::Device`].
+    pub fn node_use(&self) -> Result<NodeUse, SampleError> {
         let mut asked = [0_u32];
         self.ctx.download_buffer(*self.buffers.node_count, 0, bytemuck::cast_slice_mut(&mut asked))?;
         Ok(NodeUse { asked: asked[0], capacity: self.config.nodes() })
@@ -193,30 +193,30 @@ impl HybridOit {
     /// The lists of glass of the last frame, one for each sample.
     ///
     /// # Errors
-    /// [`HybridOitError::Device`].
-    pub fn glass_lists(&self) -> Result<GlassLists, HybridOitError> {
+    /// [`SampleError::Device`].
+    pub fn glass_lists(&self) -> Result<GlassLists, SampleError> {
         let NodeUse { asked, capacity } = self.node_use()?;
         let count = samples(self.config.extent()) as usize;
         Ok(GlassLists::read(&self.ctx, &self.buffers, count, asked.min(capacity))?)
     }
 
-    /// Where the opaque surface of each sample of the last frame is: x, y, z in scene units, and the distance from the
+    /// Positions of the opaque surface of each sample of the last frame: x, y, z in scene units, and the distance from the
     /// eye, which is 0 where the sky is seen.
     ///
     /// # Errors
-    /// [`HybridOitError::Device`].
-    pub fn positions(&self) -> Result<Vec<[f32; 4]>, HybridOitError> {
+    /// [`SampleError::Device`].
+    pub fn positions(&self) -> Result<Vec<[f32; 4]>, SampleError> {
         let bytes = self.download(&self.targets.position)?;
         let number = |at: usize| bytes[at..].first_chunk().map_or(0.0, |word| f32::from_le_bytes(*word));
         Ok((0..bytes.len() / 16).map(|texel| [0, 4, 8, 12].map(|at| number(16 * texel + at))).collect())
     }
 
-    /// Which share of the sun's red, green and blue reaches each sample of the last frame (the
+    /// Share of the sun's red, green and blue that reaches each sample of the last frame (the
     /// fourth number is 1).
     ///
     /// # Errors
-    /// [`HybridOitError::Device`].
-    pub fn sunlight(&self) -> Result<Vec<[f32; 4]>, HybridOitError> {
+    /// [`SampleError::Device`].
+    pub fn sunlight(&self) -> Result<Vec<[f32; 4]>, SampleError> {
         let bytes = self.download(&self.targets.shadow)?;
         let number = |at: usize| {
             let bits = bytes[at..].first_chunk().map_or(0, |word| u16::from_le_bytes(*word));
@@ -231,7 +231,7 @@ impl HybridOit {
         Ok(FrameConstants::new(&self.scene, self.config.extent(), addresses, numbers))
     }
 
-    fn download(&self, texture: &Holder<TextureHandle>) -> Result<Vec<u8>, HybridOitError> {
+    fn download(&self, texture: &Holder<TextureHandle>) -> Result<Vec<u8>, SampleError> {
         Ok(self.ctx.download_texture(**texture, &TextureRegion::default())?)
     }
 }

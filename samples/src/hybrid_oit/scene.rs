@@ -1,8 +1,8 @@
-//! What is seen: blocks on a floor, balls that bounce between them, spheres of tinted glass that drift above.
+//! The scene: blocks on a floor, balls that bounce between them, spheres of tinted glass that drift above.
 
+use crate::app::sample_error::SampleError;
 use glam::{Vec2, Vec3};
 
-use super::HybridOitError;
 use crate::scene::Camera;
 
 /// Seconds after which the built-in scene's motions repeat themselves.
@@ -19,7 +19,7 @@ pub struct Block {
     pub albedo: Vec3,
 }
 
-/// How a sphere moves. Rates should be whole multiples of 1/[`PERIOD_SECONDS`], so that the animation repeats itself.
+/// The motion of a sphere. Rates should be whole multiples of 1/[`PERIOD_SECONDS`], so that the animation repeats itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Motion {
     /// Middle of the motion of glass; the lowest place of the centre of a ball.
@@ -28,13 +28,13 @@ pub struct Motion {
     pub orbit: Vec2,
     /// Turns a second on the ellipse.
     pub orbit_rate: f32,
-    /// Where on the ellipse it is at time 0, in turns.
+    /// Position on the ellipse at time 0, in turns.
     pub orbit_phase: f32,
-    /// How high a ball bounces, or how far glass bobs up and down.
+    /// Height of a ball's bounce, or amplitude of the glass.
     pub height: f32,
     /// Bounces or bobs a second.
     pub height_rate: f32,
-    /// Where in a bounce or bob it is at time 0, 0 to 1.
+    /// Phase of the bounce at time 0, 0 to 1.
     pub height_phase: f32,
 }
 
@@ -45,7 +45,7 @@ pub struct Ball {
     pub radius: f32,
     /// Linear albedo of red, green and blue, 0 to 1.
     pub albedo: Vec3,
-    /// How it moves.
+    /// Its motion.
     pub motion: Motion,
 }
 
@@ -54,9 +54,9 @@ pub struct Ball {
 pub struct Glass {
     /// Radius in scene units.
     pub radius: f32,
-    /// What passes along a whole diameter, of red, green and blue, above 0 to 1.
+    /// Transmittance along a whole diameter for red, green and blue, above 0 to 1.
     pub tint: Vec3,
-    /// How it moves.
+    /// Its motion.
     pub motion: Motion,
 }
 
@@ -67,14 +67,14 @@ pub struct Sun {
     pub direction: Vec3,
     /// Tangent of half the angle under which the sun is seen.
     pub radius: f32,
-    /// What a surface of albedo 1 that faces the sun gives back, linear.
+    /// Radiance of a surface of albedo 1 that faces the sun, linear.
     pub color: Vec3,
 }
 
 /// Everything that is seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OitScene {
-    /// Where the picture is taken from.
+    /// The camera.
     pub camera: Camera,
     /// The light that casts shadows.
     pub sun: Sun,
@@ -89,7 +89,7 @@ pub struct OitScene {
 }
 
 impl Glass {
-    /// What glass absorbs of red, green and blue in a unit of length (Beer and Lambert).
+    /// Absorption of red, green and blue per unit of length (Beer and Lambert).
     #[must_use]
     pub fn absorption(&self) -> Vec3 {
         -self.tint.max(Vec3::splat(1e-6)).map(f32::ln) / (2.0 * self.radius)
@@ -132,8 +132,8 @@ impl Motion {
 
 impl OitScene {
     /// Checks that there is something of each kind and that all numbers are sound.
-    pub(super) fn check(&self) -> Result<(), HybridOitError> {
-        let broken = |what| Err(HybridOitError::BrokenScene(what));
+    pub(super) fn check(&self) -> Result<(), SampleError> {
+        let broken = |what| Err(SampleError::BrokenScene(what));
         if self.blocks.is_empty() || self.balls.is_empty() || self.glass.is_empty() {
             return broken("it needs at least one block, one ball and one sphere of glass");
         }

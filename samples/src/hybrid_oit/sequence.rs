@@ -1,27 +1,28 @@
 //! The sample as an animation.
 
+use crate::app::sample_error::SampleError;
 use egui::Slider;
 use lvk::{Context, TextureHandle};
 
-use super::{HybridOit, HybridOitConfig, HybridOitError, NodeUse, PERIOD_SECONDS};
+use super::{HybridOit, HybridOitConfig, NodeUse, PERIOD_SECONDS};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::app::ui::Wanted;
-use crate::hybrid::show_path;
+use crate::app::sample::{FrameTime, Sample};
+use crate::app::ui::PendingSettings;
+use crate::hybrid::path_switch;
 use crate::scene::Camera;
 
 /// The sample in an animation.
 pub struct HybridOitSequence {
     sample: HybridOit,
-    /// What frame 0 shows, in seconds.
+    /// Time that frame 0 shows, in seconds.
     start: f64,
-    /// How far the animation is from there, in seconds.
+    /// Time since then, in seconds.
     gone: f64,
-    /// Where the scene says that it is seen from.
+    /// The camera of the scene.
     camera: Camera,
     /// Of the frame that asked for most.
     nodes: NodeUse,
-    wanted: Wanted<HybridOitConfig>,
+    wanted: PendingSettings<HybridOitConfig>,
 }
 
 impl HybridOitSequence {
@@ -30,7 +31,7 @@ impl HybridOitSequence {
     pub fn new(sample: HybridOit, start: f64) -> Self {
         Self {
             camera: *sample.camera(),
-            wanted: Wanted::new(*sample.config()),
+            wanted: PendingSettings::new(*sample.config()),
             sample,
             start: if start.is_finite() { start.rem_euclid(PERIOD_SECONDS) } else { 0.0 },
             gone: 0.0,
@@ -38,7 +39,7 @@ impl HybridOitSequence {
         }
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn wanted(&mut self) -> &mut HybridOitConfig {
         &mut self.wanted.config
     }
@@ -49,45 +50,45 @@ impl HybridOitSequence {
 }
 
 impl Sample for HybridOitSequence {
-    type Error = HybridOitError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         self.sample.context()
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), HybridOitError> {
-        self.gone = PERIOD_SECONDS * f64::from(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.gone = PERIOD_SECONDS * f64::from(time.phase());
         self.pose();
-        self.sample.look(&self.camera);
+        self.sample.set_camera(&self.camera);
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridOitError> {
-        if let Some(config) = self.wanted.news(*self.sample.config()) {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+        if let Some(config) = self.wanted.changed_from(*self.sample.config()) {
             let done = self.sample.change(&config);
-            self.wanted.settle(done, *self.sample.config());
+            self.wanted.finish(done, *self.sample.config());
         }
         self.sample.record(frame)
     }
 
-    fn after_frame(&mut self) -> Result<(), HybridOitError> {
+    fn after_frame(&mut self) -> Result<(), SampleError> {
         let nodes = self.sample.node_use()?;
         self.nodes = if nodes.asked >= self.nodes.asked { nodes } else { self.nodes };
         Ok(())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), HybridOitError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         self.sample.resize(extent)?;
         [self.wanted.config.width, self.wanted.config.height] = extent;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
+    fn view(&mut self) -> Option<Camera> {
         Some(*self.sample.camera())
     }
 
     fn set_view(&mut self, camera: &Camera) {
-        self.sample.look(camera);
+        self.sample.set_camera(camera);
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -99,7 +100,7 @@ impl Sample for HybridOitSequence {
         }
     }
 
-    fn reload(&mut self) -> Result<(), HybridOitError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.sample.reload()
     }
 
@@ -110,7 +111,7 @@ impl Sample for HybridOitSequence {
 
 fn show_switches(ui: &mut egui::Ui, config: &mut HybridOitConfig, can_be: impl Fn(&HybridOitConfig) -> bool) {
     let before = *config;
-    show_path(ui, &mut config.path, |path| can_be(&HybridOitConfig { path, ..before }));
+    path_switch(ui, &mut config.path, |path| can_be(&HybridOitConfig { path, ..before }));
     let most = HybridOitConfig::MAX_SUPERSAMPLING;
     ui.add(Slider::new(&mut config.supersampling, 1..=most).text("samples a side of a pixel"));
     let most = HybridOitConfig::MAX_SHADOW_RAYS;

@@ -1,4 +1,4 @@
-//! What to render.
+//! The configuration of the sample.
 
 use std::path::PathBuf;
 
@@ -6,25 +6,25 @@ use clap::ValueEnum;
 
 use crate::rtx::RtxConfig;
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LargeSceneConfig {
     /// Path and size.
     pub rtx: RtxConfig,
-    /// How often a ray may be mirrored or bent, 0 to [`LargeSceneConfig::MAX_DEPTH`].
+    /// Largest number of reflections and refractions of a ray, 0 to [`LargeSceneConfig::MAX_DEPTH`].
     pub depth: u32,
     /// Rays of each pixel, evenly spread over it: 1 to [`LargeSceneConfig::MAX_SAMPLES`].
     pub samples: u32,
-    /// What pixels show.
+    /// The quantity that pixels show.
     pub show: Show,
-    /// Whether bottom-level structures are compacted.
+    /// True if bottom-level structures are compacted.
     pub compact: bool,
     /// Folder of built structures of earlier starts, if they are kept. It need not exist. Only the program itself may write
     /// there, as the device follows what the files say.
     pub cache: Option<PathBuf>,
 }
 
-/// What pixels show.
+/// The quantity that pixels show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Show {
     /// Sun, shadows, mirrors and glass.

@@ -1,8 +1,8 @@
-//! What a world takes on the device, and where its structures came from.
+//! Memory of a world on the device, and the origin of its acceleration structures.
 
 use std::fmt;
 
-/// What a world takes on the device, and where its structures came from.
+/// Memory of a world on the device, and the origin of its acceleration structures.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Figures {
     /// Each bottom-level structure.
@@ -34,11 +34,11 @@ pub struct StructureFigures {
     pub built_bytes: u64,
     /// Bytes now, tables included.
     pub bytes: u64,
-    /// Where it came from.
+    /// Its origin.
     pub origin: Origin,
 }
 
-/// Where a structure came from.
+/// The origin of an acceleration structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// A file of an earlier start.
@@ -50,7 +50,7 @@ pub enum Origin {
 }
 
 impl Figures {
-    /// How many structures came from there.
+    /// Number of acceleration structures of that origin.
     #[must_use]
     pub fn count(&self, origin: Origin) -> usize {
         self.structures.iter().filter(|structure| structure.origin == origin).count()

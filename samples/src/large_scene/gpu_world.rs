@@ -1,15 +1,16 @@
 //! A world on the GPU.
 
+use crate::app::sample_error::SampleError;
 use lvk::{
     AddressMode, BufferHandle, BufferUsage, Context, Holder, SamplerDesc, SamplerHandle, TextureHandle,
     transform_rows,
 };
 
+use super::LargeSceneConfig;
 use super::figures::Figures;
 use super::structure_cache::StructureCache;
 use super::structures::{Plan, Structures};
 use super::world::World;
-use super::{LargeSceneConfig, LargeSceneError};
 use crate::app::array_buffer::array;
 use crate::app::progress::Progress;
 use crate::app::scene_textures;
@@ -37,7 +38,7 @@ impl GpuWorld {
         world: &World,
         config: &LargeSceneConfig,
         progress: &mut Progress,
-    ) -> Result<Self, LargeSceneError> {
+    ) -> Result<Self, SampleError> {
         check_promises(&world.scene)?;
         let textures = textures(ctx, world, progress)?;
         progress.stage("uploading the scene", 0);
@@ -63,12 +64,12 @@ impl GpuWorld {
         })
     }
 
-    /// Where the shaders find the scene's arrays.
+    /// Addresses of the scene's arrays.
     pub(super) fn scene(&self) -> SceneAddresses {
         self.arrays.addresses()
     }
 
-    /// Where the shaders find places of instances and first triangles of pieces.
+    /// Addresses of the transforms of instances and of the first triangles of pieces.
     pub(super) fn tables(&self, ctx: &Context) -> lvk::Result<[u64; 2]> {
         Ok([ctx.buffer_address(*self.places)?, ctx.buffer_address(*self.firsts)?])
     }
@@ -78,7 +79,7 @@ fn textures(
     ctx: &Context,
     world: &World,
     progress: &mut Progress,
-) -> Result<Vec<Holder<TextureHandle>>, LargeSceneError> {
+) -> Result<Vec<Holder<TextureHandle>>, SampleError> {
     let textures = &world.scene.textures;
     progress.stage("uploading textures", textures.len() as u64);
     let mut made = Vec::with_capacity(textures.len());

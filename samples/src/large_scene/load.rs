@@ -4,18 +4,20 @@ use std::path::PathBuf;
 
 use lvk::{Context, Limits};
 
-use super::args::Layout;
+use super::info::Layout;
 use super::{LargeScene, LargeSceneArgs, LargeSceneConfig, World};
+use crate::app::cli::{ReadySample, warn};
 use crate::app::progress::Progress;
-use crate::app::run::{Opened, warn};
 use crate::app::run_error::RunError;
 use crate::hybrid::fit_textures;
-use crate::rtx::{RtxConfig, headline};
+use crate::rtx::RtxConfig;
 use crate::scene::{ObjOptions, Scene};
 
-/// What is to be loaded, on whichever thread.
+/// The parameters of loading, on any thread.
 pub(super) struct Load {
     pub(super) args: LargeSceneArgs,
+    /// Width and height of the images in pixels.
+    pub(super) extent: [u32; 2],
     /// The OBJ files that stand along the streets; none for the valley.
     pub(super) files: Vec<PathBuf>,
     /// Folder of built structures.
@@ -54,7 +56,7 @@ impl Load {
         mut world: World,
         textures: u32,
         progress: &mut Progress,
-    ) -> Result<Opened<LargeScene>, RunError> {
+    ) -> Result<ReadySample<LargeScene>, RunError> {
         let (args, capabilities) = (&self.args, ctx.capabilities());
         let room = capabilities.limits.max_bindless_textures.min(textures);
         let limits = Limits { max_bindless_textures: room, ..capabilities.limits };
@@ -69,14 +71,13 @@ impl Load {
             show: args.show,
             compact: !args.no_compaction,
             cache: self.cache.clone(),
-            ..LargeSceneConfig::new(RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?)
+            ..LargeSceneConfig::new(RtxConfig::from_args(args.tracing.rt, self.extent, capabilities)?)
         };
         let sample = LargeScene::new(ctx, &world, &config, progress)?;
-        let sample = sample.from_camera(&world, args.camera.place());
+        let sample = sample.from_camera(&world, args.camera.index());
         progress.pause();
-        let told = format!("{}, {} textures", world.name(), world.scene().textures.len());
-        let headline = headline(capabilities, config.rtx.path, "a compute shader", &told);
-        let headline = format!("{headline}\n{}", sample.figures());
-        Ok(Opened { sample, headline })
+        let text = format!("{}, {} textures", world.name(), world.scene().textures.len());
+        let text = format!("{text}\n{}", sample.figures());
+        Ok(ReadySample::ray_traced(sample, config.rtx.path, "a compute shader", &text))
     }
 }

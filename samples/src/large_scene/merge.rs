@@ -204,10 +204,10 @@ mod tests {
     fn too_many_triangles_for_one_mesh_are_refused() {
         let mut world = world();
         world.instances = vec![world.instances[1]; 2_000];
-        assert!(matches!(world.combined(), Err(LargeSceneError::TooManyTriangles { .. })));
-        assert!(matches!(World::street(Vec::new(), 3), Err(LargeSceneError::NoScenes)));
-        assert!(matches!(World::street(vec![Scene::town()], 0), Err(LargeSceneError::NoScenes)));
+        assert!(matches!(world.combined(), Err(SampleError::MeshTooLarge { .. })));
+        assert!(matches!(World::street(Vec::new(), 3), Err(SampleError::NoScenes)));
+        assert!(matches!(World::street(vec![Scene::town()], 0), Err(SampleError::NoScenes)));
     }
 
-    use crate::large_scene::LargeSceneError;
+    use crate::app::sample_error::SampleError;
 }

@@ -2,28 +2,23 @@
 //! originals. The library splits what is too large for the device; structures are compacted, and kept on disk so that the
 //! next start builds none.
 //!
-//! [`LargeScene`] is the sample for programs and tests, [`World`] what it shows, [`run`] the one for the command line.
+//! [`LargeScene`] is the sample for programs and tests, [`World`] what it shows, `info.rs` describes its program.
 
-mod args;
 mod config;
-mod error;
 mod figures;
 mod gpu_world;
+mod info;
 mod load;
 mod merge;
 mod pipelines;
 mod renderer;
-mod run;
 mod street;
 mod structure_cache;
 mod structures;
 mod world;
 
-pub use args::LargeSceneArgs;
 pub use config::{LargeSceneConfig, Show};
-pub use error::LargeSceneError;
 pub use figures::{Figures, Origin, StructureFigures};
-pub use pipelines::pipelines;
+pub use info::LargeSceneArgs;
 pub use renderer::LargeScene;
-pub use run::run;
 pub use world::{Instance, Piece, World};

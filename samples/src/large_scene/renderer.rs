@@ -1,19 +1,21 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
+use lvk::{BufferHandle, Context, Holder, TextureHandle};
 
 use super::figures::{Figures, Origin, bytes, number};
 use super::gpu_world::GpuWorld;
 use super::pipelines::RAYS;
 use super::world::World;
-use super::{LargeSceneConfig, LargeSceneError, Show};
+use super::{LargeSceneConfig, Show};
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::progress::Progress;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::{Lighting, SceneAddresses};
-use crate::rtx::{Canvas, Tracer};
+use crate::rtx::Tracer;
 use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Scene};
 
 /// Distance of the near plane as a share of the world's farthest coordinate; rays start at the eye.
@@ -22,7 +24,7 @@ const NEAR_SHARE: f32 = 1e-4;
 /// Renders a world of millions of triangles.
 pub struct LargeScene {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     config: LargeSceneConfig,
     world: GpuWorld,
     tracer: Tracer,
@@ -56,16 +58,16 @@ impl LargeScene {
     /// Uploads `world`, loads or builds its acceleration structures and makes the pipeline; `progress` shows how far that is.
     ///
     /// # Errors
-    /// [`LargeSceneError`] when the configuration or the world is beyond the device, or the device fails. Trouble with files of
+    /// [`SampleError`] when the configuration or the world is beyond the device, or the device fails. Trouble with files of
     /// the cache is none, but a warning.
     pub fn new(
         ctx: &Context,
         world: &World,
         config: &LargeSceneConfig,
         progress: &mut Progress,
-    ) -> Result<Self, LargeSceneError> {
+    ) -> Result<Self, SampleError> {
         let config = config.clone().clamped();
-        let canvas = Canvas::new(ctx, &config.rtx)?;
+        let target = config.rtx.create_target(ctx)?;
         let gpu_world = GpuWorld::new(ctx, world, &config, progress)?;
         progress.stage("compiling shaders", 0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
@@ -81,7 +83,7 @@ impl LargeScene {
             sky: gpu_world.sky.index(),
             surface_sampler: gpu_world.surface_sampler.index(),
             sky_sampler: gpu_world.sky_sampler.index(),
-            image: canvas.picture().index(),
+            image: target.image_index(),
             depth: 0,
             samples: 0,
             show: 0,
@@ -93,7 +95,7 @@ impl LargeScene {
             near_plane: (NEAR_SHARE * farthest).max(f32::MIN_POSITIVE),
             ctx: ctx.clone(),
             world: gpu_world,
-            canvas,
+            target,
             config,
             frame,
             constants,
@@ -109,12 +111,12 @@ impl LargeScene {
         self
     }
 
-    /// What is rendered.
+    /// The configuration.
     pub fn config(&self) -> &LargeSceneConfig {
         &self.config
     }
 
-    /// What the world takes on the device, and where its structures came from.
+    /// Memory of the world on the device, and the origin of its acceleration structures.
     pub fn figures(&self) -> &Figures {
         &self.world.figures
     }
@@ -123,7 +125,7 @@ impl LargeScene {
         let [width, height] = self.config.rtx.extent();
         let constants = FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
-            image: self.canvas.picture().index(),
+            image: self.target.image_index(),
             depth: self.config.depth,
             samples: self.config.samples,
             show: self.config.show.number(),
@@ -134,39 +136,32 @@ impl LargeScene {
 }
 
 impl Sample for LargeScene {
-    type Error = LargeSceneError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), LargeSceneError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.camera = self.path.at(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, LargeSceneError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload_frame()?;
-        let (extent, picture) = (self.config.rtx.extent(), **self.canvas.picture());
         let push = self.ctx.buffer_address(*self.frame)?;
-        let writes = Dependencies { storage_images: &[picture], ..Dependencies::default() };
-        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, extent, &writes))?;
-        Ok(picture)
+        Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), LargeSceneError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         let rtx = self.config.rtx.sized(extent);
-        self.canvas = Canvas::new(&self.ctx, &rtx)?;
+        self.target = rtx.create_target(&self.ctx)?;
         self.config.rtx = rtx;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -181,7 +176,7 @@ impl Sample for LargeScene {
         show_figures(ui, &self.world.figures);
     }
 
-    fn reload(&mut self) -> Result<(), LargeSceneError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.tracer = Tracer::new(&self.ctx, self.config.rtx.path, &RAYS)?;
         Ok(())
     }

@@ -35,7 +35,7 @@ impl Street {
     }
 }
 
-/// Where the scene on a plot stands; each copy of a scene is turned to the next side.
+/// Transform of the scene on a plot; each copy of a scene is turned to the next side.
 fn place(plot: usize, copy: usize, [columns, rows]: [usize; 2]) -> Affine3A {
     let at = |index: usize, count: usize| PITCH * (index as f32 - 0.5 * (count as f32 - 1.0));
     let turn = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2 * (copy % 4) as f32);

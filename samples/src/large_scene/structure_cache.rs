@@ -13,12 +13,17 @@ pub(super) struct StructureCache {
     folder: PathBuf,
 }
 
-/// What a structure is built from: the triangles of a piece, the device and its limits, and the flags.
+/// The key of a cached acceleration structure: the triangles of a piece, the device and its limits, and the flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct StructureKey(u64);
 
 impl StructureKey {
-    pub(super) fn of(world: &World, piece: &Piece, capabilities: &Capabilities, flags: BuildFlags) -> Self {
+    pub(super) fn from_piece(
+        world: &World,
+        piece: &Piece,
+        capabilities: &Capabilities,
+        flags: BuildFlags,
+    ) -> Self {
         let mut hasher = DefaultHasher::new();
         let Capabilities { device_name, driver_name, driver_info, profile, limits, .. } = capabilities;
         (device_name, driver_name, driver_info, profile).hash(&mut hasher);
@@ -39,7 +44,7 @@ impl StructureCache {
         Self { folder: folder.to_owned() }
     }
 
-    /// Where the structure is kept.
+    /// Path of the cached structure.
     pub(super) fn path(&self, StructureKey(key): StructureKey) -> PathBuf {
         self.folder.join(format!("{key:016x}.blas"))
     }
@@ -58,7 +63,7 @@ impl StructureCache {
     }
 
     /// Keeps the bytes for the next start, or warns.
-    pub(super) fn keep(&self, key: StructureKey, bytes: &[u8]) {
+    pub(super) fn store(&self, key: StructureKey, bytes: &[u8]) {
         let path = self.path(key);
         if let Err(error) = self.replace(&path, bytes) {
             log::warn!("the structure '{}' cannot be kept: {error}", path.display());
@@ -87,7 +92,7 @@ mod tests {
         let caps = Capabilities::default();
         let phone = Capabilities { profile: Some("mali-g715".to_owned()), ..Capabilities::default() };
         let flags = BuildFlags::FAST_TRACE;
-        let key = |piece, caps: &Capabilities, flags| StructureKey::of(&world, piece, caps, flags);
+        let key = |piece, caps: &Capabilities, flags| StructureKey::from_piece(&world, piece, caps, flags);
         let all = [
             key(first, &caps, flags),
             key(second, &caps, flags),
@@ -99,7 +104,12 @@ mod tests {
         }
         assert_eq!(
             all[0],
-            StructureKey::of(&World::valley(2_000, 9, &mut Progress::hidden()).unwrap(), first, &caps, flags),
+            StructureKey::from_piece(
+                &World::valley(2_000, 9, &mut Progress::hidden()).unwrap(),
+                first,
+                &caps,
+                flags
+            ),
             "the same ground"
         );
     }
@@ -111,7 +121,7 @@ mod tests {
         let key = StructureKey(7);
         assert_eq!(cache.read(key), None);
         for bytes in [&b"first"[..], b"second"] {
-            cache.keep(key, bytes);
+            cache.store(key, bytes);
             assert_eq!(cache.read(key).as_deref(), Some(bytes));
         }
         assert_eq!(std::fs::read_dir(folder.path().join("made")).unwrap().count(), 1);

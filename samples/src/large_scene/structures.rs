@@ -1,5 +1,6 @@
 //! The acceleration structures of a world: from files where they were kept, else built, compacted, and kept.
 
+use crate::app::sample_error::SampleError;
 use std::ops::Range;
 
 use lvk::{
@@ -7,7 +8,6 @@ use lvk::{
     TlasInstance, transform_rows,
 };
 
-use super::LargeSceneError;
 use super::figures::{Origin, StructureFigures};
 use super::structure_cache::{StructureCache, StructureKey};
 use super::world::{Instance, World};
@@ -35,7 +35,7 @@ struct Blas {
     built_bytes: u64,
 }
 
-/// What structures are made of.
+/// Geometry of the acceleration structures.
 pub(super) struct Plan<'a> {
     pub(super) ctx: &'a Context,
     pub(super) world: &'a World,
@@ -44,7 +44,7 @@ pub(super) struct Plan<'a> {
     pub(super) compact: bool,
 }
 
-/// What became of the file of a piece.
+/// The result of loading the file of a piece.
 enum Found {
     Loaded(Holder<AccelStructHandle>),
     Nothing,
@@ -53,7 +53,7 @@ enum Found {
 
 impl Structures {
     /// Loads, builds, compacts and keeps; `progress` counts pieces.
-    pub(super) fn new(plan: &Plan<'_>, progress: &mut Progress) -> Result<Self, LargeSceneError> {
+    pub(super) fn new(plan: &Plan<'_>, progress: &mut Progress) -> Result<Self, SampleError> {
         let geometries: Vec<_> = plan.world.pieces.iter().map(|piece| [plan.geometry(piece)]).collect();
         let descs: Vec<_> = geometries
             .iter()
@@ -70,11 +70,11 @@ impl Structures {
         }
         let mut blas = plan.build_missing(&descs, found, progress)?;
         plan.compact(&mut blas, progress)?;
-        plan.keep(&blas, &keys, progress)?;
+        plan.store_built(&blas, &keys, progress)?;
         Ok(Self { tlas: plan.top_level(&blas)?, blas })
     }
 
-    /// What is known of each structure now.
+    /// Figures of each acceleration structure so far.
     pub(super) fn figures(&self, ctx: &Context, world: &World) -> lvk::Result<Vec<StructureFigures>> {
         let of_piece = |(blas, piece): (&Blas, &super::Piece)| {
             let info = ctx.accel_struct_info(*blas.holder)?;
@@ -107,7 +107,7 @@ impl Plan<'_> {
 
     /// Of the files, where there are any.
     fn keys(&self) -> Vec<StructureKey> {
-        let key = |piece| StructureKey::of(self.world, piece, self.ctx.capabilities(), self.flags());
+        let key = |piece| StructureKey::from_piece(self.world, piece, self.ctx.capabilities(), self.flags());
         self.cache.iter().flat_map(|_| self.world.pieces.iter().map(key)).collect()
     }
 
@@ -132,7 +132,7 @@ impl Plan<'_> {
         descs: &[BlasDesc<'_>],
         found: Vec<Found>,
         progress: &mut Progress,
-    ) -> Result<Vec<Blas>, LargeSceneError> {
+    ) -> Result<Vec<Blas>, SampleError> {
         let missing: Vec<_> = (0..found.len()).filter(|&i| !matches!(found[i], Found::Loaded(_))).collect();
         let triangles: Vec<_> =
             missing.iter().map(|&index| self.world.pieces[index].triangles.len() as u64).collect();
@@ -163,7 +163,7 @@ impl Plan<'_> {
     }
 
     /// Compacts what was built; what came from a file was compacted before.
-    fn compact(&self, blas: &mut [Blas], progress: &mut Progress) -> Result<(), LargeSceneError> {
+    fn compact(&self, blas: &mut [Blas], progress: &mut Progress) -> Result<(), SampleError> {
         let built: Vec<_> =
             blas.iter().filter(|blas| blas.origin != Origin::Loaded).map(|blas| *blas.holder).collect();
         if !self.compact || built.is_empty() {
@@ -186,19 +186,19 @@ impl Plan<'_> {
     }
 
     /// Keeps what was built for the next start.
-    fn keep(
+    fn store_built(
         &self,
         blas: &[Blas],
         keys: &[StructureKey],
         progress: &mut Progress,
-    ) -> Result<(), LargeSceneError> {
+    ) -> Result<(), SampleError> {
         let Some(cache) = &self.cache else { return Ok(()) };
         let built: Vec<_> = blas.iter().zip(keys).filter(|(blas, _)| blas.origin != Origin::Loaded).collect();
         progress.stage("keeping acceleration structures", built.len() as u64);
         for (done, (blas, key)) in (1..).zip(built) {
             progress.go_on()?;
             match self.ctx.serialize_blas(*blas.holder) {
-                Ok(bytes) => cache.keep(*key, &bytes),
+                Ok(bytes) => cache.store(*key, &bytes),
                 Err(error) if is_of_file(&error) => {
                     log::warn!("the structure '{}' cannot be kept: {error}", cache.path(*key).display());
                 }
@@ -228,7 +228,7 @@ impl Plan<'_> {
     }
 }
 
-/// Whether only the next start is slower for it: what is in a file, or has no room beside the structure.
+/// True if only the next start is slower for it: what is in a file, or has no room beside the structure.
 fn is_of_file(error: &Error) -> bool {
     use Error::{LimitExceeded, OutOfDeviceMemory, Serialized};
     matches!(error, Serialized { .. } | LimitExceeded { .. } | OutOfDeviceMemory { .. })

@@ -1,10 +1,10 @@
-//! What the sample shows: pieces of one large scene, and where instances of them stand.
+//! The scene of the sample: pieces of one large scene, and transforms of their instances.
 
+use crate::app::sample_error::SampleError;
 use std::ops::Range;
 
 use glam::{Affine3A, Vec3, Vec3A};
 
-use super::LargeSceneError;
 use super::merge::{bake, merge};
 use super::street;
 use crate::app::progress::Progress;
@@ -14,7 +14,7 @@ use crate::scene::{Scene, Valley};
 /// Most triangles that are put into one mesh.
 const MOST_COMBINED: u64 = 1 << 25;
 
-/// What the sample shows.
+/// The scene of the sample.
 #[derive(Debug, Clone)]
 pub struct World {
     pub(super) scene: Scene,
@@ -31,7 +31,7 @@ pub struct Piece {
     pub triangles: Range<u32>,
     /// Vertices that they name are in this range.
     pub vertices: Range<u32>,
-    /// Whether light passes through them.
+    /// True if light passes through them.
     pub is_refractive: bool,
 }
 
@@ -49,29 +49,29 @@ impl World {
     /// are shown, or as many as find room. The same everywhere.
     ///
     /// # Errors
-    /// [`LargeSceneError::Stopped`].
-    pub fn valley(triangles: u32, copies: u32, progress: &mut Progress) -> Result<Self, LargeSceneError> {
+    /// [`SampleError::Stopped`].
+    pub fn valley(triangles: u32, copies: u32, progress: &mut Progress) -> Result<Self, SampleError> {
         let Valley { ground, trees, places } = Valley::new(triangles, copies, progress)?;
         let mut placed = vec![(0, Affine3A::IDENTITY)];
         placed.extend(places.into_iter().map(|(kind, place)| (kind + 1, place)));
-        Ok(Self::of(std::iter::once(ground).chain(trees).collect(), &placed))
+        Ok(Self::from_scenes(std::iter::once(ground).chain(trees).collect(), &placed))
     }
 
     /// Rows of plots along streets, in each a scene, turned to another side from plot to plot; `copies` of each scene. Scenes
     /// are scaled to their plots, and rooms are opened above to let the sun in.
     ///
     /// # Errors
-    /// [`LargeSceneError::NoScenes`].
-    pub fn street(scenes: Vec<Scene>, copies: u32) -> Result<Self, LargeSceneError> {
+    /// [`SampleError::NoScenes`].
+    pub fn street(scenes: Vec<Scene>, copies: u32) -> Result<Self, SampleError> {
         if scenes.is_empty() || copies == 0 {
-            return Err(LargeSceneError::NoScenes);
+            return Err(SampleError::NoScenes);
         }
         let street::Street { scenes, places } = street::Street::new(scenes, copies);
-        Ok(Self::of(scenes, &places))
+        Ok(Self::from_scenes(scenes, &places))
     }
 
     /// Scenes of which the first has the lights and cameras, and the index and place of each that is shown.
-    pub(super) fn of(scenes: Vec<Scene>, places: &[(usize, Affine3A)]) -> Self {
+    pub(super) fn from_scenes(scenes: Vec<Scene>, places: &[(usize, Affine3A)]) -> Self {
         let (scene, pieces) = merge(scenes);
         let of_scene = |number: usize| pieces.iter().enumerate().filter(move |(_, (of, _))| *of == number);
         let stand = |(scene, place): &(usize, Affine3A)| {
@@ -86,16 +86,16 @@ impl World {
     /// through some.
     ///
     /// # Errors
-    /// [`LargeSceneError::TooManyTriangles`].
-    pub fn combined(&self) -> Result<Self, LargeSceneError> {
+    /// [`SampleError::MeshTooLarge`].
+    pub fn combined(&self) -> Result<Self, SampleError> {
         let (count, limit) = (self.shown_triangle_count(), MOST_COMBINED);
         if count > limit {
-            return Err(LargeSceneError::TooManyTriangles { count, limit });
+            return Err(SampleError::MeshTooLarge { count, limit });
         }
         Ok(bake(self))
     }
 
-    /// What the world is called.
+    /// Name of the world.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.scene.name
@@ -107,7 +107,7 @@ impl World {
         &self.scene
     }
 
-    /// How many textures a context must have room for.
+    /// Number of descriptor slots for textures that the world needs.
     pub(super) fn textures_needed(&self) -> u32 {
         textures_needed(&self.scene)
     }
@@ -123,7 +123,7 @@ impl World {
         &self.pieces
     }
 
-    /// What is shown.
+    /// The instances.
     #[must_use]
     pub fn instances(&self) -> &[Instance] {
         &self.instances

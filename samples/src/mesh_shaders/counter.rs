@@ -1,4 +1,4 @@
-//! How many meshlets a frame drew, read without waiting.
+//! The number of meshlets that a frame drew, read without waiting.
 
 use lvk::{BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Holder, Readback};
 
@@ -6,7 +6,7 @@ use lvk::{BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Holder,
 pub(super) struct Counter {
     pub(super) buffer: Holder<BufferHandle>,
     latest: Option<u32>,
-    /// What will be there soon.
+    /// The pending readback.
     coming: Option<Readback>,
 }
 

@@ -25,11 +25,11 @@ pub struct Meshlet {
     pub cutoff: f32,
     /// First of its places in [`Meshlets::vertices`].
     pub first_vertex: u32,
-    /// How many there are.
+    /// Their number.
     pub vertex_count: u32,
     /// First of its triangles in [`Meshlets::triangles`].
     pub first_triangle: u32,
-    /// How many there are.
+    /// Their number.
     pub triangle_count: u32,
 }
 
@@ -93,7 +93,7 @@ impl<'a> Cutter<'a> {
         let mut taken = Vec::new();
         let mut next = Some(seed);
         while let Some(triangle) = next {
-            self.take(triangle, first_vertex);
+            self.add_triangle(triangle, first_vertex);
             taken.push(triangle);
             next = (taken.len() < MAX_TRIANGLES).then(|| self.best_neighbour(first_vertex, &taken)).flatten();
         }
@@ -109,7 +109,7 @@ impl<'a> Cutter<'a> {
         self.cut.vertices[first_vertex..].iter().for_each(|vertex| self.places[*vertex as usize] = NONE);
     }
 
-    fn take(&mut self, triangle: usize, first_vertex: usize) {
+    fn add_triangle(&mut self, triangle: usize, first_vertex: usize) {
         let mut packed = 0;
         for (shift, corner) in [0, 8, 16].into_iter().zip(self.triangles[triangle]) {
             let place = &mut self.places[corner as usize];

@@ -1,5 +1,7 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
@@ -15,8 +17,7 @@ use super::meshlets::Meshlets;
 use super::pipelines::MESHLETS;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::raster::{Canvas, RasterError};
+use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
 
 /// Meshlets that a task workgroup looks at (`kMeshletsPerTask` in `shaders/mesh_shaders/payload.glsl`).
@@ -27,15 +28,15 @@ const NEAR_PLANE: f32 = 0.05;
 /// Draws the knot.
 pub struct MeshShaders {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     pipeline: Holder<RenderPipelineHandle>,
-    corners: Vec<Corner>,
+    vertices: Vec<Vertex>,
     meshlets: Meshlets,
     counter: Counter,
     frame: Holder<BufferHandle>,
     constants: FrameConstants,
     camera: Camera,
-    /// From where meshlets are culled, if not from where they are seen.
+    /// The camera for culling, if it is not the camera of the image.
     held: Option<Camera>,
     _buffers: [Holder<BufferHandle>; 4],
 }
@@ -43,8 +44,8 @@ pub struct MeshShaders {
 /// A corner of the knot's triangles (`Vertex` in `shaders/mesh_shaders/frame.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Corner {
-    /// Where it is.
+pub struct Vertex {
+    /// Its position.
     pub position: [f32; 3],
     /// Outwards, of length 1.
     pub normal: [f32; 3],
@@ -72,19 +73,19 @@ impl MeshShaders {
     /// `culls`. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError::Missing`] on devices without mesh shaders, and otherwise when the picture is beyond the device, or the
+    /// [`SampleError::Missing`] on devices without mesh shaders, and otherwise when the picture is beyond the device, or the
     /// device fails.
-    pub fn new(ctx: &Context, extent: [u32; 2], culls: bool) -> Result<Self, RasterError> {
+    pub fn new(ctx: &Context, extent: [u32; 2], culls: bool) -> Result<Self, SampleError> {
         let remedy = "take another device by --device; --list-devices says which there are";
-        RasterError::unless(ctx.capabilities().mesh_shader, ctx, "mesh shaders", remedy)?;
-        let canvas = Canvas::with_depth(ctx, extent)?;
-        let (corners, meshlets) = model();
+        SampleError::require(ctx.capabilities().mesh_shader, ctx, "mesh shaders", remedy)?;
+        let target = RenderTarget::with_depth(ctx, extent)?;
+        let (vertices, meshlets) = model();
         let counter = Counter::new(ctx)?;
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let usage = BufferUsage::STORAGE;
         let buffers = [
             array(ctx, "meshlets", usage, &meshlets.meshlets)?,
-            array(ctx, "vertices", usage, &corners)?,
+            array(ctx, "vertices", usage, &vertices)?,
             array(ctx, "vertex numbers", usage, &meshlets.vertices)?,
             array(ctx, "triangles", usage, &meshlets.triangles)?,
         ];
@@ -103,9 +104,9 @@ impl MeshShaders {
         };
         Ok(Self {
             ctx: ctx.clone(),
-            canvas,
+            target,
             pipeline: pipeline(ctx)?,
-            corners,
+            vertices,
             meshlets,
             counter,
             frame,
@@ -116,7 +117,7 @@ impl MeshShaders {
         })
     }
 
-    /// The knot in pieces, whose vertices are [`corners`](Self::corners).
+    /// The knot in pieces, whose vertices are [`vertices`](Self::vertices).
     #[must_use]
     pub fn meshlets(&self) -> &Meshlets {
         &self.meshlets
@@ -124,31 +125,31 @@ impl MeshShaders {
 
     /// Corners of the knot, at rest.
     #[must_use]
-    pub fn corners(&self) -> &[Corner] {
-        &self.corners
+    pub fn vertices(&self) -> &[Vertex] {
+        &self.vertices
     }
 
-    /// How many meshlets the last frame drew that is known.
+    /// Returns the number of meshlets drawn by the latest frame whose count has arrived.
     #[must_use]
     pub fn drawn(&self) -> Option<u32> {
         self.counter.latest()
     }
 
-    /// The buffer that all stages are told of (`Frame` in `shaders/mesh_shaders/frame.glsl`).
+    /// The buffer that all stages are culling_text of (`Frame` in `shaders/mesh_shaders/frame.glsl`).
     #[must_use]
     pub fn frame_buffer(&self) -> BufferHandle {
         *self.frame
     }
 
     fn upload(&mut self) -> lvk::Result<()> {
-        let [width, height] = self.canvas.extent();
+        let [width, height] = self.target.extent();
         let seen_by = |camera: &Camera| GpuCamera::new(camera, width, height, NEAR_PLANE);
         self.constants.camera = seen_by(&self.camera);
         self.constants.culling_camera = seen_by(self.held.as_ref().unwrap_or(&self.camera));
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
     }
 
-    fn told(&self) -> String {
+    fn culling_text(&self) -> String {
         let count = self.meshlets.meshlets.len();
         match self.drawn() {
             Some(drawn) => format!("{drawn} of {count} meshlets drawn"),
@@ -158,52 +159,48 @@ impl MeshShaders {
 }
 
 impl Sample for MeshShaders {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.constants.phase = moment.phase();
-        self.camera = camera(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.constants.phase = time.phase();
+        self.camera = camera(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload()?;
         self.counter.begin(&self.ctx, &mut frame.cmd)?;
         let counts = Dependencies { buffers: &[*self.counter.buffer], ..Dependencies::default() };
-        let mut pass = self.canvas.begin(&mut frame.cmd, "meshlets", BACKDROP, &counts)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "meshlets", BACKDROP, &counts)?;
         pass.bind_render_pipeline(*self.pipeline)?;
         pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
         pass.draw_mesh_tasks([self.constants.count.div_ceil(MESHLETS_PER_TASK), 1, 1])?;
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn after_frame(&mut self) -> Result<(), RasterError> {
+    fn after_frame(&mut self) -> Result<(), SampleError> {
         Ok(self.counter.read(&self.ctx)?)
     }
 
     fn remark(&self) -> Option<String> {
-        Some(format!("culling   {}", self.told()))
+        Some(format!("culling   {}", self.culling_text()))
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        ui.label(self.told());
+        ui.label(self.culling_text());
         let (mut culls, mut is_held) = (self.constants.culls == 1, self.held.is_some());
         ui.checkbox(&mut culls, "leave out what cannot be seen");
         if ui.checkbox(&mut is_held, "from here, wherever the camera goes").changed() {
@@ -213,29 +210,29 @@ impl Sample for MeshShaders {
         ui.add(egui::Slider::new(&mut self.constants.apart, 0.0..=0.6).text("apart"));
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.pipeline = pipeline(&self.ctx)?;
         Ok(())
     }
 }
 
-/// The knot's corners, and its pieces.
-fn model() -> (Vec<Corner>, Meshlets) {
+/// The knot's vertices, and its pieces.
+fn model() -> (Vec<Vertex>, Meshlets) {
     let knot = knot();
-    let corners = knot
+    let vertices = knot
         .vertices
         .iter()
-        .map(|vertex| Corner { position: vertex.position.into(), normal: vertex.normal.into() });
+        .map(|vertex| Vertex { position: vertex.position.into(), normal: vertex.normal.into() });
     let positions: Vec<Vec3> = knot.vertices.iter().map(|vertex| vertex.position).collect();
-    let triangles: Vec<_> = knot.triangles.iter().map(|corners| corners.map(u32::from)).collect();
-    (corners.collect(), Meshlets::cut(&positions, &triangles))
+    let triangles: Vec<_> = knot.triangles.iter().map(|vertices| vertices.map(u32::from)).collect();
+    (vertices.collect(), Meshlets::cut(&positions, &triangles))
 }
 
 fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
     MESHLETS.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let eye = [0.0, 3.4 + 0.6 * (TAU * phase).sin(), 4.3];
     Camera::looking_at(eye, [0.0, -0.22, 0.0], 43.0)

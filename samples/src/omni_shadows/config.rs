@@ -1,11 +1,10 @@
-//! What to render.
+//! The configuration of the sample.
 
+use crate::app::sample_error::SampleError;
 use clap::ValueEnum;
 use lvk::{Context, OptionalFeature};
 
-use crate::raster::RasterError;
-
-/// How the faces of the cube map are drawn.
+/// The number of passes that draw the faces of the cube map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Faces {
     /// All at once where the device can, else one after the other.
@@ -16,7 +15,7 @@ pub enum Faces {
     Single,
 }
 
-/// How the shadow is filtered, as `shaders/omni_shadows/frame.glsl` counts.
+/// The filter of the shadow, in the order of `shaders/omni_shadows/frame.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ShadowFilter {
     /// There is none.
@@ -29,22 +28,22 @@ pub enum ShadowFilter {
     Soft,
 }
 
-/// What to render. Numbers out of range count as the nearest that is not.
+/// The configuration of the sample. Numbers out of range count as the nearest number in range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OmniShadowsConfig {
     /// Pixels in a row, and rows.
     pub extent: [u32; 2],
     /// Texels on an edge of the cube map, 16 to [`OmniShadowsConfig::MAX_SHADOW_SIZE`].
     pub shadow_size: u32,
-    /// How its faces are drawn.
+    /// The number of passes that draw its faces.
     pub faces: Faces,
-    /// How the shadow is filtered.
+    /// The filter of the shadow.
     pub filter: ShadowFilter,
     /// Radius of the lamp in metres, which soft shadows follow from: 0 to 0.1.
     pub lamp_radius: f32,
-    /// How thick the air is, 0 for clear to 1.
+    /// Density of the haze, 0 for clear to 1.
     pub haze: f32,
-    /// Whether the cube map is shown in a corner.
+    /// True if the cube map is shown in a corner.
     pub shows_cube: bool,
 }
 
@@ -79,21 +78,21 @@ impl OmniShadowsConfig {
 }
 
 impl Faces {
-    /// Whether the device can draw all at once.
+    /// True if the device can draw all at once.
     pub(super) fn can_be_one_pass(ctx: &Context) -> bool {
         let capabilities = ctx.capabilities();
         capabilities.has(OptionalFeature::Multiview) && capabilities.limits.max_views >= 6
     }
 
-    /// Whether all are drawn at once.
+    /// True if all are drawn at once.
     ///
     /// # Errors
-    /// [`RasterError::Missing`] where that is asked for and the device cannot.
-    pub(super) fn are_one_pass(self, ctx: &Context) -> Result<bool, RasterError> {
+    /// [`SampleError::Missing`] where that is asked for and the device cannot.
+    pub(super) fn are_one_pass(self, ctx: &Context) -> Result<bool, SampleError> {
         let can = Self::can_be_one_pass(ctx);
         if self == Self::Multiview {
             let remedy = "--faces single draws one face after the other";
-            RasterError::unless(can, ctx, "multiview of six views", remedy)?;
+            SampleError::require(can, ctx, "multiview of six views", remedy)?;
         }
         Ok(can && self != Self::Single)
     }

@@ -1,4 +1,4 @@
-//! What the shaders are told of a frame.
+//! The frame constants of the shaders.
 
 use bytemuck::{Pod, Zeroable};
 

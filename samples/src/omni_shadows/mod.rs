@@ -2,21 +2,18 @@
 //! the lamp is drawn into a cube map, all six faces in one pass by multiview, or one after the other where a device has none;
 //! the picture compares with it, filtered as softly as the size of the lamp says, on surfaces and in the air before them.
 //!
-//! [`OmniShadows`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`OmniShadows`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
 mod config;
 mod frame;
+mod info;
 mod lattice;
 mod models;
 mod pipelines;
 mod renderer;
-mod run;
 mod scene_pass;
 mod shadow_cube;
 
-pub use args::OmniShadowsArgs;
 pub use config::{Faces, OmniShadowsConfig, ShadowFilter};
-pub use pipelines::pipelines;
+pub use info::OmniShadowsArgs;
 pub use renderer::OmniShadows;
-pub use run::run;

@@ -13,12 +13,12 @@ use crate::shapes::Mesh;
 
 /// Half the room's width, its height, half its length.
 pub(super) const ROOM: [f32; 3] = [4.2, 4.4, 4.6];
-/// Where the lamp hangs from, and how far below it is.
+/// The hook of the lamp, and the length of its rope.
 const HOOK: Vec3 = Vec3::new(0.0, ROOM[1], -0.9);
 const CHAIN: f32 = 2.0;
 /// Radius of the lattice.
 const LATTICE: f32 = 0.52;
-/// How far the lamp swings, in radians.
+/// Amplitude of the lamp's swing, in radians.
 const SWING: f32 = 0.13;
 /// Least distance from the lamp to anything that throws shadows (`kNearestBlocker` of `shaders/omni_shadows/shadow.glsl`).
 #[cfg(test)]
@@ -63,7 +63,7 @@ pub(super) struct Draw {
     /// Numbers of vertices.
     pub(super) corners: Range<u32>,
     pub(super) instances: Range<u32>,
-    /// Whether it is in the lamp's way.
+    /// True if it is in the lamp's way.
     pub(super) casts: bool,
 }
 
@@ -100,7 +100,7 @@ impl Models {
         self.draws.iter().map(|draw| draw.corners.len() as u32 / 3 * draw.instances.len() as u32).sum()
     }
 
-    /// How many instances there are.
+    /// Number of instances.
     pub(super) fn instance_count(&self) -> u32 {
         self.draws.last().map_or(0, |draw| draw.instances.end)
     }
@@ -161,12 +161,12 @@ pub(super) fn instances(phase: f32) -> Vec<Instance> {
     all
 }
 
-/// Where the lamp is.
+/// Position of the lamp.
 pub(super) fn lamp(phase: f32) -> Vec3 {
     hanging(phase).transform_point3(Vec3::Y * -CHAIN)
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 pub(super) fn camera(phase: f32) -> Camera {
     let (sine, cosine) = (TAU * phase).sin_cos();
     let eye = [0.9 + 0.35 * sine, 1.75 + 0.12 * cosine, 4.2];

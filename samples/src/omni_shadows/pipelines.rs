@@ -1,10 +1,10 @@
 //! The sample's pipelines as data, with the texts and formats that its passes use.
 
+use crate::app::render_target::RenderTarget;
 use lvk::{CompareOp, DepthTest, Format};
 
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::raster::{Canvas, RasterPipeline, fragment_stage, vertex_stage};
-use crate::shaders::omni_shadows as texts;
+use crate::pipelines::{SampleStage, shader};
+use crate::raster::RasterPipeline;
 
 /// Folder of the texts in `shaders/`.
 const SAMPLE: &str = "omni_shadows";
@@ -13,17 +13,15 @@ pub(super) const CUBE: Format = Format::D32Float;
 /// A bit for each face of it.
 pub(super) const ALL_FACES: u32 = 0b11_1111;
 
-const CASTER: SampleStage = vertex_stage(texts::CASTER_VERT, "caster.vert");
+const CASTER: SampleStage = shader!("omni_shadows", "caster.vert");
 const CASTERS: [SampleStage; 1] = [CASTER];
-const CASTERS_MULTIVIEW: [SampleStage; 1] = [SampleStage { defines: texts::MULTIVIEW, ..CASTER }];
+const CASTERS_MULTIVIEW: [SampleStage; 1] = [SampleStage { defines: &[("OMNI_MULTIVIEW", "1")], ..CASTER }];
 const SURFACE: [SampleStage; 2] =
-    [vertex_stage(texts::SURFACE_VERT, "surface.vert"), fragment_stage(texts::SURFACE_FRAG, "surface.frag")];
-const CUBE_VIEW: [SampleStage; 2] = [
-    vertex_stage(texts::CUBE_VIEW_VERT, "cube_view.vert"),
-    fragment_stage(texts::CUBE_VIEW_FRAG, "cube_view.frag"),
-];
+    [shader!("omni_shadows", "surface.vert"), shader!("omni_shadows", "surface.frag")];
+const CUBE_VIEW: [SampleStage; 2] =
+    [shader!("omni_shadows", "cube_view.vert"), shader!("omni_shadows", "cube_view.frag")];
 
-/// What throws shadows, to one face of the cube map.
+/// Shadow casters, to one face of the cube map.
 pub(super) const FACE: RasterPipeline = RasterPipeline {
     sample: SAMPLE,
     name: "omni_shadows: face of the cube",
@@ -45,12 +43,9 @@ pub(super) const SURFACES: RasterPipeline =
     RasterPipeline::with_depth(SAMPLE, "omni_shadows: surfaces", &SURFACE);
 /// The cube map unfolded, over the picture.
 pub(super) const UNFOLDED: RasterPipeline = RasterPipeline {
-    depth: Some(DepthTest { format: Canvas::DEPTH, compare: CompareOp::Always, write: false }),
+    depth: Some(DepthTest { format: RenderTarget::DEPTH, compare: CompareOp::Always, write: false }),
     ..RasterPipeline::flat(SAMPLE, "omni_shadows: unfolded cube", &CUBE_VIEW)
 };
 
 /// Every pipeline of the sample.
-#[must_use]
-pub fn pipelines() -> Vec<SamplePipeline> {
-    [FACE, FACES, SURFACES, UNFOLDED].map(|pipeline| pipeline.data()).to_vec()
-}
+pub(super) const ALL: [RasterPipeline; 4] = [FACE, FACES, SURFACES, UNFOLDED];

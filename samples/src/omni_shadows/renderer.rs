@@ -1,5 +1,7 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::Zeroable;
 use lvk::{BufferHandle, BufferUsage, Context, Holder, SamplerHandle, TextureHandle};
 
@@ -10,14 +12,13 @@ use super::scene_pass::ScenePass;
 use super::shadow_cube::{CubePass, ShadowCube, samplers};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::raster::{Canvas, RasterError};
+use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
 
-/// Where the depth of the lamp's map is 1, in metres.
+/// Distance at which the depth of the lamp's map is 1, in metres.
 const LAMP_NEAR: f32 = 0.05;
 const NEAR_PLANE: f32 = 0.05;
-/// What the lamp sends to a square metre at a distance of one metre.
+/// Irradiance of the lamp at a distance of one metre.
 const INTENSITY: [f32; 3] = [27.0, 18.8, 11.0];
 /// Edges of the cube map that the panel offers.
 const SHADOW_SIZES: [u32; 4] = [256, 512, 1024, 2048];
@@ -26,7 +27,7 @@ const SHADOW_SIZES: [u32; 4] = [256, 512, 1024, 2048];
 pub struct OmniShadows {
     ctx: Context,
     config: OmniShadowsConfig,
-    canvas: Canvas,
+    target: RenderTarget,
     cube: ShadowCube,
     cube_pass: CubePass,
     scene_pass: ScenePass,
@@ -45,8 +46,8 @@ impl OmniShadows {
     /// Makes models, textures and pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError`] when the picture is beyond the device, the device cannot draw as asked, or fails.
-    pub fn new(ctx: &Context, config: &OmniShadowsConfig) -> Result<Self, RasterError> {
+    /// [`SampleError`] when the picture is beyond the device, the device cannot draw as asked, or fails.
+    pub fn new(ctx: &Context, config: &OmniShadowsConfig) -> Result<Self, SampleError> {
         let config = config.clamped();
         let models = Models::new();
         let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &models.vertices)?;
@@ -66,7 +67,7 @@ impl OmniShadows {
             ..FrameConstants::zeroed()
         };
         Ok(Self {
-            canvas: Canvas::with_depth(ctx, config.extent)?,
+            target: RenderTarget::with_depth(ctx, config.extent)?,
             cube: ShadowCube::new(ctx, config.shadow_size)?,
             cube_pass: CubePass::new(ctx, config.faces.are_one_pass(ctx)?)?,
             scene_pass: ScenePass::new(ctx)?,
@@ -95,7 +96,7 @@ impl OmniShadows {
         self.triangle_count
     }
 
-    /// Where the lamp is.
+    /// Position of the lamp.
     pub fn lamp(&self) -> [f32; 3] {
         models::lamp(self.phase).into()
     }
@@ -105,7 +106,7 @@ impl OmniShadows {
         Models::new().triangles(self.phase)
     }
 
-    /// Whether all faces of the cube map are drawn in one pass.
+    /// True if all faces of the cube map are drawn in one pass.
     pub fn is_multiview(&self) -> bool {
         self.cube_pass.is_multiview()
     }
@@ -129,7 +130,7 @@ impl OmniShadows {
     }
 
     /// Takes over what the panel has set.
-    fn apply(&mut self) -> Result<(), RasterError> {
+    fn apply(&mut self) -> Result<(), SampleError> {
         let OmniShadowsConfig { shadow_size, faces, .. } = self.config;
         if self.cube.size != shadow_size {
             self.cube = ShadowCube::new(&self.ctx, shadow_size)?;
@@ -143,39 +144,35 @@ impl OmniShadows {
 }
 
 impl Sample for OmniShadows {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.show(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.show(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.apply()?;
         self.upload()?;
-        let Self { canvas, cube, cube_pass, scene_pass, draws, frame_address, config, .. } = &*self;
+        let Self { target, cube, cube_pass, scene_pass, draws, frame_address, config, .. } = &*self;
         frame.pass("shadow cube", |cmd| cube_pass.record(cmd, cube, draws, *frame_address))?;
         let shown = (*frame_address, config.shows_cube);
-        scene_pass.record(&mut frame.cmd, canvas, *cube.texture, draws, shown)?;
-        Ok(canvas.picture())
+        scene_pass.record(&mut frame.cmd, target, *cube.texture, draws, shown)?;
+        Ok(target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -202,7 +199,7 @@ impl Sample for OmniShadows {
         ui.checkbox(&mut config.shows_cube, "cube map");
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let scene_pass = ScenePass::new(&self.ctx)?;
         self.cube_pass = CubePass::new(&self.ctx, self.cube_pass.is_multiview())?;
         self.scene_pass = scene_pass;

@@ -1,5 +1,6 @@
 //! The pass that draws the picture: surfaces, and the cube map unfolded in a corner.
 
+use crate::app::render_target::RenderTarget;
 use lvk::{
     CommandBuffer, Context, CullMode, Dependencies, Holder, RenderPipelineDesc, RenderPipelineHandle,
     TextureHandle, Topology,
@@ -8,7 +9,6 @@ use lvk::{
 use super::frame::Push;
 use super::models::Draw;
 use super::pipelines::{SURFACES, UNFOLDED};
-use crate::raster::Canvas;
 
 /// Its pipelines.
 pub(super) struct ScenePass {
@@ -28,13 +28,13 @@ impl ScenePass {
     pub(super) fn record(
         &self,
         cmd: &mut CommandBuffer,
-        canvas: &Canvas,
+        target: &RenderTarget,
         cube: TextureHandle,
         draws: &[Draw],
         (frame, shows_cube): (u64, bool),
     ) -> lvk::Result<()> {
         let reads = Dependencies { sampled_images: &[cube], ..Dependencies::default() };
-        let mut pass = canvas.begin(cmd, "surfaces", [0.0; 3], &reads)?;
+        let mut pass = target.begin(cmd, "surfaces", [0.0; 3], &reads)?;
         pass.bind_render_pipeline(*self.surfaces)?;
         pass.push_constants(&Push::new(frame, 0))?;
         // Floor and walls come last, as much of them is hidden.

@@ -78,7 +78,7 @@ impl CubePass {
         Ok(Self { pipeline: pipeline.create(ctx)?, is_multiview })
     }
 
-    /// Whether all faces are drawn in one pass.
+    /// True if all faces are drawn in one pass.
     pub(super) fn is_multiview(&self) -> bool {
         self.is_multiview
     }

@@ -1,13 +1,5 @@
-//! What the samples share that only rasterise: a picture to draw on, pipelines as data, why a sample cannot render, and
-//! what their programs say.
+//! Pipelines of samples that only rasterise, as data.
 
-mod canvas;
-mod error;
-mod headline;
 mod pipeline;
 
-pub use canvas::Canvas;
-pub(crate) use canvas::check_size;
-pub use error::RasterError;
-pub use headline::headline;
-pub use pipeline::{RasterPipeline, fragment_stage, vertex_stage};
+pub use pipeline::RasterPipeline;

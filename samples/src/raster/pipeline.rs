@@ -1,14 +1,14 @@
-//! Pipelines as data, to be made, made again of shaders that have changed, and compiled by those who run nothing.
+//! Pipelines as data, for creation, hot reload, and compilation without running.
 
 use lvk::{
     ColorTarget, Context, DepthTest, Format, Holder, RenderPipelineDesc, RenderPipelineHandle,
     ShaderModuleHandle, ShaderStage,
 };
 
-use super::Canvas;
+use crate::app::render_target::RenderTarget;
 use crate::pipelines::{SamplePipeline, SampleStage};
 
-/// A pipeline that draws on a [`Canvas`], or on targets of another kind.
+/// A pipeline that draws on a [`RenderTarget`], or on targets of another kind.
 #[derive(Debug, Clone, Copy)]
 pub struct RasterPipeline {
     /// The sample, whose folder of `shaders/` the stages lie in.
@@ -28,24 +28,24 @@ pub struct RasterPipeline {
 }
 
 impl RasterPipeline {
-    /// For a [`Canvas::flat`].
+    /// For a [`RenderTarget::flat`].
     #[must_use]
     pub const fn flat(sample: &'static str, name: &'static str, stages: &'static [SampleStage]) -> Self {
-        let samples = Canvas::SAMPLES;
-        Self { sample, name, stages, color: &[Canvas::COLOR], depth: None, samples, view_mask: 0 }
+        let samples = RenderTarget::SAMPLES;
+        Self { sample, name, stages, color: &[RenderTarget::COLOR], depth: None, samples, view_mask: 0 }
     }
 
-    /// For a [`Canvas::with_depth`].
+    /// For a [`RenderTarget::with_depth`].
     #[must_use]
     pub const fn with_depth(
         sample: &'static str,
         name: &'static str,
         stages: &'static [SampleStage],
     ) -> Self {
-        Self { depth: Some(Canvas::NEAREST), ..Self::flat(sample, name, stages) }
+        Self { depth: Some(RenderTarget::NEAREST), ..Self::flat(sample, name, stages) }
     }
 
-    /// The pipeline for those who compile it without running it.
+    /// The pipeline as data, for compilation without a device.
     #[must_use]
     pub fn data(&self) -> SamplePipeline {
         SamplePipeline {
@@ -85,27 +85,18 @@ impl RasterPipeline {
             ..*desc
         };
         for (stage, module) in self.stages.iter().zip(&modules) {
-            *place(&mut desc, stage.stage) = Some(**module);
+            *module_of(&mut desc, stage.stage) = Some(**module);
         }
         ctx.create_render_pipeline(&desc)
     }
 }
 
-/// A vertex stage without macros, in the file of that name.
-#[must_use]
-pub const fn vertex_stage(text: &'static str, name: &'static str) -> SampleStage {
-    SampleStage { stage: ShaderStage::Vertex, text, defines: &[], name }
-}
-
-/// The same as a fragment stage.
-#[must_use]
-pub const fn fragment_stage(text: &'static str, name: &'static str) -> SampleStage {
-    SampleStage { stage: ShaderStage::Fragment, text, defines: &[], name }
-}
-
-/// Where a description has its module for a stage. A stage that does not rasterise takes the place of the vertex stage, where
-/// `lvk` refuses it by name.
-fn place<'a>(desc: &'a mut RenderPipelineDesc<'_>, stage: ShaderStage) -> &'a mut Option<ShaderModuleHandle> {
+/// The field of a description that holds the module of a stage. A stage that does not rasterise goes to the field of the vertex
+/// stage, where `lvk` refuses it by name.
+fn module_of<'a>(
+    desc: &'a mut RenderPipelineDesc<'_>,
+    stage: ShaderStage,
+) -> &'a mut Option<ShaderModuleHandle> {
     match stage {
         ShaderStage::Task => &mut desc.task,
         ShaderStage::Mesh => &mut desc.mesh,

@@ -1,11 +1,11 @@
-//! What to render, and by which means of the device.
+//! The configuration of the sample.
 
+use crate::app::sample_error::SampleError;
 use lvk::Capabilities;
 
-use super::ReflectionsError;
 use crate::hybrid::RayPath;
 
-/// How the skinned character's structure follows its skin.
+/// The build mode of the skinned character's BLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SkinUpdate {
     /// The structure of the first frame is refitted.
@@ -15,7 +15,7 @@ pub enum SkinUpdate {
     Rebuild,
 }
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReflectionsConfig {
     /// By which part of Vulkan rays are traced.
@@ -29,7 +29,7 @@ pub struct ReflectionsConfig {
     /// Instances seen under a smaller angle than this, in radians, are left out of the top-level structure; 0 keeps
     /// them all.
     pub min_angle: f32,
-    /// How the skinned character's structure follows its skin.
+    /// The build mode of the skinned character's BLAS.
     pub skin_update: SkinUpdate,
 }
 
@@ -46,15 +46,9 @@ impl ReflectionsConfig {
         Self { path, width, height, samples, min_angle, skin_update: SkinUpdate::default() }
     }
 
-    pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), ReflectionsError> {
-        let limit = capabilities.limits.max_texture_2d;
-        let (width, height, samples) = (self.width, self.height, self.samples);
-        if width == 0 || height == 0 || width > limit || height > limit {
-            return Err(ReflectionsError::BadSize { width, height, limit });
-        }
-        if samples == 0 || samples > Self::MAX_SAMPLES {
-            return Err(ReflectionsError::BadSamples { samples, limit: Self::MAX_SAMPLES });
-        }
+    pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), SampleError> {
+        SampleError::check_size([self.width, self.height], capabilities)?;
+        SampleError::check_range("--samples", self.samples, [1, Self::MAX_SAMPLES])?;
         RayPath::choose(Some(self.path), capabilities)?;
         Ok(())
     }

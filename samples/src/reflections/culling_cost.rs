@@ -1,12 +1,12 @@
-//! What culling by angular size saves.
+//! Measures the cost that culling by angular size saves.
 
+use crate::app::sample_error::SampleError;
 use std::fmt;
 
-use super::error::ReflectionsError;
 use super::renderer::{RAYS, Reflections, TLAS_BUILD};
 use crate::app::timings;
 
-/// What a sample of the picture costs on the GPU, in milliseconds.
+/// GPU time of a sample of the image, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RayCost {
     /// The build of the top-level structure.
@@ -15,7 +15,7 @@ pub struct RayCost {
     pub rays_ms: f64,
 }
 
-/// What a sample of the picture costs with and without culling by angular size: the least of several rounds, which other
+/// GPU time of a sample of the image with and without culling by angular size: the least of several rounds, which other
 /// work on the device disturbs less than a mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CullingCost {
@@ -30,8 +30,8 @@ impl CullingCost {
     /// or for no rounds.
     ///
     /// # Errors
-    /// [`ReflectionsError::Device`].
-    pub fn measure(sample: &Reflections, rounds: u32) -> Result<Option<Self>, ReflectionsError> {
+    /// [`SampleError::Device`].
+    pub fn measure(sample: &Reflections, rounds: u32) -> Result<Option<Self>, SampleError> {
         let angles = [sample.config().min_angle, 0.0];
         let mut times = [const { (Vec::new(), Vec::new()) }; 2];
         for _ in 0..rounds {

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::world::Light;
+use super::scene::Light;
 use crate::scene::GpuCamera;
 
 /// Lights that the shaders have room for: channels of a texture, beside the one for openness.
@@ -20,7 +20,7 @@ pub(super) struct LightConstants {
     spread: f32,
 }
 
-/// The tables of the world, and its light: the same in every frame.
+/// The gpu_scene of the world, and its light: the same in every frame.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct WorldConstants {
@@ -81,7 +81,7 @@ pub(super) struct Push {
     pub(super) arguments: [u32; 4],
 }
 
-/// What shaders know of the lights; more than they have room for are left out.
+/// The lights for the shaders, without those beyond the capacity.
 pub(super) fn light_constants(lights: &[Light]) -> ([LightConstants; MOST_LIGHTS], u32) {
     let mut all = [LightConstants::zeroed(); MOST_LIGHTS];
     for (constants, light) in all.iter_mut().zip(lights) {

@@ -2,8 +2,8 @@
 
 use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, TextureHandle};
 
+use super::animation::compute;
 use super::frame::{Push, words};
-use super::moving::compute;
 use super::pipelines::{COMPOSITE, FILTER, RESOLVE, SMOOTH};
 use super::ray_passes::GROUP;
 use super::targets::Targets;

@@ -15,39 +15,34 @@
 //! * What is reflected is lit as what is seen, with shadow rays of its own, on screen or off; only light from all around
 //!   is a guess there, by spherical harmonics (`shaders/reflections/lighting.glsl`).
 //!
-//! [`Reflections`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`Reflections`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
+mod animation;
 mod config;
 mod culling_cost;
-mod error;
 mod frame;
+mod gpu_scene;
 mod image_passes;
-mod layers;
-mod models;
-mod moving;
-mod paint;
+mod info;
+mod meshes;
+mod panel;
 mod pipelines;
+mod procedural_textures;
 mod quantise;
-mod range;
 mod raster_passes;
 mod ray_passes;
+mod ray_range;
 mod renderer;
-mod run;
+mod scene;
 mod serpent;
 mod sky_light;
-mod switches;
-mod tables;
 mod targets;
 mod top_level;
-mod world;
+mod transparency_sort;
 
-pub use args::ReflectionsArgs;
 pub use config::{ReflectionsConfig, SkinUpdate};
 pub use culling_cost::{CullingCost, RayCost};
-pub use error::ReflectionsError;
-pub use pipelines::pipelines;
-pub use range::{FAR, ROUGHEST_TRACED, reflection_range};
+pub use info::ReflectionsArgs;
+pub use ray_range::{FAR, ROUGHEST_TRACED, reflection_range};
 pub use renderer::Reflections;
-pub use run::run;
 pub use top_level::InstanceCount;

@@ -1,40 +1,31 @@
 //! The sample's pipelines as data, with the texts and formats that its passes use. All are made when the sample starts.
 
-use lvk::{Format, ShaderStage};
+use lvk::Format;
 
 use super::targets::{COMPOSITE_FORMAT, DEPTH_FORMAT, SURFACE_FORMAT};
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::shaders::reflections as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
 
-pub(super) const SKIN: SampleStage = stage(ShaderStage::Compute, texts::SKIN_COMP, "skin.comp");
-pub(super) const LEAVES: SampleStage = stage(ShaderStage::Compute, texts::LEAVES_COMP, "leaves.comp");
-pub(super) const FILTER: SampleStage = stage(ShaderStage::Compute, texts::FILTER_COMP, "filter.comp");
-pub(super) const SMOOTH: SampleStage = stage(ShaderStage::Compute, texts::SMOOTH_COMP, "smooth.comp");
-pub(super) const COMPOSITE: SampleStage =
-    stage(ShaderStage::Compute, texts::COMPOSITE_COMP, "composite.comp");
-pub(super) const RESOLVE: SampleStage = stage(ShaderStage::Compute, texts::RESOLVE_COMP, "resolve.comp");
-pub(super) const OPAQUE_QUERY: SampleStage = stage(ShaderStage::Compute, texts::OPAQUE_COMP, "opaque.comp");
-pub(super) const TRANSPARENT_QUERY: SampleStage =
-    stage(ShaderStage::Compute, texts::TRANSPARENT_COMP, "transparent.comp");
-pub(super) const SURFACE_VERTEX: SampleStage =
-    stage(ShaderStage::Vertex, texts::SURFACE_VERT, "surface.vert");
-pub(super) const OPAQUE_FRAGMENT: SampleStage =
-    stage(ShaderStage::Fragment, texts::OPAQUE_FRAG, "opaque.frag");
-pub(super) const TRANSPARENT_FRAGMENT: SampleStage =
-    stage(ShaderStage::Fragment, texts::TRANSPARENT_FRAG, "transparent.frag");
-pub(super) const BLEND_FRAGMENT: SampleStage = stage(ShaderStage::Fragment, texts::BLEND_FRAG, "blend.frag");
-pub(super) const OPAQUE_RAYS: SampleStage = stage(ShaderStage::RayGen, texts::OPAQUE_RGEN, "opaque.rgen");
-pub(super) const TRANSPARENT_RAYS: SampleStage =
-    stage(ShaderStage::RayGen, texts::TRANSPARENT_RGEN, "transparent.rgen");
-pub(super) const CLOSEST_MISS: SampleStage = stage(ShaderStage::Miss, texts::CLOSEST_RMISS, "closest.rmiss");
-pub(super) const SHADOW_MISS: SampleStage = stage(ShaderStage::Miss, texts::SHADOW_RMISS, "shadow.rmiss");
-pub(super) const CLOSEST_HIT: SampleStage =
-    stage(ShaderStage::ClosestHit, texts::CLOSEST_RCHIT, "closest.rchit");
-pub(super) const LEAF_ANY_HIT: SampleStage = stage(ShaderStage::AnyHit, texts::LEAF_RAHIT, "leaf.rahit");
+pub(super) const SKIN: SampleStage = shader!("reflections", "skin.comp");
+pub(super) const LEAVES: SampleStage = shader!("reflections", "leaves.comp");
+pub(super) const FILTER: SampleStage = shader!("reflections", "filter.comp");
+pub(super) const SMOOTH: SampleStage = shader!("reflections", "smooth.comp");
+pub(super) const COMPOSITE: SampleStage = shader!("reflections", "composite.comp");
+pub(super) const RESOLVE: SampleStage = shader!("reflections", "resolve.comp");
+pub(super) const OPAQUE_QUERY: SampleStage = shader!("reflections", "opaque.comp");
+pub(super) const TRANSPARENT_QUERY: SampleStage = shader!("reflections", "transparent.comp");
+pub(super) const SURFACE_VERTEX: SampleStage = shader!("reflections", "surface.vert");
+pub(super) const OPAQUE_FRAGMENT: SampleStage = shader!("reflections", "opaque.frag");
+pub(super) const TRANSPARENT_FRAGMENT: SampleStage = shader!("reflections", "transparent.frag");
+pub(super) const BLEND_FRAGMENT: SampleStage = shader!("reflections", "blend.frag");
+pub(super) const OPAQUE_RAYS: SampleStage = shader!("reflections", "opaque.rgen");
+pub(super) const TRANSPARENT_RAYS: SampleStage = shader!("reflections", "transparent.rgen");
+pub(super) const CLOSEST_MISS: SampleStage = shader!("reflections", "closest.rmiss");
+pub(super) const SHADOW_MISS: SampleStage = shader!("reflections", "shadow.rmiss");
+pub(super) const CLOSEST_HIT: SampleStage = shader!("reflections", "closest.rchit");
+pub(super) const LEAF_ANY_HIT: SampleStage = shader!("reflections", "leaf.rahit");
 
-/// Every pipeline of the sample.
-#[must_use]
-pub fn pipelines() -> Vec<SamplePipeline> {
+/// Returns every pipeline of the sample.
+pub(super) fn pipelines() -> Vec<SamplePipeline> {
     vec![
         compute("reflections: skinning", SKIN),
         compute("reflections: leaves", LEAVES),
@@ -62,8 +53,4 @@ fn raster(name: &'static str, fragment: SampleStage, color: Format, depth: Optio
 
 fn compute(name: &'static str, stage: SampleStage) -> SamplePipeline {
     SamplePipeline { name, stages: vec![stage], color: Vec::new(), depth: None }
-}
-
-const fn stage(stage: ShaderStage, text: &'static str, name: &'static str) -> SampleStage {
-    SampleStage { stage, text, defines: &[], name }
 }

@@ -6,7 +6,7 @@ use glam::{Affine3A, Vec2, Vec3};
 use crate::hybrid::half_float::half_bits;
 use crate::shapes::Vertex;
 
-/// What one stands for.
+/// The value of one unit.
 const ONE: f32 = 32767.0;
 
 /// A vertex as the shaders read it (`kKindStatic` in `shaders/reflections/frame.glsl`) and as

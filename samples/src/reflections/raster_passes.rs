@@ -7,8 +7,8 @@ use lvk::{
 };
 
 use super::frame::Push;
+use super::gpu_scene::Draw;
 use super::pipelines::{BLEND_FRAGMENT, OPAQUE_FRAGMENT, SURFACE_VERTEX, TRANSPARENT_FRAGMENT};
-use super::tables::Draw;
 use super::targets::{COMPOSITE_FORMAT, DEPTH_FORMAT, SURFACE_FORMAT, Targets};
 use crate::pipelines::SampleStage;
 
@@ -19,7 +19,7 @@ pub(super) struct RasterPasses {
     blend: Holder<RenderPipelineHandle>,
 }
 
-/// What all passes draw.
+/// Geometry that all passes draw.
 #[derive(Clone, Copy)]
 pub(super) struct Drawn<'a> {
     pub(super) indices: BufferHandle,

@@ -6,8 +6,8 @@ use lvk::{
     RayTracingPipelineDesc, RayTracingPipelineHandle,
 };
 
+use super::animation::compute;
 use super::frame::Push;
-use super::moving::compute;
 use super::pipelines::{
     CLOSEST_HIT, CLOSEST_MISS, LEAF_ANY_HIT, OPAQUE_QUERY, OPAQUE_RAYS, SHADOW_MISS, TRANSPARENT_QUERY,
     TRANSPARENT_RAYS,
@@ -24,7 +24,7 @@ pub(super) enum RayPasses {
     Query([Holder<ComputePipelineHandle>; 2]),
 }
 
-/// Which surfaces to trace from.
+/// The surfaces to trace from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Surfaces {
     Opaque,

@@ -1,30 +1,30 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::sample_error::SampleError;
 use lvk::{
     AddressMode, BufferHandle, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
     TextureHandle,
 };
 
+use super::animation::{Animation, AnimationPasses};
 use super::config::ReflectionsConfig;
-use super::error::ReflectionsError;
 use super::frame::{FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, light_constants};
+use super::gpu_scene::{GeometryArena, GpuScene};
 use super::image_passes::ImagePasses;
-use super::moving::{Moving, MovingPasses};
-use super::paint::Picture;
+use super::panel;
+use super::procedural_textures::Picture;
 use super::raster_passes::{Drawn, RasterPasses};
 use super::ray_passes::{RayPasses, Surfaces};
+use super::scene::{self, HallScene};
 use super::sky_light::harmonics;
-use super::switches;
-use super::tables::{Arena, Tables};
 use super::targets::Targets;
 use super::top_level::{InstanceCount, TopLevel};
-use super::world::{self, World};
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::pass_times::PassTimes;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
-use crate::app::ui::Wanted;
+use crate::app::ui::PendingSettings;
 use crate::scene::{Camera, GpuCamera};
 
 /// Names of the build of the top-level structure and of the ray passes.
@@ -38,9 +38,9 @@ const SKY_SIZE: u32 = 256;
 pub struct Reflections {
     ctx: Context,
     config: ReflectionsConfig,
-    tables: Tables,
-    moving: Moving,
-    moving_passes: MovingPasses,
+    gpu_scene: GpuScene,
+    animation: Animation,
+    moving_passes: AnimationPasses,
     top_level: TopLevel,
     targets: Targets,
     raster: RasterPasses,
@@ -52,7 +52,7 @@ pub struct Reflections {
     frame_address: u64,
     camera: Camera,
     phase: f32,
-    wanted: Wanted<ReflectionsConfig>,
+    wanted: PendingSettings<ReflectionsConfig>,
     _held: (Vec<Holder<TextureHandle>>, [Holder<SamplerHandle>; 2]),
 }
 
@@ -60,18 +60,18 @@ impl Reflections {
     /// Makes the hall, its structures and all pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`ReflectionsError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &ReflectionsConfig) -> Result<Self, ReflectionsError> {
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &ReflectionsConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
         let extent = [config.width, config.height];
-        let world = World::new();
+        let world = HallScene::new();
         let mut textures = upload_textures(ctx, &world)?;
-        let mut arena = Arena::of(&world.models);
-        let moving = Moving::new(ctx, &mut arena, world.leaf_count)?;
+        let mut arena = GeometryArena::from_models(&world.models);
+        let animation = Animation::new(ctx, &mut arena, world.leaf_count)?;
         let buffers = arena.upload(ctx)?;
         let handles = [*buffers[0], *buffers[1]];
-        let tables = Tables::new(ctx, &world, &arena, buffers, &moving, &textures)?;
-        let moving_passes = MovingPasses::new(ctx, &moving, handles[1], config.skin_update)?;
+        let gpu_scene = GpuScene::new(ctx, &world, &arena, buffers, &animation, &textures)?;
+        let moving_passes = AnimationPasses::new(ctx, &animation, handles[1], config.skin_update)?;
         let top_level = TopLevel::new(ctx, &world, &arena, handles, &moving_passes)?;
         let targets = Targets::new(ctx, extent)?;
         let samplers = [
@@ -90,23 +90,23 @@ impl Reflections {
         textures.push(sky);
         let frame_buffer = frame_buffer(ctx, config.samples)?;
         Ok(Self {
-            constants: world_constants(&world, &tables),
+            constants: world_constants(&world, &gpu_scene),
             raster: RasterPasses::new(ctx)?,
             rays: RayPasses::new(ctx, config.path)?,
             images: ImagePasses::new(ctx)?,
             frame_address: ctx.buffer_address(*frame_buffer)?,
             ctx: ctx.clone(),
             config: *config,
-            tables,
-            moving,
+            gpu_scene,
+            animation,
             moving_passes,
             top_level,
             targets,
             indices,
             frame_buffer,
-            camera: world::camera(0.0),
+            camera: scene::camera(0.0),
             phase: 0.0,
-            wanted: Wanted::new(*config),
+            wanted: PendingSettings::new(*config),
             _held: (textures, samplers),
         })
     }
@@ -115,17 +115,17 @@ impl Reflections {
     /// which it goes round again. What is not finite counts as 0. Nothing depends on earlier phases.
     pub fn show(&mut self, phase: f32) {
         self.phase = if phase.is_finite() { phase.rem_euclid(1.0) % 1.0 } else { 0.0 };
-        self.camera = world::camera(self.phase);
+        self.camera = scene::camera(self.phase);
     }
 
     /// Looks from another place than the animation's, until the next [`show`](Self::show).
-    pub fn look(&mut self, camera: &Camera) {
+    pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;
     }
 
-    /// What the passes of the first sample take on the GPU, where instances seen under less than `min_angle` are culled;
+    /// GPU times of the passes of the first sample, where instances seen under less than `min_angle` are culled;
     /// none where the device has no timestamps.
-    pub(super) fn time_sample(&self, min_angle: f32) -> Result<PassTimes, ReflectionsError> {
+    pub(super) fn time_sample(&self, min_angle: f32) -> Result<PassTimes, SampleError> {
         self.upload_constants()?;
         let mut ignore = |_| {};
         let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
@@ -138,23 +138,23 @@ impl Reflections {
         *self.targets.picture
     }
 
-    /// How many instances rays can meet from where the camera is.
+    /// Number of instances in the TLAS at the current camera.
     pub fn instance_count(&self) -> InstanceCount {
         self.top_level.count(self.camera.eye.into(), self.config.min_angle)
     }
 
-    /// What is rendered.
+    /// The configuration.
     pub fn config(&self) -> &ReflectionsConfig {
         &self.config
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn wanted(&mut self) -> &mut ReflectionsConfig {
         &mut self.wanted.config
     }
 
     /// Renders by another configuration from now on; by the old one where this fails.
-    fn change(&mut self, config: ReflectionsConfig) -> Result<(), ReflectionsError> {
+    fn change(&mut self, config: ReflectionsConfig) -> Result<(), SampleError> {
         config.check(self.ctx.capabilities())?;
         let (ctx, before, extent) = (&self.ctx, self.config, [config.width, config.height]);
         let rays = (config.path != before.path).then(|| RayPasses::new(ctx, config.path)).transpose()?;
@@ -172,7 +172,7 @@ impl Reflections {
         if let Some(rays) = rays {
             self.rays = rays;
         }
-        self.moving_passes.follow(config.skin_update);
+        self.moving_passes.set_skin_update(config.skin_update);
         self.config = config;
         Ok(())
     }
@@ -191,7 +191,7 @@ impl Reflections {
             })
             .collect();
         self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&all))?;
-        self.moving.pose(&self.ctx, self.phase)
+        self.animation.upload_pose(&self.ctx, self.phase)
     }
 
     fn record_sample(&self, to: &mut Frame<'_>, sample: u32, min_angle: f32) -> lvk::Result<()> {
@@ -199,14 +199,14 @@ impl Reflections {
         let extent = [self.config.width, self.config.height];
         let eye = self.camera.eye.into();
         if sample == 0 {
-            let move_all = |cmd: &mut _| self.moving_passes.record(&self.ctx, cmd, &self.moving, frame);
+            let move_all = |cmd: &mut _| self.moving_passes.record(&self.ctx, cmd, &self.animation, frame);
             to.pass("skinning and its builds", move_all)?;
             to.pass(TLAS_BUILD, |cmd| self.top_level.record(cmd, eye, min_angle))?;
         }
-        let (written, transparent) = (self.moving.written(), self.tables.transparent(eye));
+        let (written, transparent) = (self.animation.written(), self.gpu_scene.transparent(eye));
         let drawn = Drawn {
-            indices: *self.tables.indices,
-            opaque: &self.tables.opaque,
+            indices: *self.gpu_scene.indices,
+            opaque: &self.gpu_scene.opaque,
             transparent: &transparent,
             written: &written,
             frame,
@@ -225,22 +225,22 @@ impl Reflections {
 }
 
 impl Sample for Reflections {
-    type Error = ReflectionsError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), ReflectionsError> {
-        self.show(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.show(time.phase());
         Ok(())
     }
 
     /// A step for each sample.
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, ReflectionsError> {
-        if let Some(config) = self.wanted.news(self.config) {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+        if let Some(config) = self.wanted.changed_from(self.config) {
             let done = self.change(config);
-            self.wanted.settle(done, self.config);
+            self.wanted.finish(done, self.config);
         }
         self.upload_constants()?;
         for sample in 0..self.config.samples {
@@ -256,30 +256,30 @@ impl Sample for Reflections {
         self.config.samples.into()
     }
 
-    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), ReflectionsError> {
+    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), SampleError> {
         self.change(ReflectionsConfig { width, height, ..self.config })?;
         (self.wanted.config.width, self.wanted.config.height) = (width, height);
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
+    fn view(&mut self) -> Option<Camera> {
         Some(self.camera)
     }
 
     fn set_view(&mut self, camera: &Camera) {
-        self.look(camera);
+        self.set_camera(camera);
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
         let capabilities = self.ctx.capabilities();
-        self.wanted.show(ui, |ui, config| switches::show(ui, config, capabilities));
+        self.wanted.show(ui, |ui, config| panel::show_settings(ui, config, capabilities));
         // Nothing is made anew for this one.
         self.config.min_angle = self.wanted.config.min_angle;
         let InstanceCount { kept, total } = self.instance_count();
         ui.label(format!("rays meet {kept} of {total} instances"));
     }
 
-    fn reload(&mut self) -> Result<(), ReflectionsError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let (raster, images) = (RasterPasses::new(&self.ctx)?, ImagePasses::new(&self.ctx)?);
         let rays = RayPasses::new(&self.ctx, self.config.path)?;
         self.moving_passes.reload(&self.ctx)?;
@@ -293,19 +293,19 @@ fn frame_buffer(ctx: &Context, samples: u32) -> lvk::Result<Holder<BufferHandle>
     buffer(ctx, "frame constants", FRAME_BYTES * u64::from(samples))
 }
 
-fn world_constants(world: &World, tables: &Tables) -> WorldConstants {
+fn world_constants(world: &HallScene, gpu_scene: &GpuScene) -> WorldConstants {
     let (lights, light_count) = light_constants(&world.lights);
     WorldConstants {
-        materials: tables.materials,
-        geometries: tables.geometries,
-        instances: tables.instances,
+        materials: gpu_scene.materials,
+        geometries: gpu_scene.geometries,
+        instances: gpu_scene.instances,
         lights,
         harmonics: harmonics(&world.sky),
         light_count,
     }
 }
 
-fn upload_textures(ctx: &Context, world: &World) -> lvk::Result<Vec<Holder<TextureHandle>>> {
+fn upload_textures(ctx: &Context, world: &HallScene) -> lvk::Result<Vec<Holder<TextureHandle>>> {
     let upload = |picture: &Picture| {
         ctx.create_texture(&TextureDesc {
             format: Format::Rgba8Srgb,

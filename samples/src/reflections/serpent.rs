@@ -112,7 +112,7 @@ fn bone_transform(parameter: f32, phase: f32, along: f32) -> Affine3A {
     Affine3A { matrix3: frame, translation: path(parameter, phase).into() } * to_joint
 }
 
-/// Where the serpent's middle line is: a ring around the basin that undulates.
+/// The serpent's middle line: a ring around the basin that undulates.
 fn path(parameter: f32, phase: f32) -> Vec3 {
     let (sine, cosine) = parameter.sin_cos();
     let sway = 0.28 * (7.0 * parameter + 2.0 * TAU * phase).sin();

@@ -18,7 +18,7 @@ pub(super) struct Targets {
     pub(super) opaque_depth: Holder<TextureHandle>,
     pub(super) glass_surface: Holder<TextureHandle>,
     pub(super) glass_depth: Holder<TextureHandle>,
-    /// How much of each light is seen, and how open the surroundings are.
+    /// Visibility of each light, and ambient visibility.
     pub(super) visibility: Holder<TextureHandle>,
     /// The same on its way through the filter.
     pub(super) smoothed: Holder<TextureHandle>,
@@ -29,7 +29,7 @@ pub(super) struct Targets {
     pub(super) filtered: Holder<TextureHandle>,
     pub(super) glass_reflection: Holder<TextureHandle>,
     pub(super) composite: Holder<TextureHandle>,
-    /// What is shown: sRGB.
+    /// The image, sRGB.
     pub(super) picture: Holder<TextureHandle>,
     /// The sums of the samples.
     pub(super) sums: Holder<BufferHandle>,

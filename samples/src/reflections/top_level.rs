@@ -1,4 +1,4 @@
-//! The top-level structure: static instances that look large enough from the eye, and the moving things.
+//! The top-level structure: static instances that look large enough from the eye, and the animation things.
 
 use glam::Vec3;
 use lvk::{
@@ -6,9 +6,9 @@ use lvk::{
     InstanceCulling, TlasDesc, TlasInstance, transform_rows,
 };
 
-use super::moving::MovingPasses;
-use super::tables::Arena;
-use super::world::World;
+use super::animation::AnimationPasses;
+use super::gpu_scene::GeometryArena;
+use super::scene::HallScene;
 
 /// `kMaskOpaque` in `shaders/reflections/masks.glsl`.
 const MASK_OPAQUE: u8 = 1;
@@ -17,7 +17,7 @@ const MASK_TRANSPARENT: u8 = 2;
 /// The hit group with the any-hit shader of leaves.
 const LEAF_HIT_GROUP: u32 = 1;
 
-/// How many instances a frame's top-level structure shows.
+/// Number of instances in a frame's TLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InstanceCount {
     /// In the structure.
@@ -30,7 +30,7 @@ pub struct InstanceCount {
 pub(super) struct TopLevel {
     pub(super) tlas: Holder<AccelStructHandle>,
     instances: Vec<Candidate>,
-    moving: Vec<TlasInstance>,
+    animation: Vec<TlasInstance>,
     _blas: Vec<Holder<AccelStructHandle>>,
 }
 
@@ -44,10 +44,10 @@ impl TopLevel {
     /// Builds a structure for each model, and has room for all instances.
     pub(super) fn new(
         ctx: &Context,
-        world: &World,
-        arena: &Arena,
+        world: &HallScene,
+        arena: &GeometryArena,
         buffers: [BufferHandle; 2],
-        moving: &MovingPasses,
+        animation: &AnimationPasses,
     ) -> lvk::Result<Self> {
         let blas = build_models(ctx, world, arena, buffers)?;
         let instances: Vec<Candidate> = (0..)
@@ -64,9 +64,9 @@ impl TopLevel {
             })
             .collect();
         let first = instances.len() as u32;
-        let moving = [(*moving.serpent, 0), (*moving.leaves, LEAF_HIT_GROUP)];
-        let moving: Vec<_> = (first..)
-            .zip(moving)
+        let animation = [(*animation.serpent, 0), (*animation.leaves, LEAF_HIT_GROUP)];
+        let animation: Vec<_> = (first..)
+            .zip(animation)
             .map(|(custom_index, (blas, hit_group_offset))| TlasInstance {
                 custom_index,
                 mask: MASK_OPAQUE,
@@ -74,9 +74,9 @@ impl TopLevel {
                 ..TlasInstance::new(blas)
             })
             .collect();
-        let capacity = first + moving.len() as u32;
+        let capacity = first + animation.len() as u32;
         let tlas = ctx.create_tlas(&TlasDesc { capacity, debug_name: "hall tlas", ..TlasDesc::default() })?;
-        Ok(Self { tlas, instances, moving, _blas: blas })
+        Ok(Self { tlas, instances, animation, _blas: blas })
     }
 
     /// Records a build of what is seen from `eye` under `min_angle` radians or more, and of everything that moves.
@@ -86,9 +86,9 @@ impl TopLevel {
         cmd.update_tlas(*self.tlas, &self.shown(eye, min_angle), BuildMode::Rebuild)
     }
 
-    /// How many instances [`record`](Self::record) shows.
+    /// Number of instances that [`record`](Self::record) puts into the TLAS.
     pub(super) fn count(&self, eye: Vec3, min_angle: f32) -> InstanceCount {
-        let total = (self.instances.len() + self.moving.len()) as u32;
+        let total = (self.instances.len() + self.animation.len()) as u32;
         InstanceCount { kept: self.shown(eye, min_angle).len() as u32, total }
     }
 
@@ -99,15 +99,15 @@ impl TopLevel {
             culling.keeps_instance(low, high, &candidate.instance.transform)
         };
         let kept = self.instances.iter().filter(keeps).map(|candidate| candidate.instance);
-        kept.chain(self.moving.iter().copied()).collect()
+        kept.chain(self.animation.iter().copied()).collect()
     }
 }
 
 /// A structure for each model, with a geometry for each of its materials.
 fn build_models(
     ctx: &Context,
-    world: &World,
-    arena: &Arena,
+    world: &HallScene,
+    arena: &GeometryArena,
     buffers: [BufferHandle; 2],
 ) -> lvk::Result<Vec<Holder<AccelStructHandle>>> {
     let geometries: Vec<Vec<BlasGeometry>> =

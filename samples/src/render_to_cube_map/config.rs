@@ -1,12 +1,12 @@
-//! What to render, and how.
+//! The configuration of the sample.
 
+use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, Context, OptionalFeature};
 
-use super::args::FacesArg;
 use super::cube_map::FACES;
-use crate::raster::RasterError;
+use super::info::FacesArg;
 
-/// How the faces of the cube map are drawn.
+/// The number of passes that draw the faces of the cube map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Faces {
     /// A pass for each.
@@ -15,21 +15,21 @@ pub enum Faces {
     OnePass,
 }
 
-/// What to render, and how.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderToCubeMapConfig {
     /// Width and height of the picture in pixels.
     pub extent: [u32; 2],
-    /// How the faces are drawn.
+    /// The number of passes that draw the faces.
     pub faces: Faces,
     /// Side of a face in pixels, 1 to [`MAX_FACE_SIZE`](Self::MAX_FACE_SIZE).
     pub face_size: u32,
-    /// How blurred the drop mirrors, 0 to 1: the part of the mips that is skipped.
+    /// Roughness of the drop, 0 to 1: the share of the mips that is skipped.
     pub roughness: f32,
 }
 
 impl RenderToCubeMapConfig {
-    /// What the sides of cube maps are at least allowed to be, on every device.
+    /// Largest side of cube maps that every device supports.
     pub const MAX_FACE_SIZE: u32 = 4096;
 
     /// As usual but for the size of the picture and the way that faces are drawn.
@@ -40,8 +40,8 @@ impl RenderToCubeMapConfig {
 }
 
 impl Faces {
-    /// What the command line asks for.
-    pub(super) fn wished(wish: FacesArg, capabilities: &Capabilities) -> Self {
+    /// The choice of the command line.
+    pub(super) fn from_args(wish: FacesArg, capabilities: &Capabilities) -> Self {
         match wish {
             FacesArg::SixPasses => Self::SixPasses,
             FacesArg::OnePass => Self::OnePass,
@@ -51,13 +51,13 @@ impl Faces {
     }
 
     /// Fails where the device cannot.
-    pub(super) fn check(self, ctx: &Context) -> Result<(), RasterError> {
+    pub(super) fn check(self, ctx: &Context) -> Result<(), SampleError> {
         let can = self == Self::SixPasses || has_six_views(ctx.capabilities());
-        RasterError::unless(can, ctx, "passes of six views", "draw the faces by --faces six-passes")
+        SampleError::require(can, ctx, "passes of six views", "draw the faces by --faces six-passes")
     }
 }
 
-/// Whether a pass can draw all faces at once.
+/// True if a pass can draw all faces at once.
 pub(super) fn has_six_views(capabilities: &Capabilities) -> bool {
     capabilities.has(OptionalFeature::Multiview) && capabilities.limits.max_views >= FACES
 }

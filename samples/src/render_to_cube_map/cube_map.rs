@@ -1,12 +1,12 @@
 //! The cube map, and both ways to draw its faces.
 
+use crate::app::render_target::RenderTarget;
 use lvk::{
     ColorAttachment, CommandBuffer, Context, DepthAttachment, Format, Holder, RenderPass, RenderPassDesc,
     SamplerDesc, SamplerHandle, TextureDesc, TextureHandle, TextureKind, TextureMemory, TextureUsage,
 };
 
 use super::config::Faces;
-use crate::raster::Canvas;
 
 /// Faces of a cube.
 pub(super) const FACES: u32 = 6;
@@ -39,7 +39,7 @@ impl CubeMap {
         };
         let depth = TextureDesc {
             kind: TextureKind::D2Array { layers: FACES },
-            format: Canvas::DEPTH,
+            format: RenderTarget::DEPTH,
             mips: 1,
             usage: TextureUsage::TARGET,
             memory: TextureMemory::Transient,

@@ -1,22 +1,23 @@
 //! The sample's pipelines as data, with the texts that their stages use.
 
+use crate::app::render_target::RenderTarget;
 use lvk::{CompareOp, DepthTest, FrontFace};
 
 use super::cube_map::{ALL_FACES, COLOR};
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::raster::{Canvas, RasterPipeline, fragment_stage, vertex_stage};
-use crate::shaders::render_to_cube_map as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
+use crate::raster::RasterPipeline;
 
 /// Folder of the texts in `shaders/`.
 const SAMPLE: &str = "render_to_cube_map";
 
-const BLOCK_VERTEX: SampleStage = vertex_stage(texts::BLOCK_VERT, "block.vert");
-const BLOCK_FRAGMENT: SampleStage = fragment_stage(texts::BLOCK_FRAG, "block.frag");
-const SKY_VERTEX: SampleStage = vertex_stage(texts::SKY_VERT, "sky.vert");
-const SKY_FRAGMENT: SampleStage = fragment_stage(texts::SKY_FRAG, "sky.frag");
+const BLOCK_VERTEX: SampleStage = shader!("render_to_cube_map", "block.vert");
+const BLOCK_FRAGMENT: SampleStage = shader!("render_to_cube_map", "block.frag");
+const SKY_VERTEX: SampleStage = shader!("render_to_cube_map", "sky.vert");
+const SKY_FRAGMENT: SampleStage = shader!("render_to_cube_map", "sky.frag");
 
 /// Of what is infinitely far away, drawn last.
-const FARTHEST: DepthTest = DepthTest { compare: CompareOp::GreaterOrEqual, write: false, ..Canvas::NEAREST };
+const FARTHEST: DepthTest =
+    DepthTest { compare: CompareOp::GreaterOrEqual, write: false, ..RenderTarget::NEAREST };
 
 /// Pipelines of what stands around the drop, for one kind of target.
 pub(super) struct Surroundings {
@@ -49,7 +50,7 @@ pub(super) const ON_FACE: Surroundings = Surroundings {
     blocks: on_faces(
         "render_to_cube_map: blocks on a face",
         &[BLOCK_VERTEX, BLOCK_FRAGMENT],
-        Canvas::NEAREST,
+        RenderTarget::NEAREST,
         0,
     ),
     sky: on_faces("render_to_cube_map: sky on a face", &[SKY_VERTEX, SKY_FRAGMENT], FARTHEST, 0),
@@ -60,7 +61,7 @@ pub(super) const ON_ALL_FACES: Surroundings = Surroundings {
     blocks: on_faces(
         "render_to_cube_map: blocks on all faces",
         &[of_all_faces(BLOCK_VERTEX), BLOCK_FRAGMENT],
-        Canvas::NEAREST,
+        RenderTarget::NEAREST,
         ALL_FACES,
     ),
     sky: on_faces(
@@ -73,12 +74,11 @@ pub(super) const ON_ALL_FACES: Surroundings = Surroundings {
 pub(super) const DROP: RasterPipeline = RasterPipeline::with_depth(
     SAMPLE,
     "render_to_cube_map: drop",
-    &[vertex_stage(texts::DROP_VERT, "drop.vert"), fragment_stage(texts::DROP_FRAG, "drop.frag")],
+    &[shader!("render_to_cube_map", "drop.vert"), shader!("render_to_cube_map", "drop.frag")],
 );
 
-/// Every pipeline of the sample.
-#[must_use]
-pub fn pipelines() -> Vec<SamplePipeline> {
+/// Returns every pipeline of the sample.
+pub(super) fn pipelines() -> Vec<SamplePipeline> {
     let surroundings = [IN_PICTURE, ON_FACE, ON_ALL_FACES];
     let all = surroundings.iter().flat_map(|Surroundings { blocks, sky, .. }| [blocks, sky]);
     all.chain([&DROP]).map(RasterPipeline::data).collect()
@@ -95,9 +95,9 @@ const fn on_faces(
 }
 
 const fn of_picture(fragment: SampleStage) -> SampleStage {
-    SampleStage { defines: texts::OF_PICTURE, ..fragment }
+    SampleStage { defines: &[("PICTURE", "1")], ..fragment }
 }
 
 const fn of_all_faces(vertex: SampleStage) -> SampleStage {
-    SampleStage { defines: texts::OF_ALL_FACES, ..vertex }
+    SampleStage { defines: &[("ALL_FACES", "1")], ..vertex }
 }

@@ -1,5 +1,7 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPass, RenderPipelineDesc,
@@ -12,8 +14,7 @@ use super::pipelines::{self, IN_PICTURE, ON_ALL_FACES, ON_FACE};
 use super::surroundings::{Block, DROP, blocks, camera};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::raster::{Canvas, RasterError};
+use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
 
 /// Corners of a block, of the sky, and of the drop (`kGrid` in `shaders/render_to_cube_map/drop.glsl`).
@@ -27,7 +28,7 @@ const NEAR_PLANE: f32 = 0.1;
 /// Draws a drop and what it mirrors.
 pub struct RenderToCubeMap {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     config: RenderToCubeMapConfig,
     cube_map: CubeMap,
     pipelines: Pipelines,
@@ -48,7 +49,7 @@ struct Pipelines {
     drop: Holder<RenderPipelineHandle>,
 }
 
-/// What stands around the drop, for one kind of target.
+/// Pipelines of the surroundings, for one kind of target.
 struct Surroundings {
     blocks: Holder<RenderPipelineHandle>,
     sky: Holder<RenderPipelineHandle>,
@@ -81,14 +82,14 @@ impl RenderToCubeMap {
     /// Makes the cube map and the pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &RenderToCubeMapConfig) -> Result<Self, RasterError> {
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &RenderToCubeMapConfig) -> Result<Self, SampleError> {
         config.faces.check(ctx)?;
-        let canvas = Canvas::with_depth(ctx, config.extent)?;
+        let target = RenderTarget::with_depth(ctx, config.extent)?;
         let blocks = blocks(0.0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
-            canvas,
+            target,
             config: *config,
             cube_map: CubeMap::new(ctx, config.face_size)?,
             pipelines: Pipelines::new(ctx)?,
@@ -115,7 +116,7 @@ impl RenderToCubeMap {
         *self.cube_map.texture
     }
 
-    /// What is rendered, and how.
+    /// The configuration.
     #[must_use]
     pub fn config(&self) -> &RenderToCubeMapConfig {
         &self.config
@@ -149,45 +150,41 @@ impl RenderToCubeMap {
 }
 
 impl Sample for RenderToCubeMap {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.phase = time.phase();
         self.blocks = blocks(self.phase);
         self.camera = camera(self.phase);
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload()?;
         let (faces, on_faces) = self.pipelines.faces(self.config.faces);
         frame.pass("cube map", |cmd| {
             self.cube_map.record(cmd, faces, |pass, view| self.draw(pass, on_faces, view))
         })?;
         let reads = Dependencies { sampled_images: &[self.cube_map()], ..Dependencies::default() };
-        let mut pass = self.canvas.begin(&mut frame.cmd, "picture", [0.0; 3], &reads)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "picture", [0.0; 3], &reads)?;
         self.draw(&mut pass, &self.pipelines.in_picture, PICTURE)?;
         pass.bind_render_pipeline(*self.pipelines.drop)?;
         pass.draw(0..DROP_CORNERS, 0..1)?;
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -200,7 +197,7 @@ impl Sample for RenderToCubeMap {
         ui.add(egui::Slider::new(&mut self.waves, 0.0..=0.3).text("waves"));
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.pipelines = Pipelines::new(&self.ctx)?;
         Ok(())
     }
@@ -218,7 +215,7 @@ impl Pipelines {
         })
     }
 
-    /// How faces are drawn where `wish` is possible, and otherwise.
+    /// Returns `wish` where the device supports it, else six passes, with the pipelines.
     fn faces(&self, wish: Faces) -> (Faces, &Surroundings) {
         match (wish, &self.on_all_faces) {
             (Faces::OnePass, Some(all)) => (Faces::OnePass, all),

@@ -1,4 +1,4 @@
-//! What stands around the drop: a floor, and two rings of blocks that rise and sink.
+//! The surroundings of the drop: a floor, and two rings of blocks that rise and sink.
 
 use std::f32::consts::TAU;
 
@@ -34,7 +34,7 @@ struct Ring {
     /// Crests of the wave that goes round, and the direction in which it goes.
     waves: f32,
     rounds: f32,
-    /// How strong colours are, 0 to 1.
+    /// Saturation of colours, 0 to 1.
     saturation: f32,
 }
 
@@ -76,7 +76,7 @@ pub(super) fn blocks(phase: f32) -> Vec<Block> {
     std::iter::once(FLOOR).chain(rings).collect()
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 pub(super) fn camera(phase: f32) -> Camera {
     let around = 0.9 + 0.5 * (TAU * phase).sin();
     let eye = [3.7 * around.sin(), 1.9, 3.7 * around.cos()];

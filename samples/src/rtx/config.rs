@@ -1,12 +1,13 @@
-//! What to render, and by which means of the device.
+//! The configuration of the sample.
 
-use lvk::Capabilities;
+use lvk::{Capabilities, Context};
 
-use super::RtxError;
 use crate::app::ray_args::RayTracing;
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use crate::hybrid::RayPath;
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RtxConfig {
     /// By which part of Vulkan rays are traced.
@@ -18,13 +19,13 @@ pub struct RtxConfig {
 }
 
 impl RtxConfig {
-    /// What the command line asks for.
-    pub(crate) fn of(
+    /// The choice of the command line.
+    pub(crate) fn from_args(
         wish: RayTracing,
         [width, height]: [u32; 2],
         capabilities: &Capabilities,
-    ) -> Result<Self, RtxError> {
-        let path = RayPath::choose(RayPath::wished(wish), capabilities)?;
+    ) -> Result<Self, SampleError> {
+        let path = RayPath::choose(RayPath::from_args(wish), capabilities)?;
         Ok(Self { path, width, height })
     }
 
@@ -38,13 +39,10 @@ impl RtxConfig {
         [self.width, self.height]
     }
 
-    pub(crate) fn check(&self, capabilities: &Capabilities) -> Result<(), RtxError> {
-        let limit = capabilities.limits.max_texture_2d;
-        let [width, height] = self.extent();
-        if width == 0 || height == 0 || width > limit || height > limit {
-            return Err(RtxError::BadSize { width, height, limit });
-        }
-        RayPath::choose(Some(self.path), capabilities)?;
-        Ok(())
+    /// Checks the configuration and creates the storage image that shaders write to.
+    pub(crate) fn create_target(&self, ctx: &Context) -> Result<RenderTarget, SampleError> {
+        let target = RenderTarget::storage(ctx, self.extent())?;
+        RayPath::choose(Some(self.path), ctx.capabilities())?;
+        Ok(target)
     }
 }

@@ -1,14 +1,8 @@
-//! What the small ray tracing samples (`rtx_hello`, `rtx_textures`, `rtx_ao`, `rtx_pipeline`) share: what is asked for,
-//! rays by pipeline or by query, a picture, and what their programs say.
+//! Shared by the small ray tracing samples (`rtx_hello`, `rtx_textures`, `rtx_ao`, `rtx_pipeline`) and `large_scene`: the
+//! configuration of path and size, and rays by pipeline or by query.
 
-mod canvas;
 mod config;
-mod error;
-mod headline;
 mod tracer;
 
-pub(crate) use canvas::Canvas;
 pub use config::RtxConfig;
-pub use error::RtxError;
-pub(crate) use headline::headline;
 pub(crate) use tracer::{RayStages, Tracer, compute_pipeline, groups};

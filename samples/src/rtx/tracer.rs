@@ -3,9 +3,11 @@
 use bytemuck::NoUninit;
 use lvk::{
     CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup, Holder,
-    RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, ShaderStage,
+    RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, ShaderStage, TextureHandle,
 };
 
+use crate::app::frame::Frame;
+use crate::app::render_target::RenderTarget;
 use crate::hybrid::RayPath;
 use crate::pipelines::{SamplePipeline, SampleStage};
 
@@ -22,7 +24,7 @@ pub(crate) struct RayStages {
     pub(crate) misses: &'static [SampleStage],
     /// A hit group of triangles each.
     pub(crate) hits: &'static [SampleStage],
-    /// How many rays deep the pipeline's stages trace.
+    /// Recursion depth of the pipeline's rays.
     pub(crate) max_recursion: u32,
     /// The compute stage, of work groups of 8 x 8 pixels.
     pub(crate) query: SampleStage,
@@ -51,7 +53,20 @@ impl Tracer {
         })
     }
 
-    /// Records the rays of a picture of `extent` pixels.
+    /// Records the pass `rays`, which stores every pixel of `target`. Returns the image.
+    pub(crate) fn record_image<P: NoUninit>(
+        &self,
+        frame: &mut Frame<'_>,
+        target: &RenderTarget,
+        push: &P,
+    ) -> lvk::Result<TextureHandle> {
+        let image = target.image();
+        let writes = Dependencies { storage_images: &[image], ..Dependencies::default() };
+        frame.pass("rays", |cmd| self.record(cmd, push, target.extent(), &writes))?;
+        Ok(image)
+    }
+
+    /// Records the rays of an image of `extent` pixels.
     pub(crate) fn record<P: NoUninit>(
         &self,
         cmd: &mut CommandBuffer,

@@ -1,8 +1,8 @@
-//! What to render.
+//! The configuration of the sample.
 
 use crate::rtx::RtxConfig;
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RtxAoConfig {
     /// Path and size.
@@ -11,7 +11,7 @@ pub struct RtxAoConfig {
     pub passes: u32,
     /// Rays to the surroundings of each pixel and pass, 1 to [`RtxAoConfig::MAX_RAYS`].
     pub rays: u32,
-    /// How far surroundings darken a surface, in scene units; `None` for a share of the scene's size.
+    /// Radius of the ambient occlusion in scene units; `None` for a share of the scene's size.
     pub radius: Option<f32>,
 }
 

@@ -27,7 +27,7 @@ pub(super) struct FrameConstants {
     pub(super) padding: u32,
 }
 
-/// What lights a scene, and the structure that its rays meet.
+/// The lights of a scene, and its TLAS.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Lighting {
@@ -51,7 +51,7 @@ pub(super) struct TargetIndices {
     pub(super) geometric: u32,
 }
 
-/// What a draw is told.
+/// Push constants of a draw.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Push {

@@ -16,7 +16,7 @@ pub(super) struct LightRays {
     pipeline: Holder<RayTracingPipelineHandle>,
 }
 
-/// What all passes since the last change add up to.
+/// The sum of all passes since the last change.
 pub(super) struct Cache {
     pub(super) pipeline: Holder<ComputePipelineHandle>,
     pub(super) sums: Holder<BufferHandle>,

@@ -6,21 +6,18 @@
 //!   than the passes before; a cache adds them up, so that the picture converges. It begins anew when the camera or
 //!   something else moves.
 //!
-//! [`RtxAo`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`RtxAo`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
 mod body;
 mod config;
 mod frame;
+mod info;
 mod light_pass;
 mod pipelines;
 mod raster;
 mod renderer;
-mod run;
 mod targets;
 
-pub use args::RtxAoArgs;
 pub use config::RtxAoConfig;
-pub use pipelines::pipelines;
+pub use info::RtxAoArgs;
 pub use renderer::{RtxAo, View};
-pub use run::run;

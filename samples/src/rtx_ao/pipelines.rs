@@ -1,23 +1,20 @@
 //! The sample's pipelines as data, with the texts and formats that its passes use.
 
-use lvk::{Format, ShaderStage};
+use lvk::Format;
 
 use super::targets::{ALBEDO, DEPTH, NUMBERS};
 use crate::hybrid::RayPath;
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::shaders::rtx_ao as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
 
 /// Folder of the texts in `shaders/`.
 pub(super) const SAMPLE: &str = "rtx_ao";
 
-pub(super) const SURFACE_VERTEX: SampleStage =
-    stage(ShaderStage::Vertex, texts::SURFACE_VERT, "surface.vert");
-const LIT_FRAGMENT: SampleStage = stage(ShaderStage::Fragment, texts::SURFACE_FRAG, "surface.frag");
-const TARGETS_FRAGMENT: SampleStage = SampleStage { defines: texts::WITH_TARGETS, ..LIT_FRAGMENT };
-pub(super) const LIGHT_RAYS: SampleStage = stage(ShaderStage::RayGen, texts::LIGHT_RGEN, "light.rgen");
-pub(super) const OPEN_MISS: SampleStage = stage(ShaderStage::Miss, texts::OPEN_RMISS, "open.rmiss");
-pub(super) const ACCUMULATE: SampleStage =
-    stage(ShaderStage::Compute, texts::ACCUMULATE_COMP, "accumulate.comp");
+pub(super) const SURFACE_VERTEX: SampleStage = shader!("rtx_ao", "surface.vert");
+const LIT_FRAGMENT: SampleStage = shader!("rtx_ao", "surface.frag");
+const TARGETS_FRAGMENT: SampleStage = SampleStage { defines: &[("RTX_AO_TARGETS", "1")], ..LIT_FRAGMENT };
+pub(super) const LIGHT_RAYS: SampleStage = shader!("rtx_ao", "light.rgen");
+pub(super) const OPEN_MISS: SampleStage = shader!("rtx_ao", "open.rmiss");
+pub(super) const ACCUMULATE: SampleStage = shader!("rtx_ao", "accumulate.comp");
 
 /// The fragment stage of a path, and the formats that it draws to.
 pub(super) fn surface_fragment(path: RayPath) -> (SampleStage, Vec<Format>) {
@@ -27,9 +24,8 @@ pub(super) fn surface_fragment(path: RayPath) -> (SampleStage, Vec<Format>) {
     }
 }
 
-/// Every pipeline of the sample but the one of depth alone, which has no fragment stage.
-#[must_use]
-pub fn pipelines() -> Vec<SamplePipeline> {
+/// Returns every pipeline of the sample but the one of depth alone, which has no fragment stage.
+pub(super) fn pipelines() -> Vec<SamplePipeline> {
     let raster = |name, path| {
         let (fragment, color) = surface_fragment(path);
         SamplePipeline { name, stages: vec![SURFACE_VERTEX, fragment], color, depth: Some(DEPTH) }
@@ -41,8 +37,4 @@ pub fn pipelines() -> Vec<SamplePipeline> {
         other("rtx_ao: rays by pipeline", vec![LIGHT_RAYS, OPEN_MISS]),
         other("rtx_ao: cache", vec![ACCUMULATE]),
     ]
-}
-
-const fn stage(stage: ShaderStage, text: &'static str, name: &'static str) -> SampleStage {
-    SampleStage { stage, text, defines: &[], name }
 }

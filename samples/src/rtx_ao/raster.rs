@@ -59,7 +59,7 @@ impl Raster {
         draw_all(&mut pass, *self.depth, bodies, frame)
     }
 
-    /// What has that depth.
+    /// Records the pass that draws surfaces at that depth.
     pub(super) fn record_surfaces(
         &self,
         cmd: &mut CommandBuffer,

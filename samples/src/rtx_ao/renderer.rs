@@ -1,5 +1,7 @@
 //! The sample as a type: say the view, get a picture that each call improves.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use glam::{Affine3A, Vec3};
 use lvk::{
     AccelStructHandle, BufferHandle, BuildMode, CommandBuffer, Context, Holder, SamplerDesc, SamplerHandle,
@@ -14,19 +16,18 @@ use super::raster::Raster;
 use super::targets::Targets;
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::RayPath;
-use crate::rtx::{Canvas, RtxError};
 use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
 
-/// How far surroundings darken, as a share of the diagonal of the scene's bounding box.
+/// Default radius of the ambient occlusion, as a share of the diagonal of the scene's bounding box.
 const RADIUS_SHARE: f32 = 0.06;
 /// Distance of the near plane as a share of the distance of what the camera looks at.
 const NEAR_SHARE: f32 = 0.01;
-/// How far rays start off a surface, as a share of the radius.
+/// Offset of rays from a surface, as a share of the radius.
 const LIFT_SHARE: f32 = 1e-3;
 
-/// From where the scene is seen, and where what turns in it is.
+/// The camera, and the angle of the turning part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// The camera.
@@ -38,7 +39,7 @@ pub struct View {
 /// Renders a scene of one body, or of one that stands and one that turns.
 pub struct RtxAo {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     config: RtxAoConfig,
     bodies: Vec<Body>,
     tlas: Holder<AccelStructHandle>,
@@ -59,15 +60,15 @@ impl RtxAo {
     /// Uploads `scene`, and what turns in it if anything does, and makes all pipelines. Refractive triangles are left out.
     ///
     /// # Errors
-    /// [`RtxError`] when the configuration is beyond the device, or the device fails.
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
     pub fn new(
         ctx: &Context,
         scene: &Scene,
         turning: Option<&Scene>,
         config: &RtxAoConfig,
-    ) -> Result<Self, RtxError> {
+    ) -> Result<Self, SampleError> {
         let (config, extent) = (config.clamped(), config.rtx.extent());
-        let canvas = Canvas::new(ctx, &config.rtx)?;
+        let target = config.rtx.create_target(ctx)?;
         let bodies: Vec<_> = [Some(scene), turning]
             .into_iter()
             .flatten()
@@ -88,7 +89,7 @@ impl RtxAo {
             view: View { camera: path.at(0.0), turns: 0.0 },
             path,
             ctx: ctx.clone(),
-            canvas,
+            target,
             config,
             bodies,
             tlas,
@@ -117,12 +118,12 @@ impl RtxAo {
         &self.view
     }
 
-    /// How many passes the picture is the average of.
+    /// Number of passes that the image averages.
     pub fn passes(&self) -> u32 {
         self.passes
     }
 
-    /// How far surroundings darken a surface, in scene units.
+    /// Radius of the ambient occlusion in scene units.
     pub fn radius(&self) -> f32 {
         self.lighting.radius()
     }
@@ -135,8 +136,8 @@ impl RtxAo {
     /// The openness of each pixel so far, 0 to 1, rows from the top; 1 where the sky is.
     ///
     /// # Errors
-    /// [`RtxError::Device`].
-    pub fn openness(&self) -> Result<Vec<f32>, RtxError> {
+    /// [`SampleError::Device`].
+    pub fn openness(&self) -> Result<Vec<f32>, SampleError> {
         let [width, height] = self.config.rtx.extent();
         let mut sums = vec![[0.0_f32; 4]; (width * height) as usize];
         self.ctx.download_buffer(*self.cache.sums, 0, bytemuck::cast_slice_mut(&mut sums))?;
@@ -162,7 +163,7 @@ impl RtxAo {
             bodies: self.ctx.buffer_address(*self.tables)?,
             sums: self.ctx.buffer_address(*self.cache.sums)?,
             light: self.lighting,
-            image: self.canvas.picture().index(),
+            image: self.target.image_index(),
             sampler: self.sampler.index(),
             targets: self.targets.indices(),
             pass: self.passes,
@@ -199,7 +200,7 @@ impl RtxAo {
         if let Some(rays) = &self.rays {
             to.pass("rays", |cmd| rays.record(cmd, targets, extent, frame))?;
         }
-        let picture = **self.canvas.picture();
+        let picture = self.target.image();
         to.pass("cache", |cmd| self.cache.record(cmd, targets, picture, extent, frame))?;
         self.passes += 1;
         Ok(())
@@ -207,15 +208,15 @@ impl RtxAo {
 }
 
 impl Sample for RtxAo {
-    type Error = RtxError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
     /// Begins anew even where nothing moved, so that a frame does not depend on those before.
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        let phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        let phase = time.phase();
         self.show(&View { camera: self.path.at(phase), turns: phase });
         self.passes = 0;
         Ok(())
@@ -230,7 +231,7 @@ impl Sample for RtxAo {
         true
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload_bodies()?;
         for pass in 0..self.config.passes {
             if pass > 0 {
@@ -238,20 +239,20 @@ impl Sample for RtxAo {
             }
             self.add_pass(frame)?;
         }
-        Ok(**self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         let rtx = self.config.rtx.sized(extent);
-        let canvas = Canvas::new(&self.ctx, &rtx)?;
+        let target = rtx.create_target(&self.ctx)?;
         let targets = Targets::new(&self.ctx, rtx.path, extent)?;
         self.cache.sums = Cache::sums(&self.ctx, extent)?;
-        (self.canvas, self.targets, self.config.rtx) = (canvas, targets, rtx);
+        (self.target, self.targets, self.config.rtx) = (target, targets, rtx);
         self.passes = 0;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
+    fn view(&mut self) -> Option<Camera> {
         Some(self.view.camera)
     }
 
@@ -268,7 +269,7 @@ impl Sample for RtxAo {
         ui.label(format!("{} passes in the picture", self.passes));
     }
 
-    fn reload(&mut self) -> Result<(), RtxError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let path = self.config.rtx.path;
         let (raster, rays) = (Raster::new(&self.ctx, path)?, light_rays(&self.ctx, path)?);
         self.cache.pipeline = Cache::pipeline(&self.ctx)?;

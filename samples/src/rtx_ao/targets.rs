@@ -52,7 +52,7 @@ impl Targets {
         }
     }
 
-    /// What the pass that colours draws to, in the order of its outputs.
+    /// Colour attachments of the surface pass, in the order of its outputs.
     pub(super) fn colors(&self) -> Vec<TextureHandle> {
         match &self.surface {
             Some([position, normal, geometric]) => {

@@ -1,4 +1,4 @@
-//! Where the triangles are: a large one that turns, and two rings around it that turn against each other.
+//! Transforms of the triangles: a large one that turns, and two rings around it that turn against each other.
 
 use std::f32::consts::TAU;
 use std::iter::{once, repeat_n};
@@ -30,7 +30,7 @@ pub(super) fn groups() -> impl Iterator<Item = usize> {
     once(0).chain(rings)
 }
 
-/// Where each triangle is at `phase` of the animation's round, 0 to 1.
+/// Transform of each triangle at `phase` of the animation's round, 0 to 1.
 pub(super) fn places(phase: f32) -> Vec<Affine3A> {
     let middle = Affine3A::from_scale_rotation_translation(
         Vec3::splat(0.72),

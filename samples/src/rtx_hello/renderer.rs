@@ -1,9 +1,11 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, Context, Dependencies,
-    Holder, TextureHandle, TlasDesc, TlasInstance, Triangles, transform_rows,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, Context, Holder,
+    TextureHandle, TlasDesc, TlasInstance, Triangles, transform_rows,
 };
 
 use super::instances::{CORNERS, groups, places};
@@ -11,8 +13,8 @@ use super::pipelines::RAYS;
 use super::switches::RtxHelloSwitches;
 use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer};
+use crate::app::sample::{FrameTime, Sample};
+use crate::rtx::{RtxConfig, Tracer};
 use crate::scene::{Camera, GpuCamera};
 
 /// Half the height of what is seen at distance 1.
@@ -21,7 +23,7 @@ const HALF_HEIGHT: f32 = 0.55;
 /// Renders the triangles.
 pub struct RtxHello {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     config: RtxConfig,
     tracer: Tracer,
     tlas: Holder<AccelStructHandle>,
@@ -45,9 +47,9 @@ impl RtxHello {
     /// Makes the triangle, its structures and the pipeline. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RtxError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &RtxConfig) -> Result<Self, RtxError> {
-        let canvas = Canvas::new(ctx, config)?;
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &RtxConfig) -> Result<Self, SampleError> {
+        let target = config.create_target(ctx)?;
         let vertices = array(ctx, "triangle", BufferUsage::ACCEL_INPUT, &CORNERS)?;
         let blas = ctx.create_blas(&BlasDesc {
             geometries: &[BlasGeometry::Triangles(Triangles::packed(*vertices, 3))],
@@ -62,7 +64,7 @@ impl RtxHello {
         let tracer = Tracer::new(ctx, config.path, &RAYS)?;
         Ok(Self {
             ctx: ctx.clone(),
-            canvas,
+            target,
             config: *config,
             tracer,
             tlas,
@@ -74,67 +76,61 @@ impl RtxHello {
         })
     }
 
-    /// How many triangles there are.
+    /// Number of triangles.
     pub fn triangle_count(&self) -> usize {
         groups().count()
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn switches(&mut self) -> &mut RtxHelloSwitches {
         &mut self.switches
     }
 }
 
 impl Sample for RtxHello {
-    type Error = RtxError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.phase = time.phase();
         self.camera = camera();
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
-        let (size, image) = (self.config.extent(), self.canvas.picture());
-        let camera = GpuCamera::new(&self.camera, size[0], size[1], 0.0);
-        let push = Push { camera, tlas: self.tlas.index(), image: image.index() };
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+        let [width, height] = self.config.extent();
+        let camera = GpuCamera::new(&self.camera, width, height, 0.0);
+        let push = Push { camera, tlas: self.tlas.index(), image: self.target.image_index() };
         let instances = instances(*self.blas, self.phase, &self.switches);
-        let writes = Dependencies { storage_images: &[**image], ..Dependencies::default() };
         frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &instances, self.switches.mode()))?;
-        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, size, &writes))?;
-        Ok(**image)
+        Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         let config = self.config.sized(extent);
-        self.canvas = Canvas::new(&self.ctx, &config)?;
+        self.target = config.create_target(&self.ctx)?;
         self.config = config;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
         self.switches.show(ui);
     }
 
-    fn reload(&mut self) -> Result<(), RtxError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
         Ok(())
     }
 }
 
-/// Where the triangles are seen from until somebody looks from elsewhere.
+/// The camera until the user moves it.
 fn camera() -> Camera {
     Camera::looking_at([0.0, 0.0, 3.2], [0.0; 3], 2.0 * HALF_HEIGHT.atan().to_degrees())
 }

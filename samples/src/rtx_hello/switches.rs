@@ -1,4 +1,4 @@
-//! What the panel of the window changes.
+//! Settings in the panel of the window.
 
 use lvk::BuildMode;
 
@@ -7,7 +7,7 @@ use super::instances::GROUPS;
 /// Refits of the top-level structure between two rebuilds.
 const MAX_REFITS: u32 = 32;
 
-/// How the top-level structure follows its triangles.
+/// The build mode of the TLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Following {
     /// By refits, and by a rebuild after some of them.
@@ -19,12 +19,12 @@ pub enum Following {
     Rebuilds,
 }
 
-/// What can be changed while the sample runs.
+/// Settings that can change while the sample runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RtxHelloSwitches {
-    /// Whether rays see the triangle in the middle, the inner ring, and the outer one.
+    /// True if rays see the triangle in the middle, the inner ring, and the outer one.
     pub is_seen: [bool; GROUPS],
-    /// How the top-level structure follows them.
+    /// The build mode of the TLAS.
     pub following: Following,
 }
 

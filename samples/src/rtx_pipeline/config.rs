@@ -1,4 +1,4 @@
-//! What to render.
+//! The configuration of the sample.
 
 use lvk::Capabilities;
 
@@ -8,12 +8,13 @@ use crate::rtx::RtxConfig;
 /// Levels of recursion besides those of mirrored and bent rays: the pixel's ray, and the last hit's shadow rays.
 const OTHER_LEVELS: u32 = 2;
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RtxPipelineConfig {
     /// Path and size.
     pub rtx: RtxConfig,
-    /// How often a ray may be mirrored or bent, 0 to [`RtxPipelineConfig::MAX_DEPTH`]; less where the device's pipelines
+    /// Largest number of reflections and refractions, 0 to [`RtxPipelineConfig::MAX_DEPTH`]; less where the device's
+    /// pipelines
     /// cannot trace so deep.
     pub depth: u32,
 }

@@ -2,18 +2,15 @@
 //! their lights by shadow rays of their own with a miss shader of their own, and trace on from mirrors and through glass,
 //! each one level deeper. By queries a loop does the same.
 //!
-//! [`RtxPipeline`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`RtxPipeline`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
 mod config;
+mod info;
 mod pipelines;
 mod renderer;
-mod run;
 mod switches;
 
-pub use args::RtxPipelineArgs;
 pub use config::RtxPipelineConfig;
-pub use pipelines::pipelines;
+pub use info::RtxPipelineArgs;
 pub use renderer::RtxPipeline;
-pub use run::run;
 pub use switches::RtxPipelineSwitches;

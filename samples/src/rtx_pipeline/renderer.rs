@@ -1,16 +1,18 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
+use lvk::{BufferHandle, Context, Holder, TextureHandle};
 
 use super::config::RtxPipelineConfig;
 use super::pipelines::RAYS;
 use super::switches::RtxPipelineSwitches;
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneAddresses, near_plane};
-use crate::rtx::{Canvas, RayStages, RtxError, Tracer};
+use crate::rtx::{RayStages, Tracer};
 use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
 
 /// Places of hit groups in the pipeline (`kSolid` and `kGlass` in `shaders/rtx_pipeline/radiance.glsl`).
@@ -19,7 +21,7 @@ const HIT_GROUPS: HitGroups = HitGroups { opaque: 0, refractive: 1 };
 /// Renders a scene by rays whose hits trace on.
 pub struct RtxPipeline {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     config: RtxPipelineConfig,
     scene: GpuScene,
     tracer: Tracer,
@@ -52,10 +54,10 @@ impl RtxPipeline {
     /// the device can.
     ///
     /// # Errors
-    /// [`RtxError`] when the configuration or the scene is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, scene: &Scene, config: &RtxPipelineConfig) -> Result<Self, RtxError> {
+    /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &Scene, config: &RtxPipelineConfig) -> Result<Self, SampleError> {
         let config = config.suited(ctx.capabilities());
-        let canvas = Canvas::new(ctx, &config.rtx)?;
+        let target = config.rtx.create_target(ctx)?;
         let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
         let path = CameraPath::tour(scene, 0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
@@ -69,7 +71,7 @@ impl RtxPipeline {
             sky: gpu_scene.sky.index(),
             surface_sampler: gpu_scene.surface_sampler.index(),
             sky_sampler: gpu_scene.sky_sampler.index(),
-            image: canvas.picture().index(),
+            image: target.image_index(),
             depth: config.depth,
         };
         Ok(Self {
@@ -78,7 +80,7 @@ impl RtxPipeline {
             near_plane: near_plane(scene),
             ctx: ctx.clone(),
             scene: gpu_scene,
-            canvas,
+            target,
             config,
             frame,
             constants,
@@ -96,7 +98,7 @@ impl RtxPipeline {
         self
     }
 
-    /// What is rendered, as far as the device can.
+    /// The configuration, limited to what the device supports.
     pub fn config(&self) -> &RtxPipelineConfig {
         &self.config
     }
@@ -106,12 +108,12 @@ impl RtxPipeline {
         self.scene.triangle_count
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn switches(&mut self) -> &mut RtxPipelineSwitches {
         &mut self.switches
     }
 
-    /// What the switches begin with, and the most that they can be.
+    /// The initial and largest values of the settings.
     fn all_switches(&self) -> RtxPipelineSwitches {
         RtxPipelineSwitches { depth: self.config.depth, lights: self.lighting.light_count() }
     }
@@ -123,43 +125,37 @@ impl RtxPipeline {
 }
 
 impl Sample for RtxPipeline {
-    type Error = RtxError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.camera = self.path.at(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
-        let (extent, picture) = (self.config.rtx.extent(), **self.canvas.picture());
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+        let [width, height] = self.config.rtx.extent();
         self.constants.depth = self.switches.depth.min(self.config.depth);
         self.constants.lighting = self.lighting.with_lights(self.switches.lights);
-        self.constants.camera = GpuCamera::new(&self.camera, extent[0], extent[1], self.near_plane);
+        self.constants.camera = GpuCamera::new(&self.camera, width, height, self.near_plane);
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
         let push = self.ctx.buffer_address(*self.frame)?;
-        let writes = Dependencies { storage_images: &[picture], ..Dependencies::default() };
-        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, extent, &writes))?;
-        Ok(picture)
+        Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         let rtx = self.config.rtx.sized(extent);
-        self.canvas = Canvas::new(&self.ctx, &rtx)?;
-        self.constants.image = self.canvas.picture().index();
+        self.target = rtx.create_target(&self.ctx)?;
+        self.constants.image = self.target.image_index();
         self.config.rtx = rtx;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -168,7 +164,7 @@ impl Sample for RtxPipeline {
         ui.label(format!("{} triangles", self.triangle_count()));
     }
 
-    fn reload(&mut self) -> Result<(), RtxError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.tracer = tracer(&self.ctx, &self.config)?;
         Ok(())
     }

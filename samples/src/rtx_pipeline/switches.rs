@@ -1,11 +1,11 @@
-//! What the panel of the window changes.
+//! Settings in the panel of the window.
 
-/// What can be changed while the sample runs.
+/// Settings that can change while the sample runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RtxPipelineSwitches {
-    /// How often a ray may be mirrored or bent, 0 to the depth of the [configuration](super::RtxPipelineConfig).
+    /// Largest number of reflections and refractions, 0 to the depth of the [configuration](super::RtxPipelineConfig).
     pub depth: u32,
-    /// How many of the scene's lights shine, and are looked for by shadow rays: the lamp, then the sun where there is one.
+    /// Number of lights that shine, each with a shadow ray: the lamp, then the sun where there is one.
     pub lights: u32,
 }
 

@@ -1,5 +1,7 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
@@ -14,9 +16,9 @@ use super::pipelines::{INSTANCES, RAYS};
 use super::switches::RtxTexturesSwitches;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
-use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer, compute_pipeline};
+use crate::rtx::{RtxConfig, Tracer, compute_pipeline};
 use crate::scene::{Camera, GpuCamera, painted_textures};
 
 /// Textures that the shaders have room for.
@@ -32,7 +34,7 @@ const GROUP: u32 = 64;
 
 /// Renders crates and rings.
 pub struct RtxTextures {
-    canvas: Canvas,
+    target: RenderTarget,
     ctx: Context,
     config: RtxConfig,
     writer: Holder<ComputePipelineHandle>,
@@ -50,7 +52,7 @@ pub struct RtxTextures {
     _held: Held,
 }
 
-/// What only the GPU reads.
+/// Resources that only the GPU reads.
 struct Held {
     _blas: Vec<Holder<AccelStructHandle>>,
     _buffers: [Holder<BufferHandle>; 2],
@@ -78,9 +80,9 @@ impl RtxTextures {
     /// Makes models, textures, structures and pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RtxError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &RtxConfig) -> Result<Self, RtxError> {
-        let canvas = Canvas::new(ctx, config)?;
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &RtxConfig) -> Result<Self, SampleError> {
+        let target = config.create_target(ctx)?;
         let models = Models::new();
         let usage = BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT;
         let vertices = array(ctx, "vertices", usage, &models.vertices)?;
@@ -102,13 +104,13 @@ impl RtxTextures {
             textures: [0; TEXTURES],
             first_triangle: std::array::from_fn(|model| models.ranges[model].start),
             tlas: tlas.index(),
-            image: canvas.picture().index(),
+            image: target.image_index(),
             sampler: 0,
             count: 0,
             phase: 0.0,
         };
         Ok(Self {
-            canvas,
+            target,
             ctx: ctx.clone(),
             config: *config,
             writer: compute_pipeline(ctx, RAYS.sample, INSTANCES)?,
@@ -138,7 +140,7 @@ impl RtxTextures {
         INSTANCE_COUNT
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn switches(&mut self) -> &mut RtxTexturesSwitches {
         &mut self.switches
     }
@@ -167,57 +169,47 @@ impl RtxTextures {
         let instances = DeviceInstances { buffer: *self.records, offset: 0, count, blas: &self.blas };
         cmd.update_tlas_from_buffer(*self.tlas, &instances, BuildMode::Rebuild)
     }
-
-    fn trace(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        let writes = Dependencies { storage_images: &[**self.canvas.picture()], ..Dependencies::default() };
-        self.tracer.record(cmd, &self.frame_address, self.config.extent(), &writes)
-    }
 }
 
 impl Sample for RtxTextures {
-    type Error = RtxError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        self.show(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.show(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         let [width, height] = self.config.extent();
         self.apply_switches();
         self.constants.camera = GpuCamera::new(&self.camera, width, height, 0.1);
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
         frame.pass("instances", |cmd| self.write_instances(cmd))?;
         frame.pass("TLAS build", |cmd| self.build_tlas(cmd))?;
-        frame.pass("rays", |cmd| self.trace(cmd))?;
-        Ok(**self.canvas.picture())
+        Ok(self.tracer.record_image(frame, &self.target, &self.frame_address)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         let config = self.config.sized(extent);
-        self.canvas = Canvas::new(&self.ctx, &config)?;
-        self.constants.image = self.canvas.picture().index();
+        self.target = config.create_target(&self.ctx)?;
+        self.constants.image = self.target.image_index();
         self.config = config;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
         self.switches.show(ui);
     }
 
-    fn reload(&mut self) -> Result<(), RtxError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let writer = compute_pipeline(&self.ctx, RAYS.sample, INSTANCES)?;
         self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
         self.writer = writer;
@@ -235,7 +227,7 @@ fn sampler(ctx: &Context, filter: Filter) -> lvk::Result<Holder<SamplerHandle>> 
     })
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let sway = 0.35 * (TAU * phase).sin();
     let eye = [9.2 * (0.5 + sway).sin(), 3.7, 9.2 * (0.5 + sway).cos()];

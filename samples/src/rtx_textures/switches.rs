@@ -1,8 +1,8 @@
-//! What the panel of the window changes.
+//! Settings in the panel of the window.
 
 use super::renderer::{INSTANCE_COUNT, TEXTURES};
 
-/// What can be changed while the sample runs.
+/// Settings that can change while the sample runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RtxTexturesSwitches {
     /// Instances that the compute shader writes and rays see, from the ground on; at least 1, and no more than
@@ -21,7 +21,7 @@ impl Default for RtxTexturesSwitches {
 }
 
 impl RtxTexturesSwitches {
-    /// How many instances there are in the next frame.
+    /// Number of instances in the next frame.
     pub(super) fn instance_count(&self) -> u32 {
         self.instances.clamp(1, INSTANCE_COUNT)
     }

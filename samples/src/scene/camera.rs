@@ -1,4 +1,4 @@
-//! Where a picture is taken from.
+//! The camera of an image.
 
 use glam::{Mat4, Vec3};
 

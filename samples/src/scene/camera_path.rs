@@ -1,4 +1,4 @@
-//! Where a camera is while it moves.
+//! The path of a camera.
 
 use glam::Vec3;
 

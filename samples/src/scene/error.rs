@@ -1,8 +1,8 @@
-//! Why a scene could not be loaded.
+//! Errors of loading a scene.
 
 use std::path::PathBuf;
 
-/// Why a scene could not be loaded. Every message names the file and says what to change.
+/// Errors of loading a scene. Every message names the file and says what to change.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// Nobody waits for it any more.
@@ -19,7 +19,7 @@ pub enum SceneError {
     Unreadable {
         /// The path as given.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The content is not a Wavefront OBJ.
@@ -27,7 +27,7 @@ pub enum SceneError {
     NotObj {
         /// The path as given.
         path: PathBuf,
-        /// What gives it away.
+        /// The feature that identifies the format.
         why: &'static str,
     },
     /// A line cannot be understood.
@@ -37,7 +37,7 @@ pub enum SceneError {
         path: PathBuf,
         /// Line number, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The error.
         what: String,
     },
     /// A position is NaN or infinite, in the file or after scaling.
@@ -59,7 +59,7 @@ pub enum SceneError {
         what: &'static str,
         /// The number in the file: from 1, or negative and relative.
         index: i64,
-        /// How many the file has.
+        /// Number in the file.
         count: usize,
     },
     /// There is nothing to draw.
@@ -89,7 +89,7 @@ pub enum SceneError {
     Parse {
         /// The path as given.
         path: PathBuf,
-        /// What the parser said.
+        /// Error of the parser.
         source: tobj::LoadError,
     },
     /// A camera file is wrong. It consists of lines `scene NAME x y z` (the point light's position), each
@@ -101,13 +101,13 @@ pub enum SceneError {
         path: PathBuf,
         /// Line number, from 1; 0 when the whole file is meant.
         line: usize,
-        /// What is wrong.
+        /// The error.
         what: String,
     },
 }
 
 impl SceneError {
-    /// Turns an error of opening or reading `path` into the matching variant.
+    /// Turns an error of setup or reading `path` into the matching variant.
     pub(super) fn from_io(path: &std::path::Path, source: std::io::Error) -> Self {
         match source.kind() {
             std::io::ErrorKind::NotFound => SceneError::NotFound { path: path.into() },

@@ -39,7 +39,7 @@ fn around(mesh: &Mesh) -> Views {
     Views { name: String::new(), light: light.to_array(), sun: None, cameras: directions.map(camera).into() }
 }
 
-/// How far from the middle of a box with the given half size a camera must stand to see all of it, in a picture
+/// Distance from the middle of a box with the given half size at which a camera sees all of it, in a picture
 /// at least 4:3 wide, with some room at the edges.
 fn fitting_distance(camera: &Camera, half_size: Vec3) -> f32 {
     let [right, up, forward] = camera.frame().map(Vec3::from);
@@ -57,7 +57,7 @@ fn bits(i: u32) -> [bool; 3] {
     [0, 1, 2].map(|bit| i >> bit & 1 == 1)
 }
 
-/// Whether the mesh surrounds its middle: at least four sides of the bounding box are covered by surfaces, and
+/// True if the mesh surrounds its middle: at least four sides of the bounding box are covered by surfaces, and
 /// these do not all face outwards as those of a solid block do.
 pub(super) fn is_room(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> bool {
     let (low, high) = bounds_of(positions);

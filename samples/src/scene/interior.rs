@@ -55,14 +55,14 @@ fn best(shots: &[Shot], chosen: &[Shot], diagonal: f32) -> Option<usize> {
     ranked.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
 }
 
-/// Which parts of the bounding box hold surfaces.
+/// Cells of the bounding box that hold surfaces.
 struct Grid {
     low: Vec3,
     high: Vec3,
     cell: f32,
     size: UVec3,
     filled: Vec<bool>,
-    /// How many triangles have their middle in each cell.
+    /// Number of triangles with their centre in each cell.
     detail: Vec<u32>,
 }
 
@@ -120,7 +120,7 @@ impl Grid {
         }
     }
 
-    /// Whether `point` is free and has surfaces below and on all sides but one.
+    /// True if `point` is free and has surfaces below and on all sides but one.
     fn is_inside(&self, point: Vec3) -> bool {
         let around = [Vec3::NEG_Y, Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z];
         let is_free = self.index(point).is_some_and(|index| !self.filled[index]);
@@ -186,14 +186,12 @@ impl Grid {
 
     /// Mean distance to surfaces around and below `place`; openings count little.
     fn openness(&self, place: Vec3) -> f32 {
-        let opening = 0.1 * self.high.distance(self.low);
+        let setup = 0.1 * self.high.distance(self.low);
         let directions = (0..32).map(|i| {
             let (turn, drop) = ((i % 16) as f32 * std::f32::consts::TAU / 16.0, (i / 16) as f32);
             Vec3::new(turn.sin(), -0.2 - drop, turn.cos()).normalize()
         });
-        directions
-            .map(|direction| self.hit(place, direction).map_or(opening, |(depth, _)| depth))
-            .sum::<f32>()
+        directions.map(|direction| self.hit(place, direction).map_or(setup, |(depth, _)| depth)).sum::<f32>()
             / 32.0
     }
 }

@@ -1,4 +1,4 @@
-//! Where light comes from, and how it becomes a displayed colour.
+//! Lights, and the conversion of light to a displayed colour.
 
 use glam::Vec3;
 

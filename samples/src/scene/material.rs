@@ -1,6 +1,6 @@
-//! How a surface answers light.
+//! The material of a surface.
 
-/// How a surface answers light; the formulas are in the documentation of the module.
+/// The material of a surface; the formulas are in the documentation of the module.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// Name in the file.
@@ -9,7 +9,7 @@ pub struct Material {
     pub albedo: [f32; 3],
     /// Index into [`super::Scene::textures`].
     pub albedo_texture: Option<u32>,
-    /// Whether its texture has holes where alpha is below one half. Only rasterisers heed it.
+    /// True if its texture has holes where alpha is below one half. Only rasterisers heed it.
     pub is_masked: bool,
     /// Index into [`super::Scene::normal_maps`]. Only the `sponza` sample heeds it.
     pub normal_map: Option<u32>,
@@ -72,7 +72,7 @@ impl Material {
         Self { emission: [0.12, 0.03, 0.0], ..Self::matte(name, [1.0, 0.25, 0.0]) }
     }
 
-    /// Whether rays go on behind the surface.
+    /// True if rays go on behind the surface.
     pub fn is_refractive(&self) -> bool {
         self.transmission > 0.0
     }

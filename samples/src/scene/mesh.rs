@@ -45,7 +45,7 @@ impl Mesh {
     pub fn drop_degenerate(&mut self) -> usize {
         let before = self.triangles.len();
         let kept: Vec<usize> = (0..before).filter(|&i| self.has_area(i)).collect();
-        self.keep(&kept);
+        self.keep_triangles(&kept);
         before - kept.len()
     }
 
@@ -63,13 +63,13 @@ impl Mesh {
             (0..self.triangles.len()).partition(is_opaque);
         let opaque_count = sequence.len() as u32;
         sequence.extend(refractive);
-        self.keep(&sequence);
+        self.keep_triangles(&sequence);
         self.number_vertices_by_use();
         opaque_count
     }
 
     /// Leaves the triangles named in `sequence`, in that order.
-    fn keep(&mut self, sequence: &[usize]) {
+    fn keep_triangles(&mut self, sequence: &[usize]) {
         self.triangles = sequence.iter().map(|&i| self.triangles[i]).collect();
         self.triangle_materials = sequence.iter().map(|&i| self.triangle_materials[i]).collect();
         self.source_triangles = sequence.iter().map(|&i| self.source_triangles[i]).collect();

@@ -1,4 +1,4 @@
-//! What a renderer draws: one list of triangles with materials, textures, lights, a sky and five cameras.
+//! A scene: one list of triangles with materials, textures, lights, a sky and five cameras.
 //!
 //! A [`Scene`] comes from a Wavefront OBJ file ([`Scene::from_obj`]) or from code ([`Scene::procedural`]);
 //! nothing here knows Vulkan. All lengths are in scene units (metres in the scenes that ship), +y is up,
@@ -80,7 +80,7 @@ pub struct Scene {
     /// Vertex indices; opaque triangles first, then refractive ones, each group in the order of
     /// the source.
     pub triangles: Vec<[u32; 3]>,
-    /// How many of `triangles` are opaque. Shadow rays pass through the rest.
+    /// Number of opaque `triangles`, which come first. Shadow rays pass through the rest.
     pub opaque_triangle_count: u32,
     /// Index into `materials`, one per triangle.
     pub triangle_materials: Vec<u32>,
@@ -99,17 +99,17 @@ pub struct Scene {
     pub sun: Option<DirectionalLight>,
     /// Light that comes from everywhere and casts no shadow.
     pub ambient: Ambient,
-    /// What rays see that leave the scene.
+    /// The sky that rays meet when they leave the scene.
     pub sky: Sky,
     /// Five views of the scene, the first being the one to show.
     pub cameras: [Camera; 5],
     /// Triangles of the source without area, which were dropped.
     pub degenerate_triangle_count: u32,
-    /// What was wrong with the source and how it was mended, one line each, for the user to read.
+    /// Errors of the source and their corrections, one line each, for the user to read.
     pub warnings: Vec<String>,
 }
 
-/// How an OBJ file is to be read.
+/// Options for reading an OBJ file.
 #[derive(Debug, Clone, Default)]
 pub struct ObjOptions {
     /// Factor from file units to scene units; `None` takes the known scale of a benchmark scene, else 1.
@@ -117,7 +117,7 @@ pub struct ObjOptions {
     /// A camera file (see [`SceneError::CameraFile`]); `None` takes the built-in cameras of a benchmark scene,
     /// else cameras computed from the geometry.
     pub cameras: Option<PathBuf>,
-    /// Whether normal maps are read (`norm`, `map_bump`, `bump`).
+    /// True if normal maps are read (`norm`, `map_bump`, `bump`).
     pub normal_maps: bool,
 }
 
@@ -171,7 +171,7 @@ impl Scene {
         setting.into_scene(String::new(), mesh::Mesh::default(), Vec::new())
     }
 
-    /// Whether it surrounds its middle, as rooms do.
+    /// True if it surrounds its middle, as rooms do.
     pub(crate) fn is_room(&self) -> bool {
         framing::is_room(&self.positions, &self.triangles)
     }

@@ -23,7 +23,7 @@ pub(super) struct Library {
     warnings: Warnings,
 }
 
-/// What [`Library::select`] answers.
+/// Result of [`Library::select`].
 pub(super) struct Selection {
     pub(super) materials: Vec<Material>,
     pub(super) textures: Vec<Texture>,
@@ -36,7 +36,7 @@ pub(super) struct Selection {
 struct Definition {
     material: Material,
     image: Option<Image>,
-    /// Where it is dark the image has holes.
+    /// Mask of holes: dark texels are holes.
     mask: Option<Image>,
     relief: Option<Image>,
 }

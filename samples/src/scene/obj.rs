@@ -10,7 +10,7 @@ use super::setting::Setting;
 use super::{Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals};
 use crate::app::progress::Progress;
 
-/// What [`Scene::from_obj`] does.
+/// Implements [`Scene::from_obj`].
 pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -> Result<Scene, SceneError> {
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     if let Some(scale) = options.scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {

@@ -25,9 +25,9 @@ pub(super) struct CleanObj {
     pub libraries: Vec<String>,
     /// Number of triangles that the faces make.
     pub triangle_count: usize,
-    /// What was taken from every position: the centre of a mesh far from its origin, else 0.
+    /// Offset subtracted from every position: the centre of a mesh far from its origin, else 0.
     pub origin: [f64; 3],
-    /// What was mended, for the user.
+    /// Corrections of the file, for the user.
     pub warnings: Vec<String>,
 }
 
@@ -97,7 +97,7 @@ struct Cleaner<'a> {
     faces: String,
     positions: Vec<[f64; 3]>,
     extent: Extent,
-    /// Where in `faces` those with more than three corners stand.
+    /// Indices in `faces` of polygons with more than three vertices.
     polygons: Vec<Range<usize>>,
     counts: [usize; 3],
     reach: [Reach; 3],

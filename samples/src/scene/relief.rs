@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::Texture;
 
-/// How steep heights are: a rise from black to white within a texel, as a slope.
+/// Scale of heights: slope of a rise from black to white within a texel.
 const STEEPNESS: f32 = 2.0;
 
 impl Texture {
@@ -45,7 +45,8 @@ fn rise_of_green(image: &Texture) -> f32 {
     inside.map(|(x, y)| change(x, y)).sum()
 }
 
-/// Whether most of an image are directions of about unit length off the surface. Black, which some images have where nothing
+/// True if most of an image are directions of about unit length off the surface. Black, which some images have where
+/// nothing
 /// shows them, does not count.
 fn shows_directions(image: &Texture) -> bool {
     let mut counts = [0_usize; 2];

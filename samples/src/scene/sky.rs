@@ -1,4 +1,4 @@
-//! What rays see that leave the scene.
+//! The sky that rays meet when they leave the scene.
 
 use glam::Vec3;
 

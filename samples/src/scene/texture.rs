@@ -22,7 +22,7 @@ impl Texture {
     /// Reads an image file.
     ///
     /// # Errors
-    /// What is wrong with the file, as text for a warning.
+    /// Describes the error in the file, as text for a warning.
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let decoded = image::ImageReader::open(path)
             .and_then(|reader| reader.with_guessed_format())

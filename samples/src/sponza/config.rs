@@ -1,20 +1,19 @@
-//! What to render, and by which kind of draws.
+//! The configuration of the sample.
 
+use crate::app::sample_error::SampleError;
 use clap::ValueEnum;
 use lvk::{Context, OptionalFeature};
 
-use crate::raster::RasterError;
-
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SponzaConfig {
     /// Width and height of the picture in pixels.
     pub extent: [u32; 2],
     /// Samples a pixel: 1 or 4.
     pub samples: u32,
-    /// Whether draws outside of the frusta are left out.
+    /// True if draws outside of the frusta are left out.
     pub culls: bool,
-    /// How draws are taken from the buffers that culling writes; `None` for what suits the device.
+    /// Source of the number of draws; `None` for the one that suits the device.
     pub draws: Option<DrawPath>,
     /// Texels on an edge of the shadow map, 16 to [`SponzaConfig::MAX_SHADOW_SIZE`].
     pub shadow_size: u32,
@@ -22,11 +21,11 @@ pub struct SponzaConfig {
     pub filter: u32,
     /// Most triangles of a draw, at least 1.
     pub triangles_per_draw: u32,
-    /// Whether surfaces have the relief of their normal maps.
+    /// True if surfaces have the relief of their normal maps.
     pub normal_maps: bool,
 }
 
-/// How draws are taken from the buffers that culling writes.
+/// Source of the number of draws after culling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DrawPath {
     /// As many as the shader has counted (`drawIndirectCount`).
@@ -60,15 +59,15 @@ impl SponzaConfig {
     /// Within the bounds of its numbers, with draws that the device has.
     ///
     /// # Errors
-    /// [`RasterError::Missing`] for counted draws on a device without them, and for samples that are neither 1 nor 4.
-    pub(super) fn suited(self, ctx: &Context) -> Result<Self, RasterError> {
+    /// [`SampleError::Missing`] for counted draws on a device without them, and for samples that are neither 1 nor 4.
+    pub(super) fn suited(self, ctx: &Context) -> Result<Self, SampleError> {
         let has_counts = ctx.capabilities().has(OptionalFeature::DrawIndirectCount);
         let best = if has_counts { DrawPath::Counted } else { DrawPath::Padded };
         let draws = self.draws.unwrap_or(best);
         let what = "draws whose number is in a buffer (drawIndirectCount)";
-        RasterError::unless(draws == DrawPath::Padded || has_counts, ctx, what, "use --draws padded")?;
+        SampleError::require(draws == DrawPath::Padded || has_counts, ctx, what, "use --draws padded")?;
         let what = "pictures of this many samples a pixel";
-        RasterError::unless(matches!(self.samples, 1 | 4), ctx, what, "use --msaa 1 or 4")?;
+        SampleError::require(matches!(self.samples, 1 | 4), ctx, what, "use --msaa 1 or 4")?;
         let limit = Self::MAX_SHADOW_SIZE.min(ctx.capabilities().limits.max_texture_2d);
         Ok(Self {
             draws: Some(draws),

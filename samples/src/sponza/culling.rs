@@ -69,7 +69,7 @@ impl Culling {
         cmd.dispatch([VIEWS as u32, 1, 1], &Dependencies { buffers: &buffers, ..Dependencies::default() })
     }
 
-    /// What a pass reads that draws what is left of a view.
+    /// Buffers that a pass reads to draw the remaining draws of a view.
     pub(super) fn reads(&self, view: usize) -> [BufferHandle; 2] {
         [self.arguments[view].handle(), self.counts.handle()]
     }
@@ -90,7 +90,7 @@ impl Culling {
         }
     }
 
-    /// How many draws the last frame left of each view. Waits for it.
+    /// Returns the number of draws that the last frame left of each view. Waits for the frame.
     pub(super) fn counts(&self, ctx: &Context) -> lvk::Result<[u32; VIEWS]> {
         let mut counts = [0_u32; VIEWS];
         ctx.download_buffer(*self.counts, 0, bytemuck::cast_slice_mut(&mut counts))?;

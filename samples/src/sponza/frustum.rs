@@ -1,10 +1,10 @@
-//! What a view may show, as planes.
+//! The volume that a view can show, as planes.
 
 use glam::Vec3;
 
 use crate::scene::Camera;
 
-/// What a view may show: points on the inner side of six planes.
+/// The volume that a view can show: points on the inner side of six planes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frustum {
     /// Normal, which looks inside, and offset of each: a point `p` is inside where `normal . p + offset >= 0`.
@@ -51,13 +51,13 @@ impl Frustum {
         Self { planes: planes.map(plane) }
     }
 
-    /// Whether it may show something of a box: false only where the box is beyond one of the planes.
+    /// True if it may show something of a box: false only where the box is beyond one of the planes.
     #[must_use]
     pub fn sees(&self, low: [f32; 3], high: [f32; 3]) -> bool {
         self.margin(low, high) >= 0.0
     }
 
-    /// How far the box reaches inside, at the plane where that is least; below 0 it is not seen.
+    /// Smallest distance that the box reaches inside of a plane; below 0 the box is not visible.
     #[must_use]
     pub fn margin(&self, low: [f32; 3], high: [f32; 3]) -> f32 {
         let inside = |plane: &[f32; 4]| {

@@ -2,24 +2,21 @@
 //! the camera and of the sun and writes what is left, and how many, for indirect draws that take their number from there; the sun
 //! casts shadows by a map with a comparison sampler and percentage-closer filtering.
 //!
-//! [`Sponza`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`Sponza`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
 mod config;
 mod culling;
 mod draws;
 mod frame;
 mod frustum;
+mod info;
 mod pipelines;
 mod renderer;
-mod run;
 mod shadow;
 mod sun_view;
 
-pub use args::SponzaArgs;
 pub use config::{DrawPath, SponzaConfig};
 pub use draws::Draw;
 pub use frustum::Frustum;
-pub use pipelines::pipelines;
+pub use info::SponzaArgs;
 pub use renderer::Sponza;
-pub use run::run;

@@ -1,25 +1,22 @@
 //! The sample's pipelines as data, with the texts that their stages use.
 
-use lvk::{CompareOp, DepthTest, ShaderStage};
+use crate::app::render_target::RenderTarget;
+use lvk::{CompareOp, DepthTest};
 
 use super::shadow::Shadow;
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::raster::{Canvas, RasterPipeline, fragment_stage, vertex_stage};
-use crate::shaders::sponza as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
+use crate::raster::RasterPipeline;
 
 /// Folder of the texts in `shaders/`.
 pub(super) const SAMPLE: &str = "sponza";
 
 /// Culls draws.
-pub(super) const CULL: SampleStage =
-    SampleStage { stage: ShaderStage::Compute, text: texts::CULL_COMP, defines: &[], name: "cull.comp" };
+pub(super) const CULL: SampleStage = shader!("sponza", "cull.comp");
 
-const SHADOW_STAGES: [SampleStage; 2] =
-    [vertex_stage(texts::SHADOW_VERT, "shadow.vert"), fragment_stage(texts::SHADOW_FRAG, "shadow.frag")];
+const SHADOW_STAGES: [SampleStage; 2] = [shader!("sponza", "shadow.vert"), shader!("sponza", "shadow.frag")];
 const SURFACE_STAGES: [SampleStage; 2] =
-    [vertex_stage(texts::SURFACE_VERT, "surface.vert"), fragment_stage(texts::SURFACE_FRAG, "surface.frag")];
-const SKY_STAGES: [SampleStage; 2] =
-    [vertex_stage(texts::SKY_VERT, "sky.vert"), fragment_stage(texts::SKY_FRAG, "sky.frag")];
+    [shader!("sponza", "surface.vert"), shader!("sponza", "surface.frag")];
+const SKY_STAGES: [SampleStage; 2] = [shader!("sponza", "sky.vert"), shader!("sponza", "sky.frag")];
 
 /// Depth as the sun sees it.
 pub(super) const SHADOW: RasterPipeline = RasterPipeline {
@@ -34,15 +31,14 @@ pub(super) const SHADOW: RasterPipeline = RasterPipeline {
 /// Of four samples a pixel.
 pub(super) const SURFACES: RasterPipeline =
     RasterPipeline::with_depth(SAMPLE, "sponza: surfaces", &SURFACE_STAGES);
-/// What no surface hides, of four samples a pixel.
+/// The sky where no surface hides it, of four samples a pixel.
 pub(super) const SKY: RasterPipeline = RasterPipeline {
-    depth: Some(DepthTest { compare: CompareOp::GreaterOrEqual, write: false, ..Canvas::NEAREST }),
+    depth: Some(DepthTest { compare: CompareOp::GreaterOrEqual, write: false, ..RenderTarget::NEAREST }),
     ..RasterPipeline::with_depth(SAMPLE, "sponza: sky", &SKY_STAGES)
 };
 
-/// Every pipeline of the sample.
-#[must_use]
-pub fn pipelines() -> Vec<SamplePipeline> {
+/// Returns every pipeline of the sample.
+pub(super) fn pipelines() -> Vec<SamplePipeline> {
     let cull = SamplePipeline { name: "sponza: culling", stages: vec![CULL], color: Vec::new(), depth: None };
     vec![cull, SHADOW.data(), SURFACES.data(), SKY.data()]
 }

@@ -1,5 +1,7 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use glam::{Quat, Vec3};
 use lvk::{
     AddressMode, BufferHandle, BufferUsage, Context, Dependencies, Holder, Readback, RenderPipelineHandle,
@@ -16,15 +18,15 @@ use super::shadow::Shadow;
 use super::sun_view::SunView;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
 use crate::hybrid::{SceneArrays, check_promises, near_plane};
-use crate::raster::{Canvas, RasterError, RasterPipeline};
+use crate::raster::RasterPipeline;
 use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Material, PointLight, Scene};
 
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
-/// Where scenes without a sun have one.
+/// The sun of scenes without one: direction and colour.
 const USUAL_SUN: ([f32; 3], [f32; 3]) = ([0.28, 0.9, 0.33], [2.6, 2.35, 1.95]);
 
 /// Renders a scene of many draws.
@@ -32,7 +34,7 @@ pub struct Sponza {
     ctx: Context,
     config: SponzaConfig,
     path_of_draws: DrawPath,
-    canvas: Canvas,
+    target: RenderTarget,
     culling: Culling,
     shadow: Shadow,
     surfaces: Holder<RenderPipelineHandle>,
@@ -48,10 +50,10 @@ pub struct Sponza {
     /// The frustum of a view that is kept while the camera goes on, to look at what was culled.
     kept: Option<Frustum>,
     turn: f32,
-    told: Told,
+    draw_counts: DrawCounts,
 }
 
-/// What shaders reach of the scene.
+/// The resources of the scene that shaders read.
 struct OnDevice {
     arrays: SceneArrays,
     finishes: Holder<BufferHandle>,
@@ -61,16 +63,16 @@ struct OnDevice {
     _textures: [Vec<Holder<TextureHandle>>; 2],
 }
 
-/// What lights the scene.
+/// The lights of the scene.
 struct Light {
     sun: DirectionalLight,
     ambient: Ambient,
     lamp: PointLight,
 }
 
-/// What is known of how many draws were left.
+/// The latest counts of draws, and the readback of the next.
 #[derive(Default)]
-struct Told {
+struct DrawCounts {
     counts: Option<[u32; VIEWS]>,
     coming: Option<Readback>,
 }
@@ -79,16 +81,16 @@ impl Sponza {
     /// Uploads `scene`, whose triangles it cuts into draws, and makes all pipelines.
     ///
     /// # Errors
-    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, mut scene: Scene, config: &SponzaConfig) -> Result<Self, RasterError> {
-        check_promises(&scene).map_err(RasterError::scene)?;
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, mut scene: Scene, config: &SponzaConfig) -> Result<Self, SampleError> {
+        check_promises(&scene)?;
         let config = config.suited(ctx)?;
-        let canvas = Canvas::with_samples(ctx, config.extent, config.samples)?;
+        let target = RenderTarget::with_samples(ctx, config.extent, config.samples)?;
         let draws = cut(&mut scene, config.triangles_per_draw);
         let path = CameraPath::tour(&scene, 0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
-            canvas,
+            target,
             culling: Culling::new(ctx, &draws)?,
             shadow: Shadow::new(ctx, config.shadow_size)?,
             surfaces: pipeline(ctx, &SURFACES, config.samples)?,
@@ -96,7 +98,7 @@ impl Sponza {
             scene: OnDevice::new(ctx, &scene)?,
             draws,
             bounds: scene.bounds(),
-            light: Light::of(&scene),
+            light: Light::from_scene(&scene),
             frame,
             camera: path.at(0.0),
             path,
@@ -106,7 +108,7 @@ impl Sponza {
             config,
             kept: None,
             turn: 0.0,
-            told: Told::default(),
+            draw_counts: DrawCounts::default(),
         })
     }
 
@@ -118,12 +120,12 @@ impl Sponza {
         self
     }
 
-    /// What is rendered.
+    /// The configuration.
     pub fn config(&self) -> &SponzaConfig {
         &self.config
     }
 
-    /// How draws are taken from the buffers that culling writes.
+    /// Source of the number of draws after culling.
     pub fn draw_path(&self) -> DrawPath {
         self.path_of_draws
     }
@@ -133,28 +135,28 @@ impl Sponza {
         &self.draws
     }
 
-    /// What the next frame culls the draws of the camera and of the sun by.
+    /// The frusta that the next frame culls draws by: of the camera and of the sun.
     pub fn frusta(&self) -> [Frustum; 2] {
         if !self.config.culls {
             return [Frustum::ALL; 2];
         }
-        let seen = || Frustum::of_camera(&self.camera, self.canvas.aspect(), self.near_plane);
+        let seen = || Frustum::of_camera(&self.camera, self.target.aspect(), self.near_plane);
         [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
     }
 
-    /// How many draws of the camera and of the sun the last frame has left. Waits for it.
+    /// Returns the number of draws of the camera and of the sun after culling in the last frame. Waits for the frame.
     ///
     /// # Errors
-    /// [`RasterError::Device`].
-    pub fn counts(&self) -> Result<[u32; 2], RasterError> {
+    /// [`SampleError::Device`].
+    pub fn counts(&self) -> Result<[u32; 2], SampleError> {
         Ok(self.culling.counts(&self.ctx)?)
     }
 
     /// First triangles of the draws that the last frame has left, of the camera (0) or the sun (1). Waits for it.
     ///
     /// # Errors
-    /// [`RasterError::Device`].
-    pub fn survivors(&self, view: usize) -> Result<Vec<u32>, RasterError> {
+    /// [`SampleError::Device`].
+    pub fn survivors(&self, view: usize) -> Result<Vec<u32>, SampleError> {
         Ok(self.culling.survivors(&self.ctx, view.min(VIEWS - 1), self.path_of_draws)?)
     }
 
@@ -188,7 +190,7 @@ impl Sponza {
     }
 
     fn upload_frame(&self) -> lvk::Result<()> {
-        let [width, height] = self.canvas.extent();
+        let [width, height] = self.target.extent();
         let (draws, arguments, counts) = self.culling.addresses(&self.ctx)?;
         let frusta = self.frusta();
         let constants = FrameConstants {
@@ -215,7 +217,7 @@ impl Sponza {
             read_buffers: &self.culling.reads(0),
             ..Dependencies::default()
         };
-        let mut pass = self.canvas.begin(&mut to.cmd, "surfaces", [0.0; 3], &reads)?;
+        let mut pass = self.target.begin(&mut to.cmd, "surfaces", [0.0; 3], &reads)?;
         pass.bind_render_pipeline(*self.surfaces)?;
         pass.push_constants(&address)?;
         self.culling.draw(&mut pass, 0, self.path_of_draws)?;
@@ -225,67 +227,63 @@ impl Sponza {
     }
 
     /// Keeps the last counts that have arrived, and asks for the next.
-    fn listen(&mut self) -> lvk::Result<()> {
-        if let Some(coming) = self.told.coming.take() {
+    fn poll_counts(&mut self) -> lvk::Result<()> {
+        if let Some(coming) = self.draw_counts.coming.take() {
             if !coming.is_ready()? {
-                self.told.coming = Some(coming);
+                self.draw_counts.coming = Some(coming);
                 return Ok(());
             }
-            self.told.counts = bytemuck::try_pod_read_unaligned(&coming.wait()?).ok();
+            self.draw_counts.counts = bytemuck::try_pod_read_unaligned(&coming.wait()?).ok();
         }
         let range = 0..(VIEWS * size_of::<u32>()) as u64;
-        self.told.coming = Some(self.ctx.read_buffer_later(self.culling.counts_buffer(), range)?);
+        self.draw_counts.coming = Some(self.ctx.read_buffer_later(self.culling.counts_buffer(), range)?);
         Ok(())
     }
 
-    fn told(&self, counts: [u32; VIEWS]) -> String {
+    fn draw_counts_text(&self, counts: [u32; VIEWS]) -> String {
         let all = self.culling.draw_count();
         format!("{} of {all} draws in the picture, {} in the shadow map", counts[0], counts[1])
     }
 }
 
 impl Sample for Sponza {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.camera = self.path.at(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload_frame()?;
         let address = self.ctx.buffer_address(*self.frame)?;
         frame.pass("culling", |cmd| self.culling.record(cmd, address))?;
         self.shadow.record(&mut frame.cmd, &self.culling, self.path_of_draws, address)?;
         self.draw_surfaces(frame, address)?;
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn after_frame(&mut self) -> Result<(), RasterError> {
-        self.told.counts = Some(self.counts()?);
+    fn after_frame(&mut self) -> Result<(), SampleError> {
+        self.draw_counts.counts = Some(self.counts()?);
         Ok(())
     }
 
     fn remark(&self) -> Option<String> {
-        self.told.counts.map(|counts| format!("culling   {}", self.told(counts)))
+        self.draw_counts.counts.map(|counts| format!("culling   {}", self.draw_counts_text(counts)))
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_samples(&self.ctx, extent, self.config.samples)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_samples(&self.ctx, extent, self.config.samples)?;
         self.config.extent = extent;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -304,8 +302,8 @@ impl Sample for Sponza {
         ui.add(egui::Slider::new(&mut self.shadow.bias.slope, 0.0..=10.0).text("slope bias"));
         ui.add(egui::Slider::new(&mut self.turn, -180.0..=180.0).text("turn of the sun"));
         // The figures are those of a frame some time ago; without them the panel tells nothing.
-        if self.listen().is_ok()
-            && let Some(counts) = self.told.counts
+        if self.poll_counts().is_ok()
+            && let Some(counts) = self.draw_counts.counts
         {
             let all = self.culling.draw_count();
             ui.label(format!("{} of {all} draws in the picture", counts[0]));
@@ -313,7 +311,7 @@ impl Sample for Sponza {
         }
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let samples = self.config.samples;
         let (surfaces, sky) = (pipeline(&self.ctx, &SURFACES, samples)?, pipeline(&self.ctx, &SKY, samples)?);
         let (culling, shadow) = (Culling::pipeline(&self.ctx)?, Shadow::pipeline(&self.ctx)?);
@@ -360,7 +358,7 @@ fn pipeline(ctx: &Context, data: &RasterPipeline, samples: u32) -> lvk::Result<H
 
 impl Light {
     /// The lights of a scene: its sun, or the usual one and the lamp.
-    fn of(scene: &Scene) -> Self {
+    fn from_scene(scene: &Scene) -> Self {
         let (direction, color) = USUAL_SUN;
         let usual = DirectionalLight { direction: Vec3::from(direction).normalize().into(), color };
         let dark = PointLight { color: [0.0; 3], ..scene.light };

@@ -17,7 +17,7 @@ pub(super) struct Wish {
     pub(super) ticket: u64,
 }
 
-/// What became of a wish.
+/// The result of a request.
 pub(super) type Answer = (Wish, lvk::Result<Holder<TextureHandle>>);
 
 /// The thread, with its ends of both ways.
@@ -55,7 +55,7 @@ impl Loader {
         self.answers.try_recv().ok()
     }
 
-    /// The next answer, which somebody must have asked for.
+    /// Waits for the next result; a request must be pending.
     pub(super) fn wait(&self) -> Option<Answer> {
         self.answers.recv().ok()
     }

@@ -1,5 +1,7 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
@@ -8,13 +10,12 @@ use lvk::{
     RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
 };
 
-use super::bodies::Bodies;
-use super::pipelines::BODIES;
-use super::streamed::{COUNT, Presence, Streamed};
+use super::models::Models;
+use super::pipelines::MODELS;
+use super::streamed::{COUNT, Residency, Streamed};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::raster::{Canvas, RasterError};
+use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera, PAINTED};
 
 /// Colour of what is far away, in linear light (`kBackdrop` in `shaders/triplanar/frame.glsl`).
@@ -26,10 +27,10 @@ const FRAMES_PER_TURN: u32 = 30;
 /// Draws bodies by textures along three axes.
 pub struct Triplanar {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     pipeline: Holder<RenderPipelineHandle>,
     textures: Streamed,
-    bodies: Bodies,
+    bodies: Models,
     triangles: Holder<BufferHandle>,
     frame: Holder<BufferHandle>,
     constants: FrameConstants,
@@ -58,12 +59,12 @@ impl Triplanar {
     /// Makes the bodies, all textures and the pipeline, for pictures of `extent` pixels. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError`] when the picture is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, extent: [u32; 2]) -> Result<Self, RasterError> {
-        let canvas = Canvas::with_depth(ctx, extent)?;
+    /// [`SampleError`] when the picture is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, extent: [u32; 2]) -> Result<Self, SampleError> {
+        let target = RenderTarget::with_depth(ctx, extent)?;
         let mut textures = Streamed::new(ctx)?;
         (0..COUNT).for_each(|number| textures.load(number));
-        let bodies = Bodies::new();
+        let bodies = Models::new();
         let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &bodies.vertices)?;
         let placed = array(ctx, "bodies", BufferUsage::STORAGE, &bodies.bodies)?;
         let sampler = ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?;
@@ -79,7 +80,7 @@ impl Triplanar {
         textures.wait()?;
         Ok(Self {
             ctx: ctx.clone(),
-            canvas,
+            target,
             pipeline: pipeline(ctx)?,
             textures,
             triangles: array(ctx, "triangles", BufferUsage::INDEX, &bodies.triangles)?,
@@ -98,10 +99,10 @@ impl Triplanar {
         PAINTED.map(|painted| painted.name)
     }
 
-    /// Where the texture with this number is; there is none of a number that is too large.
+    /// The state of the texture with this number; textures with larger numbers are unloaded.
     #[must_use]
-    pub fn presence(&self, number: usize) -> Presence {
-        self.textures.presence(number)
+    pub fn residency(&self, number: usize) -> Residency {
+        self.textures.residency(number)
     }
 
     /// Gives a texture up at once, whatever frames are on their way; from the next frame on the placeholder is shown.
@@ -117,13 +118,13 @@ impl Triplanar {
     /// Waits for the textures that are coming.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn wait_for_textures(&mut self) -> lvk::Result<()> {
         self.textures.wait()
     }
 
     fn upload(&mut self) -> lvk::Result<()> {
-        let [width, height] = self.canvas.extent();
+        let [width, height] = self.target.extent();
         self.constants.camera = GpuCamera::new(&self.camera, width, height, NEAR_PLANE);
         self.constants.textures = self.textures.indices();
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
@@ -142,55 +143,51 @@ impl Triplanar {
     }
 
     fn texture_switch(&mut self, ui: &mut egui::Ui, number: usize) {
-        let presence = self.textures.presence(number);
-        ui.horizontal(|ui| match presence {
-            Presence::There if ui.button("unload").clicked() => self.textures.unload(number),
-            Presence::Away if ui.button("load").clicked() => self.textures.load(number),
-            Presence::Coming => drop(ui.spinner()),
+        let residency = self.textures.residency(number);
+        ui.horizontal(|ui| match residency {
+            Residency::Resident if ui.button("unload").clicked() => self.textures.unload(number),
+            Residency::Unloaded if ui.button("load").clicked() => self.textures.load(number),
+            Residency::Loading => drop(ui.spinner()),
             _ => {}
         });
     }
 }
 
 impl Sample for Triplanar {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.constants.phase = moment.phase();
-        self.camera = camera(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.constants.phase = time.phase();
+        self.camera = camera(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.take_turns();
         self.textures.take_in()?;
         self.upload()?;
         let nothing = Dependencies::default();
-        let mut pass = self.canvas.begin(&mut frame.cmd, "bodies", BACKDROP, &nothing)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "bodies", BACKDROP, &nothing)?;
         pass.bind_render_pipeline(*self.pipeline)?;
         pass.bind_index_buffer(*self.triangles, 0, IndexFormat::U32)?;
         pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
         for (number, corners) in (0..).zip(&self.bodies.corners) {
             pass.draw_indexed(corners.clone(), 0, number..number + 1)?;
         }
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -211,17 +208,17 @@ impl Sample for Triplanar {
         self.constants.by_angles = by_angles.into();
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.pipeline = pipeline(&self.ctx)?;
         Ok(())
     }
 }
 
 fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
-    BODIES.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
+    MODELS.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let around = 0.25 + 0.35 * (TAU * phase).sin();
     let eye = [6.2 * around.sin(), 2.9, 6.2 * around.cos()];

@@ -5,18 +5,18 @@ use lvk::{Context, Format, Holder, TextureDesc, TextureHandle};
 use super::loader::{Loader, Wish};
 use crate::scene::PAINTED;
 
-/// How many textures there are.
+/// Number of textures.
 pub(super) const COUNT: usize = PAINTED.len();
 
-/// Where a texture is.
+/// The state of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Presence {
+pub enum Residency {
     /// It is shown.
-    There,
+    Resident,
     /// It is being made, and the placeholder shown.
-    Coming,
+    Loading,
     /// It is not, and the placeholder shown.
-    Away,
+    Unloaded,
 }
 
 /// All textures, by their number.
@@ -28,32 +28,32 @@ pub(super) struct Streamed {
 }
 
 enum Slot {
-    There(Holder<TextureHandle>),
+    Resident(Holder<TextureHandle>),
     /// With the ticket of the wish.
-    Coming(u64),
-    Away,
+    Loading(u64),
+    Unloaded,
 }
 
 impl Streamed {
     /// With no texture but the placeholder.
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
-        let slots = [const { Slot::Away }; COUNT];
+        let slots = [const { Slot::Unloaded }; COUNT];
         Ok(Self { loader: Loader::new(ctx)?, placeholder: placeholder(ctx)?, slots, tickets: 0 })
     }
 
-    pub(super) fn presence(&self, number: usize) -> Presence {
+    pub(super) fn residency(&self, number: usize) -> Residency {
         match self.slots.get(number) {
-            Some(Slot::There(_)) => Presence::There,
-            Some(Slot::Coming(_)) => Presence::Coming,
-            Some(Slot::Away) | None => Presence::Away,
+            Some(Slot::Resident(_)) => Residency::Resident,
+            Some(Slot::Loading(_)) => Residency::Loading,
+            Some(Slot::Unloaded) | None => Residency::Unloaded,
         }
     }
 
-    /// What shaders know each texture by at the moment.
+    /// Current bindless index of each texture.
     pub(super) fn indices(&self) -> [u32; COUNT] {
         std::array::from_fn(|number| match &self.slots[number] {
-            Slot::There(texture) => texture.index(),
-            Slot::Coming(_) | Slot::Away => self.placeholder.index(),
+            Slot::Resident(texture) => texture.index(),
+            Slot::Loading(_) | Slot::Unloaded => self.placeholder.index(),
         })
     }
 
@@ -61,15 +61,15 @@ impl Streamed {
     /// nobody gets its number before.
     pub(super) fn unload(&mut self, number: usize) {
         if let Some(slot) = self.slots.get_mut(number) {
-            *slot = Slot::Away;
+            *slot = Slot::Unloaded;
         }
     }
 
     /// Has a texture made that is away; some later frame shows it.
     pub(super) fn load(&mut self, number: usize) {
-        if let Some(slot @ Slot::Away) = self.slots.get_mut(number) {
+        if let Some(slot @ Slot::Unloaded) = self.slots.get_mut(number) {
             self.tickets += 1;
-            *slot = Slot::Coming(self.tickets);
+            *slot = Slot::Loading(self.tickets);
             self.loader.ask(Wish { number, ticket: self.tickets });
         }
     }
@@ -84,7 +84,7 @@ impl Streamed {
 
     /// Waits for everything that is coming.
     pub(super) fn wait(&mut self) -> lvk::Result<()> {
-        while self.slots.iter().any(|slot| matches!(slot, Slot::Coming(_))) {
+        while self.slots.iter().any(|slot| matches!(slot, Slot::Loading(_))) {
             let Some((wish, texture)) = self.loader.wait() else { break };
             self.place(wish, texture)?;
         }
@@ -94,9 +94,9 @@ impl Streamed {
     /// A texture that was given up meanwhile has another ticket, or none, and is dropped.
     fn place(&mut self, wish: Wish, texture: lvk::Result<Holder<TextureHandle>>) -> lvk::Result<()> {
         let slot = &mut self.slots[wish.number];
-        if matches!(slot, Slot::Coming(ticket) if *ticket == wish.ticket) {
-            *slot = Slot::Away;
-            *slot = Slot::There(texture?);
+        if matches!(slot, Slot::Loading(ticket) if *ticket == wish.ticket) {
+            *slot = Slot::Unloaded;
+            *slot = Slot::Resident(texture?);
         }
         Ok(())
     }

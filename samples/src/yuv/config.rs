@@ -1,9 +1,9 @@
-//! What to render: size, format and conversion.
+//! The configuration of the sample: size, format and conversion.
 
 use clap::ValueEnum;
 use lvk::{Format, YuvConversion};
 
-/// How the planes of a picture lie.
+/// The memory layout of an image's planes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum YuvFormat {
     /// One plane of Y, one of both colour differences, 8 bits.
@@ -27,7 +27,7 @@ pub enum YuvModel {
     Bt2020,
 }
 
-/// Which numbers are black and white.
+/// The range of numbers from black to white.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum YuvRange {
     /// 16 to 235, as broadcast.
@@ -50,20 +50,20 @@ pub const CONVERSIONS: [YuvConversion; 24] = {
     all
 };
 
-/// What to render. Numbers out of range count as the nearest that is not.
+/// The configuration of the sample. Numbers out of range count as the nearest number in range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct YuvConfig {
     /// Pixels in a row, and rows, of what is rendered.
     pub extent: [u32; 2],
     /// Those of the moving picture: even, 2 to 4096.
     pub film: [u32; 2],
-    /// How its planes lie; `None` for the first that the device has.
+    /// The memory layout of its planes; `None` for the first that the device supports.
     pub format: Option<YuvFormat>,
     /// The matrix.
     pub model: YuvModel,
-    /// Which numbers are black and white.
+    /// The range of numbers from black to white.
     pub range: YuvRange,
-    /// Whether its planes are shown too.
+    /// True if its planes are shown too.
     pub shows_planes: bool,
 }
 
@@ -102,7 +102,7 @@ impl YuvFormat {
         if matches!(self, Self::Nv12 | Self::I420) { 8 } else { 10 }
     }
 
-    /// Whether both colour differences share a plane.
+    /// True if both colour differences share a plane.
     #[must_use]
     pub const fn has_two_planes(self) -> bool {
         matches!(self, Self::Nv12 | Self::P010)

@@ -22,7 +22,7 @@ pub(super) fn planes(film: &Film, format: YuvFormat, model: YuvModel, range: Yuv
     codes.into_iter().map(|plane| bytes(&plane, format)).collect()
 }
 
-/// What a number stands for.
+/// The meaning of a number.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Channel {
     /// 0 to 1.

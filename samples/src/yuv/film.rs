@@ -7,12 +7,12 @@ use glam::{Vec2, Vec3};
 /// Radius of the disc in the middle, of half the picture's height.
 const DISC: f32 = 0.86;
 
-/// The moving picture at one moment.
+/// The video at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Film {
     /// Columns and rows.
     pub size: [u32; 2],
-    /// Where in its round the animation is, 0 to 1.
+    /// Phase of the animation's round, 0 to 1.
     pub phase: f32,
 }
 

@@ -2,20 +2,17 @@
 //! colour differences have half the size. Shaders sample it as colours, by the conversion that its texture was made with, and
 //! its planes one by one. The picture is flat and fills the canvas, so there is no camera that a window could move.
 //!
-//! [`Yuv`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`Yuv`] is the sample for programs and tests, `info.rs` describes its program.
 
-mod args;
 mod config;
 mod encode;
 mod film;
+mod info;
 mod pipelines;
 mod renderer;
-mod run;
-mod shown;
+mod video_texture;
 
-pub use args::YuvArgs;
 pub use config::{CONVERSIONS, YuvConfig, YuvFormat, YuvModel, YuvRange};
 pub use film::Film;
-pub use pipelines::pipelines;
+pub use info::YuvArgs;
 pub use renderer::Yuv;
-pub use run::run;

@@ -1,5 +1,7 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     AddressMode, Context, Dependencies, Holder, RenderPipelineDesc, RenderPipelineHandle, SamplerDesc,
@@ -8,10 +10,9 @@ use lvk::{
 
 use super::config::{YuvConfig, YuvFormat, YuvModel, YuvRange};
 use super::pipelines::PLANES;
-use super::shown::{Choice, Shown, supported};
+use super::video_texture::{VideoFormat, VideoTexture, supported};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::raster::{Canvas, RasterError};
+use crate::app::sample::{FrameTime, Sample};
 
 /// Beside and above the picture.
 const BACKDROP: [f32; 3] = [0.006, 0.007, 0.009];
@@ -20,9 +21,9 @@ const BACKDROP: [f32; 3] = [0.006, 0.007, 0.009];
 pub struct Yuv {
     ctx: Context,
     config: YuvConfig,
-    canvas: Canvas,
+    target: RenderTarget,
     formats: Vec<YuvFormat>,
-    shown: Shown,
+    video: VideoTexture,
     planes: Holder<RenderPipelineHandle>,
     sampler: Holder<SamplerHandle>,
     phase: f32,
@@ -32,7 +33,7 @@ pub struct Yuv {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Push {
-    /// Of the whole canvas, the part that the picture covers.
+    /// Of the whole target, the part that the picture covers.
     covered: [f32; 2],
     /// Textures of Y, Cb and Cr, and the channels that hold them.
     planes: [u32; 3],
@@ -45,18 +46,18 @@ impl Yuv {
     /// [`CONVERSIONS`](super::CONVERSIONS).
     ///
     /// # Errors
-    /// [`RasterError`] when the picture is beyond the device, the device lacks the format ([`lvk::Error::Unsupported`]), or it
+    /// [`SampleError`] when the picture is beyond the device, the device lacks the format ([`lvk::Error::Unsupported`]), or it
     /// fails.
-    pub fn new(ctx: &Context, config: &YuvConfig) -> Result<Self, RasterError> {
+    pub fn new(ctx: &Context, config: &YuvConfig) -> Result<Self, SampleError> {
         let mut config = config.clamped();
-        let canvas = Canvas::flat(ctx, config.extent)?;
-        let choice = choice(&config, config.format.unwrap_or(YuvFormat::Nv12));
-        let formats = supported(ctx, choice)?;
-        let format = config.format.or(formats.first().copied()).unwrap_or(choice.format);
+        let target = RenderTarget::flat(ctx, config.extent)?;
+        let video_format = video_format(&config, config.format.unwrap_or(YuvFormat::Nv12));
+        let formats = supported(ctx, video_format)?;
+        let format = config.format.or(formats.first().copied()).unwrap_or(video_format.format);
         config.format = Some(format);
         Ok(Self {
-            canvas,
-            shown: Shown::new(ctx, Choice { format, ..choice })?,
+            target,
+            video: VideoTexture::new(ctx, VideoFormat { format, ..video_format })?,
             planes: planes(ctx)?,
             sampler: ctx.create_sampler(&SamplerDesc {
                 address: [AddressMode::ClampToEdge; 3],
@@ -74,29 +75,29 @@ impl Yuv {
         &self.formats
     }
 
-    /// The format that is shown.
+    /// The format that is video.
     pub fn format(&self) -> YuvFormat {
-        self.shown.choice.format
+        self.video.video_format.format
     }
 
-    /// The planes of the moment, as they were uploaded.
+    /// The current planes, as they were uploaded.
     pub fn planes(&self) -> Vec<Vec<u8>> {
-        self.shown.encode(self.phase)
+        self.video.encode(self.phase)
     }
 
     /// Takes over what the panel or a key has chosen.
-    fn apply(&mut self) -> Result<(), RasterError> {
-        let wanted = choice(&self.config, self.config.format.unwrap_or(self.shown.choice.format));
-        if wanted != self.shown.choice {
-            self.shown = Shown::new(&self.ctx, wanted)?;
+    fn apply(&mut self) -> Result<(), SampleError> {
+        let wanted = video_format(&self.config, self.config.format.unwrap_or(self.video.video_format.format));
+        if wanted != self.video.video_format {
+            self.video = VideoTexture::new(&self.ctx, wanted)?;
         }
         Ok(())
     }
 
     fn push(&self) -> Push {
         let film = self.config.film;
-        let relative = film[0] as f32 / film[1] as f32 / self.canvas.aspect();
-        let planes = &self.shown.planes;
+        let relative = film[0] as f32 / film[1] as f32 / self.target.aspect();
+        let planes = &self.video.planes;
         let [y, cb] = [planes[0].index(), planes[1].index()];
         let (cr, channel) = planes.get(2).map_or((cb, 1), |plane| (plane.index(), 0));
         Push {
@@ -109,35 +110,35 @@ impl Yuv {
 }
 
 impl Sample for Yuv {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+        self.phase = time.phase();
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.apply()?;
-        self.shown.upload(&self.ctx, self.phase)?;
-        let sampled = [*self.shown.texture];
+        self.video.upload(&self.ctx, self.phase)?;
+        let sampled = [*self.video.texture];
         let reads = Dependencies { sampled_images: &sampled, ..Dependencies::default() };
-        let mut pass = self.canvas.begin(&mut frame.cmd, "picture", BACKDROP, &reads)?;
-        pass.bind_render_pipeline(*self.shown.pipeline)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "picture", BACKDROP, &reads)?;
+        pass.bind_render_pipeline(*self.video.pipeline)?;
         pass.push_constants(&self.push())?;
         pass.draw(0..4, 0..1)?;
         if self.config.shows_planes {
             pass.bind_render_pipeline(*self.planes)?;
             pass.draw(0..4, 0..3)?;
         }
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::flat(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::flat(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
     }
@@ -172,16 +173,16 @@ impl Sample for Yuv {
         ui.label("N is the next format");
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let planes = planes(&self.ctx)?;
-        self.shown.reload(&self.ctx)?;
+        self.video.reload(&self.ctx)?;
         self.planes = planes;
         Ok(())
     }
 }
 
-fn choice(config: &YuvConfig, format: YuvFormat) -> Choice {
-    Choice { format, model: config.model, range: config.range, size: config.film }
+fn video_format(config: &YuvConfig, format: YuvFormat) -> VideoFormat {
+    VideoFormat { format, model: config.model, range: config.range, size: config.film }
 }
 
 fn planes(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {

@@ -1,4 +1,4 @@
-//! From all places where a ray may hit something to what it hits.
+//! Candidates of a ray, and its hit among them.
 
 use super::triangle::Crossing;
 
@@ -11,44 +11,44 @@ const GRAZE_EDGE: f64 = 0.05;
 /// Distances closer than this, relative to the distance or to 1, are the same.
 const TIE: f64 = 2e-5;
 
-/// Which primitive was hit.
+/// Numbers of the hit primitive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct HitIds {
-    /// Place in the list of instances.
+    /// Instance number.
     pub instance: u32,
     /// The instance's custom index.
     pub custom_index: u32,
-    /// Place in the instance's list of geometries.
+    /// Geometry number.
     pub geometry: u32,
-    /// Place in the geometry's list of primitives.
+    /// Primitive number.
     pub primitive: u32,
 }
 
 /// A hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Multiple of the ray's direction.
+    /// Distance as a multiple of the ray's direction.
     pub t: f64,
-    /// What was hit.
+    /// Numbers of the primitive.
     pub ids: HitIds,
-    /// Weights of a triangle's second and third corner.
+    /// Weights of a triangle's second and third vertex.
     pub barycentrics: [f64; 2],
-    /// Whether the ray came from the side where the corners, in object space, turn clockwise in left-handed
-    /// coordinates.
+    /// True for a front face: its vertices, in object space, turn clockwise in left-handed coordinates as seen from
+    /// the ray's origin.
     pub is_front: bool,
-    /// Whether it counts without an any-hit shader.
+    /// True if no any-hit shader decides about it.
     pub is_opaque: bool,
-    /// Between the direction and the surface's normal, without its sign. Where a ray grazes a surface, rounding of its
+    /// Absolute cosine between the direction and the surface's normal. Where a ray grazes a surface, rounding of its
     /// origin moves the hit by one over this.
     pub cosine: f64,
 }
 
-/// What a ray hits first.
+/// Closest hit of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answer {
     /// The hit, or `None`.
     pub hit: Option<Hit>,
-    /// Whether arithmetic in f32 has to come to the same answer.
+    /// True if f32 arithmetic must give the same result.
     pub is_certain: bool,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Judges a crossing; `None` if the ray does not even nearly hit.
+    /// Judges a crossing. Returns `None` if the ray does not even nearly hit.
     pub(super) fn of_triangle(
         crossing: &Crossing,
         ids: HitIds,
@@ -70,7 +70,7 @@ impl Candidate {
     ) -> Option<Self> {
         let grazes = crossing.cosine.abs() < GRAZE;
         let blur = if grazes { GRAZE_EDGE } else { EDGE };
-        let in_range = Range::of(crossing.t, range);
+        let in_range = Range::locate(crossing.t, range);
         let margin = crossing.margin();
         if margin < -blur || in_range == Range::Outside {
             return None;
@@ -88,7 +88,7 @@ impl Candidate {
     }
 }
 
-/// Where a distance lies in the range of a ray.
+/// Position of a distance in the interval of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Range {
     Inside,
@@ -97,7 +97,7 @@ pub(super) enum Range {
 }
 
 impl Range {
-    pub(super) fn of(t: f64, range: (f64, f64)) -> Self {
+    pub(super) fn locate(t: f64, range: (f64, f64)) -> Self {
         if same_distance(t, range.0) || same_distance(t, range.1) {
             Self::AtAnEnd
         } else if range.0 < t && t < range.1 {
@@ -108,8 +108,8 @@ impl Range {
     }
 }
 
-/// The closest of the candidates that are hits. It is certain if no doubtful candidate lies before or at it, and no
-/// other hit at it.
+/// Returns the closest of the candidates that are hits. It is certain if no uncertain candidate lies before or at it,
+/// and no other hit at it.
 pub(super) fn closest(candidates: impl Iterator<Item = Candidate> + Clone) -> Answer {
     let hits = candidates.clone().filter(|candidate| candidate.is_hit);
     let best = hits.min_by(|a, b| a.hit.t.total_cmp(&b.hit.t));
@@ -123,7 +123,7 @@ pub(super) fn closest(candidates: impl Iterator<Item = Candidate> + Clone) -> An
     Answer { hit: Some(best.hit), is_certain: !candidates.clone().any(|other| rival(&other)) }
 }
 
-/// All hits, the closest first; `None` where any is doubtful.
+/// Returns all hits, the closest first; `None` if any is uncertain.
 pub(super) fn all(candidates: impl Iterator<Item = Candidate> + Clone) -> Option<Vec<Hit>> {
     let certain = candidates.clone().all(|candidate| candidate.is_certain);
     let mut hits: Vec<_> = candidates.map(|candidate| candidate.hit).collect();
@@ -131,7 +131,7 @@ pub(super) fn all(candidates: impl Iterator<Item = Candidate> + Clone) -> Option
     certain.then_some(hits)
 }
 
-/// Whether there is any hit; `None` where that is doubtful.
+/// Returns whether there is any hit; `None` if that is uncertain.
 pub(super) fn any(mut candidates: impl Iterator<Item = Candidate> + Clone) -> Option<bool> {
     if candidates.clone().any(|candidate| candidate.is_certain) {
         return Some(true);

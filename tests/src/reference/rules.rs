@@ -1,4 +1,4 @@
-//! What a ray may hit: by its mask and flags, and by what geometry and instance ask for.
+//! Culling and opacity rules: mask and flags of a ray, flags of geometry and instance.
 
 use crate::ray_tracer::{
     CULL_BACK, CULL_FRONT, CULL_NO_OPAQUE, CULL_OPAQUE, How, NO_OPAQUE, OPAQUE, SKIP_TRIANGLES,
@@ -7,30 +7,30 @@ use crate::ray_tracer::{
 /// A ray's cull mask and flags, as Vulkan numbers them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rules {
-    /// Sees the instances that have one of these bits.
+    /// Cull mask.
     pub mask: u8,
     /// Ray flags.
     pub flags: u32,
 }
 
-/// What a geometry in an instance asks of rays.
+/// Flags of a geometry in an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Surface {
     /// The geometry is opaque.
     pub(super) is_opaque: bool,
-    /// The instance says otherwise.
+    /// Opacity that the instance forces.
     pub(super) force_opaque: Option<bool>,
-    /// Rays do not cull its sides.
+    /// True if the instance disables face culling.
     pub(super) no_cull: bool,
 }
 
 impl Rules {
-    /// The rays that see `mask`, without flags.
+    /// Returns the rules of a mask without flags.
     pub fn of_mask(mask: u8) -> Self {
         Self { mask, flags: 0 }
     }
 
-    /// Whether hits of the surface count without an any-hit shader.
+    /// True if hits of the surface need no any-hit shader.
     pub(super) fn is_opaque(self, surface: Surface) -> bool {
         match self.flags & (OPAQUE | NO_OPAQUE) {
             OPAQUE => true,
@@ -39,7 +39,7 @@ impl Rules {
         }
     }
 
-    /// Whether a triangle of the surface may be hit on this side.
+    /// True if rays may hit this side of a triangle of the surface.
     pub(super) fn admits(self, surface: Surface, is_front: bool) -> bool {
         let side = if is_front { CULL_FRONT } else { CULL_BACK };
         let kind = if self.is_opaque(surface) { CULL_OPAQUE } else { CULL_NO_OPAQUE };

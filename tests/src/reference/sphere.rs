@@ -5,27 +5,27 @@ use lvk::glam::DVec3;
 use super::candidate::{Answer, Candidate, Hit, HitIds, Range, closest};
 use crate::rays::Ray;
 
-/// How close, relative to the radius, a ray may pass the silhouette before it is in doubt.
+/// Distance from the silhouette, relative to the radius, below which a hit is uncertain.
 const SILHOUETTE: f64 = 1e-3;
 
 /// A sphere in world space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sphere {
-    /// Its centre.
+    /// Centre.
     pub center: DVec3,
-    /// Its radius.
+    /// Radius.
     pub radius: f64,
-    /// What a hit of it reports.
+    /// Numbers that a hit reports.
     pub ids: HitIds,
 }
 
 impl Sphere {
-    /// The first place where a ray passes through the surface of one of the spheres, from outside or from inside.
+    /// Returns the first hit of a ray with the surface of one of the spheres, from outside or from inside.
     pub fn closest(spheres: &[Self], ray: &Ray) -> Answer {
         Self::closest_of(spheres, ray, &[0, 1])
     }
 
-    /// The first place where a ray leaves one of the spheres.
+    /// Returns the first point where a ray leaves one of the spheres.
     pub fn closest_exit(spheres: &[Self], ray: &Ray) -> Answer {
         Self::closest_of(spheres, ray, &[1])
     }
@@ -35,7 +35,7 @@ impl Sphere {
         closest(candidates.iter().copied())
     }
 
-    /// The first of the sides (0 in, 1 out) that lies on the ray.
+    /// Returns the first of the sides (0 in, 1 out) within the ray's interval.
     fn candidate(&self, ray: &Ray, sides: &[usize]) -> Option<Candidate> {
         let direction = DVec3::from(ray.direction.map(f64::from));
         let to_center = self.center - DVec3::from(ray.origin.map(f64::from));
@@ -47,7 +47,7 @@ impl Sphere {
         let half = (self.radius.powi(2) - passing.powi(2)).max(0.0).sqrt() / direction.length();
         let range = (f64::from(ray.t_min), f64::from(ray.t_max));
         let ends = [middle - half, middle + half];
-        let places = ends.map(|t| Range::of(t, range));
+        let places = ends.map(|t| Range::locate(t, range));
         let first = *sides.iter().find(|side| places[**side] != Range::Outside)?;
         let t = ends[first];
         let cosine = (1.0 - (passing / self.radius).powi(2)).max(0.0).sqrt();

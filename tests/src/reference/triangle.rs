@@ -1,26 +1,26 @@
-//! Where a line crosses the plane of a triangle.
+//! Crossing of a line with the plane of a triangle.
 
 use lvk::glam::DVec3;
 
 /// A line through the plane of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Multiple of the direction.
+    /// Distance as a multiple of the direction.
     pub t: f64,
-    /// Weights of the corners, which add up to 1; all positive inside of the triangle.
+    /// Weights of the vertices. Their sum is 1, and all are positive inside of the triangle.
     pub weights: [f64; 3],
     /// Cosine between the direction and the normal `(b - a) x (c - a)`.
     pub cosine: f64,
 }
 
 impl Crossing {
-    /// The smallest weight: positive inside of the triangle, by how far.
+    /// Returns the smallest weight: positive inside of the triangle.
     pub fn margin(&self) -> f64 {
         self.weights.iter().copied().fold(f64::INFINITY, f64::min)
     }
 }
 
-/// Crosses a line with the plane of a triangle. `None` where they are parallel.
+/// Crosses a line with the plane of a triangle. Returns `None` if they are parallel.
 ///
 /// The triangle is sheared so that the line becomes an axis; what remains are three 2D edge tests, which two triangles
 /// that share an edge compute from the same numbers (Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection").
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_of_the_triangle_is_found_again() {
+    fn a_point_of_the_triangle_is_hit() {
         let mut random = Random::new(1);
         for _ in 0..2_000 {
             let corners = [vector(&mut random), vector(&mut random), vector(&mut random)];

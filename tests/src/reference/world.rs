@@ -1,4 +1,4 @@
-//! Instances flattened to world space, with a tree over their triangles.
+//! Instances flattened to world space, with a BVH over their triangles.
 
 use std::time::Duration;
 
@@ -13,9 +13,9 @@ use super::rules::{Rules, Surface};
 use super::triangle::cross;
 use crate::rays::Ray;
 
-/// Fewer triangles than this need no tree.
+/// Fewer triangles than this need no BVH.
 const TREE_TRIANGLES: usize = 16;
-/// Boxes are larger than their triangles by this share, so that near hits are found and rounding does not matter.
+/// Bounds are larger than their triangles by this share, so that near hits are found and rounding does not matter.
 const BOX_SLACK: f64 = 2e-3;
 
 /// Triangles of one geometry.
@@ -25,28 +25,28 @@ pub struct Geometry {
     pub positions: Vec<DVec3>,
     /// Three vertices for each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// Moves the vertices into object space; mirrored ones change their front.
+    /// Transform to object space; a mirroring one flips the front faces.
     pub transform: DAffine3,
-    /// Hits count without an any-hit shader.
+    /// True if hits need no any-hit shader.
     pub is_opaque: bool,
 }
 
-/// Geometries placed in the world.
+/// An instance of geometries.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance<'a> {
-    /// What is placed.
+    /// Geometries.
     pub geometries: &'a [Geometry],
-    /// Object space to world.
+    /// Transform from object space to world space.
     pub transform: DAffine3,
-    /// What hits of it report.
+    /// Custom index that hits report.
     pub custom_index: u32,
-    /// Rays see the instance if this and their mask have a bit in common.
+    /// Mask: rays see the instance if their mask has one of its bits.
     pub mask: u8,
-    /// The other side is the front.
+    /// True if front and back faces are swapped.
     pub flip_facing: bool,
-    /// Rays that cull a side do not cull its triangles.
+    /// True if face culling is disabled.
     pub no_cull: bool,
-    /// Every geometry is opaque, or none.
+    /// Opacity forced on every geometry.
     pub force_opaque: Option<bool>,
 }
 
@@ -60,13 +60,28 @@ struct Triangle {
     corners: [DVec3; 3],
     ids: HitIds,
     mask: u8,
-    /// World space winds the other way round than object space, or the front is flipped, but not both.
+    /// True if exactly one of a mirroring transform and swapped faces applies.
     mirrored: bool,
     surface: Surface,
 }
 
+impl<'a> Instance<'a> {
+    /// Creates an instance without a transform, with a full mask and no flags.
+    pub fn new(geometries: &'a [Geometry]) -> Self {
+        Self {
+            geometries,
+            transform: DAffine3::IDENTITY,
+            custom_index: 0,
+            mask: 0xff,
+            flip_facing: false,
+            no_cull: false,
+            force_opaque: None,
+        }
+    }
+}
+
 impl Reference {
-    /// Flattens instances; their order gives the instance indices.
+    /// Flattens instances. Their order gives the instance numbers.
     pub fn new(instances: &[Instance<'_>]) -> Self {
         let all = (0..).zip(instances).flat_map(|(index, item)| flatten(index, item));
         let triangles: Vec<_> = all.filter(Triangle::can_be_hit).collect();
@@ -76,14 +91,14 @@ impl Reference {
         Self { triangles, tree }
     }
 
-    /// Smallest and largest corner of everything.
+    /// Returns the bounds of all triangles.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);
         let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         corners.fold(empty, |(low, high), corner| (low.min(corner), high.max(corner)))
     }
 
-    /// What a ray hits first, among instances that have a bit of `mask`.
+    /// Returns the closest hit of a ray, among instances that have a bit of `mask`.
     pub fn closest(&self, ray: &Ray, mask: u8) -> Answer {
         self.closest_where(ray, mask, |_| true)
     }
@@ -93,12 +108,12 @@ impl Reference {
         self.closest_by_where(ray, rules, |_| true)
     }
 
-    /// As [`closest`](Self::closest), as if only the hits that `accept` likes existed.
+    /// As [`closest`](Self::closest), of the hits that `accept` returns `true` for.
     pub fn closest_where(&self, ray: &Ray, mask: u8, accept: impl Fn(&Hit) -> bool) -> Answer {
         self.closest_by_where(ray, Rules::of_mask(mask), accept)
     }
 
-    /// As [`closest_by`](Self::closest_by), as if only the hits that `accept` likes existed.
+    /// As [`closest_by`](Self::closest_by), of the hits that `accept` returns `true` for.
     pub fn closest_by_where(
         &self,
         ray: &Ray,
@@ -110,12 +125,12 @@ impl Reference {
         closest(candidates.iter().copied())
     }
 
-    /// Whether a ray hits anything; `None` where that is in doubt.
+    /// Returns whether a ray hits anything; `None` if that is uncertain.
     pub fn occluded(&self, ray: &Ray, mask: u8) -> Option<bool> {
         any(self.candidates(ray, Rules::of_mask(mask)).iter().copied())
     }
 
-    /// Everything a ray hits, the closest first; `None` where any of it is in doubt.
+    /// Returns all hits of a ray, the closest first; `None` if any is uncertain.
     pub fn all_hits(&self, ray: &Ray, rules: impl Into<Rules>) -> Option<Vec<Hit>> {
         all(self.candidates(ray, rules.into()).iter().copied())
     }
@@ -209,23 +224,11 @@ mod tests {
         Geometry { positions, triangles, transform: DAffine3::IDENTITY, is_opaque: true }
     }
 
-    fn instance(geometries: &[Geometry]) -> Instance<'_> {
-        Instance {
-            geometries,
-            transform: DAffine3::IDENTITY,
-            custom_index: 0,
-            mask: 0xff,
-            flip_facing: false,
-            no_cull: false,
-            force_opaque: None,
-        }
-    }
-
     #[test]
     fn the_tree_finds_what_trying_all_triangles_finds() {
         for seed in 0..8 {
             let geometry = [soup(seed, 20 + 60 * seed as u32)];
-            let reference = Reference::new(&[instance(&geometry)]);
+            let reference = Reference::new(&[Instance::new(&geometry)]);
             assert!(reference.tree.is_some());
             let mut hits = 0;
             for ray in random_rays(seed, 500, Vec3::NEG_ONE, Vec3::ONE) {
@@ -252,12 +255,12 @@ mod tests {
             transform: DAffine3::from_translation(DVec3::Z),
             is_opaque: true,
         }];
-        let near = Instance { custom_index: 7, mask: 1, ..instance(&square) };
+        let near = Instance { custom_index: 7, mask: 1, ..Instance::new(&square) };
         let far = Instance {
             transform: DAffine3::from_translation(DVec3::Z)
                 * DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)),
             mask: 2,
-            ..instance(&square)
+            ..Instance::new(&square)
         };
         let reference = Reference::new(&[near, far]);
         let ray = Ray::new(Vec3::new(0.1, 0.1, -2.0), Vec3::Z);

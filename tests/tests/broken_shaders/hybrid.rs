@@ -1,5 +1,5 @@
-//! Tests of the tests: the pictures of the samples fail to be what they were when a shader is broken on purpose, each
-//! stage and each technique once.
+//! Tests of the image tests of `hybrid` and `hybrid_oit`: a shader broken on purpose changes the image, once for each
+//! stage and technique.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -11,13 +11,13 @@ use lvk_samples::reflections::{Reflections, ReflectionsConfig};
 use lvk_samples::scene::Camera;
 use lvk_tests::broken_shaders::{BrokenShaders, Mistake, mistake, paint_over};
 use lvk_tests::device;
-use lvk_tests::glass_room::GlassRoom;
-use lvk_tests::hybrid::{Studio, paths};
-use lvk_tests::picture::{Tolerance, reference};
-use lvk_tests::still_life::still_life;
+use lvk_tests::hybrid::{HybridHarness, paths};
+use lvk_tests::image_comparison::{Tolerance, reference_image};
+use lvk_tests::oit_reference::OitRenderer;
+use lvk_tests::scene_obj::obj_scene;
 
-const SAME_AS_EVER: Tolerance = Tolerance::SAME_AS_EVER;
-/// Of a picture and itself.
+const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
+/// Of an image and itself.
 const THE_SAME: Tolerance = Tolerance { psnr: f64::INFINITY, ssim: 0.9999, differing_share: 0.0, flip: 0.0 };
 const MAIN: &str = "void main() {";
 const NOTHING: &str = "void main() {\n    return;";
@@ -125,7 +125,7 @@ const HYBRID_QUERY: [Mistake; 4] = [
 ];
 const QUEUED_PIPELINE: [Mistake; 1] = [mistake("no bounces", "hybrid/bounces.rgen.glsl", MAIN, NOTHING)];
 const QUEUED_QUERY: [Mistake; 1] = [mistake("no bounces", "hybrid/bounces.comp.glsl", MAIN, NOTHING)];
-/// One picture, whatever the order of its pixels: these are asked for the very same one.
+/// One image, whatever the order of its pixels: these are asked for the very same one.
 const ORDERED: [Mistake; 3] = [
     mistake(
         "a pixel left out",
@@ -133,17 +133,17 @@ const ORDERED: [Mistake; 3] = [
         "= pixel.x | ",
         "= pixel.x + uint(pixel == uvec2(80u, 45u)) | ",
     ),
-    // Not left unwritten: its words lead to pixels, and what memory held before may lie outside of the picture.
+    // Not left unwritten: its words lead to pixels, and what memory held before may lie outside of the image.
     mistake("no order", "hybrid/order.comp.glsl", "= pixel.x | pixel.y << 16;", "= 0u;"),
     mistake("others left out", "hybrid/pixel.glsl", "isFirst ? before : firsts + ", "isFirst ? before : "),
 ];
 const ORDERED_QUERY: [Mistake; 1] =
     [mistake("no rays", "hybrid/render.comp.glsl", "    uint group = ", "    return;\n    uint group = ")];
 
-/// What is broken, who notices, and what is asked of the device's paths.
+/// Name of the broken part, its mistakes, and the configuration whose image must change.
 type HybridWay<'a> = (&'a str, &'a [Mistake], HybridConfig);
 
-fn hybrid_ways() -> [HybridWay<'static>; 9] {
+fn hybrid_methods() -> [HybridWay<'static>; 9] {
     let plain =
         HybridConfig { width: 160, height: 90, bounces: Some(Bounces::Inline), ..HybridConfig::default() };
     let geometry = |geometry| HybridConfig { geometry, ..plain };
@@ -168,31 +168,31 @@ fn hybrid_ways() -> [HybridWay<'static>; 9] {
 #[test]
 #[ignore = "minutes for each: cargo test --test broken_shaders hybrid:: -- --ignored"]
 fn hybrid_notices() {
-    BrokenShaders::in_child(hybrid_notices, |shaders| {
+    BrokenShaders::in_subprocess(hybrid_notices, |shaders| {
         let Some(ctx) = device() else { return };
-        let (scene, paths) = (still_life(), paths(&ctx));
+        let (scene, paths) = (obj_scene(), paths(&ctx));
         assert_eq!(HybridConfig::default().method, Method::Hybrid);
-        for (by, mistakes, config) in hybrid_ways().iter().filter(|way| paths.contains(&way.2.path)) {
-            let picture = || {
-                let mut studio = Studio::with(&ctx, &scene, config);
-                paint_over(&ctx, studio.renderer.picture());
-                studio.picture(&scene.cameras[0])
+        for (by, mistakes, config) in hybrid_methods().iter().filter(|way| paths.contains(&way.2.path)) {
+            let image = || {
+                let mut harness = HybridHarness::with_config(&ctx, &scene, config);
+                paint_over(&ctx, harness.renderer.picture());
+                harness.render(&scene.cameras[0])
             };
             let inline = HybridConfig { bounces: Some(Bounces::Inline), ..*config };
             let (expected, tolerance) = match (config.geometry, config.bounces) {
                 (_, Some(Bounces::First)) => {
-                    (Studio::with(&ctx, &scene, &inline).picture(&scene.cameras[0]), THE_SAME)
+                    (HybridHarness::with_config(&ctx, &scene, &inline).render(&scene.cameras[0]), THE_SAME)
                 }
                 // The paper's edges are not those of rays.
-                (Geometry::Paper, _) => (picture(), SAME_AS_EVER),
-                _ => (reference("hybrid_small"), SAME_AS_EVER),
+                (Geometry::Paper, _) => (image(), ACROSS_DRIVERS),
+                _ => (reference_image("hybrid_small"), ACROSS_DRIVERS),
             };
-            shaders.assert_each_shows(by, &expected, &tolerance, mistakes, picture);
+            shaders.assert_each_changes_image(by, &expected, &tolerance, mistakes, image);
         }
     });
 }
 
-// Passes write all the same, as the picture is to follow from the shaders and not from what memory held before.
+// Passes write all the same, as the image is to follow from the shaders and not from what memory held before.
 const OIT_RAYS: &str = "#include \"hybrid_oit/shadow.glsl\"";
 const NO_OIT_RAYS: &str =
     "#define traceSunlight(origin, direction) vec3(0.0)\n#include \"hybrid_oit/shadow.glsl\"";
@@ -248,7 +248,7 @@ const OIT_QUERY: [Mistake; 3] = [
     mistake("no shadow rays", "hybrid_oit/shadow.comp.glsl", OIT_RAYS, NO_OIT_RAYS),
 ];
 
-/// Seen from close to a dark ball, as the picture of the whole room has few pixels of balls, most of them behind glass.
+/// Seen from close to a dark ball, as the image of the whole room has few pixels of balls, most of them behind glass.
 const VARNISH: [Mistake; 2] = [
     mistake("no varnish", "hybrid_oit/composite.comp.glsl", "surface.gloss * reflectance", "0.0"),
     mistake(
@@ -259,31 +259,31 @@ const VARNISH: [Mistake; 2] = [
     ),
 ];
 
-fn room(ctx: &Context, path: RayPath, [width, height]: [u32; 2], scene: &OitScene) -> RgbaImage {
-    let mut room = GlassRoom::new(ctx, scene, &HybridOitConfig::new(path, width, height));
+fn render_oit(ctx: &Context, path: RayPath, [width, height]: [u32; 2], scene: &OitScene) -> RgbaImage {
+    let mut room = OitRenderer::new(ctx, scene, &HybridOitConfig::new(path, width, height));
     paint_over(ctx, room.sample.texture());
-    room.picture(1.9)
+    room.render(1.9)
 }
 
 #[test]
 #[ignore = "minutes for each: cargo test --test broken_shaders hybrid:: -- --ignored"]
 fn hybrid_oit_notices() {
-    BrokenShaders::in_child(hybrid_oit_notices, |shaders| {
+    BrokenShaders::in_subprocess(hybrid_oit_notices, |shaders| {
         let Some(ctx) = device() else { return };
-        let (scene, expected) = (OitScene::default(), reference("hybrid_oit_small"));
+        let (scene, expected) = (OitScene::default(), reference_image("hybrid_oit_small"));
         for path in paths(&ctx) {
             let mistakes = match path {
                 RayPath::Pipeline => [&OIT[..], &OIT_RASTER].concat(),
                 RayPath::Query => OIT_QUERY.to_vec(),
             };
             let by = format!("oit by {path:?}");
-            let picture = || room(&ctx, path, [240, 135], &scene);
-            shaders.assert_each_shows(&by, &expected, &SAME_AS_EVER, &mistakes, picture);
+            let image = || render_oit(&ctx, path, [240, 135], &scene);
+            shaders.assert_each_changes_image(&by, &expected, &ACROSS_DRIVERS, &mistakes, image);
         }
         let camera = Camera::looking_at([0.7, 1.7, 2.6], [0.25, 1.32, 0.95], 17.0);
         let scene = OitScene { camera, ..scene };
-        let picture = || room(&ctx, paths(&ctx)[0], [160, 90], &scene);
-        shaders.assert_each_shows("varnish", &picture(), &SAME_AS_EVER, &VARNISH, picture);
+        let image = || render_oit(&ctx, paths(&ctx)[0], [160, 90], &scene);
+        shaders.assert_each_changes_image("varnish", &image(), &ACROSS_DRIVERS, &VARNISH, image);
     });
 }
 
@@ -294,10 +294,10 @@ const NO_HALL_RAYS: &str = "
 #include \"reflections/reflect.glsl\"";
 
 const REFLECTIONS: [Mistake; 23] = [
-    mistake("mirrors short-sighted", "reflections/range.glsl", "return kFar;", "return 0.5;"),
+    mistake("mirrors short-sighted", "reflections/ray_range.glsl", "return kFar;", "return 0.5;"),
     mistake(
         "rough surfaces not traced",
-        "reflections/range.glsl",
+        "reflections/ray_range.glsl",
         "kRoughestTraced = 0.7",
         "kRoughestTraced = 0.09",
     ),
@@ -380,7 +380,7 @@ const REFLECTIONS_QUERY: [Mistake; 3] = [
 ];
 
 const REFLECTIONS_EVER: [Mistake; 3] = [
-    mistake("mirrors short-sighted", "reflections/range.glsl", "return kFar;", "return 0.5;"),
+    mistake("mirrors short-sighted", "reflections/ray_range.glsl", "return kFar;", "return 0.5;"),
     mistake("no shadows", "reflections/visibility.glsl", "if (blocker >= 0.0)", "if (blocker >= 1e30)"),
     mistake("no blur", "reflections/filter.comp.glsl", "radius > 0.75", "radius > 1e9"),
 ];
@@ -399,7 +399,7 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
     let mut hall = Reflections::new(ctx, config).unwrap();
     hall.show(0.0);
     if let Some(view) = view {
-        hall.look(view);
+        hall.set_camera(view);
     }
     paint_over(ctx, hall.picture());
     RgbaImage::from_raw(config.width, config.height, headless::picture(&mut hall).unwrap()).unwrap()
@@ -408,9 +408,9 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
 #[test]
 #[ignore = "minutes for each: cargo test --test broken_shaders hybrid:: -- --ignored"]
 fn reflections_notices() {
-    BrokenShaders::in_child(reflections_notices, |shaders| {
+    BrokenShaders::in_subprocess(reflections_notices, |shaders| {
         let Some(ctx) = device() else { return };
-        // Smaller than the picture that is as ever: there are many.
+        // Smaller than the image that is as ever: there are many.
         let expected = hall(&ctx, paths(&ctx)[0], None);
         for path in paths(&ctx) {
             let mistakes: &[Mistake] = match path {
@@ -418,19 +418,21 @@ fn reflections_notices() {
                 RayPath::Query => &REFLECTIONS_QUERY,
             };
             let by = format!("reflections by {path:?}");
-            shaders.assert_each_shows(&by, &expected, &SAME_AS_EVER, mistakes, || hall(&ctx, path, None));
+            shaders.assert_each_changes_image(&by, &expected, &ACROSS_DRIVERS, mistakes, || {
+                hall(&ctx, path, None)
+            });
         }
         let path = paths(&ctx)[0];
         let view = Camera::looking_at([2.6, 0.3, -3.6], [1.6, 0.1, -7.0], 45.0);
         let expected = hall(&ctx, path, Some(&view));
         let mistakes = if path == RayPath::Pipeline { &LEAVES[..] } else { &LEAVES[..1] };
-        shaders.assert_each_shows("leaves", &expected, &SAME_AS_EVER, mistakes, || {
+        shaders.assert_each_changes_image("leaves", &expected, &ACROSS_DRIVERS, mistakes, || {
             hall(&ctx, path, Some(&view))
         });
-        // The picture of the test that the hall looks as it always did.
+        // The image of the test that the hall looks as it always did.
         let config = ReflectionsConfig { samples: 4, ..ReflectionsConfig::new(path, 162, 91) };
-        let expected = reference("reflections_small");
-        shaders.assert_each_shows("as ever", &expected, &SAME_AS_EVER, &REFLECTIONS_EVER, || {
+        let expected = reference_image("reflections_small");
+        shaders.assert_each_changes_image("as ever", &expected, &ACROSS_DRIVERS, &REFLECTIONS_EVER, || {
             hall_of(&ctx, &config, None)
         });
     });

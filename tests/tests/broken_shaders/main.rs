@@ -1,4 +1,4 @@
-//! Tests of the tests: pictures of samples must not be what they were when a shader is broken on purpose.
+//! Tests of the image tests: a shader broken on purpose changes the image of its sample.
 
 mod hybrid;
 mod raster;

@@ -1,4 +1,4 @@
-//! Tests of the tests: the pictures of the samples that only rasterise change when a shader is broken on purpose.
+//! Tests of the image tests of the samples that only rasterise: a shader broken on purpose changes the image.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{Context, OptionalFeature};
@@ -12,13 +12,13 @@ use lvk_samples::scene::Scene;
 use lvk_samples::sponza::{DrawPath, Sponza, SponzaConfig};
 use lvk_samples::triplanar::Triplanar;
 use lvk_samples::yuv::{CONVERSIONS, Yuv, YuvConfig};
-use lvk_tests::board::board;
 use lvk_tests::broken_shaders::{BrokenShaders, Mistake, mistake};
-use lvk_tests::picture::Tolerance;
+use lvk_tests::image_comparison::Tolerance;
 use lvk_tests::raster::has;
-use lvk_tests::raster_sample::{SIZE, picture_of};
-use lvk_tests::relief::{Tilt, tiles};
-use lvk_tests::still_life::still_life;
+use lvk_tests::raster_sample::{SIZE, image_of};
+use lvk_tests::scene_normal_map::{Tilt, normal_map_scene};
+use lvk_tests::scene_obj::obj_scene;
+use lvk_tests::scene_shadow_mask::shadow_mask_scene;
 use lvk_tests::{device, device_with};
 
 /// A moment at which everything has moved.
@@ -224,11 +224,11 @@ const BOARD: [Mistake; 2] = [
 ];
 /// Of tilted tiles.
 const TILES: [Mistake; 3] = [
-    mistake("no relief", "sponza/relief.glsl", "kNoTexture || frame.hasRelief == 0u", "0u || true"),
-    mistake("upside down", "sponza/relief.glsl", "found.y * upwards", "-found.y * upwards"),
+    mistake("no relief", "sponza/normal_mapping.glsl", "kNoTexture || frame.hasRelief == 0u", "0u || true"),
+    mistake("upside down", "sponza/normal_mapping.glsl", "found.y * upwards", "-found.y * upwards"),
     mistake(
         "turned by neighbours",
-        "sponza/relief.glsl",
+        "sponza/normal_mapping.glsl",
         "sign(dot(right, acrossDown))",
         "-1.0 * sign(dot(right, acrossDown))",
     ),
@@ -243,15 +243,15 @@ const STILL_LIFE: [Mistake; 2] = [
     ),
     mistake("no mirror", "sponza/surface.frag.glsl", "material.reflectivity)", "0.0)"),
 ];
-/// Where no sun shines.
+/// Mistakes in a scene without the sun.
 const STILL_LIFE_BY_LAMP: [Mistake; 1] =
     [mistake("no lamp", "sponza/surface.frag.glsl", "albedo * lamplight", "0.0 * lamplight")];
 
-/// Breaks each shader, and takes a picture of a sample made anew.
+/// Breaks each shader, and takes an image of a sample made anew.
 fn check<S: Sample>(shaders: &BrokenShaders, by: &str, mistakes: &[Mistake], make: impl Fn() -> S) {
-    let expected = picture_of(&mut make(), FRAME);
-    let picture = || picture_of(&mut make(), FRAME);
-    shaders.assert_each_shows(by, &expected, &Tolerance::SAME_AS_EVER, mistakes, picture);
+    let expected = image_of(&mut make(), FRAME);
+    let image = || image_of(&mut make(), FRAME);
+    shaders.assert_each_changes_image(by, &expected, &Tolerance::ACROSS_DRIVERS, mistakes, image);
 }
 
 fn cube_map(ctx: &Context, faces: Faces) -> RenderToCubeMap {
@@ -275,7 +275,7 @@ fn sponza(ctx: &Context, scene: &Scene, draws: DrawPath) -> Sponza {
 #[test]
 #[ignore = "half a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn samples_that_rasterise_notice() {
-    BrokenShaders::in_child(samples_that_rasterise_notice, |shaders| {
+    BrokenShaders::in_subprocess(samples_that_rasterise_notice, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "hello_triangle", &TRIANGLE, || HelloTriangle::new(&ctx, SIZE).unwrap());
         check(shaders, "six faces", &CUBE_MAP, || cube_map(&ctx, Faces::SixPasses));
@@ -294,7 +294,7 @@ fn samples_that_rasterise_notice() {
 #[test]
 #[ignore = "a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn deferred_notices() {
-    BrokenShaders::in_child(deferred_notices, |shaders| {
+    BrokenShaders::in_subprocess(deferred_notices, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "by several passes", &[&HALL[..], &HALL_SEVERAL].concat(), || {
             hall(&ctx, Passes::Several)
@@ -308,7 +308,7 @@ fn deferred_notices() {
 #[test]
 #[ignore = "a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn omni_shadows_notices() {
-    BrokenShaders::in_child(omni_shadows_notices, |shaders| {
+    BrokenShaders::in_subprocess(omni_shadows_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let usual = OmniShadowsConfig { shows_cube: true, ..OmniShadowsConfig::new(SIZE) };
         if has(&ctx, OptionalFeature::Multiview) {
@@ -325,7 +325,7 @@ fn omni_shadows_notices() {
 #[test]
 #[ignore = "seconds: cargo test --test broken_shaders raster:: -- --ignored"]
 fn yuv_notices() {
-    BrokenShaders::in_child(yuv_notices, |shaders| {
+    BrokenShaders::in_subprocess(yuv_notices, |shaders| {
         let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
         let config = YuvConfig { film: [96, 64], shows_planes: true, ..YuvConfig::new(SIZE) };
         check(shaders, "yuv", &FILM, || Yuv::new(&ctx, &config).unwrap());
@@ -335,18 +335,18 @@ fn yuv_notices() {
 #[test]
 #[ignore = "a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn sponza_notices() {
-    BrokenShaders::in_child(sponza_notices, |shaders| {
+    BrokenShaders::in_subprocess(sponza_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let atrium = Scene::atrium();
         if has(&ctx, OptionalFeature::DrawIndirectCount) {
             check(shaders, "atrium", &ATRIUM, || sponza(&ctx, &atrium, DrawPath::Counted));
         }
         check(shaders, "padded", &ATRIUM_PADDED, || sponza(&ctx, &atrium, DrawPath::Padded));
-        let board = board();
+        let board = shadow_mask_scene();
         check(shaders, "board", &BOARD, || sponza(&ctx, &board, DrawPath::Padded));
-        let tiles = tiles(Tilt::Map);
+        let tiles = normal_map_scene(Tilt::Map);
         check(shaders, "tiles", &TILES, || sponza(&ctx, &tiles, DrawPath::Padded));
-        let sunny = still_life();
+        let sunny = obj_scene();
         check(shaders, "still life", &STILL_LIFE, || sponza(&ctx, &sunny, DrawPath::Padded));
         let dark = Scene { sun: None, ..sunny.clone() };
         check(shaders, "by the lamp", &STILL_LIFE_BY_LAMP, || sponza(&ctx, &dark, DrawPath::Padded));

@@ -1,4 +1,4 @@
-//! Tests of the tests: the pictures of the small samples that trace rays change when a shader is broken on purpose.
+//! Tests of the image tests of the small ray tracing samples: a shader broken on purpose changes the image.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -16,14 +16,14 @@ use lvk_samples::scene::{Camera, Scene};
 use lvk_tests::broken_shaders::{BrokenShaders, Mistake, mistake};
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::Tolerance;
-use lvk_tests::raster_sample::{SIZE, picture_now, picture_of};
-use lvk_tests::still_life::still_life;
+use lvk_tests::image_comparison::Tolerance;
+use lvk_tests::raster_sample::{SIZE, image_now, image_of};
+use lvk_tests::scene_obj::obj_scene;
 
 /// A moment at which everything has moved.
 const FRAME: u32 = 20;
 
-// Each writes all pixels all the same, as the picture is to follow from the shaders and not from what memory held before.
+// Each writes all pixels all the same, as the image is to follow from the shaders and not from what memory held before.
 const HELLO: [Mistake; 7] = [
     mistake("mirrored", "rtx_hello/view.glsl", "vec3(0.55 * seen.x", "vec3(-0.55 * seen.x"),
     mistake("white triangles", "rtx_hello/view.glsl", "sqrt(corners)", "vec3(1.0)"),
@@ -214,13 +214,13 @@ const VALLEY_QUERY: [Mistake; 4] = [
     ),
 ];
 
-/// Breaks each shader of a path, and takes a picture, of a sample made anew.
+/// Breaks each shader of a path, and takes an image, of a sample made anew.
 fn check(
     shaders: &BrokenShaders,
     by: &str,
     ctx: &Context,
     mistakes: [&[Mistake]; 2],
-    picture: impl Fn(&RtxConfig) -> RgbaImage,
+    image: impl Fn(&RtxConfig) -> RgbaImage,
 ) {
     let [width, height] = SIZE;
     for path in paths(ctx) {
@@ -229,19 +229,19 @@ fn check(
             RayPath::Pipeline => mistakes[0],
             RayPath::Query => mistakes[1],
         };
-        let picture = || picture(&config);
+        let image = || image(&config);
         let by = format!("{by} by {path:?}");
-        shaders.assert_each_shows(&by, &picture(), &Tolerance::SAME_AS_EVER, mistakes, picture);
+        shaders.assert_each_changes_image(&by, &image(), &Tolerance::ACROSS_DRIVERS, mistakes, image);
     }
 }
 
 #[test]
 #[ignore = "seconds: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_hello_notices() {
-    BrokenShaders::in_child(rtx_hello_notices, |shaders| {
+    BrokenShaders::in_subprocess(rtx_hello_notices, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "hello", &ctx, [&HELLO, &HELLO_QUERY], |config| {
-            picture_of(&mut RtxHello::new(&ctx, config).unwrap(), FRAME)
+            image_of(&mut RtxHello::new(&ctx, config).unwrap(), FRAME)
         });
     });
 }
@@ -249,20 +249,20 @@ fn rtx_hello_notices() {
 #[test]
 #[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_ao_notices() {
-    BrokenShaders::in_child(rtx_ao_notices, |shaders| {
+    BrokenShaders::in_subprocess(rtx_ao_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let (town, carousel) = (Scene::town(), Scene::carousel());
         let make = |config: &RtxConfig| {
             let config = RtxAoConfig { passes: 2, rays: 2, radius: Some(1.8), ..RtxAoConfig::new(*config) };
             RtxAo::new(&ctx, &town, Some(&carousel), &config).unwrap()
         };
-        let moved = |config: &RtxConfig| picture_of(&mut make(config), FRAME);
+        let moved = |config: &RtxConfig| image_of(&mut make(config), FRAME);
         check(shaders, "town", &ctx, [&TOWN, &TOWN_QUERY], moved);
         let above = Camera::looking_at([0.0, 30.0, 0.0], [30.0, 32.0, 0.0], 60.0);
         check(shaders, "above the town", &ctx, [&TOWN_SKY; 2], |config| {
             let mut sample = make(config);
             sample.set_view(&above);
-            picture_now(&mut sample)
+            image_now(&mut sample)
         });
     });
 }
@@ -270,12 +270,12 @@ fn rtx_ao_notices() {
 #[test]
 #[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_pipeline_notices() {
-    BrokenShaders::in_child(rtx_pipeline_notices, |shaders| {
+    BrokenShaders::in_subprocess(rtx_pipeline_notices, |shaders| {
         let Some(ctx) = device() else { return };
-        let scene = still_life();
+        let scene = obj_scene();
         check(shaders, "still life", &ctx, [&RECURSION, &LOOP], |config| {
             let config = RtxPipelineConfig { rtx: *config, depth: 3 };
-            picture_of(&mut RtxPipeline::new(&ctx, &scene, &config).unwrap(), FRAME)
+            image_of(&mut RtxPipeline::new(&ctx, &scene, &config).unwrap(), FRAME)
         });
     });
 }
@@ -283,10 +283,10 @@ fn rtx_pipeline_notices() {
 #[test]
 #[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_textures_notices() {
-    BrokenShaders::in_child(rtx_textures_notices, |shaders| {
+    BrokenShaders::in_subprocess(rtx_textures_notices, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "waves", &ctx, [&WAVES, &WAVES_QUERY], |config| {
-            picture_of(&mut RtxTextures::new(&ctx, config).unwrap(), FRAME)
+            image_of(&mut RtxTextures::new(&ctx, config).unwrap(), FRAME)
         });
     });
 }
@@ -294,16 +294,16 @@ fn rtx_textures_notices() {
 #[test]
 #[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn large_scene_notices() {
-    BrokenShaders::in_child(large_scene_notices, |shaders| {
+    BrokenShaders::in_subprocess(large_scene_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let show = |world: &World, rtx: &RtxConfig, show| {
             let config = LargeSceneConfig { show, ..LargeSceneConfig::new(*rtx) };
             let sample = LargeScene::new(&ctx, world, &config, &mut Progress::hidden());
-            picture_of(&mut sample.unwrap(), FRAME)
+            image_of(&mut sample.unwrap(), FRAME)
         };
         let (valley, street) = (
             World::valley(12_000, 40, &mut Progress::hidden()).unwrap(),
-            World::street(vec![still_life()], 2).unwrap(),
+            World::street(vec![obj_scene()], 2).unwrap(),
         );
         check(shaders, "valley", &ctx, [&VALLEY, &VALLEY_QUERY], |rtx| show(&valley, rtx, Show::Picture));
         check(shaders, "street", &ctx, [&STREET; 2], |rtx| show(&street, rtx, Show::Picture));

@@ -1,10 +1,11 @@
-//! Hidden barriers: chains of commands give the results of running one after the other, and validation stays silent.
+//! Automatic barriers: a chain of commands gives the same results as running one command after the other, without
+//! validation messages.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, Context, Dependencies, Error,
-    Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc, TextureDesc, TextureRegion,
-    TextureUsage,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, CommandBuffer, Context,
+    Dependencies, Error, Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc,
+    RenderPipelineHandle, TextureDesc, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::device;
@@ -90,12 +91,8 @@ const DRAW_WRITTEN: &str = "
     void main() { gl_Position = vec4(corner, 0, 1); }";
 const SEVEN: &str = "layout(location = 0) out vec4 result; void main() { result = vec4(7); }";
 
-#[test]
-fn draws_take_everything_from_a_dispatch_they_declare() {
-    let Some(ctx) = device() else { return };
-    let usage = BufferUsage::INDEX | BufferUsage::VERTEX | BufferUsage::INDIRECT;
-    let draw = buffer(&ctx, usage, 64);
-    let write = compute_pipeline(&ctx, WRITE_DRAW);
+/// A pipeline that draws vertices of a buffer, two floats each, and writes 7 to every pixel.
+fn sevens_pipeline(ctx: &Context) -> Holder<RenderPipelineHandle> {
     let attribute = lvk::VertexAttribute { format: lvk::VertexFormat::F32x2, ..Default::default() };
     let desc = RenderPipelineDesc {
         vertex_bindings: &[lvk::VertexBinding { stride: 8, per_instance: false }],
@@ -103,10 +100,26 @@ fn draws_take_everything_from_a_dispatch_they_declare() {
         color: &[Format::R32Float.into()],
         ..Default::default()
     };
-    let pipeline = render_pipeline(&ctx, DRAW_WRITTEN, SEVEN, &desc);
+    render_pipeline(ctx, DRAW_WRITTEN, SEVEN, &desc)
+}
+
+#[test]
+fn draws_take_everything_from_a_dispatch_they_declare() {
+    let Some(ctx) = device() else { return };
+    let usage = BufferUsage::INDEX | BufferUsage::VERTEX | BufferUsage::INDIRECT;
+    let draw = buffer(&ctx, usage, 64);
+    let write = compute_pipeline(&ctx, WRITE_DRAW);
+    let pipeline = sevens_pipeline(&ctx);
     let target = target(&ctx, Format::R32Float, [4, 4]);
     let color = [ColorAttachment::clear(*target, [0.0; 4])];
     let declared = Dependencies { read_buffers: &[*draw], ..Default::default() };
+    let draw_all = |cmd: &mut CommandBuffer, desc: &RenderPassDesc<'_>| {
+        let mut pass = cmd.begin_rendering(desc).unwrap();
+        pass.bind_render_pipeline(*pipeline).unwrap();
+        pass.bind_index_buffer(*draw, 0, IndexFormat::U32).unwrap();
+        pass.bind_vertex_buffer(0, *draw, 32).unwrap();
+        pass.draw_indexed_indirect(*draw, 12, 1, 20).unwrap();
+    };
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.bind_compute_pipeline(*write).unwrap();
     cmd.push_constants(&ctx.buffer_address(*draw).unwrap()).unwrap();
@@ -121,22 +134,12 @@ fn draws_take_everything_from_a_dispatch_they_declare() {
         );
     }
     drop(pass);
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { dependencies: declared, ..silent }).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.bind_index_buffer(*draw, 0, IndexFormat::U32).unwrap();
-    pass.bind_vertex_buffer(0, *draw, 32).unwrap();
-    pass.draw_indexed_indirect(*draw, 12, 1, 20).unwrap();
-    drop(pass);
+    draw_all(&mut cmd, &RenderPassDesc { dependencies: declared, ..silent });
     ctx.submit(cmd).unwrap();
     assert_eq!(pixels::<f32>(&ctx, *target), [7.0; 16]);
     // In a later command buffer the library knows without being told.
     let mut cmd = ctx.acquire_command_buffer().unwrap();
-    let mut pass = cmd.begin_rendering(&silent).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.bind_index_buffer(*draw, 0, IndexFormat::U32).unwrap();
-    pass.bind_vertex_buffer(0, *draw, 32).unwrap();
-    pass.draw_indexed_indirect(*draw, 12, 1, 20).unwrap();
-    drop(pass);
+    draw_all(&mut cmd, &silent);
     ctx.submit(cmd).unwrap();
     assert_eq!(pixels::<f32>(&ctx, *target), [7.0; 16]);
 }
@@ -152,14 +155,7 @@ fn what_a_copy_wrote_is_read_by_draws_without_being_declared() {
     };
     let source = ctx.create_buffer(&source).unwrap();
     let vertices = buffer(&ctx, BufferUsage::VERTEX, 24);
-    let attribute = lvk::VertexAttribute { format: lvk::VertexFormat::F32x2, ..Default::default() };
-    let desc = RenderPipelineDesc {
-        vertex_bindings: &[lvk::VertexBinding { stride: 8, per_instance: false }],
-        vertex_attributes: &[attribute],
-        color: &[Format::R32Float.into()],
-        ..Default::default()
-    };
-    let pipeline = render_pipeline(&ctx, DRAW_WRITTEN, SEVEN, &desc);
+    let pipeline = sevens_pipeline(&ctx);
     let target = target(&ctx, Format::R32Float, [2, 2]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     for round in 0..2 {
@@ -278,7 +274,7 @@ fn textures_keep_their_layout_when_recorded_and_submitted_in_different_orders() 
 }
 
 #[test]
-fn one_command_cannot_use_a_texture_in_two_ways() {
+fn one_command_cannot_use_a_texture_in_two_layouts() {
     let Some(ctx) = device() else { return };
     let desc = TextureDesc {
         format: Format::R32Float,
@@ -316,7 +312,7 @@ fn one_command_cannot_use_a_texture_in_two_ways() {
 }
 
 #[test]
-fn mapped_memory_shows_what_shaders_wrote() {
+fn mapped_memory_contains_what_shaders_wrote() {
     let Some(ctx) = device() else { return };
     let pipeline = step_pipeline(&ctx);
     let first: Vec<u32> = (0..64).collect();

@@ -1,4 +1,4 @@
-//! Command buffers, and queues that run them: order, barriers, threads, and what they measure.
+//! Command buffers and queues: order, barriers, threads and measurements.
 
 mod barriers;
 mod profiler;

@@ -1,4 +1,5 @@
-//! Queries: samples that pass, what the stages do, times inside of passes, clocks; and what must be refused.
+//! Query pools: occlusion, pipeline statistics, timestamps inside of passes, calibrated timestamps, and refused
+//! calls.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::time::{Duration, Instant};
@@ -121,7 +122,7 @@ fn samples_of_rectangles_are_counted() {
 }
 
 #[test]
-fn more_queries_than_are_read_at_once_keep_their_places() {
+fn more_queries_than_are_read_at_once_keep_their_order() {
     let Some(ctx) = device() else { return };
     let (canvas, pool) = (Canvas::new(&ctx), occlusion(&ctx, 70));
     let mut cmd = ctx.acquire_command_buffer().unwrap();

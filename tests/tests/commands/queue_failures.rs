@@ -1,5 +1,5 @@
-//! Submissions that a driver refuses: what was submitted before is waited for, what was not is not, and nothing that the GPU
-//! still uses is taken back; the validation layer would see it.
+//! Submissions that the driver refuses: the library waits for what was submitted before, does not wait for the rest,
+//! and frees nothing that the GPU still uses. The validation layer would report it.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::time::Duration;
 use lvk::test_hooks::{fail_submission_after, waiting_objects, with_fault_injection};
 use lvk::{Context, Error, Queue, SubmitHandle, TextureDesc, TextureUsage};
 use lvk_tests::compute::words_buffer;
-use lvk_tests::queues::{REQUESTS, WORDS, on};
+use lvk_tests::queues::{REQUESTS, WORDS, submit_on};
 use lvk_tests::{TestDevice, device_with};
 
 /// Runs a test with each way to have queues, each kept in a context whose submissions can fail.
@@ -40,11 +40,11 @@ fn ends(ctx: &Arc<TestDevice>, wait: impl Fn(&Context) -> lvk::Result<()> + Send
 }
 
 #[test]
-fn nobody_waits_for_a_submission_that_failed() {
+fn no_wait_hangs_on_a_submission_that_failed() {
     each(|ctx| {
         let words = words_buffer(ctx, &[7; WORDS]);
         for refusing in Queue::ALL {
-            let before = Queue::ALL.map(|queue| on(ctx, queue, |_| {}));
+            let before = Queue::ALL.map(|queue| submit_on(ctx, queue, |_| {}));
             let mut cmd = ctx.acquire_command_buffer_on(refusing).unwrap();
             cmd.fill_buffer(*words, 0, 256, 1).unwrap();
             if refusing != Queue::Transfer {
@@ -69,7 +69,7 @@ fn what_went_out_before_the_failure_is_kept_until_it_is_done() {
         ctx.set_profiling(true).unwrap();
         let words = words_buffer(ctx, &[7; 1 << 20]);
         for queue in [Queue::Compute, Queue::Graphics] {
-            on(ctx, queue, |_| {});
+            submit_on(ctx, queue, |_| {});
             ctx.upload_buffer(*words, 0, &[1; 4 << 20]).unwrap();
         }
         let mut cmd = ctx.acquire_command_buffer().unwrap();
@@ -94,7 +94,7 @@ fn an_image_that_left_its_queue_is_kept_until_it_is_done() {
         let clear = |cmd: &mut lvk::CommandBuffer| {
             cmd.clear_texture(*image, lvk::ClearValue::Color([1.0; 4]), &Default::default()).unwrap();
         };
-        on(ctx, Queue::Compute, clear);
+        submit_on(ctx, Queue::Compute, clear);
         let mut cmd = ctx.acquire_command_buffer().unwrap();
         clear(&mut cmd);
         fail_submission_after(1);

@@ -1,4 +1,4 @@
-//! What queues refuse, alike everywhere, and what they measure.
+//! Commands that a queue does not support: the same errors on every device; and profiling on queues.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -8,7 +8,7 @@ use lvk::{
 };
 use lvk_tests::compute::{read_words, words_buffer};
 use lvk_tests::device_with;
-use lvk_tests::queues::{WORDS, each, on, step, step_pipeline};
+use lvk_tests::queues::{WORDS, for_each_queue_request, step, step_pipeline, submit_on};
 use lvk_tests::raster::usage_error;
 
 /// Asserts that a command was refused for its queue.
@@ -25,7 +25,7 @@ fn wrong_queue<T>(result: lvk::Result<T>, wanted: Queue) {
 /// Refused alike on every device, and the command buffer stays as it was.
 #[test]
 fn queues_refuse_what_they_cannot_do() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         let words = words_buffer(ctx, &[1; WORDS]);
         let usage = TextureUsage::SAMPLED | TextureUsage::STORAGE | TextureUsage::TARGET;
@@ -74,7 +74,7 @@ fn check_foreign(ctx: &Context, words: &Holder<BufferHandle>) {
             concurrent,
             debug_name: "somebody else's",
         };
-        // SAFETY: the buffer is this context's own, outlives the handle, and nobody else uses it meanwhile.
+        // SAFETY: the buffer is this context's own, outlives the handle, and is not used otherwise meanwhile.
         unsafe { ctx.import_buffer(&import) }.unwrap()
     };
     for queue in [Queue::Compute, Queue::Transfer] {
@@ -96,10 +96,10 @@ fn check_foreign(ctx: &Context, words: &Holder<BufferHandle>) {
 #[test]
 fn submissions_of_another_context_cannot_be_waited_for() {
     let (Some(ctx), Some(other)) = (device_with(|_| {}), device_with(|_| {})) else { return };
-    let foreign = on(&other, Queue::Graphics, |_| {});
+    let foreign = submit_on(&other, Queue::Graphics, |_| {});
     let pipeline = step_pipeline(&ctx);
     let [a, b] = [(); 2].map(|()| words_buffer(&ctx, &[2; WORDS]));
-    on(&ctx, Queue::Compute, |cmd| {
+    submit_on(&ctx, Queue::Compute, |cmd| {
         step(&ctx, cmd, *pipeline, [*a, *b], 1);
         let wait_for = [SubmitHandle::default(), foreign];
         let deps = Dependencies { wait_for: &wait_for, ..Default::default() };
@@ -113,13 +113,13 @@ fn submissions_of_another_context_cannot_be_waited_for() {
 /// Pools go from queue to queue, too: reset on one, written on another, read by the host.
 #[test]
 fn timestamps_are_taken_on_every_queue_that_has_them() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pool = ctx.create_query_pool(&QueryPoolDesc { count: 6, ..Default::default() }).unwrap();
         let words = words_buffer(ctx, &[1; WORDS]);
         let queues = Queue::ALL.map(|queue| (queue, ctx.capabilities().queue(queue).timestamp_bits > 0));
         for round in 0..2 {
             if round == 1 {
-                on(ctx, Queue::Compute, |cmd| cmd.reset_queries(*pool, 0..6).unwrap());
+                submit_on(ctx, Queue::Compute, |cmd| cmd.reset_queries(*pool, 0..6).unwrap());
             }
             for ((queue, has), first) in queues.into_iter().zip([0, 2, 4]) {
                 let mut cmd = ctx.acquire_command_buffer_on(queue).unwrap();
@@ -146,14 +146,14 @@ fn timestamps_are_taken_on_every_queue_that_has_them() {
 
 #[test]
 fn profiles_have_the_scopes_of_all_queues() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         ctx.set_profiling(true).unwrap();
         let pipeline = step_pipeline(ctx);
         let [a, b] = [(); 2].map(|()| words_buffer(ctx, &[2; WORDS]));
         for _ in 0..4 {
             ctx.next_frame().unwrap();
             for (queue, name) in [(Queue::Compute, "computed"), (Queue::Graphics, "drawn")] {
-                on(ctx, queue, |cmd| {
+                submit_on(ctx, queue, |cmd| {
                     cmd.push_label(name);
                     step(ctx, cmd, *pipeline, [*a, *b], 1);
                 });

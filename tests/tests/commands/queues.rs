@@ -1,6 +1,6 @@
-//! Queues: results are those of one command buffer after the other, whichever queues they run on, and validation stays
-//! silent. No test places a barrier or waits before it reads; every test runs with queues of the device's own where it has
-//! them, with queues that are only rehearsed, and with one for all.
+//! Several queues: results equal those of one command buffer after the other, on any queue, without validation
+//! messages. No test records a barrier or waits before it reads. Every test runs with the device's own queues where
+//! it has them, with emulated queues, and with one queue for all.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::ash::vk;
@@ -11,38 +11,38 @@ use lvk::{
     SubmitHandle, TextureDesc, TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage,
     TlasDesc,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::bender::{Bender, bent};
 use lvk_tests::compute::{Evaluator, read_vec4, read_words, vec4_buffer, words_buffer};
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
-use lvk_tests::queues::{WORDS, bare_step, each, on, step, step_pipeline, stepped};
+use lvk_tests::queues::{WORDS, bare_step, for_each_queue_request, step, step_pipeline, stepped, submit_on};
 use lvk_tests::random::Random;
 use lvk_tests::raster::{COVER, PAINT, paint, pixels, render_pipeline};
 use lvk_tests::ray_scene::{Layout, Part, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{How, Method, RayTracer};
 use lvk_tests::rays::random_rays;
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 use lvk_tests::{TestDevice, device_with};
 
 #[test]
 fn every_queue_exists_and_the_graphics_queue_has_hardware() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let caps = ctx.capabilities();
         assert!(caps.queue(Queue::Graphics).own_hardware);
         for queue in Queue::ALL {
-            let done = on(ctx, queue, |_| {});
+            let done = submit_on(ctx, queue, |_| {});
             ctx.wait(done).unwrap();
             assert!(ctx.is_done(done).unwrap());
             assert_eq!(caps.queue(queue).family, ctx.raw_queue_family_of(queue));
             ctx.with_raw_queue_of(queue, |_| {});
         }
-        assert!(on(ctx, Queue::Transfer, |_| {}) < on(ctx, Queue::Graphics, |_| {}));
+        assert!(submit_on(ctx, Queue::Transfer, |_| {}) < submit_on(ctx, Queue::Graphics, |_| {}));
     });
 }
 
 /// Forty steps and copies on random queues through four buffers, none of which waits on the host.
 #[test]
 fn buffers_go_from_queue_to_queue() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         let mut random = Random::new(7);
         let mut expected: Vec<Vec<u32>> =
@@ -54,7 +54,7 @@ fn buffers_go_from_queue_to_queue() {
             let to = (from + away) % 4;
             let pair = [*buffers[from], *buffers[to]];
             let queue = Queue::ALL[pick(&mut random, 3.0)];
-            on(ctx, queue, |cmd| {
+            submit_on(ctx, queue, |cmd| {
                 if queue == Queue::Transfer || number % 5 == 4 {
                     cmd.copy_buffer(pair[0], 0, pair[1], 0, 4 * WORDS as u64).unwrap();
                 } else {
@@ -77,7 +77,7 @@ fn buffers_go_from_queue_to_queue() {
 /// that has one owner at a time.
 #[test]
 fn images_go_from_queue_to_queue() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let usage = TextureUsage::SAMPLED | TextureUsage::STORAGE | TextureUsage::TARGET;
         let desc =
             TextureDesc { format: Format::R32Float, extent: [4, 4], usage, mips: 2, ..Default::default() };
@@ -92,17 +92,17 @@ fn images_go_from_queue_to_queue() {
         for (round, result) in results.iter().enumerate() {
             let round = round as u32;
             let stores = Dependencies { storage_images: &[*image], ..Default::default() };
-            on(ctx, Queue::Compute, |cmd| {
+            submit_on(ctx, Queue::Compute, |cmd| {
                 store.record(ctx, cmd, [image.index(), 100 * round, 0], (*ones, 16), &stores);
             });
-            on(ctx, Queue::Graphics, |cmd| {
+            submit_on(ctx, Queue::Graphics, |cmd| {
                 let color = [ColorAttachment { mip: 1, ..ColorAttachment::clear(*image, [0.0; 4]) }];
                 let mut pass =
                     cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
                 pass.bind_render_pipeline(*draw).unwrap();
                 paint(&mut pass, [round as f32, 0.0, 0.0, 0.0], 0.0).unwrap();
             });
-            on(ctx, Queue::Transfer, |cmd| {
+            submit_on(ctx, Queue::Transfer, |cmd| {
                 for mip in 0..2 {
                     let region = TextureRegion { mip, ..Default::default() };
                     cmd.copy_texture(*image, &region, *copy, &region).unwrap();
@@ -110,7 +110,7 @@ fn images_go_from_queue_to_queue() {
             });
             let samples = Dependencies { sampled_images: &[*copy], ..Default::default() };
             let queue = if round.is_multiple_of(2) { Queue::Compute } else { Queue::Graphics };
-            on(ctx, queue, |cmd| {
+            submit_on(ctx, queue, |cmd| {
                 fetch.record(ctx, cmd, [copy.index(), 0, 0], (**result, 16), &samples);
             });
         }
@@ -128,7 +128,7 @@ fn images_go_from_queue_to_queue() {
 /// Parts of one image that other queues have written, in layouts of their own, arrive together.
 #[test]
 fn layers_in_different_layouts_move_together() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let desc = TextureDesc {
             kind: TextureKind::D2Array { layers: 3 },
             format: Format::R32Float,
@@ -138,18 +138,18 @@ fn layers_in_different_layouts_move_together() {
         };
         let image = ctx.create_texture(&desc).unwrap();
         let layer = |layer, layers| TextureRange { base_layer: layer, layers, ..Default::default() };
-        on(ctx, Queue::Compute, |cmd| {
+        submit_on(ctx, Queue::Compute, |cmd| {
             cmd.clear_texture(*image, ClearValue::Color([1.0; 4]), &layer(0, 2)).unwrap();
         });
-        on(ctx, Queue::Graphics, |cmd| {
+        submit_on(ctx, Queue::Graphics, |cmd| {
             let color = [ColorAttachment { layer: 2, ..ColorAttachment::clear(*image, [3.0; 4]) }];
             drop(cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap());
         });
-        on(ctx, Queue::Transfer, |cmd| {
+        submit_on(ctx, Queue::Transfer, |cmd| {
             let region = TextureRegion { layer: 1, ..Default::default() };
             cmd.update_texture(*image, &region, bytemuck::cast_slice(&[2.0_f32; 4])).unwrap();
         });
-        on(ctx, Queue::Compute, |cmd| {
+        submit_on(ctx, Queue::Compute, |cmd| {
             let [from, to] = [2, 0].map(|layer| TextureRegion { layer, ..Default::default() });
             cmd.copy_texture(*image, &from, *image, &to).unwrap();
         });
@@ -164,14 +164,14 @@ fn layers_in_different_layouts_move_together() {
 /// Textures and buffers that the transfer queue brings are there for who names them, or names the submission.
 #[test]
 fn what_the_transfer_queue_brings_is_named_or_waited_for() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let fetch = Evaluator::new(ctx, "textureBindlessFetch2D(a, ivec2(i % 8, i / 8), 0)");
         for named in [true, false] {
             let desc = TextureDesc { format: Format::R32Float, extent: [8, 8], ..Default::default() };
             let texture = ctx.create_texture(&desc).unwrap();
             let texels: Vec<f32> = (0..64).map(|i| i as f32 * 0.5).collect();
             // It was made readable on the graphics queue before.
-            let brought = on(ctx, Queue::Transfer, |cmd| {
+            let brought = submit_on(ctx, Queue::Transfer, |cmd| {
                 let bytes = bytemuck::cast_slice(&texels);
                 cmd.update_texture(*texture, &TextureRegion::default(), bytes).unwrap();
             });
@@ -181,7 +181,7 @@ fn what_the_transfer_queue_brings_is_named_or_waited_for() {
                 true => Dependencies { sampled_images: &sampled, ..Default::default() },
                 false => Dependencies { wait_for: &handle, ..Default::default() },
             };
-            on(ctx, Queue::Graphics, |cmd| {
+            submit_on(ctx, Queue::Graphics, |cmd| {
                 fetch.record(ctx, cmd, [texture.index(), 0, 0], (*result, 64), &deps);
             });
             let found: Vec<_> = read_vec4(ctx, *result, 64).iter().map(|texel| texel[0]).collect();
@@ -194,12 +194,12 @@ fn what_the_transfer_queue_brings_is_named_or_waited_for() {
         let large = vec![9_u8; 70_001];
         let desc = BufferDesc { size_bytes: 70_001, debug_name: "large", ..Default::default() };
         let target = ctx.create_buffer(&desc).unwrap();
-        let brought = on(ctx, Queue::Transfer, |cmd| {
+        let brought = submit_on(ctx, Queue::Transfer, |cmd| {
             cmd.update_buffer(*from, 0, bytemuck::cast_slice(&words)).unwrap();
             cmd.update_buffer(*target, 0, &large).unwrap();
             cmd.fill_buffer(*target, 0, 4, 0).unwrap();
         });
-        on(ctx, Queue::Compute, |cmd| {
+        submit_on(ctx, Queue::Compute, |cmd| {
             let deps = Dependencies { buffers: &[*to], wait_for: &[brought], ..Default::default() };
             bare_step(ctx, cmd, *pipeline, [*from, *to], (5, &deps));
         });
@@ -213,12 +213,12 @@ fn what_the_transfer_queue_brings_is_named_or_waited_for() {
 /// Uploads go in front of whatever is submitted next, on whichever queue, and need not be named there.
 #[test]
 fn uploads_are_there_for_the_next_submission_on_any_queue() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         let words: Vec<u32> = (0..WORDS as u32).map(|i| i * i).collect();
         for queue in [Queue::Compute, Queue::Graphics, Queue::Compute] {
             let [from, to] = [words_buffer(ctx, &words), words_buffer(ctx, &[1; WORDS])];
-            on(ctx, queue, |cmd| {
+            submit_on(ctx, queue, |cmd| {
                 let deps = Dependencies { buffers: &[*to], ..Default::default() };
                 bare_step(ctx, cmd, *pipeline, [*from, *to], (3, &deps));
             });
@@ -229,24 +229,24 @@ fn uploads_are_there_for_the_next_submission_on_any_queue() {
         let results: Vec<_> = (0..6).map(|_| words_buffer(ctx, &[0; WORDS])).collect();
         for (number, result) in (0..).zip(&results) {
             ctx.upload_buffer(*source, 0, bytemuck::cast_slice(&[number; WORDS])).unwrap();
-            on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*source, **result], 1));
+            submit_on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*source, **result], 1));
         }
         for (number, result) in (0..).zip(&results) {
             assert_eq!(read_words(ctx, **result, WORDS), [3 * number + 1; WORDS]);
         }
-        on(ctx, Queue::Transfer, |cmd| cmd.copy_buffer(*source, 0, *result, 0, 256).unwrap());
+        submit_on(ctx, Queue::Transfer, |cmd| cmd.copy_buffer(*source, 0, *result, 0, 256).unwrap());
         assert_eq!(read_words(ctx, *result, WORDS), [5; WORDS]);
     });
 }
 
 /// An upload goes out on the graphics queue, whichever queue the submission behind it is for: neither begins before the semaphore.
 #[test]
-fn semaphores_of_others_hold_up_uploads_on_every_queue() {
-    each(|ctx| {
+fn foreign_semaphores_delay_uploads_on_every_queue() {
+    for_each_queue_request(|ctx| {
         let device = ctx.raw_device();
         let words = words_buffer(ctx, &[1; WORDS]);
         for queue in Queue::ALL {
-            on(ctx, queue, |_| {});
+            submit_on(ctx, queue, |_| {});
             ctx.wait_idle().unwrap();
             let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
             let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
@@ -276,7 +276,7 @@ fn semaphores_of_others_hold_up_uploads_on_every_queue() {
 /// Structures are built on the compute queue and traced on the graphics queue, and on the compute queue again after they
 /// were moved there.
 fn check_structures(ctx: &TestDevice) -> lvk::Result<()> {
-    let bender = Bender::new(ctx)?;
+    let deformer = VertexDeformer::new(ctx)?;
     let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE;
     for method in Method::available(ctx) {
         let tracer = RayTracer::new(ctx, method)?;
@@ -304,14 +304,14 @@ fn check_structures(ctx: &TestDevice) -> lvk::Result<()> {
                     if number % 2 == 1 { (0.3, BuildMode::Refit) } else { (-0.2, BuildMode::Rebuild) };
                 let mesh = scene.models[0][0].mesh.clone();
                 let mut cmd = ctx.acquire_command_buffer_on(queue)?;
-                bender.record(&mut cmd, *buffers[0].vertices, &mesh, amount)?;
+                deformer.record(&mut cmd, *buffers[0].vertices, &mesh, amount)?;
                 cmd.build_blas(&[*models[0]], mode)?;
                 // The top level on the other queue.
                 ctx.submit(cmd)?;
                 let mut cmd = ctx.acquire_command_buffer_on(tracing)?;
                 cmd.update_tlas(*tlas, &shown, mode)?;
                 ctx.submit(cmd)?;
-                scene.models[0][0].mesh = bent(&mesh, amount);
+                scene.models[0][0].mesh = deformed(&mesh, amount);
             }
             let job = tracer.job(&rays)?;
             let mut cmd = ctx.acquire_command_buffer_on(tracing)?;
@@ -321,7 +321,7 @@ fn check_structures(ctx: &TestDevice) -> lvk::Result<()> {
         }
         for (number, (job, scene)) in jobs.iter().enumerate() {
             let (records, reference) = (tracer.read(job)?, scene.reference());
-            let agreement = Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff));
+            let agreement = HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff));
             agreement.assert(&format!("round {number} by {method:?}"));
         }
         assert!(ctx.is_done(built)?);
@@ -331,12 +331,12 @@ fn check_structures(ctx: &TestDevice) -> lvk::Result<()> {
 }
 
 #[test]
-fn structures_built_on_one_queue_are_traced_on_another() {
-    each(|ctx| check_structures(ctx).unwrap());
+fn accel_structs_built_on_one_queue_are_traced_on_another() {
+    for_each_queue_request(|ctx| check_structures(ctx).unwrap());
 }
 
 #[test]
-fn structures_of_software_are_built_on_one_queue_and_traced_on_another() {
+fn accel_structs_of_software_are_built_on_one_queue_and_traced_on_another() {
     for queues in [QueueRequest::OwnHardware, QueueRequest::Emulated] {
         let software = device_with(|desc| {
             desc.queues = queues;
@@ -349,8 +349,8 @@ fn structures_of_software_are_built_on_one_queue_and_traced_on_another() {
 
 /// Many structures, more than the scratch memory takes at once, built on both queues side by side, and compacted.
 #[test]
-fn batches_of_structures_are_built_on_two_queues_at_once() {
-    each(|ctx| {
+fn batches_of_accel_structs_are_built_on_two_queues_at_once() {
+    for_each_queue_request(|ctx| {
         let scene = RayScene::single(Mesh::sphere(6), Layout::Indexed16);
         let (_buffers, geometries) = upload_geometries(ctx, &scene.models[0]).unwrap();
         let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_COMPACTION;
@@ -373,7 +373,7 @@ fn batches_of_structures_are_built_on_two_queues_at_once() {
 /// Three threads, a queue each, with buffers of their own, one that all read, and objects that come and go.
 #[test]
 fn threads_submit_to_several_queues_at_once() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         let shared: Vec<u32> = (0..WORDS as u32).map(|i| i + 1).collect();
         let source = words_buffer(ctx, &shared);
@@ -382,7 +382,7 @@ fn threads_submit_to_several_queues_at_once() {
             let mut expected = vec![0; WORDS];
             for number in 0..12 {
                 let passing = words_buffer(ctx, &[number; WORDS]);
-                on(ctx, queue, |cmd| {
+                submit_on(ctx, queue, |cmd| {
                     if queue == Queue::Transfer {
                         cmd.copy_buffer(*source, 0, *passing, 0, 256).unwrap();
                         cmd.copy_buffer(*passing, 0, *own, 0, 256).unwrap();
@@ -408,17 +408,18 @@ fn threads_submit_to_several_queues_at_once() {
     });
 }
 
-/// What one queue still uses lives on, whichever queue is idle, and everything goes in the end.
+/// An object that one queue still uses stays alive although another queue is idle, and every object is freed in the
+/// end.
 #[test]
 fn what_is_destroyed_lives_until_every_queue_is_done() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         for number in 0..20 {
             let [a, b, c] = [(); 3].map(|()| words_buffer(ctx, &[number; WORDS]));
-            on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*a, *b], 1));
-            on(ctx, Queue::Transfer, |cmd| cmd.copy_buffer(*b, 0, *c, 0, 256).unwrap());
+            submit_on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*a, *b], 1));
+            submit_on(ctx, Queue::Transfer, |cmd| cmd.copy_buffer(*b, 0, *c, 0, 256).unwrap());
             if number % 3 == 0 {
-                ctx.wait(on(ctx, Queue::Graphics, |_| {})).unwrap();
+                ctx.wait(submit_on(ctx, Queue::Graphics, |_| {})).unwrap();
             }
         }
         ctx.wait_idle().unwrap();
@@ -428,7 +429,7 @@ fn what_is_destroyed_lives_until_every_queue_is_done() {
 
 #[test]
 fn frames_wait_for_all_queues_but_not_for_the_background() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         let [a, b] = [(); 2].map(|()| words_buffer(ctx, &[2; WORDS]));
         let mut frames: Vec<SubmitHandle> = Vec::new();
@@ -437,7 +438,7 @@ fn frames_wait_for_all_queues_but_not_for_the_background() {
             if number >= ctx.frames_in_flight() {
                 assert!(ctx.is_done(frames[number - ctx.frames_in_flight()]).unwrap());
             }
-            frames.push(on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*a, *b], 1)));
+            frames.push(submit_on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*a, *b], 1)));
             let mut cmd = ctx.acquire_command_buffer_on(Queue::Transfer).unwrap();
             cmd.fill_buffer(*a, 0, 256, number as u32).unwrap();
             ctx.submit_in_background(cmd).unwrap();
@@ -450,16 +451,16 @@ fn frames_wait_for_all_queues_but_not_for_the_background() {
 /// Readbacks come after what other queues have written, and mapped memory shows it.
 #[test]
 fn the_host_reads_what_any_queue_wrote() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         let source = words_buffer(ctx, &[4; WORDS]);
         for memory in [MemoryKind::Device, MemoryKind::Readback, MemoryKind::HostVisible] {
             let target = BufferDesc { size_bytes: 256, memory, ..Default::default() };
             let target = ctx.create_buffer(&target).unwrap();
-            let done = on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*source, *target], 2));
+            let done = submit_on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*source, *target], 2));
             let later = ctx.read_buffer_later(*target, 0..256).unwrap();
             assert!(later.submission() > done);
-            on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*source, *target], 3));
+            submit_on(ctx, Queue::Compute, |cmd| step(ctx, cmd, *pipeline, [*source, *target], 3));
             assert_eq!(later.wait().unwrap(), bytemuck::cast_slice::<u32, u8>(&[14; WORDS]));
             assert!(ctx.is_done(done).unwrap());
             assert_eq!(read_words(ctx, *target, WORDS), [15; WORDS], "{memory:?}");
@@ -467,10 +468,10 @@ fn the_host_reads_what_any_queue_wrote() {
     });
 }
 
-/// A frame loop as programs have it: compute prepares the next picture while graphics draws the last.
+/// A frame loop as programs have it: compute prepares the next image while graphics draws the last.
 #[test]
 fn a_loop_of_frames_alternates_between_two_images() {
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let usage = TextureUsage::STORAGE | TextureUsage::SAMPLED;
         let desc = TextureDesc { format: Format::R32Float, extent: [4, 4], usage, ..Default::default() };
         let prepared: [Holder<TextureHandle>; 2] = [(); 2].map(|()| ctx.create_texture(&desc).unwrap());
@@ -489,10 +490,10 @@ fn a_loop_of_frames_alternates_between_two_images() {
             ctx.next_frame().unwrap();
             let image = &prepared[number as usize % 2];
             let deps = Dependencies { storage_images: &[**image], ..Default::default() };
-            on(ctx, Queue::Compute, |cmd| {
+            submit_on(ctx, Queue::Compute, |cmd| {
                 store.record(ctx, cmd, [image.index(), number * 10, 0], (*ones, 16), &deps);
             });
-            on(ctx, Queue::Graphics, |cmd| {
+            submit_on(ctx, Queue::Graphics, |cmd| {
                 let color = [ColorAttachment::clear(*target, [0.0; 4])];
                 let dependencies = Dependencies { sampled_images: &[**image], ..Default::default() };
                 let desc = RenderPassDesc { color: &color, dependencies, ..Default::default() };

@@ -1,8 +1,8 @@
-//! Submission: waiting, asking whether something is done, and frames in flight.
+//! Submission: waiting, polling, and frames in flight.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{Dependencies, Error, Format, SubmitHandle, TextureDesc, TextureUsage};
-use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
+use lvk_tests::compute::{busy_pipeline, read_words, words_buffer};
 use lvk_tests::{device, device_with};
 
 #[test]
@@ -48,7 +48,7 @@ fn flushing_runs_uploads_and_is_idle_without_any() {
 }
 
 #[test]
-fn textures_that_are_gone_submit_nothing() {
+fn destroyed_textures_submit_nothing() {
     let Some(ctx) = device() else { return };
     let come_and_go = || {
         let desc = TextureDesc {
@@ -84,17 +84,7 @@ fn frames_count_up_and_round() {
 #[test]
 fn a_frame_starts_when_the_gpu_is_done_with_the_last_of_its_index() {
     let Some(ctx) = device_with(|desc| desc.frames_in_flight = 3) else { return };
-    let work = compute_pipeline(
-        &ctx,
-        "layout(local_size_x = 64) in;
-         layout(buffer_reference, scalar) buffer Words { uint at[]; };
-         layout(push_constant, scalar) uniform Push { Words words; };
-         void main() {
-             uint sum = gl_GlobalInvocationID.x;
-             for (uint i = 0; i < 20000; ++i) sum = sum * 1664525 + 1013904223;
-             words.at[gl_GlobalInvocationID.x] += 1 + (sum & 0);
-         }",
-    );
+    let work = busy_pipeline(&ctx, 20000, "words.at[gl_GlobalInvocationID.x] += 1 + (sum & 0);");
     let words = words_buffer(&ctx, &[0; 64]);
     let mut last = [SubmitHandle::default(); 3];
     for _ in 0..30 {

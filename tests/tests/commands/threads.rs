@@ -1,4 +1,4 @@
-//! Threads: a context is shared by all of them, and command buffers move between them.
+//! Threads: all of them share one context, and command buffers move between them.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::sync::Barrier;
@@ -105,7 +105,7 @@ fn shaders_compile_side_by_side() {
     assert_eq!(found, [1.0, 3.0, 5.0, 7.0]);
 }
 
-/// What the threads of [`eight_threads_use_every_kind_of_object`] share.
+/// State shared by the threads of [`eight_threads_use_every_kind_of_object`].
 struct Shared<'a> {
     ctx: &'a Context,
     evaluator: Evaluator,

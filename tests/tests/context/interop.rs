@@ -1,5 +1,5 @@
-//! The library inside of another engine: a device made by hand, whose images, buffers and semaphores go both ways, and of
-//! which nothing is destroyed.
+//! The library on a device that another engine created: images, buffers and semaphores are exported and imported, and
+//! the library destroys nothing that it does not own.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::{CStr, c_void};
@@ -20,7 +20,7 @@ const BYTES: u64 = (SIDE * SIDE * 4) as u64;
 const LOCAL_READ: [&CStr; 1] = [ash::khr::dynamic_rendering_local_read::NAME];
 const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
 
-/// What the layer said in this process.
+/// Messages of the validation layer in this process.
 static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 unsafe extern "system" fn on_message(
@@ -435,7 +435,7 @@ fn exchange() {
     }
 }
 
-/// What the engine's device has on is used where it is said, and refused where it is not.
+/// Features of the engine's device are used if the description lists them, and refused if not.
 fn local_reads() {
     let Some(engine) = Engine::new() else { return };
     let usage = TextureUsage::TARGET | TextureUsage::INPUT;
@@ -539,7 +539,7 @@ fn refusals() {
 
 /// One after the other, as the messages of the layer are those of the process.
 #[test]
-fn images_buffers_and_semaphores_go_both_ways_and_wrong_descriptions_are_refused() {
+fn images_buffers_and_semaphores_are_exported_and_imported_and_wrong_descriptions_are_refused() {
     exchange();
     local_reads();
     refusals();

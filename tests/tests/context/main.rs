@@ -1,4 +1,4 @@
-//! Contexts: how they start, on which devices, and inside of other engines.
+//! Contexts: creation, devices, profiles, and interoperation with other engines.
 
 mod interop;
 mod no_ray_tracing;

@@ -1,5 +1,5 @@
-//! Without ray tracing every entry point that needs it says so, and nothing panics: on a driver that has none, and on
-//! one that hides it behind a profile.
+//! Devices without ray tracing: every entry point that needs it returns an error and none panics, on a driver without
+//! ray tracing and under a profile that hides it.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fmt::Debug;
@@ -10,8 +10,8 @@ use lvk::{
     RayTracingPipelineHandle, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage, TlasDesc,
     TlasInstance, Triangles,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::words_buffer;
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::without_software;
 
 const QUERY: &str = "
@@ -111,7 +111,7 @@ fn commands(ctx: &Context) {
 
 #[test]
 fn a_driver_without_ray_tracing_refuses_clearly() {
-    without_ray_tracing(a_driver_without_ray_tracing_refuses_clearly, || {
+    on_swiftshader(a_driver_without_ray_tracing_refuses_clearly, || {
         let Some(ctx) = without_software(|_| ()) else { return };
         let name = ctx.capabilities().device_name.clone();
         for text in creations(&ctx).into_iter().chain(shaders(&ctx)).chain(pipelines(&ctx)) {

@@ -1,19 +1,17 @@
-//! Device profiles: what they hide is not there, what they tighten is tight, and refusals say whose doing it is.
+//! Device profiles: hidden features are absent, tightened limits hold, and errors name the profile.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::CStr;
 
 use lvk::ash::{self, vk};
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, ColorAttachment, Context, ContextDesc,
-    Dependencies, DeviceProfile, Error, FeatureRequest, FeatureSet, Format, Holder, OptionalFeature,
-    RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource, ShaderStage,
-    TlasDesc, Triangles, UserExtensions,
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceProfile,
+    Error, FeatureRequest, FeatureSet, Holder, OptionalFeature, RayQueryRequest, ShaderModuleDesc,
+    ShaderSource, ShaderStage, TlasDesc, Triangles, UserExtensions,
 };
-use lvk_tests::compute::Evaluator;
+use lvk_tests::accel_backend::requires_device_accel_structs;
 use lvk_tests::device::vulkan;
-use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
-use lvk_tests::structures::tests_own_structures;
+use lvk_tests::raster::expect_drawing;
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
 fn under(profile: &DeviceProfile) -> Option<TestDevice> {
@@ -76,7 +74,7 @@ fn the_device_is_made_without_what_is_hidden() {
 }
 
 #[test]
-fn what_a_profile_hides_is_not_there_for_those_who_require_it() {
+fn what_a_profile_hides_cannot_be_required() {
     let Some(ctx) = without_software(|_| ()) else { return };
     let real: Capabilities = ctx.capabilities().clone();
     for (profile, pipeline, query, had, lack) in [
@@ -120,7 +118,7 @@ fn vertices(ctx: &Context, triangles: u32) -> Holder<lvk::BufferHandle> {
     ctx.create_buffer(&BufferDesc { usage: BufferUsage::ACCEL_INPUT, data, ..Default::default() }).unwrap()
 }
 
-/// What the driver itself would answer for one build is less: the phone's figures count.
+/// The driver's own size for one build is smaller: the size of the phone counts.
 #[test]
 fn sizes_are_those_of_the_phone_where_it_needs_more() {
     const TRIANGLES: u64 = 1_000;
@@ -130,7 +128,7 @@ fn sizes_are_those_of_the_phone_where_it_needs_more() {
         ctx.blas_sizes(&BlasDesc { geometries: &geometries, ..Default::default() }).unwrap()
     };
     let Some(real) = without_software(|_| ()) else { return };
-    if !tests_own_structures(&real, "sizes that a profile raises") {
+    if !requires_device_accel_structs(&real, "sizes that a profile raises") {
         return;
     }
     let own = sizes(&real);
@@ -141,13 +139,13 @@ fn sizes_are_those_of_the_phone_where_it_needs_more() {
     assert_eq!(mali.structure_bytes, own.structure_bytes.max(219 * TRIANGLES));
 }
 
-/// A top-level structure cannot be split: it is refused by name, whichever of its sizes is over.
+/// A TLAS cannot be split: it is refused by name, whichever of its sizes is over.
 #[test]
 fn a_profile_limits_top_levels() {
     const INSTANCES: u32 = 20_000;
     let desc = TlasDesc { capacity: INSTANCES, debug_name: "the world", ..Default::default() };
     let Some(real) = without_software(|_| ()) else { return };
-    if !tests_own_structures(&real, "limits of a profile") {
+    if !requires_device_accel_structs(&real, "limits of a profile") {
         return;
     }
     let sizes = real.accel_struct_sizes(*real.create_tlas(&desc).unwrap()).unwrap();
@@ -224,7 +222,7 @@ fn optional_features_are_those_of_the_device() {
             has(&ctx, command) || !there || feature == OptionalFeature::CalibratedTimestamps,
             "{feature:?}"
         );
-        // Where the device has others of its extension, that stays on for them.
+        // Other features of the same extension stay enabled.
         let others = match feature {
             OptionalFeature::PipelineShadingRate => {
                 &[OptionalFeature::PrimitiveShadingRate, OptionalFeature::AttachmentShadingRate][..]
@@ -247,23 +245,7 @@ fn core_only_devices_draw_and_compute() {
     assert_eq!(caps.optional, FeatureSet::NONE);
     assert!(!(caps.cube_arrays || caps.multi_draw_indirect || caps.shader_int64 || caps.mesh_shader));
     assert!((caps.max_anisotropy - 1.0).abs() < f32::EPSILON);
-    let drawn = target(&ctx, Format::Rgba8Unorm, [4, 4]);
-    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
-    let pipeline = render_pipeline(&ctx, COVER, PAINT, &desc);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).unwrap();
-    pass.draw(0..3, 0..1).unwrap();
-    drop(pass);
-    ctx.submit(cmd).unwrap();
-    assert_eq!(pixels::<[u8; 4]>(&ctx, *drawn), [[0, 255, 0, 255]; 16]);
-    let sampler = ctx.create_sampler(&Default::default()).unwrap();
-    let sample = Evaluator::new(&ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
-    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
-    let found = sample.run(&ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
-    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
+    expect_drawing(&ctx);
 }
 
 /// A shader that needs a hidden feature is refused by its name.
@@ -365,7 +347,7 @@ fn extensions_of_the_callers_own_are_on() {
 }
 
 #[test]
-fn extensions_that_nobody_has_are_named() {
+fn unknown_extensions_are_named() {
     let Some(_) = device() else { return };
     let nowhere = [c"VK_LVK_nowhere"];
     for (instance, device) in [(true, false), (false, true)] {

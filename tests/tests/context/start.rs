@@ -1,4 +1,4 @@
-//! How a context starts: devices are listed, what is missing is named, and devices without ray tracing work.
+//! Creation of contexts: the device list, errors that name what is missing, and devices without ray tracing.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::OsStr;
@@ -6,14 +6,13 @@ use std::path::Path;
 
 use lvk::ash::vk;
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies,
-    Error, FeatureRequest, Format, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc,
-    ShaderSource, ShaderStage, TlasDesc, Triangles, ValidationMode,
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, ContextDesc, Error, FeatureRequest,
+    RayQueryRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc, Triangles, ValidationMode,
 };
-use lvk_tests::child::{in_child, without_ray_tracing};
-use lvk_tests::compute::{Evaluator, words_buffer};
+use lvk_tests::compute::words_buffer;
 use lvk_tests::device::vulkan;
-use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
+use lvk_tests::raster::expect_drawing;
+use lvk_tests::subprocess::{in_subprocess, on_swiftshader};
 use lvk_tests::{device, device_with, without_software};
 
 /// A context with the loader of the tests and nothing else asked for.
@@ -53,7 +52,7 @@ fn a_wrong_library_is_no_vulkan() {
 
 #[test]
 fn the_device_can_be_chosen_by_number_and_name() {
-    in_child(the_device_can_be_chosen_by_number_and_name, &[("LVK_DEVICE", None)], || {
+    in_subprocess(the_device_can_be_chosen_by_number_and_name, &[("LVK_DEVICE", None)], || {
         let Some(ctx) = device() else { return };
         let name = ctx.capabilities().device_name.clone();
         let chosen = start(|desc| desc.device = Some("0")).unwrap();
@@ -78,10 +77,10 @@ fn the_device_can_be_chosen_by_number_and_name() {
 }
 
 #[test]
-fn the_environment_goes_before_the_description() {
+fn the_environment_overrides_the_description() {
     let Some(_) = vulkan() else { return };
     let wish = Some(OsStr::new("somewhere else"));
-    in_child(the_environment_goes_before_the_description, &[("LVK_DEVICE", wish)], || {
+    in_subprocess(the_environment_overrides_the_description, &[("LVK_DEVICE", wish)], || {
         match start(|desc| desc.device = Some("0")) {
             Err(Error::NoDevice { reasons }) => assert!(reasons.contains("'somewhere else'"), "{reasons}"),
             other => unreachable!("{other:?}"),
@@ -126,7 +125,7 @@ fn features_turned_off_are_missing() {
     assert_eq!(ray_query_shader(&ctx).is_ok(), ctx.capabilities().ray_query);
 }
 
-/// What every context without ray tracing answers.
+/// Asserts the errors of every context without ray tracing.
 fn expect_no_ray_tracing(ctx: &Context) {
     assert!(!ctx.capabilities().ray_query && !ctx.capabilities().ray_tracing_pipeline);
     unsupported(ray_query_shader(ctx));
@@ -137,27 +136,6 @@ fn expect_no_ray_tracing(ctx: &Context) {
     let vertices = words_buffer(ctx, &[0; 9]);
     let geometries = [BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
     unsupported(ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() }));
-}
-
-/// Compute, textures and draws in one: a colour is drawn, sampled and read back.
-fn expect_drawing(ctx: &Context) {
-    let drawn = target(ctx, Format::Rgba8Unorm, [4, 4]);
-    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
-    let pipeline = render_pipeline(ctx, COVER, PAINT, &desc);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).unwrap();
-    pass.draw(0..3, 0..1).unwrap();
-    drop(pass);
-    ctx.submit(cmd).unwrap();
-    assert_eq!(pixels::<[u8; 4]>(ctx, *drawn), [[0, 255, 0, 255]; 16]);
-    let sampler = ctx.create_sampler(&Default::default()).unwrap();
-    let sample = Evaluator::new(ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
-    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
-    let found = sample.run(ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
-    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
 }
 
 #[test]
@@ -174,7 +152,7 @@ fn everything_else_works_with_ray_tracing_turned_off() {
 
 #[test]
 fn a_device_without_ray_tracing_does_everything_else() {
-    without_ray_tracing(a_device_without_ray_tracing_does_everything_else, || {
+    on_swiftshader(a_device_without_ray_tracing_does_everything_else, || {
         let Some(ctx) = without_software(|_| ()) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
         expect_no_ray_tracing(&ctx);
@@ -217,7 +195,7 @@ fn validation_hears_a_missing_barrier_and_a_wrong_call() {
     let info = vk::BufferCreateInfo::default().size(0).usage(vk::BufferUsageFlags::TRANSFER_SRC);
     // SAFETY: the driver takes any size; the layer complains.
     if let Ok(odd) = unsafe { ctx.raw_device().create_buffer(&info, None) } {
-        // SAFETY: created above and used by nobody.
+        // SAFETY: created above and not used.
         unsafe { ctx.raw_device().destroy_buffer(odd, None) };
     }
     let messages = ctx.take_messages();

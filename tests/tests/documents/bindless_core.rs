@@ -1,5 +1,4 @@
-//! The document on the bindless core: each row is held by tests that are there, and what it leaves out stands on a page of the
-//! manual.
+//! `docs/bindless-core.md`: each row names tests that exist, and the manual page that explains what is left out.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use crate::held_by::{self, cells, project};
@@ -34,7 +33,7 @@ fn page_complaint(left_out: &str) -> Option<String> {
 }
 
 #[test]
-fn every_row_is_held_by_tests_and_tells_where_reasons_stand() {
+fn every_row_names_its_tests_and_the_page_of_its_reasons() {
     let rows = rows();
     assert!(rows.len() > 60, "{} rows", rows.len());
     let wrong: Vec<_> = rows.iter().filter_map(|row| complaint(row).map(|why| (row[0], why))).collect();

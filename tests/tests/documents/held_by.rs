@@ -1,4 +1,4 @@
-//! What cells of tables name to hold what their row says: files of tests, by kind and without ending.
+//! Table cells that name test files, by a letter for the kind and without the ending.
 
 use std::path::{Path, PathBuf};
 

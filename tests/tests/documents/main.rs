@@ -1,7 +1,14 @@
-//! Documents that must say what is there.
+//! Tests that hold documents and the tree of sources against each other.
 
 mod bindless_core;
+mod circles;
+mod contributing;
+mod glossary;
 mod held_by;
+mod layers;
+mod map;
 mod parity;
 mod programs;
 mod readme;
+mod rust_modules;
+mod rust_tokens;

@@ -1,5 +1,5 @@
-//! The manual's page on LightweightVK's features: none is forgotten, and each row says what holds it, by files that are there, or
-//! why it is left out.
+//! The manual's page on LightweightVK's features: no feature is missing, and each row names test files that exist or
+//! the reason why the feature is left out.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::BTreeSet;

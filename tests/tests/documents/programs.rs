@@ -1,4 +1,4 @@
-//! The main file of each test program names every file beside it: one that is forgotten would never run.
+//! The `main.rs` of each test program declares every file beside it: an undeclared file would never run.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::BTreeSet;

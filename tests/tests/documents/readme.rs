@@ -4,8 +4,8 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use lvk_tests::child::in_child;
 use lvk_tests::device::vulkan;
+use lvk_tests::subprocess::in_subprocess;
 
 #[path = "../../../lvk/examples/triangle.rs"]
 mod triangle;
@@ -57,7 +57,7 @@ fn the_first_program_of_the_readme_shows_a_triangle() {
     let folder = library.and_then(Path::parent).map(Path::as_os_str);
     let variables: Vec<(&str, Option<&OsStr>)> =
         folder.iter().map(|folder| ("LD_LIBRARY_PATH", Some(*folder))).collect();
-    in_child(the_first_program_of_the_readme_shows_a_triangle, &variables, || {
+    in_subprocess(the_first_program_of_the_readme_shows_a_triangle, &variables, || {
         let folder = tempfile::tempdir().unwrap();
         std::env::set_current_dir(folder.path()).unwrap();
         triangle::main().unwrap();

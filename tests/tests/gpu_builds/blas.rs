@@ -1,21 +1,22 @@
-//! Bottom-level structures built on the GPU: every primitive once, boxes that fit, heights within the bound.
+//! BLAS builds on the GPU: every primitive once, bounds that fit, heights within the limit.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, LeafEncoding, build_blas};
 use lvk::{BlasGeometry, GeometryFlags, GeometryTransform, IndexFormat, Indices, Triangles, VertexFormat};
 use lvk_tests::device;
 use lvk_tests::gpu_built::{
-    boxes, build, check_contents, facts, input, numbered, scattered, triangles, uneven,
+    aabb_geometry, build, build_input_buffer, check_and_summarize, check_contents, scattered_triangles,
+    triangle_geometry, uneven_triangles, with_primitive_numbers,
 };
 
 #[test]
 fn every_triangle_is_in_one_leaf() {
     let Some(ctx) = device() else { return };
     for count in [0, 1, 2, 3, 4, 5, 24, 25, 100, 2048, 2049, 5000, 30_000] {
-        let corners = scattered(count, 7);
-        let vertices = input(&ctx, &corners);
-        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)]));
-        check_contents(&found, &numbered(&corners));
+        let corners = scattered_triangles(count, 7);
+        let vertices = build_input_buffer(&ctx, &corners);
+        let found = check_and_summarize(&ctx, &build(&ctx, &[triangle_geometry(*vertices, count)]));
+        check_contents(&found, &with_primitive_numbers(&corners));
         let nodes = found.node_count as usize;
         assert!(nodes <= if count > 3 { count / 10 + 2 } else { 0 }, "{nodes} nodes of {count}");
         if count == 0 {
@@ -25,18 +26,18 @@ fn every_triangle_is_in_one_leaf() {
 }
 
 #[test]
-fn many_structures_are_built_side_by_side() {
+fn many_accel_structs_are_built_side_by_side() {
     let Some(ctx) = device() else { return };
     let counts = [10, 3000, 0, 700, 5000, 1, 2500];
-    let meshes: Vec<_> = counts.iter().map(|count| scattered(*count, *count as u64)).collect();
-    let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
+    let meshes: Vec<_> = counts.iter().map(|count| scattered_triangles(*count, *count as u64)).collect();
+    let vertices: Vec<_> = meshes.iter().map(|corners| build_input_buffer(&ctx, corners)).collect();
     let geometries: Vec<_> =
-        vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
+        vertices.iter().zip(counts).map(|(vertices, count)| [triangle_geometry(**vertices, count)]).collect();
     let leaves = LeafEncoding::Corners;
     let desc = |geometries| GpuBlasDesc { geometries, improvements: 1, leaves };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
-        check_contents(&facts(&ctx, structure), &numbered(corners));
+        check_contents(&check_and_summarize(&ctx, structure), &with_primitive_numbers(corners));
     }
 }
 
@@ -45,14 +46,14 @@ fn equal_triangles_make_a_low_tree() {
     let Some(ctx) = device() else { return };
     for count in [2000, 6000] {
         let corners = vec![[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, -9.0]]; count];
-        let vertices = input(&ctx, &corners);
-        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)]));
-        check_contents(&found, &numbered(&corners));
+        let vertices = build_input_buffer(&ctx, &corners);
+        let found = check_and_summarize(&ctx, &build(&ctx, &[triangle_geometry(*vertices, count)]));
+        check_contents(&found, &with_primitive_numbers(&corners));
         assert!(found.height <= 7, "{}", found.height);
     }
 }
 
-/// How many nodes it takes if all of them are full.
+/// Returns the number of nodes if all of them are full.
 fn full_nodes(count: usize) -> u32 {
     let mut level = count.div_ceil(24);
     let mut all = level;
@@ -67,13 +68,13 @@ fn full_nodes(count: usize) -> u32 {
 fn trees_that_leave_nodes_empty_are_packed() {
     let Some(ctx) = device() else { return };
     for side in [4, 8] {
-        let corners = uneven(side);
-        let vertices = input(&ctx, &corners);
-        let geometries = [triangles(*vertices, corners.len())];
+        let corners = uneven_triangles(side);
+        let vertices = build_input_buffer(&ctx, &corners);
+        let geometries = [triangle_geometry(*vertices, corners.len())];
         for leaves in [LeafEncoding::Corners, LeafEncoding::Indexed, LeafEncoding::Packed] {
             let desc = GpuBlasDesc { geometries: &geometries, improvements: 0, leaves };
-            let found = facts(&ctx, &build_blas(&ctx, &[desc]).unwrap()[0]);
-            check_contents(&found, &numbered(&corners));
+            let found = check_and_summarize(&ctx, &build_blas(&ctx, &[desc]).unwrap()[0]);
+            check_contents(&found, &with_primitive_numbers(&corners));
             assert_eq!(found.node_count, full_nodes(corners.len()));
         }
     }
@@ -83,17 +84,20 @@ fn trees_that_leave_nodes_empty_are_packed() {
 fn inactive_triangles_are_left_out() {
     let Some(ctx) = device() else { return };
     for count in [9, 3000] {
-        let mut corners = scattered(count, 3);
+        let mut corners = scattered_triangles(count, 3);
         for i in (0..count).step_by(3) {
             corners[i][i % 2][0] = f32::NAN;
         }
-        let vertices = input(&ctx, &corners);
-        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)]));
-        let mut expected = numbered(&corners);
+        let vertices = build_input_buffer(&ctx, &corners);
+        let found = check_and_summarize(&ctx, &build(&ctx, &[triangle_geometry(*vertices, count)]));
+        let mut expected = with_primitive_numbers(&corners);
         expected.retain(|(_, corners)| corners.iter().flatten().all(|number| number.is_finite()));
         check_contents(&found, &expected);
-        let nothing = input(&ctx, &vec![[[f32::NAN; 3]; 3]; count]);
-        assert_eq!(facts(&ctx, &build(&ctx, &[triangles(*nothing, count)])).bounds, EMPTY);
+        let nothing = build_input_buffer(&ctx, &vec![[[f32::NAN; 3]; 3]; count]);
+        assert_eq!(
+            check_and_summarize(&ctx, &build(&ctx, &[triangle_geometry(*nothing, count)])).bounds,
+            EMPTY
+        );
     }
 }
 
@@ -101,15 +105,18 @@ fn inactive_triangles_are_left_out() {
 fn degenerate_triangles_are_kept() {
     let Some(ctx) = device() else { return };
     let corners = [[[1.0; 3]; 3], [[0.0; 3]; 3], [[2.0; 3], [2.0; 3], [3.0; 3]]];
-    let vertices = input(&ctx, &corners);
-    check_contents(&facts(&ctx, &build(&ctx, &[triangles(*vertices, 3)])), &numbered(&corners));
+    let vertices = build_input_buffer(&ctx, &corners);
+    check_contents(
+        &check_and_summarize(&ctx, &build(&ctx, &[triangle_geometry(*vertices, 3)])),
+        &with_primitive_numbers(&corners),
+    );
 }
 
 #[test]
-fn boxes_are_built_around() {
+fn aabbs_are_built_around() {
     let Some(ctx) = device() else { return };
     for count in [1, 500, 4000] {
-        let corners = scattered(count, 11);
+        let corners = scattered_triangles(count, 11);
         let lo = |t: &[[f32; 3]; 3], axis: usize| t[0][axis].min(t[1][axis]).min(t[2][axis]);
         let hi = |t: &[[f32; 3]; 3], axis: usize| t[0][axis].max(t[1][axis]).max(t[2][axis]);
         let mut list: Vec<[[f32; 3]; 2]> = corners
@@ -119,8 +126,8 @@ fn boxes_are_built_around() {
         if count > 10 {
             list[7][0][0] = f32::NAN;
         }
-        let buffer = input(&ctx, &list);
-        let found = facts(&ctx, &build(&ctx, &[boxes(*buffer, count)]));
+        let buffer = build_input_buffer(&ctx, &list);
+        let found = check_and_summarize(&ctx, &build(&ctx, &[aabb_geometry(*buffer, count)]));
         let expected: Vec<_> = (0..)
             .zip(&list)
             .filter(|(_, corners)| !corners[0][0].is_nan())
@@ -195,7 +202,7 @@ fn formats() -> Vec<(VertexFormat, Vec<u8>, [[f32; 3]; 3])> {
 #[test]
 fn all_formats_strides_indices_and_matrices_are_read() {
     let Some(ctx) = device() else { return };
-    let matrix = input(&ctx, &[0.0_f32, 2.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0, -3.0]);
+    let matrix = build_input_buffer(&ctx, &[0.0_f32, 2.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0, -3.0]);
     let moved = |p: [f32; 3]| [2.0 * p[1] + 1.0, p[0], 4.0 * p[2] - 3.0];
     for (format, data, corners) in formats() {
         for (index, extra) in [(None, 0), (Some(IndexFormat::U16), 0), (Some(IndexFormat::U32), 2), (None, 6)]
@@ -213,9 +220,9 @@ fn all_formats_strides_indices_and_matrices_are_read() {
                 bytes.extend_from_slice(vertex);
                 bytes.resize(bytes.len() + extra, 0xff);
             }
-            let vertices = input(&ctx, &bytes);
-            let short = input(&ctx, &[9_u16, 2, 0, 1, 1, 1, 1]);
-            let long = input(&ctx, &[9_u32, 2, 0, 1, 1, 1, 1]);
+            let vertices = build_input_buffer(&ctx, &bytes);
+            let short = build_input_buffer(&ctx, &[9_u16, 2, 0, 1, 1, 1, 1]);
+            let long = build_input_buffer(&ctx, &[9_u32, 2, 0, 1, 1, 1, 1]);
             let indices = index.map(|format| Indices {
                 buffer: if format == IndexFormat::U16 { *short } else { *long },
                 offset: u64::from(format.size_bytes()),
@@ -231,7 +238,7 @@ fn all_formats_strides_indices_and_matrices_are_read() {
                 flags: GeometryFlags::OPAQUE,
                 ..Triangles::packed(*vertices, 3)
             };
-            let found = facts(&ctx, &build(&ctx, &[BlasGeometry::Triangles(geometry)]));
+            let found = check_and_summarize(&ctx, &build(&ctx, &[BlasGeometry::Triangles(geometry)]));
             let [a, b, c] = corners.map(moved);
             let expected = match index {
                 None => vec![((0, 0), vec![a, b, c])],
@@ -245,10 +252,13 @@ fn all_formats_strides_indices_and_matrices_are_read() {
 #[test]
 fn indices_beyond_the_vertices_make_inactive_triangles() {
     let Some(ctx) = device() else { return };
-    let vertices = input(&ctx, &scattered(1, 1));
-    let indices = input(&ctx, &[0_u32, 1, 2, 0, 1, 3, u32::MAX, 0, 0]);
+    let vertices = build_input_buffer(&ctx, &scattered_triangles(1, 1));
+    let indices = build_input_buffer(&ctx, &[0_u32, 1, 2, 0, 1, 3, u32::MAX, 0, 0]);
     let geometry = BlasGeometry::Triangles(Triangles::indexed(*vertices, 3, *indices, 3));
-    check_contents(&facts(&ctx, &build(&ctx, &[geometry])), &numbered(&scattered(1, 1)));
+    check_contents(
+        &check_and_summarize(&ctx, &build(&ctx, &[geometry])),
+        &with_primitive_numbers(&scattered_triangles(1, 1)),
+    );
 }
 
 #[test]
@@ -256,33 +266,38 @@ fn several_geometries_keep_their_numbers() {
     let Some(ctx) = device() else { return };
     for scale in [1, 40] {
         let counts = [0, 30, 0, 0, 17, 100, 0].map(|count| count * scale);
-        let meshes: Vec<_> = counts.iter().map(|count| scattered(*count, *count as u64)).collect();
-        let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
-        let geometries: Vec<_> =
-            vertices.iter().zip(counts).map(|(vertices, count)| triangles(**vertices, count)).collect();
+        let meshes: Vec<_> = counts.iter().map(|count| scattered_triangles(*count, *count as u64)).collect();
+        let vertices: Vec<_> = meshes.iter().map(|corners| build_input_buffer(&ctx, corners)).collect();
+        let geometries: Vec<_> = vertices
+            .iter()
+            .zip(counts)
+            .map(|(vertices, count)| triangle_geometry(**vertices, count))
+            .collect();
         let mut expected = Vec::new();
         for (geometry, mesh) in (0..).zip(&meshes) {
-            expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
+            expected.extend(
+                with_primitive_numbers(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)),
+            );
         }
         for leaves in [LeafEncoding::Corners, LeafEncoding::Indexed, LeafEncoding::Packed] {
             let desc = GpuBlasDesc { geometries: &geometries, improvements: 1, leaves };
             let built = build_blas(&ctx, &[desc]).unwrap();
-            check_contents(&facts(&ctx, &built[0]), &expected);
+            check_contents(&check_and_summarize(&ctx, &built[0]), &expected);
         }
     }
 }
 
 #[test]
-fn better_places_cost_rays_less() {
+fn better_tree_positions_cost_rays_less() {
     let Some(ctx) = device() else { return };
     // A few long triangles among many small ones are what a space-filling curve is bad at.
-    let mut corners = scattered(4000, 21);
+    let mut corners = scattered_triangles(4000, 21);
     corners.iter_mut().step_by(16).for_each(|triangle| triangle[1] = triangle[1].map(|n| n * 0.5));
-    let vertices = input(&ctx, &corners);
-    let geometries = [triangles(*vertices, corners.len())];
+    let vertices = build_input_buffer(&ctx, &corners);
+    let geometries = [triangle_geometry(*vertices, corners.len())];
     let desc =
         |improvements| GpuBlasDesc { geometries: &geometries, improvements, leaves: LeafEncoding::Corners };
     let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();
-    let costs: Vec<f64> = built.iter().map(|structure| facts(&ctx, structure).cost).collect();
+    let costs: Vec<f64> = built.iter().map(|structure| check_and_summarize(&ctx, structure).cost).collect();
     assert!(costs[1] < costs[0] && costs[2] <= costs[1] * 1.001, "{costs:?}");
 }

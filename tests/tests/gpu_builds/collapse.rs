@@ -1,4 +1,4 @@
-//! Wide nodes that the GPU makes of binary ones: those of the model on the CPU, whatever the tree.
+//! BVH8 nodes that the GPU collapses from BVH2 nodes: equal to those of the model on the CPU, for any tree.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::Context;
@@ -11,7 +11,7 @@ fn tree(count: usize, even: usize, height: u32, seed: u64) -> Bvh2Reference {
     any_tree(count, even, height, &mut |below| (random.bits() >> 32) as usize % below)
 }
 
-/// Whether the nodes had room.
+/// True if the nodes had room.
 fn check(ctx: &Context, tree: &Bvh2Reference, what: &str) -> bool {
     let expected = tree.collapse();
     let (found, room) = collapse(ctx, tree).unwrap();
@@ -33,7 +33,7 @@ fn wide_nodes_are_those_of_the_model() {
 }
 
 #[test]
-fn paths_are_no_longer_than_walks_have_room_for() {
+fn paths_fit_the_traversal_stack() {
     let Some(ctx) = device() else { return };
     for seed in 0..8 {
         check(&ctx, &tree(600, 0, 64, seed), &format!("{seed}"));

@@ -1,9 +1,9 @@
-//! Structures that the library builds and refits itself, on the GPU.
+//! Acceleration acceleration structures that the library's own kernels build and refit on the GPU.
 
-mod anywhere;
 mod blas;
 mod collapse;
 mod kernels;
 mod refit;
 mod sort;
+mod swiftshader;
 mod tlas;

@@ -1,17 +1,21 @@
-//! Refits on the GPU, whoever built the tree: new places in the old tree, with boxes as a fresh fit has them.
+//! Refits on the GPU of trees built by the CPU or the GPU: the tree keeps its nodes, and its bounds equal those of a
+//! new fit.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, LeafEncoding, build_blas, place, read, refit};
 use lvk::{
     BlasDesc, BlasGeometry, BuildFlags, Context, Dependencies, DeviceProfile, RayQueryRequest, Result,
 };
-use lvk_tests::bender::bent;
-use lvk_tests::binary_tree::binary_structure;
+use lvk_tests::bvh2::bvh2_blob;
+use lvk_tests::bvh8::bvh8_blob;
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
-use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
+use lvk_tests::gpu_built::{
+    aabb_geometry, build, build_input_buffer, check_and_summarize, check_contents, scattered_triangles,
+    triangle_geometry, with_primitive_numbers,
+};
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, PartBuffers, upload_geometries, vertex_bytes};
-use lvk_tests::wide_tree::wide_structure;
+use lvk_tests::vertex_deform::deformed;
 use lvk_tests::{device, device_with};
 
 #[test]
@@ -19,33 +23,33 @@ fn trees_of_the_gpu_follow_moved_triangles() {
     let Some(ctx) = device() else { return };
     for count in [0, 1, 2, 3, 1000, 20_000] {
         for leaves in [LeafEncoding::Corners, LeafEncoding::Indexed, LeafEncoding::Packed] {
-            let vertices = input(&ctx, &scattered(count, 1));
-            let geometries = [triangles(*vertices, count)];
+            let vertices = build_input_buffer(&ctx, &scattered_triangles(count, 1));
+            let geometries = [triangle_geometry(*vertices, count)];
             let desc = GpuBlasDesc { geometries: &geometries, improvements: 1, leaves };
             let structure = build_blas(&ctx, &[desc]).unwrap().remove(0);
-            let before = facts(&ctx, &structure);
+            let before = check_and_summarize(&ctx, &structure);
             for seed in [2, 3] {
-                let moved = scattered(count, seed);
+                let moved = scattered_triangles(count, seed);
                 if count > 0 {
                     ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
                 }
                 refit(&ctx, &[(&structure, &geometries)]).unwrap();
-                let after = facts(&ctx, &structure);
+                let after = check_and_summarize(&ctx, &structure);
                 assert_eq!(after.primitives, before.primitives);
                 assert_eq!(after.height, before.height);
-                check_contents(&after, &numbered(&moved));
+                check_contents(&after, &with_primitive_numbers(&moved));
             }
         }
     }
 }
 
-/// Collapsed ones are encoded by the kernel that refits them, from boxes that came another way.
+/// Collapsed ones are encoded by the kernel that refits them, from AABBs that came another way.
 #[test]
 fn a_refit_of_what_did_not_move_changes_nothing() {
     let Some(ctx) = device() else { return };
     for count in [1, 3, 4, 30, 2000, 5000] {
-        let vertices = input(&ctx, &scattered(count, 6));
-        let geometries = [triangles(*vertices, count)];
+        let vertices = build_input_buffer(&ctx, &scattered_triangles(count, 6));
+        let geometries = [triangle_geometry(*vertices, count)];
         let structure = build(&ctx, &geometries);
         let words = read(&ctx, &structure).unwrap();
         refit(&ctx, &[(&structure, &geometries)]).unwrap();
@@ -54,37 +58,41 @@ fn a_refit_of_what_did_not_move_changes_nothing() {
 }
 
 #[test]
-fn boxes_follow_too() {
+fn aabbs_follow_too() {
     let Some(ctx) = device() else { return };
     let count = 3000;
     let list = |shift: f32| -> Vec<[[f32; 3]; 2]> {
-        scattered(count, 5).iter().map(|t| [t[0].map(|n| n + shift), t[0].map(|n| n + shift + 2.0)]).collect()
+        scattered_triangles(count, 5)
+            .iter()
+            .map(|t| [t[0].map(|n| n + shift), t[0].map(|n| n + shift + 2.0)])
+            .collect()
     };
-    let buffer = input(&ctx, &list(0.0));
-    let geometries = [boxes(*buffer, count)];
+    let buffer = build_input_buffer(&ctx, &list(0.0));
+    let geometries = [aabb_geometry(*buffer, count)];
     let structure = build(&ctx, &geometries);
     ctx.upload_buffer(*buffer, 0, bytemuck::cast_slice(&list(50.0))).unwrap();
     refit(&ctx, &[(&structure, &geometries)]).unwrap();
     let expected: Vec<_> =
         (0..).zip(list(50.0)).map(|(index, corners)| ((0, index), corners.to_vec())).collect();
-    check_contents(&facts(&ctx, &structure), &expected);
+    check_contents(&check_and_summarize(&ctx, &structure), &expected);
 }
 
 #[test]
-fn triangles_that_are_lost_are_in_no_box() {
+fn triangles_that_are_lost_are_in_no_aabb() {
     let Some(ctx) = device() else { return };
     let count = 100;
-    let vertices = input(&ctx, &scattered(count, 1));
-    let geometries = [triangles(*vertices, count)];
+    let vertices = build_input_buffer(&ctx, &scattered_triangles(count, 1));
+    let geometries = [triangle_geometry(*vertices, count)];
     let structure = build(&ctx, &geometries);
     ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&vec![[[f32::NAN; 3]; 3]; count])).unwrap();
     refit(&ctx, &[(&structure, &geometries)]).unwrap();
-    assert_eq!(facts(&ctx, &structure).bounds, EMPTY);
+    assert_eq!(check_and_summarize(&ctx, &structure).bounds, EMPTY);
 }
 
-/// What holds nothing has the box of [`EMPTY`], which rays in every direction miss, so that they visit nothing below it.
+/// A node without primitives has the AABB of [`EMPTY`], which rays in every direction miss, so that they visit no
+/// child of it.
 #[test]
-fn no_ray_enters_an_empty_box() {
+fn no_ray_enters_an_empty_aabb() {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return };
     let pipeline = compute_pipeline(
         &ctx,
@@ -116,14 +124,14 @@ fn no_ray_enters_an_empty_box() {
 fn binary_nodes_follow_moved_triangles() {
     let Some(ctx) = device() else { return };
     for count in [1, 3, 4, 7, 200, 5000] {
-        let vertices = input(&ctx, &scattered(count, 1));
-        let geometries = [triangles(*vertices, count)];
-        let structure = place(&ctx, &binary_structure(count)).unwrap();
+        let vertices = build_input_buffer(&ctx, &scattered_triangles(count, 1));
+        let geometries = [triangle_geometry(*vertices, count)];
+        let structure = place(&ctx, &bvh2_blob(count)).unwrap();
         for seed in [1, 4] {
-            let moved = scattered(count, seed);
+            let moved = scattered_triangles(count, seed);
             ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
             refit(&ctx, &[(&structure, &geometries)]).unwrap();
-            check_contents(&facts(&ctx, &structure), &numbered(&moved));
+            check_contents(&check_and_summarize(&ctx, &structure), &with_primitive_numbers(&moved));
         }
     }
 }
@@ -132,14 +140,14 @@ fn binary_nodes_follow_moved_triangles() {
 fn wide_nodes_follow_moved_triangles() {
     let Some(ctx) = device() else { return };
     for count in [1, 3, 4, 24, 25, 200, 5000] {
-        let vertices = input(&ctx, &scattered(count, 1));
-        let geometries = [triangles(*vertices, count)];
-        let structure = place(&ctx, &wide_structure(count)).unwrap();
+        let vertices = build_input_buffer(&ctx, &scattered_triangles(count, 1));
+        let geometries = [triangle_geometry(*vertices, count)];
+        let structure = place(&ctx, &bvh8_blob(count)).unwrap();
         for seed in [1, 4] {
-            let moved = scattered(count, seed);
+            let moved = scattered_triangles(count, seed);
             ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
             refit(&ctx, &[(&structure, &geometries)]).unwrap();
-            check_contents(&facts(&ctx, &structure), &numbered(&moved));
+            check_contents(&check_and_summarize(&ctx, &structure), &with_primitive_numbers(&moved));
         }
     }
 }
@@ -176,13 +184,13 @@ fn trees_of_the_cpu_follow_moved_triangles() {
             assert_eq!(words[1], leaf_kind, "{flags:?}");
             let structure = place(&ctx, &words).unwrap();
             for amount in [0.0, 0.8] {
-                let moved = bent(&mesh, amount);
+                let moved = deformed(&mesh, amount);
                 let bytes = vertex_bytes(&moved, Layout::Indexed16);
                 ctx.upload_buffer(*buffers[0].vertices, 0, &bytes).unwrap();
                 refit(&ctx, &[(&structure, &geometries)]).unwrap();
                 let corners = |named: &[u32; 3]| named.map(|vertex| moved.positions[vertex as usize]);
                 let expected: Vec<_> = moved.triangles.iter().map(corners).collect();
-                check_contents(&facts(&ctx, &structure), &numbered(&expected));
+                check_contents(&check_and_summarize(&ctx, &structure), &with_primitive_numbers(&expected));
             }
         }
     }
@@ -190,7 +198,7 @@ fn trees_of_the_cpu_follow_moved_triangles() {
 
 /// Scattered triangles of which every third lies far out, every sixth with one corner only, on all six sides.
 fn partly_far(count: usize, reach: f32) -> Vec<[[f32; 3]; 3]> {
-    let mut triangles = scattered(count, 1);
+    let mut triangles = scattered_triangles(count, 1);
     for number in (0..count).step_by(3) {
         let corners = if number % 2 == 0 { 1 } else { 3 };
         for corner in &mut triangles[number][..corners] {
@@ -201,61 +209,65 @@ fn partly_far(count: usize, reach: f32) -> Vec<[[f32; 3]; 3]> {
 }
 
 #[test]
-fn boxes_of_what_lies_far_out_end_as_those_of_the_cpu_do() {
+fn aabbs_of_what_lies_far_out_end_as_those_of_the_cpu_do() {
     let Some(ctx) = device() else { return };
     for count in [1, 4, 25, 2000] {
-        let vertices = input(&ctx, &scattered(count, 1));
-        let geometries = [triangles(*vertices, count)];
+        let vertices = build_input_buffer(&ctx, &scattered_triangles(count, 1));
+        let geometries = [triangle_geometry(*vertices, count)];
         let built = build(&ctx, &geometries);
-        let binary = place(&ctx, &binary_structure(count)).unwrap();
-        let wide = place(&ctx, &wide_structure(count)).unwrap();
+        let binary = place(&ctx, &bvh2_blob(count)).unwrap();
+        let wide = place(&ctx, &bvh8_blob(count)).unwrap();
         for reach in [1e14, 1e16, 1e30, 3e38, 0.0] {
             let moved = partly_far(count, reach);
             ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
             refit(&ctx, &[(&built, &geometries), (&binary, &geometries), (&wide, &geometries)]).unwrap();
             for structure in [&built, &binary, &wide, &build(&ctx, &geometries)] {
-                check_contents(&facts(&ctx, structure), &numbered(&moved));
+                check_contents(&check_and_summarize(&ctx, structure), &with_primitive_numbers(&moved));
             }
         }
     }
 }
 
-/// Boxes themselves end there, as those that the CPU reads do.
+/// AABBs themselves end there, as those that the CPU reads do.
 #[test]
-fn boxes_far_out_end_too() {
+fn aabbs_far_out_end_too() {
     let Some(ctx) = device() else { return };
     let count = 200;
     let list = |reach: f32| -> Vec<[[f32; 3]; 2]> {
-        scattered(count, 5).iter().map(|t| [t[0], t[0].map(|n| n.abs() + reach)]).collect()
+        scattered_triangles(count, 5).iter().map(|t| [t[0], t[0].map(|n| n.abs() + reach)]).collect()
     };
-    let buffer = input(&ctx, &list(1.0));
-    let geometries = [boxes(*buffer, count)];
+    let buffer = build_input_buffer(&ctx, &list(1.0));
+    let geometries = [aabb_geometry(*buffer, count)];
     let structure = build(&ctx, &geometries);
     for reach in [1e16, 3e38, f32::INFINITY] {
         ctx.upload_buffer(*buffer, 0, bytemuck::cast_slice(&list(reach))).unwrap();
         refit(&ctx, &[(&structure, &geometries)]).unwrap();
         let ended = list(reach).into_iter().map(|[low, _]| vec![low, [1e15; 3]]);
         let expected: Vec<_> = (0..).zip(ended).map(|(index, corners)| ((0, index), corners)).collect();
-        check_contents(&facts(&ctx, &structure), &expected);
+        check_contents(&check_and_summarize(&ctx, &structure), &expected);
     }
 }
 
 #[test]
-fn structures_are_refitted_side_by_side() {
+fn accel_structs_are_refitted_side_by_side() {
     let Some(ctx) = device() else { return };
     let counts = [50, 3000, 900, 400];
-    let vertices: Vec<_> = counts.iter().map(|count| input(&ctx, &scattered(*count, 1))).collect();
+    let vertices: Vec<_> =
+        counts.iter().map(|count| build_input_buffer(&ctx, &scattered_triangles(*count, 1))).collect();
     let geometries: Vec<_> =
-        vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
+        vertices.iter().zip(counts).map(|(vertices, count)| [triangle_geometry(**vertices, count)]).collect();
     let mut structures: Vec<_> = geometries[..2].iter().map(|geometries| build(&ctx, geometries)).collect();
-    structures.push(place(&ctx, &wide_structure(counts[2])).unwrap());
-    structures.push(place(&ctx, &binary_structure(counts[3])).unwrap());
+    structures.push(place(&ctx, &bvh8_blob(counts[2])).unwrap());
+    structures.push(place(&ctx, &bvh2_blob(counts[3])).unwrap());
     for (vertices, count) in vertices.iter().zip(counts) {
-        ctx.upload_buffer(**vertices, 0, bytemuck::cast_slice(&scattered(count, 9))).unwrap();
+        ctx.upload_buffer(**vertices, 0, bytemuck::cast_slice(&scattered_triangles(count, 9))).unwrap();
     }
     let refits: Vec<_> = structures.iter().zip(&geometries).map(|(s, g)| (s, &g[..])).collect();
     refit(&ctx, &refits).unwrap();
     for (structure, count) in structures.iter().zip(counts) {
-        check_contents(&facts(&ctx, structure), &numbered(&scattered(count, 9)));
+        check_contents(
+            &check_and_summarize(&ctx, structure),
+            &with_primitive_numbers(&scattered_triangles(count, 9)),
+        );
     }
 }

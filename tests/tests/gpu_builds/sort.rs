@@ -1,4 +1,4 @@
-//! The sort of the builds on the GPU: a stable permutation, whatever the keys.
+//! The radix sort of builds on the GPU: a stable permutation for any keys.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::sort;
@@ -46,6 +46,6 @@ fn keys_of_two_words_are_sorted_stably() {
 }
 
 #[test]
-fn an_odd_number_of_passes_ends_in_the_same_place() {
+fn an_odd_number_of_passes_ends_in_the_same_buffer() {
     check(17);
 }

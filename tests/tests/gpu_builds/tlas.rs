@@ -1,10 +1,12 @@
-//! Top-level structures built on the GPU, from records that name structures by address or by place.
+//! TLAS builds on the GPU, from instance descriptors that name BLASes by address or by number.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use lvk::glam::{Affine3A, EulerRot, Mat3, Quat, Vec3};
 use lvk::test_hooks::{CheckBounds, EMPTY, GpuStructure, build_tlas, check_structure, read};
 use lvk::transform_rows;
-use lvk_tests::gpu_built::{build, facts, input, scattered, triangles};
+use lvk_tests::gpu_built::{
+    build, build_input_buffer, check_and_summarize, scattered_triangles, triangle_geometry,
+};
 use lvk_tests::random::Random;
 use lvk_tests::{TestDevice, device};
 
@@ -18,7 +20,7 @@ struct Record {
     structure: u64,
 }
 
-/// Structures to show, with their bounds.
+/// Acceleration structures to show, with their bounds.
 struct Shown {
     structures: Vec<(GpuStructure, CheckBounds)>,
 }
@@ -26,9 +28,9 @@ struct Shown {
 impl Shown {
     fn new(ctx: &TestDevice) -> Self {
         let one = |count: usize| {
-            let vertices = input(ctx, &scattered(count, count as u64));
-            let structure = build(ctx, &[triangles(*vertices, count)]);
-            let bounds = facts(ctx, &structure).bounds;
+            let vertices = build_input_buffer(ctx, &scattered_triangles(count, count as u64));
+            let structure = build(ctx, &[triangle_geometry(*vertices, count)]);
+            let bounds = check_and_summarize(ctx, &structure).bounds;
             (structure, bounds)
         };
         // The last is empty.
@@ -57,7 +59,7 @@ impl Shown {
             .collect()
     }
 
-    /// What an instance needs at least, in 64 bits.
+    /// Returns the least bounds of an instance, in 64 bits.
     fn world(&self, record: &Record, place: usize) -> Option<CheckBounds> {
         let shown = self.structures[place].1;
         let m = record.rows.map(f64::from);
@@ -121,13 +123,13 @@ fn every_instance_is_in_one_leaf() {
     let Some(ctx) = device() else { return };
     let shown = Shown::new(&ctx);
     let addresses: Vec<u64> = shown.structures.iter().map(|(structure, _)| structure.address).collect();
-    let table = input(&ctx, &addresses);
+    let table = build_input_buffer(&ctx, &addresses);
     for (count, capacity) in
         [(0, 0), (0, 10), (1, 1), (2, 5), (3, 3), (100, 100), (2048, 2048), (2049, 4000), (10_000, 10_000)]
     {
         for by_place in [false, true] {
             let records = shown.records(count, by_place);
-            let buffer = input(&ctx, &records);
+            let buffer = build_input_buffer(&ctx, &records);
             let table = by_place.then_some((*table, addresses.len() as u32));
             let tlas = build_tlas(&ctx, *buffer, count as u32, capacity, table).unwrap();
             shown.check(&ctx, &tlas, &records);
@@ -148,34 +150,34 @@ fn instances_that_no_ray_meets_are_left_out() {
                 _ => {}
             }
         }
-        let buffer = input(&ctx, &records);
+        let buffer = build_input_buffer(&ctx, &records);
         let tlas = build_tlas(&ctx, *buffer, count as u32, count as u32, None).unwrap();
         shown.check(&ctx, &tlas, &records);
     }
 }
 
 #[test]
-fn places_that_do_not_exist_are_left_out() {
+fn blas_numbers_out_of_range_are_left_out() {
     let Some(ctx) = device() else { return };
     let shown = Shown::new(&ctx);
-    let table = input(&ctx, &[shown.structures[0].0.address, 0]);
+    let table = build_input_buffer(&ctx, &[shown.structures[0].0.address, 0]);
     let mut records = shown.records(1, true).repeat(5);
     for (record, place) in records.iter_mut().zip([2, 1, 0, u64::from(u32::MAX), 1 << 32]) {
         record.structure = place;
     }
-    let buffer = input(&ctx, &records);
+    let buffer = build_input_buffer(&ctx, &records);
     let tlas = build_tlas(&ctx, *buffer, 5, 5, Some((*table, 2))).unwrap();
     let words = read(&ctx, &tlas).unwrap();
     assert_eq!((words[2], words[3]), (1 << 31 | 2, 1));
 }
 
 #[test]
-fn nothing_to_show_is_empty() {
+fn a_tlas_of_nothing_is_empty() {
     let Some(ctx) = device() else { return };
     let shown = Shown::new(&ctx);
     let mut records = shown.records(3000, false);
     records.iter_mut().for_each(|record| record.structure = 0);
-    let buffer = input(&ctx, &records);
+    let buffer = build_input_buffer(&ctx, &records);
     let words = read(&ctx, &build_tlas(&ctx, *buffer, 3000, 3000, None).unwrap()).unwrap();
     assert_eq!((words[2], words[3], words[8]), (u32::MAX, 0, 0));
     assert!(f32::from_bits(words[12]) > f32::from_bits(words[15]));

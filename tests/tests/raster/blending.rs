@@ -1,4 +1,5 @@
-//! Blending: every factor and operation, constants, second sources, write masks and eight targets, against the formulas.
+//! Blending: every factor and operation, constants, dual-source blending, write masks and eight targets, against the
+//! formulas.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -249,7 +250,7 @@ fn second_sources_are_refused_where_they_cannot_be() {
     unsupported(make(&bare, PAINT_TWO, &[two]), "dualSrcBlend: the device profile 'core-only' hides it");
 }
 
-/// What is loaded is blended with, too.
+/// Loaded contents are blended with, too.
 #[test]
 fn blending_goes_on_in_the_next_pass() {
     let Some(ctx) = device() else { return };

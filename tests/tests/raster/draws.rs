@@ -1,4 +1,4 @@
-//! Draws: coverage, targets, depth, blending and views of targets, compared with what the CPU expects of each pixel.
+//! Draws: coverage, targets, depth, blending and views of targets, against the pixels that the CPU expects.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -45,7 +45,7 @@ fn draw(
 }
 
 /// Corners in clip space.
-fn clip_corners() -> [[f32; 2]; 3] {
+fn clip_vertices() -> [[f32; 2]; 3] {
     CORNERS.map(|corner| corner.map(|at| (at / 8.0 - 1.0) as f32))
 }
 
@@ -72,7 +72,7 @@ struct Vertex {
 }
 
 fn vertices() -> [Vertex; 3] {
-    clip_corners().map(|position| Vertex { position, color: RED })
+    clip_vertices().map(|position| Vertex { position, color: RED })
 }
 
 fn vertex_pipeline(ctx: &Context) -> Holder<RenderPipelineHandle> {
@@ -119,7 +119,7 @@ fn vertices_are_pulled_by_address() {
     let desc = RenderPipelineDesc { color: &color(Format::Rgba8Unorm), ..Default::default() };
     let pipeline = render_pipeline(&ctx, pull, FLAT, &desc);
     let target = target(&ctx, Format::Rgba8Unorm, SIZE);
-    let corners = buffer(&ctx, BufferUsage::STORAGE, &clip_corners());
+    let corners = buffer(&ctx, BufferUsage::STORAGE, &clip_vertices());
     draw(&ctx, &[attachment(*target, CLEAR_BLUE)], None, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
         pass.push_constants(&ctx.buffer_address(*corners)?)?;
@@ -450,7 +450,7 @@ fn mips_layers_and_faces_are_drawn_to_and_sampled() {
 }
 
 #[test]
-fn viewport_and_scissor_place_and_cut() {
+fn viewport_and_scissor_move_and_clip() {
     let Some(ctx) = device() else { return };
     let fragment = "
         layout(location = 0) out vec4 result;
@@ -472,7 +472,7 @@ fn viewport_and_scissor_place_and_cut() {
 }
 
 #[test]
-fn a_negative_height_flips_the_picture() {
+fn a_negative_height_flips_the_image() {
     let Some(ctx) = device() else { return };
     let pipeline = vertex_pipeline(&ctx);
     let target = target(&ctx, Format::Rgba8Unorm, SIZE);
@@ -491,7 +491,7 @@ fn a_negative_height_flips_the_picture() {
 #[test]
 fn culling_follows_the_winding_on_screen() {
     let Some(ctx) = device() else { return };
-    let vertices = buffer(&ctx, BufferUsage::STORAGE, &clip_corners());
+    let vertices = buffer(&ctx, BufferUsage::STORAGE, &clip_vertices());
     let pull = "
         layout(buffer_reference, scalar) readonly buffer Corners { vec2 at[]; };
         layout(push_constant, scalar) uniform Push { Corners corners; };

@@ -1,10 +1,11 @@
-//! What a render pass refuses: wrong targets, missing inputs, places outside. Refused calls record nothing.
+//! Calls that a render pass refuses: wrong targets, missing bindings, areas outside of the targets. A refused call
+//! records nothing.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
     BufferDesc, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CompareOp, Context, Dependencies,
-    DepthAttachment, DepthLoadOp, DepthTest, Error, Format, IndexFormat, RenderPassDesc, RenderPipelineDesc,
-    ShaderStage, TextureDesc, TextureUsage, VertexAttribute, VertexBinding, VertexFormat,
+    DepthAttachment, DepthLoadOp, DepthTest, Error, Format, IndexFormat, RenderPass, RenderPassDesc,
+    RenderPipelineDesc, ShaderStage, TextureDesc, TextureUsage, VertexAttribute, VertexBinding, VertexFormat,
 };
 use lvk_tests::compute::module;
 use lvk_tests::device;
@@ -151,40 +152,43 @@ fn draws_without_their_inputs_are_refused() {
     ctx.submit(cmd).unwrap();
 }
 
-#[test]
-fn viewports_and_scissors_outside_are_refused() {
+/// Calls `test` with an open pass on a target of 4 x 4 pixels. Nothing of it is submitted.
+fn in_small_pass(test: impl FnOnce(&mut RenderPass<'_>)) {
     let Some(ctx) = device() else { return };
     let target = target(&ctx, Format::Rgba8Unorm, [4, 4]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let color = [ColorAttachment::clear(*target, [0.0; 4])];
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    for rectangle in
-        [[0.0, 0.0, f32::NAN, 1.0], [0.0, f32::INFINITY, 1.0, 1.0], [0.0; 4], [0.0, 0.0, -1.0, 1.0]]
-    {
-        usage_error(pass.viewport(rectangle, [0.0, 1.0]), "viewport");
-    }
-    for depth in [[-0.1, 1.0], [0.0, 1.1], [f32::NAN, 1.0]] {
-        usage_error(pass.viewport([0.0, 0.0, 4.0, 4.0], depth), "depths");
-    }
-    for (offset, extent) in [([0, 0], [5, 4]), ([4, 0], [1, 1]), ([u32::MAX, 0], [2, 1])] {
-        usage_error(pass.scissor(offset, extent), "scissor");
-    }
-    pass.scissor([4, 4], [0, 0]).unwrap();
+    test(&mut cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap());
+}
+
+#[test]
+fn viewports_and_scissors_outside_are_refused() {
+    in_small_pass(|pass| {
+        for rectangle in
+            [[0.0, 0.0, f32::NAN, 1.0], [0.0, f32::INFINITY, 1.0, 1.0], [0.0; 4], [0.0, 0.0, -1.0, 1.0]]
+        {
+            usage_error(pass.viewport(rectangle, [0.0, 1.0]), "viewport");
+        }
+        for depth in [[-0.1, 1.0], [0.0, 1.1], [f32::NAN, 1.0]] {
+            usage_error(pass.viewport([0.0, 0.0, 4.0, 4.0], depth), "depths");
+        }
+        for (offset, extent) in [([0, 0], [5, 4]), ([4, 0], [1, 1]), ([u32::MAX, 0], [2, 1])] {
+            usage_error(pass.scissor(offset, extent), "scissor");
+        }
+        pass.scissor([4, 4], [0, 0]).unwrap();
+    });
 }
 
 /// Limits of Vulkan that a viewport must keep too, whatever the target.
 #[test]
 fn viewports_beyond_the_device_are_refused() {
-    let Some(ctx) = device() else { return };
-    let target = target(&ctx, Format::Rgba8Unorm, [4, 4]);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    let color = [ColorAttachment::clear(*target, [0.0; 4])];
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    for rectangle in
-        [[0.0, 0.0, 1.0e9, 4.0], [-1.0e9, 0.0, 4.0, 4.0], [0.0, 1.0e9, 4.0, -4.0], [0.0, 0.0, 4.0, 1.0e9]]
-    {
-        usage_error(pass.viewport(rectangle, [0.0, 1.0]), "viewport");
-    }
+    in_small_pass(|pass| {
+        for rectangle in
+            [[0.0, 0.0, 1.0e9, 4.0], [-1.0e9, 0.0, 4.0, 4.0], [0.0, 1.0e9, 4.0, -4.0], [0.0, 0.0, 4.0, 1.0e9]]
+        {
+            usage_error(pass.viewport(rectangle, [0.0, 1.0]), "viewport");
+        }
+    });
 }
 
 #[test]
@@ -235,7 +239,7 @@ fn unfit_pipelines_are_refused() {
     }
 }
 
-/// What the shader reads must be among the attributes, each location once.
+/// Every location that the shader reads must be an attribute, and no location may be one twice.
 #[test]
 fn shaders_get_every_attribute_they_read() {
     let Some(ctx) = device() else { return };

@@ -1,4 +1,4 @@
-//! Draws whose number a dispatch has written: of vertices, by index, and of meshes; and many pipelines made at once.
+//! Draws whose count a dispatch writes: of vertices, of indices and of meshes; and many pipelines created at once.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -48,10 +48,7 @@ enum Kind {
 
 #[test]
 fn a_dispatch_decides_how_many_draws_there_are() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::DrawIndirectCount) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::DrawIndirectCount)) else { return };
     let color = [Format::R32Float.into()];
     let desc = RenderPipelineDesc { color: &color, ..Default::default() };
     let stages = [(ShaderStage::Vertex, VERTEX), (ShaderStage::Fragment, FRAGMENT)];
@@ -122,10 +119,7 @@ fn a_dispatch_decides_how_many_draws_there_are() {
 /// In one command buffer the pass has to be told, and says so.
 #[test]
 fn a_number_written_in_the_same_command_buffer_is_declared() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::DrawIndirectCount) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::DrawIndirectCount)) else { return };
     let color = [Format::R32Float.into()];
     let stages = [(ShaderStage::Vertex, VERTEX), (ShaderStage::Fragment, FRAGMENT)];
     let desc = RenderPipelineDesc { color: &color, ..Default::default() };

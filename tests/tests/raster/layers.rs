@@ -1,4 +1,4 @@
-//! Layered targets and several views at once: where draws land, and how queries and the profiler count them.
+//! Layered targets and multiview: the layers that draws write, and the counts of queries and of the profiler.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -82,10 +82,7 @@ fn draws_choose_their_layer() {
 /// Geometry shaders choose too; a depth target has as many layers.
 #[test]
 fn a_geometry_shader_fills_layers_with_depths_of_their_own() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::GeometryShader) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::GeometryShader)) else { return };
     let geometry = "
         layout(triangles, invocations = 3) in;
         layout(triangle_strip, max_vertices = 3) out;
@@ -127,10 +124,7 @@ const BY_VIEW: &str = "
 /// Views 0 and 2: the layer between is left alone.
 #[test]
 fn each_view_is_drawn_to_its_layer() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::Multiview) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::Multiview)) else { return };
     let view_mask = 0b101;
     let vertex = "
         #extension GL_EXT_multiview : require
@@ -165,10 +159,7 @@ fn each_view_is_drawn_to_its_layer() {
 /// Every query takes one slot for each view: the result is their sum, and the slots behind are free.
 #[test]
 fn queries_and_stamps_count_all_views() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::Multiview) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::Multiview)) else { return };
     let view_mask = 0b111;
     let color = [Format::R32Float.into()];
     let stages = [(ShaderStage::Vertex, COVER), (ShaderStage::Fragment, BY_VIEW)];

@@ -1,5 +1,5 @@
-//! Fragment shaders that read what their own pass has drawn: the same bits as a second pass, orders of draws, samples and
-//! views.
+//! Fragment shaders that read input attachments of their own pass: the same bits as a second pass, orders of draws,
+//! samples and views.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -8,9 +8,9 @@ use lvk::{
     StencilFace, StencilOp, StencilTest, TextureDesc, TextureHandle, TextureKind, TextureMemory,
     TextureRegion, TextureUsage,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::local_read::{READ, SIZE, color_pipeline, depth_test, input};
 use lvk_tests::raster::{COVER, has, paint, pixels, run_pass, staged_pipeline, target};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// A colour, a number and a depth that differ from pixel to pixel.
@@ -24,7 +24,7 @@ const PATTERN: &str = "
         gl_FragDepth = float((at.x * 13u + at.y * 29u) % 101u) / 128.0 + 0.1;
     }";
 
-/// What both ways make of it.
+/// Combination of the inputs, equal for both passes.
 const COMBINE: &str = "
     vec4 combine(vec4 color, uint number, float depth) {
         return vec4(sqrt(color.rg) * depth, float(number >> 8) / 16777216.0, color.b - 1.0 / (depth + color.a));
@@ -57,7 +57,7 @@ fn cleared(texture: TextureHandle, format: Format) -> ColorAttachment {
 
 const TARGETS: [Format; 3] = [Format::Rgba8Unorm, Format::R32Uint, Format::Rgba32Float];
 
-/// The picture of one pass that draws the pattern and reads it.
+/// The image of one pass that draws the pattern and reads it.
 fn in_one_pass(ctx: &Context, depth: Format) -> Vec<u32> {
     drawn_and_read(ctx, depth, true)
 }
@@ -152,14 +152,14 @@ fn one_pass_has_the_bits_of_two() {
 /// Another driver, which has fewer inputs at least than ten or is right in another way.
 #[test]
 fn one_pass_has_the_bits_of_two_on_another_driver() {
-    without_ray_tracing(one_pass_has_the_bits_of_two_on_another_driver, || {
+    on_swiftshader(one_pass_has_the_bits_of_two_on_another_driver, || {
         let Some(ctx) = device() else { return };
         one_pass_is_two(&ctx);
         assert_places_are_limited(&ctx);
     });
 }
 
-/// What a shader reads beyond the device's places, here stencil, which is the last of ten.
+/// A shader may not read more input attachments than the device supports; stencil is the last of ten here.
 fn assert_places_are_limited(ctx: &Context) {
     let places = u64::from(ctx.capabilities().limits.max_input_attachments);
     let source = lvk::ShaderSource::Glsl(
@@ -189,10 +189,7 @@ fn one_pass_has_the_bits_of_two_where_indices_are_checked() {
 /// ready at once, in several command buffers.
 #[test]
 fn draws_see_those_before_them() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let fragment = "
         LVK_INPUT(0, subpassInput, gBefore);
         layout(push_constant, scalar) uniform Push { vec4 color; float depth; };
@@ -226,13 +223,10 @@ fn draws_see_those_before_them() {
     assert!(found.iter().all(|pixel| *pixel == expected), "{:?} is not {expected:?}", found[0]);
 }
 
-/// Two pipelines in turns, each of which reads what the other writes: nobody says when to wait.
+/// Two pipelines alternate, and each reads the output of the other. The test records no barrier.
 #[test]
 fn pipelines_wait_for_each_other() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let text = |from: u32, to: u32| {
         format!(
             "LVK_INPUT({from}, subpassInput, gOther);
@@ -294,9 +288,9 @@ fn samples_are_read_one_by_one() {
         ctx.create_texture(&desc).unwrap()
     };
     let (samples, lit) = (many(READ), many(TextureUsage::TARGET));
-    let picture = target(&ctx, Format::Rgba32Float, SIZE);
+    let image = target(&ctx, Format::Rgba32Float, SIZE);
     let gone = ColorAttachment { store: false, ..ColorAttachment::clear(*samples, [0.0; 4]) };
-    let resolve = Some(Resolve { texture: *picture, mip: 0, layer: 0 });
+    let resolve = Some(Resolve { texture: *image, mip: 0, layer: 0 });
     let color = [gone, ColorAttachment { texture: *lit, resolve, ..gone }];
     run_pass(&ctx, &RenderPassDesc { color: &color, local_read: true, ..Default::default() }, |pass| {
         for pipeline in [&draw, &read] {
@@ -305,7 +299,7 @@ fn samples_are_read_one_by_one() {
         }
         Ok(())
     });
-    let found = pixels::<[f32; 4]>(&ctx, *picture);
+    let found = pixels::<[f32; 4]>(&ctx, *image);
     for (at, [_, _, square, one]) in found.iter().enumerate() {
         assert_eq!(([*square, *one], at), ([(1.0 + 4.0 + 9.0) / 4.0, 1.0], at));
     }
@@ -409,13 +403,10 @@ fn stencil_is_read() {
     }
 }
 
-/// What another command wrote before the pass is read in it too, and a target that is only tested.
+/// A pass reads what another command wrote before it, and a depth target that it only tests against.
 #[test]
 fn what_is_loaded_is_read() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let read = "
         LVK_INPUT(0, subpassInput, gLoaded);
         LVK_DEPTH_INPUT(subpassInput, gDepth);
@@ -461,6 +452,6 @@ fn depth_that_the_state_of_a_pass_writes_is_waited_for() {
 fn devices_without_local_reads_draw_in_two_passes() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
-    let picture = in_two_passes(&ctx, Format::D32Float);
-    assert_eq!(picture.len(), (SIZE[0] * SIZE[1] * 4) as usize);
+    let image = in_two_passes(&ctx, Format::D32Float);
+    assert_eq!(image.len(), (SIZE[0] * SIZE[1] * 4) as usize);
 }

@@ -1,5 +1,5 @@
-//! Fragment shaders that read what their own pass has drawn: what is refused, by modules, pipelines, passes and textures, and
-//! what devices without local reads say.
+//! Fragment shaders that read input attachments of their own pass: errors of modules, pipelines, passes and textures,
+//! and of devices without local reads.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -18,10 +18,7 @@ const READS_FIRST: &str = "
 
 #[test]
 fn modules_that_read_nothing_of_the_pass_are_refused() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let refused = |declaration: &str, words: &str| {
         let text = format!(
             "{declaration}
@@ -58,10 +55,7 @@ fn modules_that_read_nothing_of_the_pass_are_refused() {
 
 #[test]
 fn pipelines_have_what_their_shaders_read() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let formats = [Format::Rgba8Unorm.into(), Format::R32Uint.into()];
     let plain = RenderPipelineDesc { color: &formats, debug_name: "reader", ..Default::default() };
     let refused = |declaration: &str, desc: &RenderPipelineDesc<'_>, words: &str| {
@@ -99,10 +93,7 @@ fn pipelines_have_what_their_shaders_read() {
 
 #[test]
 fn passes_have_what_their_pipelines_read() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let formats = [Format::Rgba8Unorm.into()];
     let desc = RenderPipelineDesc { color: &formats, debug_name: "reader", ..Default::default() };
     let reader = color_pipeline(&ctx, READS_FIRST, &desc).unwrap();
@@ -164,10 +155,7 @@ fn passes_have_what_their_pipelines_read() {
 
 #[test]
 fn textures_that_cannot_be_inputs_are_refused() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let plain = TextureDesc { usage: READ, debug_name: "made", ..Default::default() };
     let alone = TextureDesc { usage: TextureUsage::INPUT | TextureUsage::SAMPLED, ..plain };
     usage_error(ctx.create_texture(&alone), "made: INPUT is for what a pass draws to");

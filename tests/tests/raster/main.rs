@@ -1,4 +1,4 @@
-//! Rasterising: draws of every kind, and every state of passes and pipelines.
+//! Rasterisation: draws of every kind, and every state of passes and pipelines.
 
 mod blending;
 mod draws;

@@ -1,4 +1,4 @@
-//! Draws with task and mesh shaders, compared with what vertex shaders draw or what the CPU expects.
+//! Draws with task and mesh shaders, against draws with vertex shaders and against the CPU.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::sync::LazyLock;
@@ -178,7 +178,7 @@ fn a_mesh_shader_draws_what_a_vertex_shader_draws() {
     let colors: std::collections::HashSet<_> = by_vertices.0.iter().collect();
     assert!(colors.len() > 100, "{} colours test little", colors.len());
     let bytes = by_mesh.0.as_flattened().iter().zip(by_vertices.0.as_flattened());
-    assert_eq!(bytes.filter(|(a, b)| a.abs_diff(**b) > 1).count(), 0, "the pictures differ");
+    assert_eq!(bytes.filter(|(a, b)| a.abs_diff(**b) > 1).count(), 0, "the images differ");
     let depths = by_mesh.1.iter().zip(&by_vertices.1);
     assert_eq!(depths.filter(|(a, b)| (*a - *b).abs() > 1e-6).count(), 0, "the depths differ");
 }
@@ -323,7 +323,7 @@ fn arguments_may_be_written_by_a_dispatch_before_the_pass() {
     assert_eq!(first_bytes(&ctx, *cells), [1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0]);
 }
 
-/// What a dispatch wrote is read by address in the mesh stage, and what the mesh stage wrote by a dispatch.
+/// The mesh stage reads by address what a dispatch wrote, and a dispatch reads what the mesh stage wrote.
 #[test]
 fn buffers_flow_into_and_out_of_the_mesh_stage() {
     let Some(ctx) = mesh_device() else { return };

@@ -1,5 +1,5 @@
-//! Several samples a pixel: coverage, also by alpha, resolves of colour, depth and stencil, sample shading, and what is
-//! refused.
+//! Multisampling: coverage, alpha to coverage, resolves of colour, depth and stencil, sample shading, and refused
+//! calls.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -88,10 +88,7 @@ const BY_SAMPLE: &str = "
 
 #[test]
 fn fragments_run_for_each_sample_that_they_ask_for() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::SampleRateShading) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::SampleRateShading)) else { return };
     let count = "
         layout(buffer_reference, scalar) buffer Count { uint value; };
         layout(push_constant, scalar) uniform Push { Count count; };
@@ -99,7 +96,7 @@ fn fragments_run_for_each_sample_that_they_ask_for() {
         void main() { result = vec4(1); atomicAdd(count.value, 1); }";
     let color = [Format::R32Float.into()];
     let drawn = many(&ctx, Format::R32Float, [2, 2]);
-    // Where a driver cuts the triangle, the pixels of the cut run twice.
+    // A driver that splits the triangle runs pixels at the edge twice.
     for (sample_shading, invocations) in [(0.0, 4..=8), (1.0, 16..=32)] {
         let desc = RenderPipelineDesc { color: &color, sample_shading, ..Default::default() };
         let stages = [
@@ -129,10 +126,10 @@ fn fragments_run_for_each_sample_that_they_ask_for() {
     }
 }
 
-/// Strips of a picture, 8 pixels wide, of alphas from 0 to 1.
+/// Strips of an image, 8 pixels wide, of alphas from 0 to 1.
 const STRIPS: usize = 9;
 
-/// The red and the alpha of each strip of a picture, as the sum over its 8 x 8 pixels; red is 1 where it is drawn.
+/// The red and the alpha of each strip of an image, as the sum over its 8 x 8 pixels; red is 1 where it is drawn.
 fn strips(ctx: &Context, alpha_to_coverage: bool) -> [[f32; 2]; STRIPS] {
     let fragment = "
         layout(location = 0) out vec4 result;
@@ -158,7 +155,7 @@ fn strips(ctx: &Context, alpha_to_coverage: bool) -> [[f32; 2]; STRIPS] {
     sums
 }
 
-/// Which samples an alpha covers, and whether pixels differ in them, is the device's affair; how many is not.
+/// The device chooses the samples that an alpha covers, and whether pixels differ in them. Their number is defined.
 #[test]
 fn coverage_grows_with_alpha_where_it_is_asked_for() {
     let Some(ctx) = device() else { return };
@@ -178,10 +175,7 @@ fn coverage_grows_with_alpha_where_it_is_asked_for() {
 
 #[test]
 fn colour_depth_and_stencil_are_resolved_by_their_modes() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::SampleRateShading) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::SampleRateShading)) else { return };
     let format = Format::D32FloatS8;
     let limits = ctx.capabilities().limits.depth_resolve;
     assert!(limits.depth.contains(ResolveModes::SAMPLE_ZERO));
@@ -258,10 +252,7 @@ fn equal_to(ctx: &Context, tested: TextureHandle, value: u8) -> Vec<f32> {
 /// Integers have no mean. Vulkan asks for the first sample; NVIDIA's driver (580.159.04) takes another one.
 #[test]
 fn integers_are_resolved_to_one_of_their_samples() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::SampleRateShading) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::SampleRateShading)) else { return };
     let usage = TextureUsage::TARGET;
     let format = Format::R32Uint;
     let desc = TextureDesc { format, extent: [1, 1], usage, samples: SAMPLES, ..Default::default() };

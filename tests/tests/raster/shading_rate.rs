@@ -1,5 +1,5 @@
-//! Fragments of several pixels: sizes by pipeline, draw, primitive and attachment, how they come together, and what is
-//! refused. Pictures need a device that has rates; refusals do not.
+//! Fragment shading rates: sizes by pipeline, draw, primitive and attachment, their combiners, and refused calls.
+//! Only the images need a device with shading rates.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -40,7 +40,7 @@ fn pipeline(ctx: &Context, vertex: &str, rate: ShadingRate) -> Holder<RenderPipe
     staged_pipeline(ctx, &stages, &desc).unwrap()
 }
 
-/// The picture of a pass.
+/// The image of a pass.
 fn drawn(
     ctx: &Context,
     shading_rate: Option<ShadingRateAttachment>,
@@ -63,7 +63,7 @@ fn assert_fragments(found: &[[f32; 4]], columns: std::ops::Range<u32>, size: [u3
     }
 }
 
-/// What a device makes of a wish: the largest of its sizes that is nowhere larger.
+/// Returns the rate that a device grants: the largest of its sizes that is nowhere larger than the requested one.
 fn granted(ctx: &Context, wish: [u32; 2]) -> [u32; 2] {
     let fits = |size: &[u32; 2]| size[0] <= wish[0] && size[1] <= wish[1];
     let sizes = ctx.shading_rates().iter().filter(|known| known.samples & 1 != 0).map(|known| known.size);
@@ -71,7 +71,7 @@ fn granted(ctx: &Context, wish: [u32; 2]) -> [u32; 2] {
 }
 
 #[test]
-fn the_sizes_of_a_device_are_told_from_large_to_small() {
+fn the_sizes_of_a_device_are_listed_from_large_to_small() {
     let Some(ctx) = device() else { return };
     let (sizes, limits) = (ctx.shading_rates(), ctx.capabilities().limits.shading_rate);
     if !ctx.capabilities().has(OptionalFeature::PipelineShadingRate) {
@@ -88,10 +88,7 @@ fn the_sizes_of_a_device_are_told_from_large_to_small() {
 
 #[test]
 fn pipelines_and_draws_have_a_rate() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::PipelineShadingRate) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::PipelineShadingRate)) else { return };
     for known in ctx.shading_rates().iter().filter(|known| known.samples & 1 != 0) {
         let pipeline = pipeline(&ctx, COVER, ShadingRate::new(known.size));
         let found = drawn(&ctx, None, |pass| {
@@ -114,9 +111,9 @@ fn pipelines_and_draws_have_a_rate() {
     assert_fragments(&found, 32..64, [1, 1], "the next pipeline brings its own");
 }
 
-/// The rate of a texel for the left half of the picture and single pixels for the right one, and all combinations.
+/// The rate of a texel for the left half of the image and single pixels for the right one, and all combinations.
 #[test]
-fn attachments_and_primitives_come_in_by_their_formulas() {
+fn attachment_and_primitive_rates_are_combined_by_their_formulas() {
     let Some(ctx) = device() else { return };
     if !has(&ctx, OptionalFeature::AttachmentShadingRate) || !has(&ctx, OptionalFeature::PrimitiveShadingRate)
     {
@@ -168,10 +165,7 @@ fn attachments_and_primitives_come_in_by_their_formulas() {
 
 #[test]
 fn wrong_attachments_are_refused() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::AttachmentShadingRate) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::AttachmentShadingRate)) else { return };
     let plain = TextureDesc {
         format: Format::R8Uint,
         extent: [1, 1],
@@ -184,8 +178,8 @@ fn wrong_attachments_are_refused() {
     usage_error(ctx.create_texture(&TextureDesc { kind: TextureKind::D3 { depth: 2 }, ..plain }), wrong);
     let rates = ctx.create_texture(&plain).unwrap();
     let other = target(&ctx, Format::R8Uint, [64, 64]);
-    let picture = target(&ctx, Format::Rgba32Float, SIZE);
-    let color = [ColorAttachment::clear(*picture, [0.0; 4])];
+    let image = target(&ctx, Format::Rgba32Float, SIZE);
+    let color = [ColorAttachment::clear(*image, [0.0; 4])];
     let begin = |texture: TextureHandle, texel: [u32; 2], words: &str| {
         let shading_rate = Some(ShadingRateAttachment::new(texture, texel));
         let mut cmd = ctx.acquire_command_buffer().unwrap();
@@ -267,8 +261,8 @@ fn devices_without_rates_say_so() {
         unsupported(ctx.create_shader_module(&desc), "FragmentShadingRateKHR of shader 'asks for rates'");
     }
     let other = target(&ctx, Format::R8Uint, [4, 4]);
-    let picture = target(&ctx, Format::Rgba32Float, SIZE);
-    let color = [ColorAttachment::clear(*picture, [0.0; 4])];
+    let image = target(&ctx, Format::Rgba32Float, SIZE);
+    let color = [ColorAttachment::clear(*image, [0.0; 4])];
     let shading_rate = Some(ShadingRateAttachment::new(*other, [16, 16]));
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let desc = RenderPassDesc { color: &color, shading_rate, ..Default::default() };

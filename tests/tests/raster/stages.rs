@@ -1,4 +1,4 @@
-//! Tessellation and geometry stages: what they make of patches and primitives, and what is refused.
+//! Tessellation and geometry stages: their output for patches and primitives, and refused pipelines.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -46,7 +46,7 @@ const ONE: &str = "
     layout(location = 0) out vec4 result;
     void main() { result = vec4(1.0); }";
 
-fn picture(ctx: &Context, pipeline: &Holder<RenderPipelineHandle>, vertices: u32) -> Vec<f32> {
+fn render_image(ctx: &Context, pipeline: &Holder<RenderPipelineHandle>, vertices: u32) -> Vec<f32> {
     let drawn = target(ctx, Format::R32Float, SIZE);
     let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
     run_pass(ctx, &RenderPassDesc { color: &color, ..Default::default() }, |pass| {
@@ -68,10 +68,7 @@ fn make(
 
 #[test]
 fn a_divided_triangle_covers_what_the_whole_one_covers() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::TessellationShader) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::TessellationShader)) else { return };
     let stages = [
         (ShaderStage::Vertex, VERTEX),
         (ShaderStage::TessControl, CONTROL),
@@ -79,7 +76,7 @@ fn a_divided_triangle_covers_what_the_whole_one_covers() {
         (ShaderStage::Fragment, PART),
     ];
     let pipeline = make(&ctx, &stages, Topology::Patches { points: 3 }).unwrap();
-    let found = picture(&ctx, &pipeline, 3);
+    let found = render_image(&ctx, &pipeline, 3);
     let [a, b, c] = CORNERS;
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     for (index, (value, inside)) in found.iter().zip(coverage(CORNERS, SIZE)).enumerate() {
@@ -93,10 +90,7 @@ fn a_divided_triangle_covers_what_the_whole_one_covers() {
 /// Points of a quad divided in four by four, by the levels that the control stage sets.
 #[test]
 fn levels_decide_how_many_points_there_are() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::TessellationShader) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::TessellationShader)) else { return };
     let control = "
         layout(vertices = 1) out;
         void main() {
@@ -116,7 +110,7 @@ fn levels_decide_how_many_points_there_are() {
     let on = |at: usize| [2, 5, 8, 11, 14].contains(&at);
     let expected: Vec<f32> =
         (0..256).map(|index| f32::from(u8::from(on(index % 16) && on(index / 16)))).collect();
-    assert_eq!(picture(&ctx, &pipeline, 1), expected);
+    assert_eq!(render_image(&ctx, &pipeline, 1), expected);
 }
 
 /// A point becomes a rectangle, and the shader counts its primitives in a buffer.
@@ -206,7 +200,7 @@ fn a_geometry_shader_sees_what_tessellation_makes() {
         (ShaderStage::Fragment, PART),
     ];
     let pipeline = make(&ctx, &stages, Topology::Patches { points: 3 }).unwrap();
-    let found = picture(&ctx, &pipeline, 3);
+    let found = render_image(&ctx, &pipeline, 3);
     let middle = [0, 1].map(|axis| (CORNERS.iter().map(|corner| corner[axis]).sum::<f64>() / 3.0) as usize);
     let expected: Vec<f32> = (0..256).map(|i| f32::from(u8::from(i == middle[1] * 16 + middle[0]))).collect();
     assert_eq!(found, expected);

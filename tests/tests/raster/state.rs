@@ -1,4 +1,4 @@
-//! Raster state: polygon modes, line widths, depth bias and clamp, fans, and areas of passes.
+//! Raster state: polygon modes, line widths, depth bias and clamp, triangle fans, and render areas.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -33,7 +33,7 @@ fn make(
     staged_pipeline(ctx, &[(ShaderStage::Vertex, vertex), (ShaderStage::Fragment, ONE)], &desc)
 }
 
-/// What is drawn of vertices at these pixels, by row.
+/// Returns the values that draws leave at these pixels, by row.
 fn drawn(ctx: &Context, desc: &RenderPipelineDesc<'_>, at: &[[u32; 2]]) -> Vec<Vec<bool>> {
     let pipeline = make(ctx, CENTRES, desc).unwrap();
     let drawn = target(ctx, Format::R32Float, [8, 8]);
@@ -50,10 +50,7 @@ fn drawn(ctx: &Context, desc: &RenderPipelineDesc<'_>, at: &[[u32; 2]]) -> Vec<V
 
 #[test]
 fn polygons_are_filled_outlined_or_dotted() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::FillModeNonSolid) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::FillModeNonSolid)) else { return };
     let corners = [[1, 1], [6, 1], [1, 6]];
     let with = |polygon| drawn(&ctx, &RenderPipelineDesc { polygon, ..Default::default() }, &corners);
     let (lines, dots) = (with(PolygonMode::Line), with(PolygonMode::Point));
@@ -87,10 +84,7 @@ fn a_fan_turns_around_its_first_vertex() {
 
 #[test]
 fn wide_lines_cover_their_width() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::WideLines) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::WideLines)) else { return };
     let desc = RenderPipelineDesc { topology: Topology::Lines, ..Default::default() };
     for (line_width, rows) in [(1.0, 3..4), (3.0, 2..5)] {
         let found = drawn(&ctx, &RenderPipelineDesc { line_width, ..desc }, &[[1, 3], [6, 3]]);
@@ -145,7 +139,7 @@ fn depth_bias_moves_depths_by_units() {
     let plain = found[1];
     assert!((plain - 16384).abs() <= 1, "{plain}");
     let moved: Vec<i32> = found.iter().map(|depth| depth - plain).collect();
-    // What a unit is, is the device's to say: at most two steps of the format.
+    // The device defines the unit: at most two steps of the format.
     let unit = if moved[0] > 7 { 2 } else { 1 };
     let expected = [5 * unit, 0, -8 * unit, if bounded.is_some() { 3 } else { 5 * unit }, 5 * unit];
     assert!(moved.iter().zip(expected).all(|(found, expected)| (found - expected).abs() <= 1), "{moved:?}");

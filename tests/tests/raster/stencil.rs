@@ -1,4 +1,4 @@
-//! Stencil and depth state: operations, masks, faces, loads and stores, read-only targets, and state set in the pass.
+//! Stencil and depth state: operations, masks, faces, loads and stores, read-only targets, and dynamic state.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

@@ -1,4 +1,4 @@
-//! Vertex attributes of every format, and indices of every size, against the bytes they were made of.
+//! Vertex attributes of every format and indices of every size, against the bytes in the buffers.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

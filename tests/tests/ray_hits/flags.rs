@@ -1,8 +1,8 @@
-//! Masks, ray flags, instance flags and geometry flags in all their combinations, against the f64 reference.
+//! Masks, ray flags, instance flags and geometry flags in all combinations, against the f64 reference.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{DeviceProfile, GeometryFlags, InstanceFlags, Result};
-use lvk_tests::agreement::Agreement;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{
@@ -25,7 +25,7 @@ fn devices() -> Vec<TestDevice> {
 }
 
 /// A place on a grid three apart, turned by its number.
-fn place(index: u32) -> Affine3A {
+fn transform_of(index: u32) -> Affine3A {
     let at = Vec3::new((index % 4) as f32, (index / 4 % 4) as f32, (index / 16) as f32) * 2.4;
     Affine3A::from_rotation_translation(Quat::from_rotation_y(index as f32 * 0.7), at)
 }
@@ -44,7 +44,7 @@ fn models() -> Vec<Vec<Part>> {
 fn a_ray_sees_the_instances_that_share_a_bit_with_it() -> Result<()> {
     const MASKS: [u8; 14] = [0, 1, 2, 4, 8, 16, 32, 64, 128, 0xff, 0x55, 0xaa, 0x0f, 0x81];
     let Some(ctx) = device() else { return Ok(()) };
-    let place = |(index, mask)| Placed { mask, ..Placed::new(0, place(index)) };
+    let place = |(index, mask)| Placed { mask, ..Placed::new(0, transform_of(index)) };
     let scene = RayScene {
         models: vec![vec![Part::new(Mesh::cube_grid(1), Layout::Indexed16)]],
         placed: (0..).zip(MASKS).map(place).collect(),
@@ -54,13 +54,13 @@ fn a_ray_sees_the_instances_that_share_a_bit_with_it() -> Result<()> {
     let rays = rays_for(&reference, 240);
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
-        let mut whole = Agreement::default();
+        let mut whole = HitComparison::default();
         for mask in 0..=0xff {
             let how = How { mask, ..How::default() };
             let records = tracer.trace(&gpu.tlas, &rays, how)?;
-            whole.add(Agreement::of_triangles(&rays, &records, |ray| reference.closest_by(ray, how)));
+            whole.add(HitComparison::of_triangles(&rays, &records, |ray| reference.closest_by(ray, how)));
             let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::shadows() })?;
-            whole.add(Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)));
+            whole.add(HitComparison::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)));
         }
         whole.assert(&format!("256 masks by {method:?}"));
         let blind = tracer.trace(&gpu.tlas, &rays, How { mask: 0, ..How::default() })?;
@@ -79,7 +79,7 @@ fn all_instance_flags() -> Vec<InstanceFlags> {
 fn flagged() -> RayScene {
     let place = |(index, flags): (u32, InstanceFlags)| {
         let mirror = if index % 4 < 2 { 1.0 } else { -1.0 };
-        let transform = place(index) * Affine3A::from_scale(Vec3::new(mirror, 0.8, 1.1));
+        let transform = transform_of(index) * Affine3A::from_scale(Vec3::new(mirror, 0.8, 1.1));
         Placed { flags, custom_index: 5 * index, ..Placed::new(index as usize % 2, transform) }
     };
     let twice = all_instance_flags().into_iter().flat_map(|flags| [flags, flags]);
@@ -92,14 +92,15 @@ fn check_flags(ctx: &TestDevice, method: Method, kinds: &[u32], sides: &[u32]) -
     let gpu = scene.upload(ctx)?;
     let reference = scene.reference();
     let rays = rays_for(&reference, 700);
-    let tracer = RayTracer::keeping_even(ctx, method)?;
+    let tracer = RayTracer::with_even_primitives(ctx, method)?;
     for flags in kinds.iter().flat_map(|kind| sides.iter().map(move |side| kind | side)) {
         let how = How { flags, ..How::default() };
         let answer = |ray: &Ray| {
             reference.closest_by_where(ray, how, |hit| hit.is_opaque || hit.ids.primitive & 1 == 0)
         };
         let records = tracer.trace(&gpu.tlas, &rays, how)?;
-        Agreement::of_triangles(&rays, &records, answer).assert(&format!("flags {flags:#x} by {method:?}"));
+        HitComparison::of_triangles(&rays, &records, answer)
+            .assert(&format!("flags {flags:#x} by {method:?}"));
         let occluded = |ray: &Ray| {
             let answer = answer(ray);
             answer.is_certain.then_some(answer.hit.is_some())
@@ -107,7 +108,7 @@ fn check_flags(ctx: &TestDevice, method: Method, kinds: &[u32], sides: &[u32]) -
         let first = How { flags: flags | TERMINATE_ON_FIRST_HIT, ..How::default() };
         let records = tracer.trace(&gpu.tlas, &rays, first)?;
         let what = format!("first hit, flags {flags:#x} by {method:?}");
-        Agreement::of_occlusion(&rays, &records, occluded).assert(&what);
+        HitComparison::of_occlusion(&rays, &records, occluded).assert(&what);
     }
     Ok(())
 }

@@ -1,15 +1,15 @@
-//! What rays hit: triangles and boxes in every format, at every place, with every flag.
+//! Hits of rays: triangles and AABBs in every format, at every position, with every flag.
 
-mod anywhere;
-mod boxes;
-mod far;
+mod aabbs;
+mod degenerate_triangles;
+mod extreme_coordinates;
 mod flags;
-mod generated;
-mod inactive;
+mod grazing_aabbs;
 mod meshes;
 mod position_fetch;
-mod range;
+mod procedural_hits;
+mod ray_interval;
 mod shared_vertices;
-mod touched_boxes;
+mod swiftshader;
 mod transforms;
 mod vertex_formats;

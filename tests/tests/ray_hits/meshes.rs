@@ -5,8 +5,8 @@ use std::error::Error;
 use lvk::glam::{Affine3A, DVec3, Vec3};
 use lvk_samples::app::progress::Progress;
 use lvk_samples::scene::{ObjOptions, Scene};
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, Method, OPAQUE, RayTracer};
@@ -15,7 +15,7 @@ use lvk_tests::reference::Reference;
 
 type Outcome = Result<(), Box<dyn Error>>;
 
-/// What a camera sees, and rays from everywhere.
+/// Returns rays of a camera, and rays from everywhere.
 fn rays_for(reference: &Reference, seed: u64) -> Vec<Ray> {
     let (low, high) = reference.bounds();
     let (low, high) = (low.as_vec3(), high.as_vec3());
@@ -33,10 +33,10 @@ fn check(name: &str, scene: &RayScene) -> Outcome {
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
             .assert(&format!("{name} by {method:?}"));
         let shadows = tracer.trace(&gpu.tlas, &rays, How::shadows())?;
-        Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
+        HitComparison::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
             .assert(&format!("{name}, shadows by {method:?}"));
     }
     Ok(())
@@ -80,7 +80,7 @@ fn a_torus_from_an_obj_file() -> Outcome {
         for record in records.iter_mut().filter(|record| record.kind != 0) {
             record.primitive = loaded.source_triangles[record.primitive as usize];
         }
-        Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff))
+        HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff))
             .assert(&format!("torus, as in the file, by {method:?}"));
     }
     drop(gpu);
@@ -106,7 +106,7 @@ fn faces_are_culled_by_their_side() -> Outcome {
             let records = tracer.trace(&gpu.tlas, &rays, How { flags: flags | OPAQUE, ..How::default() })?;
             let answer = |ray: &Ray| reference.closest_where(ray, 0xff, |hit| hit.is_front == front);
             let what = format!("only {} faces by {method:?}", if front { "front" } else { "back" });
-            Agreement::of_triangles(&rays, &records, answer).assert(&what);
+            HitComparison::of_triangles(&rays, &records, answer).assert(&what);
         }
     }
     Ok(())

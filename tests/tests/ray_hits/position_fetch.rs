@@ -1,9 +1,10 @@
-//! The corners of what was hit, fetched from the structure: those of the mesh, in its own order and in object space.
+//! Vertices of the hit triangle, fetched from the acceleration structure: those of the mesh, in its own order and in
+//! object space.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    BuildFlags, BuildMode, ComputePipelineDesc, Context, DeviceProfile, Error, GeometryFlags, HitGroup,
-    RayQueryPath, RayTracingPipelineDesc, Result, ShaderStage, TlasDesc,
+    BuildFlags, BuildMode, Context, DeviceProfile, Error, GeometryFlags, HitGroup, RayQueryPath, Result,
+    ShaderStage, TlasDesc,
 };
 use lvk_tests::hit_check::rays_for;
 use lvk_tests::meshes::Mesh;
@@ -20,22 +21,19 @@ fn tracer(ctx: &Context, method: Method, corner: usize) -> Result<RayTracer> {
     let defines: &[_] = &[("CORNER", number.as_str())];
     if method == Method::Query {
         let text = include_str!("../../shaders/corner_query.comp.glsl");
-        let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
-        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
+        return RayTracer::from_query_text(ctx, text, defines);
     }
     let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../../shaders/closest.rgen.glsl"))?;
     let miss = shader(ctx, ShaderStage::Miss, include_str!("../../shaders/record.rmiss.glsl"))?;
     let text = include_str!("../../shaders/corner.rchit.glsl");
     let hit = shader_with(ctx, ShaderStage::ClosestHit, text, defines)?;
     let any_hit = shader(ctx, ShaderStage::AnyHit, include_str!("../../shaders/corner.rahit.glsl"))?;
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &[HitGroup { closest_hit: Some(*hit), any_hit: Some(*any_hit), ..Default::default() }],
-        ..Default::default()
-    })?;
-    Ok(RayTracer::of_pipeline(ctx, pipeline))
+    RayTracer::from_groups(
+        ctx,
+        *ray_gen,
+        *miss,
+        &[HitGroup { closest_hit: Some(*hit), any_hit: Some(*any_hit), ..Default::default() }],
+    )
 }
 
 /// Whole meshes, and such as are cut into many parts; none where the device cannot fetch.
@@ -70,10 +68,10 @@ fn scene(flags: GeometryFlags) -> RayScene {
         vec![part(Mesh::sphere(7), Layout::Interleaved, flags)],
         vec![Part { transform: Some(moved), ..part(Mesh::terrain(6), Layout::Indexed32, flags) }],
     ];
-    RayScene { models, placed: (0..6).map(place).collect() }
+    RayScene { models, placed: (0..6).map(instance_at).collect() }
 }
 
-fn place(index: u32) -> Placed {
+fn instance_at(index: u32) -> Placed {
     let turn = Quat::from_rotation_y(index as f32);
     let to = Vec3::new((index % 3) as f32 * 3.0, (index / 3) as f32 * 3.0, 0.3);
     let scale = Vec3::new(1.0, 0.7, if index % 3 == 2 { -1.0 } else { 1.0 });
@@ -81,7 +79,7 @@ fn place(index: u32) -> Placed {
 }
 
 /// The corner of a hit triangle in object space.
-fn corner(scene: &RayScene, ids: &HitIds, corner: usize) -> Vec3 {
+fn expected_vertex(scene: &RayScene, ids: &HitIds, corner: usize) -> Vec3 {
     let part = &scene.models[scene.placed[ids.instance as usize].model][ids.geometry as usize];
     let vertex = part.mesh.triangles[ids.primitive as usize][corner];
     let position = Vec3::from(part.mesh.positions[vertex as usize]);
@@ -91,7 +89,8 @@ fn corner(scene: &RayScene, ids: &HitIds, corner: usize) -> Vec3 {
 fn check(ctx: &TestDevice, what: &str, gpu: &GpuScene, scene: &RayScene) -> Result<()> {
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let is_kept = |ids: &HitIds| (0..3).map(|number| corner(scene, ids, number).x).sum::<f32>() >= 0.0;
+    let is_kept =
+        |ids: &HitIds| (0..3).map(|number| expected_vertex(scene, ids, number).x).sum::<f32>() >= 0.0;
     for method in Method::available(ctx) {
         for number in 0..3 {
             let records = tracer(ctx, method, number)?.trace(&gpu.tlas, &rays, How::default())?;
@@ -100,7 +99,7 @@ fn check(ctx: &TestDevice, what: &str, gpu: &GpuScene, scene: &RayScene) -> Resu
                 let how = How::default();
                 let answer = reference.closest_by_where(ray, how, |hit| hit.is_opaque || is_kept(&hit.ids));
                 if answer.is_certain {
-                    let expected = answer.hit.map(|hit| (hit.ids, corner(scene, &hit.ids, number)));
+                    let expected = answer.hit.map(|hit| (hit.ids, expected_vertex(scene, &hit.ids, number)));
                     hits += usize::from(expected.is_some());
                     assert!(
                         is_same(record, expected),
@@ -125,7 +124,7 @@ fn is_same(record: &HitRecord, expected: Option<(HitIds, Vec3)>) -> bool {
 }
 
 #[test]
-fn corners_are_those_of_the_mesh() -> Result<()> {
+fn fetched_vertices_are_those_of_the_mesh() -> Result<()> {
     for ctx in devices() {
         for flags in [GeometryFlags::OPAQUE, GeometryFlags::empty()] {
             let scene = scene(flags);
@@ -138,14 +137,14 @@ fn corners_are_those_of_the_mesh() -> Result<()> {
 
 /// lavapipe 25.0 answers the corners of the first geometry for all.
 #[test]
-fn corners_of_every_geometry_are_its_own() -> Result<()> {
+fn fetched_vertices_of_every_geometry_are_its_own() -> Result<()> {
     for ctx in devices() {
         if ctx.capabilities().device_name.contains("llvmpipe") {
             eprintln!("NOT TESTED, {} knows the first geometry only", ctx.capabilities().device_name);
             continue;
         }
         let parts = scene(GeometryFlags::OPAQUE).models.concat();
-        let scene = RayScene { models: vec![parts; 4], placed: (0..2).map(place).collect() };
+        let scene = RayScene { models: vec![parts; 4], placed: (0..2).map(instance_at).collect() };
         let gpu = scene.upload_with(&ctx, FETCH, BuildFlags::default(), 0)?;
         check(&ctx, "several geometries", &gpu, &scene)?;
     }
@@ -153,7 +152,7 @@ fn corners_of_every_geometry_are_its_own() -> Result<()> {
 }
 
 #[test]
-fn corners_move_with_a_refit() -> Result<()> {
+fn fetched_vertices_move_with_a_refit() -> Result<()> {
     for ctx in devices() {
         let mut scene = scene(GeometryFlags::OPAQUE);
         let gpu = scene.upload_with(&ctx, FETCH | BuildFlags::ALLOW_UPDATE, BuildFlags::default(), 0)?;
@@ -177,7 +176,7 @@ fn without_the_capability_only_software_can_fetch() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
     let scene = scene(GeometryFlags::OPAQUE);
     let device = ctx.capabilities();
-    // Structures of the library have positions whatever the device has.
+    // Acceleration structures of the library have positions whatever the device has.
     let is_software = device.ray_query_path == RayQueryPath::Software && !device.ray_tracing_pipeline;
     assert_eq!(device.position_fetch, is_software);
     if is_software {
@@ -202,7 +201,7 @@ fn without_the_capability_only_software_can_fetch() -> Result<()> {
 }
 
 #[test]
-fn a_top_level_structure_has_no_corners() -> Result<()> {
+fn a_tlas_has_no_vertices_to_fetch() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let outcome = ctx.create_tlas(&TlasDesc { flags: FETCH, ..Default::default() }).map(drop);
     assert!(matches!(outcome, Err(Error::InvalidUsage { .. })), "{outcome:?}");

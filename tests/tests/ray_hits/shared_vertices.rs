@@ -1,14 +1,14 @@
-//! Refits of trees whose leaves name vertices that triangles share: all of them follow, whichever geometry they are of, and
-//! nobody beside a vertex that is lost goes with it.
+//! Refits of trees whose leaves index vertices that triangles share: every triangle of a moved vertex follows, in
+//! every geometry, and a NaN vertex removes only its own triangles.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{BuildFlags, BuildMode, Context, DeviceProfile, RayQueryRequest, Result, transform_rows};
-use lvk_tests::bender::bent;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{
     GpuScene, Layout, MATRIX_OFFSET, Part, PartBuffers, Placed, RayScene, instances, vertex_bytes,
 };
+use lvk_tests::vertex_deform::deformed;
 use lvk_tests::{device, device_with};
 
 const SMALL: BuildFlags = BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE);
@@ -17,7 +17,7 @@ const SMALL: BuildFlags = BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE)
 const FLAGS: [BuildFlags; 2] = [SMALL, SMALL.union(BuildFlags::FAST_BUILD)];
 
 /// A mesh behind vertices that no triangle names, and in front of others.
-fn among_others(mesh: &Mesh) -> Mesh {
+fn among_other_instances(mesh: &Mesh) -> Mesh {
     const OTHERS: u32 = 300;
     let others = [[7.0, f32::NAN, 9.0]; OTHERS as usize];
     Mesh {
@@ -36,12 +36,12 @@ fn scene() -> RayScene {
     };
     let models = vec![
         vec![
-            Part::new(among_others(&Mesh::torus(8)), Layout::Indexed16),
+            Part::new(among_other_instances(&Mesh::torus(8)), Layout::Indexed16),
             moved(Mesh::cube_grid(2), Layout::Interleaved, true),
             moved(Mesh::terrain(6), Layout::Indexed32, false),
             Part::new(Mesh::cube_grid(1), Layout::Unshared),
         ],
-        vec![Part::new(among_others(&Mesh::sphere(8)), Layout::Indexed32)],
+        vec![Part::new(among_other_instances(&Mesh::sphere(8)), Layout::Indexed32)],
         vec![Part::new(Mesh::torus(5), Layout::Unshared)],
     ];
     let place = |model| Placed::new(model, Affine3A::from_translation(Vec3::X * 3.0 * model as f32));
@@ -55,7 +55,7 @@ fn moved(scene: &RayScene, amount: f32) -> RayScene {
             true => Affine3A::from_rotation_z(amount) * matrix,
             false => matrix,
         };
-        Part { mesh: bent(&part.mesh, amount), transform: part.transform.map(turn), ..part.clone() }
+        Part { mesh: deformed(&part.mesh, amount), transform: part.transform.map(turn), ..part.clone() }
     };
     let models = scene.models.iter().map(|parts| parts.iter().map(part).collect()).collect();
     RayScene { models, ..scene.clone() }
@@ -67,7 +67,7 @@ fn upload(ctx: &Context, part: &Part, buffers: &PartBuffers) -> Result<()> {
     ctx.upload_buffer(**buffer, MATRIX_OFFSET, bytemuck::bytes_of(&transform_rows(matrix)))
 }
 
-/// Has the structures follow the scene.
+/// Has the acceleration structures follow the scene.
 fn follow(ctx: &Context, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) -> Result<()> {
     let parts = scene.models.iter().flatten();
     parts.zip(&gpu.buffers).try_for_each(|(part, buffers)| upload(ctx, part, buffers))?;

@@ -1,5 +1,5 @@
-//! Transforms of instances and of geometries: uneven scales, shears, mirrors, very small and very large, by value and by
-//! buffer; and many instances in one place.
+//! Transforms of instances and of geometries: non-uniform scales, shears, mirrors, very small and very large ones, by
+//! value and from buffers; and many instances at one position.
 
 use lvk::glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 use lvk::{BuildFlags, BuildMode, DeviceProfile, InstanceFlags, Result, transform_rows};
@@ -88,7 +88,7 @@ fn geometries_are_moved_by_value_and_by_buffer() -> Result<()> {
             let part = |(index, (_, matrix)): (usize, &(_, Affine3A))| {
                 let layout = if index % 2 == 0 { Layout::Indexed32 } else { Layout::Unshared };
                 let transform = Some(at(index) * *matrix);
-                // One in three by the other way, so that both stand in one structure.
+                // One in three by the other way, so that both stand in one acceleration structure.
                 let transform_in_buffer = transform_in_buffer != (index % 3 == 0);
                 Part { transform, transform_in_buffer, ..Part::new(Mesh::torus(6), layout) }
             };

@@ -1,5 +1,5 @@
-//! Every vertex format the device builds from, with every index type, at odd strides and offsets; and a typed error for
-//! the others.
+//! Every vertex format that the device builds from, with every index type, at odd strides and offsets; and a typed
+//! error for other formats.
 
 use lvk::glam::{Affine3A, DAffine3, DVec3, Vec3};
 use lvk::{
@@ -90,7 +90,7 @@ fn components(format: VertexFormat) -> usize {
     }
 }
 
-/// How the bytes of a model lie.
+/// Memory layout of a model.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     format: VertexFormat,
@@ -193,7 +193,7 @@ fn mesh() -> Mesh {
     mesh
 }
 
-/// Whether the device builds from a format. One it does not take is an error that says so.
+/// True if the device builds from a format. One it does not take is an error that says so.
 fn accepts(ctx: &Context, format: VertexFormat) -> Result<bool> {
     let case = Case { format, indices: None, spread: false };
     match case.build(ctx, &mesh()) {
@@ -299,16 +299,7 @@ fn a_model_may_mix_formats() -> Result<()> {
         let placed = [Placed::new(0, Affine3A::IDENTITY)];
         let tlas =
             ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-        let instance = Instance {
-            geometries: &decoded,
-            transform: DAffine3::IDENTITY,
-            custom_index: 0,
-            mask: 0xff,
-            flip_facing: false,
-            no_cull: false,
-            force_opaque: None,
-        };
-        let reference = Reference::new(&[instance]);
+        let reference = Reference::new(&[Instance::new(&decoded)]);
         let how = How::default();
         // The flat ones lie in one plane, so only rays that meet a hill first have one answer.
         let rays: Vec<_> = rays_for(&reference)

@@ -1,10 +1,10 @@
-//! Instances chosen by the culling helper before an update: rays of the camera see the same as without it.
+//! Instances that the culling helper chooses before an update: rays of the camera hit the same as without culling.
 
 use lvk::glam::camera::rh::{proj::vulkan, view};
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{BuildFlags, BuildMode, Context, InstanceCulling, Result, TlasInstance};
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
@@ -31,7 +31,7 @@ fn scene() -> RayScene {
     RayScene { models, placed: (0..600).map(&mut place).collect() }
 }
 
-/// Where the camera stands and looks.
+/// Position and direction of the camera.
 #[derive(Clone, Copy)]
 struct View {
     eye: Vec3,
@@ -45,7 +45,7 @@ impl View {
         InstanceCulling::from_view_projection(self.eye, projection * view)
     }
 
-    /// Rays through the pixels of a square picture, from the near to the far plane.
+    /// Rays through the pixels of a square image, from the near to the far plane.
     fn rays(&self, side: u32) -> Vec<Ray> {
         let right = self.forward.cross(Vec3::Y).normalize();
         let up = right.cross(self.forward);
@@ -68,8 +68,8 @@ fn views() -> [View; 4] {
     ]
 }
 
-/// Boxes of the models in object space.
-fn boxes(scene: &RayScene) -> Vec<(Vec3, Vec3)> {
+/// AABBs of the models in object space.
+fn instance_bounds(scene: &RayScene) -> Vec<(Vec3, Vec3)> {
     let of_model = |parts: &Vec<Part>| {
         let points = parts[0].mesh.positions.iter().copied().map(Vec3::from);
         points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
@@ -78,8 +78,12 @@ fn boxes(scene: &RayScene) -> Vec<(Vec3, Vec3)> {
 }
 
 /// The instances that are kept. Their custom indices are their places among all.
-fn kept(scene: &RayScene, all: &[TlasInstance], culling: &InstanceCulling) -> Vec<TlasInstance> {
-    let boxes = boxes(scene);
+fn expected_instances(
+    scene: &RayScene,
+    all: &[TlasInstance],
+    culling: &InstanceCulling,
+) -> Vec<TlasInstance> {
+    let boxes = instance_bounds(scene);
     let of_instances = scene.placed.iter().zip(all);
     let is_kept = |(placed, instance): &(&Placed, &TlasInstance)| {
         let (low, high) = boxes[placed.model];
@@ -93,7 +97,7 @@ fn agree(what: &str, rays: &[Ray], mut records: Vec<HitRecord>, answer: impl Fn(
     for record in records.iter_mut().filter(|record| record.kind != MISSED) {
         record.instance = record.custom_index;
     }
-    Agreement::of_triangles(rays, &records, answer).assert(what);
+    HitComparison::of_triangles(rays, &records, answer).assert(what);
 }
 
 struct Stage {
@@ -117,9 +121,9 @@ impl Stage {
     }
 
     /// Shows what is kept; answers how many that are.
-    fn show(&self, culling: &InstanceCulling) -> Result<Vec<u32>> {
+    fn update_tlas(&self, culling: &InstanceCulling) -> Result<Vec<u32>> {
         let all = instances(&self.scene.placed, &self.gpu.models);
-        let kept = kept(&self.scene, &all, culling);
+        let kept = expected_instances(&self.scene, &all, culling);
         let mut cmd = self.ctx.acquire_command_buffer()?;
         cmd.update_tlas(*self.gpu.tlas, &kept, BuildMode::Auto { max_refits: 8 })?;
         self.ctx.submit(cmd)?;
@@ -142,7 +146,7 @@ fn rays_of_the_camera_see_what_they_would_see_of_all() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let stage = Stage::new(&ctx)?;
     for view in views() {
-        let kept = stage.show(&view.culling())?.len();
+        let kept = stage.update_tlas(&view.culling())?.len();
         assert!((10..300).contains(&kept), "{kept} of 600");
         stage.check(&format!("{kept} kept"), &view.rays(30), |_| true)?;
     }
@@ -155,8 +159,8 @@ fn a_margin_keeps_what_rays_beside_the_frustum_meet() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let stage = Stage::new(&ctx)?;
     for view in views() {
-        let exact = stage.show(&view.culling())?.len();
-        let kept = stage.show(&InstanceCulling { frustum_margin: 6.0, ..view.culling() })?.len();
+        let exact = stage.update_tlas(&view.culling())?.len();
+        let kept = stage.update_tlas(&InstanceCulling { frustum_margin: 6.0, ..view.culling() })?.len();
         assert!(exact < kept && kept < 600, "{exact} and {kept}");
         let beside = view.forward.cross(Vec3::Y).normalize() * 5.0;
         let moved = View { eye: view.eye + beside, ..view };
@@ -165,14 +169,14 @@ fn a_margin_keeps_what_rays_beside_the_frustum_meet() -> Result<()> {
     Ok(())
 }
 
-/// What is too small to matter is gone, and nothing else.
+/// Only instances that look too small are culled.
 #[test]
-fn small_instances_are_gone_and_no_others() -> Result<()> {
+fn only_small_instances_are_culled() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let stage = Stage::new(&ctx)?;
     for view in views() {
-        let all = stage.show(&view.culling())?;
-        let large = stage.show(&InstanceCulling { min_angle: 0.2, ..view.culling() })?;
+        let all = stage.update_tlas(&view.culling())?;
+        let large = stage.update_tlas(&InstanceCulling { min_angle: 0.2, ..view.culling() })?;
         assert!(large.len() < all.len() && large.iter().all(|index| all.contains(index)));
         let what = format!("{} of {} are large", large.len(), all.len());
         stage.check(&what, &view.rays(24), |ids| large.contains(&ids.instance))?;

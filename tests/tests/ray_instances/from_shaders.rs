@@ -1,4 +1,4 @@
-//! Instances that a compute shader writes in the command buffer that builds and traces them.
+//! Instances that a compute shader writes in the command buffer that builds and traces their TLAS.
 
 use bytemuck::NoUninit;
 use lvk::glam::{Affine3A, Vec3};
@@ -7,12 +7,12 @@ use lvk::{
     ComputePipelineHandle, Context, Dependencies, DeviceInstances, DeviceProfile, Error, Holder,
     InstanceFlags, Result, ShaderStage, TlasDesc,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::accel_backend::builds_device_accel_structs;
 use lvk_tests::hit_check::{HitCheck, rays_for};
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{How, shader_with};
-use lvk_tests::structures::has_own_structures;
 use lvk_tests::{TestDevice, device, device_with};
 
 const RECORD_BYTES: u64 = 64;
@@ -20,7 +20,7 @@ const WIDTH: u32 = 6;
 /// Bytes before the first record.
 const OFFSET: u64 = 48;
 
-/// What `instances.comp.glsl` is pushed.
+/// Push constants of `instances.comp.glsl`.
 #[repr(C)]
 #[derive(Clone, Copy, NoUninit)]
 struct Push {
@@ -51,7 +51,7 @@ impl Writer {
         Ok(Self { pipeline, records, address })
     }
 
-    /// Records the writing of records and the update of the structure.
+    /// Records the writing of records and the update of the acceleration structure.
     fn update(
         &self,
         cmd: &mut CommandBuffer,
@@ -73,7 +73,7 @@ impl Writer {
     }
 }
 
-/// The same instances. The reference has no instance for a structure that is not there, so it gets one that no ray sees.
+/// The same instances. The reference has no instance for an acceleration structure that is not there, so it gets one that no ray sees.
 fn scene(models: &[Vec<Part>], count: u32, turn: f32) -> RayScene {
     let place = |i: u32| {
         let to = Vec3::new((i % WIDTH) as f32, (i / WIDTH) as f32, (i % 3) as f32) * 3.0;
@@ -96,14 +96,14 @@ fn models() -> Vec<Vec<Part>> {
     ]
 }
 
-/// Plain structures; where the device has its own, some that are cut into many parts, with room for them all, and some that may
+/// Plain acceleration structures; where the device has its own, some that are cut into many parts, with room for them all, and some that may
 /// move.
 fn devices() -> Vec<(TestDevice, BuildFlags, u32)> {
     let profile = DeviceProfile { max_blas_primitives: 32, ..DeviceProfile::default() };
     let (trace, build) = (BuildFlags::FAST_TRACE, BuildFlags::FAST_BUILD);
     let plain = device().map(|ctx| (ctx, build, 1));
     let ordered = device().map(|ctx| (ctx, trace, 1));
-    let has_own = |ctx: &TestDevice| has_own_structures(ctx);
+    let has_own = |ctx: &TestDevice| builds_device_accel_structs(ctx);
     let moving = device().filter(has_own).map(|ctx| (ctx, trace | BuildFlags::ALLOW_COMPACTION, 1));
     let cut = device_with(|desc| desc.profile = Some(&profile)).filter(has_own).map(|ctx| (ctx, trace, 16));
     [plain, ordered, moving, cut].into_iter().flatten().collect()
@@ -139,7 +139,7 @@ fn instances_written_by_a_dispatch_are_traced_in_the_same_submission() -> Result
                 writer.update(&mut cmd, &gpu, count, turn, mode)?;
                 tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
                 ctx.submit(cmd)?;
-                Agreement::of_triangles(&rays, &tracer.read(&job)?, |ray| reference.closest(ray, 0xff))
+                HitComparison::of_triangles(&rays, &tracer.read(&job)?, |ray| reference.closest(ray, 0xff))
                     .assert(&format!("{count} written, {mode:?}, {flags:?}, {parts} parts, by {method:?}"));
             }
         }
@@ -169,7 +169,7 @@ fn every_frame_in_flight_has_records_of_its_own() -> Result<()> {
                 frames.push((job, rays, reference));
             }
             for (number, (job, rays, reference)) in frames.iter().enumerate() {
-                Agreement::of_triangles(rays, &tracer.read(job)?, |ray| reference.closest(ray, 0xff))
+                HitComparison::of_triangles(rays, &tracer.read(job)?, |ray| reference.closest(ray, 0xff))
                     .assert(&format!("frame {number}, {flags:?}, {parts} parts, by {method:?}"));
             }
         }

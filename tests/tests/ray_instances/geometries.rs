@@ -1,8 +1,8 @@
-//! Several geometries and instances, transforms of both, masks and fronts, against the f64 reference.
+//! Several geometries and instances, transforms of both, masks and front faces, against the f64 reference.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{GeometryFlags, InstanceFlags, Result};
-use lvk_tests::agreement::Agreement;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
@@ -75,7 +75,7 @@ fn geometries_and_instances_keep_their_numbers() -> Result<()> {
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
             .assert(&format!("instances by {method:?}"));
     }
     Ok(())
@@ -93,9 +93,9 @@ fn masks_choose_instances() -> Result<()> {
         for mask in [0b0001, 0b0110, 0b1101] {
             let what = format!("mask {mask:#b} by {method:?}");
             let records = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::default() })?;
-            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, mask)).assert(&what);
+            HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, mask)).assert(&what);
             let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::shadows() })?;
-            Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)).assert(&what);
+            HitComparison::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)).assert(&what);
         }
         let none = tracer.trace(&gpu.tlas, &rays, How { mask: 0b1111_0000, ..How::default() })?;
         assert!(none.iter().all(|record| record.kind == 0), "no instance has these bits");
@@ -104,7 +104,7 @@ fn masks_choose_instances() -> Result<()> {
 }
 
 #[test]
-fn instances_that_reach_into_each_other_keep_their_numbers() -> Result<()> {
+fn overlapping_instances_keep_their_numbers() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let scene = RayScene::scattered(GeometryFlags::OPAQUE);
     let gpu = scene.upload(&ctx)?;
@@ -115,9 +115,9 @@ fn instances_that_reach_into_each_other_keep_their_numbers() -> Result<()> {
         for mask in [0xff, 0b101] {
             let what = format!("mask {mask:#b} by {method:?}");
             let records = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::default() })?;
-            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, mask)).assert(&what);
+            HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, mask)).assert(&what);
             let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::shadows() })?;
-            Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)).assert(&what);
+            HitComparison::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)).assert(&what);
         }
     }
     Ok(())
@@ -125,7 +125,7 @@ fn instances_that_reach_into_each_other_keep_their_numbers() -> Result<()> {
 
 /// Every build is over the scratch budget by itself, so each is a batch of its own.
 #[test]
-fn many_structures_are_built_whatever_the_scratch_budget() -> Result<()> {
+fn many_accel_structs_are_built_whatever_the_scratch_budget() -> Result<()> {
     for budget in [1, 200 << 10] {
         let Some(ctx) = device_with(|desc| desc.scratch_budget_bytes = budget) else { return Ok(()) };
         let part = |size: u32| vec![Part::new(Mesh::sphere(4 + size % 5), Layout::Indexed16)];
@@ -140,7 +140,7 @@ fn many_structures_are_built_whatever_the_scratch_budget() -> Result<()> {
         let rays = rays_for(&reference);
         for method in Method::available(&ctx) {
             let records = RayTracer::new(&ctx, method)?.trace(&gpu.tlas, &rays, How::default())?;
-            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+            HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
                 .assert(&format!("30 structures, {budget} bytes of scratch, by {method:?}"));
         }
     }
@@ -171,20 +171,20 @@ fn an_any_hit_shader_looks_through_what_is_not_opaque() -> Result<()> {
     let rays = rays_for(&reference);
     let has_holes = |instance, geometry| matches!((instance, geometry), (0, 0) | (2, _));
     for method in Method::available(&ctx) {
-        let tracer = RayTracer::keeping_even(&ctx, method)?;
+        let tracer = RayTracer::with_even_primitives(&ctx, method)?;
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
         let answer = |ray: &Ray| {
             reference.closest_where(ray, 0xff, |hit| {
                 hit.ids.primitive & 1 == 0 || !has_holes(hit.ids.instance, hit.ids.geometry)
             })
         };
-        Agreement::of_triangles(&rays, &records, answer).assert(&format!("holes by {method:?}"));
+        HitComparison::of_triangles(&rays, &records, answer).assert(&format!("holes by {method:?}"));
     }
     Ok(())
 }
 
 #[test]
-fn an_empty_structure_is_missed_by_every_ray() -> Result<()> {
+fn an_empty_accel_struct_is_missed_by_every_ray() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let tlas = ctx.create_tlas(&lvk::TlasDesc::default())?;
     let rays = random_rays(1, 100, Vec3::NEG_ONE, Vec3::ONE);

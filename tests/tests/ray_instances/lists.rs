@@ -1,5 +1,5 @@
-//! Top-level structures that are given one list of instances after the other, from buffers and from the host, and lists
-//! that compaction overtakes.
+//! TLAS updates from one instance list after the other, from buffers and from the host, and lists recorded before a
+//! compaction and submitted after it.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -32,7 +32,7 @@ fn scene(count: u32, turn: f32) -> RayScene {
     RayScene { models, placed: (0..count).map(place).collect() }
 }
 
-/// The records of a scene, its models at these places of the list of structures.
+/// The records of a scene, its models at these places of the list of acceleration structures.
 fn records(scene: &RayScene, places: [u32; 2]) -> Vec<u32> {
     let record = |placed: &Placed| {
         let rows = transform_rows(&placed.transform).map(f32::to_bits);
@@ -46,7 +46,7 @@ fn models(ctx: &Context, flags: BuildFlags) -> Result<Vec<Holder<AccelStructHand
     Ok(scene(1, 0.0).upload_with(ctx, flags, BuildFlags::default(), 0)?.models)
 }
 
-fn show(
+fn update_tlas(
     ctx: &Context,
     tlas: AccelStructHandle,
     (buffer, count): (BufferHandle, u32),
@@ -60,12 +60,12 @@ fn show(
 
 /// More, fewer, moved; from a buffer and from the host in turn.
 #[test]
-fn a_structure_takes_instances_from_anywhere() -> Result<()> {
+fn an_accel_struct_takes_instances_from_anywhere() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     for flags in [BuildFlags::default(), BuildFlags::FAST_BUILD, COMPACTABLE] {
         let models = models(&ctx, flags)?;
-        // A structure may be listed twice, and places nobody refers to do no harm.
+        // A BLAS may be listed twice, and entries that no instance refers to do no harm.
         let blas = [*models[0], *models[0], *models[1]];
         let tlas = ctx.create_tlas(&TlasDesc { capacity: 9, flags: UPDATABLE, ..Default::default() })?;
         for (count, turn, mode) in [
@@ -77,7 +77,7 @@ fn a_structure_takes_instances_from_anywhere() -> Result<()> {
         ] {
             let of_count = scene(count, turn);
             let buffer = words_buffer(&ctx, &records(&of_count, [1, 2]));
-            show(&ctx, *tlas, (*buffer, count), &blas, mode)?;
+            update_tlas(&ctx, *tlas, (*buffer, count), &blas, mode)?;
             drop(buffer);
             check.scene(&format!("{count} from a buffer, {flags:?}"), &tlas, &of_count)?;
             let mut cmd = ctx.acquire_command_buffer()?;
@@ -90,7 +90,7 @@ fn a_structure_takes_instances_from_anywhere() -> Result<()> {
     Ok(())
 }
 
-/// Recorded for the old structures, submitted when they have been replaced.
+/// Recorded for the old acceleration structures, submitted when they have been replaced.
 #[test]
 fn an_update_that_is_overtaken_by_compaction_is_mended() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

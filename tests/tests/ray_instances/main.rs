@@ -1,9 +1,9 @@
-//! Instances in top-level structures: from the host, from lists, by shaders, in great numbers.
+//! Instances of a TLAS: from the host, from buffers, written by shaders, in large numbers.
 
-mod anywhere;
 mod culling;
 mod from_shaders;
 mod geometries;
 mod lists;
 mod many;
 mod overlaps;
+mod swiftshader;

@@ -1,19 +1,16 @@
-//! Top-level structures: more than a hundred thousand instances, numbers at the limits of their bits, and updates that
-//! refit or rebuild as they may.
+//! TLASes of more than a hundred thousand instances, numbers at the limits of their bits, and updates that choose
+//! between refit and rebuild.
 
 use bytemuck::Zeroable;
 use lvk::glam::{Affine3A, Vec3};
-use lvk::{
-    BuildFlags, BuildMode, ComputePipelineDesc, Context, DeviceProfile, InstanceFlags, Result, ShaderStage,
-    TlasDesc,
-};
-use lvk_tests::agreement::Agreement;
+use lvk::{BuildFlags, BuildMode, Context, DeviceProfile, InstanceFlags, Result, TlasDesc};
+use lvk_tests::accel_backend::expect_parts;
 use lvk_tests::hit_check::HitCheck;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
-use lvk_tests::ray_tracer::{BACK, FRONT, HitRecord, How, MISSED, Method, RayTracer, shader};
+use lvk_tests::ray_tracer::{BACK, FRONT, HitRecord, How, MISSED, Method, RayTracer, requires_ray_queries};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::structures::expect_parts;
 use lvk_tests::{device, device_with};
 
 /// Instances of one triangle each, on the cells of a flat grid of this width.
@@ -70,7 +67,7 @@ fn rays() -> Vec<Ray> {
 }
 
 #[test]
-fn a_hundred_thousand_instances_are_shown() -> Result<()> {
+fn a_hundred_thousand_instances_are_traced() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     let scene = many(3, 0.1);
@@ -90,7 +87,7 @@ fn a_hundred_thousand_instances_are_shown() -> Result<()> {
 
 /// As many, where a kernel puts the addresses in and the numbers are looked up: 60,000 instances of meshes cut in two.
 #[test]
-fn a_hundred_thousand_parts_of_cut_meshes_are_shown() -> Result<()> {
+fn a_hundred_thousand_parts_of_split_meshes_are_traced() -> Result<()> {
     let profile = DeviceProfile { max_blas_primitives: 1, ..DeviceProfile::default() };
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
@@ -125,7 +122,7 @@ fn update(ctx: &Context, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) -> R
 }
 
 /// Some models in a row, which `step` moves and of which it counts more or fewer.
-fn row(step: u32) -> RayScene {
+fn instances_in_a_row(step: u32) -> RayScene {
     let count = [3, 3, 3, 5, 5, 1, 6, 6, 0, 4][step as usize];
     let place = |index: u32| {
         let to = Vec3::new(index as f32 * 2.6, step as f32 * 0.3, 0.1 * (index * step) as f32);
@@ -140,7 +137,7 @@ fn row(step: u32) -> RayScene {
 
 fn updatable_and_not(ctx: &Context) -> Result<Vec<GpuScene>> {
     let scenes = [BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE, BuildFlags::FAST_BUILD]
-        .map(|top| row(0).upload_with(ctx, BuildFlags::default(), top, 6));
+        .map(|top| instances_in_a_row(0).upload_with(ctx, BuildFlags::default(), top, 6));
     scenes.into_iter().collect()
 }
 
@@ -153,17 +150,17 @@ fn an_automatic_update_is_never_refused() -> Result<()> {
         let mode = BuildMode::Auto { max_refits };
         for gpu in updatable_and_not(&ctx)? {
             for step in 0..10 {
-                update(&ctx, &gpu, &row(step), mode)?;
-                if !row(step).placed.is_empty() {
-                    check.scene(&format!("step {step}, {mode:?}"), &gpu.tlas, &row(step))?;
+                update(&ctx, &gpu, &instances_in_a_row(step), mode)?;
+                if !instances_in_a_row(step).placed.is_empty() {
+                    check.scene(&format!("step {step}, {mode:?}"), &gpu.tlas, &instances_in_a_row(step))?;
                 }
             }
             let mut cmd = ctx.acquire_command_buffer()?;
             for step in [1, 2, 4, 6, 7] {
-                cmd.update_tlas(*gpu.tlas, &instances(&row(step).placed, &gpu.models), mode)?;
+                cmd.update_tlas(*gpu.tlas, &instances(&instances_in_a_row(step).placed, &gpu.models), mode)?;
             }
             ctx.submit(cmd)?;
-            check.scene(&format!("at once, {mode:?}"), &gpu.tlas, &row(7))?;
+            check.scene(&format!("at once, {mode:?}"), &gpu.tlas, &instances_in_a_row(7))?;
         }
     }
     Ok(())
@@ -172,15 +169,9 @@ fn an_automatic_update_is_never_refused() -> Result<()> {
 /// Records the offset into the shader binding table where others record the tag of a sphere.
 fn offset_query(ctx: &Context) -> Result<RayTracer> {
     const OFFSETS: &str = r#"
-        #include <lvk/ray_query.glsl>
-        #include "ray_records.glsl"
-        layout(local_size_x = 64) in;
+        #include "ray_query_start.glsl"
         void main() {
-            uint index = gl_GlobalInvocationID.x;
-            if (index >= count) { return; }
-            Ray ray = rays.at[index];
-            LvkRayQuery rq;
-            lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+            START_RAY_QUERY;
             while (lvkRayQueryProceed(rq)) {}
             HitRecord record = kNoHit;
             if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
@@ -191,9 +182,7 @@ fn offset_query(ctx: &Context) -> Result<RayTracer> {
             }
             hits.at[index] = record;
         }"#;
-    let module = shader(ctx, ShaderStage::Compute, OFFSETS)?;
-    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    RayTracer::from_query_text(ctx, OFFSETS, &[])
 }
 
 /// Numbers at the ends of their ranges, side by side, so that none spills into another.
@@ -221,12 +210,8 @@ fn at_limits() -> RayScene {
 }
 
 #[test]
-fn numbers_at_their_limits_come_back() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    if !ctx.capabilities().ray_query {
-        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
-        return Ok(());
-    }
+fn numbers_at_their_limits_are_reported() -> Result<()> {
+    let Some(ctx) = device().filter(|ctx| requires_ray_queries(ctx)) else { return Ok(()) };
     let scene = at_limits();
     let gpu = scene.upload(&ctx)?;
     let above = |index: usize| Ray::new(Vec3::new(index as f32 + 0.3, 1.0, 0.3), Vec3::NEG_Y);
@@ -254,19 +239,27 @@ fn numbers_at_their_limits_come_back() -> Result<()> {
     Ok(())
 }
 
-/// A structure with room for more shows what it was given, however much of the room that is.
+/// An acceleration structure with room for more shows what it was given, however much of the room that is.
 #[test]
-fn capacity_above_the_count_shows_nothing_more() -> Result<()> {
+fn capacity_above_the_count_adds_no_hits() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     for capacity in [0, 6, 7, 1_000, 100_000] {
-        let gpu = row(6).upload_with(&ctx, BuildFlags::default(), BuildFlags::default(), capacity)?;
-        check.scene(&format!("room for {capacity}"), &gpu.tlas, &row(6))?;
-        update(&ctx, &gpu, &row(2), BuildMode::Rebuild)?;
-        check.scene(&format!("fewer, room for {capacity}"), &gpu.tlas, &row(2))?;
-        let more = RayScene { placed: vec![row(6).placed[0]; capacity.max(6) as usize + 1], ..row(6) };
+        let gpu = instances_in_a_row(6).upload_with(
+            &ctx,
+            BuildFlags::default(),
+            BuildFlags::default(),
+            capacity,
+        )?;
+        check.scene(&format!("room for {capacity}"), &gpu.tlas, &instances_in_a_row(6))?;
+        update(&ctx, &gpu, &instances_in_a_row(2), BuildMode::Rebuild)?;
+        check.scene(&format!("fewer, room for {capacity}"), &gpu.tlas, &instances_in_a_row(2))?;
+        let more = RayScene {
+            placed: vec![instances_in_a_row(6).placed[0]; capacity.max(6) as usize + 1],
+            ..instances_in_a_row(6)
+        };
         assert!(update(&ctx, &gpu, &more, BuildMode::Rebuild).is_err(), "one more than {capacity}");
-        check.scene("as before", &gpu.tlas, &row(2))?;
+        check.scene("as before", &gpu.tlas, &instances_in_a_row(2))?;
     }
     assert!(
         ctx.create_tlas(&TlasDesc { capacity: u32::MAX, parts_per_instance: u32::MAX, ..Default::default() })
@@ -288,7 +281,7 @@ fn flags_and_masks_at_their_limits_are_kept() -> Result<()> {
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
             .assert(&format!("numbers at their limits by {method:?}"));
     }
     Ok(())

@@ -1,17 +1,17 @@
-//! Random instances that reach into one another: of every size, turned, mirrored, flat, of different masks and structures.
+//! Random overlapping instances: of every size, rotated, mirrored, flat, with different masks and BLASes.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{BuildFlags, GeometryFlags, InstanceFlags, Result};
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device;
 use lvk_tests::hit_check::HitCheck;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{CULL_BACK, CULL_OPAQUE, How};
 use lvk_tests::rays::random_rays;
 
-/// Of meshes with room inside of them or between their parts, so that boxes say little about what lies in them.
+/// Of meshes with room inside of them or between their parts, so that AABBs say little about what lies in them.
 fn models() -> Vec<Vec<Part>> {
     let apart = |mesh: Mesh, to: [f32; 3], flags| Part {
         flags,
@@ -96,12 +96,12 @@ fn check(check: &HitCheck, what: &str, scene: &RayScene, gpu: &GpuScene) -> Resu
     for (by, tracer) in tracers.chain(opaque) {
         let records = tracer.trace(&gpu.tlas, &rays, how)?;
         let what = format!("{what}, shadows {by}");
-        Agreement::of_occlusion(&rays, &records, |ray| reference.occluded(ray, how.mask)).assert(&what);
+        HitComparison::of_occlusion(&rays, &records, |ray| reference.occluded(ray, how.mask)).assert(&what);
     }
     Ok(())
 }
 
-/// Few instances and thousands, top-level structures of the CPU, which shows overlapping ones in parts, and of the GPU.
+/// Few instances and thousands, TLASes of the CPU, which shows overlapping ones in parts, and of the GPU.
 #[test]
 fn random_instances_that_overlap_are_hit() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

@@ -1,22 +1,20 @@
-//! What any-hit shaders and query candidates see and decide: in whatever order the driver finds them, the set of hits
-//! and what becomes of the ray are the same.
+//! Candidates that any-hit shaders and ray queries see and judge: the set of hits and the result of the ray do not
+//! depend on the order of the driver's traversal.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
-use lvk::{
-    ComputePipelineDesc, Context, GeometryFlags, HitGroup, RayTracingPipelineDesc, Result, ShaderStage,
-};
-use lvk_tests::agreement::Agreement;
+use lvk::{Context, GeometryFlags, HitGroup, Result, ShaderStage};
+use lvk_tests::accel_backend::whole_and_split;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
-use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
+use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{
     HitRecord, How, MISSED, Method, OPAQUE, RayTracer, TERMINATE_ON_FIRST_HIT, shader, shader_with,
 };
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Hit, HitIds, Reference};
-use lvk_tests::structures::whole_and_split;
 
-/// What the shaders do with a candidate.
+/// The shaders' decision about a candidate.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Verdict {
     Ignore,
@@ -39,22 +37,19 @@ fn counter(ctx: &Context, method: Method, verdict: Verdict) -> Result<RayTracer>
     let defines = &[verdict.define()];
     if method == Method::Query {
         let text = include_str!("../../shaders/any_hit_query.comp.glsl");
-        let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
-        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
+        return RayTracer::from_query_text(ctx, text, defines);
     }
     let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../../shaders/any_hit.rgen.glsl"))?;
     let miss = shader(ctx, ShaderStage::Miss, include_str!("../../shaders/any_hit_keep.rmiss.glsl"))?;
     let closest = shader(ctx, ShaderStage::ClosestHit, include_str!("../../shaders/any_hit.rchit.glsl"))?;
     let text = include_str!("../../shaders/any_hit.rahit.glsl");
     let any = shader_with(ctx, ShaderStage::AnyHit, text, defines)?;
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &[HitGroup { closest_hit: Some(*closest), any_hit: Some(*any), ..Default::default() }],
-        ..Default::default()
-    })?;
-    Ok(RayTracer::of_pipeline(ctx, pipeline))
+    RayTracer::from_groups(
+        ctx,
+        *ray_gen,
+        *miss,
+        &[HitGroup { closest_hit: Some(*closest), any_hit: Some(*any), ..Default::default() }],
+    )
 }
 
 /// Overlapping models of two geometries with these flags.
@@ -112,25 +107,46 @@ fn every_candidate_is_seen_once_where_that_is_asked() -> Result<()> {
     const ONCE: GeometryFlags = GeometryFlags::NO_DUPLICATE_ANY_HIT;
     for ctx in whole_and_split(50) {
         for scene in [scene([ONCE; 2]), RayScene::scattered(ONCE)] {
-            candidates_are_seen_once(&ctx, &scene)?;
+            for_each_method_of(&ctx, &scene, candidates_are_seen_once)?;
         }
     }
     Ok(())
 }
 
-fn candidates_are_seen_once(ctx: &Context, scene: &RayScene) -> Result<()> {
-    let gpu = scene.upload(ctx)?;
-    let reference = scene.reference();
+/// A scene on a device, and a method to trace it.
+struct Case<'a> {
+    ctx: &'a Context,
+    method: Method,
+    gpu: &'a GpuScene,
+    reference: &'a Reference,
+    rays: &'a [Ray],
+}
+
+impl Case<'_> {
+    fn count(&self, verdict: Verdict, how: How) -> Result<Vec<HitRecord>> {
+        counter(self.ctx, self.method, verdict)?.trace(&self.gpu.tlas, self.rays, how)
+    }
+}
+
+/// Runs a test of whole and of split meshes, whose two geometries have these flags, by each method.
+fn for_each_case(flags: [GeometryFlags; 2], test: impl Fn(&Case<'_>) -> Result<()>) -> Result<()> {
+    whole_and_split(50).iter().try_for_each(|ctx| for_each_method_of(ctx, &scene(flags), &test))
+}
+
+fn for_each_method_of(ctx: &Context, scene: &RayScene, test: impl Fn(&Case<'_>) -> Result<()>) -> Result<()> {
+    let (gpu, reference) = (scene.upload(ctx)?, scene.reference());
     let rays = rays_for(&reference);
-    for method in Method::available(ctx) {
-        let how = How::default();
-        let records = counter(ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
-        for (record, hits) in certain(&reference, &rays, &records, how) {
-            let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
-            let expected = [hits.len() as f32, sum as f32];
-            assert_eq!(record.barycentrics, expected, "{method:?}: {hits:?}");
-            assert_eq!(record.kind, MISSED, "all were ignored");
-        }
+    let case = |method| Case { ctx, method, gpu: &gpu, reference: &reference, rays: &rays };
+    Method::available(ctx).into_iter().try_for_each(|method| test(&case(method)))
+}
+
+fn candidates_are_seen_once(case: &Case<'_>) -> Result<()> {
+    let how = How::default();
+    for (record, hits) in certain(case.reference, case.rays, &case.count(Verdict::Ignore, how)?, how) {
+        let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
+        let expected = [hits.len() as f32, sum as f32];
+        assert_eq!(record.barycentrics, expected, "{:?}: {hits:?}", case.method);
+        assert_eq!(record.kind, MISSED, "all were ignored");
     }
     Ok(())
 }
@@ -138,105 +154,81 @@ fn candidates_are_seen_once(ctx: &Context, scene: &RayScene) -> Result<()> {
 /// Without the flag a driver may show a candidate again, but leaves none out.
 #[test]
 fn every_candidate_is_seen_at_least_once() -> Result<()> {
-    for ctx in whole_and_split(50) {
-        let scene = scene([GeometryFlags::empty(); 2]);
-        let gpu = scene.upload(&ctx)?;
-        let reference = scene.reference();
-        let rays = rays_for(&reference);
-        for method in Method::available(&ctx) {
-            let how = How::default();
-            let records = counter(&ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
-            for (record, hits) in certain(&reference, &rays, &records, how) {
-                let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
-                let [seen, seen_sum] = record.barycentrics;
-                assert!(
-                    seen >= hits.len() as f32 && seen_sum >= sum as f32,
-                    "{method:?}: {seen} of {hits:?}"
-                );
-                assert!(hits.is_empty() == (seen == 0.0));
-            }
+    for_each_case([GeometryFlags::empty(); 2], |case| {
+        let method = case.method;
+        let how = How::default();
+        let records = case.count(Verdict::Ignore, how)?;
+        for (record, hits) in certain(case.reference, case.rays, &records, how) {
+            let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
+            let [seen, seen_sum] = record.barycentrics;
+            assert!(seen >= hits.len() as f32 && seen_sum >= sum as f32, "{method:?}: {seen} of {hits:?}");
+            assert!(hits.is_empty() == (seen == 0.0));
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// The closest hit does not depend on the order in which candidates were accepted.
 #[test]
 fn accepted_candidates_leave_the_closest() -> Result<()> {
-    for ctx in whole_and_split(50) {
-        let scene = scene([GeometryFlags::empty(), GeometryFlags::OPAQUE]);
-        let gpu = scene.upload(&ctx)?;
-        let reference = scene.reference();
-        let rays = rays_for(&reference);
-        for method in Method::available(&ctx) {
-            for flags in [0, OPAQUE] {
-                let how = How { flags, ..How::default() };
-                let records = counter(&ctx, method, Verdict::Accept)?.trace(&gpu.tlas, &rays, how)?;
-                Agreement::of_shapes(&rays, &records, |ray| reference.closest_by(ray, how))
-                    .assert(&format!("all accepted by {method:?}, flags {flags}"));
-                for (record, hits) in certain(&reference, &rays, &records, how) {
-                    let least = hits.first().is_some_and(|hit| !hit.is_opaque);
-                    let most = hits.iter().filter(|hit| !hit.is_opaque).count();
-                    let seen = record.barycentrics[0] as usize;
-                    assert!(usize::from(least) <= seen && seen <= most, "{method:?}: {seen} of {hits:?}");
-                }
+    for_each_case([GeometryFlags::empty(), GeometryFlags::OPAQUE], |case| {
+        let method = case.method;
+        for flags in [0, OPAQUE] {
+            let how = How { flags, ..How::default() };
+            let records = case.count(Verdict::Accept, how)?;
+            HitComparison::of_shapes(case.rays, &records, |ray| case.reference.closest_by(ray, how))
+                .assert(&format!("all accepted by {method:?}, flags {flags}"));
+            for (record, hits) in certain(case.reference, case.rays, &records, how) {
+                let least = hits.first().is_some_and(|hit| !hit.is_opaque);
+                let most = hits.iter().filter(|hit| !hit.is_opaque).count();
+                let seen = record.barycentrics[0] as usize;
+                assert!(usize::from(least) <= seen && seen <= most, "{method:?}: {seen} of {hits:?}");
             }
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
-/// Which hit ends the ray is the driver's choice, but it is one of the hits, and there is none after it.
+/// The driver chooses the hit that ends the ray, but it is one of the hits, and no hit follows it.
 #[test]
 fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
-    for ctx in whole_and_split(50) {
-        let scene = scene([GeometryFlags::empty(); 2]);
-        let gpu = scene.upload(&ctx)?;
-        let reference = scene.reference();
-        let rays = rays_for(&reference);
-        for method in Method::available(&ctx) {
-            for (verdict, flags) in [(Verdict::Terminate, 0), (Verdict::Accept, TERMINATE_ON_FIRST_HIT)] {
-                let how = How { flags, ..How::default() };
-                let records = counter(&ctx, method, verdict)?.trace(&gpu.tlas, &rays, how)?;
-                for (record, hits) in certain(&reference, &rays, &records, how) {
-                    let Some(first) = hits.first() else {
-                        assert_eq!((record.kind, record.barycentrics), (MISSED, [0.0; 2]));
-                        continue;
-                    };
-                    assert_eq!(record.barycentrics[0], 1.0, "{method:?}: one candidate was judged");
-                    let hit = hits.iter().find(|hit| hit.ids == ids(record));
-                    let hit =
-                        hit.unwrap_or_else(|| unreachable!("{method:?}: {record:?} is none of {hits:?}"));
-                    let error = (f64::from(record.t) - hit.t).abs();
-                    assert!(error <= 1e-5 * hit.t.max(1.0) && hit.t >= first.t, "{record:?}, {hit:?}");
-                    assert_eq!(record.barycentrics[1], tag(&hit.ids) as f32);
-                }
+    for_each_case([GeometryFlags::empty(); 2], |case| {
+        let method = case.method;
+        for (verdict, flags) in [(Verdict::Terminate, 0), (Verdict::Accept, TERMINATE_ON_FIRST_HIT)] {
+            let how = How { flags, ..How::default() };
+            let records = case.count(verdict, how)?;
+            for (record, hits) in certain(case.reference, case.rays, &records, how) {
+                let Some(first) = hits.first() else {
+                    assert_eq!((record.kind, record.barycentrics), (MISSED, [0.0; 2]));
+                    continue;
+                };
+                assert_eq!(record.barycentrics[0], 1.0, "{method:?}: one candidate was judged");
+                let hit = hits.iter().find(|hit| hit.ids == ids(record));
+                let hit = hit.unwrap_or_else(|| unreachable!("{method:?}: {record:?} is none of {hits:?}"));
+                let error = (f64::from(record.t) - hit.t).abs();
+                assert!(error <= 1e-5 * hit.t.max(1.0) && hit.t >= first.t, "{record:?}, {hit:?}");
+                assert_eq!(record.barycentrics[1], tag(&hit.ids) as f32);
             }
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Ignored candidates in front of opaque ones: those are hit as if nothing stood before them.
 #[test]
 fn what_is_ignored_hides_nothing() -> Result<()> {
-    for ctx in whole_and_split(50) {
-        let scene = scene([GeometryFlags::empty(), GeometryFlags::OPAQUE]);
-        let gpu = scene.upload(&ctx)?;
-        let reference = scene.reference();
-        let rays = rays_for(&reference);
-        for method in Method::available(&ctx) {
-            let how = How::default();
-            let records = counter(&ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
-            Agreement::of_shapes(&rays, &records, |ray| {
-                reference.closest_by_where(ray, how, |hit| hit.is_opaque)
-            })
-            .assert(&format!("behind the ignored by {method:?}"));
-            for (record, hits) in certain(&reference, &rays, &records, how) {
-                let before = hits.iter().take_while(|hit| !hit.is_opaque).count();
-                assert!(record.barycentrics[0] >= before as f32, "{method:?}: {record:?} of {hits:?}");
-            }
+    for_each_case([GeometryFlags::empty(), GeometryFlags::OPAQUE], |case| {
+        let method = case.method;
+        let how = How::default();
+        let records = case.count(Verdict::Ignore, how)?;
+        HitComparison::of_shapes(case.rays, &records, |ray| {
+            case.reference.closest_by_where(ray, how, |hit| hit.is_opaque)
+        })
+        .assert(&format!("behind the ignored by {method:?}"));
+        for (record, hits) in certain(case.reference, case.rays, &records, how) {
+            let before = hits.iter().take_while(|hit| !hit.is_opaque).count();
+            assert!(record.barycentrics[0] >= before as f32, "{method:?}: {record:?} of {hits:?}");
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }

@@ -1,8 +1,9 @@
-//! Shaders that rays run and that run rays: pipelines and their records, any-hit shaders, queries in every stage.
+//! Shaders that trace rays and shaders that rays run: pipelines and their records, any-hit shaders, queries in every
+//! stage.
 
 mod any_hit;
-mod anywhere;
 mod pipelines;
 mod query_getters;
 mod query_stages;
+mod swiftshader;
 mod which_runs;

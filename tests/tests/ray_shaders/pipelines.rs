@@ -1,4 +1,4 @@
-//! Ray tracing pipelines: the order of their shaders, records, stacks, libraries, indirect traces, and mistakes.
+//! Ray tracing pipelines: shader order, records, stacks, libraries, indirect traces, and errors.
 
 use lvk::{
     BufferDesc, BufferUsage, Context, Dependencies, Error, FeatureRequest, HitGroup, Holder,
@@ -87,7 +87,7 @@ fn shaders_stand_in_the_order_of_their_lists() -> Result<()> {
     Ok(())
 }
 
-/// What the shaders of the tests read from their records.
+/// Shader record of the tests.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::NoUninit)]
 struct Tag {
@@ -105,7 +105,7 @@ impl Tag {
         Self { number, weight: number as f32 * 0.25, more: [0, 0, number * 100] }
     }
 
-    /// What [`SUM`](Self::SUM) is.
+    /// Returns the value of [`SUM`](Self::SUM).
     fn sum(number: u32) -> u32 {
         number * 102
     }
@@ -365,7 +365,7 @@ fn without_pipelines_everything_about_them_is_unsupported() -> Result<()> {
 /// Each list has the pipeline's own shaders first, then those of each library, each with its own record; and the
 /// libraries may go before the pipeline runs.
 #[test]
-fn libraries_stand_behind_the_pipelines_own_shaders() -> Result<()> {
+fn groups_of_libraries_follow_the_pipelines_own_shaders() -> Result<()> {
     let Some(ctx) = library_device() else { return Ok(()) };
     let scene = GroupScene::new(&ctx)?;
     let shader = |stage| answering(&ctx, stage, Tag::BLOCK, Tag::SUM);
@@ -537,7 +537,7 @@ fn libraries_that_do_not_fit_are_refused() -> Result<()> {
     Ok(())
 }
 
-/// A library that nobody destroyed goes with the context, quietly but for the report.
+/// A library that is still alive is destroyed with the context, with a report and without another message.
 #[test]
 fn a_library_may_outlive_everything_but_the_context() -> Result<()> {
     let Some(ctx) = library_device() else { return Ok(()) };

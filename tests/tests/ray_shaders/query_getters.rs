@@ -1,4 +1,5 @@
-//! What ray queries tell of their ray, of the closest hit and of candidates, against matrices and hits computed in f64.
+//! Values that ray queries report of their ray, of the closest hit and of candidates, against matrices and hits
+//! computed in f64.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
 use lvk::glam::{Affine3A, DAffine3, DVec3, Quat, Vec3};
@@ -6,7 +7,7 @@ use lvk::{
     BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, DeviceProfile,
     GeometryFlags, Holder, InstanceFlags, RayQueryRequest, Result, ShaderStage,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{
@@ -26,7 +27,7 @@ const RAYS: usize = 600;
 /// Relative to the terms that are added up.
 const ROUNDING: f64 = 1e-5;
 
-/// What `getters_query.comp.glsl` writes of a hit.
+/// Values of a hit, as `getters_query.comp.glsl` writes them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Found {
@@ -39,7 +40,7 @@ struct Found {
     world_to_object: [f32; 12],
 }
 
-/// What it writes of a query.
+/// Values of a query, as it writes them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Told {
@@ -94,11 +95,11 @@ fn scene() -> RayScene {
         ],
         vec![glass(Mesh::sphere(6), Layout::Interleaved), Part::new(Mesh::terrain(5), Layout::Indexed32)],
     ];
-    RayScene { models, placed: (0..12).map(place).collect() }
+    RayScene { models, placed: (0..12).map(instance_at).collect() }
 }
 
 /// Sheared, since it is stretched between two turns; mirrored on no, one, two and three axes.
-fn place(index: u32) -> Placed {
+fn instance_at(index: u32) -> Placed {
     let number = index as f32;
     let sign = |axis: u32| if (index / 2) >> axis & 1 == 0 { 1.0 } else { -1.0 };
     let scale = Vec3::new(0.6 * sign(0), 1.3 * sign(1), (0.8 + 0.05 * number) * sign(2));
@@ -158,7 +159,7 @@ fn check(name: &str, found: &[f32], expected: &[f64], tolerance: f64) {
     assert!(same, "{name} is {found:?}, must be {expected:?} within {tolerance}");
 }
 
-/// What the instance alone decides: its numbers and matrices, and the ray in its space.
+/// Checks the values that the instance alone decides: its numbers and matrices, and the ray in its object space.
 fn check_instance(scene: &RayScene, ray: &Ray, found: &Found, what: &str) {
     let placed = &scene.placed[found.hit.instance as usize];
     let object_to_world = DAffine3::from_cols_array(&placed.transform.to_cols_array().map(f64::from));
@@ -184,7 +185,7 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(1.0, |most, value| most.max(value.abs()))
 }
 
-/// What of the ray is told, which no walk may change.
+/// Checks the values of the ray, which no traversal may change.
 fn check_ray(ray: &Ray, flags: u32, told: &Told, what: &str) {
     assert_eq!(told.flags, flags, "{what}: Flags");
     let found = (told.t_min, told.origin, told.direction);
@@ -200,17 +201,17 @@ fn check_hits(reference: &Reference, rays: &[Ray], all_told: &[Told], flags: u32
     let how = How { flags, ..How::default() };
     let committed: Vec<_> = all_told.iter().map(|told| told.committed.hit).collect();
     let counts = |ids: &HitIds| ids.primitive.is_multiple_of(2);
-    Agreement::of_triangles(rays, &committed, |ray| {
+    HitComparison::of_triangles(rays, &committed, |ray| {
         reference.closest_by_where(ray, how, |hit| hit.is_opaque || counts(&hit.ids))
     })
     .assert(&format!("{what}, committed"));
-    let mut candidates = Agreement::default();
+    let mut candidates = HitComparison::default();
     for (ray, told) in rays.iter().zip(all_told).filter(|(_, told)| told.candidate.hit.kind != MISSED) {
         let HitRecord { instance, custom_index, geometry, primitive, .. } = told.candidate.hit;
         let ids = HitIds { instance, custom_index, geometry, primitive };
         let is_met = |ray: &Ray| reference.closest_by_where(ray, how, |hit| !hit.is_opaque && hit.ids == ids);
         let one = std::slice::from_ref(ray);
-        candidates.add(Agreement::of_triangles(one, &[told.candidate.hit], is_met));
+        candidates.add(HitComparison::of_triangles(one, &[told.candidate.hit], is_met));
     }
     let count = candidates.rays;
     if count > 0 {
@@ -220,7 +221,7 @@ fn check_hits(reference: &Reference, rays: &[Ray], all_told: &[Told], flags: u32
 }
 
 #[test]
-fn queries_tell_the_ray_the_hit_and_the_instance() -> Result<()> {
+fn queries_report_the_ray_the_hit_and_the_instance() -> Result<()> {
     let scene = scene();
     let reference = scene.reference();
     let (low, high) = reference.bounds();
@@ -259,9 +260,9 @@ fn queries_tell_the_ray_the_hit_and_the_instance() -> Result<()> {
     Ok(())
 }
 
-/// What nobody may rely on is defined where the library walks itself: it reads no memory that is not there.
+/// Undefined values are defined in the library's own traversal: it reads no memory out of bounds.
 #[test]
-fn misses_are_told_as_zeros_in_software() -> Result<()> {
+fn misses_are_reported_as_zeros_in_software() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
     let gpu = scene().upload(&ctx)?;
     let empty = RayScene { placed: Vec::new(), ..scene() }.upload(&ctx)?;

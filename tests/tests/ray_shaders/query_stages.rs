@@ -1,5 +1,6 @@
-//! Ray queries in every stage of graphics and compute pipelines. Each sees what was built, refitted and shown before it,
-//! in earlier submissions and in its own command buffer, without a barrier or a declared structure.
+//! Ray queries in every stage of graphics and compute pipelines. Each sees the builds, refits and TLAS updates before
+//! it, of earlier submissions and of its own command buffer, without a barrier and without a declared acceleration
+//! acceleration structure.
 
 use bytemuck::NoUninit;
 use lvk::glam::{Affine3A, Vec3};
@@ -8,24 +9,24 @@ use lvk::{
     ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Error, Format, Holder, RenderPassDesc,
     RenderPipelineDesc, RenderPipelineHandle, Result, ShaderStage, TextureHandle, Topology,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::bender::{Bender, bent};
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::raster::{pixels, target};
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{BACK, FRONT, HitRecord, MISSED, shader};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Answer, HitIds};
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 use lvk_tests::{TestDevice, device};
 
 /// One ray for each pixel of a square.
 const SIDE: u32 = 32;
 const COUNT: u32 = SIDE * SIDE;
-/// Invocations of a workgroup; so many rays a group.
+/// Invocations of a workgroup; each traces one ray.
 const GROUP: u32 = 32;
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
-/// What every stage shares: `found` traces a ray and packs the hit into a texel.
+/// Code of every stage: `found` traces a ray and packs the hit into a texel.
 const TRACE: &str = r"
     #include <lvk/ray_query.glsl>
     struct Ray { vec3 origin; float tMin; vec3 direction; float tMax; };
@@ -135,7 +136,7 @@ enum Pipeline {
     Render(Holder<RenderPipelineHandle>),
 }
 
-/// Where one trace of all rays leaves its texels.
+/// Memory of the texels of one trace of all rays.
 enum Texels {
     Buffer(Holder<BufferHandle>),
     Target(Holder<TextureHandle>),
@@ -220,7 +221,8 @@ impl Prober {
         let records: Vec<HitRecord> = found.into_iter().map(unpacked).collect();
         let reference = scene.reference();
         let answer = |ray: &Ray| without_places(reference.closest(ray, 0xff));
-        Agreement::of_triangles(&self.rays, &records, answer).assert(&format!("{what}, by {:?}", self.stage));
+        HitComparison::of_triangles(&self.rays, &records, answer)
+            .assert(&format!("{what}, by {:?}", self.stage));
         Ok(())
     }
 
@@ -272,7 +274,7 @@ fn unpacked([t, u, v, code]: [f32; 4]) -> HitRecord {
     }
 }
 
-/// What the texels have no room for counts as 0.
+/// Values that the texels do not store count as 0.
 fn without_places(answer: Answer) -> Answer {
     let hit = answer.hit.map(|hit| {
         let ids = HitIds { instance: 0, geometry: 0, primitive: 0, custom_index: hit.ids.custom_index };
@@ -284,7 +286,7 @@ fn without_places(answer: Answer) -> Answer {
 /// A deforming torus, and room to show it several times.
 struct Stage {
     prober: Prober,
-    bender: Bender,
+    deformer: VertexDeformer,
     scene: RayScene,
     gpu: GpuScene,
     /// Declared last: its end judges that of everything else.
@@ -306,22 +308,22 @@ impl Stage {
             placed: vec![Placed { custom_index: 3, ..Placed::new(0, Affine3A::IDENTITY) }],
         };
         let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 4)?;
-        let bender = Bender::new(&ctx)?;
+        let deformer = VertexDeformer::new(&ctx)?;
         let prober = Prober::new(&ctx, stage)?;
-        Ok(Some(Self { prober, bender, scene, gpu, ctx }))
+        Ok(Some(Self { prober, deformer, scene, gpu, ctx }))
     }
 
     /// Moves the vertices by a dispatch and builds from them.
     fn deform(&mut self, cmd: &mut CommandBuffer, amount: f32, mode: BuildMode) -> Result<()> {
         let (vertices, mesh) = (*self.gpu.buffers[0].vertices, &mut self.scene.models[0][0].mesh);
-        self.bender.record(cmd, vertices, mesh, amount)?;
+        self.deformer.record(cmd, vertices, mesh, amount)?;
         cmd.build_blas(&[*self.gpu.models[0]], mode)?;
-        *mesh = bent(mesh, amount);
+        *mesh = deformed(mesh, amount);
         Ok(())
     }
 
     /// Shows `count` instances, turned.
-    fn show(&mut self, cmd: &mut CommandBuffer, count: u32, turn: f32, mode: BuildMode) -> Result<()> {
+    fn update_tlas(&mut self, cmd: &mut CommandBuffer, count: u32, turn: f32, mode: BuildMode) -> Result<()> {
         let place = |index: u32| {
             let to = Vec3::new(0.3 * index as f32, 0.2 - 0.4 * index as f32, 0.1);
             let transform = Affine3A::from_translation(to) * Affine3A::from_rotation_x(turn + index as f32);
@@ -335,7 +337,7 @@ impl Stage {
         self.prober.check_now("the first build", &self.gpu, &self.scene)?;
         let mut cmd = self.ctx.acquire_command_buffer()?;
         self.deform(&mut cmd, 0.3, BuildMode::Refit)?;
-        self.show(&mut cmd, 1, 0.0, BuildMode::Refit)?;
+        self.update_tlas(&mut cmd, 1, 0.0, BuildMode::Refit)?;
         self.ctx.submit(cmd)?;
         self.prober.check_now("a refit submitted before", &self.gpu, &self.scene)
     }
@@ -346,10 +348,10 @@ impl Stage {
             let texels = self.prober.texels()?;
             let mut cmd = self.ctx.acquire_command_buffer()?;
             self.deform(&mut cmd, amount, mode)?;
-            self.show(&mut cmd, 1, amount, mode)?;
+            self.update_tlas(&mut cmd, 1, amount, mode)?;
             self.prober.record(&mut cmd, &self.gpu.tlas, &texels, &[])?;
             self.ctx.submit(cmd)?;
-            self.prober.check(&format!("bent by {amount}, {mode:?}"), &texels, &self.scene)?;
+            self.prober.check(&format!("deformed by {amount}, {mode:?}"), &texels, &self.scene)?;
         }
         Ok(())
     }
@@ -365,7 +367,7 @@ impl Stage {
         let mut cmd = self.ctx.acquire_command_buffer()?;
         let mut expected = Vec::new();
         for (count, turn, mode) in shown {
-            self.show(&mut cmd, count, turn, mode)?;
+            self.update_tlas(&mut cmd, count, turn, mode)?;
             let texels = self.prober.texels()?;
             self.prober.record(&mut cmd, &self.gpu.tlas, &texels, &[])?;
             expected.push((texels, self.scene.clone()));
@@ -413,9 +415,9 @@ fn queries_of_the_task_stage_see_what_was_built() -> Result<()> {
     Stage::everything_is_seen(ShaderStage::Task)
 }
 
-/// No pipeline queries rays when the pass begins behind a build, so that only a declared structure is waited for.
+/// No pipeline queries rays when the pass begins behind a build, so that only a declared acceleration structure is waited for.
 #[test]
-fn a_pipeline_made_inside_of_a_pass_needs_the_structure_declared() -> Result<()> {
+fn a_pipeline_made_inside_of_a_pass_needs_the_accel_struct_declared() -> Result<()> {
     for is_declared in [false, true] {
         let Some(mut stage) = Stage::new(ShaderStage::Compute)? else { return Ok(()) };
         let texels = target(&stage.ctx, Format::Rgba32Float, [SIDE, SIDE]);
@@ -427,7 +429,7 @@ fn a_pipeline_made_inside_of_a_pass_needs_the_structure_declared() -> Result<()>
             ..Default::default()
         };
         let mut cmd = stage.ctx.acquire_command_buffer()?;
-        stage.show(&mut cmd, 1, 0.3, BuildMode::Refit)?;
+        stage.update_tlas(&mut cmd, 1, 0.3, BuildMode::Refit)?;
         let mut pass = cmd.begin_rendering(&RenderPassDesc { dependencies: declared, ..plain })?;
         let pipeline = render_pipeline(&stage.ctx, ShaderStage::Fragment)?;
         match pass.bind_render_pipeline(*pipeline) {

@@ -1,14 +1,14 @@
-//! Which shader runs: hit groups, miss shaders, callables, intersection shaders, ray generation shaders, and the bytes
-//! of their records.
+//! Shader selection: hit groups, miss shaders, callables, intersection shaders, ray generation shaders, and the bytes
+//! of their shader records.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
     BlasDesc, Context, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage,
     TlasDesc,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
-use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances};
+use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{How, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Reference, Sphere};
@@ -55,6 +55,22 @@ fn rays_for(reference: &Reference) -> Vec<Ray> {
     random_rays(41, 1_000, low.as_vec3(), high.as_vec3())
 }
 
+/// A scene on the GPU, its reference, and rays to trace.
+struct Traced {
+    scene: RayScene,
+    gpu: GpuScene,
+    reference: Reference,
+    rays: Vec<Ray>,
+}
+
+impl Traced {
+    fn new(ctx: &Context, scene: RayScene) -> Result<Self> {
+        let (gpu, reference) = (scene.upload(ctx)?, scene.reference());
+        let rays = rays_for(&reference);
+        Ok(Self { scene, gpu, reference, rays })
+    }
+}
+
 fn ray_gens(ctx: &Context, all: &[&[(&str, &str)]]) -> Result<Vec<Holder<ShaderModuleHandle>>> {
     all.iter().map(|defines| shader_with(ctx, ShaderStage::RayGen, RAY_GEN, defines)).collect()
 }
@@ -86,14 +102,11 @@ fn instance_ray_and_geometry_choose_the_hit_group() -> Result<()> {
         hit_groups: &groups,
         ..Default::default()
     })?;
-    let scene = scene();
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
-    let tracer = RayTracer::of_pipeline(&ctx, pipeline);
+    let Traced { scene, gpu, reference, rays } = Traced::new(&ctx, scene())?;
+    let tracer = RayTracer::from_pipeline(&ctx, pipeline);
     for (ray_gen, (offset, stride)) in (0..).zip(strides) {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
-        Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
+        HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
         let hits: Vec<_> = records.iter().filter(|record| record.kind != 0).collect();
         for hit in hits {
             let group = scene.placed[hit.instance as usize].hit_group_offset + offset + stride * hit.geometry;
@@ -125,14 +138,12 @@ fn the_miss_index_chooses_the_miss_shader() -> Result<()> {
         hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }; 5],
         ..Default::default()
     })?;
-    let scene = scene();
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
-    let tracer = RayTracer::of_pipeline(&ctx, pipeline);
+    let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, scene())?;
+    let tracer = RayTracer::from_pipeline(&ctx, pipeline);
     for (ray_gen, t) in [(0, -7.0), (2, -9.0), (1, -8.0)] {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("miss shaders");
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+            .assert("miss shaders");
         let misses: Vec<_> = records.iter().filter(|record| record.kind == 0).collect();
         assert!(!misses.is_empty() && misses.iter().all(|record| record.t == t));
     }
@@ -170,12 +181,9 @@ fn a_hit_shader_calls_the_callable_it_names() -> Result<()> {
         callable: &callables.iter().map(|module| **module).collect::<Vec<_>>(),
         ..Default::default()
     })?;
-    let scene = scene();
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
-    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
-    Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("callables");
+    let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, scene())?;
+    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("callables");
     for hit in records.iter().filter(|record| record.kind != 0) {
         let value = hit.primitive;
         let changed = [value * 5, value + 70_000, value ^ 0x3ff][value as usize % 3];
@@ -227,11 +235,9 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
         max_recursion: 2,
         ..Default::default()
     })?;
-    let scene = RayScene::single(Mesh::torus(10), Layout::Indexed16);
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
-    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    let single = RayScene::single(Mesh::torus(10), Layout::Indexed16);
+    let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, single)?;
+    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
     let first = rays.iter().zip(&records).filter(|(_, record)| record.barycentrics[0] > 0.0);
     let (behind, records): (Vec<_>, Vec<_>) = first
         .map(|(ray, record)| {
@@ -240,17 +246,17 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
         })
         .unzip();
     assert!(behind.len() > 200);
-    Agreement::of_shapes(&behind, &records, |ray| reference.closest(ray, 0xff))
+    HitComparison::of_shapes(&behind, &records, |ray| reference.closest(ray, 0xff))
         .assert("behind the first hit");
     Ok(())
 }
 
-/// Five spheres each in two geometries of boxes; two instances with radii of their own.
+/// Five spheres each in two geometries of AABBs; two instances with radii of their own.
 #[test]
-fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
+fn an_intersection_shader_hits_spheres_in_aabbs() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let spheres = SphereModel::new(5);
-    let (_buffers, geometries) = spheres.boxes(&ctx)?;
+    let (_buffers, geometries) = spheres.aabb_geometries(&ctx)?;
     let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
     let turn = Quat::from_rotation_y(0.7);
     let places = [
@@ -273,7 +279,7 @@ fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
     for method in Method::available(&ctx) {
         let tracer = spheres.tracer(&ctx, method)?;
         let records = tracer.trace(&tlas, &rays, How::default())?;
-        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
+        HitComparison::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
             .assert(&format!("spheres by {method:?}"));
         for hit in records.iter().filter(|record| record.kind != 0) {
             let (radius, tag) = GROUPS[1 - hit.instance as usize];

@@ -1,4 +1,4 @@
-//! Many structures at once: scratch and memory budgets, progress, shared buffers, and what the statistics say.
+//! Batches of acceleration structures: scratch and memory budgets, progress, shared buffers, and statistics.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -6,17 +6,19 @@ use lvk::{
     BuildFlags, BuildMode, Context, DeviceProfile, Error, Holder, Result, TlasDesc, Triangles,
     ValidationMode,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::accel_backend::{
+    builds_device_accel_structs, expect_parts, requires_device_accel_structs, software_alone,
+};
 use lvk_tests::hit_check::HitCheck;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes};
 use lvk_tests::ray_tracer::{How, Method, RayTracer};
 use lvk_tests::rays::random_rays;
-use lvk_tests::structures::{expect_parts, has_own_structures, software_alone, tests_own_structures};
-use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
-/// Fits a block of the memory of small structures many times.
+/// Fits a block of the memory of small acceleration structures many times.
 const SMALL_STRUCTURE: u64 = 64 << 10;
 
 /// Many little cubes in one vertex buffer, each half as large again as the one before the last five.
@@ -81,18 +83,19 @@ fn handles(made: &[Holder<AccelStructHandle>]) -> Vec<AccelStructHandle> {
 }
 
 #[test]
-fn two_thousand_structures_are_built_within_a_scratch_budget() -> Result<()> {
+fn two_thousand_accel_structs_are_built_within_a_scratch_budget() -> Result<()> {
     const BUDGET: u64 = 256 << 10;
-    let Some(ctx) = device_of_budget(BUDGET) else { return Ok(()) };
-    if !tests_own_structures(&ctx, "a budget for builds of the driver") {
+    let Some(ctx) = device_of_budget(BUDGET)
+        .filter(|ctx| requires_device_accel_structs(ctx, "a budget for builds of the driver"))
+    else {
         return Ok(());
-    }
+    };
     build_two_thousand(&ctx, BUDGET, BuildFlags::default())
 }
 
 /// Those that the GPU builds first; the CPU takes nothing of the budget.
 #[test]
-fn two_thousand_structures_of_software_are_built_within_a_scratch_budget() -> Result<()> {
+fn two_thousand_accel_structs_of_software_are_built_within_a_scratch_budget() -> Result<()> {
     const BUDGET: u64 = 64 << 10;
     let Some(ctx) = software_alone(|desc| desc.scratch_budget_bytes = BUDGET) else { return Ok(()) };
     build_two_thousand(&ctx, BUDGET, BuildFlags::FAST_BUILD)
@@ -116,7 +119,7 @@ fn build_two_thousand(ctx: &Context, budget: u64, flags: BuildFlags) -> Result<(
     let reference = scene.reference();
     let rays = random_rays(71, 400, Vec3::new(-1.0, -1.0, -1.0), Vec3::new(45.0, 45.0, 1.0));
     let records = tracer.trace(&tlas, &rays, How::default())?;
-    Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("2,000 cubes");
+    HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("2,000 cubes");
     let alignment = u64::from(ctx.capabilities().limits.scratch_alignment);
     // The library's own kernels want theirs at multiples of 256, wherever the buffer begins.
     let top = ctx.accel_struct_sizes(*tlas)?.build_scratch_bytes.next_multiple_of(256) + 256;
@@ -176,7 +179,7 @@ fn rebuilds_keep_the_scratch_budget() -> Result<()> {
 }
 
 #[test]
-fn small_structures_share_buffers() -> Result<()> {
+fn small_accel_structs_share_buffers() -> Result<()> {
     const COUNT: usize = 100;
     // Under validation in shaders each has its own.
     let shared = |validation| match validation {
@@ -195,7 +198,7 @@ fn small_structures_share_buffers() -> Result<()> {
     let grown = after.structure_bytes - before.structure_bytes;
     assert!(after.structures.iter().map(|info| info.structure_bytes).sum::<u64>() >= grown);
     assert_eq!(grown, each * COUNT as u64);
-    // What they take comes out of a buffer that was there; not one was added for it.
+    // Their memory comes from a buffer that existed; none was added.
     assert_eq!(before.spare_bytes, after.spare_bytes + grown);
     drop(made);
     ctx.wait_idle()?;
@@ -328,7 +331,7 @@ fn failed_creations_leave_nothing_behind() -> Result<()> {
     Ok(())
 }
 
-/// What lies between the vertices is read back too, in several pieces that end anywhere.
+/// Bytes between the vertices are read back too, in several copies that end anywhere.
 #[test]
 fn inputs_may_be_larger_than_what_is_read_back_at_once() -> Result<()> {
     const STRIDE: u64 = (1 << 20) + 12;
@@ -354,7 +357,7 @@ fn inputs_may_be_larger_than_what_is_read_back_at_once() -> Result<()> {
 }
 
 #[test]
-fn statistics_name_every_structure() -> Result<()> {
+fn statistics_name_every_accel_struct() -> Result<()> {
     let profile =
         DeviceProfile { name: "small".into(), max_blas_primitives: 100, ..DeviceProfile::default() };
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
@@ -374,7 +377,7 @@ fn statistics_name_every_structure() -> Result<()> {
     assert_eq!((of_ring, of_top), (&ctx.accel_struct_info(*ring)?, &ctx.accel_struct_info(*top)?));
     assert!(!of_ring.is_top_level && of_top.is_top_level);
     expect_parts(&ctx, *ring, 4..=8)?;
-    assert!(of_ring.is_remapped == has_own_structures(&ctx) && of_top.parts == 1);
+    assert!(of_ring.is_remapped == builds_device_accel_structs(&ctx) && of_top.parts == 1);
     let of_map = if of_ring.is_remapped { 400 * 4 } else { 0 };
     assert!(of_ring.structure_bytes > 0 && of_ring.table_bytes >= of_map && of_top.structure_bytes > 0);
     assert!(memory.structure_bytes >= of_ring.structure_bytes + of_top.structure_bytes);
@@ -387,8 +390,8 @@ fn statistics_name_every_structure() -> Result<()> {
 
 /// Each of these is quiet but for the report of leaks.
 #[test]
-fn structures_end_well_whoever_goes_first() -> Result<()> {
-    listen();
+fn accel_structs_are_destroyed_in_any_order() -> Result<()> {
+    capture_warnings();
     let profile =
         DeviceProfile { name: "small".into(), max_blas_primitives: 100, ..DeviceProfile::default() };
     for profile in [None, Some(&profile)] {

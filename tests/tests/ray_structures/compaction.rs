@@ -1,17 +1,17 @@
-//! Compaction: an asynchronous second step that keeps the handle and what shows it, and gives memory back.
+//! Compaction: an asynchronous second step that keeps the handle and its references, and frees memory.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::test_hooks::{before_next_command_buffer, waiting_objects};
 use lvk::{
     AccelStructHandle, BuildFlags, BuildMode, Compaction, Context, DeviceInstances, Error, Result, TlasDesc,
 };
-use lvk_tests::bender::{Bender, bent};
+use lvk_tests::accel_backend::{builds_device_accel_structs, requires_device_accel_structs, software_alone};
 use lvk_tests::compute::words_buffer;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
-use lvk_tests::structures::{has_own_structures, software_alone, tests_own_structures};
-use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
 const COMPACTABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_COMPACTION);
@@ -50,10 +50,10 @@ fn done(ctx: &Context, handle: AccelStructHandle) -> Result<(u64, u64)> {
     }
 }
 
-/// Fails unless a structure that is asked for waits for the GPU; what software traces has the size it needs, and is done at
+/// Fails unless an acceleration structure that is asked for waits for the GPU; what software traces has the size it needs, and is done at
 /// once.
 fn expect_pending(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
-    if has_own_structures(ctx) {
+    if builds_device_accel_structs(ctx) {
         assert_eq!(compaction(ctx, handle)?, Compaction::Pending);
     } else {
         expect_unchanged(ctx, handle)?;
@@ -61,7 +61,7 @@ fn expect_pending(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
     Ok(())
 }
 
-/// Fails unless a structure is done, and takes what it took before.
+/// Fails unless an acceleration structure is done, and takes what it took before.
 fn expect_unchanged(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
     let (before_bytes, after_bytes) = done(ctx, handle)?;
     assert_eq!((before_bytes, after_bytes), (after_bytes, ctx.accel_struct_info(handle)?.structure_bytes));
@@ -69,11 +69,11 @@ fn expect_unchanged(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
 }
 
 /// Lets the sizes arrive, the copies be made, and what they replaced go.
-fn settle(ctx: &Context) -> Result<()> {
+fn wait_for_compaction(ctx: &Context) -> Result<()> {
     (0..3).try_for_each(|_| ctx.wait_idle())
 }
 
-/// Bytes of structures, the library's own included, and the sum of those with a handle.
+/// Bytes of acceleration structures, the library's own included, and the sum of those with a handle.
 fn memory(ctx: &Context) -> (u64, u64) {
     let memory = ctx.accel_memory();
     (memory.structure_bytes, memory.structures.iter().map(|info| info.structure_bytes).sum())
@@ -92,10 +92,10 @@ fn memory_goes_back_to_the_byte() -> Result<()> {
     ctx.compact(&handles(&gpu)[..1])?;
     expect_pending(&ctx, *gpu.models[0])?;
     assert_eq!(compaction(&ctx, *gpu.models[1])?, Compaction::None);
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     check.scene("one compacted", &gpu.tlas, &scene)?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     check.scene("all compacted", &gpu.tlas, &scene)?;
     ctx.wait_idle()?;
     let mut saved = 0;
@@ -114,20 +114,21 @@ fn memory_goes_back_to_the_byte() -> Result<()> {
     Ok(())
 }
 
-/// An update that was recorded before the copies is submitted behind them. Another thread destroys the top-level structure
+/// An update that was recorded before the copies is submitted behind them. Another thread destroys the TLAS
 /// just when it is to be written again.
 #[test]
-fn a_structure_that_goes_as_it_is_rewritten_is_left_alone() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    if !tests_own_structures(&ctx, "structures that are written again") {
+fn an_accel_struct_destroyed_while_rewritten_is_left_alone() -> Result<()> {
+    let Some(ctx) =
+        device().filter(|ctx| requires_device_accel_structs(ctx, "structures that are written again"))
+    else {
         return Ok(());
-    }
+    };
     let scene = scene();
     let gpu = upload(&ctx, &scene, COMPACTABLE)?;
     let mut late = ctx.acquire_command_buffer()?;
     late.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     done(&ctx, *gpu.models[0])?;
     ctx.wait(ctx.submit(late)?)?;
     let tlas = gpu.tlas;
@@ -146,7 +147,7 @@ fn a_structure_that_goes_as_it_is_rewritten_is_left_alone() -> Result<()> {
 
 /// Instances from the host and from a buffer that changed since; no update tells them of the copies.
 #[test]
-fn top_level_structures_of_before_show_the_copies() -> Result<()> {
+fn older_tlases_reference_the_copies() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     let scene = scene();
@@ -166,17 +167,17 @@ fn top_level_structures_of_before_show_the_copies() -> Result<()> {
     ctx.compact(&blas)?;
     ctx.upload_buffer(*records, 0, &vec![0xff; words.len() * 4])?;
     drop(records);
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     for handle in &blas {
         done(&ctx, *handle)?;
     }
-    // What the copies replaced is overwritten by others.
+    // The replaced memory is overwritten by other acceleration structures.
     let _others = upload(&ctx, &scene, BuildFlags::default())?;
     check.scene("host instances", &gpu.tlas, &scene)?;
     check.scene("device instances", &from_buffer, &scene)
 }
 
-/// The update was recorded for the old structures and is submitted when they are replaced.
+/// The update was recorded for the old acceleration structures and is submitted when they are replaced.
 #[test]
 fn an_update_that_is_overtaken_by_compaction_is_mended() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
@@ -190,15 +191,15 @@ fn an_update_that_is_overtaken_by_compaction_is_mended() -> Result<()> {
     let mut cmd = ctx.acquire_command_buffer()?;
     cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     let saved =
         gpu.models.iter().map(|model| done(&ctx, **model)).map(|of| of.map(|(before, after)| before - after));
     let saved: u64 = saved.collect::<Result<Vec<_>>>()?.iter().sum();
     ctx.submit(cmd)?;
     check.scene("right after", &gpu.tlas, &scene)?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     check.scene("later", &gpu.tlas, &scene)?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert_eq!(memory(&ctx), (all_before - saved, own_before - saved), "nobody holds the old ones");
     Ok(())
 }
@@ -214,7 +215,7 @@ fn compaction_waits_for_builds_that_are_recorded() -> Result<()> {
         cmd.build_blas(&handles(&gpu)[..2], BuildMode::Rebuild)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
         ctx.compact(&handles(&gpu))?;
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         expect_pending(&ctx, *gpu.models[0])?;
         done(&ctx, *gpu.models[2])?;
         if submits {
@@ -222,8 +223,8 @@ fn compaction_waits_for_builds_that_are_recorded() -> Result<()> {
         } else {
             drop(cmd);
         }
-        settle(&ctx)?;
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
+        wait_for_compaction(&ctx)?;
         for model in &gpu.models {
             done(&ctx, **model)?;
         }
@@ -241,13 +242,13 @@ fn a_build_after_the_question_makes_another_one() -> Result<()> {
     ctx.compact(&handles(&gpu))?;
     let mut cmd = ctx.acquire_command_buffer()?;
     let mesh = scene.models[0][0].mesh.clone();
-    Bender::new(&ctx)?.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.4)?;
+    VertexDeformer::new(&ctx)?.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.4)?;
     cmd.build_blas(&handles(&gpu), BuildMode::Rebuild)?;
     cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
     ctx.submit(cmd)?;
-    scene.models[0][0].mesh = bent(&mesh, 0.4);
-    settle(&ctx)?;
-    settle(&ctx)?;
+    scene.models[0][0].mesh = deformed(&mesh, 0.4);
+    wait_for_compaction(&ctx)?;
+    wait_for_compaction(&ctx)?;
     for model in &gpu.models {
         done(&ctx, **model)?;
     }
@@ -258,7 +259,7 @@ fn a_build_after_the_question_makes_another_one() -> Result<()> {
 #[test]
 fn a_mesh_is_compacted_while_it_moves() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     let mut scene = scene();
     let gpu = upload(&ctx, &scene, MOVING)?;
     let mut done_at = None;
@@ -266,14 +267,14 @@ fn a_mesh_is_compacted_while_it_moves() -> Result<()> {
         ctx.next_frame()?;
         let mesh = scene.models[0][0].mesh.clone();
         let mut cmd = ctx.acquire_command_buffer()?;
-        bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.1)?;
+        deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.1)?;
         cmd.build_blas(&[*gpu.models[0]], BuildMode::Refit)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Refit)?;
         if frame == 2 {
             ctx.compact(&handles(&gpu))?;
         }
         ctx.submit(cmd)?;
-        scene.models[0][0].mesh = bent(&mesh, 0.1);
+        scene.models[0][0].mesh = deformed(&mesh, 0.1);
         check.scene(&format!("frame {frame}"), &gpu.tlas, &scene)?;
         if done_at.is_none() && matches!(compaction(&ctx, *gpu.models[0])?, Compaction::Done { .. }) {
             done_at = Some(frame);
@@ -285,24 +286,24 @@ fn a_mesh_is_compacted_while_it_moves() -> Result<()> {
 
 /// The copy has no room for a build. What software traces alone was not copied: then the rebuild is as any other.
 #[test]
-fn a_compacted_structure_cannot_be_rebuilt() -> Result<()> {
+fn a_compacted_accel_struct_cannot_be_rebuilt() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let (mut scene, bender) = (scene(), Bender::new(&ctx)?);
+    let (mut scene, deformer) = (scene(), VertexDeformer::new(&ctx)?);
     let gpu = upload(&ctx, &scene, MOVING)?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     done(&ctx, *gpu.models[0])?;
     let mesh = scene.models[0][0].mesh.clone();
     let mut cmd = ctx.acquire_command_buffer()?;
-    if has_own_structures(&ctx) {
+    if builds_device_accel_structs(&ctx) {
         let refused = cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild);
         let Err(Error::InvalidUsage { object, message }) = refused else { unreachable!("{refused:?}") };
         assert!(object == "model" && message.contains("compacted"), "{object}: {message}");
     } else {
-        bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.4)?;
+        deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.4)?;
         cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
-        scene.models[0][0].mesh = bent(&mesh, 0.4);
+        scene.models[0][0].mesh = deformed(&mesh, 0.4);
     }
     ctx.submit(cmd)?;
     HitCheck::new(&ctx)?.scene("after a refusal, or rebuilt", &gpu.tlas, &scene)
@@ -312,28 +313,28 @@ fn a_compacted_structure_cannot_be_rebuilt() -> Result<()> {
 #[test]
 fn automatic_builds_refit_on_what_is_compacted() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     let mut scene = scene();
     let gpu = upload(&ctx, &scene, MOVING)?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     done(&ctx, *gpu.models[0])?;
     for (frame, max_refits) in [2, 2, 2, 2, 0].into_iter().enumerate() {
         let mesh = scene.models[0][0].mesh.clone();
         let mut cmd = ctx.acquire_command_buffer()?;
-        bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.1)?;
+        deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.1)?;
         cmd.build_blas(&handles(&gpu), BuildMode::Auto { max_refits })?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Refit)?;
         ctx.submit(cmd)?;
-        scene.models[0][0].mesh = bent(&mesh, 0.1);
+        scene.models[0][0].mesh = deformed(&mesh, 0.1);
         check.scene(&format!("frame {frame}"), &gpu.tlas, &scene)?;
     }
     let still = upload(&ctx, &scene, COMPACTABLE)?;
     ctx.compact(&handles(&still))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     let mut cmd = ctx.acquire_command_buffer()?;
     let built = cmd.build_blas(&handles(&still), BuildMode::Auto { max_refits: 2 });
-    if has_own_structures(&ctx) {
+    if builds_device_accel_structs(&ctx) {
         assert!(matches!(built, Err(Error::InvalidUsage { .. })), "neither way is open: {built:?}");
         return Ok(());
     }
@@ -365,17 +366,17 @@ fn asking_twice_is_asking_once_and_wrong_questions_are_refused() -> Result<()> {
     ctx.compact(&[])?;
     ctx.compact(&[*gpu.models[0], *gpu.models[0]])?;
     ctx.compact(&[*gpu.models[0]])?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     let sizes = done(&ctx, *gpu.models[0])?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert_eq!(done(&ctx, *gpu.models[0])?, sizes, "left alone");
     HitCheck::new(&ctx)?.scene("asked often", &gpu.tlas, &scene)
 }
 
 /// In every state of the compaction.
 #[test]
-fn structures_may_be_destroyed_meanwhile() -> Result<()> {
+fn accel_structs_may_be_destroyed_meanwhile() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     let scene = scene();
@@ -387,10 +388,10 @@ fn structures_may_be_destroyed_meanwhile() -> Result<()> {
         (0..steps).try_for_each(|_| ctx.flush().map(drop))?;
         gpu.models.clear();
         gpu.buffers.clear();
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         check.scene(&format!("destroyed after {steps} submissions"), &gpu.tlas, &scene)?;
         drop(gpu);
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         assert_eq!(memory(&ctx), before, "{steps} submissions");
     }
     Ok(())
@@ -398,7 +399,7 @@ fn structures_may_be_destroyed_meanwhile() -> Result<()> {
 
 /// Nothing else keeps them.
 #[test]
-fn structures_that_nobody_shows_may_be_destroyed_meanwhile() -> Result<()> {
+fn unreferenced_accel_structs_may_be_destroyed_meanwhile() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let scene = scene();
     ctx.wait_idle()?;
@@ -413,7 +414,7 @@ fn structures_that_nobody_shows_may_be_destroyed_meanwhile() -> Result<()> {
         ctx.compact(&handles)?;
         (0..steps / 2).try_for_each(|_| ctx.flush().map(drop))?;
         drop((models, buffers));
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         assert_eq!(memory(&ctx), before, "step {steps}");
     }
     Ok(())
@@ -467,24 +468,24 @@ fn threads_compact_side_by_side() -> Result<()> {
 /// Bytes before and after compaction.
 type Sizes = (u64, u64);
 
-/// Bytes of all structures, and of each of the [`scene`]'s; nothing, loudly, where there are no copies.
+/// Bytes of all acceleration structures, and of each of the [`scene`]'s; nothing, loudly, where there are no copies.
 fn measured(ctx: Option<TestDevice>) -> Result<Option<(u64, Vec<Sizes>)>> {
     let Some(ctx) = ctx else { return Ok(None) };
-    if !tests_own_structures(&ctx, "copies that need room") {
+    if !requires_device_accel_structs(&ctx, "copies that need room") {
         return Ok(None);
     }
     let gpu = upload(&ctx, &scene(), COMPACTABLE)?;
     ctx.wait_idle()?;
     let needed = memory(&ctx).0;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     let sizes = handles(&gpu).into_iter().map(|handle| done(&ctx, handle));
     Ok(Some((needed, sizes.collect::<Result<_>>()?)))
 }
 
-/// What software traces is not copied, so a budget for the structures themselves is enough.
+/// Software BVHs are not copied, so a budget for the acceleration structures themselves is enough.
 #[test]
-fn what_only_software_traces_is_compacted_without_room_for_copies() -> Result<()> {
+fn software_accel_structs_are_compacted_without_memory_for_copies() -> Result<()> {
     let scene = scene();
     let needed = {
         let Some(ctx) = software_alone(|_| ()) else { return Ok(()) };
@@ -496,15 +497,15 @@ fn what_only_software_traces_is_compacted_without_room_for_copies() -> Result<()
     let gpu = upload(&ctx, &scene, COMPACTABLE)?;
     ctx.compact(&handles(&gpu))?;
     handles(&gpu).into_iter().try_for_each(|handle| expect_unchanged(&ctx, handle))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert_eq!(memory(&ctx).0, needed);
     HitCheck::new(&ctx)?.scene("compacted, and as before", &gpu.tlas, &scene)
 }
 
 /// Copies need room beside what they replace. Without it everything stays as it is, with a warning for each.
 #[test]
-fn compaction_fails_where_the_budget_has_no_room_for_copies() -> Result<()> {
-    listen();
+fn compaction_fails_where_the_budget_has_no_memory_for_copies() -> Result<()> {
+    capture_warnings();
     let Some((needed, sizes)) = measured(device())? else { return Ok(()) };
     let Some(ctx) = device_with(|desc| desc.accel_budget_bytes = needed + 256) else {
         return Ok(());
@@ -512,7 +513,7 @@ fn compaction_fails_where_the_budget_has_no_room_for_copies() -> Result<()> {
     let scene = scene();
     let gpu = upload(&ctx, &scene, COMPACTABLE)?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     for model in &gpu.models {
         assert_eq!(compaction(&ctx, **model)?, Compaction::Failed);
     }
@@ -521,18 +522,18 @@ fn compaction_fails_where_the_budget_has_no_room_for_copies() -> Result<()> {
     warnings.retain(|warning| warning.contains(&format!("budget of {}", needed + 256)));
     assert_eq!(warnings.len(), 3, "{warnings:?}");
     HitCheck::new(&ctx)?.scene("not compacted", &gpu.tlas, &scene)?;
-    // What is asked for again, when others have gone, is done.
+    // A second request succeeds after other objects were destroyed.
     let GpuScene { mut models, tlas, .. } = gpu;
     drop((tlas, models.pop(), models.pop()));
     ctx.wait_idle()?;
     ctx.compact(&[*models[0]])?;
     assert_eq!(compaction(&ctx, *models[0])?, Compaction::Pending);
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert_eq!(done(&ctx, *models[0])?, sizes[0]);
     Ok(())
 }
 
-/// There is room for the smallest copy only; more is made of what memory comes back, and the rest fails alone.
+/// Memory suffices for the smallest copy only. Freed memory is used for more copies, and the rest fails alone.
 #[test]
 fn what_fits_is_compacted_whatever_becomes_of_the_rest() -> Result<()> {
     let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
@@ -543,8 +544,8 @@ fn what_fits_is_compacted_whatever_becomes_of_the_rest() -> Result<()> {
     let scene = scene();
     let gpu = upload(&ctx, &scene, COMPACTABLE)?;
     ctx.compact(&handles(&gpu))?;
-    settle(&ctx)?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
+    wait_for_compaction(&ctx)?;
     let mut room = smallest;
     let mut order: Vec<_> = (0..sizes.len()).collect();
     order.sort_by_key(|index| sizes[*index].1);
@@ -565,7 +566,7 @@ fn what_fits_is_compacted_whatever_becomes_of_the_rest() -> Result<()> {
 
 /// Room for one copy at a time: the next is made when what the last one replaced is freed.
 #[test]
-fn copies_wait_for_the_memory_of_others() -> Result<()> {
+fn copies_wait_for_the_memory_of_other_copies() -> Result<()> {
     let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
     let largest = sizes.iter().map(|(_, after)| *after).max().unwrap_or(0);
     let Some(ctx) = without_software(|desc| desc.accel_budget_bytes = needed + largest) else {
@@ -593,7 +594,7 @@ fn copies_wait_for_the_memory_of_others() -> Result<()> {
 
 /// A copy that waits for room does not keep what was destroyed.
 #[test]
-fn what_waits_for_room_may_be_destroyed() -> Result<()> {
+fn what_waits_for_memory_may_be_destroyed() -> Result<()> {
     let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
     let Some(ctx) = without_software(|desc| desc.accel_budget_bytes = needed + 256) else {
         return Ok(());
@@ -605,13 +606,13 @@ fn what_waits_for_room_may_be_destroyed() -> Result<()> {
     cmd.build_blas(&[*models[2]], BuildMode::Rebuild)?;
     let all: Vec<_> = models.iter().map(|model| **model).collect();
     ctx.compact(&all)?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert_eq!(compaction(&ctx, *models[0])?, Compaction::Pending);
     // The largest, in whose place both others have room.
     drop(models.remove(1));
     drop(cmd);
-    settle(&ctx)?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert_eq!([done(&ctx, *models[0])?, done(&ctx, *models[1])?], [sizes[0], sizes[2]]);
     Ok(())
 }

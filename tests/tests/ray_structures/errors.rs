@@ -1,4 +1,4 @@
-//! Mistakes around ray tracing: each is a typed error that names the object, and the context goes on working.
+//! Wrong use of ray tracing: each call returns a typed error that names the object, and the context stays usable.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -7,8 +7,8 @@ use lvk::{
     Indices, InstanceFlags, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage, TlasDesc,
     TlasInstance, Triangles,
 };
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{How, Method, RayTracer, shader};
@@ -35,7 +35,7 @@ impl Intact {
         Ok(Self { ctx: ctx.clone(), scene, gpu, tracers: tracers? })
     }
 
-    /// Fails unless structures can still be built and traced, the old ones too.
+    /// Fails unless acceleration structures can still be built and traced, the old ones too.
     fn check(&self) -> Result<()> {
         let rays = random_rays(61, 60, Vec3::NEG_ONE, Vec3::ONE);
         let reference = self.scene.reference();
@@ -43,7 +43,7 @@ impl Intact {
         for tracer in &self.tracers {
             for gpu in [&self.gpu, &fresh] {
                 let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-                Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+                HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
                     .assert("afterwards");
             }
         }
@@ -133,7 +133,7 @@ fn geometry_that_does_not_fit_its_buffers_is_refused() -> Result<()> {
 }
 
 #[test]
-fn boxes_that_do_not_fit_their_buffer_are_refused() -> Result<()> {
+fn aabbs_that_do_not_fit_their_buffer_are_refused() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let intact = Intact::new(&ctx)?;
     let boxes = buffer(&ctx, 24 * 4, BufferUsage::ACCEL_INPUT, "few boxes")?;
@@ -209,7 +209,7 @@ fn refits_that_are_not_possible_are_refused() -> Result<()> {
 }
 
 #[test]
-fn the_wrong_level_and_stale_structures_are_refused() -> Result<()> {
+fn the_wrong_level_and_stale_accel_structs_are_refused() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let intact = Intact::new(&ctx)?;
     let (model, tlas) = (*intact.gpu.models[0], *intact.gpu.tlas);
@@ -277,7 +277,8 @@ fn a_rebuild_from_destroyed_buffers_is_refused() -> Result<()> {
     let rays = random_rays(62, 200, Vec3::NEG_ONE, Vec3::ONE);
     for tracer in &intact.tracers {
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("what was built");
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+            .assert("what was built");
     }
     Ok(())
 }

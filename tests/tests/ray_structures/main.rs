@@ -1,15 +1,15 @@
-//! Acceleration structures: built, ordered, split, changed, compacted and kept as bytes; what goes wrong, and what is left.
+//! Acceleration acceleration structures: builds, reordering, splits, updates, compaction, serialization, errors and leaks.
 
-mod anywhere;
 mod batches;
+mod blas_relocation;
 mod compaction;
 mod errors;
-mod leftovers;
+mod leaks;
 mod many_geometries;
-mod order;
-mod rebuilt_elsewhere;
-mod recorded_apart;
+mod out_of_order_tlas_updates;
+mod primitive_order;
 mod serialize;
 mod split;
 mod split_updates;
+mod swiftshader;
 mod updates;

@@ -1,12 +1,12 @@
-//! Geometries that share one large buffer of vertices, of which each names a few.
+//! Geometries that share one large vertex buffer and use few of its vertices each.
 
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode, Context, Holder,
     IndexFormat, Indices, Result, TlasDesc, TlasInstance, Triangles,
 };
+use lvk_tests::accel_backend::software_alone;
 use lvk_tests::ray_tracer::{How, MISSED, Method, RayTracer};
 use lvk_tests::rays::Ray;
-use lvk_tests::structures::software_alone;
 
 struct Shared {
     vertices: Holder<BufferHandle>,
@@ -15,7 +15,7 @@ struct Shared {
 }
 
 impl Shared {
-    /// Small triangles in a row along x, the rest of so many vertices at the origin.
+    /// Creates small triangles in a row along x. The rest of `vertex_count` vertices is at the origin.
     fn new(ctx: &Context, vertex_count: u32, triangles: u32) -> Result<Self> {
         let corners = [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]];
         let mut positions = vec![[0.0_f32; 3]; vertex_count as usize];
@@ -32,7 +32,7 @@ impl Shared {
         Ok(Self { vertices, indices: buffer(bytemuck::cast_slice(&indices))?, vertex_count })
     }
 
-    /// So many geometries of so many triangles; each may name all vertices.
+    /// Returns `count` geometries of `each` triangles. Each may index all vertices.
     fn geometries(&self, count: u32, each: u32) -> Vec<BlasGeometry> {
         let geometry = |number: u32| {
             let offset = u64::from(number * each * 12);

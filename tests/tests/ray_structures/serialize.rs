@@ -1,4 +1,4 @@
-//! Structures as bytes: what was loaded is hit like what was built, and bytes that cannot be used are refused.
+//! Serialized BLASes: a loaded BLAS gives the hits of a built one, and unusable bytes are refused.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -6,26 +6,23 @@ use lvk::{
     Error, GeometryFlags, GeometryTransform, Holder, IndexFormat, Indices, LoadedBlas, PrimitiveOrder,
     Result, TlasDesc, Triangles, VertexFormat,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::bender::{Bender, bent};
+use lvk_tests::accel_backend::{builds_device_accel_structs, whole_and_split};
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, PartBuffers, Placed, RayScene, instances, upload_geometries};
-use lvk_tests::ray_tracer::How;
 use lvk_tests::rays::random_rays;
-use lvk_tests::reference::Sphere;
 use lvk_tests::sphere_scene::SphereModel;
-use lvk_tests::structures::{has_own_structures, whole_and_split};
-use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
 const MOVING: BuildFlags =
     BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE).union(BuildFlags::ALLOW_COMPACTION);
 
-/// Of a structure of the devices that split.
+/// Of an acceleration structure of the devices that split.
 const MOST_PRIMITIVES: u64 = 60;
 
-/// A device that takes so many primitives in a structure.
+/// Creates a context that splits BLASes of more primitives.
 fn split_device() -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -72,7 +69,7 @@ impl Mine {
         BlasDesc { geometries: &self.geometries, flags, order, debug_name: "mine" }
     }
 
-    fn show(&self, ctx: &Context, blas: &Holder<AccelStructHandle>) -> Result<Holder<AccelStructHandle>> {
+    fn tlas_of(&self, ctx: &Context, blas: &Holder<AccelStructHandle>) -> Result<Holder<AccelStructHandle>> {
         let instances = self.scene.placed.iter().map(|placed| lvk::TlasInstance {
             transform: lvk::transform_rows(&placed.transform),
             custom_index: placed.custom_index,
@@ -84,7 +81,7 @@ impl Mine {
 }
 
 fn load(ctx: &Context, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
-    // SAFETY: what the driver once wrote of a structure is as it was, or its head tells that it is not.
+    // SAFETY: what the driver once wrote of an acceleration structure is as it was, or its head tells that it is not.
     unsafe { ctx.load_blas(desc, bytes) }
 }
 
@@ -93,7 +90,7 @@ fn load_or_create(ctx: &Context, desc: &BlasDesc<'_>, bytes: Option<&[u8]>) -> R
     unsafe { ctx.load_or_create_blas(desc, bytes) }
 }
 
-fn settle(ctx: &Context) -> Result<()> {
+fn wait_for_compaction(ctx: &Context) -> Result<()> {
     (0..3).try_for_each(|_| ctx.wait_idle())
 }
 
@@ -115,8 +112,8 @@ fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
     {
         let Some(ctx) = (if split { split_device() } else { device() }) else { return Ok(()) };
         let remapped = order != PrimitiveOrder::Given;
-        if remapped && !has_own_structures(&ctx) {
-            // What software traces is neither split nor ordered.
+        if remapped && !builds_device_accel_structs(&ctx) {
+            // Software BVHs are neither split nor reordered.
             continue;
         }
         let check = HitCheck::new(&ctx)?;
@@ -127,21 +124,25 @@ fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
         assert_eq!((info.parts > 5, info.is_remapped), (split, remapped));
         let plain = ctx.serialize_blas(*built)?;
         ctx.compact(&[*built])?;
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         assert!(matches!(ctx.accel_struct_info(*built)?.compaction, Compaction::Done { .. }));
         let compacted = ctx.serialize_blas(*built)?;
         drop(built);
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         for (what, bytes) in [("plain", &plain), ("compacted", &compacted)] {
             let loaded = load(&ctx, &desc, bytes)?;
             let again = ctx.serialize_blas(*loaded)?;
-            check.scene(&format!("{what}, {order:?}"), &mine.show(&ctx, &loaded)?, &mine.scene)?;
+            check.scene(&format!("{what}, {order:?}"), &mine.tlas_of(&ctx, &loaded)?, &mine.scene)?;
             drop(loaded);
             let loaded = load_or_create(&ctx, &desc, Some(&again))?;
             assert!(loaded.rejected.is_none());
             let of_loaded = ctx.accel_struct_info(*loaded.blas)?;
             assert_eq!((of_loaded.parts, of_loaded.is_remapped), (info.parts, info.is_remapped));
-            check.scene(&format!("{what} twice, {order:?}"), &mine.show(&ctx, &loaded.blas)?, &mine.scene)?;
+            check.scene(
+                &format!("{what} twice, {order:?}"),
+                &mine.tlas_of(&ctx, &loaded.blas)?,
+                &mine.scene,
+            )?;
         }
     }
     Ok(())
@@ -151,27 +152,27 @@ fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
 #[test]
 fn what_is_loaded_moves_on() -> Result<()> {
     for ctx in whole_and_split(MOST_PRIMITIVES) {
-        let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+        let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
         let mut mine = Mine::new(&ctx)?;
         let bytes = {
             let built = ctx.create_blas(&mine.desc(MOVING, PrimitiveOrder::Spatial))?;
             ctx.serialize_blas(*built)?
         };
         let loaded = load(&ctx, &mine.desc(MOVING, PrimitiveOrder::Spatial), &bytes)?;
-        let tlas = mine.show(&ctx, &loaded)?;
+        let tlas = mine.tlas_of(&ctx, &loaded)?;
         for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.3, BuildMode::Rebuild)] {
             let mesh = mine.scene.models[0][0].mesh.clone();
             let mut cmd = ctx.acquire_command_buffer()?;
-            bender.record(&mut cmd, *mine.buffers[0].vertices, &mesh, amount)?;
+            deformer.record(&mut cmd, *mine.buffers[0].vertices, &mesh, amount)?;
             cmd.build_blas(&[*loaded], mode)?;
             let model = std::slice::from_ref(&loaded);
             cmd.update_tlas(*tlas, &instances(&mine.scene.placed, model), BuildMode::Refit)?;
             ctx.submit(cmd)?;
-            mine.scene.models[0][0].mesh = bent(&mesh, amount);
+            mine.scene.models[0][0].mesh = deformed(&mesh, amount);
             check.scene(&format!("loaded, {mode:?}"), &tlas, &mine.scene)?;
         }
         ctx.compact(&[*loaded])?;
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         assert!(matches!(ctx.accel_struct_info(*loaded)?.compaction, Compaction::Done { .. }));
         check.scene("loaded and compacted", &tlas, &mine.scene)?;
     }
@@ -184,70 +185,62 @@ fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mine = Mine::new(&ctx)?;
     let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
-    let bytes = {
-        let built = ctx.create_blas(&desc)?;
-        ctx.serialize_blas(*built)?
-    };
+    let bytes = serialized(&ctx, &desc)?;
     let loaded = load(&ctx, &desc, &bytes)?;
     ctx.compact(&[*loaded])?;
-    let tlas = mine.show(&ctx, &loaded)?;
-    settle(&ctx)?;
-    settle(&ctx)?;
+    let tlas = mine.tlas_of(&ctx, &loaded)?;
+    wait_for_compaction(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert!(matches!(ctx.accel_struct_info(*loaded)?.compaction, Compaction::Done { .. }));
     HitCheck::new(&ctx)?.scene("compacted at once", &tlas, &mine.scene)
 }
 
-/// A structure from a larger allocation is loaded into what its bytes say: no more may be built in it than fits.
+/// An acceleration structure from a larger allocation is loaded into what its bytes say: no more may be built in it than fits.
 #[test]
 fn what_was_compacted_before_it_was_saved_is_refitted() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     let mut mine = Mine::new(&ctx)?;
     let built = ctx.create_blas(&mine.desc(MOVING, PrimitiveOrder::Given))?;
     ctx.compact(&[*built])?;
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     let bytes = ctx.serialize_blas(*built)?;
     drop(built);
     let loaded = load(&ctx, &mine.desc(MOVING, PrimitiveOrder::Given), &bytes)?;
-    let tlas = mine.show(&ctx, &loaded)?;
+    let tlas = mine.tlas_of(&ctx, &loaded)?;
     for mode in [BuildMode::Refit, BuildMode::Auto { max_refits: 1 }, BuildMode::Auto { max_refits: 0 }] {
         let mesh = mine.scene.models[0][0].mesh.clone();
         let mut cmd = ctx.acquire_command_buffer()?;
-        bender.record(&mut cmd, *mine.buffers[0].vertices, &mesh, 0.3)?;
+        deformer.record(&mut cmd, *mine.buffers[0].vertices, &mesh, 0.3)?;
         cmd.build_blas(&[*loaded], mode)?;
         let model = std::slice::from_ref(&loaded);
         cmd.update_tlas(*tlas, &instances(&mine.scene.placed, model), BuildMode::Refit)?;
         ctx.submit(cmd)?;
-        mine.scene.models[0][0].mesh = bent(&mesh, 0.3);
+        mine.scene.models[0][0].mesh = deformed(&mesh, 0.3);
         check.scene(&format!("compacted, loaded, {mode:?}"), &tlas, &mine.scene)?;
     }
     Ok(())
 }
 
 #[test]
-fn boxes_are_saved_too() -> Result<()> {
+fn aabbs_are_saved_too() -> Result<()> {
     let profile = DeviceProfile { name: "small".into(), max_blas_primitives: 30, ..DeviceProfile::default() };
     for profile in [None, Some(&profile)] {
         let Some(ctx) = device_with(|desc| desc.profile = profile) else { return Ok(()) };
         let spheres = SphereModel { count: 40, step: 27 };
-        let (_buffers, geometries) = spheres.boxes(&ctx)?;
+        let (_buffers, geometries) = spheres.aabb_geometries(&ctx)?;
         let order = PrimitiveOrder::Spatial;
         let desc = BlasDesc { geometries: &geometries, order, ..Default::default() };
         let built = ctx.create_blas(&desc)?;
-        assert_eq!(ctx.accel_struct_info(*built)?.is_remapped, has_own_structures(&ctx));
+        assert_eq!(ctx.accel_struct_info(*built)?.is_remapped, builds_device_accel_structs(&ctx));
         let bytes = ctx.serialize_blas(*built)?;
         drop(built);
         let model = [load(&ctx, &desc, &bytes)?];
         let placed = [Placed::new(0, Affine3A::IDENTITY)];
         let instances = instances(&placed, &model);
         let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
-        let expected = spheres.spheres(&placed);
         let rays = random_rays(53, 800, Vec3::new(-1.0, -1.0, -1.0), Vec3::new(5.0, 27.0, 3.0));
-        for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
-            let records = tracer.trace(&tlas, &rays, How::default())?;
-            Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
-                .assert(&format!("loaded boxes by {method:?}"));
-        }
+        spheres.check_hits(&ctx, &tlas, &placed, &rays, "loaded AABBs", |_| ())?;
     }
     Ok(())
 }
@@ -257,11 +250,8 @@ fn damaged_bytes_are_refused_and_leave_nothing_behind() -> Result<()> {
     for ctx in whole_and_split(MOST_PRIMITIVES) {
         let mine = Mine::new(&ctx)?;
         let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
-        let bytes = {
-            let built = ctx.create_blas(&desc)?;
-            ctx.serialize_blas(*built)?
-        };
-        settle(&ctx)?;
+        let bytes = serialized(&ctx, &desc)?;
+        wait_for_compaction(&ctx)?;
         let before = ctx.accel_memory();
         for length in [0, 1, 7, 8, 11, 27, 28, 60, bytes.len() / 2, bytes.len() - 1] {
             let reason = reason(load(&ctx, &desc, &bytes[..length]));
@@ -275,7 +265,7 @@ fn damaged_bytes_are_refused_and_leave_nothing_behind() -> Result<()> {
             reason(load(&ctx, &desc, &damaged));
         }
         reason(load(&ctx, &desc, &vec![0x5a; 4_000]));
-        settle(&ctx)?;
+        wait_for_compaction(&ctx)?;
         assert_eq!(ctx.accel_memory(), before);
         drop(load(&ctx, &desc, &bytes)?);
     }
@@ -296,7 +286,7 @@ fn bytes_of_another_mesh_or_of_other_flags_are_refused() -> Result<()> {
     let swapped: Vec<_> = mine.geometries.iter().rev().copied().collect();
     let fewer = &mine.geometries[..1];
     let spheres = SphereModel::new(12);
-    let (_buffers, boxes) = spheres.boxes(&ctx)?;
+    let (_buffers, boxes) = spheres.aabb_geometries(&ctx)?;
     for geometries in [&swapped[..], fewer, &boxes] {
         let desc = BlasDesc { geometries, ..mine.desc(MOVING, order) };
         let refused = reason(load(&ctx, &desc, &bytes));
@@ -319,7 +309,7 @@ fn bytes_of_another_mesh_or_of_other_flags_are_refused() -> Result<()> {
         let refused = reason(load(&ctx, &desc, &bytes));
         assert!(refused.contains("other geometries"), "{other:?}: {refused}");
     }
-    // Where the inputs lie is not part of the mesh.
+    // The addresses of the inputs are no part of the mesh.
     let moved = with(Triangles { vertex_stride: 12, ..ring });
     drop(load(&ctx, &BlasDesc { geometries: &moved, ..mine.desc(MOVING, order) }, &bytes)?);
     let stale = *ctx.create_blas(&mine.desc(MOVING, order))?;
@@ -341,12 +331,12 @@ fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Where the number of parts lies: behind the head, flags and geometries.
+/// Returns the offset of the number of parts: behind the header, flags and geometries.
 fn parts_start(geometries: &[BlasGeometry]) -> usize {
     28 + 8 + 28 * geometries.len()
 }
 
-/// Where the driver's own bytes start in the first part: behind the number of parts and two lengths.
+/// Returns the offset of the driver's bytes in the first part: behind the number of parts and two lengths.
 fn driver_start(geometries: &[BlasGeometry]) -> usize {
     parts_start(geometries) + 4 + 16
 }
@@ -376,10 +366,7 @@ fn parts_that_do_not_make_up_the_mesh_are_refused() -> Result<()> {
         let Some(ctx) = ctx else { return Ok(()) };
         let mine = Mine::new(&ctx)?;
         let desc = mine.desc(BuildFlags::FAST_TRACE, order);
-        let bytes = {
-            let built = ctx.create_blas(&desc)?;
-            ctx.serialize_blas(*built)?
-        };
+        let bytes = serialized(&ctx, &desc)?;
         let good = parts(&bytes, &mine.geometries);
         let with = |parts: &[&[u8]]| {
             let mut made = bytes[..parts_start(&mine.geometries)].to_vec();
@@ -388,8 +375,8 @@ fn parts_that_do_not_make_up_the_mesh_are_refused() -> Result<()> {
             resealed(made)
         };
         assert_eq!(with(&good), bytes);
-        // What software traces is one part always: others are of a driver.
-        let words = if has_own_structures(&ctx) { "parts" } else { "a driver" };
+        // A software BVH is always one part: other bytes are a driver's.
+        let words = if builds_device_accel_structs(&ctx) { "parts" } else { "a driver" };
         let (all_but_one, last) = (&good[..good.len() - 1], &good[good.len() - 1..]);
         for wrong in [
             &[][..],
@@ -405,17 +392,20 @@ fn parts_that_do_not_make_up_the_mesh_are_refused() -> Result<()> {
     Ok(())
 }
 
+/// Returns the bytes of a BLAS that is built for them and destroyed.
+fn serialized(ctx: &Context, desc: &BlasDesc<'_>) -> Result<Vec<u8>> {
+    let built = ctx.create_blas(desc)?;
+    ctx.serialize_blas(*built)
+}
+
 /// Sizes and counts in the head of the driver's own bytes that cannot be.
 #[test]
 fn absurd_sizes_are_refused_and_built_instead() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mine = Mine::new(&ctx)?;
     let desc = mine.desc(BuildFlags::FAST_TRACE, PrimitiveOrder::Given);
-    let bytes = {
-        let built = ctx.create_blas(&desc)?;
-        ctx.serialize_blas(*built)?
-    };
-    settle(&ctx)?;
+    let bytes = serialized(&ctx, &desc)?;
+    wait_for_compaction(&ctx)?;
     let before = ctx.accel_memory();
     let most = ctx.blas_sizes(&desc)?.structure_bytes;
     let (size_at, handles_at) = (driver_start(&mine.geometries) + 40, driver_start(&mine.geometries) + 48);
@@ -428,24 +418,21 @@ fn absurd_sizes_are_refused_and_built_instead() -> Result<()> {
         reason(load(&ctx, &desc, &absurd));
         assert!(load_or_create(&ctx, &desc, Some(&absurd))?.rejected.is_some(), "{number} at {at}");
     }
-    settle(&ctx)?;
+    wait_for_compaction(&ctx)?;
     assert_eq!(ctx.accel_memory().structure_bytes, before.structure_bytes);
     Ok(())
 }
 
 #[test]
 fn bytes_of_another_driver_are_refused_and_built_instead() -> Result<()> {
-    listen();
+    capture_warnings();
     let Some(ctx) = device() else { return Ok(()) };
     let mine = Mine::new(&ctx)?;
     let desc = mine.desc(BuildFlags::FAST_TRACE, PrimitiveOrder::Given);
-    let bytes = {
-        let built = ctx.create_blas(&desc)?;
-        ctx.serialize_blas(*built)?
-    };
+    let bytes = serialized(&ctx, &desc)?;
     assert_eq!(resealed(bytes.clone()), bytes, "the checksum is the library's");
     let uuid = driver_start(&mine.geometries);
-    let own = has_own_structures(&ctx);
+    let own = builds_device_accel_structs(&ctx);
     // The driver's UUID comes first, or the library's mark; what of the 16 bytes behind a UUID matters is up to the driver.
     let of_others =
         if own { "another device or driver" } else { "a driver or another version of the library" };
@@ -466,10 +453,10 @@ fn bytes_of_another_driver_are_refused_and_built_instead() -> Result<()> {
     assert!(rejected.contains("mine again") && rejected.contains("damaged"), "{rejected}");
     let warnings = take_warnings("mine again");
     assert!(warnings.len() == 1 && warnings[0].contains("building it anew"), "{warnings:?}");
-    check.scene("built instead", &mine.show(&ctx, &loaded.blas)?, &mine.scene)?;
+    check.scene("built instead", &mine.tlas_of(&ctx, &loaded.blas)?, &mine.scene)?;
     let without = load_or_create(&ctx, &desc, None)?;
     assert!(without.rejected.is_none());
-    check.scene("built without bytes", &mine.show(&ctx, &without.blas)?, &mine.scene)?;
+    check.scene("built without bytes", &mine.tlas_of(&ctx, &without.blas)?, &mine.scene)?;
     // A description that is no good is no reason to build.
     let wrong = BlasDesc { geometries: &[], ..desc };
     assert!(load_or_create(&ctx, &wrong, Some(&bytes)).is_err());

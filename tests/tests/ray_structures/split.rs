@@ -1,4 +1,5 @@
-//! Meshes cut into parts because the device takes no larger ones: hits, shaders and numbers are as with the whole mesh.
+//! Meshes that are split because the device takes no larger ones: hits, shaders and numbers equal those of the whole
+//! mesh.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -6,18 +7,18 @@ use lvk::{
     GeometryTransform, HitGroup, InstanceFlags, PrimitiveOrder, RayTracingPipelineDesc, Result, ShaderStage,
     TlasDesc,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::accel_backend::{builds_device_accel_structs, expect_parts};
 use lvk_tests::hit_check::{HitCheck, rays_for, same_hits};
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, MISSED, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::reference::{Hit, Sphere};
+use lvk_tests::reference::Hit;
 use lvk_tests::sphere_scene::{GROUPS, SphereModel};
-use lvk_tests::structures::{expect_parts, has_own_structures};
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
-/// A device that takes so many primitives in a structure.
+/// Creates a context whose BLASes take at most `primitives` primitives.
 fn device_of(primitives: u64) -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -112,13 +113,13 @@ fn a_split_mesh_is_hit_like_the_whole_one_whatever_limit_splits_it() -> Result<(
         let split = scene.upload(&ctx)?;
         let info = ctx.accel_struct_info(*split.models[0])?;
         expect_parts(&ctx, *split.models[0], 5..=60)?;
-        assert_eq!(info.is_remapped, has_own_structures(&ctx), "{info:?}");
+        assert_eq!(info.is_remapped, builds_device_accel_structs(&ctx), "{info:?}");
         for ((method, tracer), of_whole) in HitCheck::new(&ctx)?.tracers().zip(&of_whole) {
             let what = format!("{} parts, {method:?}", info.parts);
             let records = tracer.trace(&split.tlas, &rays, How::default())?;
             let at_edges = same_hits(&what, &rays, (of_whole, &records), &reference);
             assert!(at_edges * 100 < rays.len(), "{what}: {at_edges} differ");
-            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
+            HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
         }
     }
     Ok(())
@@ -140,7 +141,7 @@ fn split_and_whole_meshes_share_a_scene() -> Result<()> {
         check.closest(&what, &gpu.tlas, &rays, how, |ray| reference.closest(ray, mask))?;
         for (method, tracer) in check.tracers() {
             let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::shadows() })?;
-            Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask))
+            HitComparison::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask))
                 .assert(&format!("shadows, {what}, {method:?}"));
         }
     }
@@ -172,7 +173,7 @@ fn any_hit_shaders_know_the_primitives_of_split_meshes() -> Result<()> {
     let answer = |ray: &Ray| {
         reference.closest_where(ray, 0xff, |hit| hit.ids.primitive.is_multiple_of(2) || !has_holes(hit))
     };
-    HitCheck::keeping_even(&ctx)?.closest("holes", &gpu.tlas, &rays, How::default(), answer)
+    HitCheck::with_even_primitives(&ctx)?.closest("holes", &gpu.tlas, &rays, How::default(), answer)
 }
 
 /// The group is the instance's offset and the geometry's place, which a part without some geometries must not shift.
@@ -210,8 +211,8 @@ fn parts_keep_hit_groups() -> Result<()> {
     expect_parts(&ctx, *gpu.models[0], 5..)?;
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
-    Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
+    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
     let mut tags: Vec<_> =
         records.iter().filter(|hit| hit.kind != MISSED).map(|hit| (hit.kind, hit)).collect();
     assert!(tags.iter().all(|(tag, hit)| *tag == 100 + hit.instance + hit.geometry));
@@ -252,12 +253,12 @@ fn a_transform_in_a_buffer_is_one_by_value() -> Result<()> {
     HitCheck::new(&ctx)?.scene("matrices in a buffer", &tlas, &scene)
 }
 
-/// Intersection shaders find their sphere by the number of the box.
+/// Intersection shaders find their sphere by the number of the AABB.
 #[test]
-fn intersection_shaders_know_the_boxes_of_split_meshes() -> Result<()> {
+fn intersection_shaders_know_the_aabbs_of_split_meshes() -> Result<()> {
     let Some(ctx) = device_of(5) else { return Ok(()) };
     let spheres = SphereModel { count: 21, step: 8 };
-    let (_buffers, geometries) = spheres.boxes(&ctx)?;
+    let (_buffers, geometries) = spheres.aabb_geometries(&ctx)?;
     let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
     expect_parts(&ctx, *model[0], 9..=40)?;
     let place = |index: u32| Placed {
@@ -267,17 +268,13 @@ fn intersection_shaders_know_the_boxes_of_split_meshes() -> Result<()> {
     };
     let placed = [place(0), place(1)];
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-    let expected = spheres.spheres(&placed);
     let rays = random_rays(51, 1_500, Vec3::new(-4.0, -2.0, -6.0), Vec3::new(14.0, 14.0, 8.0));
-    for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
-        let records = tracer.trace(&tlas, &rays, How::default())?;
-        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
-            .assert(&format!("split boxes by {method:?}"));
+    spheres.check_hits(&ctx, &tlas, &placed, &rays, "split boxes", |records| {
         for hit in records.iter().filter(|record| record.kind != MISSED) {
             let (radius, tag) = GROUPS[1 - hit.instance as usize];
             assert_eq!((hit.kind, hit.barycentrics), (tag, [radius, tag as f32]));
         }
-    }
+    })?;
     Ok(())
 }
 
@@ -321,7 +318,7 @@ fn short_indices_are_gathered_to_the_last_byte() -> Result<()> {
     Ok(())
 }
 
-/// What a hit of one of many parts says does not depend on how many there are: from one triangle a part on.
+/// A hit reports the same for any number of parts, down to one triangle a part.
 #[test]
 fn a_part_may_be_a_single_triangle() -> Result<()> {
     let Some(ctx) = device_of(1) else { return Ok(()) };
@@ -353,7 +350,7 @@ fn a_mesh_over_the_limits_of_the_phone_is_split() -> Result<()> {
     let rays = rays_for(&reference);
     // Weights of triangles this small are not those of f64.
     let records = RayTracer::new(&ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::default())?;
-    Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("on the phone");
+    HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("on the phone");
     assert!(ctx.accel_memory().scratch_bytes <= (256 << 20) + 256);
     Ok(())
 }
@@ -373,6 +370,6 @@ fn a_mesh_far_over_the_limits_of_the_phone_is_hit_like_the_whole_one() -> Result
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
     let gpu = scene.upload(&ctx)?;
     expect_parts(&ctx, *gpu.models[0], 31..)?;
-    assert_eq!(ctx.accel_struct_info(*gpu.models[0])?.is_remapped, has_own_structures(&ctx));
+    assert_eq!(ctx.accel_struct_info(*gpu.models[0])?.is_remapped, builds_device_accel_structs(&ctx));
     HitCheck::new(&ctx)?.scene("many parts", &gpu.tlas, &scene)
 }

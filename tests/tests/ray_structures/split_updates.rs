@@ -1,4 +1,4 @@
-//! Split meshes that change: refits, rebuilds, compaction, instances written by the GPU. No test places a barrier.
+//! Updates of split meshes: refits, rebuilds, compaction, instances written by the GPU. No test records a barrier.
 
 use bytemuck::NoUninit;
 use lvk::glam::{Affine3A, Quat, Vec3};
@@ -6,18 +6,18 @@ use lvk::{
     AccelStructHandle, BlasDesc, BufferDesc, BufferUsage, BuildFlags, BuildMode, Compaction, Context,
     Dependencies, DeviceInstances, DeviceProfile, Error, Result, TlasDesc,
 };
-use lvk_tests::bender::{Bender, bent};
+use lvk_tests::accel_backend::{builds_device_accel_structs, expect_parts, requires_device_accel_structs};
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::hit_check::{HitCheck, rays_for};
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::How;
-use lvk_tests::structures::{expect_parts, has_own_structures, tests_own_structures};
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 use lvk_tests::{TestDevice, device_with};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
-/// A device that takes 40 primitives in a structure.
+/// A device that takes 40 primitives in an acceleration structure.
 fn split_device() -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -50,7 +50,7 @@ fn scene() -> RayScene {
 #[test]
 fn a_refit_follows_vertices_written_by_a_dispatch() -> Result<()> {
     let Some(ctx) = split_device() else { return Ok(()) };
-    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     for (method, tracer) in check.tracers() {
         let mut scene = scene();
         let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
@@ -62,17 +62,17 @@ fn a_refit_follows_vertices_written_by_a_dispatch() -> Result<()> {
             (0.2, BuildMode::Refit),
         ] {
             let mesh = scene.models[0][0].mesh.clone();
-            scene.models[0][0].mesh = bent(&mesh, amount);
+            scene.models[0][0].mesh = deformed(&mesh, amount);
             let reference = scene.reference();
             let rays = rays_for(&reference);
             let job = tracer.job(&rays)?;
             let mut cmd = ctx.acquire_command_buffer()?;
-            bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
+            deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
             cmd.build_blas(&[*gpu.models[0]], mode)?;
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
             tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
             ctx.submit(cmd)?;
-            lvk_tests::agreement::Agreement::of_triangles(&rays, &tracer.read(&job)?, |ray| {
+            lvk_tests::hit_comparison::HitComparison::of_triangles(&rays, &tracer.read(&job)?, |ray| {
                 reference.closest(ray, 0xff)
             })
             .assert(&format!("{mode:?} after {amount}, {method:?}"));
@@ -115,7 +115,7 @@ fn a_rebuild_follows_other_indices() -> Result<()> {
 fn auto_builds_follow_frame_by_frame() -> Result<()> {
     const AUTO: BuildMode = BuildMode::Auto { max_refits: 2 };
     let Some(ctx) = split_device() else { return Ok(()) };
-    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     for flags in [UPDATABLE, BuildFlags::FAST_BUILD] {
         let mut scene = scene();
         let gpu = scene.upload_with(&ctx, flags, flags, 0)?;
@@ -124,9 +124,9 @@ fn auto_builds_follow_frame_by_frame() -> Result<()> {
             ctx.next_frame()?;
             let mesh = scene.models[0][0].mesh.clone();
             let mut cmd = ctx.acquire_command_buffer()?;
-            bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.1)?;
+            deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.1)?;
             cmd.build_blas(&[*gpu.models[0], *gpu.models[1]], AUTO)?;
-            scene.models[0][0].mesh = bent(&mesh, 0.1);
+            scene.models[0][0].mesh = deformed(&mesh, 0.1);
             // Another number of instances, of parts too, makes a rebuild of its own accord.
             scene.placed.truncate(if frame < 3 { 3 } else { 2 });
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), AUTO)?;
@@ -149,13 +149,13 @@ fn refits_that_are_not_allowed_are_refused() -> Result<()> {
     let mut placed = scene.placed.clone();
     placed[0].model = 1;
     let refitted = cmd.update_tlas(*gpu.tlas, &instances(&placed, &gpu.models), BuildMode::Refit);
-    if has_own_structures(&ctx) {
+    if builds_device_accel_structs(&ctx) {
         assert!(
             matches!(&refitted, Err(Error::InvalidUsage { object, .. }) if object == "tlas"),
             "{refitted:?}"
         );
     } else {
-        // Every structure is one part.
+        // Every acceleration structure is one part.
         refitted?;
         scene.placed = placed;
     }
@@ -166,7 +166,7 @@ fn refits_that_are_not_allowed_are_refused() -> Result<()> {
 #[test]
 fn a_compacted_split_mesh_is_hit_and_refitted_like_before() -> Result<()> {
     let Some(ctx) = split_device() else { return Ok(()) };
-    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     let mut scene = scene();
     let gpu = scene.upload_with(&ctx, UPDATABLE | BuildFlags::ALLOW_COMPACTION, UPDATABLE, 0)?;
     let parts = expect_split(&ctx, *gpu.models[0])?;
@@ -183,12 +183,12 @@ fn a_compacted_split_mesh_is_hit_and_refitted_like_before() -> Result<()> {
     for amount in [0.3, -0.2] {
         let mesh = scene.models[0][0].mesh.clone();
         let mut cmd = ctx.acquire_command_buffer()?;
-        bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
+        deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
         cmd.build_blas(&[*gpu.models[0]], BuildMode::Refit)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Refit)?;
         ctx.submit(cmd)?;
-        scene.models[0][0].mesh = bent(&mesh, amount);
-        check.scene(&format!("compacted and bent by {amount}"), &gpu.tlas, &scene)?;
+        scene.models[0][0].mesh = deformed(&mesh, amount);
+        check.scene(&format!("compacted and deformed by {amount}"), &gpu.tlas, &scene)?;
     }
     Ok(())
 }
@@ -213,7 +213,7 @@ fn refitted_instances_of_split_meshes_move_with_all_their_parts() -> Result<()> 
     Ok(())
 }
 
-/// Instances in two columns, every third of a structure that does not exist.
+/// Instances in two columns, every third of an acceleration structure that does not exist.
 const WRITE_INSTANCES: &str = "
     layout(local_size_x = 32) in;
     struct Instance { vec4 rows[3]; uint customAndMask; uint offsetAndFlags; uvec2 place; };
@@ -236,7 +236,7 @@ struct WritePush {
     shift: f32,
 }
 
-/// What [`WRITE_INSTANCES`] writes; instances of nothing are of a model without triangles.
+/// Returns the scene that [`WRITE_INSTANCES`] writes. Empty instances are of a model without triangles.
 fn written(count: u32, shift: f32) -> RayScene {
     let nothing = Mesh { positions: Vec::new(), triangles: Vec::new() };
     let mut models = scene().models;
@@ -249,7 +249,7 @@ fn written(count: u32, shift: f32) -> RayScene {
 }
 
 #[test]
-fn instances_written_by_the_gpu_may_show_split_meshes() -> Result<()> {
+fn instances_written_by_the_gpu_may_reference_split_meshes() -> Result<()> {
     const COUNT: u32 = 7;
     let Some(ctx) = split_device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
@@ -288,9 +288,9 @@ fn instances_written_by_the_gpu_may_show_split_meshes() -> Result<()> {
     Ok(())
 }
 
-/// Room for parts is asked for when the structure is made.
+/// Room for parts is asked for when the acceleration structure is made.
 #[test]
-fn more_parts_than_there_is_room_for_are_refused() -> Result<()> {
+fn more_parts_than_the_capacity_are_refused() -> Result<()> {
     let Some(ctx) = split_device() else { return Ok(()) };
     let scene = scene();
     let gpu = scene.upload(&ctx)?;
@@ -313,7 +313,7 @@ fn more_parts_than_there_is_room_for_are_refused() -> Result<()> {
         cmd.update_tlas_from_buffer(*tight, &source, BuildMode::Rebuild),
     ];
     for updated in updates {
-        if !has_own_structures(&ctx) {
+        if !builds_device_accel_structs(&ctx) {
             // Of one part each there is room for all.
             updated?;
             continue;
@@ -344,8 +344,8 @@ fn a_triangle_that_does_not_fit_is_an_error() -> Result<()> {
         let (_buffers, geometries) = lvk_tests::ray_scene::upload_geometries(&ctx, &scene.models[1])?;
         let desc = |geometries| BlasDesc { geometries, debug_name: "huge", ..Default::default() };
         let made = ctx.create_blas_batch(&[desc(&geometries), desc(&geometries)]);
-        if !has_own_structures(&ctx) {
-            // The limits of a profile are those of the device's structures.
+        if !builds_device_accel_structs(&ctx) {
+            // The limits of a profile are those of the device's acceleration structures.
             assert_eq!(made?.len(), 2);
             continue;
         }
@@ -362,10 +362,11 @@ fn a_triangle_that_does_not_fit_is_an_error() -> Result<()> {
 /// Indices gathered for the parts are of no use once nothing can build them again.
 #[test]
 fn compaction_frees_what_only_builds_read() -> Result<()> {
-    let Some(ctx) = split_device() else { return Ok(()) };
-    if !tests_own_structures(&ctx, "inputs that are gathered for parts") {
+    let Some(ctx) =
+        split_device().filter(|ctx| requires_device_accel_structs(ctx, "inputs that are gathered for parts"))
+    else {
         return Ok(());
-    }
+    };
     let (scene, check) = (scene(), HitCheck::new(&ctx)?);
     for (flags, freed) in [(BuildFlags::FAST_TRACE, true), (UPDATABLE, false)] {
         let gpu = scene.upload_with(&ctx, flags | BuildFlags::ALLOW_COMPACTION, UPDATABLE, 0)?;
@@ -396,7 +397,7 @@ fn compaction_frees_what_only_builds_read() -> Result<()> {
         let mut cmd = ctx.acquire_command_buffer()?;
         let rebuilt = cmd.build_blas(&[*loaded], BuildMode::Rebuild).is_ok();
         ctx.submit(cmd)?;
-        // A loaded structure for which compaction saved nothing has room for a build.
+        // A loaded acceleration structure for which compaction saved nothing has room for a build.
         let needed = if rebuilt { before } else { info.table_bytes };
         assert_eq!(ctx.accel_struct_info(*loaded)?.table_bytes, needed);
         let models = [loaded];

@@ -1,21 +1,21 @@
-//! Structures that change: rebuilt, refitted, in the same command buffer and with frames in flight. No test places a
-//! barrier or waits before its last line.
+//! Rebuilds and refits, in the same command buffer and with frames in flight. No test records a barrier, or waits
+//! before its last line.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
     BlasDesc, BlasGeometry, BuildFlags, BuildMode, Context, Error, PrimitiveOrder, Result, TlasDesc,
     Triangles,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::bender::{Bender, bent};
+use lvk_tests::accel_backend::{requires_device_accel_structs, software_alone};
 use lvk_tests::device;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{
     GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes,
 };
-use lvk_tests::ray_tracer::{How, Method, RayTracer};
+use lvk_tests::ray_tracer::{How, Method, RayTracer, for_each_method};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::structures::{software_alone, tests_own_structures};
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
@@ -32,7 +32,7 @@ fn check(what: &str, tracer: &RayTracer, gpu: &GpuScene, scene: &RayScene) -> Re
 
 fn agree(what: &str, rays: &[Ray], records: &[lvk_tests::ray_tracer::HitRecord], scene: &RayScene) {
     let reference = scene.reference();
-    Agreement::of_triangles(rays, records, |ray| reference.closest(ray, 0xff)).assert(what);
+    HitComparison::of_triangles(rays, records, |ray| reference.closest(ray, 0xff)).assert(what);
 }
 
 /// `count` small models on a spiral that `turn` turns.
@@ -62,46 +62,40 @@ fn update(ctx: &Context, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) -> R
 
 #[test]
 fn a_rebuild_takes_more_and_fewer_instances() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let gpu = spiral(5, 0.0).upload_with(&ctx, BuildFlags::default(), BuildFlags::FAST_BUILD, 12)?;
+    for_each_method(|ctx, method, tracer| {
+        let gpu = spiral(5, 0.0).upload_with(ctx, BuildFlags::default(), BuildFlags::FAST_BUILD, 12)?;
         for (count, turn) in [(5, 0.0), (12, 0.5), (2, 1.0), (9, 1.5)] {
             let scene = spiral(count, turn);
-            update(&ctx, &gpu, &scene, BuildMode::Rebuild)?;
-            check(&format!("{count} instances by {method:?}"), &tracer, &gpu, &scene)?;
+            update(ctx, &gpu, &scene, BuildMode::Rebuild)?;
+            check(&format!("{count} instances by {method:?}"), tracer, &gpu, &scene)?;
         }
         let none = RayScene { placed: Vec::new(), ..spiral(2, 0.0) };
-        update(&ctx, &gpu, &none, BuildMode::Rebuild)?;
+        update(ctx, &gpu, &none, BuildMode::Rebuild)?;
         let records = tracer.trace(&gpu.tlas, &rays(), How::default())?;
         assert!(records.iter().all(|record| record.kind == 0), "there is nothing left to hit");
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 #[test]
 fn a_refit_moves_instances() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let gpu = spiral(8, 0.0).upload_with(&ctx, BuildFlags::default(), UPDATABLE, 0)?;
+    for_each_method(|ctx, method, tracer| {
+        let gpu = spiral(8, 0.0).upload_with(ctx, BuildFlags::default(), UPDATABLE, 0)?;
         for turn in [0.4, 1.9] {
             let scene = spiral(8, turn);
-            update(&ctx, &gpu, &scene, BuildMode::Refit)?;
-            check(&format!("turned by {turn}, {method:?}"), &tracer, &gpu, &scene)?;
+            update(ctx, &gpu, &scene, BuildMode::Refit)?;
+            check(&format!("turned by {turn}, {method:?}"), tracer, &gpu, &scene)?;
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
-/// Refits that need not wait for each other, and two of one structure, which must; what they show before and after that
+/// Refits that need not wait for each other, and two of one acceleration structure, which must; what they show before and after that
 /// is built, traced and destroyed in between.
 #[test]
-fn many_structures_are_refitted_in_one_command_buffer() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let upload = |turn| spiral(8, turn).upload_with(&ctx, UPDATABLE, UPDATABLE, 0);
+fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
+    for_each_method(|ctx, method, tracer| {
+        let upload = |turn| spiral(8, turn).upload_with(ctx, UPDATABLE, UPDATABLE, 0);
         let all = [0.0, 0.3, 0.6].into_iter().map(upload).collect::<Result<Vec<_>>>()?;
         let rays = rays();
         let jobs = all.iter().map(|_| tracer.job(&rays)).collect::<Result<Vec<_>>>()?;
@@ -127,11 +121,11 @@ fn many_structures_are_refitted_in_one_command_buffer() -> Result<()> {
                 agree(&what, &rays, &tracer.read(job)?, &scene(number, 0.2));
             }
         }
-        // The same structures shown by another one, and then no longer there.
+        // The same acceleration structures shown by another one, and then no longer there.
         let mut cmd = ctx.acquire_command_buffer()?;
         cmd.update_tlas(*all[1].tlas, &shown, BuildMode::Refit)?;
         ctx.submit(cmd)?;
-        check("shown by another", &tracer, &all[1], &spiral(8, 0.0))?;
+        check("shown by another", tracer, &all[1], &spiral(8, 0.0))?;
         let mut all = all;
         all[0].models.clear();
         let mut cmd = ctx.acquire_command_buffer()?;
@@ -139,15 +133,15 @@ fn many_structures_are_refitted_in_one_command_buffer() -> Result<()> {
         assert!(matches!(refused, Err(lvk::Error::StaleHandle { .. })), "{refused:?}");
         cmd.update_tlas(*all[1].tlas, &instances(&spiral(8, 0.4).placed, &all[1].models), BuildMode::Refit)?;
         ctx.submit(cmd)?;
-        check("after its models are gone", &tracer, &all[1], &spiral(8, 0.4))?;
-    }
-    Ok(())
+        check("after its models are gone", tracer, &all[1], &spiral(8, 0.4))?;
+        Ok(())
+    })
 }
 
 #[test]
-fn a_structure_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
+fn an_accel_struct_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let bender = Bender::new(&ctx)?;
+    let deformer = VertexDeformer::new(&ctx)?;
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let mut scene = deformable();
@@ -157,43 +151,41 @@ fn a_structure_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
         for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.4, BuildMode::Rebuild)] {
             let mesh = &scene.models[0][0].mesh;
             let mut cmd = ctx.acquire_command_buffer()?;
-            bender.record(&mut cmd, *gpu.buffers[0].vertices, mesh, amount)?;
+            deformer.record(&mut cmd, *gpu.buffers[0].vertices, mesh, amount)?;
             cmd.build_blas(&[*gpu.models[0]], mode)?;
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
             tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
             ctx.submit(cmd)?;
-            scene.models[0][0].mesh = bent(mesh, amount);
-            agree(&format!("bent by {amount}, {method:?}"), &rays, &tracer.read(&job)?, &scene);
+            scene.models[0][0].mesh = deformed(mesh, amount);
+            agree(&format!("deformed by {amount}, {method:?}"), &rays, &tracer.read(&job)?, &scene);
         }
     }
     Ok(())
 }
 
 #[test]
-fn a_structure_is_rebuilt_from_uploaded_vertices() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
+fn an_accel_struct_is_rebuilt_from_uploaded_vertices() -> Result<()> {
+    for_each_method(|ctx, method, tracer| {
         let mut scene = deformable();
-        let gpu = scene.upload(&ctx)?;
-        check(&format!("before, by {method:?}"), &tracer, &gpu, &scene)?;
-        scene.models[0][0].mesh = bent(&scene.models[0][0].mesh, 0.6);
+        let gpu = scene.upload(ctx)?;
+        check(&format!("before, by {method:?}"), tracer, &gpu, &scene)?;
+        scene.models[0][0].mesh = deformed(&scene.models[0][0].mesh, 0.6);
         let bytes = vertex_bytes(&scene.models[0][0].mesh, Layout::Indexed16);
         ctx.upload_buffer(*gpu.buffers[0].vertices, 0, &bytes)?;
         let mut cmd = ctx.acquire_command_buffer()?;
         cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
         ctx.submit(cmd)?;
-        check(&format!("after, by {method:?}"), &tracer, &gpu, &scene)?;
-    }
-    Ok(())
+        check(&format!("after, by {method:?}"), tracer, &gpu, &scene)?;
+        Ok(())
+    })
 }
 
 /// One TLAS, one deforming BLAS and one vertex buffer for all frames, none of which waits for the frame before.
 #[test]
 fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let bender = Bender::new(&ctx)?;
+    let deformer = VertexDeformer::new(&ctx)?;
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let mut scene = deformable();
@@ -206,9 +198,9 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
                 if number % 3 == 2 { (-0.35, BuildMode::Rebuild) } else { (0.2, BuildMode::Refit) };
             let job = tracer.job(&rays)?;
             let mut cmd = ctx.acquire_command_buffer()?;
-            bender.record(&mut cmd, *gpu.buffers[0].vertices, &scene.models[0][0].mesh, amount)?;
+            deformer.record(&mut cmd, *gpu.buffers[0].vertices, &scene.models[0][0].mesh, amount)?;
             cmd.build_blas(&[*gpu.models[0]], mode)?;
-            scene.models[0][0].mesh = bent(&scene.models[0][0].mesh, amount);
+            scene.models[0][0].mesh = deformed(&scene.models[0][0].mesh, amount);
             scene.placed[0].transform = Affine3A::from_rotation_z(number as f32);
             scene.placed[0].custom_index = number;
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
@@ -223,33 +215,29 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
     Ok(())
 }
 
-/// Structures that the top level still shows outlive their holders.
+/// Acceleration structures that the top level still shows outlive their holders.
 #[test]
-fn a_destroyed_model_is_shown_until_the_next_update() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
+fn a_destroyed_blas_is_referenced_until_the_next_update() -> Result<()> {
+    for_each_method(|ctx, method, tracer| {
         let scene = spiral(6, 0.2);
-        let mut gpu = scene.upload(&ctx)?;
+        let mut gpu = scene.upload(ctx)?;
         gpu.models.clear();
         gpu.buffers.clear();
         ctx.wait_idle()?;
-        check(&format!("destroyed models by {method:?}"), &tracer, &gpu, &scene)?;
-    }
-    Ok(())
+        check(&format!("destroyed models by {method:?}"), tracer, &gpu, &scene)?;
+        Ok(())
+    })
 }
 
-/// What a dropped command buffer would have shown is not shown, and what is shown stays alive.
+/// An update of a dropped command buffer has no effect, and the BLASes of the TLAS stay alive.
 #[test]
 fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
+    for_each_method(|ctx, method, tracer| {
         let scene = deformable();
-        let mut gpu = scene.upload_with(&ctx, BuildFlags::default(), UPDATABLE, 4)?;
+        let mut gpu = scene.upload_with(ctx, BuildFlags::default(), UPDATABLE, 4)?;
         ctx.wait_idle()?;
         let other = spiral(3, 0.0);
-        let other_gpu = other.upload(&ctx)?;
+        let other_gpu = other.upload(ctx)?;
         let mut cmd = ctx.acquire_command_buffer()?;
         let others = instances(&other.placed, &other_gpu.models);
         cmd.update_tlas(*gpu.tlas, &others, BuildMode::Rebuild)?;
@@ -266,19 +254,17 @@ fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
         drop(cmd);
         gpu.models.clear();
         ctx.wait_idle()?;
-        let _takes_its_place = scene.upload(&ctx)?;
-        check(&format!("given up, {method:?}"), &tracer, &gpu, &scene)?;
-    }
-    Ok(())
+        let _takes_its_place = scene.upload(ctx)?;
+        check(&format!("given up, {method:?}"), tracer, &gpu, &scene)?;
+        Ok(())
+    })
 }
 
 /// Two command buffers are recorded side by side; the first submitted changes how many instances the second refits.
 #[test]
 fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let gpu = spiral(3, 0.0).upload_with(&ctx, BuildFlags::default(), UPDATABLE, 4)?;
+    for_each_method(|ctx, method, tracer| {
+        let gpu = spiral(3, 0.0).upload_with(ctx, BuildFlags::default(), UPDATABLE, 4)?;
         let three = instances(&spiral(3, 0.0).placed, &gpu.models);
         let two = spiral(2, 1.0);
         let mut rebuild = ctx.acquire_command_buffer()?;
@@ -287,19 +273,20 @@ fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
         refit.update_tlas(*gpu.tlas, &three, BuildMode::Refit)?;
         ctx.submit(rebuild)?;
         assert!(matches!(ctx.submit(refit), Err(lvk::Error::InvalidUsage { .. })));
-        check(&format!("two are shown, {method:?}"), &tracer, &gpu, &two)?;
-    }
-    Ok(())
+        check(&format!("two are shown, {method:?}"), tracer, &gpu, &two)?;
+        Ok(())
+    })
 }
 
 /// A rebuild reads the indices again and a refit does not, where the library has put the triangles into an order: so
 /// empty triangles tell the two apart.
 #[test]
 fn builds_given_up_do_not_count_as_wear() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    if !tests_own_structures(&ctx, "indices that a refit does not read") {
+    let Some(ctx) =
+        device().filter(|ctx| requires_device_accel_structs(ctx, "indices that a refit does not read"))
+    else {
         return Ok(());
-    }
+    };
     let tracer = RayTracer::new(&ctx, Method::available(&ctx)[0])?;
     let ring = Mesh::torus(10);
     let count = ring.triangles.len();
@@ -347,8 +334,8 @@ fn builds_given_up_do_not_count_as_wear() -> Result<()> {
     Ok(())
 }
 
-/// What software traces becomes another tree with its first rebuild, so its bytes tell the two apart. Refits of what did not move
-/// change nothing but boxes, and these by the first alone.
+/// The first rebuild gives a software BVH another tree, so its bytes tell a rebuild from a refit. Refits of unmoved
+/// vertices change nothing but AABBs, and these by the first refit alone.
 #[test]
 fn builds_of_software_given_up_do_not_count_as_wear() -> Result<()> {
     let Some(ctx) = software_alone(|_| ()) else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! The bindless set: indices are stable, slots are not taken again too early, and running out is an error.
+//! The bindless descriptor set: indices are stable, slots are not reused too early, and full arrays return an error.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -17,7 +17,7 @@ fn flat(ctx: &Context, value: f32) -> lvk::Result<Holder<TextureHandle>> {
 const FETCH: &str = "textureBindlessFetch2D(a, ivec2(i % 2, i / 2), 0)";
 
 #[test]
-fn the_empty_slot_shows_magenta_and_black() {
+fn the_default_descriptor_is_magenta_and_black() {
     let Some(ctx) = device() else { return };
     let (magenta, black) = ([1.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0]);
     let checker = [magenta, black, black, magenta];
@@ -36,7 +36,7 @@ fn the_empty_slot_shows_magenta_and_black() {
 }
 
 #[test]
-fn textures_without_sampling_show_the_dummy() {
+fn textures_without_sampling_read_as_the_default_descriptor() {
     let Some(ctx) = device() else { return };
     let desc = TextureDesc { usage: TextureUsage::STORAGE, ..Default::default() };
     let texture = ctx.create_texture(&desc).unwrap();
@@ -141,7 +141,7 @@ fn running_out_of_textures_is_an_error_that_passes() {
 }
 
 #[test]
-fn failed_creations_give_their_slot_back() {
+fn failed_creations_free_their_slot() {
     let Some(ctx) = device_with(|desc| desc.max_textures = 4) else { return };
     for _ in 0..16 {
         let bad = [

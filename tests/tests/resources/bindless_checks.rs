@@ -1,4 +1,4 @@
-//! Indices of bindless arrays checked in shaders: every array and stage, by name, and nothing said of what is right.
+//! Bindless index checks in shaders: every array and stage, by name, and no report of a valid index.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -69,8 +69,8 @@ fn freed_and_unknown_textures_are_named_and_replaced() {
     assert_eq!(ctx.index_faults().unwrap().len(), 3);
 }
 
-/// What was recorded while the owner was alive may reach it, whenever it runs; what is recorded later may not, even while
-/// the slot still shows the texture.
+/// Commands that were recorded while the owner was alive may read its slot, whenever they run. Later commands may
+/// not, even while the slot still holds the texture.
 #[test]
 fn an_index_ends_with_its_handle_for_command_buffers_begun_later() {
     let Some(ctx) = checking() else { return };
@@ -95,7 +95,7 @@ fn an_index_ends_with_its_handle_for_command_buffers_begun_later() {
 }
 
 #[test]
-fn samplers_storage_images_and_usages_are_told_apart() {
+fn samplers_storage_images_and_usages_are_distinguished() {
     let Some(ctx) = checking() else { return };
     let sampled = flat(&ctx, "sampled only", 2.0);
     let stored = ctx
@@ -130,7 +130,7 @@ fn samplers_storage_images_and_usages_are_told_apart() {
 }
 
 /// A triangle across the ray along z.
-fn structures(ctx: &Context) -> (Holder<AccelStructHandle>, Holder<AccelStructHandle>) {
+fn accel_structs(ctx: &Context) -> (Holder<AccelStructHandle>, Holder<AccelStructHandle>) {
     let positions = [[-1.0_f32, -1.0, 1.0], [1.0, -1.0, 1.0], [0.0, 1.0, 1.0]];
     let vertices = BufferDesc {
         data: Some(bytemuck::cast_slice(&positions)),
@@ -160,7 +160,7 @@ const TRACE: &str = "
         result.at = hit ? lvkRayQueryT(rq, LVK_COMMITTED) : -1.0;
     }";
 
-/// How far a ray gets, or -1.
+/// Returns the distance of a ray's hit, or -1.
 fn trace(ctx: &Context, pipeline: ComputePipelineHandle, tlas: u32) -> f32 {
     let result = words_buffer(ctx, &[0]);
     let address = ctx.buffer_address(*result).unwrap();
@@ -174,7 +174,7 @@ fn trace(ctx: &Context, pipeline: ComputePipelineHandle, tlas: u32) -> f32 {
 
 /// By the device's own queries and by the library's.
 #[test]
-fn ray_queries_check_their_structures() {
+fn ray_queries_check_their_accel_structs() {
     for query in [RayQueryRequest::HardwareIfPresent, RayQueryRequest::Software] {
         let made = device_with(|desc| {
             desc.check_indices = true;
@@ -185,7 +185,7 @@ fn ray_queries_check_their_structures() {
             eprintln!("NOT TESTED, the device has no ray queries");
             continue;
         }
-        let (_blas, tlas) = structures(&ctx);
+        let (_blas, tlas) = accel_structs(&ctx);
         let index = tlas.index();
         let pipeline = compute_pipeline(&ctx, TRACE);
         assert_eq!(trace(&ctx, *pipeline, index), 1.0, "{query:?}");
@@ -202,7 +202,7 @@ fn ray_queries_check_their_structures() {
     }
 }
 
-/// A module that looks at texture 60, which nobody has; its name is that of its stage.
+/// Creates a module that reads texture 60, which does not exist. Its name is that of its stage.
 fn astray(ctx: &Context, stage: ShaderStage, text: &str) -> Holder<ShaderModuleHandle> {
     let text = text.replace("ASTRAY", "textureBindlessFetch2D(60u, ivec2(0), 0)");
     let name = format!("{stage:?}");
@@ -315,7 +315,7 @@ fn stages_that_trace_are_checked() {
         eprintln!("NOT TESTED, the device has no ray tracing pipelines");
         return;
     }
-    let (_blas, tlas) = structures(&ctx);
+    let (_blas, tlas) = accel_structs(&ctx);
     let payload =
         |body: &str| format!("layout(location = 0) rayPayloadInEXT float value; void main() {{ {body} }}");
     let ray_gen = astray(&ctx, RayGen, RAY_GEN);
@@ -363,7 +363,7 @@ fn without_the_switch_there_is_nothing_to_ask() {
 /// Every module of the samples is instrumented, and the layer takes it.
 #[test]
 fn the_modules_of_all_samples_stay_valid() {
-    lvk_tests::warnings::listen();
+    lvk_tests::warnings::capture_warnings();
     let Some(ctx) = checking() else { return };
     let stages = pipelines::all().into_iter().flat_map(|pipeline| pipeline.stages);
     let made = stages.filter(|stage| ctx.create_shader_module(&stage.module()).is_ok()).count();

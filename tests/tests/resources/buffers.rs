@@ -1,4 +1,4 @@
-//! Buffers: what is uploaded, copied, filled and written by shaders is what is downloaded, and misuse is an error.
+//! Buffers: downloads equal what was uploaded, copied, filled or written by shaders, and wrong use returns an error.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{BufferCopy, BufferDesc, BufferUsage, Context, Dependencies, Error, Holder, MemoryKind};
@@ -79,7 +79,7 @@ fn the_last_of_overlapping_uploads_wins() {
 }
 
 #[test]
-fn uploads_keep_their_place_between_submissions() {
+fn uploads_keep_their_order_between_submissions() {
     let Some(ctx) = device() else { return };
     let source = buffer(&ctx, MemoryKind::Device, &[1; 256]);
     let [first, second] = [0, 0].map(|byte| buffer(&ctx, MemoryKind::Device, &[byte; 256]));
@@ -303,7 +303,7 @@ fn updates_of_any_size_and_copies_of_several_ranges_write_what_they_say() {
 }
 
 #[test]
-fn mapped_buffers_are_written_and_read_in_place() {
+fn mapped_buffers_are_written_and_read_without_copies() {
     let Some(ctx) = device() else { return };
     let make = |memory| {
         let desc = BufferDesc { memory, size_bytes: 10, debug_name: "in place", ..Default::default() };

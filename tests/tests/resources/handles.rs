@@ -1,4 +1,4 @@
-//! Handles and their owners: stale and foreign handles are errors, and nothing dies while it is in use.
+//! Handles: stale and foreign handles return errors, and no object is destroyed while it is in use.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fmt::Debug;
@@ -290,7 +290,7 @@ fn a_context_ends_well_with_released_objects_and_uploads_that_never_ran() {
 
 #[test]
 fn what_is_alive_is_listed_and_reported_by_name() {
-    lvk_tests::warnings::listen();
+    lvk_tests::warnings::capture_warnings();
     let Some(ctx) = device() else { return };
     assert_eq!(ctx.live_objects(), []);
     let named = |name| BufferDesc { size_bytes: 16, debug_name: name, ..Default::default() };
@@ -316,7 +316,7 @@ fn what_is_alive_is_listed_and_reported_by_name() {
 
 /// The validation layer says the names it was given.
 #[test]
-fn names_reach_vulkan_where_somebody_reads_them() {
+fn names_reach_vulkan_where_a_tool_reads_them() {
     for (wish, expected) in [(None, true), (Some(true), true), (Some(false), false)] {
         let Some(ctx) = device_with(|desc| desc.debug_names = wish) else { return };
         let desc = BufferDesc { size_bytes: 64, debug_name: "read by the layer", ..Default::default() };

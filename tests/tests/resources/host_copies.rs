@@ -1,15 +1,15 @@
-//! First contents that the host writes itself are those that the GPU copies, bit for bit, and nothing waits for them.
+//! Initial texture contents by host image copies: bit for bit those of GPU copies, without a wait.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
     Context, Dependencies, DeviceProfile, Format, OptionalFeature, Queue, TextureDesc, TextureKind,
     TextureRegion, TextureUsage,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device::TestDevice;
 use lvk_tests::noise::noise;
-use lvk_tests::queues::{each, on};
+use lvk_tests::queues::{for_each_queue_request, submit_on};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// The device with host copies, and without; `None`, loudly, where it does not use them.
@@ -62,7 +62,7 @@ fn compare([by_host, staged]: &[TestDevice; 2]) -> usize {
     let mut compared = 0;
     for (seed, format) in (0..).zip(Format::ALL.iter().copied().filter(|format| !format.is_yuv())) {
         for (number, (kind, extent)) in (0..).zip(kinds()) {
-            // Plain pictures in all ways, other kinds in turn.
+            // Plain images in all ways, other kinds in turn.
             let ways: &[(u32, u32)] = match kind {
                 TextureKind::D2 => &[(1, 0), (3, 0), (3, 2)],
                 _ if (seed + number) % 3 == 0 => &[(3, 0)],
@@ -105,15 +105,15 @@ fn compare([by_host, staged]: &[TestDevice; 2]) -> usize {
 }
 
 #[test]
-fn every_format_and_kind_is_filled_alike() {
+fn every_format_and_kind_is_filled_the_same() {
     let Some(pair) = both() else { return };
     let compared = compare(&pair);
     assert!(compared > 200, "{compared}");
 }
 
 #[test]
-fn another_driver_fills_alike() {
-    without_ray_tracing(another_driver_fills_alike, || {
+fn another_driver_fills_the_same() {
+    on_swiftshader(another_driver_fills_the_same, || {
         let Some(pair) = both() else { return };
         let compared = compare(&pair);
         assert!(compared > 200, "{compared}");
@@ -147,13 +147,13 @@ fn every_queue_takes_them_over() {
     if both().is_none() {
         return;
     }
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let (data, whole) = (noise(5, 4 * 64), TextureRegion::default());
         let desc = TextureDesc { extent: [8, 8], data: Some(&data), ..TextureDesc::default() };
         for queue in Queue::ALL {
             let from = ctx.create_texture(&desc).unwrap();
             let to = ctx.create_texture(&TextureDesc { data: None, ..desc }).unwrap();
-            on(ctx, queue, |cmd| cmd.copy_texture(*from, &whole, *to, &whole).unwrap());
+            submit_on(ctx, queue, |cmd| cmd.copy_texture(*from, &whole, *to, &whole).unwrap());
             let fetch = Evaluator::new(ctx, "textureBindlessFetch2D(a, ivec2(0, 0), 0)");
             let seen = fetch.run(ctx, [from.index(), 0, 0], 1, &Dependencies::default())[0][0];
             assert!((seen - f32::from(data[0]) / 255.0).abs() < 1e-4, "{queue:?}: {seen}");
@@ -164,7 +164,7 @@ fn every_queue_takes_them_over() {
 
 /// They can be uploaded to, copied from and sampled again like all others.
 #[test]
-fn such_textures_are_like_all_others_afterwards() {
+fn such_textures_are_like_any_texture_afterwards() {
     let Some(pair) = both() else { return };
     let [data, more] = [1, 2].map(|seed| noise(seed, 4 * 64));
     let [first, second] = pair.each_ref().map(|ctx| {
@@ -184,7 +184,7 @@ fn such_textures_are_like_all_others_afterwards() {
     assert!(first.0 != data && first.1 != data);
 }
 
-/// What the GPU writes too, or whose texels others may see in other formats, goes by staging memory as ever.
+/// Textures that the GPU also writes, or whose texels may be viewed in other formats, go through staging memory.
 #[test]
 fn other_textures_are_filled_as_ever() {
     let Some([ctx, _]) = both() else { return };

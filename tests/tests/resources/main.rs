@@ -1,4 +1,4 @@
-//! Buffers and handles, bindless indices and push constants: what shaders are given, and by what name.
+//! Buffers, handles, bindless indices and push constants.
 
 mod bindless;
 mod bindless_checks;

@@ -1,4 +1,4 @@
-//! Push constants and specialization constants: what is given is what the shader reads, and misfits are errors.
+//! Push constants and specialization constants: shaders read the given values, and mismatches return errors.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -146,17 +146,27 @@ const CONSTANTS: &str = "
         result.at[gl_LocalInvocationIndex] = values[gl_LocalInvocationIndex];
     }";
 
-fn constants(ctx: &Context, specialization: &[SpecializationConstant]) -> Vec<u32> {
-    let module = module(ctx, ShaderStage::Compute, CONSTANTS);
+/// Runs one workgroup of a specialized shader, and returns the words that it writes to the address in its push constants.
+fn specialized_result(
+    ctx: &Context,
+    text: &str,
+    specialization: &[SpecializationConstant],
+    count: usize,
+) -> Vec<u32> {
+    let module = module(ctx, ShaderStage::Compute, text);
     let desc = ComputePipelineDesc { module: Some(*module), specialization, ..Default::default() };
     let pipeline = ctx.create_compute_pipeline(&desc).unwrap();
-    let result = words_buffer(ctx, &[99; 4]);
+    let result = words_buffer(ctx, &vec![99; count]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.bind_compute_pipeline(*pipeline).unwrap();
     cmd.push_constants(&ctx.buffer_address(*result).unwrap()).unwrap();
     cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*result], ..Default::default() }).unwrap();
     ctx.submit(cmd).unwrap();
-    read_words(ctx, *result, 4)
+    read_words(ctx, *result, count)
+}
+
+fn constants(ctx: &Context, specialization: &[SpecializationConstant]) -> Vec<u32> {
+    specialized_result(ctx, CONSTANTS, specialization, 4)
 }
 
 fn constant(id: u32, value: SpecializationValue) -> SpecializationConstant {
@@ -224,16 +234,7 @@ const WIDE_CONSTANTS: &str = "
     }";
 
 fn wide_constants(ctx: &Context, specialization: &[SpecializationConstant]) -> (u64, i64, f64, u32) {
-    let module = module(ctx, ShaderStage::Compute, WIDE_CONSTANTS);
-    let desc = ComputePipelineDesc { module: Some(*module), specialization, ..Default::default() };
-    let pipeline = ctx.create_compute_pipeline(&desc).unwrap();
-    let result = words_buffer(ctx, &[99; 7]);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    cmd.bind_compute_pipeline(*pipeline).unwrap();
-    cmd.push_constants(&ctx.buffer_address(*result).unwrap()).unwrap();
-    cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*result], ..Default::default() }).unwrap();
-    ctx.submit(cmd).unwrap();
-    let words = read_words(ctx, *result, 7);
+    let words = specialized_result(ctx, WIDE_CONSTANTS, specialization, 7);
     let wide = |at: usize| u64::from(words[at]) | u64::from(words[at + 1]) << 32;
     (wide(0), wide(2).cast_signed(), f64::from_bits(wide(4)), words[6])
 }

@@ -1,5 +1,5 @@
-//! Frames of samples: pictures are the same whether frames are waited for or not, and after changes of size, view and
-//! shaders they are those of a sample made so. Shaders that are changed show, and wrong ones leave the old in use.
+//! Frames of samples: images do not depend on waits between frames, and after a change of size, view or shader they
+//! equal those of a new sample. A changed shader takes effect; a wrong one leaves the old one in use.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fs;
@@ -9,7 +9,7 @@ use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureRegion, Te
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::headless;
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::deferred::{Deferred, DeferredConfig};
 use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};
@@ -30,7 +30,7 @@ use lvk_samples::sponza::{Sponza, SponzaConfig};
 use lvk_samples::triplanar::Triplanar;
 use lvk_samples::yuv::{CONVERSIONS, Yuv, YuvConfig};
 use lvk_tests::hybrid::paths;
-use lvk_tests::still_life::still_life;
+use lvk_tests::scene_obj::obj_scene;
 use lvk_tests::{device, device_with};
 use tempfile::TempDir;
 
@@ -38,14 +38,14 @@ const SIZE: [u32; 2] = [40, 24];
 const OTHER_SIZE: [u32; 2] = [24, 40];
 const MOMENTS: [u32; 3] = [0, 3, 7];
 
-fn moment(frame: u32) -> Moment {
-    Moment::of_frame(frame, 10)
+fn frame_time(frame: u32) -> FrameTime {
+    FrameTime::from_frame(frame, 10)
 }
 
-/// What a sample shows at some moments; each frame is waited for.
+/// Renders a sample at some times, and waits for each frame.
 fn one_by_one<S: Sample>(sample: &mut S) -> Vec<Vec<u8>> {
     let mut at = |frame| {
-        sample.update(moment(frame)).map_err(Into::into).unwrap();
+        sample.update(frame_time(frame)).map_err(Into::into).unwrap();
         headless::picture(sample).map_err(Into::into).unwrap()
     };
     MOMENTS.map(&mut at).to_vec()
@@ -56,11 +56,11 @@ fn at_once<S: Sample>(sample: &mut S, size: [u32; 2]) -> Vec<Vec<u8>> {
     let ctx = sample.context().clone();
     let kept = MOMENTS.map(|frame| {
         let copy = texture(&ctx, size);
-        sample.update(moment(frame)).map_err(Into::into).unwrap();
+        sample.update(frame_time(frame)).map_err(Into::into).unwrap();
         let mut frame = Frame::free(&ctx).unwrap();
-        let picture = sample.record(&mut frame).map_err(Into::into).unwrap();
+        let image = sample.record(&mut frame).map_err(Into::into).unwrap();
         let region = TextureRegion::default();
-        frame.cmd.copy_texture(picture, &region, *copy, &region).unwrap();
+        frame.cmd.copy_texture(image, &region, *copy, &region).unwrap();
         assert!(frame.finish().unwrap().is_empty(), "nobody waited");
         copy
     });
@@ -72,11 +72,11 @@ fn texture(ctx: &Context, extent: [u32; 2]) -> Holder<TextureHandle> {
     ctx.create_texture(&TextureDesc { format, extent, usage, ..TextureDesc::default() }).unwrap()
 }
 
-/// Whether a sample can be looked at from elsewhere.
+/// True if a sample can be looked at from elsewhere.
 #[derive(PartialEq)]
 enum Seen {
     FromAnywhere,
-    /// What it shows is flat.
+    /// Flat images.
     Flat,
 }
 
@@ -96,9 +96,9 @@ fn check<S: Sample>(seen: Seen, make: impl Fn([u32; 2]) -> S) {
     check_panel(&mut sample, &expected[0]);
 }
 
-/// What `sample` shows at the first of the moments.
+/// Renders `sample` at the first of the times.
 fn first<S: Sample>(sample: &mut S) -> Vec<u8> {
-    sample.update(moment(MOMENTS[0])).map_err(Into::into).unwrap();
+    sample.update(frame_time(MOMENTS[0])).map_err(Into::into).unwrap();
     headless::picture(sample).map_err(Into::into).unwrap()
 }
 
@@ -146,7 +146,7 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
 }
 
 fn check_view<S: Sample>(sample: &mut S, seen: Seen, expected: &[u8]) {
-    sample.update(moment(MOMENTS[0])).map_err(Into::into).unwrap();
+    sample.update(frame_time(MOMENTS[0])).map_err(Into::into).unwrap();
     assert!(sample.view().is_some() == (seen == Seen::FromAnywhere), "has it a camera?");
     let Some(view) = sample.view() else { return };
     sample.set_view(&Camera { vertical_fov_degrees: 0.5 * view.vertical_fov_degrees, ..view });
@@ -241,7 +241,7 @@ fn rtx_textures_goes_by_frames() {
 #[test]
 fn rtx_pipeline_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     check(Seen::FromAnywhere, |size| {
         let config = RtxPipelineConfig { depth: 2, ..RtxPipelineConfig::new(rtx(&ctx, size)) };
         RtxPipeline::new(&ctx, &scene, &config).unwrap()
@@ -270,7 +270,7 @@ fn large_scene_goes_by_frames() {
 #[test]
 fn hybrid_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     check(Seen::FromAnywhere, |[width, height]| {
         let (path, method) = (paths(&ctx)[0], Method::choose(None, ctx.capabilities()));
         let few = HybridConfig { max_depth: 1, samples: 2, ..HybridConfig::default() };
@@ -304,7 +304,7 @@ fn reflections_goes_by_frames() {
 #[test]
 fn sponza_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     check(Seen::FromAnywhere, |size| {
         let config = SponzaConfig { shadow_size: 256, triangles_per_draw: 32, ..SponzaConfig::new(size) };
         Sponza::new(&ctx, scene.clone(), &config).unwrap()

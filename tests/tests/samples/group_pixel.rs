@@ -1,4 +1,4 @@
-//! The pixels of work groups, as the samples' compute shaders share a picture out among their invocations.
+//! The pixel that each invocation of a workgroup computes, as the samples' compute shaders divide an image.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -9,7 +9,7 @@ use lvk_samples::shaders::INCLUDES;
 use lvk_tests::compute::{read_words, words_buffer};
 use lvk_tests::device;
 
-/// How often each pixel is seen, and behind them how often none.
+/// Counts how often each pixel is computed, and, after those, how often none is.
 const TEXT: &str = "
 #include \"common/group_pixel.glsl\"
 

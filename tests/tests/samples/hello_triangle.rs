@@ -1,5 +1,5 @@
-//! The pictures of the `hello_triangle` sample: every pixel has the colour that arithmetic gives it, on a device with every
-//! feature and on one with hardly any.
+//! Images of the `hello_triangle` sample: every pixel has the computed colour, with every optional feature and with
+//! hardly any.
 
 use std::f32::consts::TAU;
 
@@ -7,9 +7,11 @@ use glam::{Vec2, Vec3};
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::hello_triangle::HelloTriangle;
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
-use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_of};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
+use lvk_tests::raster_sample::{
+    ROUND, SIZE, assert_loops_without_seam, assert_refuses_impossible_sizes, image_of,
+};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// On SwiftShader: the same but for the rounding of colours and the places of samples in a pixel.
@@ -31,7 +33,7 @@ fn encoded(linear: Vec3) -> [u8; 3] {
 }
 
 /// Corners in pixels, where the animation is at `phase`.
-fn corners(phase: f32) -> [Vec2; 3] {
+fn vertices_at(phase: f32) -> [Vec2; 3] {
     let size = Vec2::new(SIZE[0] as f32, SIZE[1] as f32);
     [0.0, 1.0, 2.0].map(|number| {
         let angle = TAU * (phase + number / 3.0);
@@ -40,12 +42,12 @@ fn corners(phase: f32) -> [Vec2; 3] {
 }
 
 /// Fails unless all pixels that no edge touches have the colour they should. Answers how many lie in the triangle.
-fn assert_painted(picture: &RgbaImage, phase: f32) -> u32 {
-    let [a, b, c] = corners(phase);
+fn assert_painted(image: &RgbaImage, phase: f32) -> u32 {
+    let [a, b, c] = vertices_at(phase);
     let area = (b - a).perp_dot(c - a);
     let pixel_share = a.distance(b) / area.abs();
     let mut inside = 0;
-    for (x, y, pixel) in picture.enumerate_pixels() {
+    for (x, y, pixel) in image.enumerate_pixels() {
         let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
         let shares = [(b, c), (c, a), (a, b)].map(|(from, to)| (to - from).perp_dot(at - from) / area);
         let least = shares.into_iter().fold(f32::INFINITY, f32::min);
@@ -66,7 +68,7 @@ fn every_pixel_is_as_computed() {
     let Some(ctx) = device() else { return };
     let mut sample = triangle(&ctx);
     for frame in [0, 13, 71] {
-        let inside = assert_painted(&picture_of(&mut sample, frame), frame as f32 / ROUND as f32);
+        let inside = assert_painted(&image_of(&mut sample, frame), frame as f32 / ROUND as f32);
         assert!(inside > 1000, "{inside} pixels in the triangle");
     }
 }
@@ -74,37 +76,39 @@ fn every_pixel_is_as_computed() {
 #[test]
 fn a_round_has_no_seam() {
     let Some(ctx) = device() else { return };
-    let mut sample = triangle(&ctx);
-    let first = picture_of(&mut sample, 0);
-    assert_ne!(picture_of(&mut sample, 33), first, "colours turn too");
-    assert_eq!(picture_of(&mut sample, ROUND), first);
+    assert_loops_without_seam(&mut triangle(&ctx));
 }
 
 #[test]
 fn the_triangle_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    assert_as_ever("hello_triangle_small", &picture_of(&mut triangle(&ctx), 0));
+    assert_matches_reference("hello_triangle_small", &image_of(&mut triangle(&ctx), 0));
 }
 
 #[test]
-fn a_device_without_optional_features_shows_it() {
+fn a_device_without_optional_features_renders_it() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
-    assert_painted(&picture_of(&mut triangle(&ctx), 0), 0.0);
+    assert_painted(&image_of(&mut triangle(&ctx), 0), 0.0);
 }
 
 #[test]
-fn another_driver_shows_it() {
-    without_ray_tracing(another_driver_shows_it, || {
+fn another_driver_renders_it() {
+    on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = device() else { return };
-        let picture = picture_of(&mut triangle(&ctx), 0);
-        assert_painted(&picture, 0.0);
-        assert_alike("SwiftShader triangle", &picture, &reference("hello_triangle_small"), &OTHER_DRIVER);
+        let image = image_of(&mut triangle(&ctx), 0);
+        assert_painted(&image, 0.0);
+        assert_similar(
+            "SwiftShader triangle",
+            &image,
+            &reference_image("hello_triangle_small"),
+            &OTHER_DRIVER,
+        );
     });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     assert_refuses_impossible_sizes(|size| HelloTriangle::new(&ctx, size));
 }

@@ -1,21 +1,24 @@
-//! The pictures of the `hybrid` sample: all its ways of rendering agree, and they show what they should.
+//! Images of the `hybrid` sample: all its rendering methods agree, and the images are right.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
-use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use lvk_samples::app::sample_error::SampleError;
+use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::Scene;
-use lvk_tests::hybrid::{Studio, paths};
-use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, reference};
-use lvk_tests::still_life::still_life;
+use lvk_tests::hybrid::{HybridHarness, paths};
+use lvk_tests::image_comparison::{
+    ImageSimilarity, Tolerance, assert_matches_reference, assert_not_empty, assert_similar, reference_image,
+};
+use lvk_tests::scene_obj::obj_scene;
 use lvk_tests::{device, device_with};
 
 /// No multiple of a workgroup or a band of rows.
 const SIZE: [u32; 2] = [163, 91];
-/// Nor these, for pictures of many samples.
+/// Nor these, for images of many samples.
 const SMALL: [u32; 2] = [99, 55];
 
-/// Drivers compile the shaders anew for each depth, which takes longer than the pictures: tests that need no other take
+/// Drivers compile the shaders anew for each depth, which takes longer than the images: tests that need no other take
 /// this one, and shadows alone and one bounce have one test each.
 const DEPTH: u32 = 4;
 
@@ -23,10 +26,10 @@ const DEPTH: u32 = 4;
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// Of rasterised and traced first hits: the compute rasteriser leaves to rays what rounding decides.
 const SAME_VIEW: Tolerance = Tolerance { psnr: 60.0, ssim: 0.999, differing_share: 2e-4, flip: 1e-3 };
-const SAME_AS_EVER: Tolerance = Tolerance::SAME_AS_EVER;
+const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
 
 /// Renders through some cameras by all four ways and compares.
-fn assert_all_ways_agree(
+fn assert_all_methods_agree(
     ctx: &Context,
     scene: &Scene,
     size: [u32; 2],
@@ -34,85 +37,78 @@ fn assert_all_ways_agree(
     cameras: &[usize],
     tolerance: &Tolerance,
 ) {
-    let studios = |method| -> Vec<Studio> {
+    let harnesses = |method| -> Vec<HybridHarness> {
         let paths = paths(ctx).into_iter();
-        paths.map(|path| Studio::new(ctx, scene, (method, path), size, depth)).collect()
+        paths.map(|path| HybridHarness::new(ctx, scene, (method, path), size, depth)).collect()
     };
-    let mut standalone = studios(Method::Standalone);
-    let mut hybrid = studios(Method::Hybrid);
+    let mut standalone = harnesses(Method::Standalone);
+    let mut hybrid = harnesses(Method::Hybrid);
     for &number in cameras {
         let camera = &scene.cameras[number];
         let what = |pair: &str| format!("{} camera {} depth {depth} {pair}", scene.name, number + 1);
-        let standalone: Vec<_> = standalone.iter_mut().map(|studio| studio.picture(camera)).collect();
-        let hybrid: Vec<_> = hybrid.iter_mut().map(|studio| studio.picture(camera)).collect();
-        assert_shows_something(&standalone[0]);
+        let standalone: Vec<_> = standalone.iter_mut().map(|harness| harness.render(camera)).collect();
+        let hybrid: Vec<_> = hybrid.iter_mut().map(|harness| harness.render(camera)).collect();
+        assert_not_empty(&standalone[0], 200);
         for other in 1..standalone.len() {
-            assert_alike(&what("standalone query"), &standalone[other], &standalone[0], &SAME_RAYS);
-            assert_alike(&what("hybrid query"), &hybrid[other], &hybrid[0], &SAME_RAYS);
+            assert_similar(&what("standalone query"), &standalone[other], &standalone[0], &SAME_RAYS);
+            assert_similar(&what("hybrid query"), &hybrid[other], &hybrid[0], &SAME_RAYS);
         }
-        assert_alike(&what("hybrid"), &hybrid[0], &standalone[0], tolerance);
+        assert_similar(&what("hybrid"), &hybrid[0], &standalone[0], tolerance);
     }
 }
 
-/// Two empty pictures would agree too.
-fn assert_shows_something(picture: &RgbaImage) {
-    let colors: std::collections::HashSet<[u8; 4]> = picture.pixels().map(|pixel| pixel.0).collect();
-    assert!(colors.len() > 200, "{} colours", colors.len());
-    assert!(picture.pixels().all(|pixel| pixel[3] == 255), "a pixel was left out");
+#[test]
+fn all_methods_agree_on_shadows_alone() {
+    let Some(ctx) = device() else { return };
+    assert_all_methods_agree(&ctx, &obj_scene(), SIZE, 0, &[2, 3], &SAME_VIEW);
 }
 
 #[test]
-fn all_ways_agree_on_shadows_alone() {
+fn all_methods_agree_on_four_bounces() {
     let Some(ctx) = device() else { return };
-    assert_all_ways_agree(&ctx, &still_life(), SIZE, 0, &[2, 3], &SAME_VIEW);
+    assert_all_methods_agree(&ctx, &obj_scene(), SIZE, DEPTH, &[0, 1, 4], &SAME_VIEW);
 }
 
 #[test]
-fn all_ways_agree_on_four_bounces() {
+fn all_methods_agree_on_the_courtyard() {
     let Some(ctx) = device() else { return };
-    assert_all_ways_agree(&ctx, &still_life(), SIZE, DEPTH, &[0, 1, 4], &SAME_VIEW);
-}
-
-#[test]
-fn all_ways_agree_on_the_courtyard() {
-    let Some(ctx) = device() else { return };
-    assert_all_ways_agree(&ctx, &Scene::procedural(), [96, 54], DEPTH, &[0], &SAME_VIEW);
+    assert_all_methods_agree(&ctx, &Scene::procedural(), [96, 54], DEPTH, &[0], &SAME_VIEW);
 }
 
 const HYBRID_BY_PIPELINE: (Method, RayPath) = (Method::Hybrid, RayPath::Pipeline);
 
-/// Were it not for this, a picture without mirrors would agree with itself.
+/// Were it not for this, an image without mirrors would agree with itself.
 #[test]
-fn bounces_show_in_mirrors_and_glass_only() {
+fn bounces_change_mirrors_and_glass_only() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let camera = &scene.cameras[0];
-    let at = |depth| Studio::new(&ctx, &scene, HYBRID_BY_PIPELINE, SIZE, depth).picture(camera);
+    let at = |depth| HybridHarness::new(&ctx, &scene, HYBRID_BY_PIPELINE, SIZE, depth).render(camera);
     let [none, one, four] = [at(0), at(1), at(DEPTH)];
     let other = (Method::Standalone, paths(&ctx).pop().unwrap());
-    let theirs = Studio::new(&ctx, &scene, other, SIZE, 1).picture(camera);
-    assert_alike(&format!("one bounce {other:?}"), &theirs, &one, &SAME_VIEW);
-    let first = Likeness::of(&one, &none);
+    let theirs = HybridHarness::new(&ctx, &scene, other, SIZE, 1).render(camera);
+    assert_similar(&format!("one bounce {other:?}"), &theirs, &one, &SAME_VIEW);
+    let first = ImageSimilarity::measure(&one, &none);
     assert!(first.difference.psnr < 25.0 && first.flip > 0.05, "the first bounce: {first}");
-    let further = Likeness::of(&four, &one);
+    let further = ImageSimilarity::measure(&four, &one);
     assert!(further.difference.psnr < 40.0 && further.flip > 0.005, "further bounces: {further}");
-    let bottom = |picture: &RgbaImage| image::imageops::crop_imm(picture, 0, SIZE[1] - 4, 40, 4).to_image();
+    let bottom = |image: &RgbaImage| image::imageops::crop_imm(image, 0, SIZE[1] - 4, 40, 4).to_image();
     assert_eq!(bottom(&none), bottom(&four), "the floor is no mirror");
 }
 
 #[test]
-fn a_picture_is_the_same_each_time() {
+fn an_image_is_the_same_each_time() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let paths = paths(&ctx);
     for way in [(Method::Standalone, paths[0]), (Method::Hybrid, paths[paths.len() - 1])] {
-        let mut studio = Studio::new(&ctx, &scene, way, SIZE, DEPTH);
-        let first = studio.picture(&scene.cameras[0]);
-        assert_eq!(studio.picture(&scene.cameras[0]), first, "{way:?}: the next frame");
-        assert_ne!(studio.picture(&scene.cameras[1]), first, "{way:?}: another camera");
-        assert_eq!(studio.picture(&scene.cameras[0]), first, "{way:?}: back at the first camera");
-        let mut other = Studio::new(&ctx, &still_life(), way, SIZE, DEPTH);
-        assert_eq!(other.picture(&scene.cameras[0]), first, "{way:?}: set up anew");
+        let mut harness = HybridHarness::new(&ctx, &scene, way, SIZE, DEPTH);
+        let first = harness.render(&scene.cameras[0]);
+        assert_eq!(harness.render(&scene.cameras[0]), first, "{way:?}: the next frame");
+        assert_ne!(harness.render(&scene.cameras[1]), first, "{way:?}: another camera");
+        assert_eq!(harness.render(&scene.cameras[0]), first, "{way:?}: back at the first camera");
+        let mut other = HybridHarness::new(&ctx, &obj_scene(), way, SIZE, DEPTH);
+        assert_eq!(other.render(&scene.cameras[0]), first, "{way:?}: set up anew");
     }
 }
 
@@ -120,8 +116,8 @@ fn a_picture_is_the_same_each_time() {
 fn a_device_with_one_path_renders_by_it_and_names_the_other() {
     use FeatureRequest::{Off, Optional};
     use RayQueryRequest::{HardwareIfPresent, Off as NoQuery};
-    let scene = still_life();
-    let mut pictures = Vec::new();
+    let scene = obj_scene();
+    let mut images = Vec::new();
     for (pipeline, query, path, missing) in [
         (Optional, NoQuery, RayPath::Pipeline, RayPath::Query),
         (Off, HardwareIfPresent, RayPath::Query, RayPath::Pipeline),
@@ -135,14 +131,15 @@ fn a_device_with_one_path_renders_by_it_and_names_the_other() {
             continue;
         };
         assert_eq!(chosen, path);
-        pictures
-            .push(Studio::new(&ctx, &scene, (Method::Hybrid, path), SIZE, DEPTH).picture(&scene.cameras[2]));
+        images.push(
+            HybridHarness::new(&ctx, &scene, (Method::Hybrid, path), SIZE, DEPTH).render(&scene.cameras[2]),
+        );
         let config = HybridConfig { path: missing, ..sized(SIZE) };
         let refused = HybridRenderer::new(&ctx, &scene, &config).err();
-        assert!(matches!(refused, Some(HybridError::PathMissing { .. })), "{refused:?}");
+        assert!(matches!(refused, Some(SampleError::PathMissing { .. })), "{refused:?}");
     }
-    for other in &pictures[1..] {
-        assert_alike("the only path", other, &pictures[0], &SAME_RAYS);
+    for other in &images[1..] {
+        assert_similar("the only path", other, &images[0], &SAME_RAYS);
     }
 }
 
@@ -154,22 +151,22 @@ fn with_samples(
     samples: u32,
 ) -> RgbaImage {
     let config = HybridConfig { method, path, samples, ..sized(size) };
-    Studio::with(ctx, scene, &config).picture(&scene.cameras[0])
+    HybridHarness::with_config(ctx, scene, &config).render(&scene.cameras[0])
 }
 
 /// Neighbours, left and right, whose green differs by more than a third of the range.
-fn hard_steps(picture: &RgbaImage) -> usize {
-    let pairs = (0..picture.height()).flat_map(|y| (1..picture.width()).map(move |x| (x, y)));
-    pairs.filter(|(x, y)| picture.get_pixel(*x, *y)[1].abs_diff(picture.get_pixel(x - 1, *y)[1]) > 85).count()
+fn hard_steps(image: &RgbaImage) -> usize {
+    let pairs = (0..image.height()).flat_map(|y| (1..image.width()).map(move |x| (x, y)));
+    pairs.filter(|(x, y)| image.get_pixel(*x, *y)[1].abs_diff(image.get_pixel(x - 1, *y)[1]) > 85).count()
 }
 
 #[test]
-fn samples_smooth_edges_and_all_ways_take_the_same_ones() {
+fn samples_smooth_edges_and_all_methods_take_the_same_ones() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let one = with_samples(&ctx, &scene, SMALL, HYBRID_BY_PIPELINE, 1);
     assert_eq!(
-        Studio::with(&ctx, &scene, &sized(SMALL)).picture(&scene.cameras[0]),
+        HybridHarness::with_config(&ctx, &scene, &sized(SMALL)).render(&scene.cameras[0]),
         one,
         "one sample is the default"
     );
@@ -181,24 +178,25 @@ fn samples_smooth_edges_and_all_ways_take_the_same_ones() {
     );
     for path in paths(&ctx) {
         let standalone = with_samples(&ctx, &scene, SMALL, (Method::Standalone, path), 16);
-        assert_alike(&format!("16 samples {path:?}"), &smooth, &standalone, &SAME_VIEW);
+        assert_similar(&format!("16 samples {path:?}"), &smooth, &standalone, &SAME_VIEW);
     }
     let (before, after) = (hard_steps(&one), hard_steps(&smooth));
     eprintln!("{before} hard steps, {after} with 16 samples");
     assert!(before > 50 && after * 3 < before * 2, "{before} hard steps, {after} with 16 samples");
 }
 
-/// The middles of a pixel's samples lie evenly in it: their mean is that of a picture four times as large, shrunk.
+/// The middles of a pixel's samples lie evenly in it: their mean is that of an image four times as large, shrunk.
 #[test]
 fn samples_are_spread_over_their_pixel() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
-    let large = Studio::with(&ctx, &scene, &sized(SIZE.map(|side| 4 * side))).picture(&scene.cameras[0]);
+    let scene = obj_scene();
+    let large =
+        HybridHarness::with_config(&ctx, &scene, &sized(SIZE.map(|side| 4 * side))).render(&scene.cameras[0]);
     let smooth = with_samples(&ctx, &scene, SIZE, HYBRID_BY_PIPELINE, 16);
     let shrunk = shrunk(&large);
     let one = with_samples(&ctx, &scene, SIZE, HYBRID_BY_PIPELINE, 1);
-    let [near, far] = [&smooth, &one].map(|picture| Likeness::of(picture, &shrunk).difference.psnr);
-    eprintln!("{near:.1} dB from the shrunk picture, {far:.1} dB with one sample");
+    let [near, far] = [&smooth, &one].map(|image| ImageSimilarity::measure(image, &shrunk).difference.psnr);
+    eprintln!("{near:.1} dB from the shrunk image, {far:.1} dB with one sample");
     assert!(near > 36.0 && near > far + 6.0, "{near:.1} dB, {far:.1} dB with one sample");
 }
 
@@ -227,9 +225,9 @@ fn sized([width, height]: [u32; 2]) -> HybridConfig {
 }
 
 #[test]
-fn queued_bounces_give_the_very_same_picture() {
+fn queued_bounces_give_the_very_same_image() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let paths = paths(&ctx);
     for &path in &paths {
         let is = |which| path == which || paths.len() == 1;
@@ -238,31 +236,31 @@ fn queued_bounces_give_the_very_same_picture() {
         let alone = is(RayPath::Pipeline).then_some((Method::Standalone, Geometry::default(), 1));
         let ways = [1, 3].map(|samples| (Method::Hybrid, Geometry::default(), samples));
         for (method, geometry, samples) in ways.into_iter().chain(paper).chain(alone) {
-            let picture = |bounces| {
+            let image = |bounces| {
                 let bounces = Some(bounces);
                 let config = HybridConfig { method, path, geometry, samples, bounces, ..sized(SIZE) };
-                Studio::with(&ctx, &scene, &config).picture(&scene.cameras[1])
+                HybridHarness::with_config(&ctx, &scene, &config).render(&scene.cameras[1])
             };
             let what = format!("{method:?} {path:?} {geometry:?}, {samples} samples");
-            let inline = picture(Bounces::Inline);
-            assert!(picture(Bounces::Queued) == inline, "{what}, queued");
+            let inline = image(Bounces::Inline);
+            assert!(image(Bounces::Queued) == inline, "{what}, queued");
             if method == Method::Hybrid && geometry != Geometry::Paper {
-                assert!(picture(Bounces::First) == inline, "{what}, first");
+                assert!(image(Bounces::First) == inline, "{what}, first");
                 continue;
             }
             let config =
                 HybridConfig { method, path, geometry, bounces: Some(Bounces::First), ..sized(SIZE) };
             let refused = HybridRenderer::new(&ctx, &scene, &config).err();
-            assert!(matches!(refused, Some(HybridError::NothingFirst)), "{what}, first: {refused:?}");
+            assert!(matches!(refused, Some(SampleError::NothingFirst)), "{what}, first: {refused:?}");
         }
     }
 }
 
 /// A phone whose structures hold so little that the scene's are split.
 #[test]
-fn a_phone_with_split_meshes_shows_the_same() {
+fn a_phone_with_split_meshes_renders_the_same() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let phone = DeviceProfile { max_blas_primitives: 200, ..DeviceProfile::mali_g715() };
     let Some(rehearsal) = device_with(|desc| desc.profile = Some(&phone)) else { return };
     assert_eq!(paths(&rehearsal), [RayPath::Query]);
@@ -271,12 +269,12 @@ fn a_phone_with_split_meshes_shows_the_same() {
         let renderer = HybridRenderer::new(&rehearsal, &scene, &config).unwrap();
         let (parts, structures) = (renderer.blas_part_count() as usize, renderer.blas_count());
         assert!(parts >= 2 * structures, "{structures} structures in {parts} parts");
-        let mut split = Studio::with(&rehearsal, &scene, &config);
+        let mut split = HybridHarness::with_config(&rehearsal, &scene, &config);
         let whole = HybridConfig { path: paths(&ctx)[0], ..config };
-        let mut whole = Studio::with(&ctx, &scene, &whole);
+        let mut whole = HybridHarness::with_config(&ctx, &scene, &whole);
         for (number, camera) in scene.cameras.iter().enumerate().take(2) {
             let what = format!("{method:?} on a phone, camera {}", number + 1);
-            assert_alike(&what, &split.picture(camera), &whole.picture(camera), &SAME_VIEW);
+            assert_similar(&what, &split.render(camera), &whole.render(camera), &SAME_VIEW);
         }
     }
 }
@@ -284,19 +282,19 @@ fn a_phone_with_split_meshes_shows_the_same() {
 #[test]
 fn the_still_life_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    let picture = small_picture(&ctx, &still_life());
-    assert_as_ever("hybrid_small", &picture);
+    let image = small_image(&ctx, &obj_scene());
+    assert_matches_reference("hybrid_small", &image);
 }
 
-/// What it is, and how a scene shows it.
+/// Name of a mistake, and the change of the scene that makes it.
 type Mistake<'a> = (&'a str, &'a dyn Fn(&mut Scene));
 
-/// What a shader forgets or gets wrong must not pass for another driver's rounding.
+/// A mistake in a shader differs from the reference by more than another driver's rounding.
 #[test]
-fn the_reference_picture_tells_small_mistakes() {
+fn the_reference_image_detects_small_mistakes() {
     let Some(ctx) = device() else { return };
-    let expected = reference("hybrid_small");
-    let scene = still_life();
+    let expected = reference_image("hybrid_small");
+    let scene = obj_scene();
     let named = |name: &str| scene.materials.iter().position(|material| material.name == name).unwrap();
     let mistakes: [Mistake<'_>; 6] = [
         ("no highlight", &|scene| {
@@ -311,12 +309,12 @@ fn the_reference_picture_tells_small_mistakes() {
     for (what, mistake) in mistakes {
         let mut wrong = scene.clone();
         mistake(&mut wrong);
-        let likeness = Likeness::of(&small_picture(&ctx, &wrong), &expected);
-        eprintln!("{what}: {likeness}");
-        assert!(!likeness.is_within(&SAME_AS_EVER), "{what} goes unnoticed: {likeness}");
+        let similarity = ImageSimilarity::measure(&small_image(&ctx, &wrong), &expected);
+        eprintln!("{what}: {similarity}");
+        assert!(!similarity.is_within(&ACROSS_DRIVERS), "{what} goes unnoticed: {similarity}");
     }
 }
 
-fn small_picture(ctx: &Context, scene: &Scene) -> RgbaImage {
-    Studio::new(ctx, scene, HYBRID_BY_PIPELINE, [160, 90], DEPTH).picture(&scene.cameras[0])
+fn small_image(ctx: &Context, scene: &Scene) -> RgbaImage {
+    HybridHarness::new(ctx, scene, HYBRID_BY_PIPELINE, [160, 90], DEPTH).render(&scene.cameras[0])
 }

@@ -1,27 +1,30 @@
-//! The `hybrid_oit` sample: its lists, its shadows and its pictures against what the host computes.
+//! The `hybrid_oit` sample: its node lists, shadows and images against a reference on the host.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
 use lvk::glam::{DVec3, Vec2, Vec3};
 use lvk::{Context, DeviceProfile};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, HybridOitError, Motion, OitScene};
-use lvk_tests::glass_room::{GlassRoom, HostScene, decode, encode, expose, through, through_sorted};
+use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, Motion, OitScene};
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, reference};
+use lvk_tests::image_comparison::{
+    ImageSimilarity, Tolerance, assert_matches_reference, assert_similar, reference_image,
+};
+use lvk_tests::oit_reference::{HostScene, OitRenderer, composite, composite_sorted, decode, encode, expose};
 use lvk_tests::{device, device_with};
 
 /// No multiple of a workgroup.
 const SIZE: [u32; 2] = [163, 91];
 const MOMENT: f64 = 1.9;
 
-/// Of the same picture by pipeline and by query.
+/// Of the same image by pipeline and by query.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// Of the same lists sorted by the device and by the host.
 const SAME_GLASS: Tolerance = Tolerance { psnr: 60.0, ssim: 0.999, differing_share: 2e-4, flip: 0.01 };
-/// Of a picture and the same one on a lesser device.
+/// Of an image and the same one on a lesser device.
 const SAME_DEVICE: Tolerance = Tolerance { psnr: 60.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
-const SAME_AS_EVER: Tolerance = Tolerance::SAME_AS_EVER;
+const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
 
 /// Glass that is sunk into the floor, blocks and balls, so that shadow rays begin inside of it.
 fn sunk() -> OitScene {
@@ -53,19 +56,19 @@ fn crowd() -> OitScene {
 }
 
 #[test]
-fn both_paths_give_the_same_picture() {
+fn both_paths_give_the_same_image() {
     let Some(ctx) = device() else { return };
-    let pictures = |seconds| -> Vec<RgbaImage> {
+    let images = |seconds| -> Vec<RgbaImage> {
         let take = |path| {
             let config = HybridOitConfig::new(path, SIZE[0], SIZE[1]);
-            GlassRoom::new(&ctx, &OitScene::default(), &config).picture(seconds)
+            OitRenderer::new(&ctx, &OitScene::default(), &config).render(seconds)
         };
         paths(&ctx).into_iter().map(take).collect()
     };
     for seconds in [0.0, 5.3] {
-        let pictures = pictures(seconds);
-        for other in &pictures[1..] {
-            assert_alike("oit query", other, &pictures[0], &SAME_RAYS);
+        let images = images(seconds);
+        for other in &images[1..] {
+            assert_similar("oit query", other, &images[0], &SAME_RAYS);
         }
     }
 }
@@ -75,8 +78,8 @@ fn both_paths_give_the_same_picture() {
 fn lists_hold_every_crossing_in_front() {
     let Some(ctx) = device() else { return };
     for (scene, least) in [(OitScene::default(), 3000), (crowd(), 10_000)] {
-        let mut room = GlassRoom::new(&ctx, &scene, &plain(&ctx));
-        room.picture(MOMENT);
+        let mut room = OitRenderer::new(&ctx, &scene, &plain(&ctx));
+        room.render(MOMENT);
         let (lists, opaque) = (room.sample.glass_lists().unwrap(), room.sample.positions().unwrap());
         let host = HostScene::new(&scene, MOMENT);
         let (mut compared, mut doubtful) = (0, 0);
@@ -86,7 +89,8 @@ fn lists_hold_every_crossing_in_front() {
                 doubtful += 1;
                 continue;
             };
-            let mut found: Vec<f64> = lists.of(sample).iter().map(|node| f64::from(node.distance)).collect();
+            let mut found: Vec<f64> =
+                lists.nodes_of(sample).iter().map(|node| f64::from(node.distance)).collect();
             found.sort_by(f64::total_cmp);
             assert_eq!(found.len(), expected.len(), "pixel {pixel:?}: {found:?}, must be {expected:?}");
             for (found, expected) in found.iter().zip(&expected) {
@@ -118,63 +122,63 @@ fn crossings(host: &HostScene, pixel: [u32; 2], opaque: f32) -> Option<Vec<f64>>
     (!is_doubtful).then_some(all)
 }
 
-/// A pool without nodes gives the picture behind the glass; what the host sees of it through the lists that it sorts is
-/// the picture with glass. Lists taken as they come give another.
+/// A pool without nodes gives the image behind the glass; what the host sees of it through the lists that it sorts is
+/// the image with glass. Lists taken as they come give another.
 #[test]
-fn the_picture_is_what_sorted_lists_show() {
+fn the_image_equals_one_of_sorted_lists() {
     let Some(ctx) = device() else { return };
     for (name, scene, longest) in [("room", OitScene::default(), 4), ("crowd", crowd(), 17)] {
         for side in [1, 2] {
             let config = HybridOitConfig { supersampling: side, ..plain(&ctx) };
             let mut room =
-                GlassRoom::new(&ctx, &scene, &HybridOitConfig { node_capacity: Some(1 << 19), ..config });
-            let picture = room.picture(MOMENT);
+                OitRenderer::new(&ctx, &scene, &HybridOitConfig { node_capacity: Some(1 << 19), ..config });
+            let image = room.render(MOMENT);
             let lists = room.sample.glass_lists().unwrap();
-            let behind = behind_glass(&ctx, &scene, side, 1);
-            // Where there is no glass nothing is sorted, and the samples' 8 bits would only add their rounding.
-            let without = behind_glass(&ctx, &scene, 1, side);
+            let behind = image_behind_glass(&ctx, &scene, side, 1);
+            // Without glass nothing is sorted, and the 8 bits of samples would only add their rounding.
+            let without = image_behind_glass(&ctx, &scene, 1, side);
             let has_glass = |[x, y]: [u32; 2]| {
                 let samples =
                     (0..side * side).map(|i| (side * y + i / side) * side * SIZE[0] + side * x + i % side);
-                samples.into_iter().any(|sample| !lists.of(sample as usize).is_empty())
+                samples.into_iter().any(|sample| !lists.nodes_of(sample as usize).is_empty())
             };
             let mut found_longest = 0;
             let mut seen = |is_sorted: bool| {
                 let radiance = |sample: [u32; 2]| {
-                    let mut nodes = lists.of((sample[1] * side * SIZE[0] + sample[0]) as usize);
+                    let mut nodes = lists.nodes_of((sample[1] * side * SIZE[0] + sample[0]) as usize);
                     found_longest = found_longest.max(nodes.len());
                     let background = behind.get_pixel(sample[0], sample[1]);
                     let background = [0, 1, 2].map(|channel| decode(background[channel]));
                     if is_sorted {
-                        return through_sorted(&nodes, background);
+                        return composite_sorted(&nodes, background);
                     }
                     nodes.reverse();
-                    through(&nodes, background)
+                    composite(&nodes, background)
                 };
-                let mut picture = averaged(side, radiance);
-                for (x, y, pixel) in picture.enumerate_pixels_mut().filter(|(x, y, _)| !has_glass([*x, *y])) {
+                let mut image = averaged(side, radiance);
+                for (x, y, pixel) in image.enumerate_pixels_mut().filter(|(x, y, _)| !has_glass([*x, *y])) {
                     *pixel = *without.get_pixel(x, y);
                 }
-                picture
+                image
             };
             let (sorted, as_they_came) = (seen(true), seen(false));
             let what = format!("{name}, {side} x {side} samples");
-            assert_alike(&what, &picture, &sorted, &SAME_GLASS);
-            let unsorted = Likeness::of(&picture, &as_they_came).difference.psnr;
+            assert_similar(&what, &image, &sorted, &SAME_GLASS);
+            let unsorted = ImageSimilarity::measure(&image, &as_they_came).difference.psnr;
             assert!(unsorted < 45.0, "{what}: order makes no difference, so nothing was tested: {unsorted}");
             assert!(found_longest >= longest, "the longest list has {found_longest} nodes");
         }
     }
 }
 
-/// What is seen without glass, in a picture `times` as large.
-fn behind_glass(ctx: &Context, scene: &OitScene, times: u32, supersampling: u32) -> RgbaImage {
+/// Renders the scene without glass, in an image `times` as large.
+fn image_behind_glass(ctx: &Context, scene: &OitScene, times: u32, supersampling: u32) -> RgbaImage {
     let [width, height] = SIZE.map(|pixels| times * pixels);
     let config = HybridOitConfig { width, height, supersampling, node_capacity: Some(0), ..plain(ctx) };
-    GlassRoom::new(ctx, scene, &config).picture(MOMENT)
+    OitRenderer::new(ctx, scene, &config).render(MOMENT)
 }
 
-/// The picture of samples, `side` a pixel along each side.
+/// The image of samples, `side` a pixel along each side.
 fn averaged(side: u32, mut radiance: impl FnMut([u32; 2]) -> [f64; 3]) -> RgbaImage {
     RgbaImage::from_fn(SIZE[0], SIZE[1], |x, y| {
         let mut sum = [0.0; 3];
@@ -187,26 +191,26 @@ fn averaged(side: u32, mut radiance: impl FnMut([u32; 2]) -> [f64; 3]) -> RgbaIm
     })
 }
 
-/// What does not fit is counted, and the lists use every node of the pool once and none beside it.
+/// Nodes that do not fit are counted, and the lists use every node of the pool once and no other memory.
 #[test]
 fn a_pool_that_runs_out_is_counted_and_safe() {
     let Some(ctx) = device() else { return };
     let scene = OitScene::default();
     let config = plain(&ctx);
-    let mut whole = GlassRoom::new(&ctx, &scene, &config);
-    let complete = whole.picture(MOMENT);
+    let mut whole = OitRenderer::new(&ctx, &scene, &config);
+    let complete = whole.render(MOMENT);
     let asked = whole.sample.node_use().unwrap();
     assert_eq!(asked.lost(), 0);
     assert_eq!(whole.sample.glass_lists().unwrap().linked_count(), asked.asked as usize);
     for capacity in [0, 1, 1000, asked.asked] {
         let config = HybridOitConfig { node_capacity: Some(capacity), ..config };
-        let mut room = GlassRoom::new(&ctx, &scene, &config);
-        let picture = room.picture(MOMENT);
+        let mut room = OitRenderer::new(&ctx, &scene, &config);
+        let image = room.render(MOMENT);
         let nodes = room.sample.node_use().unwrap();
         assert_eq!((nodes.asked, nodes.capacity), (asked.asked, capacity));
         assert_eq!(nodes.lost(), asked.asked - capacity);
         assert_eq!(room.sample.glass_lists().unwrap().linked_count(), capacity as usize);
-        assert_eq!(picture == complete, capacity == asked.asked, "{capacity} nodes");
+        assert_eq!(image == complete, capacity == asked.asked, "{capacity} nodes");
     }
 }
 
@@ -217,8 +221,8 @@ fn shadows_are_those_the_host_computes() {
     let Some(ctx) = device() else { return };
     for scene in [OitScene::default(), sunk()] {
         for path in paths(&ctx) {
-            let mut room = GlassRoom::new(&ctx, &scene, &HybridOitConfig { path, ..plain(&ctx) });
-            room.picture(MOMENT);
+            let mut room = OitRenderer::new(&ctx, &scene, &HybridOitConfig { path, ..plain(&ctx) });
+            room.render(MOMENT);
             let (positions, sunlight) = (room.sample.positions().unwrap(), room.sample.sunlight().unwrap());
             let host = HostScene::new(&scene, MOMENT);
             let mut counts = ShadowCounts::default();
@@ -242,7 +246,7 @@ fn shadows_are_those_the_host_computes() {
     }
 }
 
-/// How many points were compared.
+/// Numbers of compared points.
 #[derive(Debug, Default)]
 struct ShadowCounts {
     lit: u32,
@@ -282,26 +286,26 @@ fn a_frame_is_the_same_alone_and_in_a_sequence() {
     for path in paths(&ctx) {
         let config = HybridOitConfig { path, ..plain(&ctx) };
         let at = |frame: u32| f64::from(frame) / 30.0;
-        let mut sequence = GlassRoom::new(&ctx, &scene, &config);
-        let frames: Vec<_> = (100..104).map(|frame| sequence.picture(at(frame))).collect();
+        let mut sequence = OitRenderer::new(&ctx, &scene, &config);
+        let frames: Vec<_> = (100..104).map(|frame| sequence.render(at(frame))).collect();
         assert_ne!(frames[0], frames[1], "the animation stands still");
-        let alone = GlassRoom::new(&ctx, &scene, &config).picture(at(103));
+        let alone = OitRenderer::new(&ctx, &scene, &config).render(at(103));
         assert_eq!(alone, frames[3], "{path:?}");
-        assert_eq!(sequence.picture(at(103 + 240)), frames[3], "{path:?}: a round later");
-        assert_eq!(sequence.picture(at(100)), frames[0], "{path:?}: back in time");
+        assert_eq!(sequence.render(at(103 + 240)), frames[3], "{path:?}: a round later");
+        assert_eq!(sequence.render(at(100)), frames[0], "{path:?}: back in time");
     }
 }
 
 #[test]
-fn a_phone_would_show_the_same() {
+fn a_phone_would_render_the_same() {
     let Some(ctx) = device() else { return };
     let scene = OitScene::default();
-    let picture = |ctx: &Context| GlassRoom::new(ctx, &scene, &plain(ctx)).picture(MOMENT);
-    let expected = picture(&ctx);
+    let image = |ctx: &Context| OitRenderer::new(ctx, &scene, &plain(ctx)).render(MOMENT);
+    let expected = image(&ctx);
     let profile = DeviceProfile::mali_g715();
     let Some(phone) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     assert_eq!(paths(&phone), [RayPath::Query]);
-    assert_alike("oit as on a phone", &picture(&phone), &expected, &SAME_DEVICE);
+    assert_similar("oit as on a phone", &image(&phone), &expected, &SAME_DEVICE);
 }
 
 #[test]
@@ -318,25 +322,25 @@ fn scenes_without_sense_are_refused() {
         let mut scene = OitScene::default();
         mistake(&mut scene);
         let refused = HybridOit::new(&ctx, &scene, &plain(&ctx)).err();
-        assert!(matches!(refused, Some(HybridOitError::BrokenScene(_))), "{refused:?}");
+        assert!(matches!(refused, Some(SampleError::BrokenScene(_))), "{refused:?}");
     }
 }
 
 #[test]
-fn the_room_looks_as_it_always_did() {
+fn the_image_matches_the_reference() {
     let Some(ctx) = device() else { return };
-    let picture = small_picture(&ctx, &OitScene::default());
-    assert_as_ever("hybrid_oit_small", &picture);
+    let image = small_image(&ctx, &OitScene::default());
+    assert_matches_reference("hybrid_oit_small", &image);
 }
 
-/// What it is, and how a scene shows it.
+/// Name of a mistake, and the change of the scene that makes it.
 type Mistake = (&'static str, fn(&mut OitScene));
 
-/// What a shader forgets or gets wrong must not pass for another driver's rounding.
+/// A mistake in a shader differs from the reference by more than another driver's rounding.
 #[test]
-fn the_reference_picture_tells_small_mistakes() {
+fn the_reference_image_detects_small_mistakes() {
     let Some(ctx) = device() else { return };
-    let expected = reference("hybrid_oit_small");
+    let expected = reference_image("hybrid_oit_small");
     let mistakes: [Mistake; 5] = [
         ("paler glass", |scene| scene.glass.iter_mut().for_each(|glass| glass.tint = glass.tint.powf(0.8))),
         ("moved sun", |scene| scene.sun.direction.x += 0.06),
@@ -347,13 +351,13 @@ fn the_reference_picture_tells_small_mistakes() {
     for (what, mistake) in mistakes {
         let mut wrong = OitScene::default();
         mistake(&mut wrong);
-        let likeness = Likeness::of(&small_picture(&ctx, &wrong), &expected);
-        eprintln!("{what}: {likeness}");
-        assert!(!likeness.is_within(&SAME_AS_EVER), "{what} goes unnoticed: {likeness}");
+        let similarity = ImageSimilarity::measure(&small_image(&ctx, &wrong), &expected);
+        eprintln!("{what}: {similarity}");
+        assert!(!similarity.is_within(&ACROSS_DRIVERS), "{what} goes unnoticed: {similarity}");
     }
 }
 
-fn small_picture(ctx: &Context, scene: &OitScene) -> RgbaImage {
+fn small_image(ctx: &Context, scene: &OitScene) -> RgbaImage {
     let config = HybridOitConfig::new(paths(ctx)[0], 240, 135);
-    GlassRoom::new(ctx, scene, &config).picture(MOMENT)
+    OitRenderer::new(ctx, scene, &config).render(MOMENT)
 }

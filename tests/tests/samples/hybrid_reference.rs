@@ -1,15 +1,15 @@
-//! What the `hybrid` sample sees and what is in shadow, pixel by pixel, against the reference in f64.
+//! Visibility and shadows of the `hybrid` sample, pixel by pixel, against the f64 reference.
 
 use image::RgbaImage;
 use lvk::glam::{DAffine3, DVec3, Vec3};
 use lvk_samples::hybrid::Method;
 use lvk_samples::scene::{Ambient, Camera, DirectionalLight, Scene, Sky};
 use lvk_tests::device;
-use lvk_tests::hybrid::{Studio, paths};
-use lvk_tests::picture::keep;
+use lvk_tests::hybrid::{HybridHarness, paths};
+use lvk_tests::image_comparison::write_test_image;
 use lvk_tests::rays::Ray;
 use lvk_tests::reference::{Geometry, Instance, Reference};
-use lvk_tests::still_life::still_life;
+use lvk_tests::scene_obj::obj_scene;
 
 const SIZE: [u32; 2] = [163, 91];
 const OPAQUE: u8 = 1;
@@ -53,13 +53,13 @@ fn ray_through(camera: &Camera, [x, y]: [u32; 2]) -> Ray {
     Ray::new(camera.eye.into(), direction.as_vec3())
 }
 
-/// Whether a ray hits anything; `None` where that is in doubt.
+/// True if a ray hits anything; `None` where that is in doubt.
 fn is_hit(reference: &Reference, ray: &Ray) -> Option<bool> {
     let answer = reference.closest(ray, OPAQUE | REFRACTIVE);
     answer.is_certain.then_some(answer.hit.is_some())
 }
 
-/// Whether a ray hits nothing, or something that is lit by the scene's sun, or else by its lamp; `None` where that is in doubt.
+/// True if a ray hits nothing, or something that is lit by the scene's sun, or else by its lamp; `None` where that is in doubt.
 fn is_lit(scene: &Scene, reference: &Reference, ray: &Ray) -> Option<bool> {
     let answer = reference.closest(ray, OPAQUE | REFRACTIVE);
     let Some(hit) = answer.hit.filter(|_| answer.is_certain) else {
@@ -106,22 +106,23 @@ fn assert_mask(what: &str, scene: &Scene, expected: impl Fn(&Ray) -> Option<bool
         .into_iter()
         .flat_map(|method| paths(&ctx).into_iter().map(move |path| (method, path)))
         .collect();
-    let mut studios: Vec<_> = ways.iter().map(|way| Studio::new(&ctx, scene, *way, SIZE, 0)).collect();
+    let mut harnesses: Vec<_> =
+        ways.iter().map(|way| HybridHarness::new(&ctx, scene, *way, SIZE, 0)).collect();
     for (number, camera) in scene.cameras.iter().enumerate().take(3) {
         let mask: Vec<_> = (0..SIZE[0] * SIZE[1])
             .map(|index| expected(&ray_through(camera, [index % SIZE[0], index / SIZE[0]])))
             .collect();
-        for (studio, (method, path)) in studios.iter_mut().zip(ways.iter().copied()) {
+        for (harness, (method, path)) in harnesses.iter_mut().zip(ways.iter().copied()) {
             let what = format!("{what} camera {} {method:?} {path:?}", number + 1);
             // The rasteriser places vertices on a grid, and so moves edges a little.
             let allowed = if method == Method::Hybrid { SIZE[0] * SIZE[1] / 1000 } else { 0 };
-            compare_mask(&what, &studio.picture(camera), &mask, allowed as usize);
+            compare_mask(&what, &harness.render(camera), &mask, allowed as usize);
         }
     }
 }
 
-fn compare_mask(what: &str, picture: &RgbaImage, mask: &[Option<bool>], allowed: usize) {
-    let found = picture.pixels().map(|pixel| pixel.0[..3] != [0; 3]);
+fn compare_mask(what: &str, image: &RgbaImage, mask: &[Option<bool>], allowed: usize) {
+    let found = image.pixels().map(|pixel| pixel.0[..3] != [0; 3]);
     let judged = || found.clone().zip(mask).filter_map(|(found, expected)| Some((found, (*expected)?)));
     let (count, bright) = (judged().count(), judged().filter(|(_, expected)| *expected).count());
     let wrong: Vec<String> = found
@@ -137,9 +138,9 @@ fn compare_mask(what: &str, picture: &RgbaImage, mask: &[Option<bool>], allowed:
     assert!(count * 20 > mask.len() * 19, "{what}: too few pixels are certain");
     assert!(
         bright * 200 > count && (count - bright) * 200 > count,
-        "{what}: an even picture would test nothing"
+        "{what}: an even image would test nothing"
     );
-    let kept = (wrong.len() > allowed).then(|| keep(what, picture));
+    let kept = (wrong.len() > allowed).then(|| write_test_image(what, image));
     assert_eq!(kept, None, "{what}: {} pixels are wrong, {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
 }
 
@@ -150,8 +151,8 @@ fn bright_sky() -> Sky {
 
 /// A bright sky behind black things.
 #[test]
-fn the_sky_shows_where_no_ray_hits() {
-    let mut scene = still_life();
+fn the_sky_is_where_no_ray_hits() {
+    let mut scene = obj_scene();
     scene.sky = bright_sky();
     scene.ambient = Ambient { above: [0.0; 3], below: [0.0; 3] };
     scene.light.color = [0.0; 3];
@@ -162,7 +163,7 @@ fn the_sky_shows_where_no_ray_hits() {
 
 /// White things without highlights before a bright sky, lit by a strong lamp or a strong sun alone.
 fn lit_by(light: [f32; 3], sun: Option<DirectionalLight>) -> Scene {
-    let mut scene = still_life();
+    let mut scene = obj_scene();
     scene.sky = bright_sky();
     scene.ambient = Ambient { above: [0.0; 3], below: [0.0; 3] };
     (scene.light.color, scene.sun) = (light, sun);
@@ -182,7 +183,7 @@ fn the_lamp_lights_what_no_opaque_thing_hides() {
 /// From where the line `sun` of the camera file says.
 #[test]
 fn the_sun_lights_what_no_opaque_thing_hides() {
-    let sun = still_life().sun.map(|sun| DirectionalLight { color: [500.0; 3], ..sun });
+    let sun = obj_scene().sun.map(|sun| DirectionalLight { color: [500.0; 3], ..sun });
     let expected = Vec3::new(-0.6, 0.7, 0.5).normalize();
     assert!(sun.is_some_and(|sun| Vec3::from(sun.direction).distance(expected) < 1e-6), "{sun:?}");
     let scene = lit_by([0.0; 3], sun);

@@ -1,4 +1,4 @@
-//! What the `hybrid` sample's geometry passes find is what rays find, also where triangles are awkward.
+//! Geometry passes of the `hybrid` sample: they find the surfaces that rays find, also of degenerate triangles.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -6,9 +6,9 @@ use lvk::Context;
 use lvk_samples::hybrid::{Geometry, HybridConfig, HybridRenderer, Method, Raster, RasterTuning, RayPath};
 use lvk_samples::scene::{Camera, Scene};
 use lvk_tests::device;
-use lvk_tests::hybrid::{Studio, paths};
-use lvk_tests::picture::{Tolerance, assert_alike};
-use lvk_tests::still_life::still_life;
+use lvk_tests::hybrid::{HybridHarness, paths};
+use lvk_tests::image_comparison::{Tolerance, assert_similar};
+use lvk_tests::scene_obj::obj_scene;
 
 const SIZE: [u32; 2] = [163, 91];
 
@@ -26,26 +26,26 @@ fn config(path: RayPath, geometry: Geometry) -> HybridConfig {
     HybridConfig { path, geometry, width: SIZE[0], height: SIZE[1], max_depth: 1, ..HybridConfig::default() }
 }
 
-fn pictures(ctx: &Context, scene: &Scene, config: &HybridConfig, cameras: &[Camera]) -> Vec<RgbaImage> {
-    let mut studio = Studio::with(ctx, scene, config);
-    cameras.iter().map(|camera| studio.picture(camera)).collect()
+fn render_images(ctx: &Context, scene: &Scene, config: &HybridConfig, cameras: &[Camera]) -> Vec<RgbaImage> {
+    let mut harness = HybridHarness::with_config(ctx, scene, config);
+    cameras.iter().map(|camera| harness.render(camera)).collect()
 }
 
 /// Compares all geometry passes with rays alone, through each camera and by each path.
 fn assert_geometry_agrees(ctx: &Context, scene: &Scene, cameras: &[Camera], by_hardware: Tolerance) {
     let path = paths(ctx)[0];
     let standalone = HybridConfig { method: Method::Standalone, ..config(path, COMPUTE) };
-    let expected = pictures(ctx, scene, &standalone, cameras);
+    let expected = render_images(ctx, scene, &standalone, cameras);
     for (geometry, tolerance) in
         [(COMPUTE, SAME_PIXELS), (HARDWARE, by_hardware), (Geometry::Paper, SAME_VIEW)]
     {
         let mut by_path: Vec<Vec<RgbaImage>> = Vec::new();
         for path in paths(ctx) {
-            by_path.push(pictures(ctx, scene, &config(path, geometry), cameras));
+            by_path.push(render_images(ctx, scene, &config(path, geometry), cameras));
         }
         for (number, expected) in expected.iter().enumerate() {
             let what = format!("camera {} {geometry:?}", number + 1);
-            assert_alike(&what, &by_path[0][number], expected, &tolerance);
+            assert_similar(&what, &by_path[0][number], expected, &tolerance);
             for other in &by_path[1..] {
                 assert!(other[number] == by_path[0][number], "{what}: pipeline and query differ");
             }
@@ -56,15 +56,15 @@ fn assert_geometry_agrees(ctx: &Context, scene: &Scene, cameras: &[Camera], by_h
 #[test]
 fn every_geometry_pass_finds_what_rays_find() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     assert_geometry_agrees(&ctx, &scene, &scene.cameras, SAME_EDGES);
 }
 
 /// Just above the floor and beside a wall, so that large triangles begin far behind the eye, and with a corner at it.
 #[test]
-fn triangles_through_the_near_plane_are_cut_where_rays_begin() {
+fn triangles_through_the_near_plane_are_clipped_where_rays_begin() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let corner = scene.positions[scene.triangles[0][0] as usize];
     let cameras = [
         Camera::looking_along([0.3, 0.002, 1.5], [-0.2, 0.01, -1.0], 100.0),
@@ -105,24 +105,24 @@ fn with_awkward_triangles(scene: &mut Scene) {
 #[test]
 fn awkward_triangles_are_seen_as_rays_see_them() {
     let Some(ctx) = device() else { return };
-    let mut scene = still_life();
+    let mut scene = obj_scene();
     with_awkward_triangles(&mut scene);
     let path = paths(&ctx)[0];
     let standalone = HybridConfig { method: Method::Standalone, ..config(path, COMPUTE) };
-    let expected = pictures(&ctx, &scene, &standalone, &scene.cameras[..3]);
-    let found = pictures(&ctx, &scene, &config(path, COMPUTE), &scene.cameras[..3]);
+    let expected = render_images(&ctx, &scene, &standalone, &scene.cameras[..3]);
+    let found = render_images(&ctx, &scene, &config(path, COMPUTE), &scene.cameras[..3]);
     for (number, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        assert_alike(&format!("awkward, camera {}", number + 1), found, expected, &SAME_PIXELS);
+        assert_similar(&format!("awkward, camera {}", number + 1), found, expected, &SAME_PIXELS);
     }
 }
 
-/// Who rasterises a triangle, and whether lists have room for it and its tiles, must not show.
+/// The rasteriser of a triangle, and lists too short for it and its tiles, must not change the image.
 #[test]
-fn tuning_and_full_lists_do_not_change_the_picture() {
+fn tuning_and_full_lists_do_not_change_the_image() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let plain = config(paths(&ctx)[0], COMPUTE);
-    let expected = pictures(&ctx, &scene, &plain, &scene.cameras[..2]);
+    let expected = render_images(&ctx, &scene, &plain, &scene.cameras[..2]);
     for (small, medium, set_aside, tiles) in [
         (0, 1024, 1 << 16, 1 << 16),
         (0, 0, 1 << 16, 1 << 16),
@@ -135,15 +135,15 @@ fn tuning_and_full_lists_do_not_change_the_picture() {
     ] {
         let (small_pixels, medium_pixels) = (Some(small), Some(medium));
         let tuning = RasterTuning { small_pixels, medium_pixels, set_aside, tiles };
-        let found = pictures(&ctx, &scene, &HybridConfig { tuning, ..plain }, &scene.cameras[..2]);
+        let found = render_images(&ctx, &scene, &HybridConfig { tuning, ..plain }, &scene.cameras[..2]);
         assert!(found == expected, "{tuning:?} changes the picture");
     }
 }
 
 #[test]
-fn the_choice_of_a_rasteriser_is_told_and_leaves_a_picture() {
+fn the_choice_of_a_rasteriser_is_reported_and_leaves_an_image() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let path = paths(&ctx)[0];
     for (geometry, reason) in
         [(COMPUTE, "as asked for"), (HARDWARE, "as asked for"), (Geometry::default(), "")]
@@ -154,7 +154,7 @@ fn the_choice_of_a_rasteriser_is_told_and_leaves_a_picture() {
         let named = matches!(geometry, Geometry::Visibility(Some(raster)) if raster != choice.raster);
         assert!(!named, "{geometry:?} became {choice}");
         renderer.render(&scene.cameras[0]).unwrap();
-        let expected = pictures(
+        let expected = render_images(
             &ctx,
             &scene,
             &config(path, Geometry::Visibility(Some(choice.raster))),

@@ -1,30 +1,29 @@
-//! The pictures of the `large_scene` sample: instanced and combined worlds agree on every path and under the profiles of
-//! phones, structures are built once and loaded afterwards, and the valley looks as ever.
+//! Images of the `large_scene` sample: instanced and combined worlds agree on every path and under the profiles of
+//! phones, acceleration structures are built once and loaded later, and the valley equals the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk_samples::app::sample_error::SampleError;
 use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 
 use image::RgbaImage;
-use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
-use lvk_samples::app::headless;
+use lvk::{Context, DeviceProfile};
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::app::scene_list::{self, FoundScene};
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, LargeSceneError, Origin, Show, World};
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, Origin, Show, World};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::scene::{ObjOptions, Scene};
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
-use lvk_tests::still_life::still_life;
-use lvk_tests::warnings::{listen, take_warnings};
-use lvk_tests::{TestDevice, device, device_with};
+use lvk_tests::image_comparison::{
+    Tolerance, assert_matches_reference, assert_similar, assert_swiftshader_matches,
+};
+use lvk_tests::rtx_sample::{SIZE, contexts_and_paths, image_of, software_device};
+use lvk_tests::scene_obj::obj_scene;
+use lvk_tests::warnings::{capture_warnings, take_warnings};
+use lvk_tests::{device, device_with};
 
-/// No multiple of a work group.
-const SIZE: [u32; 2] = [158, 89];
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 0.01, flip: 2e-3 };
 /// On SwiftShader: its textures are filtered with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 40.0, ssim: 0.99, differing_share: 0.4, flip: 0.05 };
@@ -37,40 +36,23 @@ fn make(ctx: &Context, world: &World, config: &LargeSceneConfig) -> LargeScene {
     LargeScene::new(ctx, world, config, &mut Progress::hidden()).unwrap()
 }
 
-fn picture_of(sample: &mut LargeScene, frame: u32) -> RgbaImage {
-    sample.update(Moment::of_frame(frame, 100)).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(sample).unwrap()).unwrap()
-}
-
 fn valley() -> World {
     World::valley(12_000, 40, &mut Progress::hidden()).unwrap()
 }
 
 /// Two still lives, one of them turned.
 fn street() -> World {
-    World::street(vec![still_life()], 2).unwrap()
-}
-
-fn software() -> Option<TestDevice> {
-    device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
-    })
-}
-
-/// Every device and path there is here.
-fn ways<'a>(ctx: &'a Context, software: Option<&'a Context>) -> Vec<(&'a Context, RayPath)> {
-    let own = paths(ctx).into_iter().map(|path| (ctx, path));
-    own.chain(software.map(|ctx| (ctx, RayPath::Query))).collect()
+    World::street(vec![obj_scene()], 2).unwrap()
 }
 
 #[test]
-fn instances_and_one_mesh_show_the_same_on_every_path() {
+fn instances_and_one_mesh_render_the_same_on_every_path() {
     let Some(ctx) = device() else { return };
-    let software = software();
+    let software = software_device();
     for world in [valley(), street()] {
         let combined = world.combined().unwrap();
         let mut first = None;
-        for (ctx, path) in ways(&ctx, software.as_deref()) {
+        for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
             for world in [&world, &combined] {
                 let mut sample = make(ctx, world, &config(path));
                 let figures = sample.figures();
@@ -79,19 +61,19 @@ fn instances_and_one_mesh_show_the_same_on_every_path() {
                     (figures.structures.len(), figures.instances),
                     (world.pieces().len(), world.instances().len())
                 );
-                let picture = picture_of(&mut sample, 0);
-                let expected = first.get_or_insert_with(|| picture.clone());
-                assert_alike(&format!("{} by {path:?}", world.name()), &picture, expected, &SAME_RAYS);
+                let image = image_of(&mut sample, 0);
+                let expected = first.get_or_insert_with(|| image.clone());
+                assert_similar(&format!("{} by {path:?}", world.name()), &image, expected, &SAME_RAYS);
             }
         }
     }
 }
 
 #[test]
-fn phones_split_the_mesh_and_show_the_same() {
+fn phones_split_the_mesh_and_render_the_same() {
     let Some(whole) = device() else { return };
     let combined = valley().combined().unwrap();
-    let expected = picture_of(&mut make(&whole, &combined, &config(paths(&whole)[0])), 0);
+    let expected = image_of(&mut make(&whole, &combined, &config(paths(&whole)[0])), 0);
     for phone in [DeviceProfile::mali_g715(), DeviceProfile::xclipse_940()] {
         let phone = DeviceProfile { max_blas_primitives: 10_000, ..phone };
         let Some(ctx) = device_with(|desc| desc.profile = Some(&phone)) else { return };
@@ -100,7 +82,7 @@ fn phones_split_the_mesh_and_show_the_same() {
             let least = combined.triangle_count().div_ceil(10_000) as u32;
             assert!(sample.figures().parts() >= least, "{} parts of {least}", sample.figures().parts());
             assert!(least > 5);
-            assert_alike(&phone.name, &picture_of(&mut sample, 0), &expected, &SAME_RAYS);
+            assert_similar(&phone.name, &image_of(&mut sample, 0), &expected, &SAME_RAYS);
         }
     }
 }
@@ -112,13 +94,13 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Structures that were loaded, built, and built anew in place of damaged files; and the picture.
+/// Structures that were loaded, built, and built anew in place of damaged files; and the image.
 fn start(ctx: &Context, path: RayPath, world: &World, folder: &Path) -> ([usize; 3], RgbaImage) {
     let config = LargeSceneConfig { cache: Some(folder.to_owned()), ..config(path) };
     let mut sample = make(ctx, world, &config);
     let counts =
         [Origin::Loaded, Origin::Built, Origin::Rebuilt].map(|origin| sample.figures().count(origin));
-    (counts, picture_of(&mut sample, 0))
+    (counts, image_of(&mut sample, 0))
 }
 
 /// Starts three times, the last time with one file cut off and one changed.
@@ -151,17 +133,17 @@ fn starts_build_once(ctx: &Context, path: RayPath, world: &World) {
 
 #[test]
 fn a_second_start_builds_nothing_and_damaged_files_are_dropped_with_a_warning() {
-    listen();
+    capture_warnings();
     let Some(ctx) = device() else { return };
-    let software = software();
-    for (ctx, path) in ways(&ctx, software.as_deref()) {
+    let software = software_device();
+    for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
         starts_build_once(ctx, path, &valley());
     }
 }
 
 #[test]
-fn structures_that_were_split_are_kept_too_and_not_for_another_device() {
-    listen();
+fn accel_structs_that_were_split_are_kept_too_and_not_for_another_device() {
+    capture_warnings();
     let phone = DeviceProfile { max_blas_primitives: 900, ..DeviceProfile::mali_g715() };
     let Some(ctx) = device_with(|desc| desc.profile = Some(&phone)) else { return };
     starts_build_once(&ctx, RayPath::Query, &street());
@@ -180,7 +162,7 @@ fn structures_that_were_split_are_kept_too_and_not_for_another_device() {
 }
 
 #[test]
-fn figures_tell_what_compaction_saves() {
+fn figures_say_what_compaction_saves() {
     let Some(ctx) = device() else { return };
     let (world, path) = (valley(), paths(&ctx)[0]);
     let loose = make(&ctx, &world, &LargeSceneConfig { compact: false, ..config(path) });
@@ -201,18 +183,18 @@ fn figures_tell_what_compaction_saves() {
 }
 
 #[test]
-fn numbers_are_shown_alike_on_every_path() {
+fn numbers_are_rendered_the_same_on_every_path() {
     let Some(ctx) = device() else { return };
-    let software = software();
+    let software = software_device();
     for show in [Show::Instances, Show::Triangles] {
         let mut first: Option<RgbaImage> = None;
-        for (ctx, path) in ways(&ctx, software.as_deref()) {
+        for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
             let mut sample = make(ctx, &street(), &LargeSceneConfig { show, ..config(path) });
-            let picture = picture_of(&mut sample, 0);
-            let expected = first.get_or_insert_with(|| picture.clone());
-            assert_alike(&format!("{show:?}"), &picture, expected, &SAME_RAYS);
+            let image = image_of(&mut sample, 0);
+            let expected = first.get_or_insert_with(|| image.clone());
+            assert_similar(&format!("{show:?}"), &image, expected, &SAME_RAYS);
         }
-        let plain = picture_of(&mut make(&ctx, &street(), &config(paths(&ctx)[0])), 0);
+        let plain = image_of(&mut make(&ctx, &street(), &config(paths(&ctx)[0])), 0);
         assert!(first.is_some_and(|first| first != plain), "{show:?} shows the picture");
     }
 }
@@ -221,32 +203,32 @@ fn numbers_are_shown_alike_on_every_path() {
 fn the_valley_and_the_street_look_as_they_always_did() {
     let Some(ctx) = device() else { return };
     let path = paths(&ctx)[0];
-    assert_as_ever(
+    assert_matches_reference(
         "large_scene_small",
-        &picture_of(
+        &image_of(
             &mut make(&ctx, &World::valley(60_000, 300, &mut Progress::hidden()).unwrap(), &config(path)),
             0,
         ),
     );
-    assert_as_ever("large_scene_street", &picture_of(&mut make(&ctx, &street(), &config(path)), 0));
+    assert_matches_reference("large_scene_street", &image_of(&mut make(&ctx, &street(), &config(path)), 0));
 }
 
 #[test]
-fn depth_samples_and_moment_count() {
+fn depth_samples_and_frame_time_count() {
     let Some(ctx) = device() else { return };
     let path = paths(&ctx)[0];
     let world = valley();
     let mut sample = make(&ctx, &world, &config(path));
-    let first = picture_of(&mut sample, 0);
-    assert_ne!(picture_of(&mut sample, 30), first, "the camera moves");
-    assert_eq!(picture_of(&mut sample, 100), first, "a round has no seam");
+    let first = image_of(&mut sample, 0);
+    assert_ne!(image_of(&mut sample, 30), first, "the camera moves");
+    assert_eq!(image_of(&mut sample, 100), first, "a round has no seam");
     for other in
         [LargeSceneConfig { depth: 0, ..config(path) }, LargeSceneConfig { samples: 1, ..config(path) }]
     {
-        assert_ne!(picture_of(&mut make(&ctx, &world, &other), 0), first, "{other:?}");
+        assert_ne!(image_of(&mut make(&ctx, &world, &other), 0), first, "{other:?}");
     }
     let mut second = make(&ctx, &world, &config(path)).from_camera(&world, 1);
-    assert_eq!(picture_of(&mut second, 0), picture_of(&mut sample, 20), "the second of five cameras");
+    assert_eq!(image_of(&mut second, 0), image_of(&mut sample, 20), "the second of five cameras");
 }
 
 /// Small archives of scenes that may lie beside the project, in `../shared/scenes`.
@@ -295,33 +277,34 @@ fn the_archives_make_a_street() {
     assert!(!small.is_empty(), "no small OBJ in {}", folder.display());
     let load = |path: &Path| Scene::from_obj(path, &ObjOptions::default(), &mut Progress::hidden()).unwrap();
     let world = World::street(small.iter().map(|scene| load(&scene.path)).collect(), 2).unwrap();
-    let software = software();
+    let software = software_device();
     let mut first = None;
-    for (ctx, path) in ways(&ctx, software.as_deref()) {
+    for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
         for world in [&world, &world.combined().unwrap()] {
-            let picture = picture_of(&mut make(ctx, world, &config(path)), 0);
-            let expected = first.get_or_insert_with(|| picture.clone());
-            assert_alike(&format!("archives by {path:?}"), &picture, expected, &SAME_RAYS);
+            let image = image_of(&mut make(ctx, world, &config(path)), 0);
+            let expected = first.get_or_insert_with(|| image.clone());
+            assert_similar(&format!("archives by {path:?}"), &image, expected, &SAME_RAYS);
         }
     }
 }
 
 #[test]
-fn a_driver_without_ray_tracing_shows_the_street() {
-    without_ray_tracing(a_driver_without_ray_tracing_shows_the_street, || {
-        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = picture_of(&mut make(&ctx, &street(), &config(RayPath::Query)), 0);
-        assert_alike("SwiftShader street", &picture, &reference("large_scene_street"), &OTHER_FILTERS);
-    });
+fn a_driver_without_ray_tracing_renders_the_street() {
+    assert_swiftshader_matches(
+        a_driver_without_ray_tracing_renders_the_street,
+        "large_scene_street",
+        &OTHER_FILTERS,
+        |ctx| image_of(&mut make(ctx, &street(), &config(RayPath::Query)), 0),
+    );
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     let path = paths(&ctx)[0];
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let config = LargeSceneConfig::new(RtxConfig { path, width, height });
         let error = LargeScene::new(&ctx, &street(), &config, &mut Progress::hidden()).err();
-        assert!(matches!(error, Some(LargeSceneError::Rtx(RtxError::BadSize { .. }))), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! The samples: their pictures, their frames, their sequences, and the report of the experiment.
+//! The samples: images, frames, sequences, and the report of the experiment.
 
 mod deferred;
 mod frames;

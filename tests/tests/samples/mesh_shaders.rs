@@ -1,18 +1,20 @@
-//! The pictures of the `mesh_shaders` sample: meshlets that are left out are not missed, and what task and mesh shaders draw is
-//! what a vertex shader draws.
+//! Images of the `mesh_shaders` sample: culled meshlets change no pixel, and task and mesh shaders draw what a vertex
+//! shader draws.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
 use lvk::{Context, CullMode, Dependencies, DeviceProfile, RenderPipelineDesc, TextureRegion};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::render_target::RenderTarget;
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::pipelines::SampleStage;
-use lvk_samples::raster::{Canvas, RasterError, RasterPipeline, fragment_stage, vertex_stage};
+use lvk_samples::raster::RasterPipeline;
 use lvk_samples::scene::Camera;
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever};
-use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_of};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar};
+use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, image_of};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{TestDevice, device, device_with};
 
 const SAME_TRIANGLES: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 2e-3, flip: 1e-3 };
@@ -21,7 +23,7 @@ const MOST_CORNERS: u32 = 3 * 96;
 
 /// Corners of all meshlets, an instance for each, without task and mesh shaders.
 const STAGES: [SampleStage; 2] = [
-    vertex_stage(
+    SampleStage::from_glsl(
         r#"
         #include "mesh_shaders/frame.glsl"
         layout(location = 0) out vec3 position;
@@ -39,7 +41,7 @@ const STAGES: [SampleStage; 2] = [
         }"#,
         "test.vert",
     ),
-    fragment_stage(
+    SampleStage::from_glsl(
         r#"
         #include "mesh_shaders/frame.glsl"
         #include "mesh_shaders/shade.glsl"
@@ -69,21 +71,21 @@ fn knot(ctx: &Context, culls: bool) -> MeshShaders {
     MeshShaders::new(ctx, SIZE, culls).unwrap()
 }
 
-/// What a vertex shader draws of the frame that `sample` has drawn last.
+/// Draws, by a vertex shader, the frame that `sample` has drawn last.
 fn by_vertex_shader(ctx: &Context, sample: &MeshShaders) -> RgbaImage {
-    let canvas = Canvas::with_depth(ctx, SIZE).unwrap();
+    let target = RenderTarget::with_depth(ctx, SIZE).unwrap();
     let state = RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() };
     let pipeline = RasterPipeline::with_depth("mesh_shaders", "by vertex shader", &STAGES);
     let pipeline = pipeline.create_with(ctx, &state).unwrap();
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let backdrop = [0.010, 0.012, 0.020];
-    let mut pass = canvas.begin(&mut cmd, "by vertex shader", backdrop, &Dependencies::default()).unwrap();
+    let mut pass = target.begin(&mut cmd, "by vertex shader", backdrop, &Dependencies::default()).unwrap();
     pass.bind_render_pipeline(*pipeline).unwrap();
     pass.push_constants(&ctx.buffer_address(sample.frame_buffer()).unwrap()).unwrap();
     pass.draw(0..MOST_CORNERS, 0..sample.meshlets().meshlets.len() as u32).unwrap();
     drop(pass);
     ctx.submit(cmd).unwrap();
-    let pixels = ctx.download_texture(canvas.picture(), &TextureRegion::default()).unwrap();
+    let pixels = ctx.download_texture(target.image(), &TextureRegion::default()).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).unwrap()
 }
 
@@ -93,7 +95,7 @@ fn what_is_left_out_is_not_missed() {
     let (mut all, mut some) = (knot(&ctx, false), knot(&ctx, true));
     let count = all.meshlets().meshlets.len() as u32;
     for frame in [0, 30, 80] {
-        assert!(picture_of(&mut all, frame) == picture_of(&mut some, frame), "frame {frame}");
+        assert!(image_of(&mut all, frame) == image_of(&mut some, frame), "frame {frame}");
         let drawn = some.drawn().unwrap();
         assert_eq!(all.drawn(), Some(count));
         assert!(drawn < count - count / 10 && drawn > count / 3, "{drawn} of {count} in frame {frame}");
@@ -102,7 +104,7 @@ fn what_is_left_out_is_not_missed() {
 
 /// From within the knot, from beside it, and with it behind the camera.
 #[test]
-fn what_lies_beside_the_picture_is_left_out() {
+fn what_lies_outside_the_image_is_left_out() {
     let Some(ctx) = mesh_device() else { return };
     let (mut all, mut some) = (knot(&ctx, false), knot(&ctx, true));
     let count = all.meshlets().meshlets.len() as u32;
@@ -114,7 +116,7 @@ fn what_lies_beside_the_picture_is_left_out() {
         (behind, 0),
     ] {
         let [whole, culled] = [&mut all, &mut some].map(|sample| {
-            sample.update(Moment::of_frame(10, ROUND)).unwrap();
+            sample.update(FrameTime::from_frame(10, ROUND)).unwrap();
             sample.set_view(&view);
             headless::picture(sample).unwrap()
         });
@@ -128,38 +130,38 @@ fn a_vertex_shader_draws_the_same() {
     let Some(ctx) = mesh_device() else { return };
     let mut sample = knot(&ctx, true);
     for frame in [0, 55] {
-        let picture = picture_of(&mut sample, frame);
-        assert_alike("knot by vertex shader", &by_vertex_shader(&ctx, &sample), &picture, &SAME_TRIANGLES);
+        let image = image_of(&mut sample, frame);
+        assert_similar("knot by vertex shader", &by_vertex_shader(&ctx, &sample), &image, &SAME_TRIANGLES);
     }
 }
 
 #[test]
 fn the_knot_looks_as_it_always_did() {
     let Some(ctx) = mesh_device() else { return };
-    assert_as_ever("mesh_shaders_small", &picture_of(&mut knot(&ctx, true), 0));
+    assert_matches_reference("mesh_shaders_small", &image_of(&mut knot(&ctx, true), 0));
 }
 
 fn assert_missing(ctx: &Context) {
     let refused = MeshShaders::new(ctx, SIZE, true).err();
-    let Some(error @ RasterError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
+    let Some(error @ SampleError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
     let text = error.to_string();
     let device = &ctx.capabilities().device_name;
     assert!(text.contains("no mesh shaders") && text.contains(device) && text.contains("--device"), "{text}");
 }
 
 #[test]
-fn devices_without_mesh_shaders_are_told() {
+fn devices_without_mesh_shaders_are_reported() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     assert_missing(&ctx);
-    without_ray_tracing(devices_without_mesh_shaders_are_told, || {
+    on_swiftshader(devices_without_mesh_shaders_are_reported, || {
         let Some(ctx) = device() else { return };
         assert_missing(&ctx);
     });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = mesh_device() else { return };
     assert_refuses_impossible_sizes(|size| MeshShaders::new(&ctx, size, true));
 }

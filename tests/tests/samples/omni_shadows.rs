@@ -1,5 +1,5 @@
-//! The pictures of the `omni_shadows` sample: its shadows are those that rays find, in whatever way the cube map of them is
-//! drawn, and they look as ever.
+//! Images of the `omni_shadows` sample: shadows equal those that rays find, for every method to draw the cube map,
+//! and equal the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -9,14 +9,16 @@ use lvk::{
     TlasDesc, TlasInstance, Triangles,
 };
 use lvk_samples::app::sample::Sample;
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::omni_shadows::{Faces, OmniShadows, OmniShadowsConfig, ShadowFilter};
-use lvk_samples::raster::RasterError;
 use lvk_samples::scene::Camera;
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
-use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_now, picture_of};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
+use lvk_tests::raster_sample::{
+    SIZE, assert_loops_without_seam, assert_refuses_impossible_sizes, image_now, image_of,
+};
 use lvk_tests::ray_tracer::{FRONT, How, MISSED, Method, RayTracer};
 use lvk_tests::rays::Ray;
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// On SwiftShader: its samples lie elsewhere in a pixel, and its comparisons are filtered with fewer bits.
@@ -31,14 +33,14 @@ fn lamp(ctx: &Context, config: &OmniShadowsConfig) -> OmniShadows {
 }
 
 #[test]
-fn one_pass_and_six_give_the_same_picture() {
+fn one_pass_and_six_give_the_same_image() {
     let Some(ctx) = device() else { return };
-    let picture = |faces| {
+    let image = |faces| {
         let mut sample = lamp(&ctx, &OmniShadowsConfig { faces, shows_cube: true, ..usual() });
         assert_eq!(sample.is_multiview(), faces == Faces::Multiview);
-        picture_of(&mut sample, 21)
+        image_of(&mut sample, 21)
     };
-    assert!(picture(Faces::Multiview) == picture(Faces::Single));
+    assert!(image(Faces::Multiview) == image(Faces::Single));
 }
 
 #[test]
@@ -47,14 +49,14 @@ fn devices_without_multiview_draw_face_by_face() {
     let profile = DeviceProfile::core_only();
     let Some(bare) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     let asked = OmniShadows::new(&bare, &OmniShadowsConfig { faces: Faces::Multiview, ..usual() }).err();
-    assert!(matches!(asked, Some(RasterError::Missing { .. })), "{asked:?}");
+    assert!(matches!(asked, Some(SampleError::Missing { .. })), "{asked:?}");
     let mut sample = lamp(&bare, &usual());
     assert!(!sample.is_multiview());
-    assert!(picture_of(&mut sample, 0) == picture_of(&mut lamp(&ctx, &usual()), 0));
+    assert!(image_of(&mut sample, 0) == image_of(&mut lamp(&ctx, &usual()), 0));
 }
 
 /// Triangles as a structure of their own.
-fn structure(
+fn accel_structs(
     ctx: &Context,
     triangles: &[[[f32; 3]; 3]],
 ) -> (Holder<AccelStructHandle>, Holder<AccelStructHandle>) {
@@ -83,12 +85,12 @@ fn pixel_rays(camera: &Camera) -> Vec<Ray> {
     (0..SIZE[0] * SIZE[1]).map(through).collect()
 }
 
-/// Whether each pixel lies in shadow as rays find it; `None` where that cannot be told, or the lamp is behind the surface.
-fn traced_shadows(ctx: &Context, sample: &OmniShadows) -> Vec<Option<bool>> {
+/// True if each pixel lies in shadow as rays find it; `None` where that cannot be told, or the lamp is behind the surface.
+fn traced_shadows(ctx: &Context, sample: &mut OmniShadows) -> Vec<Option<bool>> {
     let [casters, others] = sample.triangles();
     let everything = [&casters[..], &others[..]].concat();
-    let (all, _all_blas) = structure(ctx, &everything);
-    let (blockers, _blockers_blas) = structure(ctx, &casters);
+    let (all, _all_blas) = accel_structs(ctx, &everything);
+    let (blockers, _blockers_blas) = accel_structs(ctx, &casters);
     let tracer = RayTracer::new(ctx, Method::available(ctx)[0]).unwrap();
     let rays = pixel_rays(&sample.view().unwrap());
     let lamp = Vec3::from(sample.lamp());
@@ -113,13 +115,13 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
     let config = |filter| OmniShadowsConfig { filter, haze: 0.0, shadow_size: 2048, ..usual() };
     let [mut lit, mut shadowed] =
         [ShadowFilter::Off, ShadowFilter::Hard].map(|filter| lamp(ctx, &config(filter)));
-    let pictures = [&mut lit, &mut shadowed].map(|sample| {
+    let images = [&mut lit, &mut shadowed].map(|sample| {
         sample.set_view(view);
-        picture_now(sample)
+        image_now(sample)
     });
-    let expected = traced_shadows(ctx, &shadowed);
+    let expected = traced_shadows(ctx, &mut shadowed);
     let (width, mut counts, mut wrong) = (SIZE[0] as usize, [0, 0], Vec::new());
-    for (x, y, pixel) in pictures[0].enumerate_pixels() {
+    for (x, y, pixel) in images[0].enumerate_pixels() {
         let (x, y) = (x as usize, y as usize);
         if x == 0 || y == 0 || x + 1 == width || y + 1 == SIZE[1] as usize {
             continue;
@@ -130,7 +132,7 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
             continue;
         }
         counts[usize::from(is_dark)] += 1;
-        let other = pictures[1].get_pixel(x as u32, y as u32);
+        let other = images[1].get_pixel(x as u32, y as u32);
         if is_dark != (pixel != other) {
             wrong.push((x, y));
         }
@@ -167,11 +169,11 @@ fn shadows_are_those_that_rays_find() {
 #[test]
 fn a_larger_lamp_makes_softer_edges_and_no_other_light() {
     let Some(ctx) = device() else { return };
-    let picture = |filter, lamp_radius| {
-        picture_of(&mut lamp(&ctx, &OmniShadowsConfig { filter, lamp_radius, haze: 0.0, ..usual() }), 0)
+    let image = |filter, lamp_radius| {
+        image_of(&mut lamp(&ctx, &OmniShadowsConfig { filter, lamp_radius, haze: 0.0, ..usual() }), 0)
     };
-    let hard = picture(ShadowFilter::Linear, 0.0);
-    let [sharp, soft] = [0.002, 0.05].map(|radius| picture(ShadowFilter::Soft, radius));
+    let hard = image(ShadowFilter::Linear, 0.0);
+    let [sharp, soft] = [0.002, 0.05].map(|radius| image(ShadowFilter::Soft, radius));
     let [near, far] = [&sharp, &soft].map(edges);
     assert!(far < 0.8 * near, "edges of {far} are no softer than of {near}");
     let [dim, bright] = [&hard, &soft].map(mean);
@@ -179,42 +181,39 @@ fn a_larger_lamp_makes_softer_edges_and_no_other_light() {
 }
 
 /// Mean difference of pixels side by side.
-fn edges(picture: &RgbaImage) -> f64 {
-    let rows = picture.rows().map(|row| row.map(|pixel| f64::from(pixel[1])).collect::<Vec<_>>());
+fn edges(image: &RgbaImage) -> f64 {
+    let rows = image.rows().map(|row| row.map(|pixel| f64::from(pixel[1])).collect::<Vec<_>>());
     let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>());
     steps.sum::<f64>() / f64::from(SIZE[0] * SIZE[1])
 }
 
-fn mean(picture: &RgbaImage) -> f64 {
-    picture.pixels().map(|pixel| f64::from(pixel[1])).sum::<f64>() / f64::from(SIZE[0] * SIZE[1])
+fn mean(image: &RgbaImage) -> f64 {
+    image.pixels().map(|pixel| f64::from(pixel[1])).sum::<f64>() / f64::from(SIZE[0] * SIZE[1])
 }
 
 #[test]
 fn a_round_has_no_seam() {
     let Some(ctx) = device() else { return };
-    let mut sample = lamp(&ctx, &usual());
-    let first = picture_of(&mut sample, 0);
-    assert_ne!(picture_of(&mut sample, 33), first, "it swings");
-    assert_eq!(picture_of(&mut sample, ROUND), first);
+    assert_loops_without_seam(&mut lamp(&ctx, &usual()));
 }
 
 #[test]
 fn the_lamp_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    assert_as_ever("omni_shadows_small", &picture_of(&mut lamp(&ctx, &usual()), 0));
+    assert_matches_reference("omni_shadows_small", &image_of(&mut lamp(&ctx, &usual()), 0));
 }
 
 #[test]
-fn another_driver_shows_it() {
-    without_ray_tracing(another_driver_shows_it, || {
+fn another_driver_renders_it() {
+    on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = device() else { return };
-        let picture = picture_of(&mut lamp(&ctx, &usual()), 0);
-        assert_alike("SwiftShader lamp", &picture, &reference("omni_shadows_small"), &OTHER_DRIVER);
+        let image = image_of(&mut lamp(&ctx, &usual()), 0);
+        assert_similar("SwiftShader lamp", &image, &reference_image("omni_shadows_small"), &OTHER_DRIVER);
     });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     assert_refuses_impossible_sizes(|extent| {
         OmniShadows::new(&ctx, &OmniShadowsConfig { extent, ..usual() })

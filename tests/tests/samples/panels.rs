@@ -1,22 +1,22 @@
-//! Panels of samples that make targets and pipelines anew for what is asked of them: the picture is then that of a sample made so.
+//! Panels of samples that recreate targets and pipelines: after a change the image equals that of a new sample.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fmt::Debug;
 
 use lvk::Context;
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridRenderer, HybridSequence, Method, RayPath};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig, SkinUpdate};
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
-use lvk_tests::still_life::still_life;
+use lvk_tests::scene_obj::obj_scene;
 
 const SIZE: [u32; 2] = [40, 24];
 
-fn picture<S: Sample>(sample: &mut S) -> Vec<u8> {
-    sample.update(Moment::of_frame(3, 10)).map_err(Into::into).unwrap();
+fn render_image<S: Sample>(sample: &mut S) -> Vec<u8> {
+    sample.update(FrameTime::from_frame(3, 10)).map_err(Into::into).unwrap();
     headless::picture(sample).map_err(Into::into).unwrap()
 }
 
@@ -28,14 +28,14 @@ fn check<S: Sample, C: Copy + PartialEq + Debug>(
     impossible: C,
 ) {
     let mut sample = make(&configs[0]);
-    let first = picture(&mut sample);
+    let first = render_image(&mut sample);
     for config in configs[1..].iter().chain(&configs[..1]) {
         *wanted(&mut sample) = *config;
-        assert!(picture(&mut sample) == picture(&mut make(config)), "{config:?}");
+        assert!(render_image(&mut sample) == render_image(&mut make(config)), "{config:?}");
         assert_eq!(*wanted(&mut sample), *config, "it was refused");
     }
     *wanted(&mut sample) = impossible;
-    assert!(picture(&mut sample) == first, "{impossible:?}");
+    assert!(render_image(&mut sample) == first, "{impossible:?}");
     assert_eq!(*wanted(&mut sample), configs[0], "what cannot be is wanted no more");
 }
 
@@ -47,7 +47,7 @@ fn other_path(ctx: &Context) -> RayPath {
 #[test]
 fn hybrid_changes_method_bounces_depth_and_samples() {
     let Some(ctx) = device() else { return };
-    let scene = still_life();
+    let scene = obj_scene();
     let make = |config: &HybridConfig| {
         HybridSequence::new(HybridRenderer::new(&ctx, &scene, config).unwrap(), &scene, 0, false)
     };

@@ -1,4 +1,4 @@
-//! The paper's experiment on a tiny scene: it measures everything, and its report is whole and consistent.
+//! The paper's experiment on a tiny scene: it measures everything, and its report is complete and consistent.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::HashMap;
@@ -10,7 +10,7 @@ use lvk_samples::bench::paper::{
 };
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
-use lvk_tests::still_life::still_life;
+use lvk_tests::scene_obj::obj_scene;
 
 const SIZE: [u32; 2] = [96, 54];
 const FRAMES: u32 = 3;
@@ -18,12 +18,12 @@ const FRAMES: u32 = 3;
 /// The experiment on a scene that bears the name of one of the paper's.
 fn experiment(folder: &Path) -> Option<Experiment> {
     let ctx = device()?;
-    let mut scene = still_life();
+    let mut scene = obj_scene();
     scene.name = "conference".to_owned();
     let paths = paths(&ctx).into_iter().map(|path| TracePath::of(path, ctx.capabilities())).collect();
     let plan = Plan { size: SIZE, frames: FRAMES, runs: 1, warm_up: 0, compared: 2, max_depth: 2, paths };
-    let pictures = Pictures::new(&folder.join(PICTURES), SIZE).unwrap();
-    let found = measure(&ctx, &scene, &plan, &pictures, &mut Progress::hidden()).unwrap();
+    let images = Pictures::new(&folder.join(PICTURES), SIZE).unwrap();
+    let found = measure(&ctx, &scene, &plan, &images, &mut Progress::hidden()).unwrap();
     let mut experiment = Experiment::new(ctx.capabilities(), "bench paper".to_owned(), plan);
     experiment.scenes.push(found);
     experiment.write(folder).unwrap();
@@ -81,7 +81,7 @@ fn the_experiment_measures_everything_and_reports_it() {
         }
     }
     assert_report_is_whole(folder.path(), &experiment);
-    assert_pictures_are_alike(folder.path(), &experiment);
+    assert_images_are_similar(folder.path(), &experiment);
 }
 
 /// A span is at least as long as its passes, up to rounding.
@@ -119,7 +119,7 @@ fn assert_report_is_whole(folder: &Path, experiment: &Experiment) {
     assert_eq!(linked, 1 + path_count * 3);
 }
 
-fn assert_pictures_are_alike(folder: &Path, experiment: &Experiment) {
+fn assert_images_are_similar(folder: &Path, experiment: &Experiment) {
     let scene = &experiment.scenes[0];
     for cell in &scene.cells {
         let alike = &cell.likeness;
@@ -138,8 +138,8 @@ fn assert_pictures_are_alike(folder: &Path, experiment: &Experiment) {
     for path in &experiment.plan.paths {
         let name = path.file_name();
         let file = |what: &str| folder.join(PICTURES).join(format!("conference_{name}_cam3_{what}.png"));
-        let picture = |what: &str| image::open(file(what)).unwrap().into_rgba8();
-        let (standalone, difference) = (picture("standalone"), picture("difference"));
+        let image = |what: &str| image::open(file(what)).unwrap().into_rgba8();
+        let (standalone, difference) = (image("standalone"), image("difference"));
         assert_eq!((standalone.dimensions(), difference.dimensions()), ((96, 54), (98, 56)));
         let white = difference.pixels().filter(|pixel| pixel.0 == [255; 4]).count();
         assert!(white > 96 * 54 / 2, "only {white} pixels are equal");

@@ -1,24 +1,27 @@
-//! The pictures of the `reflections` sample: its ways of rendering agree, and they show what they should.
+//! Images of the `reflections` sample: its rendering paths agree, and the images are right.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
 use lvk::{Context, Dependencies, DeviceProfile};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::reflections::{
-    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
+    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, SkinUpdate, reflection_range,
 };
 use lvk_samples::scene::Camera;
 use lvk_samples::shaders::INCLUDES;
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever};
+use lvk_tests::image_comparison::{
+    ImageSimilarity, Tolerance, assert_matches_reference, assert_not_empty, assert_similar,
+};
 use lvk_tests::{device, device_with};
 
 /// No multiple of a work group.
 const SIZE: [u32; 2] = [162, 91];
-/// Of one picture by two paths.
+/// Of one image by two paths.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 2e-3, flip: 2e-3 };
 
 fn config(path: RayPath) -> ReflectionsConfig {
@@ -29,33 +32,25 @@ fn hall(ctx: &Context, config: &ReflectionsConfig) -> Reflections {
     Reflections::new(ctx, config).unwrap()
 }
 
-fn picture_at(hall: &mut Reflections, phase: f32) -> RgbaImage {
+fn image_at(hall: &mut Reflections, phase: f32) -> RgbaImage {
     hall.show(phase);
-    picture(hall)
+    render_image(hall)
 }
 
-fn picture(hall: &mut Reflections) -> RgbaImage {
+fn render_image(hall: &mut Reflections) -> RgbaImage {
     let [width, height] = [hall.config().width, hall.config().height];
     RgbaImage::from_raw(width, height, headless::picture(hall).unwrap()).unwrap()
 }
 
-/// Two empty pictures would agree too.
-fn assert_shows_something(picture: &RgbaImage) {
-    let colors: std::collections::HashSet<[u8; 4]> = picture.pixels().map(|pixel| pixel.0).collect();
-    assert!(colors.len() > 2000, "{} colours", colors.len());
-    assert!(picture.pixels().all(|pixel| pixel[3] == 255), "a pixel was left out");
-}
-
 #[test]
-fn both_paths_give_the_same_picture() {
+fn both_paths_give_the_same_image() {
     let Some(ctx) = device() else { return };
     let paths = paths(&ctx);
     for phase in [0.0, 0.3] {
-        let all: Vec<_> =
-            paths.iter().map(|path| picture_at(&mut hall(&ctx, &config(*path)), phase)).collect();
-        assert_shows_something(&all[0]);
+        let all: Vec<_> = paths.iter().map(|path| image_at(&mut hall(&ctx, &config(*path)), phase)).collect();
+        assert_not_empty(&all[0], 2000);
         for other in &all[1..] {
-            assert_alike(&format!("reflections at {phase} by query"), other, &all[0], &SAME_RAYS);
+            assert_similar(&format!("reflections at {phase} by query"), other, &all[0], &SAME_RAYS);
         }
     }
 }
@@ -65,13 +60,13 @@ fn a_frame_depends_on_its_phase_alone() {
     let Some(ctx) = device() else { return };
     let config = ReflectionsConfig { samples: 2, ..config(paths(&ctx)[0]) };
     let mut sequence = hall(&ctx, &config);
-    let first = picture_at(&mut sequence, 0.0);
+    let first = image_at(&mut sequence, 0.0);
     for frame in 1..4 {
-        assert_ne!(picture_at(&mut sequence, frame as f32 / 240.0), first, "something moves");
+        assert_ne!(image_at(&mut sequence, frame as f32 / 240.0), first, "something moves");
     }
-    let fifth = picture_at(&mut sequence, 5.0 / 240.0);
-    assert_eq!(picture_at(&mut hall(&ctx, &config), 5.0 / 240.0), fifth, "alone");
-    assert_eq!(picture_at(&mut sequence, 0.0), first, "back again");
+    let fifth = image_at(&mut sequence, 5.0 / 240.0);
+    assert_eq!(image_at(&mut hall(&ctx, &config), 5.0 / 240.0), fifth, "alone");
+    assert_eq!(image_at(&mut sequence, 0.0), first, "back again");
 }
 
 #[test]
@@ -79,16 +74,17 @@ fn a_round_ends_where_it_began_without_a_seam() {
     let Some(ctx) = device() else { return };
     let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
     let mut frame = |frame, frames_per_round| {
-        hall.update(Moment::of_frame(frame, frames_per_round)).unwrap();
-        picture(&mut hall)
+        hall.update(FrameTime::from_frame(frame, frames_per_round)).unwrap();
+        render_image(&mut hall)
     };
     let first = frame(0, 240);
-    assert_shows_something(&first);
+    assert_not_empty(&first, 2000);
     for round in [1, 7, 240] {
         assert!(frame(round, round) == first, "frame {round} of a round of as many is frame 0");
     }
     assert!(frame(242, 240) == frame(2, 240), "and so on");
-    let [next, last] = [1, 239].map(|number| Likeness::of(&frame(number, 240), &first).difference.psnr);
+    let [next, last] =
+        [1, 239].map(|number| ImageSimilarity::measure(&frame(number, 240), &first).difference.psnr);
     assert!(next < 40.0, "something moves: {next} dB");
     assert!((next - last).abs() < 2.0, "{last} dB to the end of the round, {next} dB from its beginning on");
 }
@@ -96,7 +92,7 @@ fn a_round_ends_where_it_began_without_a_seam() {
 /// From close by the basin.
 fn look_at_serpent(hall: &mut Reflections, phase: f32) {
     hall.show(phase);
-    hall.look(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
+    hall.set_camera(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
 }
 
 #[test]
@@ -108,22 +104,22 @@ fn the_refitted_serpent_is_the_one_built_anew() {
             // Several refits, each from the one before.
             for step in 0..4 {
                 hall.show(0.15 * step as f32);
-                picture(&mut hall);
+                render_image(&mut hall);
             }
             look_at_serpent(&mut hall, 0.6);
-            picture(&mut hall)
+            render_image(&mut hall)
         };
         let (refitted, rebuilt) = (updated(SkinUpdate::Refit), updated(SkinUpdate::Rebuild));
-        assert_shows_something(&refitted);
+        assert_not_empty(&refitted, 2000);
         let elsewhere = {
             let mut hall = hall(&ctx, &config(path));
             look_at_serpent(&mut hall, 0.0);
-            picture(&mut hall)
+            render_image(&mut hall)
         };
-        let moved = Likeness::of(&refitted, &elsewhere);
-        assert!(moved.difference.psnr < 28.0, "the serpent is large in the picture, and swims: {moved}");
+        let moved = ImageSimilarity::measure(&refitted, &elsewhere);
+        assert!(moved.difference.psnr < 28.0, "the serpent is large in the image, and swims: {moved}");
         let what = format!("refitted serpent {path:?}");
-        assert_alike(
+        assert_similar(
             &what,
             &refitted,
             &rebuilt,
@@ -138,8 +134,8 @@ fn culling_leaves_out_small_things_and_nothing_else() {
     let path = paths(&ctx)[0];
     let with = |min_angle| {
         let mut hall = hall(&ctx, &ReflectionsConfig { min_angle, ..config(path) });
-        let picture = picture_at(&mut hall, 0.0);
-        (hall.instance_count(), picture)
+        let image = image_at(&mut hall, 0.0);
+        (hall.instance_count(), image)
     };
     let (all, whole) = with(0.0);
     let (usual, culled) = with(ReflectionsConfig::DEFAULT_MIN_ANGLE);
@@ -149,16 +145,16 @@ fn culling_leaves_out_small_things_and_nothing_else() {
     assert!(usual.kept * 10 < usual.total * 8, "{usual:?}: culling saves something");
     assert!(few.kept < usual.kept && few.kept > 10, "{few:?}: large things stay");
     let tolerance = Tolerance { psnr: 38.0, ssim: 0.99, differing_share: 0.02, flip: 0.01 };
-    assert_alike("culled hall", &culled, &whole, &tolerance);
-    let likeness = Likeness::of(&empty, &whole);
-    assert!(likeness.difference.psnr < 60.0, "larger things do show: {likeness}");
+    assert_similar("culled hall", &culled, &whole, &tolerance);
+    let similarity = ImageSimilarity::measure(&empty, &whole);
+    assert!(similarity.difference.psnr < 60.0, "larger things do show: {similarity}");
 }
 
 #[test]
 fn what_culling_saves_is_measured_and_changes_nothing() {
     let Some(ctx) = device() else { return };
     let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
-    let before = picture_at(&mut hall, 0.0);
+    let before = image_at(&mut hall, 0.0);
     let Some(cost) = CullingCost::measure(&hall, 2).unwrap() else {
         return eprintln!("NOT TESTED, {} has no timestamps", ctx.capabilities().device_name);
     };
@@ -166,12 +162,12 @@ fn what_culling_saves_is_measured_and_changes_nothing() {
         assert!(build_ms > 0.0 && rays_ms > 0.0, "{cost}");
     }
     assert_eq!(CullingCost::measure(&hall, 0).unwrap(), None);
-    assert!(picture(&mut hall) == before);
+    assert!(render_image(&mut hall) == before);
 }
 
 /// The length of rays for roughness 0, 0.01 and so on to 1, by the shaders' own text.
 fn ranges_by_shader(ctx: &Context) -> Vec<f32> {
-    let (_, rule) = INCLUDES.iter().find(|(name, _)| *name == "reflections/range.glsl").unwrap();
+    let (_, rule) = INCLUDES.iter().find(|(name, _)| *name == "reflections/ray_range.glsl").unwrap();
     let main = "
         layout(local_size_x = 1) in;
         layout(buffer_reference, scalar) writeonly buffer Ranges { float at[]; };
@@ -205,7 +201,7 @@ fn shaders_shorten_rays_by_the_rule() {
 }
 
 #[test]
-fn a_phone_shows_the_same() {
+fn a_phone_renders_the_same() {
     let phone = DeviceProfile::mali_g715();
     let Some(ctx) = device() else { return };
     let Some(rehearsal) = device_with(|desc| desc.profile = Some(&phone)) else { return };
@@ -215,23 +211,23 @@ fn a_phone_shows_the_same() {
         eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
         return;
     }
-    let expected = picture_at(&mut hall(&ctx, &config(path)), 1.0);
-    let picture = picture_at(&mut hall(&rehearsal, &config(path)), 1.0);
-    assert_alike("hall on a phone", &picture, &expected, &Tolerance { psnr: 60.0, ..SAME_RAYS });
+    let expected = image_at(&mut hall(&ctx, &config(path)), 1.0);
+    let image = image_at(&mut hall(&rehearsal, &config(path)), 1.0);
+    assert_similar("hall on a phone", &image, &expected, &Tolerance { psnr: 60.0, ..SAME_RAYS });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     let config = config(paths(&ctx)[0]);
     let refused = |config| Reflections::new(&ctx, &config).err();
     for samples in [0, ReflectionsConfig::MAX_SAMPLES + 1] {
         let error = refused(ReflectionsConfig { samples, ..config });
-        assert!(matches!(error, Some(ReflectionsError::BadSamples { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::OutOfRange { .. })), "{error:?}");
     }
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let error = refused(ReflectionsConfig { width, height, ..config });
-        assert!(matches!(error, Some(ReflectionsError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }
 
@@ -239,6 +235,6 @@ fn impossible_pictures_are_refused() {
 fn the_hall_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
     let config = ReflectionsConfig { samples: 4, ..config(paths(&ctx)[0]) };
-    let picture = picture_at(&mut hall(&ctx, &config), 0.0);
-    assert_as_ever("reflections_small", &picture);
+    let image = image_at(&mut hall(&ctx, &config), 0.0);
+    assert_matches_reference("reflections_small", &image);
 }

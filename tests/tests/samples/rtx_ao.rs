@@ -1,23 +1,27 @@
-//! The pictures of the `rtx_ao` sample: its paths agree, it converges to what a reference in f64 finds, and its cache
-//! forgets what has moved.
+//! Images of the `rtx_ao` sample: its paths agree, it converges to a reference in f64, and its cache drops what has
+//! moved.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
 use image::imageops::{FilterType, resize};
 use lvk::glam::{DAffine3, DVec3, Vec3};
-use lvk::{Context, FeatureRequest, RayQueryRequest};
+use lvk::{Context, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig, View};
 use lvk_samples::scene::{Camera, Scene};
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, reference};
+use lvk_tests::image_comparison::{
+    ImageSimilarity, Tolerance, assert_matches_reference, assert_similar, reference_image,
+};
 use lvk_tests::rays::Ray;
 use lvk_tests::reference::{Geometry, Hit, Instance, Reference};
-use lvk_tests::{TestDevice, device, device_with};
+use lvk_tests::rtx_sample::software_device;
+use lvk_tests::subprocess::on_swiftshader;
+use lvk_tests::{device, device_with};
 
 /// No multiple of a work group.
 const SIZE: [u32; 2] = [158, 89];
@@ -32,53 +36,47 @@ fn town(ctx: &Context, path: RayPath, passes: u32, rays: u32) -> RtxAo {
     RtxAo::new(ctx, &Scene::town(), Some(&Scene::carousel()), &config).unwrap()
 }
 
-fn picture(town: &mut RtxAo) -> RgbaImage {
+fn render_image(town: &mut RtxAo) -> RgbaImage {
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(town).unwrap()).unwrap()
 }
 
-fn software() -> Option<TestDevice> {
-    device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
-    })
-}
-
 #[test]
-fn all_paths_show_the_town() {
-    let (Some(ctx), Some(other)) = (device(), software()) else { return };
+fn all_paths_render_the_town() {
+    let (Some(ctx), Some(other)) = (device(), software_device()) else { return };
     let mut all: Vec<_> = paths(&ctx).into_iter().map(|path| town(&ctx, path, 2, 1)).collect();
     all.push(town(&other, RayPath::Query, 2, 1));
     for phase in [0, 3] {
         let mut show = |town: &mut RtxAo| {
-            town.update(Moment::of_frame(phase, 20)).unwrap();
-            picture(town)
+            town.update(FrameTime::from_frame(phase, 20)).unwrap();
+            render_image(town)
         };
-        let pictures: Vec<_> = all.iter_mut().map(&mut show).collect();
-        for other in &pictures[1..] {
-            assert_alike(&format!("town in frame {phase}"), other, &pictures[0], &SAME_RAYS);
+        let images: Vec<_> = all.iter_mut().map(&mut show).collect();
+        for other in &images[1..] {
+            assert_similar(&format!("town in frame {phase}"), other, &images[0], &SAME_RAYS);
         }
     }
 }
 
 #[test]
 fn the_cache_forgets_what_has_moved() {
-    let Some(ctx) = software() else { return };
+    let Some(ctx) = software_device() else { return };
     let mut town = town(&ctx, RayPath::Query, 2, 1);
     let start = *town.shown();
-    let first = picture(&mut town);
+    let first = render_image(&mut town);
     town.show(&start);
     assert_eq!(town.passes(), 2, "nothing moved");
-    assert_ne!(picture(&mut town), first, "four passes are not two");
+    assert_ne!(render_image(&mut town), first, "four passes are not two");
     assert_eq!(town.passes(), 4);
     let moved = Camera { eye: [9.0, 6.0, 2.0], ..start.camera };
     for view in [View { camera: moved, ..start }, View { turns: 0.06, ..start }] {
         town.show(&view);
         assert_eq!(town.passes(), 0, "{view:?}");
-        assert_ne!(picture(&mut town), first, "{view:?}");
+        assert_ne!(render_image(&mut town), first, "{view:?}");
         town.show(&start);
-        assert_eq!(picture(&mut town), first, "back from {view:?}");
+        assert_eq!(render_image(&mut town), first, "back from {view:?}");
     }
-    town.update(Moment::of_frame(0, 9)).unwrap();
-    assert_eq!(picture(&mut town), first, "a frame depends on its moment alone");
+    town.update(FrameTime::from_frame(0, 9)).unwrap();
+    assert_eq!(render_image(&mut town), first, "a frame depends on its moment alone");
 }
 
 /// The triangles of both bodies, where they are at the beginning.
@@ -112,7 +110,7 @@ impl World {
         Self { scenes, reference }
     }
 
-    /// Where a ray ends, and the geometric and the shading normal there, towards its origin.
+    /// Returns the end of a ray, and the geometric and the shading normal there, towards its origin.
     fn surface(&self, ray: &Ray, hit: &Hit) -> [DVec3; 3] {
         let scene = &self.scenes[hit.ids.custom_index as usize];
         let corners = scene.triangles[hit.ids.primitive as usize].map(|corner| corner as usize);
@@ -177,17 +175,17 @@ fn mean_error(openness: &[f32], expected: &[([u32; 2], f64)]) -> f64 {
 
 #[test]
 fn it_converges_to_the_reference() {
-    let Some(ctx) = software() else { return };
+    let Some(ctx) = software_device() else { return };
     let mut town = town(&ctx, RayPath::Query, 6, 4);
     let mut shown = None;
     let mut after = |passes: u32| {
         while town.passes() < passes {
-            shown = Some(picture(&mut town));
+            shown = Some(render_image(&mut town));
         }
         (shown.clone().unwrap(), town.openness().unwrap())
     };
     let [few, more, most] = [6, 24, 96].map(&mut after);
-    let psnr = |one: &RgbaImage, other: &RgbaImage| Likeness::of(one, other).difference.psnr;
+    let psnr = |one: &RgbaImage, other: &RgbaImage| ImageSimilarity::measure(one, other).difference.psnr;
     let (first, second) = (psnr(&few.0, &more.0), psnr(&more.0, &most.0));
     eprintln!("6 to 24 passes: {first:.1} dB, 24 to 96: {second:.1} dB");
     assert!(first > 26.0 && second > first + 3.0, "{first} dB, then {second} dB");
@@ -207,42 +205,47 @@ fn it_converges_to_the_reference() {
 #[test]
 fn the_town_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    assert_as_ever("rtx_ao_small", &picture(&mut town(&ctx, paths(&ctx)[0], 16, 2)));
+    assert_matches_reference("rtx_ao_small", &render_image(&mut town(&ctx, paths(&ctx)[0], 16, 2)));
 }
 
-fn small(picture: &RgbaImage) -> RgbaImage {
-    resize(picture, SIZE[0] / 4, SIZE[1] / 4, FilterType::Triangle)
+fn small(image: &RgbaImage) -> RgbaImage {
+    resize(image, SIZE[0] / 4, SIZE[1] / 4, FilterType::Triangle)
 }
 
-/// What the next test asks of another driver.
+/// The next test, on the usual driver.
 #[test]
-fn few_passes_show_the_same_but_for_noise_and_nothing_else_does() {
-    let Some(ctx) = software() else { return };
-    let expected = small(&reference("rtx_ao_small"));
-    let noisy = small(&picture(&mut town(&ctx, RayPath::Query, 2, 2)));
-    assert_alike("town by few passes", &noisy, &expected, &OTHER_NOISE);
+fn few_passes_render_the_same_but_for_noise_and_nothing_else_does() {
+    let Some(ctx) = software_device() else { return };
+    let expected = small(&reference_image("rtx_ao_small"));
+    let noisy = small(&render_image(&mut town(&ctx, RayPath::Query, 2, 2)));
+    assert_similar("town by few passes", &noisy, &expected, &OTHER_NOISE);
     let rtx = RtxConfig { path: RayPath::Query, width: SIZE[0], height: SIZE[1] };
     let config = RtxAoConfig { passes: 2, radius: Some(0.2), ..RtxAoConfig::new(rtx) };
     let open = RtxAo::new(&ctx, &Scene::town(), Some(&Scene::carousel()), &config);
-    let likeness = Likeness::of(&small(&picture(&mut open.unwrap())), &expected);
-    assert!(!likeness.is_within(&OTHER_NOISE), "without occlusion: {likeness}");
-    eprintln!("without occlusion: {likeness}");
+    let similarity = ImageSimilarity::measure(&small(&render_image(&mut open.unwrap())), &expected);
+    assert!(!similarity.is_within(&OTHER_NOISE), "without occlusion: {similarity}");
+    eprintln!("without occlusion: {similarity}");
 }
 
 /// Rays take SwiftShader seconds for each pass.
 #[test]
-fn a_driver_without_ray_tracing_shows_the_town() {
-    without_ray_tracing(a_driver_without_ray_tracing_shows_the_town, || {
+fn a_driver_without_ray_tracing_renders_the_town() {
+    on_swiftshader(a_driver_without_ray_tracing_renders_the_town, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = picture(&mut town(&ctx, RayPath::Query, 2, 2));
-        assert_alike("SwiftShader town", &small(&picture), &small(&reference("rtx_ao_small")), &OTHER_NOISE);
+        let image = render_image(&mut town(&ctx, RayPath::Query, 2, 2));
+        assert_similar(
+            "SwiftShader town",
+            &small(&image),
+            &small(&reference_image("rtx_ao_small")),
+            &OTHER_NOISE,
+        );
     });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     let config = RtxAoConfig::new(RtxConfig { path: paths(&ctx)[0], width: 0, height: 8 });
     let error = RtxAo::new(&ctx, &Scene::carousel(), None, &config).err();
-    assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
+    assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
 }

@@ -1,4 +1,4 @@
-//! Sequences of pictures: frame N depends on N alone, and Ctrl-C leaves whole pictures.
+//! Image sequences: frame N depends on N alone, and Ctrl-C leaves complete images.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;
@@ -7,24 +7,24 @@ use lvk::Context;
 use lvk_samples::app::frame_name::FrameName;
 use lvk_samples::app::headless::Headless;
 use lvk_samples::app::interrupt::Interrupt;
-use lvk_samples::app::play::{Job, Played, play};
 use lvk_samples::app::progress::Progress;
+use lvk_samples::app::sequence::{RenderJob, RenderReport, render_frames};
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};
 use lvk_tests::device;
-use lvk_tests::hybrid::{Studio, paths};
-use lvk_tests::still_life::still_life;
+use lvk_tests::hybrid::{HybridHarness, paths};
+use lvk_tests::scene_obj::obj_scene;
 
 const SIZE: [u32; 2] = [64, 36];
 
 /// The sample, set up anew as by a process of its own, plays some frames into a folder.
-fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
-    let scene = still_life();
+fn played(ctx: &Context, frames: &str, folder: &Path) -> RenderReport {
+    let scene = obj_scene();
     let path = paths(ctx)[0];
     let config =
         HybridConfig { path, width: SIZE[0], height: SIZE[1], max_depth: 2, ..HybridConfig::default() };
     let renderer = HybridRenderer::new(ctx, &scene, &config).unwrap();
     let mut sequence = HybridSequence::new(renderer, &scene, 0, true);
-    let job = Job {
+    let job = RenderJob {
         frames: frames.parse().unwrap(),
         warm_up: 0,
         frames_per_round: 7,
@@ -33,7 +33,8 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
         resume: false,
     };
     job.check().unwrap();
-    play(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf()).unwrap()
+    render_frames(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf())
+        .unwrap()
 }
 
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -62,13 +63,13 @@ fn ranges_of_several_processes_make_the_same_sequence() {
 }
 
 #[test]
-fn a_sequence_starts_with_the_picture_of_its_camera() {
+fn a_sequence_starts_with_the_image_of_its_camera() {
     let Some(ctx) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
     let timings = played(&ctx, "0..1", folder.path()).timings;
-    let scene = still_life();
+    let scene = obj_scene();
     let way = (Method::Hybrid, paths(&ctx)[0]);
-    let expected = Studio::new(&ctx, &scene, way, SIZE, 2).picture(&scene.cameras[0]);
+    let expected = HybridHarness::new(&ctx, &scene, way, SIZE, 2).render(&scene.cameras[0]);
     assert!(image::open(folder.path().join("frame_00.png")).unwrap().into_rgba8() == expected);
     let passes: Vec<&str> = timings.passes().collect();
     assert_eq!(passes, ["geometry pass", "ray pass"]);
@@ -79,9 +80,8 @@ mod interrupted {
     use std::process::{Command, Stdio};
     use std::time::{Duration, Instant};
 
-    use clap::Parser as _;
-    use lvk_samples::app::args::HybridArgs;
-    use lvk_tests::child::path_in_program;
+    use lvk_samples::app::cli;
+    use lvk_tests::subprocess::test_path;
     use rustix::process::{Pid, Signal, kill_process};
 
     use super::*;
@@ -92,7 +92,7 @@ mod interrupted {
     const OBJ: &str = "v -2 -2 0\nv 2 -2 0\nv 0 2 0\nv -9 -9 -3\nv 9 -9 -3\nv 9 9 -3\nv -9 9 -3\n\
                        f 1 2 3\nf 4 5 6 7\n";
 
-    /// What the program of the sample does, in this process.
+    /// Runs the program of the sample in this process.
     fn program(folder: &Path) -> ! {
         std::fs::write(folder.join("scene.obj"), OBJ).unwrap();
         let out = folder.join("frames/frame_######.png");
@@ -105,13 +105,13 @@ mod interrupted {
             "--out".to_owned(),
             out.display().to_string(),
         ]);
-        let status = lvk_samples::hybrid::run(&HybridArgs::parse_from(words));
+        let status = cli::run::<HybridSequence>(&cli::parse::<HybridSequence>(words).unwrap());
         let is_interrupted = status == std::process::ExitCode::from(130);
         std::process::exit(if is_interrupted { 42 } else { 1 });
     }
 
     #[test]
-    fn an_interrupted_program_leaves_whole_pictures_and_says_so() {
+    fn an_interrupted_program_leaves_whole_images_and_says_so() {
         if let Some(folder) = std::env::var_os(FOLDER) {
             program(Path::new(&folder));
         }
@@ -119,7 +119,7 @@ mod interrupted {
             return;
         }
         let folder = tempfile::tempdir().unwrap();
-        let test = path_in_program(&an_interrupted_program_leaves_whole_pictures_and_says_so);
+        let test = test_path(&an_interrupted_program_leaves_whole_images_and_says_so);
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args([test, "--exact", "--nocapture"])
             .env(FOLDER, folder.path())
@@ -141,8 +141,8 @@ mod interrupted {
         assert!(written.len() >= 3);
         for (name, content) in written {
             assert!(name.starts_with("frame_") && name.ends_with(".png"), "{name} was left behind");
-            let picture = image::load_from_memory(&content).unwrap();
-            assert_eq!((picture.width(), picture.height()), (48, 27), "{name}");
+            let image = image::load_from_memory(&content).unwrap();
+            assert_eq!((image.width(), image.height()), (48, 27), "{name}");
         }
     }
 }

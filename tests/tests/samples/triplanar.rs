@@ -1,15 +1,15 @@
-//! The pictures of the `triplanar` sample: textures go and come while frames are on their way, what shows them changes and nothing
-//! else, and nothing is left behind.
+//! Images of the `triplanar` sample: textures are loaded and freed with frames in flight, only the bodies that sample
+//! them change, and no memory is left.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::frame::Frame;
-use lvk_samples::app::sample::{Moment, Sample};
-use lvk_samples::triplanar::{Presence, Triplanar};
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
-use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_of};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::triplanar::{Residency, Triplanar};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
+use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, image_of};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// On SwiftShader: its filters have fewer bits, and are not anisotropic in the same way.
@@ -27,9 +27,9 @@ fn all() -> std::ops::Range<usize> {
     0..Triplanar::texture_names().len()
 }
 
-/// Submits a frame that nobody waits for.
+/// Submits a frame without waiting for it.
 fn send(sample: &mut Triplanar, frame: u32) {
-    sample.update(Moment::of_frame(frame, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(frame, ROUND)).unwrap();
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
     sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -51,7 +51,7 @@ fn textures(ctx: &Context) -> usize {
 fn textures_go_and_come_while_frames_are_on_their_way() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
-    let first = picture_of(&mut sample, 0);
+    let first = image_of(&mut sample, 0);
     let count = textures(&ctx);
     for round in 0..4 {
         send(&mut sample, round);
@@ -59,7 +59,7 @@ fn textures_go_and_come_while_frames_are_on_their_way() {
         send(&mut sample, round);
         assert_eq!(textures(&ctx), count - all().len(), "all but the targets and the placeholder");
         all().for_each(|number| sample.load(number));
-        assert!(all().all(|number| sample.presence(number) == Presence::Coming));
+        assert!(all().all(|number| sample.residency(number) == Residency::Loading));
         send(&mut sample, round);
         // One that is given up before it has come, and asked for again.
         sample.unload(1);
@@ -68,40 +68,40 @@ fn textures_go_and_come_while_frames_are_on_their_way() {
         sample.wait_for_textures().unwrap();
         send(&mut sample, round);
     }
-    assert!(all().all(|number| sample.presence(number) == Presence::There));
-    assert!(picture_of(&mut sample, 0) == first, "what came back is what had gone");
+    assert!(all().all(|number| sample.residency(number) == Residency::Resident));
+    assert!(image_of(&mut sample, 0) == first, "what came back is what had gone");
     assert_eq!(textures(&ctx), count);
 }
 
 #[test]
-fn a_frame_on_its_way_keeps_the_textures_it_shows() {
+fn a_frame_on_its_way_keeps_the_textures_it_samples() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
-    let whole = picture_of(&mut sample, 0);
-    sample.update(Moment::of_frame(0, ROUND)).unwrap();
+    let whole = image_of(&mut sample, 0);
+    sample.update(FrameTime::from_frame(0, ROUND)).unwrap();
     let mut frame = Frame::free(&ctx).unwrap();
-    let picture = sample.record(&mut frame).unwrap();
+    let image = sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
     all().for_each(|number| sample.unload(number));
-    let pixels = ctx.download_texture(picture, &lvk::TextureRegion::default()).unwrap();
+    let pixels = ctx.download_texture(image, &lvk::TextureRegion::default()).unwrap();
     assert!(pixels == *whole.as_raw());
 }
 
 #[test]
-fn only_what_a_texture_is_on_shows_the_placeholder() {
+fn only_textured_surfaces_have_the_placeholder() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
-    let whole = picture_of(&mut sample, 0);
+    let whole = image_of(&mut sample, 0);
     // Bricks are on the left, marble on the right.
     let (left, right) = (0..SIZE[0] / 3, 2 * SIZE[0] / 3..SIZE[0]);
     for (name, on, off) in [("brick", left.clone(), right.clone()), ("marble", right, left)] {
         sample.unload(number_of(name));
-        let without = picture_of(&mut sample, 0);
+        let without = image_of(&mut sample, 0);
         assert!(differing(&whole, &without, on) > 0.1 && differing(&whole, &without, off) == 0.0, "{name}");
         sample.load(number_of(name));
-        assert_eq!(sample.presence(number_of(name)), Presence::Coming);
+        assert_eq!(sample.residency(number_of(name)), Residency::Loading);
         sample.wait_for_textures().unwrap();
-        assert!(picture_of(&mut sample, 0) == whole, "{name} is back");
+        assert!(image_of(&mut sample, 0) == whole, "{name} is back");
     }
 }
 
@@ -118,13 +118,13 @@ fn what_comes_too_late_is_dropped() {
     // Made after it, by the same thread.
     sample.load(wood);
     sample.wait_for_textures().unwrap();
-    picture_of(&mut sample, 0);
-    assert_eq!((sample.presence(brick), sample.presence(wood)), (Presence::Away, Presence::There));
+    image_of(&mut sample, 0);
+    assert_eq!((sample.residency(brick), sample.residency(wood)), (Residency::Unloaded, Residency::Resident));
     assert_eq!(textures(&ctx), count - 1);
     sample.load(brick);
     sample.load(999);
     sample.unload(999);
-    assert_eq!(sample.presence(999), Presence::Away);
+    assert_eq!(sample.residency(999), Residency::Unloaded);
     // The thread ends with the sample, whatever it is at.
     drop(sample);
     assert_eq!(textures(&ctx), 0);
@@ -134,37 +134,37 @@ fn what_comes_too_late_is_dropped() {
 fn bodies_look_as_they_always_did() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
-    assert_as_ever("triplanar_small", &picture_of(&mut sample, 0));
+    assert_matches_reference("triplanar_small", &image_of(&mut sample, 0));
     ["brick", "leaves"].into_iter().for_each(|name| sample.unload(number_of(name)));
-    assert_as_ever("triplanar_unloaded_small", &picture_of(&mut sample, 0));
+    assert_matches_reference("triplanar_unloaded_small", &image_of(&mut sample, 0));
 }
 
 #[test]
-fn a_device_without_optional_features_shows_them() {
+fn a_device_without_optional_features_renders_them() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
-    let picture = picture_of(&mut sample(&ctx), 0);
-    assert_alike("bodies without features", &picture, &reference("triplanar_small"), &OTHER_DRIVER);
+    let image = image_of(&mut sample(&ctx), 0);
+    assert_similar("bodies without features", &image, &reference_image("triplanar_small"), &OTHER_DRIVER);
 }
 
 #[test]
-fn another_driver_shows_them() {
-    without_ray_tracing(another_driver_shows_them, || {
+fn another_driver_renders_them() {
+    on_swiftshader(another_driver_renders_them, || {
         let Some(ctx) = device() else { return };
         let mut sample = sample(&ctx);
-        let picture = picture_of(&mut sample, 0);
+        let image = image_of(&mut sample, 0);
         all().for_each(|number| sample.unload(number));
         send(&mut sample, 5);
         all().for_each(|number| sample.load(number));
         send(&mut sample, 6);
         sample.wait_for_textures().unwrap();
-        assert!(picture_of(&mut sample, 0) == picture);
-        assert_alike("SwiftShader bodies", &picture, &reference("triplanar_small"), &OTHER_DRIVER);
+        assert!(image_of(&mut sample, 0) == image);
+        assert_similar("SwiftShader bodies", &image, &reference_image("triplanar_small"), &OTHER_DRIVER);
     });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     assert_refuses_impossible_sizes(|size| Triplanar::new(&ctx, size));
 }

@@ -42,7 +42,7 @@ impl Easel {
         Self { ctx: ctx.clone(), ui, painter, target: ctx.create_texture(&desc).unwrap() }
     }
 
-    /// What `paint` puts on the ground, in pixels.
+    /// Returns the pixels after `paint` has drawn over the ground.
     fn paint(&mut self, shown: &[TextureHandle], paint: impl Fn(&egui::Painter)) -> RgbaImage {
         self.paint_with(1.0, shown, paint)
     }
@@ -84,7 +84,7 @@ fn rect(low: [f32; 2], high: [f32; 2]) -> Rect {
     Rect { min: low.into(), max: high.into() }
 }
 
-/// Which pixels are not the ground.
+/// Returns the pixels that differ from the ground.
 fn touched(picture: &RgbaImage) -> Vec<(u32, u32)> {
     picture.enumerate_pixels().filter(|(.., pixel)| pixel.0 != GROUND).map(|(x, y, _)| (x, y)).collect()
 }
@@ -142,7 +142,7 @@ fn what_is_translucent_lets_the_ground_through() {
 }
 
 #[test]
-fn pictures_are_named_by_number() {
+fn images_are_named_by_number() {
     let Some(ctx) = device() else { return };
     let pixels: Vec<u8> = (0..8_u8 * 4).flat_map(|i| [8 * i, 255 - 8 * i, i, 255]).collect();
     let (format, data) = (Format::Rgba8Unorm, Some(&pixels[..]));
@@ -165,7 +165,7 @@ fn pictures_are_named_by_number() {
 }
 
 #[test]
-fn text_is_in_its_place_and_new_letters_come_to_the_atlas() {
+fn text_is_at_its_position_and_new_letters_come_to_the_atlas() {
     let Some(ctx) = device() else { return };
     let write = |text: &'static str| {
         move |painter: &egui::Painter| {
@@ -228,7 +228,7 @@ fn a_reload_takes_over_the_shaders_of_sample_and_painter_or_neither() {
 }
 
 #[test]
-fn many_triangles_find_room_and_textures_go() {
+fn many_triangles_fit_and_textures_are_freed() {
     let Some(ctx) = device() else { return };
     let mut easel = Easel::new(&ctx, Format::Rgba8Unorm);
     let image = egui::ColorImage::filled([2, 2], Color32::from_rgb(0, 255, 0));

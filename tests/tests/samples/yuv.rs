@@ -1,21 +1,25 @@
-//! The pictures of the `yuv` sample: what shaders sample is what arithmetic makes of the planes, in every format and by every
-//! conversion, and it looks as ever.
+//! Images of the `yuv` sample: sampled colours equal those computed from the planes, in every format and by every
+//! conversion, and the image equals the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile, Error};
 use lvk_samples::app::sample::Sample;
-use lvk_samples::raster::RasterError;
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::yuv::{CONVERSIONS, Film, Yuv, YuvConfig, YuvFormat, YuvModel, YuvRange};
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::device::TestDevice;
 use lvk_tests::device_with;
-use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, keep, reference};
-use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_now, picture_of};
+use lvk_tests::image_comparison::{
+    ImageSimilarity, Tolerance, assert_matches_reference, assert_similar, reference_image, write_test_image,
+};
+use lvk_tests::raster_sample::{
+    ROUND, SIZE, assert_loops_without_seam, assert_refuses_impossible_sizes, image_now, image_of,
+};
+use lvk_tests::subprocess::on_swiftshader;
 
 /// As computed: but for the weights of colour differences between texels, which drivers round.
 const AS_COMPUTED: Tolerance = Tolerance { psnr: 46.0, ssim: 0.998, differing_share: 0.2, flip: 0.025 };
-/// As it was before it was encoded, when colour differences had the same size as the picture.
+/// As it was before it was encoded, when colour differences had the same size as the image.
 const AS_FILMED: Tolerance = Tolerance { psnr: 24.0, ssim: 0.9, differing_share: 1.0, flip: 0.1 };
 const FRAME: u32 = 30;
 
@@ -33,16 +37,16 @@ fn sample(ctx: &Context, config: &YuvConfig) -> Yuv {
 }
 
 /// Numbers of a plane, 0 to 1.
-fn numbers(plane: &[u8], format: YuvFormat) -> Vec<f64> {
+fn decode_plane(plane: &[u8], format: YuvFormat) -> Vec<f64> {
     match format.bits() {
         8 => plane.iter().map(|byte| f64::from(*byte)).collect(),
         _ => plane.chunks(2).map(|two| f64::from(u16::from_le_bytes([two[0], two[1]]) >> 6)).collect(),
     }
 }
 
-/// What the planes show: colour differences lie at every second texel of every second row.
+/// Returns the colours of the planes: chroma samples are at every second texel of every second row.
 fn computed(planes: &[Vec<u8>], config: &YuvConfig, format: YuvFormat) -> RgbaImage {
-    let all: Vec<_> = planes.iter().map(|plane| numbers(plane, format)).collect();
+    let all: Vec<_> = planes.iter().map(|plane| decode_plane(plane, format)).collect();
     let [width, height] = config.film.map(|side| side as usize);
     let difference = |number: usize, column: usize, row: usize| {
         let at = row.min(height / 2 - 1) * (width / 2) + column.min(width / 2 - 1);
@@ -104,10 +108,10 @@ fn every_format_and_conversion_is_as_computed() {
             for range in [YuvRange::Narrow, YuvRange::Full] {
                 let config = YuvConfig { format: Some(format), model, range, ..usual() };
                 let mut sample = sample(&ctx, &config);
-                let picture = picture_of(&mut sample, FRAME);
+                let image = image_of(&mut sample, FRAME);
                 let what = format!("{format:?} {model:?} {range:?}");
-                assert_alike(&what, &picture, &computed(&sample.planes(), &config, format), &AS_COMPUTED);
-                assert_alike(&format!("{what} filmed"), &picture, &filmed, &AS_FILMED);
+                assert_similar(&what, &image, &computed(&sample.planes(), &config, format), &AS_COMPUTED);
+                assert_similar(&format!("{what} filmed"), &image, &filmed, &AS_FILMED);
             }
         }
     }
@@ -115,18 +119,18 @@ fn every_format_and_conversion_is_as_computed() {
 
 /// That the comparison above would notice a wrong matrix or range.
 #[test]
-fn other_conversions_show_other_pictures() {
+fn other_conversions_render_other_images() {
     let Some(ctx) = yuv_device() else { return };
     let mut sample = sample(&ctx, &usual());
-    let (picture, planes, format) = (picture_of(&mut sample, FRAME), sample.planes(), sample.format());
+    let (image, planes, format) = (image_of(&mut sample, FRAME), sample.planes(), sample.format());
     for (model, range) in [
         (YuvModel::Bt601, YuvRange::Narrow),
         (YuvModel::Bt2020, YuvRange::Narrow),
         (YuvModel::Bt709, YuvRange::Full),
     ] {
         let other = computed(&planes, &YuvConfig { model, range, ..usual() }, format);
-        let likeness = Likeness::of(&picture, &other);
-        assert!(!likeness.is_within(&AS_COMPUTED), "{model:?} {range:?}: {likeness}");
+        let similarity = ImageSimilarity::measure(&image, &other);
+        assert!(!similarity.is_within(&AS_COMPUTED), "{model:?} {range:?}: {similarity}");
     }
 }
 
@@ -135,26 +139,26 @@ fn the_next_format_follows_and_the_first_comes_again() {
     let Some(ctx) = yuv_device() else { return };
     let mut sample = sample(&ctx, &usual());
     let formats = sample.formats().to_vec();
-    let first = picture_of(&mut sample, FRAME);
+    let first = image_of(&mut sample, FRAME);
     for number in 1..=formats.len() {
         sample.next();
-        let picture = picture_now(&mut sample);
+        let image = image_now(&mut sample);
         assert_eq!(sample.format(), formats[number % formats.len()]);
-        assert_alike("the next format", &picture, &filmed(), &AS_FILMED);
+        assert_similar("the next format", &image, &filmed(), &AS_FILMED);
     }
-    assert!(picture_now(&mut sample) == first);
+    assert!(image_now(&mut sample) == first);
 }
 
-/// Where the planes are shown, the picture is covered by greys.
+/// Pixels that show planes are grey.
 #[test]
 fn planes_are_shown_as_greys() {
     let Some(ctx) = yuv_device() else { return };
-    let picture = picture_of(&mut sample(&ctx, &YuvConfig { shows_planes: true, ..usual() }), FRAME);
-    keep("yuv planes", &picture);
+    let image = image_of(&mut sample(&ctx, &YuvConfig { shows_planes: true, ..usual() }), FRAME);
+    write_test_image("yuv planes", &image);
     let place = |share: f32, side: u32| (share * side as f32) as u32;
     for which in [0.1, 0.4, 0.7] {
         for across in [0.06, 0.15, 0.25] {
-            let pixel = picture.get_pixel(place(across, SIZE[0]), place(which, SIZE[1]));
+            let pixel = image.get_pixel(place(across, SIZE[0]), place(which, SIZE[1]));
             let [red, green, blue, _] = pixel.0;
             assert!(red.abs_diff(green) <= 1 && green.abs_diff(blue) <= 1, "{which} {across}: {pixel:?}");
         }
@@ -164,26 +168,23 @@ fn planes_are_shown_as_greys() {
 #[test]
 fn a_round_has_no_seam() {
     let Some(ctx) = yuv_device() else { return };
-    let mut sample = sample(&ctx, &usual());
-    let first = picture_of(&mut sample, 0);
-    assert_ne!(picture_of(&mut sample, 33), first, "it moves");
-    assert_eq!(picture_of(&mut sample, ROUND), first);
+    assert_loops_without_seam(&mut sample(&ctx, &usual()));
 }
 
 #[test]
 fn the_card_looks_as_it_always_did() {
     let Some(ctx) = yuv_device() else { return };
     let config = YuvConfig { shows_planes: true, ..usual() };
-    assert_as_ever("yuv_small", &picture_of(&mut sample(&ctx, &config), FRAME));
+    assert_matches_reference("yuv_small", &image_of(&mut sample(&ctx, &config), FRAME));
 }
 
 #[test]
-fn another_driver_shows_it() {
-    without_ray_tracing(another_driver_shows_it, || {
+fn another_driver_renders_it() {
+    on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = yuv_device() else { return };
         let mut sample = sample(&ctx, &YuvConfig { shows_planes: true, ..usual() });
-        let picture = picture_of(&mut sample, FRAME);
-        assert_alike("SwiftShader card", &picture, &reference("yuv_small"), &AS_COMPUTED);
+        let image = image_of(&mut sample, FRAME);
+        assert_similar("SwiftShader card", &image, &reference_image("yuv_small"), &AS_COMPUTED);
     });
 }
 
@@ -195,14 +196,14 @@ fn devices_without_conversions_are_refused_by_name() {
     };
     for format in [None, Some(YuvFormat::P010)] {
         match Yuv::new(&ctx, &YuvConfig { format, ..usual() }).err() {
-            Some(RasterError::Device(Error::Unsupported { .. })) => {}
+            Some(SampleError::Device(Error::Unsupported { .. })) => {}
             other => unreachable!("{format:?}: {other:?}"),
         }
     }
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = yuv_device() else { return };
     assert_refuses_impossible_sizes(|extent| Yuv::new(&ctx, &YuvConfig { extent, ..usual() }));
 }

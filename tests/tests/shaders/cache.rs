@@ -1,4 +1,5 @@
-//! Compiled GLSL on disk: it is found again, noticed to be outdated, and dropped with a warning when it does not fit.
+//! The disk cache of compiled GLSL: it is loaded again, detects outdated entries, and is dropped with a warning when
+//! it is damaged.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::{Path, PathBuf};
@@ -10,11 +11,11 @@ use lvk::{
 };
 use lvk_samples::pipelines;
 use lvk_tests::compute::{read_words, words_buffer};
-use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
 fn folder() -> tempfile::TempDir {
-    listen();
+    capture_warnings();
     tempfile::tempdir().unwrap()
 }
 
@@ -39,7 +40,7 @@ const TEXT: &str = r#"
     layout(push_constant, scalar) uniform Push { Result result; };
     void main() { result.at[0] = VALUE + ADDED; }"#;
 
-/// What the shader answers.
+/// Returns the shader's result.
 fn answer(ctx: &Context, desc: &ShaderModuleDesc<'_>) -> u32 {
     let module = ctx.create_shader_module(desc).unwrap();
     let pipeline = ctx

@@ -1,4 +1,5 @@
-//! Shaders that use a device feature work where the device has it and are refused, by its name, where it has not.
+//! Shaders that use a device feature: they work where the device has it, and are refused with the feature's name
+//! where it has not.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::ash::vk;
@@ -6,15 +7,15 @@ use lvk::{
     ColorAttachment, ComputePipelineDesc, Context, Dependencies, Error, Format, Holder, RenderPassDesc,
     RenderPipelineDesc, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::{module, read_words, words_buffer};
 use lvk_tests::device;
 use lvk_tests::raster::{pixels, target};
+use lvk_tests::subprocess::on_swiftshader;
 
 /// A device feature by name, and whether it was found.
 type Feature = (&'static str, fn(&Found) -> vk::Bool32);
 
-/// What the device offers.
+/// Features of the device.
 #[derive(Default)]
 struct Found {
     core: vk::PhysicalDeviceFeatures,
@@ -25,7 +26,7 @@ struct Found {
 }
 
 impl Found {
-    fn of(ctx: &Context) -> Self {
+    fn query(ctx: &Context) -> Self {
         let mut found = Self::default();
         let (instance, device) = (ctx.raw_instance(), ctx.raw_physical_device());
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut found.subgroups);
@@ -46,7 +47,7 @@ impl Found {
     }
 }
 
-/// Which of `features` the device lacks.
+/// Returns those of `features` that the device lacks.
 fn missing(found: &Found, features: &[Feature]) -> Vec<&'static str> {
     features.iter().filter(|(_, is_on)| is_on(found) == vk::FALSE).map(|(name, _)| *name).collect()
 }
@@ -153,7 +154,7 @@ fn created(
     needs: &[Feature],
 ) -> Option<Holder<ShaderModuleHandle>> {
     let module = create(ctx, stage, ShaderSource::Glsl(text));
-    let missing = missing(&Found::of(ctx), needs);
+    let missing = missing(&Found::query(ctx), needs);
     if missing.is_empty() {
         return Some(module.unwrap());
     }
@@ -240,9 +241,9 @@ fn features_work_or_are_refused_by_name() {
 /// SwiftShader lacks several of the features.
 #[test]
 fn features_that_are_missing_are_refused_by_name() {
-    without_ray_tracing(features_that_are_missing_are_refused_by_name, || {
+    on_swiftshader(features_that_are_missing_are_refused_by_name, || {
         let Some(ctx) = device() else { return };
-        let found = Found::of(&ctx);
+        let found = Found::query(&ctx);
         let lacks = |shader: &&Use| !missing(&found, shader.needs).is_empty();
         assert!(USES.iter().filter(lacks).count() >= 3, "the device has nearly everything");
         expect_all(&ctx);
@@ -252,7 +253,7 @@ fn features_that_are_missing_are_refused_by_name() {
 /// SwiftShader has no mesh shaders.
 #[test]
 fn mesh_and_task_stages_are_refused_where_there_are_none() {
-    without_ray_tracing(mesh_and_task_stages_are_refused_where_there_are_none, || {
+    on_swiftshader(mesh_and_task_stages_are_refused_where_there_are_none, || {
         let Some(ctx) = device() else { return };
         assert!(!ctx.capabilities().mesh_shader);
         let mesh = "layout(local_size_x = 1) in; layout(triangles, max_vertices = 3, max_primitives = 1) out;

@@ -1,4 +1,4 @@
-//! Shader modules and pipelines: from text or words, checked, and kept on disk.
+//! Shader modules and pipelines: from GLSL or SPIR-V, checked, and kept on disk.
 
 mod cache;
 mod features;

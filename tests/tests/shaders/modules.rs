@@ -1,4 +1,4 @@
-//! Shader modules: errors carry the user's own lines, SPIR-V is taken and checked, bindings and stages must fit.
+//! Shader modules: errors name the user's own lines, SPIR-V is accepted and checked, bindings and stages must match.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -223,7 +223,7 @@ fn dispatches_are_checked() {
     ctx.submit(cmd).unwrap();
 }
 
-/// What only the device can know: more invocations than it takes.
+/// Only the device knows this error: more invocations than it supports.
 #[test]
 fn work_groups_over_the_limit_are_refused() {
     let Some(ctx) = device() else { return };

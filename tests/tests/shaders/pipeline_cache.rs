@@ -1,19 +1,19 @@
-//! The file of compiled pipelines: it is written, found again, and dropped with a warning when it does not fit.
+//! The file of the pipeline cache: it is written, loaded again, and dropped with a warning when it is damaged.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::{Path, PathBuf};
 
 use lvk::{Error, RayTracingPipelineDesc, ShaderStage};
-use lvk_tests::child::in_child;
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::swiftshader;
 use lvk_tests::shader_groups::{Counts, GroupScene, answering, ray_gen};
-use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::subprocess::in_subprocess;
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
 /// A folder whose name is in every warning about files in it.
 fn folder() -> tempfile::TempDir {
-    listen();
+    capture_warnings();
     tempfile::tempdir().unwrap()
 }
 
@@ -146,7 +146,7 @@ fn a_file_of_another_device_is_dropped_and_replaced() {
         ("LVK_DEVICE", None),
         (FILE, Some(path.as_os_str())),
     ];
-    in_child(a_file_of_another_device_is_dropped_and_replaced, &variables, || {
+    in_subprocess(a_file_of_another_device_is_dropped_and_replaced, &variables, || {
         let ctx = start(&path).unwrap();
         assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
         make_pipelines(&ctx);
@@ -183,7 +183,7 @@ fn a_missing_folder_is_named() {
 }
 
 #[test]
-fn a_folder_in_place_of_the_file_is_left_alone() {
+fn a_folder_with_the_name_of_the_file_is_left_alone() {
     let folder = folder();
     let path = folder.path().join("folder");
     std::fs::create_dir(&path).unwrap();

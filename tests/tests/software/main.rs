@@ -1,8 +1,8 @@
-//! Ray queries that the library walks itself.
+//! Ray queries by the library's own traversal.
 
-mod corrupt;
-mod pictures;
+mod corrupt_blobs;
+mod denormal_directions;
 mod queries;
-mod seams;
-mod short;
-mod singular;
+mod sample_images;
+mod singular_matrices;
+mod watertightness;

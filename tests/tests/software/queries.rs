@@ -1,18 +1,18 @@
-//! Ray queries that the library walks itself: on devices without ray tracing, and beside those that have it.
+//! Ray queries by the library's own traversal: on devices without ray tracing, and beside the device's own.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
     BlasDesc, BuildFlags, BuildMode, ComputePipelineDesc, Context, DeviceProfile, Error, GeometryFlags,
     RayQueryPath, RayQueryRequest, Result, ShaderStage, TlasDesc, TlasInstance,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::gpu_built::uneven;
+use lvk_tests::gpu_built::uneven_triangles;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{BUILD_FLAGS, Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{HitRecord, How, MISSED, Method, OPAQUE, RayTracer, shader};
 use lvk_tests::rays::{Ray, random_rays};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{TestDevice, device, device_with};
 
 fn software() -> Option<TestDevice> {
@@ -44,10 +44,10 @@ fn check_crowd(ctx: &Context, flags: BuildFlags, rays: usize) -> Result<()> {
     let reference = scene.reference();
     let rays = random_rays(5, rays, Vec3::splat(-2.0), Vec3::splat(2.0));
     let records = RayTracer::new(ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::default())?;
-    Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+    HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
         .assert(&format!("a crowd with {flags:?}"));
     let shadows = RayTracer::new(ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::shadows())?;
-    Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
+    HitComparison::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
         .assert(&format!("shadows of a crowd with {flags:?}"));
     Ok(())
 }
@@ -69,7 +69,7 @@ fn every_kind_of_build_is_hit_as_the_reference_says() -> Result<()> {
 }
 
 #[test]
-fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
+fn a_device_without_accel_structs_of_its_own_has_everything() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Auto) else { return Ok(()) };
     let caps = ctx.capabilities();
     assert!(caps.ray_query && !caps.ray_tracing_pipeline && !caps.ray_query_reason.is_empty());
@@ -79,7 +79,7 @@ fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
 
 #[test]
 fn a_driver_without_ray_tracing_traces() {
-    without_ray_tracing(a_driver_without_ray_tracing_traces, || {
+    on_swiftshader(a_driver_without_ray_tracing_traces, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"));
         for flags in BUILD_FLAGS {
@@ -91,7 +91,7 @@ fn a_driver_without_ray_tracing_traces() {
 }
 
 #[test]
-fn software_and_the_device_answer_alike() -> Result<()> {
+fn software_and_the_device_give_the_same_hits() -> Result<()> {
     let (Some(one), Some(other)) = (device(), software()) else { return Ok(()) };
     if one.capabilities().ray_query_path != RayQueryPath::Hardware {
         eprintln!("NOT TESTED, {} has no ray queries", one.capabilities().device_name);
@@ -109,7 +109,7 @@ fn software_and_the_device_answer_alike() -> Result<()> {
     Ok(())
 }
 
-/// Where a module promises to meet opaque triangles alone, by the library and by the device.
+/// Modules that declare opaque triangles alone, by the library and by the device.
 #[test]
 fn modules_without_candidates_see_the_same() -> Result<()> {
     let (Some(one), Some(other)) = (device(), software()) else { return Ok(()) };
@@ -182,7 +182,7 @@ fn queries_that_take_turns_do_not_disturb_each_other() -> Result<()> {
         let text = TURNS.replace("ALTERNATE(index)", when);
         let module = shader(&ctx, ShaderStage::Compute, &text)?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        let tracer = RayTracer::of_query(&ctx, ctx.create_compute_pipeline(&desc)?);
+        let tracer = RayTracer::from_query(&ctx, ctx.create_compute_pipeline(&desc)?);
         tracer.trace(&gpu.tlas, &rays, How::default())
     };
     let (in_turns, one_after_the_other) = (records("true")?, records("!goesA")?);
@@ -239,7 +239,7 @@ fn a_query_may_begin_anew_wherever_it_was() -> Result<()> {
     let records = |turns: &str| -> Result<Vec<HitRecord>> {
         let module = shader(&ctx, ShaderStage::Compute, &ANEW.replace("TURNS(index)", turns))?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        let tracer = RayTracer::of_query(&ctx, ctx.create_compute_pipeline(&desc)?);
+        let tracer = RayTracer::from_query(&ctx, ctx.create_compute_pipeline(&desc)?);
         tracer.trace(&gpu.tlas, &rays, How::default())
     };
     let fresh = records("0u")?;
@@ -250,7 +250,7 @@ fn a_query_may_begin_anew_wherever_it_was() -> Result<()> {
 }
 
 #[test]
-fn a_structure_is_the_same_after_a_file() -> Result<()> {
+fn an_accel_struct_is_the_same_after_a_file() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let parts = [Part::new(Mesh::torus(12), Layout::Indexed16)];
     let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
@@ -260,7 +260,7 @@ fn a_structure_is_the_same_after_a_file() -> Result<()> {
         let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
         let built = ctx.create_blas(&desc)?;
         let bytes = ctx.serialize_blas(*built)?;
-        // SAFETY: nobody made the bytes up.
+        // SAFETY: `serialize_blas` returned the bytes.
         let loaded = unsafe { ctx.load_blas(&desc, &bytes) }?;
         let trace = |blas| {
             let instances = [TlasInstance::new(blas)];
@@ -277,11 +277,11 @@ fn a_structure_is_the_same_after_a_file() -> Result<()> {
     Ok(())
 }
 
-/// What has no room for its own nodes gets full ones: rays hit the same, from a file too.
+/// A BLAS without memory for compact nodes gets full ones: rays hit the same, from a file too.
 #[test]
 fn uneven_trees_are_hit_as_even_ones() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
-    let positions: Vec<_> = uneven(8).into_iter().flatten().collect();
+    let positions: Vec<_> = uneven_triangles(8).into_iter().flatten().collect();
     let triangles =
         (0..positions.len() as u32 / 3).map(|number| [0, 1, 2].map(|step| number * 3 + step)).collect();
     let parts = [Part::new(Mesh { positions, triangles }, Layout::Indexed32)];
@@ -303,14 +303,15 @@ fn uneven_trees_are_hit_as_even_ones() -> Result<()> {
         let built = ctx.create_blas(&desc)?;
         assert!(close(&trace(*built)?), "{more:?}");
         let bytes = ctx.serialize_blas(*built)?;
-        // SAFETY: nobody made the bytes up.
+        // SAFETY: `serialize_blas` returned the bytes.
         let loaded = unsafe { ctx.load_blas(&desc, &bytes) }?;
         assert!(close(&trace(*loaded)?), "{more:?}, from a file");
     }
     Ok(())
 }
 
-/// Three triangles side by side whose corners lie far apart in a list of so many vertices, and so many more that are points.
+/// Returns three triangles side by side, whose vertices are far apart in a list of `count` vertices, and `points`
+/// degenerate ones.
 fn among_many(count: usize, points: u32) -> Mesh {
     let named = [[0, 1 << 11, count - 1], [count - 2, 5, 1 << 20], [count / 2 + 1, count - 3, (1 << 11) - 1]];
     let mut positions = vec![[0.0; 3]; count];
@@ -372,7 +373,7 @@ fn compaction_has_nothing_to_do_and_says_so() -> Result<()> {
     ctx.wait_idle()
 }
 
-/// A top-level structure may show parts of trees that a rebuild has replaced: what it sees then stays within them, and is
+/// A TLAS may show parts of trees that a rebuild has replaced: what it sees then stays within them, and is
 /// the same where nothing moved.
 #[test]
 fn rebuilds_below_parts_of_instances_are_seen() -> Result<()> {
@@ -385,7 +386,7 @@ fn rebuilds_below_parts_of_instances_are_seen() -> Result<()> {
     let tracer = RayTracer::new(&ctx, Method::Query)?;
     let agrees = |what: &str| -> Result<()> {
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(what);
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(what);
         Ok(())
     };
     agrees("parts")?;
@@ -400,7 +401,7 @@ fn rebuilds_below_parts_of_instances_are_seen() -> Result<()> {
     agrees("rebuilt above")
 }
 
-/// What builds take of the scratch buffer, which has no more than the largest needs where the budget is nothing.
+/// Scratch memory of builds: the buffer has no more than the largest build needs if the budget is 0.
 #[test]
 fn scratch_memory_is_what_the_sizes_say() -> Result<()> {
     const ALIGNMENTS: u64 = 1024;
@@ -444,7 +445,7 @@ fn scratch_memory_is_what_the_sizes_say() -> Result<()> {
     Ok(())
 }
 
-/// Bytes of the structure of a mesh, by `accel_struct_sizes`.
+/// Bytes of the acceleration structure of a mesh, by `accel_struct_sizes`.
 fn bytes_of(ctx: &Context, mesh: &Mesh, layout: Layout, flags: BuildFlags) -> Result<u64> {
     let (_buffers, geometries) = upload_geometries(ctx, &[Part::new(mesh.clone(), layout)])?;
     let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
@@ -454,7 +455,7 @@ fn bytes_of(ctx: &Context, mesh: &Mesh, layout: Layout, flags: BuildFlags) -> Re
     Ok(bytes)
 }
 
-/// What may be refitted shares the vertices that its indices share, and keeps none that nobody names.
+/// A BLAS that may be refitted shares vertices as its indices do, and stores no unused vertex.
 #[test]
 fn low_memory_is_low_with_updates_too() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
@@ -476,9 +477,9 @@ fn low_memory_is_low_with_updates_too() -> Result<()> {
     Ok(())
 }
 
-/// What the GPU builds takes no more than what the CPU does, though nobody knows beforehand how many nodes there will be.
+/// Builds on the GPU take no more memory than those on the CPU, though the number of nodes is not known before.
 #[test]
-fn structures_of_the_gpu_are_small() -> Result<()> {
+fn accel_structs_of_the_gpu_are_small() -> Result<()> {
     const FIRST: u64 = 1024;
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let mesh = Mesh::terrain(90);
@@ -490,9 +491,9 @@ fn structures_of_the_gpu_are_small() -> Result<()> {
     Ok(())
 }
 
-/// Where it may be refitted, and so is never shown in parts.
+/// Flags that allow refits, so that re-braiding never opens it.
 #[test]
-fn what_the_cpu_built_is_rebuilt_in_its_place() -> Result<()> {
+fn what_the_cpu_built_is_rebuilt_in_the_same_memory() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let mesh = Mesh::terrain(90);
     let count = mesh.triangles.len() as u64;

@@ -1,4 +1,4 @@
-//! Textures: every shape, mip, layer and format keeps its texels, shaders see them, and misuse is an error.
+//! Textures: every shape, mip, layer and format keeps its texels, shaders read them, and wrong use returns an error.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::ash::vk;
@@ -52,7 +52,7 @@ fn every_usage_of_every_format_works_or_is_unsupported() {
 }
 
 #[test]
-fn every_mip_layer_and_region_is_a_place_of_its_own() {
+fn every_mip_layer_and_region_is_distinct() {
     let Some(ctx) = device() else { return };
     for kind in KINDS {
         let extent = if kind == TextureKind::Cube { [13, 13] } else { [13, 7] };
@@ -107,7 +107,7 @@ fn data_fills_mip_zero_of_every_layer() {
     }
 }
 
-/// Halves a power-of-two picture of one float a texel.
+/// Halves a power-of-two image of one float a texel.
 fn halved(picture: &[f32], width: usize) -> Vec<f32> {
     let height = picture.len() / width;
     let at = |x: usize, y: usize| picture[y.min(height - 1) * width + x.min(width - 1)];

@@ -1,4 +1,4 @@
-//! What textures refuse: impossible shapes and regions, and uses they were not made for.
+//! Refused textures: impossible shapes and regions, and uses without the usage flag.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

@@ -1,14 +1,15 @@
-//! Formats: every one keeps its texels, blocks included, is cleared, copied, scaled and seen as Vulkan says.
+//! Formats: every one keeps its texels, compressed blocks included, and is cleared, copied, blitted and sampled as
+//! Vulkan defines.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
     Aspect, Channel, ClearValue, Context, Dependencies, Error, Filter, Format, Holder, Swizzle, TextureDesc,
     TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage, TextureViewDesc,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device;
 use lvk_tests::noise::noise;
+use lvk_tests::subprocess::on_swiftshader;
 
 const ALL: TextureRange = TextureRange { base_mip: 0, mips: 0, base_layer: 0, layers: 0 };
 const STENCIL: TextureRegion = region([0, 0], [0, 0], Aspect::Stencil);
@@ -37,7 +38,7 @@ fn texels(format: Format, seed: u32, count: u64) -> Vec<u8> {
     }
 }
 
-/// What a download of `format` answers, without bits that mean nothing.
+/// Returns a download of `format` without undefined bits.
 fn meaningful(format: Format, mut bytes: Vec<u8>) -> Vec<u8> {
     if matches!(format, Format::D24UnormS8 | Format::X8D24Unorm) {
         bytes.chunks_mut(4).for_each(|texel| texel[3] = 0);
@@ -144,7 +145,7 @@ fn every_format_keeps_its_texels_or_is_unsupported() {
 
 #[test]
 fn compressed_formats_of_phones_keep_their_blocks_and_are_decoded() {
-    without_ray_tracing(compressed_formats_of_phones_keep_their_blocks_and_are_decoded, || {
+    on_swiftshader(compressed_formats_of_phones_keep_their_blocks_and_are_decoded, || {
         let Some(ctx) = device() else { return };
         let wanted =
             [Format::Etc2Rgb8Unorm, Format::Etc2Rgba8Unorm, Format::EacR11Unorm, Format::Astc8x5Unorm];
@@ -342,7 +343,7 @@ fn depth_stencil_and_integers_are_copied_and_scaled() {
 
 #[test]
 fn depth_and_stencil_are_copied_one_at_a_time() {
-    without_ray_tracing(depth_and_stencil_are_copied_one_at_a_time, || {
+    on_swiftshader(depth_and_stencil_are_copied_one_at_a_time, || {
         let Some(ctx) = device() else { return };
         copies_and_scales(&ctx);
     });
@@ -423,7 +424,7 @@ fn copies_and_scales(ctx: &Context) {
 }
 
 #[test]
-fn textures_of_their_own_swizzle_and_rows_are_sampled_as_said() {
+fn textures_with_swizzles_and_row_lengths_are_sampled_as_described() {
     let Some(ctx) = device() else { return };
     let swizzle =
         Swizzle { red: Channel::Blue, green: Channel::One, blue: Channel::Red, alpha: Channel::Zero };

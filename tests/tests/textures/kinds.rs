@@ -1,4 +1,4 @@
-//! Volumes and arrays of cubes: moved, sampled, stored to, drawn to, seen in parts.
+//! Volumes and cube arrays: copied, sampled, stored to, drawn to, and viewed in parts.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -54,7 +54,7 @@ fn values(seed: u32, count: usize) -> Vec<f32> {
 }
 
 #[test]
-fn every_box_of_every_mip_of_a_volume_is_a_place_of_its_own() {
+fn every_box_of_every_mip_of_a_volume_is_a_region_of_its_own() {
     let Some(ctx) = device() else { return };
     let sizes = [[13_u32, 7, 9], [6, 3, 4], [3, 1, 2], [1, 1, 1]];
     let kind = TextureKind::D3 { depth: 9 };

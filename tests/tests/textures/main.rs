@@ -1,4 +1,4 @@
-//! Textures and samplers: every kind, format, part and filter.
+//! Textures and samplers: every kind, format, view and filter.
 
 mod contents;
 mod errors;

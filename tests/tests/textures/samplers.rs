@@ -10,7 +10,7 @@ use lvk_tests::compute::Evaluator;
 use lvk_tests::device;
 
 /// Four texels in a row: 1, 2, 3 and 4.
-fn row(ctx: &Context) -> Holder<TextureHandle> {
+fn row_texture(ctx: &Context) -> Holder<TextureHandle> {
     let data = [1.0_f32, 2.0, 3.0, 4.0];
     let desc = TextureDesc {
         format: Format::R32Float,
@@ -43,7 +43,7 @@ fn nearest(address: AddressMode) -> SamplerDesc<'static> {
 #[test]
 fn nearest_takes_a_texel_and_linear_a_mean() {
     let Some(ctx) = device() else { return };
-    let texture = row(&ctx);
+    let texture = row_texture(&ctx);
     let between = "(0.8 + i) / 4.0";
     let found = sample(&ctx, texture.index(), &nearest(AddressMode::ClampToEdge), between, 4);
     assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
@@ -55,7 +55,7 @@ fn nearest_takes_a_texel_and_linear_a_mean() {
 #[test]
 fn address_modes_say_what_lies_outside() {
     let Some(ctx) = device() else { return };
-    let texture = row(&ctx);
+    let texture = row_texture(&ctx);
     let expected = [
         (AddressMode::Repeat, [3.0, 4.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0]),
         (AddressMode::MirroredRepeat, [2.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 3.0]),
@@ -171,7 +171,7 @@ fn odd_numbers_are_errors_or_clamped() {
 }
 
 #[test]
-fn samplers_run_out_and_come_back() {
+fn samplers_run_out_and_are_freed() {
     let Some(ctx) = device() else { return };
     let limit = ctx.capabilities().limits.max_bindless_samplers;
     let mut samplers: Vec<_> =
@@ -180,12 +180,12 @@ fn samplers_run_out_and_come_back() {
     assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
     samplers.truncate(samplers.len() / 2);
     ctx.wait_idle().unwrap();
-    let texture = row(&ctx);
+    let texture = row_texture(&ctx);
     let found = sample(&ctx, texture.index(), &nearest(AddressMode::Repeat), "(0.5 + i) / 4.0", 4);
     assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
 }
 
-/// What a shader sees of one texel of 0.5 beyond its edge.
+/// Returns the sampled colour beyond the edge of one texel of 0.5.
 fn beyond(ctx: &Context, border: BorderColor) -> [f32; 4] {
     let data = Some(&[128; 4][..]);
     let texture = ctx.create_texture(&TextureDesc { data, ..Default::default() }).unwrap();
@@ -206,7 +206,7 @@ fn borders_have_the_colour_asked_for() {
     for (border, expected) in colors {
         assert_eq!(beyond(&ctx, border), expected, "{border:?}");
     }
-    // What the texels can be: some devices round to that.
+    // Colours that texels can store: some devices round to them.
     let color = [64.0, 127.0, 191.0, 32.0].map(|byte: f32| byte / 255.0);
     let own = SamplerDesc { border: BorderColor::Custom(color), ..Default::default() };
     if !ctx.capabilities().has(OptionalFeature::CustomBorderColorWithoutFormat) {
@@ -251,7 +251,7 @@ fn without_optional_features_samplers_are_refused_by_name() {
 #[test]
 fn mirrors_and_reductions_take_the_texels_they_name() {
     let Some(ctx) = device() else { return };
-    let texture = row(&ctx);
+    let texture = row_texture(&ctx);
     let optional = |feature| {
         let has = ctx.capabilities().has(feature);
         if !has {

@@ -1,4 +1,4 @@
-//! Views: parts of a texture, as another kind, format or order of channels, are textures like any other.
+//! Texture views: parts of a texture with another kind, format or swizzle behave as textures.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -25,7 +25,7 @@ fn one_mip(ctx: &Context, of: TextureHandle, base_mip: u32) -> Holder<TextureHan
     view(ctx, of, TextureViewDesc { base_mip, mips: 1, debug_name: "one mip", ..Default::default() })
 }
 
-fn place(mip: u32, layer: u32) -> TextureRegion {
+fn region_of(mip: u32, layer: u32) -> TextureRegion {
     TextureRegion { mip, layer, ..Default::default() }
 }
 
@@ -85,7 +85,7 @@ fn a_mip_is_sampled_while_the_next_is_stored() {
     ctx.submit(cmd).unwrap();
     let mut expected = values;
     for mip in 0..5 {
-        assert_eq!(floats(&ctx, *chain, &place(mip, 0)), expected, "mip {mip}");
+        assert_eq!(floats(&ctx, *chain, &region_of(mip, 0)), expected, "mip {mip}");
         let side = 16 >> mip;
         let texel = |x: usize, y: usize| expected[y * side + x];
         let mean = |x, y| {
@@ -113,7 +113,7 @@ fn overlapping_views_are_read_together() {
     let whole = texture(&ctx, &desc);
     for mip in 0..6_u8 {
         let texels = vec![f32::from(mip); (64 >> mip) * (64 >> mip)];
-        ctx.upload_texture(*whole, &place(mip.into(), 0), bytemuck::cast_slice(&texels)).unwrap();
+        ctx.upload_texture(*whole, &region_of(mip.into(), 0), bytemuck::cast_slice(&texels)).unwrap();
     }
     let mips = |base_mip, mips| view(&ctx, *whole, TextureViewDesc { base_mip, mips, ..Default::default() });
     let (low, high, stored) = (mips(0, 4), mips(2, 3), mips(5, 1));
@@ -130,7 +130,7 @@ fn overlapping_views_are_read_together() {
     };
     let found = fetch.run(&ctx, [low.index(), high.index(), stored.index()], 1, &deps);
     assert_eq!(found, [[3.0, 4.0, 4.0, 3.0]]);
-    assert_eq!(floats(&ctx, *whole, &place(5, 0))[0], 9.0);
+    assert_eq!(floats(&ctx, *whole, &region_of(5, 0))[0], 9.0);
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn uses_of_the_same_texels_that_exclude_each_other_name_both_views() {
     ];
     let pass = RenderPassDesc { color: &twice, ..Default::default() };
     usage_error(cmd.begin_rendering(&pass).map(drop), &["twice"]);
-    usage_error(cmd.copy_texture(*head, &place(1, 0), *tail, &place(0, 0)), &["head", "tail"]);
+    usage_error(cmd.copy_texture(*head, &region_of(1, 0), *tail, &region_of(0, 0)), &["head", "tail"]);
     ctx.submit(cmd).unwrap();
 }
 
@@ -175,7 +175,7 @@ fn from_srgb(byte: u8) -> f32 {
 }
 
 #[test]
-fn linear_and_srgb_views_show_the_same_bytes() {
+fn linear_and_srgb_views_read_the_same_bytes() {
     let Some(ctx) = device() else { return };
     let bytes = [10_u8, 100, 200, 128];
     let formats = [Format::Rgba8Unorm, Format::Rgba8Srgb];
@@ -367,7 +367,7 @@ fn a_layer_is_drawn_to_while_another_is_sampled() {
             ..Default::default()
         },
     );
-    ctx.upload_texture(*array, &place(0, 0), &[10; 64]).unwrap();
+    ctx.upload_texture(*array, &region_of(0, 0), &[10; 64]).unwrap();
     let layer = |base_layer| {
         view(&ctx, *array, TextureViewDesc { kind: Some(TextureKind::D2), base_layer, ..Default::default() })
     };
@@ -390,7 +390,7 @@ fn a_layer_is_drawn_to_while_another_is_sampled() {
     }
     ctx.submit(cmd).unwrap();
     for index in 0..4_u8 {
-        let found = ctx.download_texture(*array, &place(0, index.into())).unwrap();
+        let found = ctx.download_texture(*array, &region_of(0, index.into())).unwrap();
         assert_eq!(found, [10 + 20 * index; 64], "layer {index}");
     }
 }
@@ -442,38 +442,38 @@ fn transfers_count_from_the_first_mip_and_layer_of_a_view() {
     );
     for layer in 0..5 {
         for mip in 0..4 {
-            ctx.upload_texture(*base, &place(mip, layer), &vec![7; 4 << (2 * (4 - mip))]).unwrap();
+            ctx.upload_texture(*base, &region_of(mip, layer), &vec![7; 4 << (2 * (4 - mip))]).unwrap();
         }
     }
     let texels = noise(1, 4 * 8 * 8);
-    ctx.upload_texture(*part, &place(0, 1), &texels).unwrap();
-    assert_eq!(ctx.download_texture(*part, &place(0, 1)).unwrap(), texels);
-    assert_eq!(ctx.download_texture(*base, &place(1, 4)).unwrap(), texels);
+    ctx.upload_texture(*part, &region_of(0, 1), &texels).unwrap();
+    assert_eq!(ctx.download_texture(*part, &region_of(0, 1)).unwrap(), texels);
+    assert_eq!(ctx.download_texture(*base, &region_of(1, 4)).unwrap(), texels);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
-    cmd.copy_texture(*part, &place(0, 1), *part, &place(0, 0)).unwrap();
-    let quarter = TextureRegion { extent: [4, 4], ..place(0, 0) };
-    cmd.blit_texture(*part, &quarter, *base, &place(2, 0), Filter::Nearest).unwrap();
+    cmd.copy_texture(*part, &region_of(0, 1), *part, &region_of(0, 0)).unwrap();
+    let quarter = TextureRegion { extent: [4, 4], ..region_of(0, 0) };
+    cmd.blit_texture(*part, &quarter, *base, &region_of(2, 0), Filter::Nearest).unwrap();
     ctx.submit(cmd).unwrap();
-    assert_eq!(ctx.download_texture(*base, &place(1, 3)).unwrap(), texels);
+    assert_eq!(ctx.download_texture(*base, &region_of(1, 3)).unwrap(), texels);
     let corner: Vec<u8> = (0..4).flat_map(|row| texels[32 * row..32 * row + 16].to_vec()).collect();
-    assert_eq!(ctx.download_texture(*base, &place(2, 0)).unwrap(), corner);
+    assert_eq!(ctx.download_texture(*base, &region_of(2, 0)).unwrap(), corner);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.clear_texture(*part, ClearValue::Color([1.0; 4]), &TextureRange::default()).unwrap();
     ctx.submit(cmd).unwrap();
     for layer in 0..5 {
         for mip in 0..4 {
             let cleared = layer >= 3 && (1..3).contains(&mip);
-            let found = ctx.download_texture(*base, &place(mip, layer)).unwrap();
+            let found = ctx.download_texture(*base, &region_of(mip, layer)).unwrap();
             assert_eq!(found.iter().all(|byte| *byte == 255), cleared, "mip {mip}, layer {layer}");
         }
     }
-    ctx.upload_texture(*part, &place(0, 0), &[9; 4 * 64]).unwrap();
+    ctx.upload_texture(*part, &region_of(0, 0), &[9; 4 * 64]).unwrap();
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.generate_mipmaps(*part).unwrap();
     ctx.submit(cmd).unwrap();
-    assert_eq!(ctx.download_texture(*base, &place(2, 3)).unwrap(), [9; 64]);
-    assert_eq!(ctx.download_texture(*base, &place(3, 3)).unwrap(), [7; 16]);
-    let outside = ctx.download_texture(*part, &place(2, 0));
+    assert_eq!(ctx.download_texture(*base, &region_of(2, 3)).unwrap(), [9; 64]);
+    assert_eq!(ctx.download_texture(*base, &region_of(3, 3)).unwrap(), [7; 16]);
+    let outside = ctx.download_texture(*part, &region_of(2, 0));
     usage_error(outside, &["2 mips and 2 layers"]);
 }
 

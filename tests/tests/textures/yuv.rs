@@ -1,4 +1,5 @@
-//! Textures in Y'CbCr: converted as BT.601, BT.709 and BT.2020 say, moved plane by plane, and refused where they cannot be.
+//! Y'CbCr textures: converted by BT.601, BT.709 and BT.2020, copied plane by plane, and refused where the device has
+//! no conversion.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -6,17 +7,17 @@ use lvk::{
     SpecializationConstant, SpecializationValue, TextureDesc, TextureHandle, TextureKind, TextureRegion,
     TextureUsage, TextureViewDesc, YuvConversion, YuvModel, YuvRange,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::{Evaluator, module, read_vec4, vec4_buffer};
 use lvk_tests::device::{TestDevice, device_with};
 use lvk_tests::noise::noise;
+use lvk_tests::subprocess::on_swiftshader;
 
 const WIDTH: u32 = 8;
 const HEIGHT: u32 = 4;
 const FORMATS: [Format; 4] = [Format::Nv12, Format::Yuv420p8, Format::P010, Format::Yuv420p10];
 const MODELS: [YuvModel; 3] = [YuvModel::Bt601, YuvModel::Bt709, YuvModel::Bt2020];
 
-/// A picture of one code for each texel of Y, Cb and Cr, of 8 or 10 bits.
+/// An image of one code for each texel of Y, Cb and Cr, of 8 or 10 bits.
 struct Picture {
     bits: u32,
     codes: [Vec<u16>; 3],
@@ -47,7 +48,7 @@ impl Picture {
         planes.into_iter().map(|plane| plane.into_iter().flat_map(bytes).collect()).collect()
     }
 
-    /// What the colour of a texel may be: between two colour differences either is the nearest.
+    /// Returns the possible colours of a texel: between two chroma samples either is the nearest.
     fn colors(&self, model: YuvModel, range: YuvRange, i: usize) -> Vec<[f64; 3]> {
         let places = |place: usize, side: u32| [place / 2, place.div_ceil(2).min(side as usize / 2 - 1)];
         let (columns, rows) = (places(i % WIDTH as usize, WIDTH), places(i / WIDTH as usize, HEIGHT));
@@ -152,18 +153,18 @@ fn colors(ctx: &Context, textures: &[Holder<TextureHandle>]) -> Vec<Vec<[f32; 4]
 }
 
 fn check_conversions(ctx: &Context, all: &[YuvConversion]) {
-    let (mut textures, mut pictures) = (Vec::new(), Vec::new());
+    let (mut textures, mut images) = (Vec::new(), Vec::new());
     for (seed, (number, conversion)) in (0..).zip(all.iter().enumerate()) {
         let YuvConversion { format, filter, .. } = *conversion;
         if filter == Filter::Linear {
             continue;
         }
-        let picture = Picture::new(format, 40 * seed);
-        let data = picture.planes(format).concat();
+        let image = Picture::new(format, 40 * seed);
+        let data = image.planes(format).concat();
         match ctx.create_texture(&TextureDesc { conversion: Some(number), ..desc(format, &data) }) {
             Ok(texture) => {
                 textures.push(texture);
-                pictures.push((conversion, picture));
+                images.push((conversion, image));
             }
             Err(Error::Unsupported { why, .. }) => {
                 assert!(!matches!(format, Format::Nv12 | Format::Yuv420p8), "{format:?}: {why}");
@@ -172,10 +173,10 @@ fn check_conversions(ctx: &Context, all: &[YuvConversion]) {
             Err(other) => unreachable!("{conversion:?}: {other}"),
         }
     }
-    assert!(pictures.len() >= 12, "the formats of 8 bits in all models and ranges");
-    for ((conversion, picture), found) in pictures.iter().zip(colors(ctx, &textures)) {
+    assert!(images.len() >= 12, "the formats of 8 bits in all models and ranges");
+    for ((conversion, image), found) in images.iter().zip(colors(ctx, &textures)) {
         for (i, found) in found.into_iter().enumerate() {
-            let expected = picture.colors(conversion.model, conversion.range, i);
+            let expected = image.colors(conversion.model, conversion.range, i);
             let far = |(found, expected): (&f32, &f64)| (f64::from(found.clamp(0.0, 1.0)) - expected).abs();
             let close = |color: &[f64; 3]| found.iter().zip(color).map(far).all(|far| far < 2.0 / 255.0);
             assert!(expected.iter().any(close), "{conversion:?} {i}: {found:?} not {expected:?}");
@@ -191,7 +192,7 @@ fn colours_are_those_of_the_standards() {
 
 #[test]
 fn colours_are_those_of_the_standards_on_another_driver() {
-    without_ray_tracing(colours_are_those_of_the_standards_on_another_driver, || {
+    on_swiftshader(colours_are_those_of_the_standards_on_another_driver, || {
         let Some((ctx, all)) = yuv_device() else { return };
         check_conversions(&ctx, &all[..12]);
     });
@@ -201,8 +202,8 @@ fn colours_are_those_of_the_standards_on_another_driver() {
 fn planes_are_moved_and_seen_one_by_one() {
     let Some((ctx, _)) = yuv_device() else { return };
     for format in FORMATS {
-        let picture = Picture::new(format, 7);
-        let planes = picture.planes(format);
+        let image = Picture::new(format, 7);
+        let planes = image.planes(format);
         let data = planes.concat();
         let Ok(texture) = ctx.create_texture(&desc(format, &data)) else {
             eprintln!("NOT TESTED, the device lacks {format:?}");
@@ -220,7 +221,7 @@ fn planes_are_moved_and_seen_one_by_one() {
             let view = ctx.create_texture_view(&view).unwrap();
             let fetch = Evaluator::new(&ctx, "textureBindlessFetch2D(a, ivec2(1, 1), 0)");
             let found = fetch.run(&ctx, [view.index(), 0, 0], 1, &Dependencies::default())[0][0];
-            let expected = if picture.bits == 8 { 64.0 / 255.0 } else { f32::from(0x4040_u16) / 65_535.0 };
+            let expected = if image.bits == 8 { 64.0 / 255.0 } else { f32::from(0x4040_u16) / 65_535.0 };
             assert!((found - expected).abs() < 1e-3, "{format:?} {number}: {found}");
             let through = TextureRegion { aspect: Aspect::Main, ..part };
             assert_eq!(ctx.download_texture(*view, &through).unwrap(), vec![0x40; size]);
@@ -234,7 +235,7 @@ fn planes_are_moved_and_seen_one_by_one() {
 }
 
 #[test]
-fn slots_run_out_and_come_back_and_empty_ones_are_black() {
+fn slots_run_out_and_are_freed_and_empty_ones_are_black() {
     let Some(ctx) = device_with(|desc| desc.max_yuv_textures = 2) else { return };
     let data = [128; 48];
     let make = || ctx.create_texture(&desc(Format::Nv12, &data));

@@ -1,6 +1,6 @@
 //! Binary trees by binned surface area, never deeper than the walk's stack.
 
-use super::mesh_bvh::{Bvh, BvhNodes};
+use super::nodes::{Bvh, BvhNodes};
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::{
     Bvh2NodeRecord, LEAF, MAX_BVH2_DEPTH, MAX_LEAF_PRIMITIVES, NONE, leaf,

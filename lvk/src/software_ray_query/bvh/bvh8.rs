@@ -6,7 +6,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 
-use super::mesh_bvh::{Bvh, BvhNodes};
+use super::nodes::{Bvh, BvhNodes};
 use super::ploc;
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::{Bvh2NodeRecord, MAX_BVH8_DEPTH};

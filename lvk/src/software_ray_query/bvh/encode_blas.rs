@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::indexed_triangles::{IndexedMesh, index_mesh};
-use super::mesh_bvh::{Bvh, BvhNodes};
+use super::nodes::{Bvh, BvhNodes};
 use super::primitives::{Mesh, MeshPrimitives};
 use super::settings::BvhSettings;
 use crate::accel::geometry::GeometryFlags;

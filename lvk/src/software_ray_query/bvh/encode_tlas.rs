@@ -2,7 +2,7 @@
 
 use super::bvh2;
 use super::encode_instances::PlacedInstance;
-use super::mesh_bvh::BvhNodes;
+use super::nodes::BvhNodes;
 use super::rebraid::rebraid;
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::LeafKind;

@@ -1,26 +1,10 @@
 //! A tree over the primitives of a mesh, in the form that suits it.
 
-use obvhs::cwbvh::node::CwBvhNode;
-
 use super::bvh2;
 use super::bvh8;
+use super::nodes::{Bvh, BvhNodes};
 use crate::accel::primitive_bounds::Bounds;
-use crate::software_ray_query::layout::{Bvh2NodeRecord, NONE, leaf};
-
-/// Nodes of either form.
-pub(crate) enum BvhNodes {
-    Wide(Vec<CwBvhNode>),
-    Binary(Vec<Bvh2NodeRecord>),
-}
-
-/// A tree, and the order of primitives in its leaves.
-pub(crate) struct Bvh {
-    pub(crate) nodes: BvhNodes,
-    /// A node or a leaf, or [`NONE`].
-    pub(crate) root: u32,
-    /// For each place in the leaves which primitive stands there.
-    pub(crate) order: Vec<u32>,
-}
+use crate::software_ray_query::layout::{NONE, leaf};
 
 impl Bvh {
     /// The tree of a bottom-level structure: wide, but for meshes that wide nodes do not suit.

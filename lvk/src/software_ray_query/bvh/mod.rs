@@ -10,6 +10,7 @@ pub(crate) mod encode_instances;
 pub(crate) mod encode_tlas;
 pub(crate) mod indexed_triangles;
 pub(crate) mod mesh_bvh;
+pub(crate) mod nodes;
 mod ploc;
 pub(crate) mod primitives;
 pub(crate) mod rebraid;

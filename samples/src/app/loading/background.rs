@@ -1,4 +1,4 @@
-//! What a window shows while there is no picture.
+//! The background of a window while its sample is loading.
 
 use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
 

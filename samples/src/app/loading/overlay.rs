@@ -20,7 +20,7 @@ pub(super) fn show(ui: &egui::Context, stage: &Stage, elapsed: Duration) {
     });
 }
 
-/// A bar, or something that turns where nobody knows how much there is.
+/// A progress bar, or a spinner where the total is unknown.
 fn show_share(ui: &mut Ui, share: Option<f32>) {
     match share {
         Some(share) => ui.add(ProgressBar::new(share).show_percentage()),

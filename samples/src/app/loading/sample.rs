@@ -9,12 +9,12 @@ use lvk::{Context, Holder, TextureHandle};
 use super::background::background;
 use super::overlay;
 use super::status::Status;
+use crate::app::cli::ReadySample;
 use crate::app::frame::Frame;
+use crate::app::print_line;
 use crate::app::progress::Progress;
-use crate::app::run::Opened;
 use crate::app::run_error::RunError;
-use crate::app::sample::{Moment, Sample};
-use crate::app::say;
+use crate::app::sample::{FrameTime, Sample};
 use crate::scene::Camera;
 
 /// A sample that a thread may still be loading. Until it is there, frames are empty, with the progress over them.
@@ -39,7 +39,7 @@ struct UnderWay<S> {
     frames: u32,
 }
 
-type Made<S> = Result<Opened<S>, RunError>;
+type Made<S> = Result<ReadySample<S>, RunError>;
 
 impl<S: Sample> Loading<S> {
     /// One that is there.
@@ -90,14 +90,14 @@ impl<S: Sample> Loading<S> {
 }
 
 impl<S: Sample> UnderWay<S> {
-    /// What the thread has made, once it has ended.
+    /// Takes the result of the thread, once it has ended.
     fn take(&mut self) -> Option<Made<S>> {
         let thread = self.thread.take_if(|thread| thread.is_finished())?;
-        let Opened { mut sample, headline } = match thread.join().unwrap_or_else(|panic| resume_unwind(panic))
-        {
-            Ok(opened) => opened,
-            Err(error) => return Some(Err(error)),
-        };
+        let ReadySample { mut sample, summary } =
+            match thread.join().unwrap_or_else(|panic| resume_unwind(panic)) {
+                Ok(opened) => opened,
+                Err(error) => return Some(Err(error)),
+            };
         if let Some(extent) = self.extent
             && let Err(error) = sample.resize(extent).map_err(Into::into)
         {
@@ -105,7 +105,7 @@ impl<S: Sample> UnderWay<S> {
         }
         let seconds = self.start.elapsed().as_secs_f32();
         eprintln!("loaded in {seconds:.1} s, with {} frames shown meanwhile", self.frames);
-        Some(Ok(Opened { sample, headline }))
+        Some(Ok(ReadySample { sample, summary }))
     }
 }
 
@@ -129,14 +129,14 @@ impl<S: Sample> Sample for Loading<S> {
     fn is_loading(&mut self) -> Result<bool, RunError> {
         let State::UnderWay(under_way) = &mut self.state else { return Ok(false) };
         let Some(made) = under_way.take() else { return Ok(true) };
-        let Opened { sample, headline } = made?;
-        say(&headline);
+        let ReadySample { sample, summary } = made?;
+        print_line(&summary);
         self.state = State::Ready(sample);
         Ok(false)
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RunError> {
-        self.sample_mut().map_or(Ok(()), |sample| sample.update(moment).map_err(Into::into))
+    fn update(&mut self, time: FrameTime) -> Result<(), RunError> {
+        self.sample_mut().map_or(Ok(()), |sample| sample.update(time).map_err(Into::into))
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
@@ -175,8 +175,8 @@ impl<S: Sample> Sample for Loading<S> {
         self.sample().is_some_and(S::stands_at_first)
     }
 
-    fn view(&self) -> Option<Camera> {
-        self.sample().and_then(S::view)
+    fn view(&mut self) -> Option<Camera> {
+        self.sample_mut().and_then(S::view)
     }
 
     fn set_view(&mut self, camera: &Camera) {

@@ -1,4 +1,4 @@
-//! How far loading is, and whether it is still wanted, between the thread that loads and the window.
+//! The progress and cancellation of loading, shared by the loading thread and the window.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[error("loading was stopped")]
 pub struct Stopped;
 
-/// How far loading is, and whether it is still wanted. Clones are the same.
+/// The progress and cancellation of loading. Clones share their state.
 #[derive(Debug, Clone, Default)]
 pub struct Status {
     shared: Arc<Shared>,
@@ -20,7 +20,7 @@ struct Shared {
     is_stopped: AtomicBool,
 }
 
-/// What is being done.
+/// The current stage.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Stage {
     pub(super) name: String,
@@ -45,12 +45,12 @@ impl Status {
         self.lock().clone()
     }
 
-    /// Asks whoever loads to end.
+    /// Asks the loading thread to stop.
     pub fn stop(&self) {
         self.shared.is_stopped.store(true, Ordering::Relaxed);
     }
 
-    /// Whether that was asked.
+    /// True if that was asked.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.shared.is_stopped.load(Ordering::Relaxed)

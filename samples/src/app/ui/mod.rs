@@ -3,9 +3,9 @@
 mod atlas;
 mod painter;
 mod panel;
-mod wanted;
+mod pending_settings;
 
 pub use painter::{Painter, pipelines};
-pub use panel::{Panel, Told};
-pub use wanted::Wanted;
-pub(crate) use wanted::option;
+pub use panel::{Panel, PanelInfo};
+pub use pending_settings::PendingSettings;
+pub(crate) use pending_settings::option_button;

@@ -7,27 +7,23 @@ use egui::epaint::{ClippedPrimitive, Primitive, Vertex};
 use egui::{FullOutput, Rect};
 use lvk::{
     Blend, BufferDesc, BufferHandle, BufferUsage, ColorTarget, Context, CullMode, Format, Holder,
-    IndexFormat, RenderPass, RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureHandle,
+    IndexFormat, RenderPass, RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
 };
 
 use super::atlas::Atlas;
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::shaders::app as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
 
 /// Folder of the texts in `shaders/`.
 const FOLDER: &str = "app";
-const VERTEX: SampleStage =
-    SampleStage { stage: ShaderStage::Vertex, text: texts::UI_VERT, defines: &[], name: "ui.vert" };
-const FRAGMENT: SampleStage =
-    SampleStage { stage: ShaderStage::Fragment, text: texts::UI_FRAG, defines: &[], name: "ui.frag" };
+const VERTEX: SampleStage = shader!("app", "ui.vert");
+const FRAGMENT: SampleStage = shader!("app", "ui.frag");
 /// Bytes that buffers have at first.
 const LEAST_BYTES: u64 = 1 << 16;
 
 /// Every pipeline of the user interface.
 #[must_use]
 pub fn pipelines() -> Vec<SamplePipeline> {
-    let (color, depth) = (vec![Format::Rgba8Unorm], None);
-    vec![SamplePipeline { name: "app: user interface", stages: vec![VERTEX, FRAGMENT], color, depth }]
+    vec![SamplePipeline::raster("app: user interface", &[VERTEX, FRAGMENT], &[Format::Rgba8Unorm], None)]
 }
 
 /// Paints a user interface.
@@ -83,7 +79,7 @@ impl Painter {
     /// A painter that has nothing to paint.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn new(ctx: &Context) -> lvk::Result<Self> {
         Ok(Self {
             ctx: ctx.clone(),
@@ -97,7 +93,7 @@ impl Painter {
         })
     }
 
-    /// What egui calls a texture that is `picture` to shaders: sRGB as it is encoded, so of a format that decodes nothing.
+    /// The egui id of `picture`, which holds encoded sRGB, so a format without decoding.
     #[must_use]
     pub fn texture_id(picture: &Holder<TextureHandle>) -> egui::TextureId {
         egui::TextureId::User(picture.index().into())
@@ -107,7 +103,7 @@ impl Painter {
     /// way, before the next submission.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn upload(&mut self, ui: &egui::Context, output: FullOutput, extent: [u32; 2]) -> lvk::Result<()> {
         self.given_up.drain(..).for_each(|id| self.atlas.free(id));
         for (id, delta) in &output.textures_delta.set {
@@ -150,7 +146,7 @@ impl Painter {
     /// name the pictures of the interface among its dependencies.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn record(&self, pass: &mut RenderPass<'_>) -> lvk::Result<()> {
         let Some((format, pipeline)) = &self.pipeline else { return Ok(()) };
         let linear_target = matches!(format, Format::Rgba8Srgb | Format::Bgra8Srgb).into();

@@ -3,30 +3,30 @@
 use egui::{CollapsingHeader, Color32, Grid, RichText, Ui};
 use lvk::{GpuProfile, GpuScope, PresentMode};
 
-/// What all windows have in their panel.
+/// The panel that all windows have.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Whether it is seen.
+    /// True if it is seen.
     pub is_open: bool,
-    /// Whether the animation goes on.
+    /// True if the animation goes on.
     pub animates: bool,
-    /// How pictures come to the screen.
+    /// The present mode.
     pub present_mode: PresentMode,
-    /// Why the shaders on disk are not in use.
+    /// Error of the shaders on disk, if they do not compile.
     pub shader_error: Option<String>,
     /// Milliseconds from frame to frame, smoothed.
     frame_ms: f32,
 }
 
-/// What a panel tells of the moment.
-pub struct Told<'a> {
+/// Values that a panel displays.
+pub struct PanelInfo<'a> {
     /// Name of the device.
     pub device: &'a str,
     /// Size of the window in pixels.
     pub extent: [u32; 2],
-    /// How pictures can come to the screen.
+    /// The present modes that the device supports.
     pub present_modes: &'a [PresentMode],
-    /// What the GPU took.
+    /// GPU times.
     pub profile: Option<&'a GpuProfile>,
     /// Keys and what they do.
     pub keys: &'a [(&'a str, &'a str)],
@@ -57,26 +57,32 @@ impl Panel {
     }
 
     /// Lays itself out, with the sample's own switches in it.
-    pub fn show(&mut self, ui: &egui::Context, title: &str, told: &Told<'_>, switches: impl FnOnce(&mut Ui)) {
+    pub fn show(
+        &mut self,
+        ui: &egui::Context,
+        title: &str,
+        info: &PanelInfo<'_>,
+        switches: impl FnOnce(&mut Ui),
+    ) {
         if !self.is_open {
             return;
         }
         egui::Window::new(title).default_pos([8.0, 8.0]).default_width(250.0).show(ui, |ui| {
-            let [width, height] = told.extent;
+            let [width, height] = info.extent;
             let rate = 1e3 / self.frame_ms.max(1e-3);
-            ui.label(told.device);
+            ui.label(info.device);
             ui.label(format!("{width} x {height}, {:.1} ms, {rate:.0} a second", self.frame_ms));
             if let Some(error) = &self.shader_error {
                 ui.label(RichText::new(error).color(Color32::LIGHT_RED).monospace());
             }
             ui.checkbox(&mut self.animates, "animation");
-            self.show_modes(ui, told.present_modes);
+            self.show_modes(ui, info.present_modes);
             switches(ui);
-            CollapsingHeader::new("GPU time").default_open(true).show(ui, |ui| match told.profile {
+            CollapsingHeader::new("GPU time").default_open(true).show(ui, |ui| match info.profile {
                 Some(profile) => show_times(ui, profile),
                 None => drop(ui.label("none known")),
             });
-            CollapsingHeader::new("Keys").show(ui, |ui| show_keys(ui, told.keys));
+            CollapsingHeader::new("Keys").show(ui, |ui| show_keys(ui, info.keys));
         });
     }
 

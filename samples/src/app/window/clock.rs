@@ -1,10 +1,10 @@
-//! What time it is in the animation of a window.
+//! The clock of a window's animation.
 
 use std::time::{Duration, Instant};
 
-use crate::app::sample::Moment;
+use crate::app::sample::FrameTime;
 
-/// What time it is in the animation.
+/// The clock of a window's animation.
 #[derive(Debug)]
 pub(super) struct Clock {
     start: Instant,
@@ -33,11 +33,12 @@ impl Clock {
         self.frames += u32::from(animates);
     }
 
-    /// The moment in rounds of so many frames: by the clock, or frame by frame, so that each run shows the same ones.
-    pub(super) fn moment(&self, by_frame: bool, frames_per_round: u32) -> Moment {
+    /// The frame time in rounds of `frames_per_round` frames: by the clock, or frame by frame, so that each run shows the
+    /// same frames.
+    pub(super) fn frame_time(&self, by_frame: bool, frames_per_round: u32) -> FrameTime {
         match by_frame {
-            true => Moment::of_frame(self.frames, frames_per_round),
-            false => Moment::after(self.animation.as_millis() as u32, frames_per_round),
+            true => FrameTime::from_frame(self.frames, frames_per_round),
+            false => FrameTime::from_millis(self.animation.as_millis() as u32, frames_per_round),
         }
     }
 
@@ -68,8 +69,8 @@ mod tests {
     fn an_animation_that_stands_shows_its_moment_however_that_is_counted() {
         let (all, some) = (after(&[true; 6]), after(&[true, false, false, true, false, true]));
         for (by_frame, six, three) in [(true, 6, 3), (false, 1500, 750)] {
-            assert_eq!(all.moment(by_frame, 240).frame, six);
-            assert_eq!(some.moment(by_frame, 240).frame, three);
+            assert_eq!(all.frame_time(by_frame, 240).frame, six);
+            assert_eq!(some.frame_time(by_frame, 240).frame, three);
         }
         assert_eq!(some.seconds(), 1.5, "the window's own time goes on");
     }

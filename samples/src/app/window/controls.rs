@@ -1,4 +1,4 @@
-//! What keys and mouse mean to a sample's window.
+//! The mapping of keys and mouse to actions of a window.
 
 use std::collections::HashSet;
 
@@ -9,13 +9,13 @@ use crate::app::fly_camera::Steering;
 /// Radians for each pixel that the mouse is dragged.
 const TURN: f32 = 0.004;
 
-/// What a key asks of the window.
+/// The action of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Action {
     /// Lets the animation stand or go on.
     Pause,
     /// Gives the camera back to the animation.
-    GiveBack,
+    ReleaseCamera,
     /// Shows or hides the panel.
     Panel,
     /// Goes on to the next of what the sample shows.
@@ -41,10 +41,10 @@ const HELP: [(&str, &str); 9] = [
     ("F12, Esc", "screenshot, close"),
 ];
 
-/// How many of them are the camera's.
+/// Number of keys of the camera.
 const CAMERA_KEYS: usize = 5;
 
-/// What keys and mouse do in the window of a sample with a camera, or without one.
+/// Returns the help for keys and mouse, of a sample with or without a camera.
 pub(super) fn help(has_camera: bool) -> &'static [(&'static str, &'static str)] {
     &HELP[if has_camera { 0 } else { CAMERA_KEYS }..]
 }
@@ -74,7 +74,7 @@ impl Controls {
         self.tapped.insert(key);
         match key {
             KeyCode::Space => Some(Action::Pause),
-            KeyCode::KeyC => Some(Action::GiveBack),
+            KeyCode::KeyC => Some(Action::ReleaseCamera),
             KeyCode::F1 => Some(Action::Panel),
             KeyCode::KeyN => Some(Action::Next),
             KeyCode::F5 => Some(Action::Reload),
@@ -102,13 +102,13 @@ impl Controls {
         self.faster += notches;
     }
 
-    /// The window listens no more: nothing is held.
-    pub(super) fn let_go(&mut self) {
+    /// Releases all keys, as when the window loses the focus.
+    pub(super) fn release_all(&mut self) {
         *self = Self { pointer: self.pointer, ..Self::default() };
     }
 
-    /// What was asked of the camera since the last time.
-    pub(super) fn take(&mut self) -> Steering {
+    /// Takes the steering since the last call.
+    pub(super) fn take_steering(&mut self) -> Steering {
         let is_on = |key| self.held.contains(&key) || self.tapped.contains(&key);
         let axis = |plus, minus| f32::from(is_on(plus)) - f32::from(is_on(minus));
         let steering = Steering {
@@ -138,14 +138,14 @@ mod tests {
             assert_eq!(controls.key(key, true), None);
         }
         for _ in 0..2 {
-            let steering = controls.take();
+            let steering = controls.take_steering();
             assert_eq!((steering.direction, steering.hurry), ([0.0, -1.0, 1.0], true));
         }
         controls.key(KeyCode::KeyS, true);
         controls.key(KeyCode::KeyQ, false);
-        assert_eq!(controls.take().direction, [0.0; 3], "forward and back");
-        controls.let_go();
-        assert_eq!(controls.take(), Steering::default());
+        assert_eq!(controls.take_steering().direction, [0.0; 3], "forward and back");
+        controls.release_all();
+        assert_eq!(controls.take_steering(), Steering::default());
     }
 
     #[test]
@@ -153,8 +153,8 @@ mod tests {
         let mut controls = Controls::default();
         controls.key(KeyCode::KeyA, true);
         controls.key(KeyCode::KeyA, false);
-        assert_eq!(controls.take().direction, [-1.0, 0.0, 0.0]);
-        assert_eq!(controls.take().direction, [0.0; 3]);
+        assert_eq!(controls.take_steering().direction, [-1.0, 0.0, 0.0]);
+        assert_eq!(controls.take_steering().direction, [0.0; 3]);
     }
 
     #[test]
@@ -178,15 +178,15 @@ mod tests {
         let mut controls = Controls::default();
         controls.pointer([5.0, 5.0]);
         controls.pointer([9.0, 5.0]);
-        assert_eq!(controls.take(), Steering::default());
+        assert_eq!(controls.take_steering(), Steering::default());
         controls.drag(true);
         controls.pointer([109.0, 55.0]);
         controls.wheel(2.0);
-        let steering = controls.take();
+        let steering = controls.take_steering();
         assert!((steering.turn[0] - 0.4).abs() < 1e-6 && (steering.turn[1] - 0.2).abs() < 1e-6);
-        assert_eq!((steering.faster, controls.take()), (2.0, Steering::default()));
+        assert_eq!((steering.faster, controls.take_steering()), (2.0, Steering::default()));
         controls.drag(false);
         controls.pointer([0.0, 0.0]);
-        assert_eq!(controls.take(), Steering::default());
+        assert_eq!(controls.take_steering(), Steering::default());
     }
 }

@@ -1,11 +1,11 @@
 //! A sample in a window: camera by mouse and keys, a panel with switches and times, shaders compiled as they change.
 
+mod camera_controller;
 mod clock;
 mod controls;
-mod pilot;
-mod program;
+mod present_pass;
 mod resize;
-mod screen;
 mod ui_input;
+mod window_app;
 
-pub(super) use program::run;
+pub(super) use window_app::run;

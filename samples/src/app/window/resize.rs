@@ -1,19 +1,20 @@
-//! When the pictures of a sample follow the size of its window.
+//! Debounces changes of a window's size.
 
 use std::time::{Duration, Instant};
 
-/// How long a window must keep its size. A picture is stretched meanwhile: samples make much anew for another size.
+/// Time that a window must keep its size. The image is stretched meanwhile, as samples recreate many resources for another
+/// size.
 const REST: Duration = Duration::from_millis(150);
 
-/// Which size pictures have, and which they are to get.
+/// The current size of images, and the latest size of the window.
 #[derive(Debug)]
-pub(super) struct Follower {
+pub(super) struct ResizeDebounce {
     pictures: [u32; 2],
     window: [u32; 2],
     changed: Option<Instant>,
 }
 
-impl Follower {
+impl ResizeDebounce {
     /// For pictures of this size.
     pub(super) fn new(pictures: [u32; 2]) -> Self {
         Self { pictures, window: pictures, changed: None }
@@ -43,15 +44,15 @@ mod tests {
     fn pictures_follow_when_the_window_rests() {
         let start = Instant::now();
         let at = |milliseconds| start + Duration::from_millis(milliseconds);
-        let mut follower = Follower::new([8, 8]);
-        assert_eq!(follower.next([8, 8], at(0)), None);
-        assert_eq!(follower.next([9, 8], at(10)), None);
-        assert_eq!(follower.next([10, 8], at(150)), None, "still under way");
-        assert_eq!(follower.next([10, 8], at(290)), None);
-        assert_eq!(follower.next([10, 8], at(300)), Some([10, 8]));
-        assert_eq!(follower.next([10, 8], at(600)), None, "once");
+        let mut resize = ResizeDebounce::new([8, 8]);
+        assert_eq!(resize.next([8, 8], at(0)), None);
+        assert_eq!(resize.next([9, 8], at(10)), None);
+        assert_eq!(resize.next([10, 8], at(150)), None, "still under way");
+        assert_eq!(resize.next([10, 8], at(290)), None);
+        assert_eq!(resize.next([10, 8], at(300)), Some([10, 8]));
+        assert_eq!(resize.next([10, 8], at(600)), None, "once");
         for (time, size) in [(700, [0, 0]), (900, [0, 0]), (1000, [10, 8]), (1200, [10, 8])] {
-            assert_eq!(follower.next(size, at(time)), None, "minimised and back again");
+            assert_eq!(resize.next(size, at(time)), None, "minimised and back again");
         }
     }
 }

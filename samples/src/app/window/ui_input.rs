@@ -1,4 +1,4 @@
-//! What happens to a window, in egui's words.
+//! Translates events of a window for egui.
 
 use egui::{Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, Vec2, pos2, vec2};
 use winit::dpi::PhysicalPosition;
@@ -42,8 +42,8 @@ impl UiInput {
         }
     }
 
-    /// What happened since the last time, and the keys that modify others.
-    pub(super) fn take(&mut self) -> (Vec<Event>, Modifiers) {
+    /// Takes the events since the last call, and the modifier keys.
+    pub(super) fn take_events(&mut self) -> (Vec<Event>, Modifiers) {
         (std::mem::take(&mut self.events), self.modifiers)
     }
 
@@ -61,7 +61,7 @@ fn in_points(place: PhysicalPosition<f64>, per_point: f32) -> Pos2 {
     pos2(place.x as f32 / per_point, place.y as f32 / per_point)
 }
 
-/// How far the wheel was turned.
+/// The distance of a turn of the wheel.
 fn wheel(delta: MouseScrollDelta, per_point: f32) -> (MouseWheelUnit, Vec2) {
     match delta {
         MouseScrollDelta::LineDelta(x, y) => (MouseWheelUnit::Line, vec2(x, y)),
@@ -125,12 +125,12 @@ mod tests {
         input.push(&WindowEvent::CursorMoved { device_id, position: PhysicalPosition::new(30.0, 50.0) }, 2.0);
         let (state, button) = (ElementState::Pressed, MouseButton::Left);
         input.push(&WindowEvent::MouseInput { device_id, state, button }, 2.0);
-        let (events, _) = input.take();
+        let (events, _) = input.take_events();
         assert_eq!(events[0], Event::PointerMoved(pos2(15.0, 25.0)));
         assert!(
             matches!(events[1], Event::PointerButton { pos, pressed: true, .. } if pos == pos2(15.0, 25.0))
         );
-        assert!(input.take().0.is_empty());
+        assert!(input.take_events().0.is_empty());
     }
 
     #[test]
@@ -139,7 +139,7 @@ mod tests {
         input.key(KeyCode::Digit4, ElementState::Pressed, false, Some("4"));
         input.key(KeyCode::Backspace, ElementState::Pressed, true, Some("\u{8}"));
         input.key(KeyCode::Digit4, ElementState::Released, false, Some("4"));
-        let (events, _) = input.take();
+        let (events, _) = input.take_events();
         assert_eq!(events[0], Event::Text("4".to_owned()));
         assert!(matches!(events[1], Event::Key { key: Key::Backspace, repeat: true, .. }));
         assert_eq!(events.len(), 2);

@@ -1,10 +1,10 @@
 //! Why the experiment did not end.
 
+use crate::app::sample_error::SampleError;
 use std::path::{Path, PathBuf};
 
 use crate::app::metrics::SizeError;
 use crate::app::png::PngError;
-use crate::hybrid::HybridError;
 
 /// Why the experiment did not end.
 #[derive(Debug, thiserror::Error)]
@@ -12,7 +12,7 @@ use crate::hybrid::HybridError;
 pub enum PaperError {
     /// A method could not render.
     #[error(transparent)]
-    Hybrid(#[from] HybridError),
+    Hybrid(#[from] SampleError),
     /// A picture could not be written.
     #[error(transparent)]
     Png(#[from] PngError),

@@ -38,7 +38,7 @@ pub(super) fn build(solids: &mut Solids) {
 }
 
 fn floor(solids: &mut Solids) {
-    solids.at([0.0; 3], 0.0).of(of::PAVING);
+    solids.at([0.0; 3], 0.0).material(of::PAVING);
     let (x, z) = (POOL.0 + 0.15, POOL.1 + 0.15);
     let far = 13.0;
     for [x0, z0, x1, z1] in [[-far, z, far, far], [-far, -far, far, -z], [-far, -z, -x, z], [x, -z, far, z]] {
@@ -53,7 +53,7 @@ fn floor(solids: &mut Solids) {
 fn pool(solids: &mut Solids) {
     let (x, z) = POOL;
     let (bottom, rim, edge) = (-0.75, 0.28, 0.32);
-    solids.at([0.0; 3], 0.0).of(of::MOSAIC);
+    solids.at([0.0; 3], 0.0).material(of::MOSAIC);
     // The tiles stand off the rim's blocks: faces in one plane have no order that a ray and a rasteriser share.
     let tile = 0.006;
     let corner = |sx: f32, y: f32, sz: f32| Vec3::new(sx * (x - tile), y, sz * (z - tile));
@@ -77,7 +77,7 @@ fn pool(solids: &mut Solids) {
             corner(ax, top, az),
         ]);
     }
-    solids.of(of::SANDSTONE);
+    solids.material(of::SANDSTONE);
     let (out_x, out_z) = (x + edge, z + edge);
     solids.block([-out_x, 0.0, z], [out_x, rim, out_z]);
     solids.block([-out_x, 0.0, -out_z], [out_x, rim, -z]);
@@ -89,7 +89,7 @@ fn pool(solids: &mut Solids) {
 /// A rippled sheet: rings around the plinth in the middle, and a slight breeze.
 fn water(solids: &mut Solids) {
     let (x, z) = POOL;
-    solids.of(of::WATER);
+    solids.material(of::WATER);
     solids.patch(120, 84, |i, j| {
         let p = Vec2::new(x * (i as f32 / 60.0 - 1.0), z * (1.0 - j as f32 / 42.0));
         let rings = (p.length() * 14.0).sin() * (-0.9 * p.length()).exp();
@@ -116,11 +116,11 @@ pub(super) fn arcade(
         column(solids, sides);
     }
     for i in 0..bays {
-        solids.at(local((i as f32 + 0.5) * BAY), turn).of(of::SANDSTONE);
+        solids.at(local((i as f32 + 0.5) * BAY), turn).material(of::SANDSTONE);
         arch(solids);
     }
     let length = bays as f32 * BAY;
-    solids.at(local(0.0), turn).of(of::SANDSTONE);
+    solids.at(local(0.0), turn).material(of::SANDSTONE);
     for (from, to) in [(-0.36, 0.0), (length, length + 0.36)] {
         solids.block([from, SPRING, -HALF_WALL], [to, PARAPET, HALF_WALL]);
     }
@@ -129,14 +129,14 @@ pub(super) fn arcade(
 }
 
 fn column(solids: &mut Solids, sides: u32) {
-    solids.of(of::SANDSTONE);
+    solids.material(of::SANDSTONE);
     solids.block([-0.34, 0.0, -0.34], [0.34, 0.12, 0.34]);
     solids.block([-0.36, SPRING - 0.12, -0.36], [0.36, SPRING, 0.36]);
     let base = smooth_profile(
         &[(0.34, 0.12), (0.36, 0.17), (0.33, 0.22), (0.285, 0.25), (0.30, 0.29), (0.31, 0.32), (0.26, 0.36)],
         18,
     );
-    solids.of(of::MARBLE).lathe(&base, sides / 3, |_, _| 1.0);
+    solids.material(of::MARBLE).lathe(&base, sides / 3, |_, _| 1.0);
     let capital = smooth_profile(
         &[(0.20, 2.28), (0.235, 2.31), (0.205, 2.35), (0.21, 2.42), (0.28, 2.55), (0.34, SPRING - 0.12)],
         18,
@@ -224,11 +224,11 @@ fn cornice(solids: &mut Solids, length: f32) {
 
 /// Brick behind the arcades, a wooden ceiling over them, and low walls at the open sides.
 fn walls(solids: &mut Solids) {
-    solids.at([0.0; 3], 0.0).of(of::BRICK);
+    solids.at([0.0; 3], 0.0).material(of::BRICK);
     let (back, left) = (-7.4, -8.6);
     brick_wall(solids, Vec3::new(left, 0.0, back), Vec3::new(9.0, 0.0, back), 4.3);
     brick_wall(solids, Vec3::new(left, 0.0, 9.0), Vec3::new(left, 0.0, back), 4.3);
-    solids.of(of::WOOD);
+    solids.material(of::WOOD);
     solids.block([left - 0.2, 4.2, back - 0.2], [9.2, 4.28, -4.9]);
     solids.block([left - 0.2, 4.2, -4.9], [-6.1, 4.28, 5.2]);
     for i in 0..22 {
@@ -239,7 +239,7 @@ fn walls(solids: &mut Solids) {
         let z = -4.4 + 0.8 * i as f32;
         solids.block([left, 4.02, z - 0.07], [-6.1, 4.2, z + 0.07]);
     }
-    solids.of(of::SANDSTONE);
+    solids.material(of::SANDSTONE);
     solids.block([6.9, 0.0, -4.4], [7.3, 1.1, 11.0]);
     solids.block([6.8, 1.1, -4.4], [7.4, 1.22, 11.0]);
     solids.block([-8.6, 0.0, 10.6], [7.3, 1.1, 11.0]);
@@ -257,8 +257,8 @@ fn brick_wall(solids: &mut Solids, from: Vec3, to: Vec3, height: f32) {
 
 /// A glass globe in a metal cap and ring. The lamp shines from its middle: glass casts no shadow.
 fn lantern(solids: &mut Solids, position: [f32; 3]) {
-    solids.at(position, 0.0).of(of::GLOW).sphere(0.19, 48);
-    solids.of(of::BRONZE);
+    solids.at(position, 0.0).material(of::GLOW).sphere(0.19, 48);
+    solids.material(of::BRONZE);
     let cap = smooth_profile(
         &[(0.17, 0.13), (0.18, 0.16), (0.12, 0.22), (0.05, 0.26), (0.02, 0.34), (0.0, 0.36)],
         20,

@@ -27,7 +27,7 @@ const STOREYS: u32 = 2;
 const CLOTH: u32 = of::LEAVES + 1;
 const CLOTHS: [[f32; 3]; 3] = [[0.45, 0.05, 0.04], [0.06, 0.20, 0.08], [0.07, 0.10, 0.34]];
 
-/// What [`Scene::atrium`] does.
+/// Implements [`Scene::atrium`].
 pub(in crate::scene) fn atrium() -> Scene {
     let mut solids = Solids::new();
     for storey in 0..STOREYS {
@@ -65,7 +65,7 @@ fn storey_of_arcades(solids: &mut Solids, floor: f32) {
         architecture::arcade(solids, [x, floor, HALF_COURT], 90.0, [END_BAYS, SIDES], false);
     }
     let (x, near, far) = (half_length() + AISLE, HALF_COURT + 0.2, HALF_COURT + AISLE);
-    solids.at([0.0, floor + STOREY - 0.14, 0.0], 0.0).of(of::WOOD);
+    solids.at([0.0, floor + STOREY - 0.14, 0.0], 0.0).material(of::WOOD);
     for side in [-1.0_f32, 1.0] {
         let [low, high] = if side > 0.0 { [near, far] } else { [-far, -near] };
         solids.block([-x, 0.0, low], [x, 0.13, high]);
@@ -83,7 +83,7 @@ fn storey_of_arcades(solids: &mut Solids, floor: f32) {
 fn walls(solids: &mut Solids) {
     let (x, z) = (half_length() + AISLE, HALF_COURT + AISLE);
     let height = STOREYS as f32 * STOREY;
-    solids.at([0.0; 3], 0.0).of(of::BRICK);
+    solids.at([0.0; 3], 0.0).material(of::BRICK);
     let corner = |sx: f32, sz: f32| Vec3::new(sx * x, 0.0, sz * z);
     for (from, to) in [
         (corner(-1.0, -1.0), corner(1.0, -1.0)),
@@ -93,7 +93,7 @@ fn walls(solids: &mut Solids) {
     ] {
         wall(solids, from, to, height);
     }
-    solids.of(of::SANDSTONE);
+    solids.material(of::SANDSTONE);
     for side in [-1.0_f32, 1.0] {
         let (a, b) = (side * z, side * (z + 0.4));
         solids.block([-x - 0.4, 0.0, a.min(b)], [x + 0.4, height + 0.5, a.max(b)]);
@@ -117,9 +117,9 @@ fn wall(solids: &mut Solids, from: Vec3, to: Vec3, height: f32) {
 /// Paving, and a long carpet of tiles along the middle.
 fn ground(solids: &mut Solids) {
     let (x, z) = (half_length() + AISLE, HALF_COURT + AISLE);
-    solids.at([0.0; 3], 0.0).of(of::PAVING);
+    solids.at([0.0; 3], 0.0).material(of::PAVING);
     floor(solids, [24, 12], [x, z], 0.0, 4.8);
-    solids.of(of::MOSAIC);
+    solids.material(of::MOSAIC);
     floor(solids, [24, 3], [half_length() - 1.6, 0.8], 0.012, 1.6);
 }
 
@@ -140,7 +140,7 @@ fn curtains(solids: &mut Solids) {
                 continue;
             }
             let x = -half_length() + (bay as f32 + 0.5) * BAY;
-            solids.at([x, STOREY, side * (HALF_COURT + 0.02)], 0.0).of(CLOTH + (bay + row as u32) % 3);
+            solids.at([x, STOREY, side * (HALF_COURT + 0.02)], 0.0).material(CLOTH + (bay + row as u32) % 3);
             let (half, top, long) = (0.5 * BAY - 0.36, 2.72, 1.5 + 1.0 * chance(42));
             solids.patch(48, 24, |i, j| {
                 let (across, up) = (i as f32 / 24.0 - 1.0, j as f32 / 24.0);
@@ -156,7 +156,7 @@ fn curtains(solids: &mut Solids) {
 /// A golden knot in the middle, vases along the court, and bushes in pots.
 fn furniture(solids: &mut Solids) {
     sculpture::plinth(solids, [0.0; 3], 0.45, 1.1);
-    solids.at([0.0, 1.86, 0.0], 24.0).of(of::GOLD);
+    solids.at([0.0, 1.86, 0.0], 24.0).material(of::GOLD);
     sculpture::knot(solids, 0.68, 0.15);
     for number in 0..BAYS - 1 {
         let x = -half_length() + (number as f32 + 1.0) * BAY;
@@ -169,7 +169,7 @@ fn furniture(solids: &mut Solids) {
 }
 
 fn vase(solids: &mut Solids, at: [f32; 3]) {
-    solids.at(at, 0.0).of(of::MARBLE).block([-0.26, 0.0, -0.26], [0.26, 0.3, 0.26]);
+    solids.at(at, 0.0).material(of::MARBLE).block([-0.26, 0.0, -0.26], [0.26, 0.3, 0.26]);
     let body = smooth_profile(
         &[
             (0.0, 0.3),
@@ -183,7 +183,7 @@ fn vase(solids: &mut Solids, at: [f32; 3]) {
         ],
         36,
     );
-    solids.of(of::LACQUER).lathe(&body, 48, |_, _| 1.0);
+    solids.material(of::LACQUER).lathe(&body, 48, |_, _| 1.0);
 }
 
 fn bush(solids: &mut Solids, at: [f32; 3], seed: u32) {
@@ -191,8 +191,8 @@ fn bush(solids: &mut Solids, at: [f32; 3], seed: u32) {
         &[(0.0, 0.0), (0.24, 0.0), (0.34, 0.46), (0.38, 0.50), (0.36, 0.56), (0.30, 0.50), (0.0, 0.48)],
         24,
     );
-    solids.at(at, 0.0).of(of::TERRACOTTA).lathe(&pot, 32, |_, _| 1.0);
-    solids.of(of::LEAVES);
+    solids.at(at, 0.0).material(of::TERRACOTTA).lathe(&pot, 32, |_, _| 1.0);
+    solids.material(of::LEAVES);
     let crown: Vec<(f32, f32)> = (0..=40)
         .map(|i| {
             let t = i as f32 / 40.0;

@@ -1,4 +1,4 @@
-//! What the courtyard is made of; each constant is the number of a material.
+//! Materials of the courtyard; each constant is the number of a material.
 
 use crate::scene::{Material, Texture};
 

@@ -21,7 +21,7 @@ use super::mesh::Mesh;
 use super::setting::Setting;
 use super::{Ambient, Camera, DirectionalLight, Material, PointLight, Scene, Sky, Texture, normals};
 
-/// What [`Scene::procedural`] does.
+/// Implements [`Scene::procedural`].
 pub(super) fn courtyard() -> Scene {
     let materials = materials::all();
     let (textures, (mesh, opaque_triangle_count)) = std::thread::scope(|scope| {

@@ -1,4 +1,4 @@
-//! What stands in the courtyard: statues, mirrors, glass, plants.
+//! Objects in the courtyard: statues, mirrors, glass, plants.
 
 use std::f32::consts::{PI, TAU};
 
@@ -30,7 +30,7 @@ pub(super) fn build(solids: &mut Solids) {
 /// A golden knot on a plinth in the middle of the pool.
 fn fountain(solids: &mut Solids) {
     plinth(solids, [0.0, -0.75, 0.0], 0.42, 1.55);
-    solids.at([0.0, 1.62, 0.0], 18.0).of(of::GOLD);
+    solids.at([0.0, 1.62, 0.0], 18.0).material(of::GOLD);
     knot(solids, 0.62, 0.135);
 }
 
@@ -59,7 +59,7 @@ pub(super) fn knot(solids: &mut Solids, radius: f32, thickness: f32) {
 /// A twisted marble flame, taller than a person.
 fn flame(solids: &mut Solids) {
     plinth(solids, [-3.55, 0.0, 1.7], 0.46, 0.8);
-    solids.at([-3.55, 0.8, 1.7], 20.0).of(of::MARBLE);
+    solids.at([-3.55, 0.8, 1.7], 20.0).material(of::MARBLE);
     let profile: Vec<(f32, f32)> = (0..=150)
         .map(|i| {
             let t = i as f32 / 150.0;
@@ -76,7 +76,7 @@ fn flame(solids: &mut Solids) {
 /// A ball of blue lacquer with spiral furrows.
 fn carved_ball(solids: &mut Solids) {
     plinth(solids, [2.75, 0.0, -3.1], 0.5, 0.75);
-    solids.at([2.75, 1.33, -3.1], 0.0).of(of::LACQUER);
+    solids.at([2.75, 1.33, -3.1], 0.0).material(of::LACQUER);
     solids.lathe(&arc(0.6, 96), 144, |angle, height| {
         let polar = (height / 0.6).clamp(-1.0, 1.0).acos();
         let edge = polar.sin();
@@ -86,9 +86,9 @@ fn carved_ball(solids: &mut Solids) {
 
 /// Three metal balls on the floor and a curved wall of mirrors.
 fn mirrors(solids: &mut Solids) {
-    solids.at([1.95, 0.46, 3.55], 0.0).of(of::CHROME).sphere(0.46, 72);
-    solids.at([-1.55, 0.3, 3.9], 0.0).of(of::COPPER).sphere(0.3, 64);
-    solids.at([-0.85, 0.16, 4.55], 0.0).of(of::CHROME).sphere(0.16, 48);
+    solids.at([1.95, 0.46, 3.55], 0.0).material(of::CHROME).sphere(0.46, 72);
+    solids.at([-1.55, 0.3, 3.9], 0.0).material(of::COPPER).sphere(0.3, 64);
+    solids.at([-0.85, 0.16, 4.55], 0.0).material(of::CHROME).sphere(0.16, 48);
     mirror_wall(solids);
 }
 
@@ -115,11 +115,11 @@ fn mirror_wall(solids: &mut Solids) {
             solids.quad(corners.map(|(r, y)| at(i, r, y)));
         }
     };
-    solids.of(of::MARBLE);
+    solids.material(of::MARBLE);
     band(solids, RADIUS + 0.14, RADIUS - 0.2, 0.0, 0.3);
-    solids.of(of::MIRROR);
+    solids.material(of::MIRROR);
     band(solids, RADIUS, RADIUS - 0.05, 0.3, 2.5);
-    solids.of(of::BRONZE);
+    solids.material(of::BRONZE);
     band(solids, RADIUS + 0.05, RADIUS - 0.1, 2.5, 2.6);
     for i in [0, STEPS] {
         let Vec3 { x, z, .. } = at(i, RADIUS, 0.0);
@@ -130,12 +130,12 @@ fn mirror_wall(solids: &mut Solids) {
 /// A ball, a bowl and a block of glass.
 fn glasses(solids: &mut Solids) {
     plinth(solids, [3.3, 0.0, 2.3], 0.36, 0.5);
-    solids.at([3.3, 0.96, 2.3], 0.0).of(of::GLASS).sphere(0.46, 96);
+    solids.at([3.3, 0.96, 2.3], 0.0).material(of::GLASS).sphere(0.46, 96);
     solids
         .at([0.62, 0.292, 4.25], 28.0)
-        .of(of::GREEN_GLASS)
+        .material(of::GREEN_GLASS)
         .rounded_block(Vec3::new(0.22, 0.29, 0.22), 0.035);
-    solids.at([-2.3, 0.282, 1.86], 0.0).of(of::AMBER_GLASS);
+    solids.at([-2.3, 0.282, 1.86], 0.0).material(of::AMBER_GLASS);
     let bowl = smooth_profile(
         &[
             (0.0, 0.0),
@@ -157,17 +157,17 @@ fn glasses(solids: &mut Solids) {
 }
 
 pub(super) fn plinth(solids: &mut Solids, position: [f32; 3], half: f32, height: f32) {
-    solids.at(position, 0.0).of(of::SANDSTONE);
+    solids.at(position, 0.0).material(of::SANDSTONE);
     solids.block([-half, 0.0, -half], [half, 0.12, half]);
     let inner = half - 0.05;
     solids.block([-inner, 0.12, -inner], [inner, height - 0.1, inner]);
-    solids.of(of::MARBLE).block([-half, height - 0.1, -half], [half, height, half]);
+    solids.material(of::MARBLE).block([-half, height - 0.1, -half], [half, height, half]);
 }
 
 /// A clipped tree in a terracotta pot.
 fn cypress(solids: &mut Solids, position: [f32; 3], height: f32) {
     const CROWN: u32 = 60;
-    solids.at(position, 0.0).of(of::TERRACOTTA);
+    solids.at(position, 0.0).material(of::TERRACOTTA);
     let pot = smooth_profile(
         &[
             (0.0, 0.0),
@@ -183,7 +183,7 @@ fn cypress(solids: &mut Solids, position: [f32; 3], height: f32) {
         22,
     );
     solids.lathe(&pot, 36, |_, _| 1.0);
-    solids.of(of::LEAVES);
+    solids.material(of::LEAVES);
     let top = height - 0.5;
     let crown: Vec<(f32, f32)> = (0..=CROWN)
         .map(|i| {

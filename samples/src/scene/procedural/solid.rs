@@ -12,7 +12,7 @@ use crate::scene::mesh::Mesh;
 /// Adds solids to a mesh, each placed by `place` and made of `material`.
 pub(super) struct Solids {
     pub mesh: Mesh,
-    /// Where the next solids go.
+    /// Placement of the next solids.
     pub place: Affine3A,
     /// Number of the material of the next solids.
     pub material: u32,
@@ -31,7 +31,7 @@ impl Solids {
     }
 
     /// Makes the next solids of `material`.
-    pub fn of(&mut self, material: u32) -> &mut Self {
+    pub fn material(&mut self, material: u32) -> &mut Self {
         self.material = material;
         self
     }

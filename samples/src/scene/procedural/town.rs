@@ -36,26 +36,26 @@ pub(crate) fn town() -> Scene {
     finish("town", solids)
 }
 
-/// What turns around the vertical in the middle of the town.
+/// The carousel, which turns around the vertical in the middle of the town.
 pub(crate) fn carousel() -> Scene {
     let mut solids = Solids::new();
-    solids.at([0.0, 0.14, 0.0], 0.0).of(CREAM);
+    solids.at([0.0, 0.14, 0.0], 0.0).material(CREAM);
     solids.lathe(&[(0.0, -0.07), (1.5, -0.07), (1.55, 0.0), (1.5, 0.07), (0.0, 0.07)], 48, |_, _| 1.0);
-    solids.of(ROOF).lathe(&[(0.0, 1.6), (1.75, 1.55), (1.75, 1.68), (0.0, 2.45)], 12, |_, _| 1.0);
-    solids.of(PAPER).lathe(&[(0.28, 0.05), (0.28, 1.65)], 24, |_, _| 1.0);
+    solids.material(ROOF).lathe(&[(0.0, 1.6), (1.75, 1.55), (1.75, 1.68), (0.0, 2.45)], 12, |_, _| 1.0);
+    solids.material(PAPER).lathe(&[(0.28, 0.05), (0.28, 1.65)], 24, |_, _| 1.0);
     for number in 0..8 {
         let turn = 45.0 * number as f32;
         let place = glam::Quat::from_rotation_y(turn.to_radians()) * Vec3::new(0.0, 0.14, 1.2);
-        solids.at(place.into(), turn).of(PAPER).lathe(&[(0.04, 0.05), (0.04, 1.6)], 8, |_, _| 1.0);
+        solids.at(place.into(), turn).material(PAPER).lathe(&[(0.04, 0.05), (0.04, 1.6)], 8, |_, _| 1.0);
         solids.place.translation.y += 0.5 + 0.25 * (number % 2) as f32;
-        solids.of(if number % 2 == 0 { MINT } else { ROOF }).sphere(0.22, 20);
+        solids.material(if number % 2 == 0 { MINT } else { ROOF }).sphere(0.22, 20);
     }
     finish("carousel", solids)
 }
 
 fn ground(solids: &mut Solids) {
     let [far, near] = [-60.0, 60.0];
-    solids.at([0.0; 3], 0.0).of(PAPER).quad([
+    solids.at([0.0; 3], 0.0).material(PAPER).quad([
         Vec3::new(far, 0.0, near),
         Vec3::new(near, 0.0, near),
         Vec3::new(near, 0.0, far),
@@ -63,7 +63,7 @@ fn ground(solids: &mut Solids) {
     ]);
     for step in 0..3 {
         let (radius, height) = (2.5 - 0.25 * step as f32, 0.03 * (step + 1) as f32);
-        solids.of(CREAM).lathe(&[(radius, 0.0), (radius, height), (0.0, height)], 48, |_, _| 1.0);
+        solids.material(CREAM).lathe(&[(radius, 0.0), (radius, height), (0.0, height)], 48, |_, _| 1.0);
     }
 }
 
@@ -74,15 +74,15 @@ fn house(solids: &mut Solids, x: i32, z: i32) {
     let height = 0.9 + 0.45 * far + 1.3 * chance(1);
     let half = 0.6 + 0.2 * chance(2);
     solids.at([STREET * x as f32, 0.0, STREET * z as f32], 8.0 * (chance(3) - 0.5));
-    solids.of(if chance(4) < 0.5 { PAPER } else { CREAM });
+    solids.material(if chance(4) < 0.5 { PAPER } else { CREAM });
     solids.block([-half, 0.0, -half], [half, height, half]);
     solids.block([-half - 0.07, height, -half - 0.07], [half + 0.07, height + 0.09, half + 0.07]);
     solids.block([-0.16, 0.0, half], [0.16, 0.5, half + 0.18]);
     solids.place.translation.y += height + 0.09;
     match (chance(5) * 4.0) as u32 {
-        0 => hip(solids.of(ROOF), half),
-        1 => hip(solids.of(SLATE), 0.8 * half),
-        2 => solids.of(MINT).lathe(&arc(0.8 * half, 16)[8..], 32, |_, _| 1.0),
+        0 => hip(solids.material(ROOF), half),
+        1 => hip(solids.material(SLATE), 0.8 * half),
+        2 => solids.material(MINT).lathe(&arc(0.8 * half, 16)[8..], 32, |_, _| 1.0),
         _ => {
             solids.block([-0.7 * half, 0.0, -0.7 * half], [0.7 * half, 0.5, 0.7 * half]);
             solids.block([-0.35 * half, 0.5, -0.35 * half], [0.35 * half, 0.9, 0.35 * half]);
@@ -107,10 +107,10 @@ fn arcade(solids: &mut Solids, turn: f32) {
     let out = glam::Quat::from_rotation_y(turn.to_radians());
     for number in 0..7 {
         let place = out * Vec3::new(0.8 * number as f32 - 2.4, 0.0, 2.95);
-        solids.at(place.into(), turn).of(PAPER);
+        solids.at(place.into(), turn).material(PAPER);
         solids.lathe(&[(0.12, 0.0), (0.12, 0.08), (0.07, 0.12), (0.07, 0.9), (0.12, 0.95)], 16, |_, _| 1.0);
     }
-    solids.at([0.0; 3], turn).of(CREAM).block([-2.6, 0.95, 2.8], [2.6, 1.1, 3.1]);
+    solids.at([0.0; 3], turn).material(CREAM).block([-2.6, 0.95, 2.8], [2.6, 1.1, 3.1]);
 }
 
 fn finish(name: &str, solids: Solids) -> Scene {

@@ -8,7 +8,7 @@ use crate::scene::Material;
 use crate::scene::mesh::Mesh;
 use crate::scene::noise::lattice;
 
-/// What tells kinds of trees apart. Lengths are shares of a tree's height.
+/// Parameters of a kind of tree. Lengths are shares of a tree's height.
 pub(super) struct Kind {
     name: &'static str,
     /// In metres, on average.
@@ -79,7 +79,7 @@ pub(super) struct Tree {
     pub(super) materials: Vec<Material>,
 }
 
-/// A tree of about so many triangles.
+/// A tree of about this many triangles.
 pub(super) fn grow(kind: &Kind, triangles: u32, seed: u32) -> Tree {
     let mut mesh = Mesh::default();
     let sides = (triangles / 100).clamp(3, 32);
@@ -117,7 +117,7 @@ fn trunk(mesh: &mut Mesh, kind: &Kind, sides: u32) {
 }
 
 impl Kind {
-    /// Where a leaf hangs, and which way is outside there.
+    /// Position of a leaf, and the outward direction there.
     fn place_of_leaf(&self, chance: &impl Fn(u32) -> f32, seed: u32) -> (Vec3, Vec3) {
         let around = TAU * chance(1);
         let out = Vec3::new(around.sin(), 0.0, around.cos());

@@ -176,7 +176,7 @@ fn materials() -> Vec<Material> {
     ]
 }
 
-/// Where trees stand: on grass that is not steep, together in woods.
+/// Positions of trees: on grass that is not steep, together in woods.
 fn places(wanted: u32) -> Vec<(usize, Affine3A)> {
     let tries = 0..wanted.saturating_mul(TRIES);
     tries.filter_map(place).take(wanted as usize).collect()

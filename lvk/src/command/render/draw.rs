@@ -1,0 +1,245 @@
+//! Vertex and index buffers, and draws of vertices.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::pass::{BoundIndexBuffer, RenderPass};
+use crate::barrier::Use;
+use crate::command::compute::check_arguments;
+use crate::error::{Error, Result, check_limit};
+use crate::format::IndexFormat;
+use crate::gpu::caps::optional_features::OptionalFeature;
+use crate::handle::BufferHandle;
+use crate::pipeline::FrontEnd;
+use crate::resource::Buffer;
+use crate::resource::buffer::BufferUsage;
+
+impl RenderPass<'_> {
+    /// Binds a buffer to a vertex binding of the pipeline, from `offset` bytes on (`vkCmdBindVertexBuffers`): a multiple of 4, so
+    /// that whatever attributes the pipeline has are aligned.
+    pub fn bind_vertex_buffer(&mut self, slot: u32, buffer: BufferHandle, offset: u64) -> Result<()> {
+        const SLOTS: u32 = 16;
+        let buffer = self.cmd.shared.store.buffers.get(buffer)?;
+        buffer.check_usage(BufferUsage::VERTEX)?;
+        buffer.check_range(offset, 1)?;
+        if !offset.is_multiple_of(4) {
+            return Err(Error::usage(
+                &buffer.name,
+                format!("the vertex offset {offset} is no multiple of 4"),
+            ));
+        }
+        if slot >= SLOTS {
+            return Err(Error::usage(
+                &buffer.name,
+                format!("vertex slot {slot} does not exist, there are {SLOTS}"),
+            ));
+        }
+        self.read_in_pass(&buffer, Use::vertex())?;
+        // SAFETY: the buffer has the usage and the offset lies inside of it.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            device.cmd_bind_vertex_buffers(self.cmd.raw(), slot, &[buffer.raw], &[offset]);
+        }
+        self.vertex_slots |= 1 << slot;
+        Ok(())
+    }
+
+    /// Binds indices, from `offset` bytes on (`vkCmdBindIndexBuffer`).
+    pub fn bind_index_buffer(
+        &mut self,
+        buffer: BufferHandle,
+        offset: u64,
+        format: IndexFormat,
+    ) -> Result<()> {
+        let buffer = self.cmd.shared.store.buffers.get(buffer)?;
+        buffer.check_usage(BufferUsage::INDEX)?;
+        if format == IndexFormat::U8 {
+            self.cmd.shared.gpu.require(OptionalFeature::IndexTypeUint8, "a buffer of 8-bit indices")?;
+        }
+        let size = u64::from(format.size_bytes());
+        if !offset.is_multiple_of(size) {
+            return Err(Error::usage(
+                &buffer.name,
+                format!("the index offset {offset} is no multiple of {size}"),
+            ));
+        }
+        buffer.check_range(offset, size)?;
+        self.read_in_pass(&buffer, Use::index())?;
+        // SAFETY: the buffer has the usage and the offset is aligned and inside of it.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            device.cmd_bind_index_buffer(self.cmd.raw(), buffer.raw, offset, format.raw());
+        }
+        self.indices = Some(BoundIndexBuffer { count: (buffer.size_bytes - offset) / size, buffer });
+        Ok(())
+    }
+
+    /// Draws vertices (`vkCmdDraw`).
+    #[inline]
+    pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) -> Result<()> {
+        self.check_draw()?;
+        let (count, instance_count) = (range_length(&vertices), range_length(&instances));
+        // SAFETY: a pipeline is bound with all its vertex buffers and push constants.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            device.cmd_draw(self.cmd.raw(), count, instance_count, vertices.start, instances.start);
+        }
+        Ok(())
+    }
+
+    /// Draws vertices by index; `base_vertex` is added to each (`vkCmdDrawIndexed`).
+    pub fn draw_indexed(
+        &mut self,
+        indices: Range<u32>,
+        base_vertex: i32,
+        instances: Range<u32>,
+    ) -> Result<()> {
+        self.check_draw()?;
+        let bound = self.bound_index_buffer()?;
+        if u64::from(indices.end) > bound.count {
+            let message = format!("indices {indices:?} are drawn, but {} are bound", bound.count);
+            return Err(Error::usage(&bound.buffer.name, message));
+        }
+        let (count, instance_count) = (range_length(&indices), range_length(&instances));
+        // SAFETY: as in `draw`, and the indices lie inside the bound buffer.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            let raw = self.cmd.raw();
+            device.cmd_draw_indexed(raw, count, instance_count, indices.start, base_vertex, instances.start);
+        }
+        Ok(())
+    }
+
+    /// Draws `draw_count` times with arguments (`VkDrawIndirectCommand`) from a buffer with
+    /// [`BufferUsage::INDIRECT`], `stride` bytes apart (`vkCmdDrawIndirect`).
+    pub fn draw_indirect(
+        &mut self,
+        arguments: BufferHandle,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+    ) -> Result<()> {
+        self.check_draw()?;
+        let size = size_of::<vk::DrawIndirectCommand>() as u64;
+        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
+        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
+        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
+            // SAFETY: as in `draw`, and the arguments lie inside the buffer.
+            unsafe { device.cmd_draw_indirect(raw, buffer.raw, offset, count, stride) };
+        }
+        Ok(())
+    }
+
+    /// Draws by index `draw_count` times with arguments (`VkDrawIndexedIndirectCommand`) from a buffer with
+    /// [`BufferUsage::INDIRECT`], `stride` bytes apart (`vkCmdDrawIndexedIndirect`).
+    pub fn draw_indexed_indirect(
+        &mut self,
+        arguments: BufferHandle,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+    ) -> Result<()> {
+        self.check_draw()?;
+        self.bound_index_buffer()?;
+        let size = size_of::<vk::DrawIndexedIndirectCommand>() as u64;
+        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
+        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
+        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
+            // SAFETY: as in `draw`, and the arguments lie inside the buffer.
+            unsafe { device.cmd_draw_indexed_indirect(raw, buffer.raw, offset, count, stride) };
+        }
+        Ok(())
+    }
+
+    /// One call for all draws, or one for each where the device takes no more.
+    pub(super) fn indirect_calls(
+        &self,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+    ) -> impl Iterator<Item = (u64, u32)> + use<> {
+        let multi = self.cmd.shared.gpu.caps.multi_draw_indirect;
+        let (calls, draws) = if multi { (draw_count.min(1), draw_count) } else { (draw_count, 1) };
+        (0..calls).map(move |call| (offset + u64::from(call) * u64::from(stride), draws))
+    }
+
+    pub(super) fn indirect_buffer(
+        &mut self,
+        arguments: BufferHandle,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+        size: u64,
+    ) -> Result<Arc<Buffer>> {
+        let buffer = self.cmd.shared.store.buffers.get(arguments)?;
+        if u64::from(stride) < size || !stride.is_multiple_of(4) {
+            let message = format!("the stride {stride} must be a multiple of 4 and at least {size} bytes");
+            return Err(Error::usage(&buffer.name, message));
+        }
+        let limits = &self.cmd.shared.gpu.caps.limits;
+        if self.cmd.shared.gpu.caps.multi_draw_indirect {
+            check_limit(&buffer.name, "draw count", draw_count.into(), limits.max_indirect_draws.into())?;
+        }
+        let bytes = u64::from(draw_count.saturating_sub(1)) * u64::from(stride) + size;
+        check_arguments(&buffer, offset, bytes)?;
+        self.read_in_pass(&buffer, Use::indirect())?;
+        Ok(buffer)
+    }
+
+    pub(super) fn bound_index_buffer(&self) -> Result<&BoundIndexBuffer> {
+        self.indices.as_ref().ok_or_else(|| Error::usage("draw_indexed", "bind an index buffer first"))
+    }
+
+    /// Fails unless a pipeline with a vertex shader is bound with all it reads.
+    #[inline]
+    pub(super) fn check_draw(&mut self) -> Result<()> {
+        self.hazards.drawn = true;
+        match &self.draws {
+            Some(needs)
+                if self.vertex_slots & needs.vertex_slots == needs.vertex_slots
+                    && self.cmd.has_pushed(needs.push_constants) =>
+            {
+                Ok(())
+            }
+            _ => Err(self.draw_error()),
+        }
+    }
+
+    /// What is missing for a draw.
+    #[cold]
+    fn draw_error(&self) -> Error {
+        let pipeline = match self.bound_pipeline("draw") {
+            Ok(pipeline) => pipeline,
+            Err(nothing_bound) => return nothing_bound,
+        };
+        if pipeline.front_end != FrontEnd::Vertex {
+            let message = "it has a mesh shader; draw with draw_mesh_tasks or draw_mesh_tasks_indirect";
+            return Error::usage(&*pipeline.name, message);
+        }
+        let needed = (1_u32 << pipeline.vertex_binding_count) - 1;
+        if self.vertex_slots & needed != needed {
+            let message = format!("it reads {} vertex buffers; bind them all", pipeline.vertex_binding_count);
+            return Error::usage(&*pipeline.name, message);
+        }
+        self.cmd.missing_constants_error(&pipeline.name, pipeline.push_constant_bytes)
+    }
+
+    /// Fails unless a pipeline with a mesh shader is bound with all it reads.
+    pub(super) fn check_mesh_draw(&mut self) -> Result<()> {
+        self.hazards.drawn = true;
+        let pipeline = self.bound_pipeline("draw_mesh_tasks")?;
+        if pipeline.front_end == FrontEnd::Vertex {
+            let message = "it has no mesh shader; draw with draw, draw_indexed or their indirect forms";
+            return Err(Error::usage(&*pipeline.name, message));
+        }
+        self.cmd.state.queries.check_mesh_draw()?;
+        self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
+    }
+}
+
+#[inline]
+fn range_length(range: &Range<u32>) -> u32 {
+    range.end.saturating_sub(range.start)
+}

@@ -1,0 +1,408 @@
+//! The program of a sample that has a window: events in, frames out.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui::{Rect, ViewportInfo, vec2};
+use lvk::{Context, SubmitHandle, ValidationSink};
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, MouseButton, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::keyboard::PhysicalKey;
+use winit::window::{Window, WindowId};
+
+use super::camera_controller::CameraController;
+use super::clock::Clock;
+use super::controls::{Action, Controls, help};
+use super::present_pass::PresentPass;
+use super::resize::ResizeDebounce;
+use super::ui_input::{UiInput, notches};
+use crate::app::cli::{ReadySample, SampleSetup};
+use crate::app::frame::Frame;
+use crate::app::frames::Frames;
+use crate::app::hot_reload::{ShaderWatch, reload};
+use crate::app::print_line;
+use crate::app::run_args::RunArgs;
+use crate::app::run_error::RunError;
+use crate::app::sample::{FrameTime, Sample};
+use crate::app::screenshot::{Screenshot, free_name};
+use crate::app::ui::{Panel, PanelInfo};
+use crate::shader_folder;
+
+/// Time between two looks at a window that shows nothing.
+const NAP: Duration = Duration::from_millis(30);
+
+/// Shows the sample that `make` makes, until its window is closed or `--frames` are shown. Messages of the validation layer
+/// go into `sink`.
+pub(in crate::app) fn run<S, M>(
+    name: &str,
+    args: &RunArgs,
+    sink: &ValidationSink,
+    make: M,
+) -> Result<(), RunError>
+where
+    S: Sample,
+    M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
+{
+    let event_loop = EventLoop::new().map_err(|error| RunError::window(&error))?;
+    let mut program =
+        WindowApp { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
+    event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
+    let WindowApp { running, ended, .. } = program;
+    let closed = running.map_or(Ok(()), Running::close);
+    ended?;
+    closed
+}
+
+/// The handler of events.
+struct WindowApp<'a, S, M> {
+    name: &'a str,
+    args: &'a RunArgs,
+    sink: &'a ValidationSink,
+    make: Option<M>,
+    running: Option<Running<S>>,
+    /// No frame before, unless something happens to the window.
+    rests_until: Option<Instant>,
+    ended: Result<(), RunError>,
+}
+
+impl<S, M> ApplicationHandler for WindowApp<'_, S, M>
+where
+    S: Sample,
+    M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
+{
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if let Some(make) = self.make.take() {
+            match self.open(event_loop, make) {
+                Ok(running) => self.running = Some(running),
+                Err(error) => self.end(event_loop, Err(error)),
+            }
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(running) = &mut self.running else { return };
+        let done = match event {
+            WindowEvent::CloseRequested => Ok(Next::Close),
+            WindowEvent::RedrawRequested => running.redraw(self.name, self.args),
+            event => running.event(&event),
+        };
+        match done {
+            Ok(Next::Frame) => {
+                self.rests_until = None;
+                event_loop.set_control_flow(ControlFlow::Poll);
+            }
+            Ok(Next::Nap) => {
+                let until = Instant::now() + NAP;
+                self.rests_until = Some(until);
+                event_loop.set_control_flow(ControlFlow::WaitUntil(until));
+            }
+            Ok(Next::Close) => self.end(event_loop, Ok(())),
+            Err(error) => self.end(event_loop, Err(error)),
+        }
+    }
+
+    fn about_to_wait(&mut self, _: &ActiveEventLoop) {
+        // A redraw that is asked for comes at once, whatever is waited for.
+        let is_due = self.rests_until.is_none_or(|until| Instant::now() >= until);
+        if let Some(running) = self.running.as_ref().filter(|_| is_due) {
+            running.window.request_redraw();
+        }
+    }
+}
+
+impl<S: Sample, M> WindowApp<'_, S, M>
+where
+    M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
+{
+    fn open(&self, event_loop: &ActiveEventLoop, make: M) -> Result<Running<S>, RunError> {
+        let size = PhysicalSize::new(self.args.width, self.args.height);
+        let look = Window::default_attributes().with_title(self.name).with_inner_size(size);
+        let window = Arc::new(event_loop.create_window(look).map_err(|error| RunError::window(&error))?);
+        let mut setup = SampleSetup::new(self.name, self.args, self.sink);
+        setup.window = Some(Arc::clone(&window) as Arc<_>);
+        let ReadySample { sample, summary } = make(&mut setup)?;
+        drop(setup);
+        if !summary.is_empty() {
+            print_line(&summary);
+        }
+        Running::new(window, sample, self.args)
+    }
+
+    fn end(&mut self, event_loop: &ActiveEventLoop, ended: Result<(), RunError>) {
+        if self.ended.is_ok() {
+            self.ended = ended;
+        }
+        // What is still being loaded may take a time to end.
+        self.running.iter().for_each(|running| running.window.set_visible(false));
+        event_loop.exit();
+    }
+}
+
+/// The next step of the event loop.
+enum Next {
+    /// A frame, at once.
+    Frame,
+    /// A frame, later: nothing is seen for now.
+    Nap,
+    /// Nothing any more.
+    Close,
+}
+
+/// A sample in its window.
+struct Running<S> {
+    sample: S,
+    present_pass: PresentPass,
+    panel: Panel,
+    controls: Controls,
+    ui_input: UiInput,
+    resize: ResizeDebounce,
+    watch: Option<ShaderWatch>,
+    camera_controller: CameraController,
+    clock: Clock,
+    /// The time that the sample shows.
+    at: Option<FrameTime>,
+    shown: u32,
+    wants_screenshot: bool,
+    /// The latest frame.
+    latest: SubmitHandle,
+    ctx: Context,
+    window: Arc<Window>,
+}
+
+impl<S: Sample> Running<S> {
+    fn new(window: Arc<Window>, sample: S, args: &RunArgs) -> Result<Self, RunError> {
+        let ctx = sample.context().clone();
+        let present_pass = PresentPass::new(&ctx, extent(&window))?;
+        let (mode, _) = present_pass.present_modes()?;
+        ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
+        let mut panel = Panel::new(mode);
+        // Frames that are counted are those of the animation.
+        panel.animates = args.frames.is_some() || !sample.stands_at_first();
+        Ok(Self {
+            sample,
+            present_pass,
+            panel,
+            controls: Controls::default(),
+            ui_input: UiInput::default(),
+            resize: ResizeDebounce::new([args.width, args.height]),
+            watch: shader_folder::folder().map(|folder| ShaderWatch::new(&folder)),
+            camera_controller: CameraController::new(),
+            clock: Clock::new(Instant::now()),
+            at: None,
+            shown: 0,
+            wants_screenshot: false,
+            latest: SubmitHandle::default(),
+            ctx,
+            window,
+        })
+    }
+
+    fn event(&mut self, event: &WindowEvent) -> Result<Next, RunError> {
+        self.ui_input.push(event, self.per_point());
+        let ui = self.present_pass.ui();
+        match event {
+            WindowEvent::Resized(size) => self.present_pass.resize([size.width, size.height])?,
+            WindowEvent::Focused(false) => self.controls.release_all(),
+            WindowEvent::CursorMoved { position, .. } => {
+                self.controls.pointer([position.x as f32, position.y as f32]);
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => {
+                let is_down = *state == ElementState::Pressed;
+                self.controls.drag(is_down && !ui.is_pointer_over_area());
+            }
+            WindowEvent::MouseWheel { delta, .. } if !ui.is_pointer_over_area() => {
+                self.controls.wheel(notches(*delta));
+            }
+            WindowEvent::KeyboardInput { event, .. } => {
+                let PhysicalKey::Code(code) = event.physical_key else { return Ok(Next::Frame) };
+                // A key that goes up is let go, whoever it was meant for.
+                let is_down = event.state.is_pressed();
+                if (!is_down || !ui.wants_keyboard_input())
+                    && let Some(action) = self.controls.key(code, is_down)
+                {
+                    return Ok(self.act(action));
+                }
+            }
+            _ => {}
+        }
+        Ok(Next::Frame)
+    }
+
+    fn act(&mut self, action: Action) -> Next {
+        match action {
+            Action::Pause => self.panel.animates = !self.panel.animates,
+            Action::ReleaseCamera => {
+                self.camera_controller.release();
+                self.at = None;
+            }
+            Action::Panel => self.panel.is_open = !self.panel.is_open,
+            Action::Next => self.sample.next(),
+            Action::Reload => self.reload(),
+            Action::Screenshot => self.wants_screenshot = true,
+            Action::Close => return Next::Close,
+        }
+        Next::Frame
+    }
+
+    /// Compiles all shaders again. Where one is wrong, all old pipelines stay.
+    fn reload(&mut self) {
+        let done = reload(&mut self.sample, self.present_pass.painter());
+        self.panel.shader_error = done.err().map(|error| error.to_string());
+        match &self.panel.shader_error {
+            Some(error) => eprintln!("error: {error}\nthe shaders from before stay in use"),
+            None => eprintln!("shaders compiled anew"),
+        }
+    }
+
+    /// Ends what is loading, and waits for the GPU.
+    fn close(self) -> Result<(), RunError> {
+        let Self { sample, ctx, .. } = self;
+        drop(sample);
+        Ok(ctx.wait_idle()?)
+    }
+
+    fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
+        if self.sample.is_loading().map_err(Into::into)? {
+            return self.redraw_loading(name);
+        }
+        self.ctx.next_frame()?;
+        let seconds = self.clock.tick(Instant::now(), self.panel.animates);
+        self.follow(args, seconds)?;
+        let Some(image) = self.present_pass.next_image()? else { return Ok(Next::Nap) };
+        self.panel.count_frame(seconds);
+        let mut frame = Frame::free(&self.ctx)?;
+        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let mut cmd = frame.into_commands();
+        let (input, profile) = (self.input(image.extent()), self.ctx.last_profile()?);
+        let (_, modes) = self.present_pass.present_modes()?;
+        let before = self.panel.present_mode;
+        let info = PanelInfo {
+            device: &self.ctx.capabilities().device_name,
+            extent: image.extent(),
+            present_modes: &modes,
+            profile: profile.as_deref(),
+            keys: help(self.sample.view().is_some()),
+        };
+        let (panel, sample) = (&mut self.panel, &mut self.sample);
+        self.present_pass.record(&mut cmd, &image, picture, input, |ui| {
+            panel.show(ui, name, &info, |ui| sample.panel(ui));
+            sample.overlay(ui);
+        })?;
+        let last = self.is_last(args);
+        let file = args.out.as_deref().filter(|_| last);
+        let shot = (self.wants_screenshot || file.is_some())
+            .then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
+        self.latest = self.ctx.present(cmd, image)?;
+        self.shown += 1;
+        self.clock.count_frame(self.panel.animates);
+        if let Some(shot) = shot {
+            self.save(shot, file, name)?;
+        }
+        if before != self.panel.present_mode {
+            self.present_pass.set_present_mode(self.panel.present_mode)?;
+        }
+        Ok(if last { Next::Close } else { Next::Frame })
+    }
+
+    /// A frame without a picture, now and then, so that whoever loads is not held up; none while the GPU is at work for that
+    /// one, so that the window is not held up either.
+    fn redraw_loading(&mut self, name: &str) -> Result<Next, RunError> {
+        self.follow_size();
+        if !self.ctx.is_done(self.latest)? {
+            return Ok(Next::Nap);
+        }
+        self.ctx.next_frame()?;
+        let Some(image) = self.present_pass.next_image()? else { return Ok(Next::Nap) };
+        // The animation begins with the picture.
+        self.clock.tick(Instant::now(), false);
+        let mut frame = Frame::free(&self.ctx)?;
+        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let mut cmd = frame.into_commands();
+        let input = self.input(image.extent());
+        let sample = &mut self.sample;
+        self.present_pass.record(&mut cmd, &image, picture, input, |ui| sample.overlay(ui))?;
+        let shot = self.wants_screenshot.then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
+        self.latest = self.ctx.present(cmd, image)?;
+        if let Some(shot) = shot {
+            self.save(shot, None, name)?;
+        }
+        Ok(Next::Nap)
+    }
+
+    /// Resizes the sample once the window keeps its size.
+    fn follow_size(&mut self) {
+        if let Some(size) = self.resize.next(extent(&self.window), Instant::now())
+            && let Err(error) = self.sample.resize(size).map_err(Into::into)
+        {
+            eprintln!("warning: pictures keep their size: {error}");
+        }
+    }
+
+    /// Applies changes of size, shaders, time and camera.
+    fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
+        self.follow_size();
+        if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {
+            self.reload();
+        }
+        let steering = self.controls.take_steering();
+        let is_steered = self.camera_controller.steer(self.sample.view().as_ref(), &steering, seconds);
+        let time = self.clock.frame_time(args.frames.is_some(), args.round);
+        let is_later = self.at != Some(time);
+        if is_later {
+            self.sample.update(time).map_err(Into::into)?;
+            self.at = Some(time);
+        }
+        if let (true, Some(camera)) = (is_steered || is_later, self.camera_controller.camera()) {
+            self.sample.set_view(&camera);
+        }
+        Ok(())
+    }
+
+    fn is_last(&self, args: &RunArgs) -> bool {
+        matches!(args.frames, Some(Frames::Still(count)) if self.shown + 1 >= count)
+    }
+
+    /// Writes `shot`. A picture that only a key has asked for is no reason to end.
+    fn save(
+        &mut self,
+        shot: Result<Screenshot, RunError>,
+        file: Option<&Path>,
+        name: &str,
+    ) -> Result<(), RunError> {
+        self.wants_screenshot = false;
+        let path = file.map_or_else(|| free_name(Path::new(""), name), Path::to_owned);
+        match shot.and_then(|shot| shot.write(&self.ctx, &path)) {
+            Ok(()) => print_line(&format!("wrote {}", path.display())),
+            Err(error) if file.is_some() => return Err(error),
+            Err(error) => eprintln!("error: {error}"),
+        }
+        Ok(())
+    }
+
+    fn input(&mut self, [width, height]: [u32; 2]) -> egui::RawInput {
+        let (events, modifiers) = self.ui_input.take_events();
+        let per_point = self.per_point();
+        let size = vec2(width as f32, height as f32) / per_point;
+        let viewport = ViewportInfo { native_pixels_per_point: Some(per_point), ..ViewportInfo::default() };
+        let mut input = egui::RawInput {
+            screen_rect: Some(Rect::from_min_size(egui::Pos2::ZERO, size)),
+            time: Some(self.clock.seconds()),
+            modifiers,
+            events,
+            ..egui::RawInput::default()
+        };
+        input.viewports.insert(input.viewport_id, viewport);
+        input
+    }
+
+    fn per_point(&self) -> f32 {
+        self.window.scale_factor() as f32
+    }
+}
+
+fn extent(window: &Window) -> [u32; 2] {
+    window.inner_size().into()
+}

@@ -1,0 +1,27 @@
+//! The description of the sample's program.
+
+use super::HelloTriangle;
+use super::renderer::TRIANGLE;
+use crate::app::sample_info::prelude::*;
+
+impl SampleInfo for HelloTriangle {
+    const NAME: &'static str = "hello_triangle";
+    const ABOUT: &'static str =
+        "Rasterises a turning triangle, the first thing to draw, and writes pictures as PNG";
+    const EXAMPLES: &'static str = "
+        | a picture, by the best device
+        --window --hot-reload | in a window, whose shaders can be changed meanwhile
+        --validate | with validation
+    ";
+    type Args = NoArgs;
+    type Sample = Self;
+
+    fn pipelines() -> Vec<SamplePipeline> {
+        vec![TRIANGLE.data()]
+    }
+
+    fn open(_: &NoArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Self>, RunError> {
+        let sample = Self::new(&setup.device(&DeviceNeeds::default())?, setup.extent())?;
+        Ok(ReadySample::raster(sample, "a turning triangle"))
+    }
+}

@@ -1,0 +1,151 @@
+//! The passes of a frame and what lies between them: all that depends on the size of the picture and on the shaders.
+
+use std::ops::Range;
+
+use lvk::{BufferHandle, CommandBuffer, Context, Holder};
+
+use super::accumulation::Accumulation;
+use super::config::{Bounces, HybridConfig};
+use super::frame::{FRAME_BYTES, FrameConstants, Indices, Lighting, Push, ReflectivePixelAddresses};
+use super::geometry_stage::GeometryStage;
+use super::gpu_scene::GpuScene;
+use super::launch_tiles::launch_tiles;
+use super::pixel_order::PixelOrder;
+use super::ray_pass::{GeometryLeft, RayPass};
+use crate::app::array_buffer::buffer;
+use crate::scene::GpuCamera;
+
+/// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
+const CPU_TILE_ROWS: u32 = 48;
+/// Pixels that a GPU renders in one go: so few that no driver takes it for hung.
+const GPU_TILE_PIXELS: u32 = 1 << 23;
+
+/// The passes of a frame and what lies between them.
+pub(super) struct FramePasses {
+    pub(super) geometry: GeometryStage,
+    pub(super) accumulation: Accumulation,
+    /// The rows of each launch of rays.
+    pub(super) launch_tiles: Vec<Range<u32>>,
+    order: Option<PixelOrder>,
+    rays: RayPass,
+    addresses: Addresses,
+    indices: Indices,
+    /// A block for each sample.
+    frame_buffer: Holder<BufferHandle>,
+    uploaded: Vec<FrameConstants>,
+    width: u32,
+    height: u32,
+}
+
+/// Addresses of buffers.
+struct Addresses {
+    frame: u64,
+    sums: u64,
+    bounces: ReflectivePixelAddresses,
+    order: u64,
+}
+
+impl FramePasses {
+    pub(super) fn new(ctx: &Context, scene: &GpuScene, config: &HybridConfig) -> lvk::Result<Self> {
+        let HybridConfig { width, height, samples, .. } = *config;
+        let frame_buffer = buffer(ctx, "frame constants", FRAME_BYTES * u64::from(samples))?;
+        let accumulation = Accumulation::new(ctx, [width, height], samples)?;
+        let geometry = GeometryStage::new(ctx, scene, config)?;
+        let is_ordered = config.bounces == Some(Bounces::First) && config.max_depth > 0;
+        let order = is_ordered.then(|| PixelOrder::new(ctx, [width, height])).transpose()?;
+        let tile_rows = tile_rows(config, ctx.capabilities().is_cpu).min(height);
+        let rays = RayPass::new(ctx, config, width * tile_rows)?;
+        let addresses = Addresses {
+            frame: ctx.buffer_address(*frame_buffer)?,
+            sums: accumulation.sums_address(ctx)?,
+            bounces: rays.reflective_pixel_addresses(ctx)?,
+            order: order.as_ref().map_or(Ok(0), |order| order.address(ctx))?,
+        };
+        Ok(Self {
+            indices: indices(scene, &geometry, accumulation.picture.index()),
+            uploaded: Vec::new(),
+            launch_tiles: launch_tiles(height, tile_rows),
+            geometry,
+            accumulation,
+            order,
+            rays,
+            addresses,
+            frame_buffer,
+            width,
+            height,
+        })
+    }
+
+    /// Tells the shaders how the scene is seen and lit, if that is news to them.
+    pub(super) fn upload(
+        &mut self,
+        ctx: &Context,
+        view: &GpuCamera,
+        scene: &GpuScene,
+        lighting: Lighting,
+        sample_count: u32,
+    ) -> lvk::Result<()> {
+        let constants: Vec<_> = (0..sample_count)
+            .map(|sample_number| FrameConstants {
+                camera: view.for_sample(sample_number, sample_count),
+                scene: scene.addresses(),
+                lighting,
+                indices: self.indices,
+                visibility: self.geometry.addresses(),
+                bounces: self.addresses.bounces,
+                order: self.addresses.order,
+                sums: self.addresses.sums,
+                sample_number,
+                sample_count,
+                padding: [0; 2],
+            })
+            .collect();
+        if self.uploaded != constants {
+            ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&constants))?;
+            self.uploaded = constants;
+        }
+        Ok(())
+    }
+
+    /// Records what comes before the rays of a sample.
+    pub(super) fn record_geometry(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {
+        let push = self.push(sample, 0..self.height);
+        self.geometry.record(cmd, &push)?;
+        self.order.as_ref().map_or(Ok(()), |order| order.record(cmd, &push, &self.geometry.left()))
+    }
+
+    /// Records the rays of a tile of a sample.
+    pub(super) fn record_tile(&self, cmd: &mut CommandBuffer, sample: u32, tile: usize) -> lvk::Result<()> {
+        let push = self.push(sample, self.launch_tiles[tile].clone());
+        self.rays.record(cmd, self.width, &push, &self.left(), &self.accumulation)
+    }
+
+    /// Resources that the geometry pass and the pixel order leave.
+    fn left(&self) -> GeometryLeft {
+        let mut left = self.geometry.left();
+        left.buffers.extend(self.order.as_ref().map(PixelOrder::buffer));
+        left
+    }
+
+    fn push(&self, sample: u32, rows: Range<u32>) -> Push {
+        let frame = self.addresses.frame + FRAME_BYTES * u64::from(sample);
+        Push { frame, first: rows.start, end: rows.end }
+    }
+}
+
+fn tile_rows(config: &HybridConfig, is_cpu: bool) -> u32 {
+    if is_cpu { CPU_TILE_ROWS } else { GPU_TILE_PIXELS / config.width }
+}
+
+fn indices(scene: &GpuScene, geometry: &GeometryStage, output: u32) -> Indices {
+    let mut indices = Indices {
+        tlas: scene.tlas.index(),
+        sky: scene.sky.index(),
+        surface_sampler: scene.surface_sampler.index(),
+        sky_sampler: scene.sky_sampler.index(),
+        output,
+        ..bytemuck::Zeroable::zeroed()
+    };
+    geometry.name_in(&mut indices);
+    indices
+}

@@ -1,0 +1,9 @@
+//! Builds on a device without ray tracing.
+
+use lvk_tests::subprocess::rerun_on_swiftshader;
+
+#[test]
+#[ignore = "a minute, of the step swiftshader of .ci/run"]
+fn accel_structs_are_built_the_same_without_ray_tracing() {
+    rerun_on_swiftshader(&[]);
+}

@@ -1,9 +1,0 @@
-//! Instances on a device that has no ray tracing at all.
-
-use lvk_tests::child::program_without_ray_tracing;
-
-#[test]
-#[ignore = "a minute, of the step swiftshader of .ci/run"]
-fn instances_are_shown_the_same_without_ray_tracing() {
-    program_without_ray_tracing(&[]);
-}

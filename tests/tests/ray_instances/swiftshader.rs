@@ -1,0 +1,9 @@
+//! Instances on a device without ray tracing.
+
+use lvk_tests::subprocess::rerun_on_swiftshader;
+
+#[test]
+#[ignore = "a minute, of the step swiftshader of .ci/run"]
+fn instances_are_traced_the_same_without_ray_tracing() {
+    rerun_on_swiftshader(&[]);
+}
