@@ -5,15 +5,15 @@ use std::time::Instant;
 
 use lvk::Context;
 
-use super::super::error::BenchError;
-use super::super::setup::{DefaultBy, Setup, ray_paths};
-use super::super::table::Table;
 use super::args::PaperArgs;
 use super::measure::{ExperimentPlan, measure};
 use super::report::{Experiment, IMAGE_FOLDER};
 use super::report_images::ReportImages;
 use super::tables;
 use super::trace_path::TracePath;
+use crate::error::BenchError;
+use crate::setup::{DefaultBy, Setup, ray_paths};
+use crate::table::Table;
 use lvk_samples::app::interrupt::Interrupt;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::app::ray_args::RayTracing;
