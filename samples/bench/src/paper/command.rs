@@ -87,7 +87,7 @@ fn default_scenes(folder: Option<&Path>) -> (Vec<PathBuf>, Option<String>) {
         return (vec![PathBuf::from(scene_list::BUILT_IN)], Some(missing_note));
     }
     let missing_note = (!missing.is_empty())
-        .then(|| format!("without {wanted}; set {VARIABLE} to a folder with these scenes"));
+        .then(|| format!("without {wanted}, which the folder in {VARIABLE} does not contain"));
     (there.into_iter().map(PathBuf::from).collect(), missing_note)
 }
 
