@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Args, Parser, Subcommand};
 use lvk::DeviceProfile;
 
-use super::paper::PaperArgs;
+use crate::paper::PaperArgs;
 
 /// Measures the costs and gains of lvk on a device and prints Markdown tables.
 ///

@@ -7,12 +7,12 @@ use lvk::{
     PrimitiveOrder, Triangles,
 };
 
-use super::args::BatchArgs;
-use super::error::BenchError;
-use super::measure::{elapsed_ms, interleave, median_of};
-use super::mesh::{MeshBuffers, create_input_buffer};
-use super::setup::{DefaultBy, Setup};
-use super::table::{Table, format_bytes, format_grouped, format_ms, format_ratio};
+use crate::args::BatchArgs;
+use crate::error::BenchError;
+use crate::measure::{elapsed_ms, interleave, median_of};
+use crate::mesh::{MeshBuffers, create_input_buffer};
+use crate::setup::{DefaultBy, Setup};
+use crate::table::{Table, format_bytes, format_grouped, format_ms, format_ratio};
 
 type Holders = Vec<Holder<AccelStructHandle>>;
 

@@ -5,13 +5,13 @@ use std::rc::Rc;
 use lvk::ash::vk;
 use lvk::{AccelStructHandle, BuildFlags, BuildMode, Compaction, Context, PrimitiveOrder};
 
-use super::args::MeshArgs;
-use super::error::BenchError;
-use super::hand_written::{RawAccelStruct, RawCommands, RawDevice, triangle_geometry};
-use super::measure::{Stopwatch, interleave, median_of};
-use super::mesh::{Mesh, MeshBuffers};
-use super::setup::{DefaultBy, Setup};
-use super::table::{Table, format_bytes, format_ms, format_ratio};
+use crate::args::MeshArgs;
+use crate::error::BenchError;
+use crate::hand_written::{RawAccelStruct, RawCommands, RawDevice, triangle_geometry};
+use crate::measure::{Stopwatch, interleave, median_of};
+use crate::mesh::{Mesh, MeshBuffers};
+use crate::setup::{DefaultBy, Setup};
+use crate::table::{Table, format_bytes, format_ms, format_ratio};
 
 /// Number of submissions within which a compaction must finish.
 const MAX_SUBMISSIONS: u32 = 100;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use lvk::ash::vk;
 
-use super::paper::PaperError;
+use crate::paper::PaperError;
 use lvk_dev_driver::DriverError;
 use lvk_samples::app::interrupt;
 use lvk_samples::app::run_error::RunError;

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use lvk::{CommandBuffer, Context, Holder, QueryPoolDesc, QueryPoolHandle};
 
-use super::error::BenchError;
+use crate::error::BenchError;
 use lvk_samples::app::timings;
 
 /// Times of one submission, in milliseconds.

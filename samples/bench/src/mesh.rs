@@ -5,9 +5,9 @@ use lvk::{
     Holder, PrimitiveOrder, TlasDesc, TlasInstance, Triangles,
 };
 
-use super::args::MeshArgs;
-use super::error::BenchError;
-use super::synthetic::spheres;
+use crate::args::MeshArgs;
+use crate::error::BenchError;
+use crate::synthetic::spheres;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::scene::{Camera, ObjOptions, Scene};
 

@@ -4,14 +4,14 @@ use std::time::Instant;
 
 use lvk::{Context, PrimitiveOrder};
 
-use super::args::TraceArgs;
-use super::error::BenchError;
-use super::measure::{Stopwatch, elapsed_ms, interleave, median_of};
-use super::mesh::{BuiltMesh, Mesh, MeshBuffers};
-use super::morton::morton_order;
-use super::setup::{DefaultBy, Setup, path_name, ray_paths};
-use super::table::{Table, format_ms, format_ratio};
-use super::tracer::{RayKind, TracedImage, Tracer};
+use crate::args::TraceArgs;
+use crate::error::BenchError;
+use crate::measure::{Stopwatch, elapsed_ms, interleave, median_of};
+use crate::mesh::{BuiltMesh, Mesh, MeshBuffers};
+use crate::morton::morton_order;
+use crate::setup::{DefaultBy, Setup, path_name, ray_paths};
+use crate::table::{Table, format_ms, format_ratio};
+use crate::tracer::{RayKind, TracedImage, Tracer};
 use lvk_samples::hybrid::RayPath;
 
 /// Compares rays per second for the same triangles in three orders.

@@ -6,18 +6,18 @@ use lvk::ash::vk;
 use lvk::{BufferDesc, BufferHandle, BufferUsage};
 use lvk::{Context, Holder, MemoryKind, PrimitiveOrder};
 
-use super::args::TraceArgs;
-use super::error::BenchError;
-use super::hand_written::{
+use crate::args::TraceArgs;
+use crate::error::BenchError;
+use crate::hand_written::{
     RawAccelStruct, RawCommands, RawDevice, RawTracing, instance_geometry, triangle_geometry,
 };
-use super::instance_record::InstanceRecord;
-use super::measure::{Stopwatch, interleave, median};
-use super::mesh::{BuiltMesh, Mesh, MeshBuffers};
-use super::pipelines::stages;
-use super::setup::{DefaultBy, Setup};
-use super::table::{Table, format_ms, format_ratio};
-use super::tracer::{RayKind, TracedImage, Tracer};
+use crate::instance_record::InstanceRecord;
+use crate::measure::{Stopwatch, interleave, median};
+use crate::mesh::{BuiltMesh, Mesh, MeshBuffers};
+use crate::pipelines::stages;
+use crate::setup::{DefaultBy, Setup};
+use crate::table::{Table, format_ms, format_ratio};
+use crate::tracer::{RayKind, TracedImage, Tracer};
 use lvk_samples::shaders::bench::BUILT_IN_NUMBERS;
 
 /// Compares frames of primary rays.

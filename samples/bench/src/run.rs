@@ -3,11 +3,11 @@
 use std::io::Write as _;
 use std::process::ExitCode;
 
-use super::args::{BenchArgs, Benchmark};
-use super::error::BenchError;
-use super::setup::Setup;
-use super::table::Table;
-use super::{batch, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
+use crate::args::{BenchArgs, Benchmark};
+use crate::error::BenchError;
+use crate::setup::Setup;
+use crate::table::Table;
+use crate::{batch, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
 use lvk_samples::app::{device, scene_list};
 
 /// Runs the selected benchmark. Prints tables to standard output, and an error in one line to standard error. The exit status

@@ -6,8 +6,8 @@ use lvk::{
     Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, ValidationMode, ValidationSink,
 };
 
-use super::args::{BenchArgs, Benchmark, ImageSizeArgs};
-use super::error::BenchError;
+use crate::args::{BenchArgs, Benchmark, ImageSizeArgs};
+use crate::error::BenchError;
 use lvk_dev_driver::{DriverRequest, prepare};
 use lvk_samples::app::ray_args::RayTracing;
 use lvk_samples::hybrid::RayPath;

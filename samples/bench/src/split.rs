@@ -2,13 +2,13 @@
 
 use lvk::{Context, PrimitiveOrder};
 
-use super::args::SplitArgs;
-use super::error::BenchError;
-use super::measure::{Stopwatch, interleave, median_of};
-use super::mesh::{BuiltMesh, Mesh, MeshBuffers};
-use super::setup::{DefaultBy, Setup, path_name, ray_paths};
-use super::table::{Table, format_ms, format_ratio};
-use super::tracer::{RayKind, TracedImage, Tracer};
+use crate::args::SplitArgs;
+use crate::error::BenchError;
+use crate::measure::{Stopwatch, interleave, median_of};
+use crate::mesh::{BuiltMesh, Mesh, MeshBuffers};
+use crate::setup::{DefaultBy, Setup, path_name, ray_paths};
+use crate::table::{Table, format_ms, format_ratio};
+use crate::tracer::{RayKind, TracedImage, Tracer};
 use lvk_samples::hybrid::RayPath;
 
 /// Compares traces of the whole mesh and of the mesh split by a device profile with few primitives per BLAS.

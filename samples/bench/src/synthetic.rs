@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::mesh::Mesh;
+use crate::mesh::Mesh;
 use lvk_samples::scene::Camera;
 
 /// Number of spheres along x and z.

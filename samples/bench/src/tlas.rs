@@ -10,15 +10,15 @@ use lvk::{
     DeviceInstances, Holder, MemoryKind, PrimitiveOrder, TlasDesc, TlasInstance, transform_rows,
 };
 
-use super::args::TlasArgs;
-use super::error::BenchError;
-use super::hand_written::{RawAccelStruct, RawCommands, RawDevice, instance_geometry};
-use super::instance_record::InstanceRecord;
-use super::measure::{Stopwatch, SubmissionTimes, elapsed_ms, interleave, median};
-use super::mesh::MeshBuffers;
-use super::setup::{DefaultBy, Setup};
-use super::synthetic::spheres;
-use super::table::{Table, format_grouped, format_ms, format_ratio};
+use crate::args::TlasArgs;
+use crate::error::BenchError;
+use crate::hand_written::{RawAccelStruct, RawCommands, RawDevice, instance_geometry};
+use crate::instance_record::InstanceRecord;
+use crate::measure::{Stopwatch, SubmissionTimes, elapsed_ms, interleave, median};
+use crate::mesh::MeshBuffers;
+use crate::setup::{DefaultBy, Setup};
+use crate::synthetic::spheres;
+use crate::table::{Table, format_grouped, format_ms, format_ratio};
 
 /// Triangles of the mesh that all instances reference.
 const MESH_TRIANGLES: u32 = 1000;

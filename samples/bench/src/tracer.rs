@@ -8,8 +8,8 @@ use lvk::{
     ShaderModuleHandle, ShaderSource,
 };
 
-use super::mesh::Mesh;
-use super::pipelines::{SAMPLE, query_stage, stages};
+use crate::mesh::Mesh;
+use crate::pipelines::{SAMPLE, query_stage, stages};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::pipelines::SampleStage;
 use lvk_samples::shaders::bench as texts;

@@ -4,8 +4,8 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use super::error::DriverError;
-use super::layout::{KEYBOARDS, X_SERVER};
+use crate::error::DriverError;
+use crate::layout::{KEYBOARDS, X_SERVER};
 
 /// A running X server, stopped on drop. The server also stops when its last client disconnects.
 #[derive(Debug)]

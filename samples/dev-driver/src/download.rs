@@ -6,11 +6,11 @@ use std::path::Path;
 use indicatif::{ProgressBar, ProgressStyle};
 use rustix::fs::FlockOperation;
 
-use super::apt::{Apt, DownloadPlan};
-use super::error::DownloadError;
-use super::file;
-use super::install::install;
-use super::layout::{Component, Manifest};
+use crate::apt::{Apt, DownloadPlan};
+use crate::error::DownloadError;
+use crate::file;
+use crate::install::install;
+use crate::layout::{Component, Manifest};
 
 /// Downloads those of `components` that are incomplete below `root`. Concurrent processes wait for each other. Removes the
 /// files of an interrupted download first.

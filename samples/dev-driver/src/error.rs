@@ -1,9 +1,9 @@
-//! Errors of [`prepare`](super::prepare) and of downloads.
+//! Errors of [`prepare`](crate::prepare) and of downloads.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// An error of [`prepare`](super::prepare) and of the other functions of this crate.
+/// An error of [`prepare`](crate::prepare) and of the other functions of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriverError {

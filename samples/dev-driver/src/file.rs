@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::DownloadError;
+use crate::error::DownloadError;
 
 /// Creates `folder` and its parents.
 pub(super) fn create_dir_all(folder: &Path) -> Result<(), DownloadError> {

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::elf;
-use super::error::DownloadError;
-use super::file;
-use super::layer_json;
-use super::layout::{
+use crate::elf;
+use crate::error::DownloadError;
+use crate::file;
+use crate::layer_json;
+use crate::layout::{
     CLIENT_LIBRARIES, Component, DRIVER, DRIVER_JSON, KEYBOARD_COMPILER, KEYBOARDS, LAYER, LAYER_FOLDER,
     LOADER, Manifest, RADV, RADV_JSON, SWIFTSHADER, SWIFTSHADER_JSON, X_SERVER,
 };

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ash::vk;
 
-use super::error::DownloadError;
+use crate::error::DownloadError;
 
 /// Name of the validation layer.
 pub(super) const LAYER_NAME: &CStr = c"VK_LAYER_KHRONOS_validation";

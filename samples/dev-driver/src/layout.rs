@@ -18,7 +18,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::apt::{PackageRequest, Suite};
+use crate::apt::{PackageRequest, Suite};
 
 /// The loader inside [`Component::Driver`].
 pub(super) const LOADER: &str = "lib/libvulkan.so.1";

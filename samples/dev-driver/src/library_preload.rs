@@ -6,7 +6,7 @@ use std::path::Path;
 
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 
-use super::error::DriverError;
+use crate::error::DriverError;
 
 /// Makes `dlopen` succeed only for libraries that are already open (`dlfcn.h` of glibc and musl on x86-64).
 const RTLD_NOLOAD: i32 = 4;

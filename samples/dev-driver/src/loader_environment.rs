@@ -4,9 +4,9 @@ use std::env;
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
-use super::layout::{Component, DRIVER_JSON, LAYER_FOLDER};
-use super::settings::Settings;
-use super::{Driver, DriverOrigin};
+use crate::layout::{Component, DRIVER_JSON, LAYER_FOLDER};
+use crate::settings::Settings;
+use crate::{Driver, DriverOrigin};
 
 /// Folder of Mesa's shader cache. Mesa uses the user's cache folder if the variable is not set.
 const MESA_CACHE: &str = "MESA_SHADER_CACHE_DIR";

@@ -4,8 +4,8 @@ use std::env;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use super::error::{DownloadError, DriverError};
-use super::layout::Component;
+use crate::error::{DownloadError, DriverError};
+use crate::layout::Component;
 
 /// The driver that the user prefers, from `LVK_DRIVER`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn drivers_listed_by_a_parent_process_are_not_the_users() {
-        let ours = Path::new("/p/.vulkan").join("driver").join(super::super::layout::DRIVER_JSON);
+        let ours = Path::new("/p/.vulkan").join("driver").join(crate::layout::DRIVER_JSON);
         let settings = |files: &Path| Settings {
             preference: DriverPreference::Auto,
             download_allowed: true,

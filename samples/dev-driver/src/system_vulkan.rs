@@ -2,7 +2,7 @@
 
 use ash::{Entry, Instance, vk};
 
-use super::layer_json::LAYER_NAME;
+use crate::layer_json::LAYER_NAME;
 
 /// Oldest validation layer that detects hazards of shader accesses (Vulkan SDK 1.3.296).
 const MIN_LAYER_VERSION: u32 = vk::make_api_version(0, 1, 3, 296);

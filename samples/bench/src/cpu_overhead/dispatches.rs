@@ -16,9 +16,9 @@ use crate::measure::elapsed_ms;
 
 pub(super) fn measure(ctx: &Context, silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
     let count = (workload.draws / 10).max(1);
-    let what = format!("dispatch after a storage image barrier, {count} recorded");
+    let name = format!("dispatch after a storage image barrier, {count} recorded");
     let limits = Limits { ratio: 1.25, library_ns: 25.0 };
-    measure_recording(ctx, silent, (workload.runs, count), (ours, by_hand), (what, limits))
+    measure_recording(ctx, silent, (workload.runs, count), (ours, by_hand), (name, limits))
 }
 
 /// Returns the milliseconds of the recording.

@@ -16,9 +16,9 @@ use crate::measure::elapsed_ms;
 
 pub(super) fn measure(ctx: &Context, silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
     let count = workload.draws;
-    let what = format!("push constants + draw, {count} pairs recorded");
+    let name = format!("push constants + draw, {count} pairs recorded");
     let limits = Limits { ratio: 1.10, library_ns: 7.0 };
-    measure_recording(ctx, silent, (workload.runs, count), (ours, by_hand), (what, limits))
+    measure_recording(ctx, silent, (workload.runs, count), (ours, by_hand), (name, limits))
 }
 
 /// Returns the milliseconds of the recording.

@@ -21,14 +21,13 @@ pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Row>, 
     frames(silent, &scene, workload.many, 0)?;
     let each = |from: u64, to: u64| (to - from) as f64 / f64::from(workload.many);
     let (full, empty) = (each(before, middle), each(middle, allocation_count()));
-    let row = |what: &str, ours, unit, limit| Row { what: what.to_owned(), ours, other: None, unit, limit };
     let mut rows = vec![
-        row("heap allocations per draw", (full - empty) / f64::from(DRAWS), "", Limit::AtMost(0.005)),
-        row("heap allocations per frame of one pass and one dispatch", empty, "", Limit::None),
+        Row::new("heap allocations per draw", (full - empty) / f64::from(DRAWS), "", Limit::AtMost(0.005)),
+        Row::new("heap allocations per frame of one pass and one dispatch", empty, "", Limit::None),
     ];
     let grown = memory.zip(after).map(|(before, after)| after - before);
-    let what = format!("resident memory growth over {} frames", workload.many);
-    rows.extend(grown.map(|grown| row(&what, grown, "MB", Limit::AtMost(0.5))));
+    let name = format!("resident memory growth over {} frames", workload.many);
+    rows.extend(grown.map(|grown| Row::new(name, grown, "MB", Limit::AtMost(0.5))));
     Ok(rows)
 }
 

@@ -29,13 +29,8 @@ pub(super) fn measure(setup: &Setup, ctx: &Context, workload: Workload) -> Resul
     let mut rows = Vec::new();
     rows.extend(comparison_rows("buffer created + destroyed, with frees", &buffers, 0.6));
     rows.extend(comparison_rows("texture created + destroyed, with frees", &textures, 1.8));
-    rows.push(Row {
-        what: "1,000 buffers of 256 B created, without a submission".to_owned(),
-        ours: median_of(&thousand, |ms| *ms),
-        other: None,
-        unit: "ms",
-        limit: Limit::None,
-    });
+    let name = "1,000 buffers of 256 B created, without a submission";
+    rows.push(Row::new(name, median_of(&thousand, |ms| *ms), "ms", Limit::None));
     rows.extend(crowded_rows(setup, workload)?);
     Ok(rows)
 }
@@ -47,13 +42,12 @@ fn memory(turn: usize) -> Option<Memory> {
 
 /// Returns the rows of the library, compared with hand-written Vulkan. The third sample uses preallocated memory and so
 /// measures the driver's part.
-fn comparison_rows(what: &str, samples: &[Vec<f64>; 3], limit: f64) -> [Row; 2] {
+fn comparison_rows(name: &str, samples: &[Vec<f64>; 3], limit: f64) -> [Row; 2] {
     let [ours, by_hand, driver] =
         samples.each_ref().map(|samples| each_ns(median_of(samples, |ms| *ms), AT_ONCE) * 1e-3);
-    let row = |what: &str, ours, other, limit| Row { what: what.to_owned(), ours, other, unit: "us", limit };
     [
-        row(what, ours, Some(by_hand), Limit::AtMost(limit)),
-        row("- library share", ours - driver, None, Limit::None),
+        Row::new(name, ours, "us", Limit::AtMost(limit)).compared_with(by_hand),
+        Row::new("- library share", ours - driver, "us", Limit::None),
     ]
 }
 
@@ -110,7 +104,7 @@ fn crowded_rows(setup: &Setup, workload: Workload) -> Result<Vec<Row>, BenchErro
         Ok(taken)
     })?;
     drop(held);
-    let [ours, other] = samples.map(|samples| median_of(&samples, |ms| *ms) * 1e3);
-    let what = format!("texture created among {}, compared with among {FEW}", workload.crowd);
-    Ok(vec![Row { what, ours, other: Some(other), unit: "us", limit: Limit::RatioAtMost(1.10) }])
+    let [ours, reference] = samples.map(|samples| median_of(&samples, |ms| *ms) * 1e3);
+    let name = format!("texture created among {}, compared with among {FEW}", workload.crowd);
+    Ok(vec![Row::new(name, ours, "us", Limit::RatioAtMost(1.10)).compared_with(reference)])
 }

@@ -30,7 +30,7 @@ pub(super) fn measure_recording(
     silent: &Context,
     (runs, count): (u32, u32),
     (ours, by_hand): (Ours, ByHand),
-    (what, limits): (String, Limits),
+    (name, limits): (String, Limits),
 ) -> Result<Vec<Row>, BenchError> {
     let (scene, silent_scene) = (Scene::new(ctx)?, Scene::new(silent)?);
     let raw = RawRecorder::new(&RawDevice::new(ctx))?;
@@ -42,7 +42,7 @@ pub(super) fn measure_recording(
     let [ours, by_hand, own] = samples.map(|samples| each_ns(median_of(&samples, |ms| *ms), count));
     let limit = Limit::AtMost(limits.library_ns);
     Ok(vec![
-        Row { what, ours, other: Some(by_hand), unit: "ns", limit: Limit::RatioAtMost(limits.ratio) },
-        Row { what: "- library share".to_owned(), ours: own, other: None, unit: "ns", limit },
+        Row::new(name, ours, "ns", Limit::RatioAtMost(limits.ratio)).compared_with(by_hand),
+        Row::new("- library share", own, "ns", limit),
     ])
 }

@@ -4,13 +4,13 @@ use crate::table::Table;
 
 /// One measured figure with a reference figure and a limit.
 pub(super) struct Row {
-    pub(super) what: String,
+    name: String,
     /// The library's figure, in `unit`.
-    pub(super) ours: f64,
+    ours: f64,
     /// The reference figure, in the same unit.
-    pub(super) other: Option<f64>,
-    pub(super) unit: &'static str,
-    pub(super) limit: Limit,
+    reference: Option<f64>,
+    unit: &'static str,
+    limit: Limit,
 }
 
 /// Limit of a figure.
@@ -27,8 +27,18 @@ pub(super) enum Limit {
 }
 
 impl Row {
+    /// Creates a row without a reference figure.
+    pub(super) fn new(name: impl Into<String>, ours: f64, unit: &'static str, limit: Limit) -> Self {
+        Self { name: name.into(), ours, reference: None, unit, limit }
+    }
+
+    /// Adds the reference figure.
+    pub(super) fn compared_with(self, reference: f64) -> Self {
+        Self { reference: Some(reference), ..self }
+    }
+
     fn ratio(&self) -> Option<f64> {
-        self.other.map(|other| self.ours / other)
+        self.reference.map(|reference| self.ours / reference)
     }
 
     /// Returns true if the limit is met; `None` without a limit.
@@ -55,10 +65,10 @@ impl Row {
         let figure = |value: f64| format!("{value:.2} {}", self.unit);
         let kept = self.is_met().map_or("", |kept| if kept { "kept" } else { "MISSED" });
         table.add_row(
-            self.what.clone(),
+            self.name.clone(),
             [
                 figure(self.ours),
-                self.other.map(figure).unwrap_or_default(),
+                self.reference.map(figure).unwrap_or_default(),
                 self.ratio().map(|ratio| format!("{ratio:.3}x")).unwrap_or_default(),
                 self.limit_text(),
                 kept.to_owned(),
@@ -73,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_figure_equal_to_its_limit_is_met() {
-        let row = |ours, other, limit| Row { what: String::new(), ours, other, unit: "ns", limit };
+        let row = |ours, reference, limit| Row { reference, ..Row::new("", ours, "ns", limit) };
         assert_eq!(row(7.0, None, Limit::AtMost(7.0)).is_met(), Some(true));
         assert_eq!(row(7.1, None, Limit::AtMost(7.0)).is_met(), Some(false));
         assert_eq!(row(3.0, Some(2.0), Limit::RatioAtMost(1.25)).is_met(), Some(false));

@@ -20,10 +20,9 @@ pub(super) fn measure(setup: &Setup) -> Result<Vec<Row>, BenchError> {
         samples.push(elapsed_ms(start));
         drop(ctx);
     }
-    let row = |what: &str, ours, unit, limit| Row { what: what.to_owned(), ours, other: None, unit, limit };
-    let created = row("context created", median_of(&samples, |ms| *ms), "ms", Limit::AtMost(60.0));
+    let created = Row::new("context created", median_of(&samples, |ms| *ms), "ms", Limit::AtMost(60.0));
     let held =
-        resident.map(|mb| row("resident memory with the first context", mb, "MB", Limit::AtMost(90.0)));
+        resident.map(|mb| Row::new("resident memory with the first context", mb, "MB", Limit::AtMost(90.0)));
     Ok(std::iter::once(created).chain(held).collect())
 }
 

@@ -27,8 +27,7 @@ pub(super) fn measure(ctx: &Context, workload: Workload) -> Result<Vec<Row>, Ben
         Ok(elapsed_ms(start) * 1e3 / f64::from(count))
     })?;
     let [ours, fence, timeline] = samples.map(|samples| median_of(&samples, |us| *us));
-    let row =
-        |what: &str, other, limit| Row { what: what.to_owned(), ours, other: Some(other), unit: "us", limit };
+    let row = |name, reference, limit| Row::new(name, ours, "us", limit).compared_with(reference);
     Ok(vec![
         row("empty submission + wait, by hand with a fence", fence, Limit::RatioAtMost(1.0)),
         row("- by hand with a timeline semaphore", timeline, Limit::None),
@@ -41,9 +40,9 @@ fn uploads(ctx: &Context, workload: Workload) -> Result<Row, BenchError> {
     let buffer = ctx.create_buffer(&BufferDesc { size_bytes, ..BufferDesc::default() })?;
     let samples: [Vec<f64>; 2] =
         interleave(workload.runs.div_ceil(5), |which| upload(ctx, *buffer, workload.many, which == 1))?;
-    let [ours, other] = samples.map(|samples| median_of(&samples, |ms| *ms));
-    let what = format!("{} uploads of 4 KiB, compared with one submission each", workload.many);
-    Ok(Row { what, ours, other: Some(other), unit: "ms", limit: Limit::FasterThan(10.0) })
+    let [ours, reference] = samples.map(|samples| median_of(&samples, |ms| *ms));
+    let name = format!("{} uploads of 4 KiB, compared with one submission each", workload.many);
+    Ok(Row::new(name, ours, "ms", Limit::FasterThan(10.0)).compared_with(reference))
 }
 
 /// Returns the milliseconds until all uploads are done.

@@ -44,9 +44,9 @@ pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Row>, 
         Ok(taken)
     };
     let [once, often] = interleave(workload.runs * 20, |which| record(if which == 0 { 1 } else { TURNS }))?;
-    let row = |what: String, samples: &[f64], turns, limit| {
+    let row = |name: String, samples: &[f64], turns, limit| {
         let ours = each_ns(median_of(samples, |ms| *ms), TLAS_COUNT * turns);
-        Row { what, ours, other: None, unit: "ns", limit }
+        Row::new(name, ours, "ns", limit)
     };
     Ok(vec![
         row("TLAS refit recorded, library share".to_owned(), &often, TURNS, Limit::AtMost(50.0)),

@@ -5,15 +5,15 @@ use std::time::Instant;
 
 use lvk::Context;
 
-use super::super::error::BenchError;
-use super::super::setup::{DefaultBy, Setup, ray_paths};
-use super::super::table::Table;
 use super::args::PaperArgs;
 use super::measure::{ExperimentPlan, measure};
 use super::report::{Experiment, IMAGE_FOLDER};
 use super::report_images::ReportImages;
 use super::tables;
 use super::trace_path::TracePath;
+use crate::error::BenchError;
+use crate::setup::{DefaultBy, Setup, ray_paths};
+use crate::table::Table;
 use lvk_samples::app::interrupt::Interrupt;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::app::ray_args::RayTracing;
@@ -87,7 +87,7 @@ fn default_scenes(folder: Option<&Path>) -> (Vec<PathBuf>, Option<String>) {
         return (vec![PathBuf::from(scene_list::BUILT_IN)], Some(missing_note));
     }
     let missing_note = (!missing.is_empty())
-        .then(|| format!("without {wanted}; set {VARIABLE} to a folder with these scenes"));
+        .then(|| format!("without {wanted}, which the folder in {VARIABLE} does not contain"));
     (there.into_iter().map(PathBuf::from).collect(), missing_note)
 }
 

@@ -44,7 +44,9 @@ pub enum PaperError {
         device: String,
     },
     /// The context uses another implementation of ray queries than the plan.
-    #[error("the plan requires {planned}, but the context uses {found}; see ContextDesc::ray_query")]
+    #[error(
+        "the plan is to trace by {planned}, but the context traces by {found}; see ContextDesc::ray_query"
+    )]
     OtherPath {
         /// Name of the path in the plan.
         planned: &'static str,

@@ -1,11 +1,11 @@
 //! The goals of the hybrid method, and the measured values.
 
-use super::super::table::Table;
 use super::measure::{CameraResult, SceneResult};
 use super::published::PublishedScene;
 use super::tables::decibels;
 use super::times::{Statistic, Times};
 use super::trace_path::TracePath;
+use crate::table::Table;
 
 /// Maximum average t/T.
 pub(super) const AVERAGE_RATIO: f64 = 0.75;

@@ -1,11 +1,11 @@
 //! The paper's tables with the measured numbers beside the paper's.
 
-use super::super::table::{Table, format_grouped};
 use super::image_metrics::ImageMetrics;
 use super::measure::SceneResult;
 use super::published::{self, PublishedScene, TimesTable};
 use super::times::{Statistic, Times};
 use super::trace_path::TracePath;
+use crate::table::{Table, format_grouped};
 
 /// Columns of a table of times, without the first.
 const TIMES: [&str; 6] = ["T", "t_a", "t_a/T", "t_b", "t", "t/T"];

@@ -4,15 +4,15 @@ use std::time::{Duration, Instant};
 
 use lvk::{AccelStructHandle, BuildFlags, BuildMode, Context, Holder, PrimitiveOrder};
 
-use super::super::compaction::compact_and_wait;
-use super::super::error::BenchError;
-use super::super::measure::{Stopwatch, interleave_all, median_of};
-use super::super::mesh::{Mesh, MeshBuffers};
-use super::super::setup::Setup;
-use super::super::table::{Table, format_grouped, format_ms};
 use super::contexts::Contexts;
 use super::cpu_builds;
 use super::instances::{COUNT, Instances};
+use crate::compaction::compact_and_wait;
+use crate::error::BenchError;
+use crate::measure::{Stopwatch, interleave_all, median_of};
+use crate::mesh::{Mesh, MeshBuffers};
+use crate::setup::Setup;
+use crate::table::{Table, format_grouped, format_ms};
 
 const UPDATED: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 const SMALL_UPDATED: BuildFlags = BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE);

@@ -2,8 +2,8 @@
 
 use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
 
-use super::super::error::BenchError;
-use super::super::setup::Setup;
+use crate::error::BenchError;
+use crate::setup::Setup;
 
 /// Three contexts of one device.
 pub(super) struct Contexts {

@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use lvk::{BuildFlags, Context, FeatureRequest, PrimitiveOrder, RayQueryRequest};
 
-use super::super::error::BenchError;
-use super::super::measure::{elapsed_ms, interleave, median_of};
-use super::super::mesh::{Mesh, MeshBuffers};
-use super::super::setup::Setup;
-use super::super::table::{Table, format_ms};
+use crate::error::BenchError;
+use crate::measure::{elapsed_ms, interleave, median_of};
+use crate::mesh::{Mesh, MeshBuffers};
+use crate::setup::Setup;
+use crate::table::{Table, format_ms};
 
 /// Maximum number of runs, because builds are slow.
 const MAX_RUNS: u32 = 10;

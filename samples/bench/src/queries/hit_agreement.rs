@@ -1,9 +1,9 @@
 //! Compares the hits of software ray queries with those of the driver.
 
-use super::super::table::Table;
-use super::super::tracer::{Hit, TracedImage};
 use super::tracers::Layout;
 use super::traversal::TraversalResult;
+use crate::table::Table;
+use crate::tracer::{Hit, TracedImage};
 
 /// Relative tolerance for equal distances.
 const TOLERANCE: f32 = 1e-4;

@@ -5,12 +5,12 @@ use lvk::{
     PrimitiveOrder, TlasDesc, TlasInstance,
 };
 
-use super::super::error::BenchError;
-use super::super::instance_record::InstanceRecord;
-use super::super::measure::Stopwatch;
-use super::super::mesh::MeshBuffers;
-use super::super::synthetic::spheres;
-use super::super::tlas::instance_transform;
+use crate::error::BenchError;
+use crate::instance_record::InstanceRecord;
+use crate::measure::Stopwatch;
+use crate::mesh::MeshBuffers;
+use crate::synthetic::spheres;
+use crate::tlas::instance_transform;
 
 /// Instances of the TLAS.
 pub(super) const COUNT: u32 = 10_000;

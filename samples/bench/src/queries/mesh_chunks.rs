@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::super::mesh::Mesh;
+use crate::mesh::Mesh;
 
 /// Splits the triangles into `count` meshes, or fewer for a mesh with fewer triangles. No mesh is empty.
 pub(super) fn split_into_chunks(mesh: &Mesh, count: u32) -> Vec<Mesh> {
@@ -28,8 +28,8 @@ fn chunk(mesh: &Mesh, triangles: &[[u32; 3]]) -> Mesh {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::synthetic::spheres;
     use super::*;
+    use crate::synthetic::spheres;
 
     #[test]
     fn chunks_have_all_triangles_in_their_order() {

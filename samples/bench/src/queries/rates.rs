@@ -1,8 +1,8 @@
 //! Tables of rays per second.
 
-use super::super::table::{Table, format_ratio};
 use super::tracers::{Backend, Layout};
 use super::traversal::{TraversalPlan, TraversalResult};
+use crate::table::{Table, format_ratio};
 
 /// Column heads: for each kind of rays the rate and its ratios to the driver's pipeline.
 const COLUMNS: [&str; 7] = [

@@ -4,12 +4,12 @@ use std::rc::Rc;
 
 use lvk::{AccelStructHandle, BlasDesc, BuildFlags, Context, Holder, PrimitiveOrder, TlasDesc, TlasInstance};
 
-use super::super::error::BenchError;
-use super::super::measure::Stopwatch;
-use super::super::mesh::{Mesh, MeshBuffers};
-use super::super::tracer::Tracer;
 use super::contexts::Contexts;
 use super::mesh_chunks::split_into_chunks;
+use crate::error::BenchError;
+use crate::measure::Stopwatch;
+use crate::mesh::{Mesh, MeshBuffers};
+use crate::tracer::Tracer;
 use lvk_samples::hybrid::RayPath;
 
 /// Layout of the traced scene.

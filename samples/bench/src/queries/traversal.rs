@@ -1,11 +1,11 @@
 //! Traces the same images with every tracer under test.
 
-use super::super::error::BenchError;
-use super::super::measure::{SubmissionTimes, interleave_all, median_of};
-use super::super::mesh::Mesh;
-use super::super::tracer::{RayKind, TracedImage};
 use super::hit_agreement::HitAgreement;
 use super::tracers::{Backend, Layout, TracerCase};
+use crate::error::BenchError;
+use crate::measure::{SubmissionTimes, interleave_all, median_of};
+use crate::mesh::Mesh;
+use crate::tracer::{RayKind, TracedImage};
 use lvk_samples::scene::Camera;
 
 /// Cameras, image size and run count.

@@ -10,8 +10,8 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use super::error::DownloadError;
-use super::file;
+use crate::error::DownloadError;
+use crate::file;
 use mirror::Mirror;
 
 /// A private apt state with up-to-date package lists.
