@@ -96,7 +96,6 @@ fn describe_all(library: &Crate, imports: &Imports, circles: &[Circle]) -> Strin
 }
 
 #[test]
-#[ignore = "the library does not obey yet"]
 fn files_import_each_other_without_circles() {
     let library = library();
     let imports = imports(&library);
