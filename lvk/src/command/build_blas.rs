@@ -150,10 +150,7 @@ impl CommandBuffer {
                 unsafe { ext.cmd_build_acceleration_structures(self.raw(), &infos, &ranges) };
             }
         }
-        self.first_builds = is_first;
-        let recorded = self.record_software_builds(software);
-        self.first_builds = false;
-        if let Err(error) = recorded {
+        if let Err(error) = self.record_software_builds(software, is_first) {
             let name = open.first().map_or("build_blas", |build| &build.target.name);
             return Err(self.poison(name, error));
         }
@@ -167,8 +164,7 @@ impl CommandBuffer {
 
     fn use_build_accesses(&mut self, build: &BlasPartBuild, is_first: bool) {
         let write = Use::accel_build_write();
-        let shared = &self.shared;
-        let group = if is_first { shared.new_blas[self.recording.queue_index] } else { shared.all_blas };
+        let group = self.built_group(is_first);
         self.state.accesses.add_id(build.id, write);
         self.state.accesses.add_accumulating(group, write);
         build.read_buffers.iter().for_each(|buffer| self.use_buffer(buffer, Use::accel_build_input()));

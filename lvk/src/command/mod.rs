@@ -72,8 +72,6 @@ pub struct CommandBuffer {
     staged: StagingChunk,
     /// Present where the command buffer is profiled.
     scopes: Option<Box<Scopes>>,
-    /// Whether structures are built that nothing can show yet.
-    pub(crate) first_builds: bool,
 }
 
 /// What is left of a command buffer once it is complete.
@@ -109,7 +107,6 @@ impl CommandBuffer {
             had_pass: false,
             views: 1,
             staged: StagingChunk::default(),
-            first_builds: false,
         }
     }
 

@@ -99,6 +99,11 @@ impl CommandBuffer {
             self.recording.references.push((id, access));
         }
     }
+
+    /// Returns the resource that stands for the BLAS that are built now: all BLAS, or the new ones, which no TLAS references.
+    pub(crate) fn built_group(&self, is_first: bool) -> ResourceId {
+        if is_first { self.shared.new_blas[self.recording.queue_index] } else { self.shared.all_blas }
+    }
 }
 
 /// Fails for the transfer queue.

@@ -6,10 +6,10 @@ use ash::vk;
 
 use super::Context;
 use super::holder::Holder;
-use super::plan_blas::{BlasInputs, part_limits};
+use super::plan_blas::{new_blas_object, part_limits};
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
-use crate::accel::blas::{Blas, BlasPart, BlasStructures};
+use crate::accel::blas::{BlasPart, BlasStructures};
 use crate::accel::build::BuildInput;
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::{AccelStructSizes, BuildMode};
@@ -23,7 +23,6 @@ use crate::device_state::DeviceState;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
 use crate::queue::Queue;
-use crate::software_ray_query::blas::SoftwareBlas;
 use crate::software_ray_query::create::software_tlas;
 use crate::submit::SubmitHandle;
 
@@ -165,21 +164,6 @@ impl Context {
 
 /// Handles of structures, and what they name.
 type NewBatch = (Vec<Holder<AccelStructHandle>>, Vec<Arc<AccelStruct>>);
-
-/// Makes the object behind the handle of a BLAS.
-pub(crate) fn new_blas_object(
-    desc: &BlasDesc<'_>,
-    inputs: BlasInputs,
-    body: BlasStructures,
-    software: Option<SoftwareBlas>,
-) -> AccelStruct {
-    let BlasInputs { transforms, parts } = inputs;
-    let hardware = parts.iter().map(|part| part.sizes);
-    let all = hardware.chain(software.as_ref().map(|software| software.sizes(desc.flags)));
-    let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::max_with);
-    let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body, software);
-    AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(Arc::new(blas)))
-}
 
 /// Makes a top-level structure for a slot the caller reserved, whatever it takes; nothing is built yet.
 pub(super) fn new_tlas(shared: &DeviceState, desc: &TlasDesc<'_>, slot: u32) -> Result<AccelStruct> {

@@ -1,7 +1,11 @@
 //! Decides of what parts a bottom-level structure consists, and in which order their primitives are built.
 
+use std::sync::Arc;
+
 use super::Context;
-use crate::accel::blas::BlasPart;
+use crate::accel::AccelStruct;
+use crate::accel::accel_struct::AccelKind;
+use crate::accel::blas::{Blas, BlasPart, BlasStructures};
 use crate::accel::build::{BuildInput, transform_matrices};
 use crate::accel::desc::{BlasDesc, PrimitiveOrder};
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
@@ -16,7 +20,7 @@ use crate::gpu::caps::limits::Limits;
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
-use crate::software_ray_query::blas::max_sizes;
+use crate::software_ray_query::blas::{SoftwareBlas, max_sizes};
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.
 const MIN_REORDERED_PRIMITIVES: u64 = 64;
@@ -146,6 +150,21 @@ fn new_transforms(shared: &DeviceState, name: &str, matrices: &[f32]) -> Result<
     buffer.write(0, bytes);
     Ok(buffer)
 }
+/// Makes the object behind the handle of a BLAS.
+pub(crate) fn new_blas_object(
+    desc: &BlasDesc<'_>,
+    inputs: BlasInputs,
+    body: BlasStructures,
+    software: Option<SoftwareBlas>,
+) -> AccelStruct {
+    let BlasInputs { transforms, parts } = inputs;
+    let hardware = parts.iter().map(|part| part.sizes);
+    let all = hardware.chain(software.as_ref().map(|software| software.sizes(desc.flags)));
+    let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::max_with);
+    let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body, software);
+    AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(Arc::new(blas)))
+}
+
 fn choose_plan(gpu: &Gpu, desc: &BlasDesc<'_>, whole: &AccelStructSizes) -> BlasPlan {
     let primitives: u64 = desc.geometries.iter().map(|geometry| u64::from(geometry.primitive_count())).sum();
     let order = match desc.order {

@@ -6,9 +6,8 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::Context;
-use super::create_accel::new_blas_object;
 use super::holder::Holder;
-use super::plan_blas::{BlasInputs, convert_geometries};
+use super::plan_blas::{BlasInputs, convert_geometries, new_blas_object};
 use crate::accel::AccelStruct;
 use crate::accel::blas::{BlasPart, BlasStructures};
 use crate::accel::blas_file::{

@@ -23,7 +23,7 @@ impl CommandBuffer {
         Ok(SoftwareBuilds)
     }
 
-    pub(crate) fn record_software_builds(&mut self, _: SoftwareBuilds) -> Result<()> {
+    pub(crate) fn record_software_builds(&mut self, _: SoftwareBuilds, _: bool) -> Result<()> {
         Ok(())
     }
 

@@ -55,15 +55,6 @@ struct BlobMove {
 }
 
 impl CommandBuffer {
-    /// The pseudo-resource of the BLAS under construction: all BLAS, or the new ones that no TLAS references yet.
-    fn built_group(&self) -> ResourceId {
-        if self.first_builds {
-            self.shared.new_blas[self.recording.queue_index]
-        } else {
-            self.shared.all_blas
-        }
-    }
-
     /// Copies what the CPU built into a bottom-level structure.
     pub(crate) fn fill_software_blas(
         &mut self,
@@ -118,7 +109,7 @@ impl CommandBuffer {
     /// Builds what software traces of a structure for the first time.
     pub(crate) fn build_software_blas(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
         let work = self.plan_first_software_builds(std::slice::from_ref(target))?;
-        self.record_software_builds(work)
+        self.record_software_builds(work, false)
     }
 
     /// Makes room for builds or refits of what software traces of these structures; records nothing.
@@ -139,14 +130,14 @@ impl CommandBuffer {
     }
 
     /// Records what was planned.
-    pub(crate) fn record_software_builds(&mut self, work: SoftwareBuilds) -> Result<()> {
+    pub(crate) fn record_software_builds(&mut self, work: SoftwareBuilds, is_first: bool) -> Result<()> {
         let SoftwareBuilds { targets, builds, refits, moves } = work;
         if builds.is_empty() && refits.is_empty() {
             return Ok(());
         }
         let write = Use::shader_write(Stages::COMPUTE);
         targets.into_iter().for_each(|target| self.state.accesses.add_id(target, write));
-        let group = self.built_group();
+        let group = self.built_group(is_first);
         self.state.accesses.add_accumulating(group, write);
         if !builds.is_empty() {
             self.record_gpu_builds(&builds)?;
