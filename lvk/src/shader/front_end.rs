@@ -64,7 +64,7 @@ fn translate(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Result<
             ));
         }
     };
-    let (included, texts) = includes.into_found();
+    let (included, texts) = includes.into_included();
     if !desc.debug_info {
         return Ok(CachedModule { included, words });
     }

@@ -60,7 +60,7 @@ impl<'a> Includes<'a> {
     }
 
     /// What was found: the directives in order, and the texts with their names.
-    pub(super) fn into_found(self) -> (Vec<Included>, Vec<(String, String)>) {
+    pub(super) fn into_included(self) -> (Vec<Included>, Vec<(String, String)>) {
         (self.included, self.texts)
     }
 

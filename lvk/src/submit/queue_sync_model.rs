@@ -127,15 +127,16 @@ impl History {
                     let mut reach = Reach::new(sent.queue_index, sent.value, start);
                     let mut first = steps[place + 1..].iter();
                     let later = || self.sent[at + 1..].iter();
-                    let wrong =
-                        first.find_map(|step| reach.meet(sent.queue_index, step, accumulated, writes));
+                    let wrong = first
+                        .find_map(|step| reach.first_unordered(sent.queue_index, step, accumulated, writes));
                     let wrong = wrong.map(|what| (sent.value, what)).or_else(|| {
                         later().find_map(|next| {
                             reach.arrive(next);
                             let steps = self.steps(next, cell);
                             let mut wrong = steps.iter();
-                            let wrong = wrong
-                                .find_map(|step| reach.meet(next.queue_index, step, accumulated, writes));
+                            let wrong = wrong.find_map(|step| {
+                                reach.first_unordered(next.queue_index, step, accumulated, writes)
+                            });
                             wrong.map(|what| (next.value, what))
                         })
                     });
@@ -254,7 +255,7 @@ impl Reach {
     }
 
     /// What is wrong with a later step on a queue.
-    fn meet(
+    fn first_unordered(
         &mut self,
         queue_index: usize,
         step: &QueueCellStep,

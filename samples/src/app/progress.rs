@@ -24,7 +24,7 @@ pub struct Progress {
     timing: Timing,
     is_seen: bool,
     target: fn() -> ProgressDrawTarget,
-    shown: Option<Shown>,
+    shown: Option<VisibleBar>,
     lines: Option<Lines>,
     status: Option<Status>,
 }
@@ -38,7 +38,7 @@ struct Timing {
 
 /// A bar, and the thread that keeps it moving.
 #[derive(Debug)]
-struct Shown {
+struct VisibleBar {
     bar: ProgressBar,
     stop: Option<Sender<()>>,
     ticker: Option<JoinHandle<()>>,
@@ -89,7 +89,7 @@ impl Progress {
         if !self.is_seen {
             return;
         }
-        let bar = &self.shown.get_or_insert_with(|| Shown::new(self.timing, self.target)).bar;
+        let bar = &self.shown.get_or_insert_with(|| VisibleBar::new(self.timing, self.target)).bar;
         bar.set_style(style(total > 0));
         bar.set_length(total);
         bar.set_position(0);
@@ -105,7 +105,7 @@ impl Progress {
         if let Some(line) = self.lines.as_mut().and_then(|lines| lines.set(done, Instant::now())) {
             self.print_line(&line);
         }
-        if let Some(Shown { bar, .. }) = &self.shown {
+        if let Some(VisibleBar { bar, .. }) = &self.shown {
             bar.set_position(done);
         }
     }
@@ -153,7 +153,7 @@ impl Lines {
     }
 }
 
-impl Shown {
+impl VisibleBar {
     fn new(timing: Timing, target: fn() -> ProgressDrawTarget) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         let (stop, stopped) = mpsc::channel::<()>();
@@ -172,7 +172,7 @@ impl Shown {
     }
 }
 
-impl Drop for Shown {
+impl Drop for VisibleBar {
     fn drop(&mut self) {
         drop(self.stop.take());
         if let Some(ticker) = self.ticker.take() {

@@ -13,7 +13,7 @@ const DEPTH: u32 = 3;
 
 /// A scene that was found.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct FoundScene {
+pub struct SceneFile {
     /// The file's stem.
     pub name: String,
     /// The file.
@@ -25,7 +25,7 @@ pub struct FoundScene {
 /// The OBJ files in `folder` and the folders in it, three levels deep, by name. Folders that cannot be read count as
 /// empty.
 #[must_use]
-pub fn find(folder: &Path) -> Vec<FoundScene> {
+pub fn find(folder: &Path) -> Vec<SceneFile> {
     let mut found = Vec::new();
     collect(folder, DEPTH, &mut found);
     found.sort();
@@ -69,7 +69,7 @@ pub fn resolve(wish: &Path, folder: Option<&Path>) -> PathBuf {
     found.map_or_else(|| wish.to_owned(), |scene| scene.path)
 }
 
-fn collect(folder: &Path, depth: u32, found: &mut Vec<FoundScene>) {
+fn collect(folder: &Path, depth: u32, found: &mut Vec<SceneFile>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()) {
         let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
@@ -78,7 +78,7 @@ fn collect(folder: &Path, depth: u32, found: &mut Vec<FoundScene>) {
             Ok(data) if data.is_file() && is_obj => {
                 let name =
                     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-                found.push(FoundScene { name, path, bytes: data.len() });
+                found.push(SceneFile { name, path, bytes: data.len() });
             }
             _ => {}
         }

@@ -99,7 +99,7 @@ fn figures(ctx: &Context, world: &World, structures: &Structures) -> lvk::Result
     Ok(Figures {
         structures: structures.figures(ctx, world)?,
         triangles: world.triangle_count(),
-        shown_triangles: world.shown_triangle_count(),
+        shown_triangles: world.instanced_triangle_count(),
         instances: world.instances.len(),
         scene_bytes: (scene.positions.len() * vertex_bytes + scene.triangles.len() * triangle_bytes) as u64,
         top_level_bytes: top_level.structure_bytes + top_level.table_bytes,

@@ -174,7 +174,7 @@ mod tests {
         let world = world();
         let combined = world.combined().unwrap();
         assert_eq!((combined.instances.len(), combined.pieces.len()), (2, 2));
-        assert_eq!(combined.triangle_count(), world.shown_triangle_count());
+        assert_eq!(combined.triangle_count(), world.instanced_triangle_count());
         assert!(combined.triangle_count() > world.triangle_count());
         assert!(seen(&combined) == seen(&world), "another world");
         assert!((combined.farthest() - world.farthest()).abs() < 0.1 * world.farthest());

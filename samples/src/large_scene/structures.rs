@@ -45,7 +45,7 @@ pub(super) struct Plan<'a> {
 }
 
 /// The result of loading the file of a piece.
-enum Found {
+enum LoadOutcome {
     Loaded(Holder<AccelStructHandle>),
     Nothing,
     Refused,
@@ -112,15 +112,15 @@ impl Plan<'_> {
     }
 
     /// The structure of an earlier start. Files that are of no use are dropped with a warning.
-    fn load(&self, desc: &BlasDesc<'_>, key: Option<StructureKey>) -> lvk::Result<Found> {
-        let Some((cache, key)) = self.cache.as_ref().zip(key) else { return Ok(Found::Nothing) };
-        let Some(bytes) = cache.read(key) else { return Ok(Found::Nothing) };
+    fn load(&self, desc: &BlasDesc<'_>, key: Option<StructureKey>) -> lvk::Result<LoadOutcome> {
+        let Some((cache, key)) = self.cache.as_ref().zip(key) else { return Ok(LoadOutcome::Nothing) };
+        let Some(bytes) = cache.read(key) else { return Ok(LoadOutcome::Nothing) };
         // SAFETY: the folder is the program's own, whose files `keep` alone writes.
         match unsafe { self.ctx.load_blas(desc, &bytes) } {
-            Ok(blas) => Ok(Found::Loaded(blas)),
+            Ok(blas) => Ok(LoadOutcome::Loaded(blas)),
             Err(error) if is_of_file(&error) => {
                 log::warn!("the structure '{}' is dropped: {error}", cache.path(key).display());
-                Ok(Found::Refused)
+                Ok(LoadOutcome::Refused)
             }
             Err(error) => Err(error),
         }
@@ -130,10 +130,11 @@ impl Plan<'_> {
     fn build_missing(
         &self,
         descs: &[BlasDesc<'_>],
-        found: Vec<Found>,
+        found: Vec<LoadOutcome>,
         progress: &mut Progress,
     ) -> Result<Vec<Blas>, SampleError> {
-        let missing: Vec<_> = (0..found.len()).filter(|&i| !matches!(found[i], Found::Loaded(_))).collect();
+        let missing: Vec<_> =
+            (0..found.len()).filter(|&i| !matches!(found[i], LoadOutcome::Loaded(_))).collect();
         let triangles: Vec<_> =
             missing.iter().map(|&index| self.world.pieces[index].triangles.len() as u64).collect();
         progress.stage("building acceleration structures", triangles.iter().sum());
@@ -150,11 +151,11 @@ impl Plan<'_> {
         let mut all = Vec::with_capacity(found.len());
         for found in found {
             let origin = match found {
-                Found::Loaded(_) => Origin::Loaded,
-                Found::Nothing => Origin::Built,
-                Found::Refused => Origin::Rebuilt,
+                LoadOutcome::Loaded(_) => Origin::Loaded,
+                LoadOutcome::Nothing => Origin::Built,
+                LoadOutcome::Refused => Origin::Rebuilt,
             };
-            let loaded = if let Found::Loaded(blas) = found { Some(blas) } else { None };
+            let loaded = if let LoadOutcome::Loaded(blas) = found { Some(blas) } else { None };
             let Some(holder) = loaded.or_else(|| built.next()) else { break };
             let info = self.ctx.accel_struct_info(*holder)?;
             all.push(Blas { built_bytes: info.structure_bytes + info.table_bytes, holder, origin });

@@ -88,7 +88,7 @@ impl World {
     /// # Errors
     /// [`SampleError::MeshTooLarge`].
     pub fn combined(&self) -> Result<Self, SampleError> {
-        let (count, limit) = (self.shown_triangle_count(), MOST_COMBINED);
+        let (count, limit) = (self.instanced_triangle_count(), MOST_COMBINED);
         if count > limit {
             return Err(SampleError::MeshTooLarge { count, limit });
         }
@@ -119,7 +119,7 @@ impl World {
 
     /// The pieces, those first that light does not pass through.
     #[must_use]
-    pub fn pieces(&self) -> &[Piece] {
+    pub fn parts(&self) -> &[Piece] {
         &self.pieces
     }
 
@@ -137,7 +137,7 @@ impl World {
 
     /// Triangles of all instances.
     #[must_use]
-    pub fn shown_triangle_count(&self) -> u64 {
+    pub fn instanced_triangle_count(&self) -> u64 {
         self.instances.iter().map(|instance| self.pieces[instance.piece].triangles.len() as u64).sum()
     }
 

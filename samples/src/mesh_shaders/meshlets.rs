@@ -47,7 +47,7 @@ pub struct Meshlets {
 impl Meshlets {
     /// Cuts a mesh. A meshlet grows from the first triangle that is left by neighbours, those first that bring the fewest
     /// vertices and lie nearest, until it is full or has no neighbours.
-    pub fn cut(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let mut cutter = Cutter::new(positions, triangles);
         for seed in 0..triangles.len() {
             if cutter.is_left[seed] {
@@ -194,7 +194,7 @@ mod tests {
     proptest! {
         #[test]
         fn every_triangle_is_in_one_meshlet((points, triangles) in soup()) {
-            let cut = Meshlets::cut(&points, &triangles);
+            let cut = Meshlets::build(&points, &triangles);
             prop_assert_eq!(sorted(all_corners(&cut)), sorted(triangles));
             for meshlet in &cut.meshlets {
                 prop_assert!((1..=MAX_VERTICES as u32).contains(&meshlet.vertex_count));
@@ -204,7 +204,7 @@ mod tests {
 
         #[test]
         fn what_a_cone_calls_hidden_shows_no_front((points, triangles) in soup(), eye in prop::array::uniform3(-3.0_f32..3.0)) {
-            let (cut, eye) = (Meshlets::cut(&points, &triangles), Vec3::from(eye));
+            let (cut, eye) = (Meshlets::build(&points, &triangles), Vec3::from(eye));
             for meshlet in &cut.meshlets {
                 let seen = Vec3::from(meshlet.middle) - eye;
                 let is_hidden = seen.dot(meshlet.axis.into()) >= meshlet.cutoff * seen.length() + meshlet.radius;
@@ -222,7 +222,7 @@ mod tests {
         let knot = super::super::knot::knot();
         let positions: Vec<Vec3> = knot.vertices.iter().map(|vertex| vertex.position).collect();
         let triangles: Vec<_> = knot.triangles.iter().map(|corners| corners.map(u32::from)).collect();
-        let cut = Meshlets::cut(&positions, &triangles);
+        let cut = Meshlets::build(&positions, &triangles);
         assert!(cut.meshlets.len() * 80 < triangles.len(), "{} meshlets", cut.meshlets.len());
         assert!(cut.meshlets.iter().all(|meshlet| meshlet.radius < 0.5));
         let has_cone = cut.meshlets.iter().filter(|meshlet| meshlet.cutoff < 1.0).count();

@@ -225,7 +225,7 @@ fn model() -> (Vec<Vertex>, Meshlets) {
         .map(|vertex| Vertex { position: vertex.position.into(), normal: vertex.normal.into() });
     let positions: Vec<Vec3> = knot.vertices.iter().map(|vertex| vertex.position).collect();
     let triangles: Vec<_> = knot.triangles.iter().map(|vertices| vertices.map(u32::from)).collect();
-    (vertices.collect(), Meshlets::cut(&positions, &triangles))
+    (vertices.collect(), Meshlets::build(&positions, &triangles))
 }
 
 fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {

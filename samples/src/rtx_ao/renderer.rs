@@ -114,7 +114,7 @@ impl RtxAo {
     }
 
     /// The view that is shown.
-    pub fn shown(&self) -> &View {
+    pub fn current_view(&self) -> &View {
         &self.view
     }
 

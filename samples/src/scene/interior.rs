@@ -17,7 +17,7 @@ const HEADINGS: u32 = 12;
 
 /// Light near the ceiling and five cameras; `None` when there is no place that is free and surrounded.
 pub(super) fn views(mesh: &Mesh) -> Option<Views> {
-    let grid = Grid::of(mesh);
+    let grid = Grid::from_mesh(mesh);
     let mut shots = grid.shots();
     let mut chosen: Vec<Shot> = Vec::new();
     while chosen.len() < 5 {
@@ -67,7 +67,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn of(mesh: &Mesh) -> Self {
+    fn from_mesh(mesh: &Mesh) -> Self {
         let (low, high) = bounds_of(&mesh.positions);
         let (low, high) = (Vec3::from(low), Vec3::from(high));
         let cell = ((high - low).max_element() / CELLS).max(f32::MIN_POSITIVE);

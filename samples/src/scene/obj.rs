@@ -36,7 +36,7 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
     progress.go_on()?;
     progress.stage(&format!("{name}: arranging triangles"), 0);
     let opaque_triangle_count = finish(&mut mesh, &materials, &mut obj.warnings, degenerate);
-    let setting = Setting::of(&mesh, views);
+    let setting = Setting::from_mesh(&mesh, views);
     Ok(Scene {
         opaque_triangle_count,
         textures,

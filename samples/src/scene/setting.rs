@@ -20,7 +20,7 @@ pub(super) struct Setting {
 
 impl Setting {
     /// The setting of a mesh from a file: the given views, filled up with views computed from the geometry.
-    pub fn of(mesh: &Mesh, views: Option<Views>) -> Self {
+    pub fn from_mesh(mesh: &Mesh, views: Option<Views>) -> Self {
         let (low, high) = bounds_of(&mesh.positions);
         let (low_corner, high_corner) = (Vec3::from(low), Vec3::from(high));
         let diagonal = low_corner.distance(high_corner);

@@ -18,7 +18,7 @@ pub struct Draw {
 }
 
 /// Puts the triangles of `scene` into the order of draws of at most `most` triangles, and answers those.
-pub(super) fn cut(scene: &mut Scene, most: u32) -> Vec<Draw> {
+pub(super) fn split_draws(scene: &mut Scene, most: u32) -> Vec<Draw> {
     let mut order: Vec<u32> = (0..scene.triangles.len() as u32).collect();
     order.sort_by_key(|&triangle| scene.triangle_materials[triangle as usize]);
     let centres: Vec<Vec3> = (0..scene.triangles.len()).map(|triangle| centre(scene, triangle)).collect();
@@ -81,7 +81,7 @@ mod tests {
             let mut scene = Scene::town();
             scene.source_triangles = (0..scene.triangles.len() as u32).collect();
             let before = scene.clone();
-            let draws = cut(&mut scene, most);
+            let draws = split_draws(&mut scene, most);
             let mut sources = scene.source_triangles.clone();
             sources.sort_unstable();
             assert!(sources.iter().copied().eq(0..before.triangles.len() as u32));
@@ -105,6 +105,6 @@ mod tests {
             assert_eq!(next as usize, scene.triangles.len());
         }
         let mut scene = Scene::town();
-        assert!(cut(&mut scene, 64).len() < 4 * scene.triangles.len() / 64, "draws are small");
+        assert!(split_draws(&mut scene, 64).len() < 4 * scene.triangles.len() / 64, "draws are small");
     }
 }

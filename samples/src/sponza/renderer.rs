@@ -10,7 +10,7 @@ use lvk::{
 
 use super::config::{DrawPath, SponzaConfig};
 use super::culling::{Culling, VIEWS};
-use super::draws::{Draw, cut};
+use super::draws::{Draw, split_draws};
 use super::frame::{FrameConstants, GpuFinish, GpuSun, GpuView};
 use super::frustum::Frustum;
 use super::pipelines::{SKY, SURFACES};
@@ -86,7 +86,7 @@ impl Sponza {
         check_promises(&scene)?;
         let config = config.suited(ctx)?;
         let target = RenderTarget::with_samples(ctx, config.extent, config.samples)?;
-        let draws = cut(&mut scene, config.triangles_per_draw);
+        let draws = split_draws(&mut scene, config.triangles_per_draw);
         let path = CameraPath::tour(&scene, 0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {

@@ -217,7 +217,7 @@ Never a function's whole name: `of`, `tell`.
         for (text, word) in [
             ("\npub(crate) struct ShownSet;", "shown"),
             ("\nenum Lane { A }", "lane"),
-            ("\n    fn hand_over_texture() {}", "hand over"),
+            ("\n    pub fn hand_over_texture() {}", "hand over"),
             ("\nmod shown {}", "shown"),
         ] {
             let found = complaints("a.rs", text);

@@ -10,7 +10,7 @@ use std::process::{Command, ExitStatus};
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::scene_list::{self, FoundScene};
+use lvk_samples::app::scene_list::{self, SceneFile};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, Origin, Show, World};
 use lvk_samples::rtx::RtxConfig;
@@ -59,7 +59,7 @@ fn instances_and_one_mesh_render_the_same_on_every_path() {
                 assert_eq!(figures.shown_triangles, combined.triangle_count());
                 assert_eq!(
                     (figures.structures.len(), figures.instances),
-                    (world.pieces().len(), world.instances().len())
+                    (world.parts().len(), world.instances().len())
                 );
                 let image = image_of(&mut sample, 0);
                 let expected = first.get_or_insert_with(|| image.clone());
@@ -107,7 +107,7 @@ fn start(ctx: &Context, path: RayPath, world: &World, folder: &Path) -> ([usize;
 fn starts_build_once(ctx: &Context, path: RayPath, world: &World) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().join("structures");
-    let all = world.pieces().len();
+    let all = world.parts().len();
     let (counts, first) = start(ctx, path, world, &folder);
     assert_eq!(counts, [0, all, 0], "there is nothing to load");
     assert_eq!(files(&folder).len(), all);
@@ -149,7 +149,7 @@ fn accel_structs_that_were_split_are_kept_too_and_not_for_another_device() {
     starts_build_once(&ctx, RayPath::Query, &street());
     let Some(other) = device() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let (world, all) = (street(), street().pieces().len());
+    let (world, all) = (street(), street().parts().len());
     assert_eq!(start(&ctx, RayPath::Query, &world, folder.path()).0, [0, all, 0]);
     assert_eq!(
         start(&other, paths(&other)[0], &world, folder.path()).0,
@@ -157,7 +157,7 @@ fn accel_structs_that_were_split_are_kept_too_and_not_for_another_device() {
         "files of another device"
     );
     let combined = world.combined().unwrap();
-    let all = combined.pieces().len();
+    let all = combined.parts().len();
     assert_eq!(start(&ctx, RayPath::Query, &combined, folder.path()).0, [0, all, 0], "files of another mesh");
 }
 
@@ -251,7 +251,7 @@ fn scenes(scratch: &Path) -> Option<PathBuf> {
 }
 
 /// The largest OBJ below 12 MB of each folder, three of them at most.
-fn small_scenes(folder: &Path) -> Vec<FoundScene> {
+fn small_scenes(folder: &Path) -> Vec<SceneFile> {
     let mut found = scene_list::find(folder);
     found.retain(|scene| scene.bytes < 12_000_000);
     found.sort_by_key(|scene| (scene.path.parent().map(Path::to_owned), Reverse(scene.bytes)));

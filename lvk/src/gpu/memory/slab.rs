@@ -152,7 +152,7 @@ mod tests {
             self.taken.iter().map(|(slot, block)| (*block, slot.number))
         }
 
-        fn give(&mut self, place: usize) {
+        fn give_back(&mut self, place: usize) {
             let (slot, block) = self.taken.swap_remove(place);
             if let Some(gone) = self.slab.free(slot) {
                 assert_eq!(gone, block);
@@ -179,11 +179,11 @@ mod tests {
                     SlabOp::Give(which) => {
                         for index in which {
                             if !model.taken.is_empty() {
-                                model.give(index.index(model.taken.len()));
+                                model.give_back(index.index(model.taken.len()));
                             }
                         }
                     }
-                    SlabOp::GiveAll => (0..model.taken.len()).rev().for_each(|place| model.give(place)),
+                    SlabOp::GiveAll => (0..model.taken.len()).rev().for_each(|place| model.give_back(place)),
                 }
                 prop_assert!(model.empty_blocks() <= 1);
             }

@@ -38,7 +38,7 @@ impl Contexts {
     }
 
     /// Returns notes on what is not measured because the device lacks it.
-    pub(super) fn missing_notes(&self) -> Vec<String> {
+    pub(super) fn unmeasured(&self) -> Vec<String> {
         let caps = self.driver.capabilities();
         let device = &caps.device_name;
         let lacks = [("ray tracing pipelines", caps.ray_tracing_pipeline), ("ray queries", caps.ray_query)];

@@ -48,6 +48,6 @@ fn measure_tracing(
     let cases = TracerCases::new(contexts, mesh, chunk_count)?;
     let results = measure_traversal(&cases.all, mesh, plan)?;
     let mut whole = rates::single_instance_table(headline, &results, plan);
-    contexts.missing_notes().into_iter().for_each(|note| whole.add_note(note));
+    contexts.unmeasured().into_iter().for_each(|note| whole.add_note(note));
     Ok(vec![whole, rates::chunks_table(cases.chunk_count, &results), hit_agreement::table(&results)])
 }
