@@ -93,7 +93,7 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
     }
 
     /// The objects of this row and those behind it.
-    pub(crate) fn from_index(&self, index: usize) -> &[Arc<T>] {
+    pub(crate) fn objects_from(&self, index: usize) -> &[Arc<T>] {
         &self.objects[index..]
     }
 

@@ -25,6 +25,7 @@ pub(crate) struct AccelStruct {
 }
 
 /// What differs between the two levels.
+#[expect(clippy::large_enum_variant, reason = "an update of a TLAS reads it without one more pointer")]
 pub(crate) enum AccelKind {
     /// A bottom-level structure.
     Blas(Arc<Blas>),

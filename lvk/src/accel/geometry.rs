@@ -186,7 +186,7 @@ impl BlasGeometry {
     }
 
     /// Checks the geometry and converts it. `matrix` is the address of its matrix if that is given by value, else 0.
-    pub(crate) fn to_vulkan(
+    pub(crate) fn convert(
         &self,
         gpu: &Gpu,
         name: &str,

@@ -221,7 +221,7 @@ impl TlasTrackers {
     /// Fails if what was recorded no longer fits what was submitted since.
     pub(crate) fn check(&self) -> Result<()> {
         self.cache
-            .from_index(0)
+            .objects_from(0)
             .iter()
             .zip(&self.trackers)
             .try_for_each(|(target, update)| update.check(target))
@@ -231,7 +231,7 @@ impl TlasTrackers {
     pub(crate) fn with_unexpected_hit_table(&self) -> impl Iterator<Item = &Tlas> {
         let relying = self
             .cache
-            .from_index(0)
+            .objects_from(0)
             .iter()
             .zip(&self.trackers)
             .filter(|(_, update)| update.expects_no_hit_table);
@@ -242,7 +242,7 @@ impl TlasTrackers {
 
     /// Makes it all so; `before` is told of each structure with what it is to show.
     pub(crate) fn apply(&mut self, mut before: impl FnMut(&Arc<AccelStruct>, &TlasContents)) {
-        for (target, update) in self.cache.from_index(0).iter().zip(&mut self.trackers) {
+        for (target, update) in self.cache.objects_from(0).iter().zip(&mut self.trackers) {
             if let (Ok(tlas), true, Some(contents)) = (target.tlas(), update.is_recorded, &update.contents) {
                 before(target, contents);
                 self.replaced.extend(update.apply(tlas));

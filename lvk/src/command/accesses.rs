@@ -145,7 +145,7 @@ impl CommandAccesses {
     /// Tells the images of textures that were found since. Apart, as most commands find none.
     #[inline(never)]
     fn sync_image_cache(&mut self, cache: &TextureCache, images: &mut Images) {
-        for texture in cache.from_index(self.known_images) {
+        for texture in cache.objects_from(self.known_images) {
             images.insert(texture.image.id, texture.image.barrier_image());
         }
         self.known_images = cache.len();

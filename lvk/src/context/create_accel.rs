@@ -125,10 +125,7 @@ impl Context {
     }
 
     /// Splits BLAS into batches whose first builds fill the scratch budget. The flag is true for the last batch.
-    fn scratch_batches<'a>(
-        &self,
-        objects: &'a [Arc<AccelStruct>],
-    ) -> Result<Vec<(&'a [Arc<AccelStruct>], bool)>> {
+    fn scratch_batches<'a>(&self, objects: &'a [Arc<AccelStruct>]) -> Result<Vec<BlasBatch<'a>>> {
         let budget = self.device_state().scratch[0].tiers.batch_bytes();
         let (mut batches, mut first, mut scratch) = (Vec::new(), 0, 0_u64);
         for (index, object) in objects.iter().enumerate() {
@@ -165,6 +162,9 @@ impl Context {
         Ok(holder)
     }
 }
+
+/// BLAS that are built together, and true for the last batch.
+type BlasBatch<'a> = (&'a [Arc<AccelStruct>], bool);
 
 /// Handles of the new BLAS, and the objects behind them.
 type NewBatch = (Vec<Holder<AccelStructHandle>>, Vec<Arc<AccelStruct>>);
