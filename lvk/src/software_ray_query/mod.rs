@@ -1,8 +1,8 @@
-//! What software traces: how structures lie in memory, how builds and refits of them on the GPU are planned, and what
-//! stands behind a handle. Trees that the CPU builds are made in [`crate::software_ray_query::bvh`].
+//! Software ray queries: memory layout of BLASes and TLASes, plans of builds and refits on the GPU, and the software
+//! half of BLAS and TLAS objects. [`crate::software_ray_query::bvh`] builds trees on the CPU.
 //!
-//! `disabled.rs` has the names that the rest of the crate uses, for builds without the feature `software-ray-query`. The
-//! folders `command/software_ray_query` and `context/software_ray_query` record and create, each in its layer.
+//! `disabled.rs` has the items that the rest of the crate uses, for builds without the feature `software-ray-query`.
+//! The folder `command/software_ray_query` records builds, and `context/software_ray_query` creates objects.
 
 pub(crate) mod blas;
 pub(crate) mod bvh;
@@ -14,7 +14,7 @@ pub(crate) mod storage;
 pub(crate) mod tlas;
 pub(crate) mod validate_blob;
 
-/// The files behind `#include <lvk/software_*.glsl>`.
+/// The files for `#include <lvk/software_*.glsl>`.
 #[cfg(feature = "glsl")]
 pub(crate) const GLSL: &[(&str, &str)] = &[
     ("lvk/software_boxes.glsl", include_str!("glsl/software_boxes.glsl")),
