@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Push {
     Gathered gathered;
     uint count;
     uint kind;
-    uint oddHalf;      // 1 if the first 16-bit index lies two bytes after `source`
+    uint oddHalf;      // 1 if the first 16-bit index is two bytes after `source`
     uint boxStride;    // bytes from one AABB to the next
 };
 
