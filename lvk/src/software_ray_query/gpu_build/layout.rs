@@ -314,7 +314,7 @@ fn blob_offsets(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blo
         part(u64::from(shape.geometry_count) * GEOMETRY_BYTES, 16),
     ];
     let bytes = layout.end.next_multiple_of(BLOB_ALIGNMENT);
-    check_limit(name, "structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
+    check_limit(name, "acceleration structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
     let [nodes, primitives, vertices, geometries] = places.map(|place| place as u32);
     Ok((BlobOffsets { nodes, primitives, vertices, geometries }, bytes))
 }

@@ -127,7 +127,7 @@ impl<'a> BlobChecker<'a> {
     }
 
     fn word_at(&self, at: usize) -> Checked<u32> {
-        self.words.get(at).copied().ok_or_else(|| format!("word {at} lies behind the structure"))
+        self.words.get(at).copied().ok_or_else(|| format!("word {at} is beyond the end of the BLAS or TLAS"))
     }
 
     fn vec3(&self, at: usize) -> Checked<[f32; 3]> {
