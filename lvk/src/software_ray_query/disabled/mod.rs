@@ -1,10 +1,10 @@
-//! The names of this folder in a build without the feature `software-ray-query`. No context takes the software path then:
+//! The items of this folder in a build without the feature `software-ray-query`. No context has the software path then:
 //! the types of a BLAS and a TLAS have no values, so that every `Option` of them is `None`.
 
 pub(crate) mod create;
 pub(crate) mod record;
 
-/// The files behind `#include <lvk/software_*.glsl>`: none.
+/// The files for `#include <lvk/software_*.glsl>`: none.
 #[cfg(feature = "glsl")]
 pub(crate) const GLSL: &[(&str, &str)] = &[];
 
@@ -44,12 +44,12 @@ pub(crate) mod blas {
         }
     }
 
-    /// Fails: without acceleration structures of the device there are none.
+    /// Fails: the device has no acceleration structures.
     pub(crate) fn max_sizes(name: &str, _: &[BlasGeometry], _: BuildFlags) -> Result<AccelStructSizes> {
         Err(missing(name))
     }
 
-    /// The error for a BLAS that only software could trace.
+    /// Returns the error for a BLAS that only software could trace.
     pub(crate) fn missing(name: &str) -> Error {
         let why = "the device has no acceleration structures; enable lvk's feature `software-ray-query`";
         Error::unsupported(format!("the BLAS '{name}'"), why)
