@@ -1,5 +1,6 @@
-//! The items of this folder in a build without the feature `software-ray-query`. No context has the software path then:
-//! the types of a BLAS and a TLAS have no values, so that every `Option` of them is `None`.
+//! The names of this folder for a build without the feature `software-ray-query`. No context uses software ray queries
+//! then: [`SoftwareBlas`](blas::SoftwareBlas) and [`SoftwareTlas`](tlas::SoftwareTlas) have no values, so that every
+//! `Option` of them is `None`.
 
 pub(crate) mod create;
 pub(crate) mod record;
@@ -15,7 +16,7 @@ pub(crate) mod blas {
     use crate::accel::geometry::BlasGeometry;
     use crate::error::{Error, Result};
 
-    /// The software half of a BLAS: no BLAS has one.
+    /// The software BVH of a BLAS; no BLAS has one.
     pub(crate) enum SoftwareBlas {}
 
     impl SoftwareBlas {
@@ -44,7 +45,7 @@ pub(crate) mod blas {
         }
     }
 
-    /// Fails: the device has no acceleration structures.
+    /// Fails, since without acceleration structures of the device there are no BLAS.
     pub(crate) fn max_sizes(name: &str, _: &[BlasGeometry], _: BuildFlags) -> Result<AccelStructSizes> {
         Err(missing(name))
     }
@@ -59,7 +60,7 @@ pub(crate) mod blas {
 pub(crate) mod tlas {
     use crate::accel::flags::AccelStructSizes;
 
-    /// The software half of a TLAS: no TLAS has one.
+    /// The software BVH of a TLAS; no TLAS has one.
     pub(crate) enum SoftwareTlas {}
 
     impl SoftwareTlas {
