@@ -114,7 +114,7 @@ impl RecordingStatePool {
     const MAX_SPARE: usize = 8;
 
     pub(crate) fn new() -> Self {
-        Self(Mutex::new(Rank::SpareNotes, Vec::new()))
+        Self(Mutex::new(Rank::RecordingStates, Vec::new()))
     }
 
     pub(crate) fn acquire(&self) -> Box<RecordingState> {

@@ -10,6 +10,7 @@
 #[repr(u8)]
 pub(crate) enum Rank {
     /// A swapchain. It is taken first, because presenting submits.
+    #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only windows have swapchains"))]
     Swapchain,
     /// Compactions in progress. They record copies that run before the next submission.
     Compactions,
@@ -56,7 +57,7 @@ pub(crate) enum Rank {
     /// Measurements of the profiler.
     Profiler,
     /// Unused recording states of command buffers.
-    SpareNotes,
+    RecordingStates,
     /// Cached image limits of the device.
     ImageLimitCache,
     /// Owners of the bindless slots, where indices are checked.
@@ -101,7 +102,7 @@ impl Rank {
         Self::PipelineCacheFile,
         Self::ShaderCacheFolder,
         Self::Profiler,
-        Self::SpareNotes,
+        Self::RecordingStates,
         Self::ImageLimitCache,
         Self::SlotOwners,
         Self::SharedWork,
