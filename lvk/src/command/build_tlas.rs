@@ -16,7 +16,7 @@ use crate::accel::tlas_tracker::{RecordedTlasBuild, TlasChange, TlasTracker};
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::error::{Error, Result, check_limit};
 use crate::resource::Buffer;
-use crate::submit::ownership::QueueAccess;
+use crate::submit::last_access::QueueAccess;
 
 /// State of a TLAS before the next command.
 pub(super) struct PreviousState<'a> {

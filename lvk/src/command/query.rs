@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::handle::QueryPoolHandle;
 use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryKind;
-use crate::submit::ownership::QueueAccess;
+use crate::submit::last_access::QueueAccess;
 
 impl CommandBuffer {
     /// Resets queries, so that they can be written again (`vkCmdResetQueryPool`).

@@ -10,7 +10,7 @@ use crate::queue::Queue;
 use crate::resource::Texture;
 use crate::resource::region::Region;
 use crate::submit::SubmitHandle;
-use crate::submit::ownership::QueueAccess;
+use crate::submit::last_access::QueueAccess;
 use crate::submit::queue::stages_of;
 
 /// The name of builds in error messages.

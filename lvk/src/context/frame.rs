@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::Context;
 use crate::error::Result;
-use crate::submit::ownership::PerQueue;
+use crate::submit::last_access::PerQueue;
 
 /// A frame about to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::ownership::PerQueue;
+use super::last_access::PerQueue;
 use super::recording::Recording;
 use crate::error::Result;
 use crate::gpu::Gpu;

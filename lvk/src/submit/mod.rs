@@ -5,7 +5,7 @@ pub(crate) mod command_pool;
 pub(crate) mod deferred_free;
 pub(crate) mod emit_barriers;
 pub(crate) mod input_attachment_sets;
-pub(crate) mod ownership;
+pub(crate) mod last_access;
 #[cfg_attr(not(any(feature = "window", test)), expect(dead_code, reason = "only swapchains present"))]
 pub(crate) mod presentable;
 pub(crate) mod profiler;

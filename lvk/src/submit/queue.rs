@@ -8,7 +8,7 @@ use super::batches::Batches;
 use super::command_pool::{self, CommandRing, Ticket};
 use super::deferred_free::DeferredFree;
 use super::emit_barriers::{Images, LastBarrier, Side, emit, emit_ownership_transfers, vulkan_stages};
-use super::ownership::{PerQueue, QUEUE_COUNT, TimelineVector};
+use super::last_access::{PerQueue, QUEUE_COUNT, TimelineVector};
 use super::presentable::{AcquireWait, Presentables};
 use super::queue_sync::{OwnershipRelease, QueueCaps, QueueSync, SubmitPlan, SubmitRequest};
 use super::recording::{Recording, begin_commands, end_commands};

@@ -1,7 +1,7 @@
 //! Synchronisation of command buffers on several queues: the barriers, waits and ownership transfers before each. It
 //! decides only, and records no commands.
 
-use super::ownership::{Ownership, PerQueue, QUEUE_COUNT, QueueAccess, TimelineVector};
+use super::last_access::{Ownership, PerQueue, QUEUE_COUNT, QueueAccess, TimelineVector};
 use crate::barrier::{
     Barriers, Layout, QueueState, ResourceId, Stages, Subresources, TextureShape, TrackedUse, Tracker,
 };

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::ownership::QUEUE_COUNT;
+use super::last_access::QUEUE_COUNT;
 use super::queue_sync::{OwnershipTransfer, QueueCaps};
 use crate::barrier::model::{Cell, Edge, ModelEvent, Wait, edges, may_follow};
 use crate::barrier::{Layout, Stages, Use};

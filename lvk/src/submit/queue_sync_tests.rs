@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 
-use super::ownership::{QUEUE_COUNT, QueueAccess, TimelineVector};
+use super::last_access::{QUEUE_COUNT, QueueAccess, TimelineVector};
 use super::queue::stages_of;
 use super::queue_sync::{QueueCaps, QueueSync, SubmitRequest};
 use super::queue_sync_model::{History, SubmittedWork as Logged, external_stages, weaker};

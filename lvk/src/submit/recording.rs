@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::emit_barriers::Images;
 use super::input_attachment_sets::InputSets;
-use super::ownership::{QueueAccess, TimelineVector};
+use super::last_access::{QueueAccess, TimelineVector};
 use crate::barrier::{ResourceId, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

@@ -7,7 +7,7 @@ use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
 use crate::submit::emit_barriers::layout_from_vulkan;
-use crate::submit::ownership::QueueAccess;
+use crate::submit::last_access::QueueAccess;
 
 impl CommandBuffer {
     /// Transitions a whole texture to the layout that another engine expects, after everything recorded so far
