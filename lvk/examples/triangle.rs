@@ -17,8 +17,8 @@ const SHADER: &str = r"
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let ctx = Context::new(&ContextDesc::default())?;
-    let corners = [-0.7_f32, 0.6, 0.0, 0.7, 0.6, 0.0, 0.0, -0.7, 0.0].map(f32::to_ne_bytes);
-    let (usage, data) = (BufferUsage::ACCEL_INPUT, Some(corners.as_flattened()));
+    let positions = [-0.7_f32, 0.6, 0.0, 0.7, 0.6, 0.0, 0.0, -0.7, 0.0].map(f32::to_ne_bytes);
+    let (usage, data) = (BufferUsage::ACCEL_INPUT, Some(positions.as_flattened()));
     let vertices = ctx.create_buffer(&BufferDesc { usage, data, ..Default::default() })?;
     let geometries = &[BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
     let blas = ctx.create_blas(&BlasDesc { geometries, ..Default::default() })?;

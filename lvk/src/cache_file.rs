@@ -1,14 +1,14 @@
-//! Files that caches keep: read whole, replaced at once, told apart and checked by sums.
+//! Cache files: whole-file reads, atomic replacement, and checksums.
 
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Caches beyond this are taken for damage.
+/// Maximum size of a cache in bytes. A larger one is treated as damaged.
 pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
-/// FNV-1a with 64 bits: tells damage, not malice.
+/// Returns the 64-bit FNV-1a hash. It detects damage, but not tampering.
 pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
     const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
@@ -16,19 +16,21 @@ pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
     bytes.fold(BASIS, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(PRIME))
 }
 
-/// Reads a file; of one that is larger than it can be only the start, which is then refused as cut off.
+/// Reads a file. Of a file larger than `most_bytes`, only the start is read, which is then rejected as
+/// truncated.
 pub(crate) fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(most_bytes).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// Replaces a file at once: whoever reads it, or starts after a crash, finds the old bytes or the new ones.
+/// Replaces a file atomically. Concurrent readers, and processes after a crash, find either the old bytes or
+/// the new ones.
 pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let temporary = temporary_name(path)?;
     let written = write_temporary(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
     if written.is_err() {
-        // What failed first is reported; a leftover is harmless.
+        // The first error is reported; a leftover file is harmless.
         let _ = std::fs::remove_file(&temporary);
     }
     written
@@ -40,7 +42,7 @@ fn write_temporary(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
-/// A name in the same folder that no other context uses.
+/// Returns a name in the same folder that no other context uses.
 fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let Some(name) = path.file_name() else {
@@ -51,7 +53,8 @@ fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     Ok(path.with_file_name(name))
 }
 
-/// A checksum of eight bytes at a time: tells damage and other contents, not malice.
+/// Returns a checksum, computed eight bytes at a time. It detects damage and different contents, but not
+/// tampering.
 pub(crate) fn fingerprint(bytes: &[u8], seed: u64) -> u64 {
     const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
     let mix = |sum: u64, word: u64| {

@@ -35,58 +35,58 @@ use crate::upload::{BufferRecycler, Staging};
 
 /// The parts of a context below the command layer. Fields are dropped in this order, the device last.
 pub(crate) struct DeviceState {
-    /// What stands in bindless slots nobody owns.
+    /// The objects in bindless slots without an owner.
     pub(crate) default_objects: OnceLock<DefaultObjects>,
     pub(crate) store: Store,
     pub(crate) staging: Staging,
-    /// One for each queue, so that builds on one queue do not wait for those on another.
+    /// A scratch buffer for each queue, so that builds on one queue do not wait for those on another.
     pub(crate) scratch: [ScratchBuffer; 3],
     pub(crate) accel_storage: AccelStorage,
     pub(crate) kernels: Kernels,
-    /// Mapped buffers for lists of instances that are kept for a while.
+    /// Mapped buffers for lists of instances that outlive their command buffer.
     pub(crate) instance_buffers: BufferRecycler,
-    /// For each top-level structure where the rows of its instances lie; none without acceleration structures.
+    /// The addresses of the hit remap table and of the software TLAS of each TLAS; `None` without acceleration
+    /// structures.
     pub(crate) tlas_table: Option<Arc<Buffer>>,
     pub(crate) layout: PipelineLayout,
-    /// Where the context keeps compiled pipelines in a file.
+    /// The file of compiled pipelines, if the context keeps one.
     pub(crate) pipeline_cache: Option<PipelineCache>,
-    /// Where the context keeps SPIR-V that was compiled from GLSL.
+    /// The cache of SPIR-V that was compiled from GLSL, if the context keeps one.
     pub(crate) shader_cache: Option<ShaderCache>,
     pub(crate) bindless: Bindless,
-    /// Where the context keeps trees that the CPU has built.
+    /// The cache of BVHs that the CPU has built, if the context keeps one.
     #[cfg(feature = "software-ray-query")]
     pub(crate) tree_cache: Option<crate::software_ray_query::bvh_cache::BvhCache>,
     pub(crate) submitter: Submitter<DeferredObject>,
     pub(crate) profiler: Profiler,
-    /// Where graphics pipelines query rays.
+    /// The stages in which graphics pipelines query rays.
     pub(crate) graphics_queries: RayQueryStages,
-    /// Stands for every bottom-level structure at once: their builds add to it; builds of top levels, traces and
-    /// queries read it.
+    /// A pseudo-resource for all BLAS: builds of BLAS write it; builds of TLAS, traces and ray queries read it.
     pub(crate) all_blas: ResourceId,
-    /// As `all_blas`, for first builds of structures that nothing shows yet: only what comes later on the same queue is kept
-    /// behind them. Other queues wait for the structures they name.
+    /// As `all_blas`, for first builds of BLAS that no TLAS references yet. Only later commands on the same queue wait
+    /// for them. Other queues wait for the BLAS that they name.
     pub(crate) new_blas: [ResourceId; 3],
-    /// Stands for every top-level structure at once: their builds add to it, traces and queries read it.
+    /// A pseudo-resource for all TLAS: their builds write it; traces and ray queries read it.
     pub(crate) all_tlas: ResourceId,
-    /// Stands for the table of top-level structures and all rows.
+    /// A pseudo-resource for the TLAS table and all hit remap tables.
     pub(crate) hit_tables_id: ResourceId,
-    /// Some top-level structure shows what compaction has replaced.
+    /// True if a TLAS references acceleration structures that compaction has replaced.
     pub(crate) outdated_tlas: AtomicBool,
-    /// How often a bottom-level structure has moved.
+    /// Number of moves of BLAS so far.
     pub(crate) blas_moves: AtomicU64,
-    /// Slots of top-level structures that are gone, where the table still says what software traced.
+    /// Slots of destroyed TLAS whose entry in the TLAS table still has the address of the software TLAS.
     pub(crate) freed_tlas_slots: Mutex<Vec<u32>>,
     pub(crate) gpu: Arc<Gpu>,
 }
 
-/// Objects behind the dummy slots.
+/// The objects behind default descriptors.
 pub(crate) struct DefaultObjects {
     pub(crate) _textures: Vec<Arc<Texture>>,
     pub(crate) _sampler: Sampler,
     pub(crate) _tlas: Option<Arc<AccelStruct>>,
 }
 
-/// An object that waits until the GPU is done with it.
+/// An object that is freed once the GPU is done with it.
 pub(crate) enum DeferredObject {
     Buffer(Arc<Buffer>),
     Texture(Arc<Texture>),
@@ -100,32 +100,34 @@ pub(crate) enum DeferredObject {
     Swapchain(
         #[expect(dead_code, reason = "held only to be dropped")] Arc<crate::swapchain::state::Swapchain>,
     ),
-    /// What a top-level structure showed; handles of it may still be in use.
+    /// The previous contents of a TLAS. Handles of the BLAS in it may still be in use.
     TlasContents(Box<TlasContents>),
-    /// What a compacted structure took the place of, or what took its place.
+    /// The acceleration structures before or after a compaction, which a command buffer copies.
     BlasStorage(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasStructures>),
-    /// A buffer that a command buffer uses, whoever else holds it: its owner may fail to come into being.
+    /// A reference to a buffer that a command buffer uses. There may be other references; the creation of its owner may
+    /// fail.
     BufferRef(Arc<Buffer>),
-    /// As [`BufferRef`](Self::BufferRef), one of those who [share](crate::resource::image::Image::add_texture) the image.
+    /// As [`BufferRef`](Self::BufferRef), for one of the textures that
+    /// [share](crate::resource::image::Image::add_texture) an image.
     TextureRef(Arc<Texture>),
-    /// A structure of the library's own that a command buffer fills, whoever else holds it.
+    /// A reference to the storage of a software BVH that a command buffer fills. There may be other references.
     #[cfg(feature = "software-ray-query")]
     SoftwareStorage(
         #[expect(dead_code, reason = "held only to be dropped")]
         Arc<crate::software_ray_query::storage::SoftwareAccelStorage>,
     ),
-    /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
+    /// A query of compacted sizes, whose results may be there before the GPU is done with its command buffer.
     SizeQuery(#[expect(dead_code, reason = "held only to be dropped")] Arc<CompactedSizeQuery>),
 }
 
 impl DeviceState {
-    /// What pipelines are made with.
+    /// Returns the layout and the cache for new pipelines.
     pub(crate) fn pipeline_base(&self) -> PipelineBase {
         let cache = self.pipeline_cache.as_ref().map_or(vk::PipelineCache::null(), |cache| cache.raw);
         PipelineBase { layout: self.layout.raw, cache }
     }
 
-    /// Destroys an object later, once no command buffer can use it.
+    /// Destroys an object once no command buffer can use it.
     pub(crate) fn free_later(&self, garbage: DeferredObject) {
         const COLLECT_INTERVAL: usize = 256;
         self.mark_slot_retired(&garbage);
@@ -137,11 +139,11 @@ impl DeviceState {
         }
     }
 
-    /// The slot of the object may be reached no longer by what is recorded from now on.
+    /// Marks the bindless slot of an object as invalid for commands recorded from now on.
     fn mark_slot_retired(&self, garbage: &DeferredObject) {
         let newest = || self.submitter.newest_sequence();
         match garbage {
-            // Indices of textures in Y'CbCr are constants, which nobody checks.
+            // Indices of Y'CbCr textures are constants, which the index checks do not cover.
             DeferredObject::Texture(texture) if texture.is_yuv() => {}
             DeferredObject::Texture(texture) => {
                 self.bindless.record_retired(&TEXTURE_ARRAYS, texture.slot, newest)
@@ -158,7 +160,7 @@ impl DeviceState {
         }
     }
 
-    /// Takes a bindless slot; where none is free, takes back what the GPU has finished with and tries again.
+    /// Reserves a bindless slot. If none is free, frees what the GPU has finished with and tries again.
     pub(crate) fn reserve_slot(&self, slot: impl Fn() -> Result<u32>) -> Result<u32> {
         slot().or_else(|_| {
             self.collect()?;
@@ -166,12 +168,12 @@ impl DeviceState {
         })
     }
 
-    /// Takes back what the GPU has finished with.
+    /// Frees the objects and the staging memory that the GPU has finished with.
     pub(crate) fn collect(&self) -> Result<()> {
         self.release_finished(self.submitter.collect()?)
     }
 
-    /// The same, as far as is known without asking the GPU: for who has just waited.
+    /// As [`collect`](Self::collect), without asking the GPU for its progress. For callers that have just waited.
     pub(crate) fn collect_known(&self) -> Result<()> {
         self.release_finished(self.submitter.collect_known())
     }
@@ -182,7 +184,7 @@ impl DeviceState {
         self.profiler.collect(finished.passed)
     }
 
-    /// Drops an object the GPU is done with, and frees its slot.
+    /// Drops an object that the GPU is done with, and frees its slot.
     pub(crate) fn free_now(&self, garbage: DeferredObject) {
         match garbage {
             DeferredObject::Buffer(buffer) => self.submitter.forget(buffer.id),
@@ -222,7 +224,7 @@ impl DeviceState {
         }
     }
 
-    /// Takes every object out that is still alive and reports it by name.
+    /// Removes every object that is still alive, and reports the objects by name.
     fn free_leaked_objects(&mut self) {
         if let Some(report) = leak_report::leak_report(&self.store.live()) {
             log::warn!("{report}");
@@ -234,7 +236,7 @@ impl DeviceState {
         self.submitter.forget(object.id);
         match &object.kind {
             AccelKind::Tlas(tlas) => {
-                // Before somebody else may take the slot.
+                // The entry is queued before another TLAS can take the slot.
                 tlas.software.iter().for_each(|_| self.freed_tlas_slots().push(tlas.slot));
                 self.bindless.free_tlas(tlas.slot);
                 tlas.records.get().into_iter().for_each(|buffer| self.submitter.forget(buffer.id));
@@ -250,14 +252,14 @@ impl DeviceState {
         }
     }
 
-    /// Slots whose entry in the table is to be emptied before anything else is submitted.
+    /// Returns the slots whose entries in the TLAS table must be cleared before the next submission.
     pub(crate) fn freed_tlas_slots(&self) -> Guard<'_, Vec<u32>> {
         self.freed_tlas_slots.lock()
     }
 
-    /// A source that was kept lies in buffers of the library's own; the next one may have the mapped one.
+    /// Frees the buffers of a kept instance source, and recycles the mapped one.
     fn recycle_instance_source(&self, contents: TlasContents) {
-        // Contents written again share the source.
+        // Rewritten contents share the source.
         let Some(source) = contents.source.and_then(Arc::into_inner) else { return };
         let bytes = [Some(source.instances), source.owners];
         for buffer in bytes.into_iter().flatten().filter_map(|bytes| bytes.buffer) {
@@ -266,7 +268,7 @@ impl DeviceState {
         }
     }
 
-    /// What updates say is submitted; `note` is told of each structure.
+    /// Applies TLAS updates that are submitted. Calls `note` with each TLAS.
     pub(crate) fn apply_tlas_updates(
         &self,
         updates: &mut TlasTrackers,
@@ -283,34 +285,34 @@ impl DeviceState {
             .for_each(|contents| self.free_later(DeferredObject::TlasContents(Box::new(contents))));
     }
 
-    /// References the BLAS that a handle names.
+    /// Returns a reference to the BLAS with this handle.
     pub(crate) fn blas_ref(&self, handle: AccelStructHandle) -> Result<BlasRef> {
         self.store.accel_structs.get(handle)?.blas_ref(handle)
     }
 
-    /// Rises with every structure that is destroyed or moves.
+    /// Returns the generation of acceleration structures, which changes if one is destroyed or moves.
     #[inline]
     pub(crate) fn accel_generation(&self) -> AccelGeneration {
         AccelGeneration { removals: self.store.accel_structs.removals(), moves: self.blas_moves() }
     }
 
-    /// How often a bottom-level structure has moved.
+    /// Returns the number of moves of BLAS so far.
     #[inline]
     pub(crate) fn blas_moves(&self) -> u64 {
         self.blas_moves.load(Ordering::Acquire)
     }
 
-    /// A bottom-level structure has moved.
+    /// Counts the move of a BLAS.
     pub(crate) fn count_blas_move(&self) {
         self.blas_moves.fetch_add(1, Ordering::Release);
     }
 
-    /// Some top-level structure shows what compaction has replaced.
+    /// Records that a TLAS references acceleration structures that compaction has replaced.
     pub(crate) fn mark_tlas_outdated(&self) {
         self.outdated_tlas.store(true, Ordering::Release);
     }
 
-    /// Whether that was noted since this was last asked.
+    /// Returns true if a TLAS was marked as outdated since the last call.
     pub(crate) fn take_tlas_outdated(&self) -> bool {
         self.outdated_tlas.load(Ordering::Relaxed) && self.outdated_tlas.swap(false, Ordering::AcqRel)
     }
@@ -320,7 +322,7 @@ impl Drop for DeviceState {
     fn drop(&mut self) {
         // SAFETY: no command buffer is being recorded or submitted: each holds a reference to `self`.
         if let Err(result) = unsafe { self.gpu.device.device_wait_idle() } {
-            log::error!("vkDeviceWaitIdle answered {result} at the end of a context");
+            log::error!("vkDeviceWaitIdle returned {result} at the end of a context");
         }
         drop(self.submitter.drain());
         self.free_leaked_objects();

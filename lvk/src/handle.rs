@@ -6,10 +6,10 @@ mod sealed {
     pub trait Sealed {}
 }
 
-/// A handle: a typed, generational, 64-bit key. `Copy`, and harmless when stale or when it belongs to another
-/// context: using it is an [`Error::StaleHandle`](crate::Error::StaleHandle).
+/// A handle: a typed, generational, 64-bit key. It is `Copy`. Use of a handle that is stale or belongs to
+/// another context is safe and returns [`Error::StaleHandle`](crate::Error::StaleHandle).
 pub trait Handle: sealed::Sealed + Copy + Eq + fmt::Debug + Send + Sync + 'static {
-    /// Which kind of object the handle names, as error messages say it.
+    /// Kind of the object, as error messages name it.
     const KIND: &'static str;
 
     #[doc(hidden)]

@@ -1,4 +1,4 @@
-//! Objects that a command buffer has found so far, to find them again without the pool's lock.
+//! A cache of the objects that a command buffer uses, to find them again without the pool's lock.
 
 use std::sync::Arc;
 
@@ -7,25 +7,27 @@ use crate::error::Result;
 use crate::handle::Handle;
 use crate::pool::HandlePool;
 
-/// Every object that a command buffer has used, once, in a row of its own. Commands name rows, and count no references.
+/// The objects that a command buffer has used, each once. Commands name an object by its index, and count no
+/// references.
 ///
-/// Nothing is found here by its handle that the pool would not find: once anything was taken out of the pool, all handles are
-/// forgotten. The objects are not. `PLACES`, a power of two, says how many are kept in reach.
+/// A lookup by handle returns no object that the pool would not return: if an object was removed from the pool, the
+/// cache drops all handles. It keeps the objects. `PLACES`, a power of two, is the number of handles it keeps.
 pub(crate) struct HandleCache<H, T, const PLACES: usize = 8> {
     objects: Vec<Arc<T>>,
-    /// Rows by where the object lies, which no other one does while it is held; where they are more than a few.
+    /// Indices by the address of the object, which is unique while the object is held. Empty while there are few
+    /// objects.
     index_by_object: IdMap<usize>,
-    /// Rows of the last handles, each at a place that follows from the handle.
+    /// Indices of recent handles, each in a slot that follows from the handle.
     recent: [Option<(H, usize)>; PLACES],
-    /// How many objects had been taken out of the pool when the first of these was found.
+    /// Number of removals from the pool when the first of `recent` was found.
     removals: u64,
 }
 
 impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
-    /// So many are searched one by one, which is faster than a map.
+    /// Up to this many objects are searched linearly, which is faster than a map.
     const LINEAR_SEARCH_MAX: usize = 16;
 
-    /// The row of the object of a handle.
+    /// Returns the index of the object of a handle.
     #[inline]
     pub(crate) fn index_of_handle(&mut self, pool: &HandlePool<H, T>, handle: H) -> Result<usize> {
         match self.recent[Self::cache_slot(handle)] {
@@ -34,7 +36,7 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
         }
     }
 
-    /// Finds by the pool.
+    /// Looks the handle up in the pool.
     #[inline(never)]
     fn find_in_pool(&mut self, pool: &HandlePool<H, T>, handle: H) -> Result<usize> {
         let removals = pool.removals();
@@ -48,7 +50,7 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
         Ok(index)
     }
 
-    /// The row of an object.
+    /// Returns the index of an object, which is added if it is new.
     pub(crate) fn index_of(&mut self, object: &Arc<T>) -> usize {
         self.known_index(object).unwrap_or_else(|| self.push(Arc::clone(object)))
     }
@@ -72,12 +74,12 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
         self.objects.len() - 1
     }
 
-    /// Handles of one pool differ most in their low bits, which count objects.
+    /// Returns the slot of a handle. Handles of one pool differ most in their low bits, which count objects.
     fn cache_slot(handle: H) -> usize {
         handle.bits() as usize % PLACES
     }
 
-    /// Forgets everything; keeps the memory.
+    /// Clears everything and keeps the memory.
     pub(crate) fn clear(&mut self) {
         if !self.objects.is_empty() {
             self.objects.clear();
@@ -86,18 +88,18 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
         }
     }
 
-    /// How many there are.
+    /// Returns the number of objects.
     #[inline]
     pub(crate) fn len(&self) -> usize {
         self.objects.len()
     }
 
-    /// The objects of this row and those behind it.
-    pub(crate) fn from_index(&self, index: usize) -> &[Arc<T>] {
+    /// Returns the objects from `index` on.
+    pub(crate) fn objects_from(&self, index: usize) -> &[Arc<T>] {
         &self.objects[index..]
     }
 
-    /// The object of a row.
+    /// Returns the object at `index`.
     #[inline]
     pub(crate) fn object(&self, index: usize) -> &Arc<T> {
         &self.objects[index]
@@ -110,7 +112,7 @@ impl<H: Copy, T, const PLACES: usize> Default for HandleCache<H, T, PLACES> {
     }
 }
 
-/// Where an object lies names it, as long as it is held.
+/// Returns the address of an object as its id, which is unique while the object is held.
 fn pointer_id<T>(object: &Arc<T>) -> ResourceId {
     ResourceId(Arc::as_ptr(object) as u64)
 }
@@ -123,7 +125,8 @@ mod tests {
     use crate::handle::BufferHandle;
 
     proptest! {
-        /// More objects than places, and handles whose objects are gone, also those whose place was taken again.
+        /// With more objects than slots, and with handles whose objects were removed, also if their place in the pool
+        /// was reused.
         #[test]
         fn whatever_the_pool_finds_is_found_and_nothing_else(
             steps in prop::collection::vec((0..3_u8, any::<prop::sample::Index>()), 1..120)

@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use crate::store::LiveObject;
 
-/// Names said of each kind; of more only the number.
+/// Most names listed of each kind; the report has only the number of others.
 const MAX_NAMES: usize = 20;
 
-/// One line a kind, with the names in order, each with how often it occurs; `None` where nothing is alive.
+/// Returns a report with one line a kind: the names in order, each with how often it occurs. `None` if no object is
+/// alive.
 pub(crate) fn leak_report(live: &[LiveObject]) -> Option<String> {
     if live.is_empty() {
         return None;

@@ -1,21 +1,21 @@
-//! Work that threads share. The system may give fewer than are asked for: then those that there are do all of it.
+//! Parallel work on threads. If the system refuses some of the threads, the others do all of the work.
 
 use std::num::NonZero;
 use std::thread::{Builder, available_parallelism, scope};
 
 use crate::lock_order::{HeldLocks, Mutex, Rank};
 
-/// Threads that are worth having for work of any number of pieces.
+/// Returns the number of threads that is useful for work of any size.
 pub(crate) fn core_count() -> usize {
     available_parallelism().map_or(1, NonZero::get)
 }
 
-/// Has so many threads do the same, this one among them, or as many of them as the system gives.
+/// Runs `work` on `threads` threads, including the current one. Fewer if the system refuses some.
 pub(crate) fn run_on_threads(threads: usize, work: impl Fn() + Sync) {
     run_on_built_threads(threads, || Builder::new().name("lvk".to_owned()), work);
 }
 
-/// The others are made as `thread` says.
+/// As [`run_on_threads`], with a thread builder from `thread`.
 fn run_on_built_threads(threads: usize, thread: impl Fn() -> Builder, work: impl Fn() + Sync) {
     let waiting = HeldLocks::of_current_thread();
     scope(|scope| {
@@ -28,7 +28,8 @@ fn run_on_built_threads(threads: usize, thread: impl Fn() -> Builder, work: impl
     });
 }
 
-/// Has so many threads work on the items until none is left. Who is done takes the next, as items take very different times.
+/// Processes the items on `threads` threads. Each thread takes the next item when it is done, because items
+/// take very different times.
 pub(crate) fn parallel_for<T: Send>(
     threads: usize,
     items: impl Iterator<Item = T> + Send,
@@ -43,7 +44,7 @@ pub(crate) fn parallel_for<T: Send>(
     });
 }
 
-/// What `make` makes of each item, in their order, on all cores.
+/// Maps the items with `make` on all cores, and returns the results in order.
 pub(crate) fn parallel_map<T: Sync, R: Send>(items: &[T], make: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let mut made: Vec<Option<R>> = items.iter().map(|_| None).collect();
     let places = items.iter().zip(&mut made);

@@ -1,4 +1,4 @@
-//! The pool of one kind of objects: handle to object, or [`Error::StaleHandle`].
+//! The pool of one kind of object: maps a handle to its object, or to [`Error::StaleHandle`].
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -10,12 +10,13 @@ use crate::error::{Error, Result};
 use crate::handle::Handle;
 use crate::lock_order::{Rank, RwLock};
 
-/// Objects of one kind.
+/// Objects of one kind, by handle.
 ///
-/// Keys leave the pool combined with a mask of the context, so that a handle of another context finds nothing.
+/// A handle is a key combined with a mask of the context, so that the pool has no object for a handle of another
+/// context.
 pub(crate) struct HandlePool<H, T> {
     objects: RwLock<SlotMap<DefaultKey, Arc<T>>>,
-    /// How many objects were taken out. While it stays the same, whatever was found is still there.
+    /// Number of objects removed so far. While it stays the same, every object found before is still in the pool.
     removals: AtomicU64,
     mask: u64,
     handle: PhantomData<fn() -> H>,
@@ -44,19 +45,19 @@ impl<H: Handle, T> HandlePool<H, T> {
         Ok(object)
     }
 
-    /// Rises whenever an object is taken out.
+    /// Returns the number of objects removed so far.
     #[inline]
     pub(crate) fn removals(&self) -> u64 {
         self.removals.load(Ordering::Acquire)
     }
 
-    /// Everything there is.
+    /// Returns every object.
     pub(crate) fn all_objects(&self) -> Vec<Arc<T>> {
         let objects = self.objects.read();
         objects.values().cloned().collect()
     }
 
-    /// Takes everything out.
+    /// Removes and returns every object.
     pub(crate) fn drain(&self) -> Vec<Arc<T>> {
         let mut objects = self.objects.write();
         objects.drain().map(|(_, object)| object).collect()
@@ -67,7 +68,7 @@ impl<H: Handle, T> HandlePool<H, T> {
     }
 }
 
-/// A different mask for each context of the process: odd multiples spread over all bits.
+/// Returns a different mask for each context of the process: multiples of an odd number, spread over all bits.
 pub(crate) fn next_context_mask() -> u64 {
     static CONTEXTS: AtomicU64 = AtomicU64::new(1);
     CONTEXTS.fetch_add(1, Ordering::Relaxed).wrapping_mul(0x9e37_79b9_7f4a_7c15)

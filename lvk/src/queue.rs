@@ -1,28 +1,30 @@
 //! The three queues that command buffers run on.
 
-/// Where command buffers run. All three exist on every device and refuse the same commands everywhere, but for what
-/// [`QueueInfo`](crate::QueueInfo) says of timestamps and copies; those without hardware of their own share it.
+/// The queue that a command buffer runs on. All three queues exist on every device. Each refuses the same
+/// commands everywhere, except that [`QueueInfo`](crate::QueueInfo) limits timestamps and copies. Queues
+/// without hardware of their own share a Vulkan queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Queue {
-    /// Takes every command, and shows pictures in windows. Uploads run here.
+    /// Supports every command, and presents to windows. Uploads run here.
     #[default]
     Graphics,
-    /// Takes dispatches, traces, builds of acceleration structures, clears of colours, and copies: beside what is drawn.
+    /// Supports dispatches, traces, builds of acceleration structures, clears of colours, and copies,
+    /// concurrently with graphics.
     Compute,
-    /// Takes copies, fills and updates of buffers, beside everything else.
+    /// Supports copies, fills and updates of buffers, concurrently with the other queues.
     Transfer,
 }
 
 impl Queue {
-    /// All of them.
+    /// All queues.
     pub const ALL: [Self; 3] = [Self::Graphics, Self::Compute, Self::Transfer];
 
-    /// Its place in [`ALL`](Self::ALL).
+    /// Returns the index in [`ALL`](Self::ALL).
     pub(crate) fn index(self) -> usize {
         self as usize
     }
 
-    /// As messages say it.
+    /// Returns the name for messages.
     pub(crate) fn label(self) -> &'static str {
         match self {
             Self::Graphics => "graphics",

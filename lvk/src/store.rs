@@ -11,12 +11,12 @@ use crate::pipeline::{ComputePipeline, RayTracingLibrary, RayTracingPipeline, Re
 use crate::pool::{HandlePool, next_context_mask};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 
-/// Makes the store from one list: each pool with its handles and objects.
+/// Defines the store from one list: each pool with its handles and objects.
 macro_rules! pools {
     ($($(#[$attribute:meta])* $pool:ident: $handle:ty => $object:ty;)*) => {
         /// Every object of a context, by handle.
         pub(crate) struct Store {
-            /// A number no other context of the process has.
+            /// A number that is unique among the contexts of the process.
             pub(crate) context_id: u64,
             $($(#[$attribute])* pub(crate) $pool: HandlePool<$handle, $object>,)*
         }
@@ -30,12 +30,12 @@ macro_rules! pools {
                 }
             }
 
-            /// Every object, kind by kind.
+            /// Returns every object, kind by kind.
             pub(crate) fn live(&self) -> Vec<LiveObject> {
                 [$($(#[$attribute])* live(&self.$pool),)*].concat()
             }
 
-            /// Takes every object out.
+            /// Removes every object.
             pub(crate) fn drain(&self) {
                 $($(#[$attribute])* self.$pool.drain();)*
             }
@@ -67,7 +67,7 @@ pools! {
 /// An object that has a handle.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct LiveObject {
-    /// Which kind of object, in the words of error messages: `buffer`, `render pipeline` and so on.
+    /// Kind of the object, in the words of error messages: `buffer`, `render pipeline` and so on.
     pub kind: &'static str,
     /// Its debug name.
     pub name: String,
@@ -78,7 +78,7 @@ trait Named {
     fn name(&self) -> &str;
 }
 
-/// Lists every object of a pool.
+/// Returns every object of a pool.
 fn live<H: Handle, T: Named>(pool: &HandlePool<H, T>) -> Vec<LiveObject> {
     let describe = |object: &Arc<T>| LiveObject { kind: H::KIND, name: object.name().to_owned() };
     pool.all_objects().iter().map(describe).collect()

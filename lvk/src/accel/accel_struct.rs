@@ -25,6 +25,7 @@ pub(crate) struct AccelStruct {
 }
 
 /// Data of a BLAS or of a TLAS.
+#[expect(clippy::large_enum_variant, reason = "an update of a TLAS reads it without one more pointer")]
 pub(crate) enum AccelKind {
     /// A bottom-level acceleration structure.
     Blas(Arc<Blas>),

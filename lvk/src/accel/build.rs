@@ -41,7 +41,7 @@ impl BuildInput {
                 (Some(_), Some(start)) => start + index as u64 * TRANSFORM_BYTES,
                 _ => 0,
             };
-            converted.push(geometry.to_vulkan(gpu, name, find, matrix)?);
+            converted.push(geometry.convert(gpu, name, find, matrix)?);
         }
         Ok(Self::new(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &converted))
     }

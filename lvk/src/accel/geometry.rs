@@ -186,7 +186,7 @@ impl BlasGeometry {
     }
 
     /// Checks and converts the geometry. `matrix` is the address of a transform matrix given by value, else 0.
-    pub(crate) fn to_vulkan(
+    pub(crate) fn convert(
         &self,
         gpu: &Gpu,
         name: &str,

@@ -226,7 +226,7 @@ impl TlasTrackers {
     /// Fails if a recorded refit no longer matches the submitted contents.
     pub(crate) fn check(&self) -> Result<()> {
         self.cache
-            .from_index(0)
+            .objects_from(0)
             .iter()
             .zip(&self.trackers)
             .try_for_each(|(target, update)| update.check(target))
@@ -236,7 +236,7 @@ impl TlasTrackers {
     pub(crate) fn with_unexpected_hit_table(&self) -> impl Iterator<Item = &Tlas> {
         let relying = self
             .cache
-            .from_index(0)
+            .objects_from(0)
             .iter()
             .zip(&self.trackers)
             .filter(|(_, update)| update.expects_no_hit_table);
@@ -247,7 +247,7 @@ impl TlasTrackers {
 
     /// Sets the contents of all updated TLAS. Calls `before` with each TLAS and its new contents.
     pub(crate) fn apply(&mut self, mut before: impl FnMut(&Arc<AccelStruct>, &TlasContents)) {
-        for (target, update) in self.cache.from_index(0).iter().zip(&mut self.trackers) {
+        for (target, update) in self.cache.objects_from(0).iter().zip(&mut self.trackers) {
             if let (Ok(tlas), true, Some(contents)) = (target.tlas(), update.is_recorded, &update.contents) {
                 before(target, contents);
                 self.replaced.extend(update.apply(tlas));

@@ -1,16 +1,16 @@
-//! How a command touches a resource: pipeline stages, kinds of memory access and the image layout it asks for.
+//! Uses of a resource by a command: pipeline stages, kinds of memory access and the required image layout.
 
 use bitflags::bitflags;
 
 bitflags! {
-    /// Groups of Vulkan pipeline stages, as coarse as hazards of this library need them.
+    /// Groups of Vulkan pipeline stages, as coarse as the library's hazards allow.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
     pub(crate) struct Stages: u16 {
         /// Reads and writes through a mapped pointer.
         const HOST = 1 << 0;
         /// Copies, blits, clears, fills and resolves.
         const TRANSFER = 1 << 1;
-        /// Fetch of indirect parameters, of draws, dispatches and traces.
+        /// Fetch of indirect parameters of draws, dispatches and traces.
         const DRAW_INDIRECT = 1 << 2;
         /// Index and vertex fetch.
         const VERTEX_INPUT = 1 << 3;
@@ -47,9 +47,9 @@ bitflags! {
         const INDEX_READ = 1 << 1;
         /// Vertex attributes.
         const VERTEX_READ = 1 << 2;
-        /// Sampled and storage reads of shaders; input geometry of acceleration structure builds.
+        /// Sampled and storage reads by shaders, and input geometry of acceleration structure builds.
         const SHADER_READ = 1 << 3;
-        /// Storage writes of shaders.
+        /// Storage writes by shaders.
         const SHADER_WRITE = 1 << 4;
         /// Load, blend and logic operations.
         const COLOR_READ = 1 << 5;
@@ -63,17 +63,17 @@ bitflags! {
         const TRANSFER_READ = 1 << 9;
         /// Destination of a copy, fill or clear.
         const TRANSFER_WRITE = 1 << 10;
-        /// Traversal, and structures a build reads.
+        /// Traversal, and acceleration structures that a build reads.
         const ACCEL_READ = 1 << 11;
-        /// Structures a build writes, and its scratch memory.
+        /// Acceleration structures that a build writes, and its scratch memory.
         const ACCEL_WRITE = 1 << 12;
         /// Reads through a mapped pointer.
         const HOST_READ = 1 << 13;
         /// Writes through a mapped pointer.
         const HOST_WRITE = 1 << 14;
-        /// Attachments of the pass as fragment shaders read them.
+        /// Input attachment reads by fragment shaders.
         const INPUT_READ = 1 << 15;
-        /// Shading rates of an attachment.
+        /// Shading rates read from an attachment.
         const SHADING_RATE_READ = 1 << 16;
 
         /// Every access that changes memory.
@@ -83,10 +83,10 @@ bitflags! {
 }
 
 impl Stages {
-    /// How many single stages there are.
+    /// Number of single stages.
     pub(crate) const COUNT: usize = 12;
 
-    /// The accesses that a single stage can perform; Vulkan forbids masks that name any other.
+    /// Returns the accesses that a single stage can perform. Vulkan forbids masks with any other access.
     pub(crate) const fn possible_access(self) -> Access {
         const SHADER: Access = Access::SHADER_READ.union(Access::SHADER_WRITE).union(Access::ACCEL_READ);
         const ACCEL: Access = Access::SHADER_READ
@@ -110,18 +110,18 @@ impl Stages {
         }
     }
 
-    /// The accesses that any of these stages can perform.
+    /// Returns the accesses that any of these stages can perform.
     pub(crate) fn possible_accesses(self) -> Access {
         self.indices().fold(Access::empty(), |all, row| all | POSSIBLE[row])
     }
 
-    /// Position of a single stage in a table of [`Stages::COUNT`] rows.
+    /// Returns the index of a single stage in a table of [`Stages::COUNT`] entries.
     #[cfg(test)]
     fn index(self) -> usize {
         (self.bits().trailing_zeros() as usize).min(Self::COUNT - 1)
     }
 
-    /// The rows of all of them, in rising order.
+    /// Returns the table indices of all these stages, in ascending order.
     fn indices(self) -> impl Iterator<Item = usize> {
         let mut left = self.bits();
         std::iter::from_fn(move || {
@@ -132,7 +132,7 @@ impl Stages {
     }
 }
 
-/// What each single stage can perform, by its row.
+/// Possible accesses of each single stage, by its index.
 const POSSIBLE: [Access; Stages::COUNT] = {
     let mut possible = [Access::empty(); Stages::COUNT];
     let mut row = 0;
@@ -146,12 +146,12 @@ const POSSIBLE: [Access; Stages::COUNT] = {
 /// Image layouts that the library uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub(crate) enum Layout {
-    /// Contents are unknown; also stands for "no layout" where the resource is a buffer.
+    /// Contents are unknown. Also means "no layout" for buffers.
     #[default]
     Undefined,
-    /// Storage images, and images that are read and written at once.
+    /// Storage images, and images that one command both reads and writes.
     General,
-    /// Sampled images, and depth targets that are only tested: both at once too.
+    /// Sampled images, and depth targets that are only tested, also both at the same time.
     ShaderRead,
     /// Color attachment.
     ColorTarget,
@@ -161,22 +161,22 @@ pub(crate) enum Layout {
     TransferSrc,
     /// Destination of a copy, blit or clear.
     TransferDst,
-    /// With the presentation engine.
+    /// Owned by the presentation engine.
     Present,
     /// Attachment that fragment shaders of the same pass read.
     LocalRead,
-    /// Shading rates of a pass.
+    /// Shading rate attachment of a pass.
     ShadingRate,
 }
 
-/// One way in which a command touches a resource.
+/// One use of a resource by a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Use {
-    /// Where in the pipeline.
+    /// Pipeline stages.
     pub(crate) stages: Stages,
-    /// What is done to the memory; each stage performs those that it can.
+    /// Memory accesses. Each stage performs those that it supports.
     pub(crate) access: Access,
-    /// The layout an image must have; buffers have none.
+    /// Required image layout; `Undefined` for buffers.
     pub(crate) layout: Layout,
 }
 
@@ -200,7 +200,7 @@ impl Use {
         Self::new(stages, Access::SHADER_READ, Layout::ShaderRead)
     }
 
-    /// Storage image or buffer that shaders of `stages` read and write.
+    /// Storage image or buffer that shaders in `stages` read and write.
     pub(crate) const fn shader_write(stages: Stages) -> Self {
         Self::new(stages, Access::SHADER_READ.union(Access::SHADER_WRITE), Layout::General)
     }
@@ -220,7 +220,7 @@ impl Use {
         Self::new(Stages::DRAW_INDIRECT, Access::INDIRECT_READ, Layout::Undefined)
     }
 
-    /// Color attachment; `load` when earlier contents are loaded or blended with.
+    /// Color attachment. `load` is true if earlier contents are loaded or blended with.
     pub(crate) const fn color_target(load: bool) -> Self {
         let read = if load { Access::COLOR_READ } else { Access::empty() };
         Self::new(Stages::COLOR, Access::COLOR_WRITE.union(read), Layout::ColorTarget)
@@ -231,7 +231,7 @@ impl Use {
         Self::new(Stages::DEPTH, Access::DEPTH_READ.union(Access::DEPTH_WRITE), Layout::DepthTarget)
     }
 
-    /// Depth attachment that is tested and not written; merges with a sampled image.
+    /// Depth attachment that is tested and not written. It merges with a use as sampled image.
     pub(crate) const fn depth_read() -> Self {
         Self::new(Stages::DEPTH, Access::DEPTH_READ, Layout::ShaderRead)
     }
@@ -241,12 +241,12 @@ impl Use {
         Self::new(Stages::ACCEL_BUILD, Access::ACCEL_READ.union(Access::ACCEL_WRITE), Layout::Undefined)
     }
 
-    /// Buffer that a structure is written to as bytes.
+    /// Buffer that an acceleration structure is serialised to.
     pub(crate) const fn accel_to_memory() -> Self {
         Self::new(Stages::ACCEL_BUILD, Access::TRANSFER_WRITE, Layout::Undefined)
     }
 
-    /// Buffer that a structure is read from as bytes.
+    /// Buffer that an acceleration structure is deserialised from.
     pub(crate) const fn accel_from_memory() -> Self {
         Self::new(Stages::ACCEL_BUILD, Access::TRANSFER_READ, Layout::Undefined)
     }
@@ -256,22 +256,23 @@ impl Use {
         Self::new(Stages::ACCEL_BUILD, Access::SHADER_READ, Layout::Undefined)
     }
 
-    /// Acceleration structure that `stages` traverse, or that a build in [`Stages::ACCEL_BUILD`] refers to.
+    /// Acceleration structure that `stages` traverse, or that a build in [`Stages::ACCEL_BUILD`] references.
     pub(crate) const fn accel_read(stages: Stages) -> Self {
         Self::new(stages, Access::ACCEL_READ, Layout::Undefined)
     }
 
-    /// Structures that shaders of `stages` walk themselves, or have walked for them.
+    /// Acceleration structures that shaders in `stages` traverse in software, or by hardware queries on their
+    /// behalf.
     pub(crate) const fn software_traversal(stages: Stages) -> Self {
         Self::new(stages, Access::ACCEL_READ.union(Access::SHADER_READ), Layout::Undefined)
     }
 
-    /// Reads through a mapped pointer once the GPU is done.
+    /// Reads through a mapped pointer after the GPU is done.
     pub(crate) const fn host_read() -> Self {
         Self::new(Stages::HOST, Access::HOST_READ, Layout::General)
     }
 
-    /// Every read a device stage can make of a buffer: what a command may do that declares nothing.
+    /// Every read of a buffer that a device stage can perform, for commands that do not declare their reads.
     pub(crate) fn everything_read() -> Self {
         let stages = Stages::SHADERS
             | Stages::TRANSFER
@@ -283,24 +284,25 @@ impl Use {
         Self::new(stages, !Access::WRITES - attachments - Access::HOST_READ, Layout::Undefined)
     }
 
-    /// Whether memory changes.
+    /// True if memory changes.
     pub(crate) fn is_write(self) -> bool {
         self.access.intersects(Access::WRITES)
     }
 
-    /// What of it the given stages do.
+    /// Returns the part of the use in the given stages.
     pub(crate) fn limited_to(self, stages: Stages) -> Self {
         let stages = self.stages & stages;
         Self { stages, access: self.access & stages.possible_accesses(), ..self }
     }
 
-    /// The same accesses in another layout.
+    /// Returns the same accesses in another layout.
     pub(crate) const fn with_layout(self, layout: Layout) -> Self {
         Self { layout, ..self }
     }
 
-    /// Both uses at once, by one command. `None` where no layout serves both, for example an attachment that is
-    /// sampled in the same pass, or a storage image that is sampled too: descriptors promise one layout for each.
+    /// Returns both uses combined in one command. `None` if no layout supports both, because descriptors
+    /// expect one layout for each image. Examples are an attachment that is sampled in the same pass, and a
+    /// storage image that is also sampled.
     pub(crate) fn merge(self, other: Self) -> Option<Self> {
         let layout = match (self.layout, other.layout) {
             (a, b) if a == b => a,
@@ -311,41 +313,43 @@ impl Use {
     }
 }
 
-/// Uses by render passes beyond plain targets, and by windows.
+/// Uses by render passes beyond plain targets, and by presentation.
 impl Use {
-    /// Attachment that fragment shaders of the same pass read; merges with a target in the same layout.
+    /// Attachment that fragment shaders of the same pass read. It merges with a target in the same layout.
     pub(crate) const fn local_read() -> Self {
         Self::new(Stages::FRAGMENT, Access::INPUT_READ, Layout::LocalRead)
     }
 
-    /// Multisampled target, of depth too, that is resolved at the end of its pass; merges with the target.
+    /// Multisampled target, colour or depth, that is resolved at the end of its pass. It merges with the
+    /// target.
     pub(crate) const fn resolve_source() -> Self {
         Self::new(Stages::COLOR, Access::COLOR_READ, Layout::Undefined)
     }
 
-    /// What a colour target is resolved to. Vulkan resolves depth in the same stage, in [`Layout::DepthTarget`].
+    /// Resolve target of a colour target. Vulkan resolves depth in the same stage, in
+    /// [`Layout::DepthTarget`].
     pub(crate) const fn resolve_target() -> Self {
         Self::new(Stages::COLOR, Access::COLOR_WRITE, Layout::ColorTarget)
     }
 
-    /// Attachment that a pass takes its shading rates from.
+    /// Attachment from which a pass reads its shading rates.
     pub(crate) const fn shading_rate() -> Self {
         Self::new(Stages::SHADING_RATE, Access::SHADING_RATE_READ, Layout::ShadingRate)
     }
 
-    /// Goes to the presentation engine, which waits by a semaphore.
+    /// Presentation of an image. The presentation engine waits for a semaphore.
     #[cfg_attr(not(any(feature = "window", test)), expect(dead_code, reason = "only swapchains present"))]
     pub(crate) const fn present() -> Self {
         Self::new(Stages::empty(), Access::empty(), Layout::Present)
     }
 }
 
-/// Which accesses of which single stages.
+/// A set of accesses for each single stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct StageAccess([Access; Stages::COUNT]);
 
 impl StageAccess {
-    /// Adds what `touch` does at each of its stages.
+    /// Adds the accesses of `touch` at each of its stages.
     #[inline(never)]
     pub(crate) fn insert(&mut self, touch: Use) {
         for row in touch.stages.indices() {
@@ -353,24 +357,24 @@ impl StageAccess {
         }
     }
 
-    /// What `other` has and this lacks.
+    /// Returns the accesses of `other` that `self` lacks.
     pub(crate) fn missing(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|row| other.0[row] - self.0[row]))
     }
 
-    /// Accesses of a single stage.
+    /// Returns the accesses of a single stage.
     #[cfg(test)]
     pub(crate) fn at(&self, stage: Stages) -> Access {
         self.0[stage.index()]
     }
 
-    /// Stages with at least one access.
+    /// Returns the stages with at least one access.
     pub(crate) fn stages(&self) -> Stages {
         let bit = |(row, access): (usize, &Access)| u16::from(!access.is_empty()) << row;
         Stages::from_bits_retain(self.0.iter().enumerate().map(bit).fold(0, |all, bit| all | bit))
     }
 
-    /// Accesses of all stages together.
+    /// Returns the accesses of all stages together.
     pub(crate) fn access(&self) -> Access {
         self.0.iter().fold(Access::empty(), |all, access| all | *access)
     }

@@ -1,4 +1,4 @@
-//! Barriers of one place in a command buffer, merged so that one Vulkan call records them all.
+//! The barriers in front of one command, merged so that one Vulkan call records them all.
 
 use super::access::{Access, Stages};
 use super::resource_id::ResourceId;
@@ -19,8 +19,8 @@ pub(crate) struct MemoryBarrier {
 }
 
 impl MemoryBarrier {
-    /// The same in parts that never name traversal together with shader stages outside of ray tracing pipelines, which
-    /// Vulkan forbids where ray queries are off.
+    /// Returns the same barrier, split so that no part names traversal together with shader stages outside
+    /// ray tracing pipelines. Vulkan forbids that combination if ray queries are disabled.
     pub(crate) fn without_ray_queries(self) -> impl Iterator<Item = Self> {
         let traversing = self.dst_stages & (Stages::RAY_TRACING | Stages::ACCEL_BUILD);
         if self.dst_stages == traversing || !self.dst_access.contains(Access::ACCEL_READ) {
@@ -37,23 +37,23 @@ impl MemoryBarrier {
 pub(crate) struct ImageBarrier {
     /// The texture.
     pub(crate) id: ResourceId,
-    /// Which part of it.
+    /// The affected part of the texture.
     pub(crate) subresources: Subresources,
-    /// Both sides; the layouts differ.
+    /// Scopes of both sides; the layouts differ.
     pub(crate) scopes: BarrierScopes,
 }
 
 /// All barriers in front of one command.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Barriers {
-    /// Everything that needs no layout transition, of all buffers and textures together.
+    /// The barrier without layout transitions, for all buffers and textures together.
     pub(crate) memory: Option<MemoryBarrier>,
     /// Layout transitions.
     pub(crate) images: Vec<ImageBarrier>,
 }
 
 impl Barriers {
-    /// Whether there is nothing to record.
+    /// True if there is nothing to record.
     #[inline]
     pub(crate) fn is_empty(&self) -> bool {
         self.memory.is_none() && self.images.is_empty()
@@ -76,7 +76,7 @@ impl Barriers {
         memory.dst_access |= scopes.dst_access;
     }
 
-    /// Adds a barrier of a part of a texture.
+    /// Adds a barrier for a part of a texture.
     #[inline]
     pub(crate) fn push_image(&mut self, id: ResourceId, subresources: Subresources, scopes: &BarrierScopes) {
         if scopes.old_layout == scopes.new_layout {

@@ -1,7 +1,8 @@
-//! Hidden barriers, decided without a Vulkan device.
+//! Automatic barriers, computed without a Vulkan device.
 //!
-//! A [`Tracker`] follows one command buffer while it is recorded; [`QueueState`] follows the queue. Both advance the
-//! `ResourceState` of each buffer and each subresource of a texture by one rule, `resource_state::transition`.
+//! A [`Tracker`] follows one command buffer while it is recorded; [`QueueState`] follows the queue. Both
+//! advance the `ResourceState` of each buffer and of each texture subresource by one rule,
+//! `resource_state::transition`.
 
 mod access;
 mod batch;

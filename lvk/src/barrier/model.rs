@@ -1,7 +1,7 @@
-//! A naive model of Vulkan's rules for barriers, which knows nothing of states and prefixes.
+//! A naive model of Vulkan's synchronisation rules, independent of tracked states and prefixes.
 //!
-//! It walks the barriers between every pair of conflicting accesses of a queue and follows the chains of stages that
-//! they form, the flushes, and what becomes visible where.
+//! It follows the barriers between every pair of conflicting accesses of a queue: the execution dependency
+//! chains, the flushes, and the visibility.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ pub(crate) struct Op {
     /// `None` for buffers.
     pub(crate) texture: Option<(TextureShape, Subresources)>,
     pub(crate) touch: Use,
-    /// Whether it does not conflict with other accumulated writes.
+    /// True if it does not conflict with other accumulated writes.
     pub(crate) accumulated: bool,
 }
 
@@ -34,17 +34,17 @@ pub(crate) struct Cell {
     pub(crate) layer: u32,
 }
 
-/// What one command does, at most one thing to a resource.
+/// The accesses of one command, at most one per resource.
 pub(crate) type Command = Vec<Op>;
 
-/// What the queue executes.
+/// An event in the execution order of a queue.
 #[derive(Debug, Clone)]
 pub(crate) enum ModelEvent {
     Barriers(Barriers),
     Command(Command),
 }
 
-/// One dependency, as far as it concerns one cell.
+/// One dependency, reduced to one cell.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Edge {
     src_stages: Stages,
@@ -59,7 +59,7 @@ fn contains(range: Subresources, cell: Cell) -> bool {
         && (range.base_layer..range.base_layer + range.layer_count).contains(&cell.layer)
 }
 
-/// Dependencies that reach one cell.
+/// Returns the dependencies that affect one cell.
 pub(crate) fn edges(barriers: &Barriers, cell: Cell) -> Vec<Edge> {
     let memory = barriers.memory.iter().map(|m| Edge {
         src_stages: m.src_stages,
@@ -79,7 +79,7 @@ pub(crate) fn edges(barriers: &Barriers, cell: Cell) -> Vec<Edge> {
     memory.chain(images).collect()
 }
 
-/// What happens to one cell, in the order of the queue.
+/// One event of a cell, in the order of the queue.
 #[derive(Debug, Clone)]
 enum CellStep {
     Barrier(Vec<Edge>),
@@ -102,13 +102,13 @@ fn steps(log: &[ModelEvent], cell: Cell) -> Vec<CellStep> {
     steps
 }
 
-/// How far one earlier access, at one of its stages, has been waited for.
+/// Synchronisation state of one earlier access at one of its stages.
 #[derive(Debug, Clone)]
 pub(crate) struct Wait {
     origin: Stages,
-    /// What the access wrote; a stage has only one way to write.
+    /// Accesses that wrote; each stage has only one kind of write.
     pub(crate) written: Access,
-    /// Stages that start after it.
+    /// Stages that start after the access.
     chain: Stages,
     /// Stages that start after its writes were flushed.
     flushed: Stages,
@@ -126,7 +126,8 @@ impl Wait {
         }
     }
 
-    /// A semaphore stands in between, which holds up everything behind it and shows it everything before.
+    /// Returns the state after a semaphore. All later stages wait for it, and all earlier writes are visible
+    /// to them.
     pub(crate) fn behind_semaphore(&self) -> Self {
         let mut wait = self.clone();
         wait.chain = Stages::all();
@@ -135,7 +136,7 @@ impl Wait {
         wait
     }
 
-    /// A transition is flushed by the barrier that performs it.
+    /// Returns the state of a layout transition, which is flushed by its own barrier.
     pub(crate) fn for_transition(edge: &Edge) -> Self {
         let mut wait = Self::for_access(Stages::empty(), Access::empty());
         wait.chain = edge.dst_stages;
@@ -161,7 +162,7 @@ impl Wait {
         here || edge.src_stages.intersects(self.flushed)
     }
 
-    /// Passes one place with barriers: they run side by side and do not chain with each other.
+    /// Applies the barriers of one batch. They are concurrent and do not chain with each other.
     pub(crate) fn apply_edges(&mut self, edges: &[Edge]) {
         let before = self.clone();
         for edge in edges.iter().filter(|edge| before.is_waited_by(edge)) {
@@ -172,12 +173,12 @@ impl Wait {
         }
     }
 
-    /// A layout transition may follow.
+    /// True if a layout transition may follow.
     pub(crate) fn allows_transition(&self, edge: &Edge) -> bool {
         self.is_waited_by(edge) && (self.written.is_empty() || self.is_flushed_by(edge))
     }
 
-    /// An access at `stage` may follow without looking at the values.
+    /// True if an access at `stage` may follow that does not read the values.
     fn ordered_before(&self, stage: Stages) -> bool {
         self.chain.contains(stage)
     }
@@ -188,7 +189,7 @@ impl Wait {
     }
 }
 
-/// The first violation of Vulkan's rules in what happens to one cell.
+/// Returns the first violation of Vulkan's rules in the events of one cell.
 fn violation(steps: &[CellStep]) -> Option<String> {
     wrong_layout(steps).or_else(|| (0..steps.len()).find_map(|at| violation_after(steps, at)))
 }
@@ -276,7 +277,7 @@ fn cells_of(log: &[ModelEvent]) -> Vec<Cell> {
     cells.into_iter().collect()
 }
 
-/// The first violation in a queue's log, with what happens to the cell concerned.
+/// Returns the first violation in a queue's log, with the events of the affected cell.
 pub(crate) fn any_violation(log: &[ModelEvent]) -> Option<String> {
     cells_of(log).into_iter().find_map(|cell| {
         violation(&steps(log, cell)).map(|what| format!("{cell:?}: {what}\n{:#?}", steps(log, cell)))

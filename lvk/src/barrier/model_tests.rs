@@ -1,4 +1,4 @@
-//! The tracker against the naive [`model`](super::model), over random programs.
+//! Tests of the tracker against the naive [`model`](super::model), with random programs.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ struct Program {
 }
 
 impl Program {
-    /// The same program with only one cell in it.
+    /// Returns the program reduced to one cell.
     fn only(&self, cell: Cell) -> Self {
         let mut program = self.clone();
         for command in program.commands.iter_mut().flatten() {
@@ -35,7 +35,7 @@ impl Program {
         program
     }
 
-    /// Records with the tracker, interleaved, and submits.
+    /// Records the command buffers interleaved with the tracker, submits them, and returns the log.
     fn run(&self) -> Vec<ModelEvent> {
         let mut trackers = vec![Tracker::default(); self.commands.len()];
         let mut recorded: Vec<Vec<ModelEvent>> = vec![Vec::new(); self.commands.len()];
@@ -80,7 +80,7 @@ fn record(tracker: &mut Tracker, command: &Command, log: &mut Vec<ModelEvent>) {
     log.push(ModelEvent::Command(command.clone()));
 }
 
-/// Every log that lacks one barrier of `log`, with the words for it.
+/// Returns every log that lacks one barrier of `log`, with a description.
 fn logs_without_one(log: &[ModelEvent]) -> Vec<(String, Vec<ModelEvent>)> {
     let mut weaker = Vec::new();
     for (at, event) in log.iter().enumerate() {
@@ -99,7 +99,7 @@ fn logs_without_one(log: &[ModelEvent]) -> Vec<(String, Vec<ModelEvent>)> {
     weaker
 }
 
-/// Every log in which one bit of one barrier of `log` is missing.
+/// Returns every log in which one bit of one barrier of `log` is missing, with a description.
 fn logs_without_one_bit(log: &[ModelEvent]) -> Vec<(String, Vec<ModelEvent>)> {
     let mut weaker = Vec::new();
     for (at, event) in log.iter().enumerate() {
@@ -257,7 +257,7 @@ fn texture_cells() -> impl Iterator<Item = Cell> {
     })
 }
 
-/// What the barriers of one event do to the layout of one cell.
+/// Returns the layout transitions of one cell in the barriers of one event.
 fn relayouts(barriers: &Barriers, cell: Cell) -> Vec<(Layout, Layout)> {
     edges(barriers, cell).iter().filter_map(|edge| edge.relayout).collect()
 }
@@ -270,7 +270,7 @@ proptest! {
         prop_assert_eq!(any_violation(&program.run()), None);
     }
 
-    /// Barriers of other resources must not be what saves a resource.
+    /// A resource must be safe without the barriers of other resources.
     #[test]
     fn every_cell_is_safe_by_its_own_barriers(program in program()) {
         for cell in buffer_cells().chain(texture_cells()) {
@@ -278,9 +278,9 @@ proptest! {
         }
     }
 
-    /// Every barrier of a cell prevents a hazard or a wrong layout, so that none repeats another and none stands
-    /// between reads. Accumulated resources may wait once too often where ordinary writes are mixed in, which the
-    /// library never does.
+    /// Every barrier of a cell prevents a hazard or a wrong layout: none is redundant, and none stands
+    /// between reads. Accumulated resources may get one wait too many if ordinary writes are mixed in, which
+    /// the library never does.
     #[test]
     fn no_barrier_can_be_left_out(program in program()) {
         let plain = buffer_cells().filter(|cell| cell.id.0 < BUFFERS);
@@ -291,7 +291,7 @@ proptest! {
         }
     }
 
-    /// Nor waits any barrier for more than it must.
+    /// No barrier has a stage or access bit that is not needed.
     #[test]
     fn no_bit_of_a_memory_barrier_can_be_left_out(program in program()) {
         let plain = buffer_cells().filter(|cell| cell.id.0 < BUFFERS);
@@ -302,7 +302,7 @@ proptest! {
         }
     }
 
-    /// Resources do not influence each other's barriers, nor do the parts of a texture.
+    /// Resources do not influence each other's barriers. Neither do the subresources of a texture.
     #[test]
     fn barriers_are_the_sum_over_cells(program in program()) {
         let cells: Vec<Cell> = buffer_cells().chain(texture_cells()).collect();
@@ -332,7 +332,7 @@ fn log_of(ops: &[Op]) -> Vec<ModelEvent> {
     Program { commands, recording_order: vec![0; ops.len()], submission_order: vec![0] }.run()
 }
 
-/// The model itself must be able to fail.
+/// Checks that the model can detect errors.
 #[test]
 fn model_finds_a_missing_barrier_of_each_kind() {
     let write = buffer(Use::shader_write(Stages::COMPUTE));
@@ -347,7 +347,8 @@ fn model_finds_a_missing_barrier_of_each_kind() {
     assert_eq!(any_violation(&[ModelEvent::Command(vec![read]), ModelEvent::Command(vec![read])]), None);
 }
 
-/// Reads of an earlier command buffer in another stage than the reads in front of a write: the write waits for both.
+/// An earlier command buffer reads in another stage than the reads in front of a write. The write waits for
+/// both.
 #[test]
 fn write_behind_reads_waits_for_readers_of_earlier_command_buffers() {
     let compute = buffer(Use::shader_read(Stages::COMPUTE));

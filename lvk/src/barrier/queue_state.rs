@@ -1,4 +1,5 @@
-//! What the queue will have done to every resource, and the barriers between it and the next command buffer.
+//! State of every resource after all submissions to a queue, and the barriers in front of the next command
+//! buffer.
 
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
@@ -7,7 +8,7 @@ use super::resource_state::{BarrierScopes, ResourceState, accumulate, transition
 use super::subresource::{PerSubresource, Subresources, TextureShape};
 use super::tracker::{LocalState, Prefix, TrackedUse, Tracker, TransferredState};
 
-/// State of every resource after everything submitted to one queue so far.
+/// State of every resource after all submissions to one queue so far.
 #[derive(Debug, Default)]
 pub(crate) struct QueueState {
     buffers: IdMap<ResourceState>,
@@ -15,8 +16,8 @@ pub(crate) struct QueueState {
 }
 
 impl QueueState {
-    /// Appends a recorded command buffer. The barriers returned must be recorded in front of it, after everything
-    /// submitted before.
+    /// Appends a recorded command buffer. The returned barriers must be recorded in front of it, after all
+    /// earlier submissions.
     pub(crate) fn submit(&mut self, local: &Tracker) -> Barriers {
         let mut out = Barriers::default();
         for (id, local) in local.buffers() {
@@ -41,26 +42,26 @@ impl QueueState {
         out
     }
 
-    /// An image comes from the presentation engine. The next submission waits for its semaphore at `stages`, so that the
-    /// first barrier has to start there.
+    /// Records that an image was acquired from the presentation engine. The next submission waits for its
+    /// semaphore at `stages`, so the first barrier must start there.
     pub(crate) fn mark_acquired(&mut self, id: ResourceId, shape: TextureShape, stages: Stages) {
         self.textures.insert(id, PerSubresource::new(shape, ResourceState::acquired(stages)));
     }
 
-    /// An image comes from somebody else, in this layout. Whatever the next submission waits for, the first barrier starts
-    /// there.
+    /// Records that the caller imported an image in this layout. The next submission may wait for a semaphore
+    /// at any stage, so the first barrier starts at all of them.
     pub(crate) fn mark_imported(&mut self, id: ResourceId, shape: TextureShape, layout: Layout) {
         let stages = Stages::all() - Stages::HOST - Stages::SHADING_RATE;
         self.textures.insert(id, PerSubresource::new(shape, ResourceState::imported(layout, stages)));
     }
 
-    /// The layouts that a texture is in; none for buffers, and for what was never used.
+    /// Returns the layouts of a texture. `None` for buffers and for resources that were never used.
     pub(crate) fn layouts(&self, id: ResourceId) -> Option<PerSubresource<Layout>> {
         self.textures.get(&id).map(|cells| cells.map(ResourceState::layout))
     }
 
-    /// The next submission takes a resource over from another queue, which left it in these layouts, and waits for a semaphore
-    /// at `stages`.
+    /// Records that the next submission takes over a resource from another queue, which left it in the
+    /// layouts `before`. The submission waits for a semaphore at `stages`.
     pub(crate) fn take_ownership(
         &mut self,
         used: TrackedUse<'_>,
@@ -77,17 +78,17 @@ impl QueueState {
         }
     }
 
-    /// Everything that was ever used.
+    /// Returns the ids of all resources ever used.
     pub(crate) fn ids(&self) -> impl Iterator<Item = ResourceId> {
         self.buffers.keys().chain(self.textures.keys()).copied()
     }
 
-    /// The host has written a new image, and left it in the layout that shaders sample: nothing is pending.
+    /// Records that the host wrote a new image and left it in the layout for sampling. No access is pending.
     pub(crate) fn mark_host_written(&mut self, id: ResourceId, shape: TextureShape) {
         self.textures.insert(id, PerSubresource::new(shape, ResourceState::untouched_in(Layout::ShaderRead)));
     }
 
-    /// Drops what is known about a destroyed resource.
+    /// Removes the state of a destroyed resource.
     pub(crate) fn forget(&mut self, id: ResourceId) {
         self.buffers.remove(&id);
         self.textures.remove(&id);
@@ -105,7 +106,7 @@ fn apply_texture(
     }
 }
 
-/// Advances `queue` by all that a command buffer does, and returns the barrier in front of the command buffer.
+/// Advances `queue` by all accesses of a command buffer. Returns the barrier in front of the command buffer.
 fn apply_local(queue: &mut ResourceState, local: &LocalState) -> Option<BarrierScopes> {
     let scopes = match &local.prefix {
         Prefix::Unused => return None,
@@ -123,8 +124,9 @@ fn apply_local(queue: &mut ResourceState, local: &LocalState) -> Option<BarrierS
     scopes
 }
 
-/// What follows inside the command buffer waits for these writes only, but with them for the same scope of everything
-/// submitted before. An earlier accumulated write outside that scope must be chained to these.
+/// Advances `queue` by accumulated writes at the start of a command buffer. Later commands of the command
+/// buffer wait for these writes and for the same scope of earlier submissions, and for nothing else. Earlier
+/// accumulated writes outside that scope must therefore be chained to these.
 fn apply_accumulated(
     queue: &mut ResourceState,
     writes: &StageAccess,

@@ -1,4 +1,4 @@
-//! Which graphics stages may query rays: what render passes must wait for before any pipeline is bound.
+//! Graphics stages that may use ray queries. Render passes wait for these before any pipeline is bound.
 
 use std::sync::atomic::{AtomicU16, Ordering};
 
@@ -6,23 +6,24 @@ use super::access::{Stages, Use};
 use super::resource_id::ResourceId;
 use super::tracker::Tracker;
 
-/// The stages in which some graphics pipeline made so far queries rays.
+/// The stages in which any graphics pipeline created so far uses ray queries.
 ///
-/// A pipeline that is gone still counts, which costs a barrier and nothing else.
+/// A destroyed pipeline still counts, which costs a barrier and nothing else.
 #[derive(Debug, Default)]
 pub(crate) struct RayQueryStages(AtomicU16);
 
 impl RayQueryStages {
-    /// A pipeline was made that queries rays in `stages`.
+    /// Records the creation of a pipeline that uses ray queries in `stages`.
     pub(crate) fn insert(&self, stages: Stages) {
         self.0.fetch_or(stages.bits(), Ordering::Relaxed);
     }
 
-    /// What a pass that begins now must let see the acceleration structures that its command buffer has built: nothing
-    /// where it has built none, or where these stages see them already. Structures built by earlier submissions are the
-    /// queue's business, once a pipeline is bound that queries rays.
+    /// Returns the stages to which a pass that begins now must make the acceleration structures visible that
+    /// its command buffer has built. `None` if it has built none, or if they are already visible to these
+    /// stages. Acceleration structures built by earlier submissions are synchronised by the queue, once a
+    /// pipeline with ray queries is bound.
     ///
-    /// `reads` lists everything that queries read in the given stages.
+    /// `reads` returns all reads of ray queries in the given stages.
     pub(crate) fn waiting_stages<const N: usize>(
         &self,
         tracker: &Tracker,

@@ -1,21 +1,22 @@
-//! Identities of what is tracked, and maps by them.
+//! Identities of tracked resources, and maps keyed by them.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Identity of a buffer, a texture or a group of resources that is tracked as one; never reused.
+/// Identity of a buffer, a texture or a group of resources that is tracked as one. It is never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct ResourceId(pub(crate) u64);
 
 impl ResourceId {
-    /// An id nobody else has, and nobody gets again.
+    /// Returns a new id, unique for the life of the process.
     pub(crate) fn next() -> Self {
         static LAST: AtomicU64 = AtomicU64::new(0);
         Self(LAST.fetch_add(1, Ordering::Relaxed) + 1)
     }
 
-    /// One of 64 bits, for sets that rule out most. Identities are consecutive, so few of a small set share a bit.
+    /// Returns one of 64 bits, for sets that reject most ids early. Ids are consecutive, so few ids of a
+    /// small set share a bit.
     #[inline]
     pub(crate) fn bit(self) -> u64 {
         1 << (self.0 % 64)
@@ -25,8 +26,8 @@ impl ResourceId {
 /// A map keyed by [`ResourceId`].
 pub(crate) type IdMap<T> = HashMap<ResourceId, T, BuildHasherDefault<IdHasher>>;
 
-/// Spreads ids, which are consecutive numbers chosen by the library itself, so that no defence against crafted keys is
-/// needed.
+/// Hashes ids. They are consecutive numbers assigned by the library, so protection against crafted keys is
+/// not needed.
 #[derive(Default)]
 pub(crate) struct IdHasher(u64);
 

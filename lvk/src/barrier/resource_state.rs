@@ -1,4 +1,4 @@
-//! What is known about one resource, or one subresource of an image, and the barrier its next use needs.
+//! Synchronisation state of one resource or image subresource, and the barrier that its next use needs.
 
 use super::access::{Access, Layout, StageAccess, Stages, Use};
 
@@ -9,7 +9,7 @@ pub(crate) struct BarrierScopes {
     pub(crate) src_stages: Stages,
     /// Writes of those stages that must be flushed.
     pub(crate) src_access: Access,
-    /// Stages that must not start before.
+    /// Stages that must not start earlier.
     pub(crate) dst_stages: Stages,
     /// Accesses of those stages that must see the writes.
     pub(crate) dst_access: Access,
@@ -31,80 +31,82 @@ impl BarrierScope {
         Self { stages: table.stages(), access: table.access() }
     }
 
-    /// Stages alone, where nothing has to be flushed or seen.
+    /// Returns stages without accesses, for dependencies that flush nothing and make nothing visible.
     fn execution_only(stages: Stages) -> Self {
         Self { stages, access: Access::empty() }
     }
 
-    /// A barrier reaches every access of every stage it names.
+    /// Returns the scope as a use. A barrier affects every access of every stage it names.
     fn as_use(self) -> Use {
         Use { stages: self.stages, access: self.access, layout: Layout::Undefined }
     }
 }
 
-/// Writers that do not wait for each other.
+/// Accumulated writes, which do not wait for each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Epoch {
-    /// What every one of them waits for.
+    /// Scope that all of them wait for.
     before: BarrierScope,
-    /// Which of them already do.
+    /// Accesses that already wait for it.
     waited: StageAccess,
 }
 
-/// Everything later uses of one (sub)resource may have to wait for.
+/// Synchronisation state that later uses of one (sub)resource may have to wait for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct ResourceState {
     layout: Layout,
-    /// The last write, or the last layout transition: then the stages that waited for it, and no access, since Vulkan
-    /// flushes its own transitions.
+    /// The last write. After a layout transition: the stages that waited for it, without accesses, since
+    /// Vulkan flushes its own transitions.
     write: BarrierScope,
-    /// Stages that read since, less those that another reading stage has waited for.
+    /// Stages that have read since the last write, except those that another reading stage has waited for.
     readers: Stages,
-    /// Reads that already see the last write.
+    /// Reads to which the last write is already visible.
     visible: StageAccess,
-    /// Present while the last write is an accumulated one.
+    /// `Some` if the last write is accumulated.
     epoch: Option<Epoch>,
 }
 
 impl ResourceState {
-    /// Untouched so far, with the layout that the first use will find.
+    /// Returns the state before any use, with the layout that the first use finds.
     pub(crate) fn untouched_in(layout: Layout) -> Self {
         Self { layout, ..Self::default() }
     }
 
-    /// Image that the presentation engine has let go of: contents are unknown, and a semaphore is waited for at `stages`.
+    /// Returns the state of an image acquired from the presentation engine. Its contents are unknown, and a
+    /// semaphore wait happens at `stages`.
     pub(crate) fn acquired(stages: Stages) -> Self {
         Self { write: BarrierScope::execution_only(stages), ..Self::default() }
     }
 
-    /// Image of somebody else's, or of another queue's, for which a semaphore is waited for at `stages`.
+    /// Returns the state of an image from the caller or from another queue, with a semaphore wait at
+    /// `stages`.
     pub(crate) fn imported(layout: Layout, stages: Stages) -> Self {
         Self { layout, write: BarrierScope::execution_only(stages), ..Self::default() }
     }
 
-    /// Layout after the last use.
+    /// Returns the layout after the last use.
     pub(crate) fn layout(&self) -> Layout {
         self.layout
     }
 
-    /// Whether something has read since the last write.
+    /// True if the resource was read since the last write.
     pub(crate) fn is_read(&self) -> bool {
         !self.readers.is_empty()
     }
 
-    /// Whether waiting for `stages` and `access` includes the last write.
+    /// True if a wait for `stages` and `access` includes the last write.
     pub(crate) fn write_is_within(&self, stages: Stages, access: Access) -> bool {
         stages.contains(self.write.stages) && access.contains(self.write.access)
     }
 
-    /// Whether a use writes, or changes the layout, so that others have to wait for it.
+    /// True if a use writes or changes the layout, so that later uses have to wait for it.
     #[inline]
     pub(crate) fn is_changed_by(&self, next: Use) -> bool {
         next.is_write() || (next.layout != Layout::Undefined && next.layout != self.layout)
     }
 
-    /// The barrier in front of a use that writes as the last one did, with nothing between, after which all stands as before.
-    /// `None` for every other use.
+    /// Returns the barrier in front of a use that repeats the last write with no use in between. Such a use
+    /// leaves the state unchanged. `None` for every other use.
     #[inline(always)]
     pub(crate) fn repeated(&self, next: Use) -> Option<BarrierScopes> {
         let write = BarrierScope { stages: next.stages, access: next.access & Access::WRITES };
@@ -120,22 +122,23 @@ impl ResourceState {
         self.read(&next.into())
     }
 
-    /// Adds reads in the current layout; a barrier is needed for those that do not see the last write yet.
+    /// Adds reads in the current layout. Returns a barrier if the last write is not visible yet to some of
+    /// them.
     pub(crate) fn read(&mut self, reads: &StageAccess) -> Option<BarrierScopes> {
         let src = self.flushed_write();
         let dst = BarrierScope::from_accesses(&self.visible.missing(reads));
         let needed = !src.stages.is_empty() && !dst.stages.is_empty();
         if needed {
             self.visible.insert(dst.as_use());
-            // Earlier readers in these stages are now waited for by the new ones.
+            // Earlier readers in these stages are now covered by a wait for the new ones.
             self.readers -= src.stages;
         }
         self.readers |= reads.stages();
         needed.then(|| self.scopes(src, dst, self.layout))
     }
 
-    /// Reads in the current layout that a write follows which waits for them alone: chains to them those earlier
-    /// readers whom the write would miss.
+    /// Adds reads in the current layout, before a write that waits for these reads only. Earlier readers that
+    /// the write would not wait for are chained to these reads.
     pub(crate) fn read_for_all(&mut self, reads: &StageAccess) -> Option<BarrierScopes> {
         let loose = self.readers - reads.stages();
         if loose.is_empty() {
@@ -150,14 +153,14 @@ impl ResourceState {
         Some(self.scopes(src, dst, self.layout))
     }
 
-    /// What a read has to wait for. Where a stage that wrote has also read since, it has waited for the whole write and
-    /// its flush: then that stage is enough.
+    /// Returns the scope that a read has to wait for. If a stage of the write has also read since, it has
+    /// waited for the whole write and its flush. Waiting for that stage is then enough.
     fn flushed_write(&self) -> BarrierScope {
         let seen = last_stage(self.write.stages & self.visible.stages());
         if seen.is_empty() { self.write } else { BarrierScope::execution_only(seen) }
     }
 
-    /// A use that waits for everything before it.
+    /// Applies a use that waits for everything before it.
     #[inline]
     pub(crate) fn overwrite(&mut self, next: Use) -> Option<BarrierScopes> {
         let src = self.unfinished();
@@ -166,7 +169,7 @@ impl ResourceState {
         let dst = BarrierScope { stages: next.stages, access: next.access };
         let scopes = self.scopes(src, dst, new_layout);
         let write = BarrierScope { stages: next.stages, access: next.access & Access::WRITES };
-        // One by one, so that no state is put together elsewhere and moved here.
+        // Field by field, so that no state is built elsewhere and moved here.
         self.layout = new_layout;
         self.write = write;
         self.readers = Stages::empty();
@@ -196,14 +199,14 @@ impl ResourceState {
         needed.then(|| self.scopes(epoch.before, dst, self.layout))
     }
 
-    /// What a write has to wait for.
+    /// Returns the scope that a write has to wait for.
     #[inline]
     fn unfinished(&self) -> BarrierScope {
         if self.readers.is_empty() { self.write } else { self.through_readers(self.readers) }
     }
 
-    /// Waits for `readers`, who have waited for the last write and its flush, so that waiting for them is enough. The
-    /// host is the exception: no stage of the device waits for it.
+    /// Returns the scope that waits for `readers`. They have waited for the last write and its flush, so
+    /// waiting for them is enough. The host is the exception: no stage of the device waits for it.
     #[inline]
     fn through_readers(&self, readers: Stages) -> BarrierScope {
         if readers.contains(Stages::HOST) {
@@ -227,18 +230,20 @@ impl ResourceState {
 
 /// Advances `state` by `next` and returns the barrier to be recorded in front of it, if one is needed.
 ///
-/// * A read waits for the last write, unless exactly those accesses of those stages already see it.
-/// * A write waits for all readers since the last write, or for that write where nothing has read it.
-/// * A layout change is a write by the barrier itself, which later readers in other stages chain from.
+/// * A read waits for the last write, unless that write is already visible to exactly these accesses of these
+///   stages.
+/// * A write waits for all readers since the last write. If there are none, it waits for that write.
+/// * A layout change is a write by the barrier itself. Later readers in other stages chain from it.
 ///
-/// `next.layout` of [`Layout::Undefined`] asks for no layout.
+/// [`Layout::Undefined`] in `next.layout` requests no layout.
 #[inline]
 pub(crate) fn transition(state: &mut ResourceState, next: Use) -> Option<BarrierScopes> {
     if state.is_changed_by(next) { state.overwrite(next) } else { state.read_by(next) }
 }
 
-/// Advances `state` by some of several writes that touch disjoint parts of the resource, so that they need not wait for
-/// each other, only for what came before the first of them: readers, or an ordinary write.
+/// Advances `state` by accumulated writes: several writes to disjoint parts of the resource, which need not
+/// wait for each other. They only wait for the accesses before the first of them: readers, or an ordinary
+/// write.
 pub(crate) fn accumulate(state: &mut ResourceState, writes: &StageAccess) -> Option<BarrierScopes> {
     match state.epoch {
         Some(epoch) if state.readers.is_empty() => state.continue_epoch(epoch, writes),
@@ -246,7 +251,8 @@ pub(crate) fn accumulate(state: &mut ResourceState, writes: &StageAccess) -> Opt
     }
 }
 
-/// Where one stage is enough to wait for or to chain through, the last one holds up the least.
+/// Returns the last of the stages. If one stage is enough to wait for or to chain through, the last one
+/// delays the least.
 fn last_stage(stages: Stages) -> Stages {
     Stages::from_bits_retain(stages.bits().checked_ilog2().map_or(0, |last| 1 << last))
 }
@@ -279,7 +285,7 @@ mod tests {
     }
 
     proptest! {
-        /// From any state that uses lead to: nothing is taken for a repetition that is none.
+        /// Checks every reachable state: no use is taken for a repetition by mistake.
         #[test]
         fn a_repeated_use_has_the_barrier_of_any_other_and_changes_nothing(
             before in prop::collection::vec((uses(), any::<bool>()), 0..5), next in uses()
@@ -297,7 +303,7 @@ mod tests {
                 prop_assert_eq!(repeated, barrier);
                 prop_assert_eq!(state, was);
             }
-            // Twice the same write is one.
+            // A write repeats itself.
             prop_assert_eq!(state.repeated(next).is_some(), next.is_write() && next.layout == state.layout);
         }
     }

@@ -1,4 +1,4 @@
-//! Values kept for each mip level and array layer of a texture, stored once while they are all equal.
+//! Values for each mip level and array layer of a texture. A single value is stored while they are all equal.
 
 use super::resource_state::BarrierScopes;
 
@@ -12,7 +12,7 @@ pub(crate) struct TextureShape {
 }
 
 impl TextureShape {
-    /// All mips of all layers.
+    /// Returns the range of all mips and layers.
     #[inline]
     pub(crate) fn all_subresources(self) -> Subresources {
         Subresources { base_mip: 0, mip_count: self.mips, base_layer: 0, layer_count: self.layers }
@@ -49,7 +49,7 @@ impl Subresources {
         self.mip_count == 0 || self.layer_count == 0
     }
 
-    /// What both have, if anything.
+    /// Returns the common part of both ranges, if any.
     #[inline]
     pub(crate) fn intersection(self, other: Self) -> Option<Self> {
         let (base_mip, mip_count) =
@@ -59,7 +59,7 @@ impl Subresources {
         Some(Self { base_mip, mip_count, base_layer, layer_count })
     }
 
-    /// What of this is not in `cut`, as disjoint ranges.
+    /// Returns the part of this range outside `cut`, as disjoint ranges.
     pub(crate) fn without(self, cut: Self) -> impl Iterator<Item = Self> {
         let pieces = match self.intersection(cut) {
             None => [self, EMPTY, EMPTY, EMPTY],
@@ -78,7 +78,8 @@ impl Subresources {
         pieces.into_iter().filter(|piece| !piece.is_empty())
     }
 
-    /// Makes `self` one mip longer if `scopes` goes on at `mip` of the same single layer.
+    /// Extends the range by `mip` if it is a single layer equal to `layer`, and `mip` is the next mip level.
+    /// Returns true if extended.
     fn extend_mips(&mut self, mip: u32, layer: u32) -> bool {
         let follows = self.base_mip + self.mip_count == mip;
         let extends = follows && self.base_layer == layer && self.layer_count == 1;
@@ -86,7 +87,8 @@ impl Subresources {
         extends
     }
 
-    /// Joins `next` where it has the same mips and starts at the layer after the last.
+    /// Extends the range by `next` if it has the same mips and starts at the next layer. Returns true if
+    /// extended.
     fn extend_layers(&mut self, next: Self) -> bool {
         let same_mips = self.base_mip == next.base_mip && self.mip_count == next.mip_count;
         let extends = same_mips && self.base_layer + self.layer_count == next.base_layer;
@@ -97,7 +99,7 @@ impl Subresources {
 
 const EMPTY: Subresources = Subresources { base_mip: 0, mip_count: 0, base_layer: 0, layer_count: 0 };
 
-/// First and count of what two ranges, each its first and count, have in common.
+/// Returns the intersection of two ranges, each given as start and count.
 fn range_intersection((a, a_count): (u32, u32), (b, b_count): (u32, u32)) -> Option<(u32, u32)> {
     let (start, end) = (a.max(b), (a + a_count).min(b + b_count));
     (start < end).then(|| (start, end - start))
@@ -112,20 +114,20 @@ pub(crate) struct PerSubresource<T> {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum PerSubresourceValues<T> {
-    /// One for all.
+    /// One value for all subresources.
     Same(T),
-    /// One for each subresource, layer by layer; not all are equal.
+    /// One value for each subresource, layer by layer. Not all are equal.
     Each(Vec<T>),
 }
 
 impl<T: Copy + PartialEq> PerSubresource<T> {
-    /// The same value everywhere. A shape of zero counts as one.
+    /// Creates the same value for all subresources. Zero mips or layers count as one.
     pub(crate) fn new(shape: TextureShape, value: T) -> Self {
         let shape = TextureShape { mips: shape.mips.max(1), layers: shape.layers.max(1) };
         Self { shape, values: PerSubresourceValues::Same(value) }
     }
 
-    /// A value for each mip and layer.
+    /// Creates a value for each mip and layer.
     pub(crate) fn from_fn(shape: TextureShape, value: impl Fn(u32, u32) -> T) -> Self {
         let mut cells = Self::new(shape, value(0, 0));
         let each = positions(cells.shape.all_subresources()).map(|(mip, layer)| value(mip, layer)).collect();
@@ -133,7 +135,7 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         cells
     }
 
-    /// Another value for each of them.
+    /// Returns the values mapped by `value`.
     pub(crate) fn map<U: Copy + PartialEq>(&self, value: impl Fn(&T) -> U) -> PerSubresource<U> {
         let values = match &self.values {
             PerSubresourceValues::Same(same) => PerSubresourceValues::Same(value(same)),
@@ -144,7 +146,7 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         PerSubresource { shape: self.shape, values }
     }
 
-    /// Parts of one value each.
+    /// Returns ranges of equal values.
     pub(crate) fn uniform_ranges(&self) -> Vec<(Subresources, T)> {
         let mut runs = Vec::new();
         match self.uniform() {
@@ -155,12 +157,12 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         join_layers(runs)
     }
 
-    /// Mips and layers.
+    /// Returns the number of mips and layers.
     pub(crate) fn shape(&self) -> TextureShape {
         self.shape
     }
 
-    /// The value all subresources share, if they do.
+    /// Returns the common value of all subresources. `None` if they differ.
     pub(crate) fn uniform(&self) -> Option<&T> {
         match &self.values {
             PerSubresourceValues::Same(value) => Some(value),
@@ -168,7 +170,7 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         }
     }
 
-    /// Value of one subresource; positions outside the texture read its last one.
+    /// Returns the value of one subresource. Positions outside the texture return the last one.
     pub(crate) fn at(&self, mip: u32, layer: u32) -> &T {
         match &self.values {
             PerSubresourceValues::Same(value) => value,
@@ -176,7 +178,7 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         }
     }
 
-    /// Whether `test` holds for any subresource in `range`.
+    /// True if `test` is true for any subresource in `range`.
     pub(crate) fn any(&self, range: Subresources, mut test: impl FnMut(&T) -> bool) -> bool {
         let range = self.shape.clamp(range);
         match self.uniform() {
@@ -185,8 +187,8 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         }
     }
 
-    /// Steps all subresources of `range` alike and returns the barriers, those of neighbours joined where they are
-    /// equal.
+    /// Applies `step` to all subresources of `range` and returns the barriers. Equal barriers of neighbours
+    /// are merged.
     pub(crate) fn update(
         &mut self,
         range: Subresources,
@@ -199,7 +201,7 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         }
     }
 
-    /// The one value of all subresources, where `range` names them all and no others.
+    /// Returns the common value of all subresources if `range` covers the whole texture.
     #[inline]
     pub(crate) fn uniform_mut(&mut self, range: Subresources) -> Option<&mut T> {
         match &mut self.values {
@@ -208,7 +210,7 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         }
     }
 
-    /// Like [`PerSubresource::update`], where a step also depends on the mip and the layer.
+    /// As [`PerSubresource::update`], for a step that also depends on the mip and the layer.
     pub(crate) fn update_each(
         &mut self,
         range: Subresources,
@@ -229,7 +231,7 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
         join_layers(runs)
     }
 
-    /// A value for every subresource.
+    /// Takes the values out, one for every subresource.
     fn split(&mut self) -> Vec<T> {
         match &mut self.values {
             PerSubresourceValues::Same(value) => {
@@ -241,13 +243,13 @@ impl<T: Copy + PartialEq> PerSubresource<T> {
 }
 
 impl<T: Copy + PartialEq> PerSubresourceValues<T> {
-    /// As one where all are equal. There is at least one.
+    /// Stores a single value if all are equal. `each` must not be empty.
     fn from_each(each: Vec<T>) -> Self {
         if each.windows(2).all(|pair| pair[0] == pair[1]) { Self::Same(each[0]) } else { Self::Each(each) }
     }
 }
 
-/// Where the value of a subresource stands; positions outside the texture mean its last one.
+/// Returns the index of a subresource's value. Positions outside the texture map to the last one.
 fn index(shape: TextureShape, mip: u32, layer: u32) -> usize {
     let (mips, layers) = (shape.mips as usize, shape.layers as usize);
     (layer as usize * mips + mip as usize).min(mips * layers - 1)

@@ -1,4 +1,4 @@
-//! Barriers inside one command buffer, recorded without knowing what the queue did before.
+//! Barriers inside one command buffer, computed without knowledge of earlier submissions.
 
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
@@ -6,9 +6,11 @@ use super::resource_id::{IdMap, ResourceId};
 use super::resource_state::{BarrierScopes, ResourceState, accumulate, transition};
 use super::subresource::{PerSubresource, Subresources, TextureShape};
 
-/// How a command buffer uses a (sub)resource before anything in it must wait for anything else in it.
+/// The first uses of a (sub)resource by a command buffer, before a use that must wait for another one in the
+/// same command buffer.
 ///
-/// This is all that the queue has to prepare; see [`QueueState::submit`](super::queue_state::QueueState::submit).
+/// The queue only has to synchronise with the prefix; see
+/// [`QueueState::submit`](super::queue_state::QueueState::submit).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Prefix {
     /// Not used at all.
@@ -18,7 +20,7 @@ pub(super) enum Prefix {
     Reads(Layout, StageAccess),
     /// A write.
     Write(Use),
-    /// Writes that do not wait for each other.
+    /// Accumulated writes, which do not wait for each other.
     Accumulated(StageAccess),
 }
 
@@ -31,7 +33,7 @@ impl Prefix {
         }
     }
 
-    /// The layout an image has to be in; none where it is not used.
+    /// Returns the layout that an image must have before the command buffer. `None` if it is not used.
     fn layout(&self) -> Option<Layout> {
         match self {
             Self::Unused => None,
@@ -42,23 +44,25 @@ impl Prefix {
     }
 }
 
-/// One (sub)resource inside one command buffer.
+/// State of one (sub)resource inside one command buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct LocalState {
     pub(super) prefix: Prefix,
-    /// Whether the command buffer has used it beyond the prefix, so that `state` depends on nothing before it.
+    /// True if the command buffer has used it beyond the prefix. `state` then depends on nothing before the
+    /// command buffer.
     pub(super) past_prefix: bool,
     pub(super) state: ResourceState,
 }
 
 impl LocalState {
-    /// The barrier in front of a use that is the last one again, and changes nothing here; `None` for every other use.
+    /// Returns the barrier in front of a use that repeats the last one and leaves the state unchanged. `None`
+    /// for every other use.
     #[inline(always)]
     fn repeated(&self, next: Use) -> Option<BarrierScopes> {
         if self.past_prefix { self.state.repeated(next) } else { None }
     }
 
-    /// Adds a use; answers the barrier in front of it, if one is needed.
+    /// Adds a use. Returns the barrier in front of it, if one is needed.
     #[inline(never)]
     fn apply(&mut self, next: Use) -> Option<BarrierScopes> {
         if !self.past_prefix {
@@ -67,7 +71,7 @@ impl LocalState {
         transition(&mut self.state, next)
     }
 
-    /// A use that may wait for nothing in the command buffer.
+    /// Adds a use that may belong to the prefix.
     fn apply_to_prefix(&mut self, next: Use) {
         match &mut self.prefix {
             Prefix::Unused => self.end_prefix(next),
@@ -83,7 +87,7 @@ impl LocalState {
             if next.is_write() { Prefix::Write(next) } else { Prefix::Reads(next.layout, next.into()) };
     }
 
-    /// Whether contents change, or the layout that is found.
+    /// True if the command buffer changes the contents, or the layout `found` before it.
     fn changes(&self, found: Layout) -> bool {
         match self.prefix {
             Prefix::Unused => false,
@@ -104,16 +108,16 @@ impl LocalState {
     }
 }
 
-/// How many rows of a table are kept in reach; a power of two.
+/// Number of cached table indices, a power of two.
 const INDEX_SIZE: usize = 8;
 
-/// Values in the order of their first use, found by id.
+/// Values in the order of their first use, with lookup by id.
 #[derive(Debug, Clone)]
 struct IdTable<T> {
     rows: IdMap<usize>,
     values: Vec<(ResourceId, T)>,
-    /// Rows asked for lately, each at a place that follows from the id: commands use the same few resources again and again.
-    /// What stands in the row tells whether it is the one.
+    /// Cache of recently used indices, at positions derived from the id. Commands use the same few resources
+    /// again and again. A cached index is valid for an id if the entry at the index has that id.
     lately: [usize; INDEX_SIZE],
 }
 
@@ -153,11 +157,11 @@ impl<T> Default for IdTable<T> {
     }
 }
 
-/// The uses of all resources by one command buffer, while it is recorded.
+/// The uses of all resources by one command buffer during recording.
 ///
-/// Barriers returned here only concern what the same command buffer did earlier. What it needs from the queue is kept
-/// for [`QueueState::submit`](super::queue_state::QueueState::submit), so that command buffers can be recorded side by side and
-/// submitted in any order.
+/// The barriers returned here only concern earlier commands of the same command buffer. The requirements on
+/// the queue are kept for [`QueueState::submit`](super::queue_state::QueueState::submit). Command buffers can
+/// therefore be recorded concurrently and submitted in any order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tracker {
     buffers: IdTable<LocalState>,
@@ -165,13 +169,13 @@ pub(crate) struct Tracker {
 }
 
 impl Tracker {
-    /// Forgets everything, for the next command buffer; keeps its memory.
+    /// Clears the tracker for the next command buffer, but keeps its memory.
     pub(crate) fn clear(&mut self) {
         self.buffers.clear();
         self.textures.clear();
     }
 
-    /// A command uses a buffer; adds the barrier that must stand in front of the command to `out`.
+    /// Records the use of a buffer by a command. Adds the barrier in front of the command to `out`.
     #[inline(always)]
     pub(crate) fn use_buffer(&mut self, id: ResourceId, next: Use, out: &mut Barriers) {
         let next = next.with_layout(Layout::Undefined);
@@ -181,8 +185,8 @@ impl Tracker {
         }
     }
 
-    /// A command writes a part of a resource that no other such command writes without a use in between, for example
-    /// builds of different acceleration structures, which are tracked as one resource.
+    /// Records a write to a part of a resource that no other such write touches without a use in between. An
+    /// example are builds of different acceleration structures, which are tracked as one resource.
     pub(crate) fn accumulate_buffer(&mut self, id: ResourceId, write: Use, out: &mut Barriers) {
         let write = write.with_layout(Layout::Undefined);
         if let Some(scopes) = self.buffers.entry(id, LocalState::default).accumulate(write) {
@@ -190,9 +194,10 @@ impl Tracker {
         }
     }
 
-    /// A command uses a part of a texture; adds the barriers that must stand in front of the command to `out`.
+    /// Records the use of a part of a texture by a command. Adds the barriers in front of the command to
+    /// `out`.
     ///
-    /// `shape` is the same in every call for one texture; `subresources` outside of it are ignored.
+    /// `shape` must be the same in every call for one texture. `subresources` outside it are ignored.
     #[inline(always)]
     pub(crate) fn use_texture(
         &mut self,
@@ -210,13 +215,15 @@ impl Tracker {
         }
     }
 
-    /// Whether [`use_buffer`](Self::use_buffer) would need a barrier, which cannot be recorded inside a render pass.
+    /// True if [`use_buffer`](Self::use_buffer) would need a barrier, which cannot be recorded inside a
+    /// render pass.
     pub(crate) fn needs_barrier_buffer(&self, id: ResourceId, next: Use) -> bool {
         let next = next.with_layout(Layout::Undefined);
         self.buffers.get(id).is_some_and(|local| would_wait(local, next))
     }
 
-    /// Whether [`use_texture`](Self::use_texture) would need a barrier, which cannot be recorded inside a render pass.
+    /// True if [`use_texture`](Self::use_texture) would need a barrier, which cannot be recorded inside a
+    /// render pass.
     pub(crate) fn needs_barrier_texture(
         &self,
         id: ResourceId,
@@ -227,23 +234,24 @@ impl Tracker {
         self.textures.get(id).is_some_and(|cells| cells.any(subresources, |local| would_wait(local, next)))
     }
 
-    /// Stages of the first uses of a texture that is used alike in all its parts; `None` where it is not used.
+    /// Returns the stages of the first uses of a texture whose subresources are all used alike. `None` if it
+    /// is not used.
     pub(crate) fn first_stages(&self, id: ResourceId) -> Option<Stages> {
         self.textures.get(id)?.uniform().map(|local| local.prefix.stages())
     }
 
-    /// Buffers in the order of their first use.
+    /// Returns the buffers in the order of their first use.
     pub(super) fn buffers(&self) -> &[(ResourceId, LocalState)] {
         &self.buffers.values
     }
 
-    /// Textures in the order of their first use.
+    /// Returns the textures in the order of their first use.
     pub(super) fn textures(&self) -> &[(ResourceId, PerSubresource<LocalState>)] {
         &self.textures.values
     }
 }
 
-/// A resource that a command buffer uses, as queues hand it to each other.
+/// A resource that a command buffer uses, for synchronisation and ownership transfers between queues.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TrackedUse<'a> {
     pub(crate) id: ResourceId,
@@ -257,7 +265,7 @@ enum TrackedUseKind<'a> {
 }
 
 impl Tracker {
-    /// Everything the command buffer uses.
+    /// Returns all resources that the command buffer uses.
     pub(crate) fn tracked_uses(&self) -> impl Iterator<Item = TrackedUse<'_>> {
         let buffers = self
             .buffers
@@ -272,14 +280,14 @@ impl Tracker {
         buffers.chain(textures)
     }
 
-    /// Whether the command buffer uses a resource.
+    /// True if the command buffer uses the resource.
     pub(crate) fn uses_resource(&self, id: ResourceId) -> bool {
         self.buffers.get(id).is_some() || self.textures.get(id).is_some()
     }
 }
 
 impl TrackedUse<'_> {
-    /// Whether contents or layouts change, where a texture is in these layouts before.
+    /// True if the command buffer changes the contents, or the layouts `before` of a texture.
     pub(crate) fn changes(&self, before: Option<&PerSubresource<Layout>>) -> bool {
         match self.parts {
             TrackedUseKind::Buffer(local) => local.changes(Layout::Undefined),
@@ -293,8 +301,9 @@ impl TrackedUse<'_> {
         }
     }
 
-    /// The state in which another queue, which waits for a semaphore at `stages`, finds a buffer, or a texture in these
-    /// layouts. Only what changes its layout first has to be told of the semaphore: everything else begins behind it.
+    /// Returns the state of the resource on another queue, which waits for a semaphore at `stages`. A texture
+    /// is in the layouts `before`. Only resources whose first use changes the layout depend on the semaphore
+    /// stages: all other uses start after the semaphore.
     pub(super) fn transferred_state(
         &self,
         before: Option<&PerSubresource<Layout>>,
@@ -312,7 +321,7 @@ impl TrackedUse<'_> {
     }
 }
 
-/// What another queue finds.
+/// State of a resource at the start of its use by another queue.
 pub(super) enum TransferredState {
     Buffer,
     Texture(PerSubresource<ResourceState>),
@@ -322,7 +331,7 @@ fn positions(shape: TextureShape) -> impl Iterator<Item = (u32, u32)> {
     (0..shape.layers).flat_map(move |layer| (0..shape.mips).map(move |mip| (mip, layer)))
 }
 
-/// Uses a part of a texture otherwise than the last time.
+/// Uses a part of a texture in a way that differs from the last use.
 #[inline(never)]
 fn use_subresources(
     id: ResourceId,
@@ -345,7 +354,8 @@ fn would_wait(local: &LocalState, next: Use) -> bool {
     after.apply(next).is_some()
 }
 
-/// A texture always needs a layout; one that every access allows stands in for none.
+/// Returns the use with a layout, because a texture always needs one. The general layout, which supports
+/// every access, replaces none.
 fn with_some_layout(next: Use) -> Use {
     if next.layout == Layout::Undefined { next.with_layout(Layout::General) } else { next }
 }

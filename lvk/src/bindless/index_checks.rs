@@ -1,9 +1,11 @@
-//! What shaders look their indices up in where they are checked, and the faults they write down.
+//! The buffer in which shaders check their bindless indices, and the faults that they write.
 //!
-//! One word for each slot says up to which command buffer its owner may be reached: 0 where nobody is, all ones while the
-//! owner is alive, and after the end of its handle the number of the last command buffer that was begun before. Every
-//! command buffer first writes its own number into a word in front of them, so that what was recorded while the owner was
-//! alive may still reach it, and what came later may not.
+//! The buffer holds one word for each slot: the number of the last command buffer that may access the slot's owner. The
+//! word is 0 for a slot without owner and all ones while the owner is alive. After the owner's handle is destroyed, the
+//! word is the number of the last command buffer begun before.
+//!
+//! Every command buffer first writes its own number into a word before those of the slots. Therefore commands recorded
+//! while the owner was alive may still access it, and later commands may not.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -20,41 +22,41 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 /// An array of the bindless set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum BindlessArray {
-    /// Sampled textures: `kTextures2D` and its kin.
+    /// Sampled textures: `kTextures2D` and the arrays of other kinds.
     Textures,
     /// `kSamplers` and `kSamplersShadow`.
     Samplers,
-    /// Storage images: `kImages2D` and its kin.
+    /// Storage images: `kImages2D` and the arrays of other kinds.
     StorageImages,
-    /// Top-level acceleration structures: `kTLAS`, and what the library's helpers and ray queries take for its index.
+    /// Top-level acceleration structures: `kTLAS`, and the indices that the library's helpers and ray queries take.
     AccelStructs,
 }
 
-/// What was found behind an index.
+/// State of a slot that a wrong index refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SlotState {
-    /// Nobody ever had it since the context began, or the index is beyond the array.
+    /// No object has had the index since the creation of the context, or the index is beyond the array.
     NeverCreated,
-    /// Its owner's handle was destroyed before the command buffer was begun.
+    /// The handle of the owner was destroyed before the command buffer was begun.
     Freed,
-    /// Its owner lacks the usage that this array needs: a texture without `SAMPLED` or `STORAGE`.
+    /// The owner lacks the usage that this array needs: a texture without `SAMPLED` or `STORAGE`.
     OtherUsage,
 }
 
-/// Accesses of one shader by one wrong index.
+/// Accesses of one shader with the same wrong index.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct IndexFault {
     /// The array.
     pub array: BindlessArray,
-    /// The index. The shader went on with index 0, the dummy.
+    /// The index. The shader used index 0, the default descriptor, instead.
     pub index: u32,
-    /// What was found there.
+    /// State of the slot.
     pub state: SlotState,
-    /// Debug name of the object that has or last had the index, if any had.
+    /// Debug name of the object that has or last had the index, if any.
     pub object: Option<String>,
     /// Debug name of the shader module.
     pub shader: String,
-    /// How often, counted by invocation; those of helper invocations do not count.
+    /// Number of accesses, counted by invocation. Helper invocations do not count.
     pub count: u32,
 }
 
@@ -63,7 +65,7 @@ impl BindlessArray {
         [Self::Textures, Self::Samplers, Self::StorageImages, Self::AccelStructs];
 }
 
-/// Places in the buffer, in words; `shader/glsl/checked_index.glsl` has the same numbers.
+/// Positions in the buffer, in words. `shader/glsl/checked_index.glsl` has the same numbers.
 const CURRENT: u32 = 0;
 const LOST: usize = 1;
 const ENTRIES: u32 = 16;
@@ -73,24 +75,24 @@ const STATES: u32 = ENTRIES + ENTRY_COUNT * ENTRY_WORDS;
 const FREE: u32 = 0;
 const ALIVE: u32 = u32::MAX;
 
-/// Where the words of an array lie.
+/// Position of the words of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct WordRange {
     pub(crate) first: u32,
     pub(crate) count: u32,
 }
 
-/// What a shader needs to be checked.
+/// Parameters of the index checks of a shader.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CheckPlan {
     pub(crate) address: u64,
-    /// The number its faults are written down under.
+    /// The shader number in its faults.
     pub(crate) shader: u32,
-    /// By [`BindlessArray::ALL`].
+    /// Word ranges in the order of [`BindlessArray::ALL`].
     pub(crate) arrays: [WordRange; 4],
 }
 
-/// The buffer, and who has and had which slot.
+/// The buffer of the index checks, and the current and former owners of each slot.
 pub(crate) struct IndexChecks {
     pub(crate) buffer: Arc<Buffer>,
     arrays: [WordRange; 4],
@@ -99,13 +101,13 @@ pub(crate) struct IndexChecks {
 
 #[derive(Default)]
 struct SlotOwners {
-    /// Who has or last had a slot.
+    /// The current or last owner of a slot.
     owners: HashMap<(BindlessArray, u32), String>,
     shaders: Vec<String>,
 }
 
 impl IndexChecks {
-    /// `counts` are the slots of each array.
+    /// Creates the buffer. `counts` are the slots of each array.
     pub(crate) fn new(gpu: &Arc<Gpu>, counts: [u32; 4]) -> Result<Self> {
         let mut first = STATES;
         let arrays = counts.map(|count| {
@@ -125,7 +127,7 @@ impl IndexChecks {
         Ok(checks)
     }
 
-    /// What a module of this name needs.
+    /// Returns the check parameters of a module of this name.
     pub(crate) fn plan(&self, shader: &str) -> CheckPlan {
         let mut known = self.lock();
         known.shaders.push(shader.to_owned());
@@ -136,30 +138,30 @@ impl IndexChecks {
         }
     }
 
-    /// Somebody has a slot from now on; of a texture both arrays are told.
+    /// Records the owner of a slot. A texture owns the slot in both of its arrays.
     pub(super) fn reserve(&self, arrays: &[BindlessArray], slot: u32, name: &str) {
         let mut known = self.lock();
         arrays.iter().for_each(|array| _ = known.owners.insert((*array, slot), name.to_owned()));
     }
 
-    /// The owner can be reached.
+    /// Marks the owner of a slot as accessible.
     pub(super) fn mark_alive(&self, array: BindlessArray, slot: u32) {
         self.write(array, slot, ALIVE);
     }
 
-    /// The owner's handle is gone; command buffers up to `newest` may still reach it.
+    /// Marks the handle of a slot's owner as destroyed. Command buffers up to `newest` may still access the owner.
     pub(super) fn mark_retired(&self, array: BindlessArray, slot: u32, newest: u64) {
         self.write(array, slot, (newest as u32).clamp(1, ALIVE - 1));
     }
 
-    /// The slot goes back. An owner that never came into being is forgotten.
+    /// Frees a slot. An owner that is still marked alive was never created; its word becomes 0.
     pub(super) fn mark_free(&self, array: BindlessArray, slot: u32) {
         if self.read(array, slot) == ALIVE {
             self.write(array, slot, FREE);
         }
     }
 
-    /// Records that the command buffer of this number begins, behind everything before it.
+    /// Records the number of the command buffer at its begin, after all earlier commands.
     pub(crate) fn record_begin(&self, gpu: &Gpu, commands: vk::CommandBuffer, sequence: u64) {
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
         let all = (Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE);
@@ -173,15 +175,15 @@ impl IndexChecks {
         barrier(gpu, commands, transfer, all);
     }
 
-    /// The faults in a copy of the buffer's first [`fault_bytes`](Self::fault_bytes), in the order of arrays, indices and
-    /// shaders.
+    /// Returns the faults in a copy of the buffer's first [`fault_bytes`](Self::fault_bytes), sorted by array, index
+    /// and shader.
     pub(crate) fn faults(&self, words: &[u32]) -> Vec<IndexFault> {
         let (entries, _) =
             words.get(ENTRIES as usize..).unwrap_or(&[]).as_chunks::<{ ENTRY_WORDS as usize }>();
         let lost = words.get(LOST).copied().unwrap_or(0);
         if lost > 0 {
             log::warn!(
-                "{lost} accesses by wrong indices are not listed one by one: there are too many kinds of them"
+                "{lost} accesses with wrong indices are not listed: there are too many different faults"
             );
         }
         let mut faults: Vec<_> = entries.iter().filter_map(|entry| self.decode_fault(entry)).collect();
@@ -189,12 +191,12 @@ impl IndexChecks {
         faults
     }
 
-    /// Bytes at the start of the buffer that hold the faults.
+    /// Returns the size of the faults, which are at the start of the buffer.
     pub(crate) fn fault_bytes() -> u64 {
         u64::from(STATES) * 4
     }
 
-    /// Key, shader, array, index, the word found, and the count.
+    /// Decodes an entry: key, shader, array, index, the word found, and the count.
     fn decode_fault(&self, entry: &[u32; ENTRY_WORDS as usize]) -> Option<IndexFault> {
         let [key, shader, array, index, word, count, ..] = *entry;
         let array = BindlessArray::ALL.get(array as usize).copied().filter(|_| key != 0)?;
@@ -233,7 +235,7 @@ impl IndexChecks {
 
 type SyncScope = (vk::PipelineStageFlags2, vk::AccessFlags2);
 
-/// Outside of the trackers, which do not know of the buffer: shaders reach it in every command.
+/// Records a barrier for the buffer. The trackers do not know the buffer, since shaders access it in every command.
 fn barrier(gpu: &Gpu, commands: vk::CommandBuffer, from: SyncScope, to: SyncScope) {
     let barrier = [vk::MemoryBarrier2::default()
         .src_stage_mask(from.0)

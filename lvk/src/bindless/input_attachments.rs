@@ -1,4 +1,4 @@
-//! The second descriptor set: the targets of a pass as its own fragment shaders read them.
+//! The second descriptor set: the targets of a pass, read by the fragment shaders of the same pass.
 
 use std::fmt;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::gpu::Gpu;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum InputAttachment {
     Depth,
-    /// By its place among the colour targets.
+    /// A colour target, by its number.
     Color(u32),
     Stencil,
 }
@@ -20,10 +20,11 @@ pub(crate) enum InputAttachment {
 impl InputAttachment {
     /// Colour targets of a pass.
     const COLORS: u32 = 8;
-    /// Places of the set on devices that allow so many.
+    /// Bindings of the set on devices without a lower limit.
     pub(crate) const COUNT: u32 = Self::COLORS + 2;
 
-    /// What is at a place. Depth and the first colours come first, as some devices have four inputs in all.
+    /// Returns the input attachment of an index. Depth and the first colours come first, because some devices have only
+    /// four input attachments.
     pub(crate) fn from_index(place: u32) -> Option<Self> {
         match place {
             0 => Some(Self::Depth),
@@ -33,7 +34,7 @@ impl InputAttachment {
         }
     }
 
-    /// Its place: its binding in the set, and its `input_attachment_index`, which has the same limit.
+    /// Returns the index: the binding in the set, and the `input_attachment_index`, which has the same limit.
     pub(crate) fn index(self) -> u32 {
         match self {
             Self::Depth => 0,
@@ -53,7 +54,7 @@ impl fmt::Display for InputAttachment {
     }
 }
 
-/// Some targets of a pass.
+/// A set of targets of a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct InputAttachmentMask(u16);
 
@@ -78,17 +79,17 @@ impl InputAttachmentMask {
         Self(self.0 | other.0)
     }
 
-    /// Those that `other` lacks.
+    /// Returns the targets that are not in `other`.
     pub(crate) fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// Whether depth or stencil is among them.
+    /// True if the set contains depth or stencil.
     pub(crate) fn has_depth(self) -> bool {
         self.contains(InputAttachment::Depth) || self.contains(InputAttachment::Stencil)
     }
 
-    /// By their places.
+    /// Returns the targets in the order of their indices.
     pub(crate) fn iter(self) -> impl Iterator<Item = InputAttachment> {
         (0..InputAttachment::COUNT)
             .filter_map(InputAttachment::from_index)
@@ -107,13 +108,13 @@ impl FromIterator<InputAttachment> for InputAttachmentMask {
 /// The layout of the set, destroyed on drop. Its descriptors are never updated after they are bound.
 pub(crate) struct InputAttachmentLayout {
     pub(crate) raw: vk::DescriptorSetLayout,
-    /// Bindings it has.
+    /// Number of bindings.
     pub(crate) count: u32,
     gpu: Arc<Gpu>,
 }
 
 impl InputAttachmentLayout {
-    /// `None` for devices whose shaders cannot read what their pass draws.
+    /// Creates the layout. Returns `None` for devices whose shaders cannot read the targets of their pass.
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Option<Self>> {
         let count = gpu.caps.limits.max_input_attachments;
         if count == 0 {

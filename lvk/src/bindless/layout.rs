@@ -1,16 +1,16 @@
-//! The binding numbers of the bindless descriptor set, for Rust and for GLSL, and its numbers of descriptors.
+//! Binding numbers of the bindless descriptor set, for Rust and for GLSL, and its descriptor counts.
 //!
 //! The shader preamble and the check of foreign SPIR-V are both generated from these constants.
 
 use crate::gpu::Gpu;
 use crate::gpu::caps::descriptor_limits::ReservedDescriptors;
 
-/// The descriptor set that holds everything.
+/// The set number of the bindless descriptor set.
 pub(crate) const SET: u32 = 0;
-/// The set of the pass's own targets as fragment shaders read them; its bindings are
+/// The set number of the pass's own targets, which fragment shaders read. Its bindings are
 /// [`InputAttachment`](super::input_attachments::InputAttachment)s.
 pub(crate) const INPUT_SET: u32 = 1;
-/// Sampled images: every texture, seen as 2D, array, 3D or cube through aliased declarations.
+/// Sampled images: every texture, declared as 2D, array, 3D or cube by aliased arrays.
 pub(crate) const SAMPLED_IMAGES: u32 = 0;
 /// Samplers, with and without depth comparison.
 pub(crate) const SAMPLERS: u32 = 1;
@@ -20,33 +20,33 @@ pub(crate) const STORAGE_IMAGES: u32 = 2;
 pub(crate) const YCBCR: u32 = 3;
 /// Top-level acceleration structures.
 pub(crate) const ACCEL_STRUCTS: u32 = 4;
-/// One storage buffer: for each top-level structure the address of the rows that lead from hits to the caller's
-/// instances and primitives.
+/// One storage buffer, the TLAS table. Its entry of a TLAS holds the addresses of the hit remap table and of the
+/// software TLAS. The hit remap table maps hits to the caller's instances and primitives.
 pub(crate) const TLAS_TABLE: u32 = 5;
 
-/// Bytes of an entry of the table of top-level structures.
+/// Size of an entry of the TLAS table in bytes.
 pub(crate) const TLAS_TABLE_ENTRY_BYTES: u64 = 16;
 
-/// Each binding with the words an error message and the preamble use for it.
+/// Each binding with its name in the preamble and its description in error messages.
 pub(crate) const BINDINGS: [(u32, &str, &str); 6] = [
     (SAMPLED_IMAGES, "LVK_BINDING_SAMPLED_IMAGES", "sampled images"),
     (SAMPLERS, "LVK_BINDING_SAMPLERS", "samplers"),
     (STORAGE_IMAGES, "LVK_BINDING_STORAGE_IMAGES", "storage images"),
     (YCBCR, "LVK_BINDING_YCBCR", "combined Y'CbCr samplers"),
     (ACCEL_STRUCTS, "LVK_BINDING_ACCEL_STRUCTS", "top-level acceleration structures"),
-    (TLAS_TABLE, "LVK_BINDING_TLAS_TABLE", "the table of top-level structures"),
+    (TLAS_TABLE, "LVK_BINDING_TLAS_TABLE", "the TLAS table"),
 ];
 
-/// Numbers of descriptors of the bindless set beside textures and samplers.
+/// Descriptor counts of the bindless set, without textures and samplers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DescriptorCounts {
-    /// Top-level acceleration structures, of either form.
+    /// TLAS slots, for hardware or software traversal.
     pub(super) tlas_slots: u32,
-    /// Top-level acceleration structures of the device.
+    /// TLAS descriptors; 0 without hardware acceleration structures.
     pub(super) hardware_tlas: u32,
-    /// Tables of top-level acceleration structures.
+    /// Descriptors of the TLAS table, 0 or 1.
     pub(super) tlas_tables: u32,
-    /// What they count for together, with the set of a pass's own targets.
+    /// Descriptors that count against shared limits, including the set of a pass's own targets.
     pub(super) reserved: ReservedDescriptors,
 }
 

@@ -1,24 +1,25 @@
-//! Places in one bindless descriptor array, and which of them have to be written.
+//! Allocator of the slots of one bindless descriptor array, with the list of slots to write.
 
-/// Whether a slot is taken, and whether it is already on the list of slots to write.
+/// State of a slot: whether it is taken, and whether it is on the list of slots to write.
 #[derive(Debug, Clone, Copy, Default)]
 struct SlotMark {
     taken: bool,
     dirty: bool,
 }
 
-/// Slots of one descriptor array. Slot 0 is the dummy that shaders see in place of nothing; it is never handed out.
+/// Slots of one descriptor array. Slot 0 is the default descriptor, which shaders read in place of no object. It is
+/// never allocated.
 #[derive(Debug)]
 pub(crate) struct Slots {
     capacity: u32,
-    /// One for each slot ever used, the dummy first.
+    /// State of each slot ever used, the default descriptor first.
     marks: Vec<SlotMark>,
     free: Vec<u32>,
     dirty: Vec<u32>,
 }
 
 impl Slots {
-    /// Slots `0..capacity`; the dummy is to be written first.
+    /// Creates the slots `0..capacity`. The default descriptor is on the list of slots to write.
     pub(crate) fn new(capacity: u32) -> Self {
         let mut slots = Self { capacity, marks: Vec::new(), free: Vec::new(), dirty: Vec::new() };
         if capacity > 0 {
@@ -28,7 +29,7 @@ impl Slots {
         slots
     }
 
-    /// A slot that nobody uses, to be written; `None` if all are taken.
+    /// Allocates a free slot and marks it to be written; `None` if all are taken.
     pub(crate) fn alloc(&mut self) -> Option<u32> {
         let slot = match self.free.pop() {
             Some(slot) => slot,
@@ -39,8 +40,8 @@ impl Slots {
         Some(slot)
     }
 
-    /// Gives a slot back, which is then to be written with the dummy. The caller has waited until the GPU no longer
-    /// reads it. A slot that is not taken, and the dummy, are left alone.
+    /// Frees a slot and marks it to be written with the default descriptor. The caller must have waited until the GPU
+    /// no longer reads the slot. Slot 0 and slots that are not taken are ignored.
     pub(crate) fn free(&mut self, slot: u32) {
         if slot == 0 || !self.is_taken(slot) {
             return;
@@ -50,7 +51,7 @@ impl Slots {
         self.free.push(slot);
     }
 
-    /// Notes that a taken slot has to be written again.
+    /// Marks a taken slot to be written again.
     pub(crate) fn mark_dirty(&mut self, slot: u32) {
         match self.marks.get_mut(slot as usize) {
             Some(mark) if mark.taken && !mark.dirty => mark.dirty = true,
@@ -59,12 +60,12 @@ impl Slots {
         self.dirty.push(slot);
     }
 
-    /// Whether no slot is to be written.
+    /// True if no slot must be written.
     pub(crate) fn is_clean(&self) -> bool {
         self.dirty.is_empty()
     }
 
-    /// The slots to write, in ascending order, each once; they count as written from now on.
+    /// Returns the slots to write in ascending order, without duplicates, and clears the list.
     pub(crate) fn take_dirty(&mut self) -> Vec<u32> {
         let mut dirty = std::mem::take(&mut self.dirty);
         dirty.sort_unstable();
@@ -74,12 +75,12 @@ impl Slots {
         dirty
     }
 
-    /// Whether somebody uses the slot; the dummy is always taken.
+    /// True if the slot is taken. Slot 0 is always taken.
     pub(crate) fn is_taken(&self, slot: u32) -> bool {
         self.marks.get(slot as usize).is_some_and(|mark| mark.taken)
     }
 
-    /// Number of slots, with the dummy.
+    /// Returns the number of slots, slot 0 included.
     pub(crate) fn capacity(&self) -> u32 {
         self.capacity
     }

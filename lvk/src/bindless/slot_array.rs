@@ -1,9 +1,9 @@
-//! Slots of one array with their owners.
+//! Slots of one descriptor array with their owners.
 
 use super::slot_allocator::Slots;
 use crate::error::{Error, Result};
 
-/// Slots of one kind and who owns them.
+/// Slots of one kind and their owners.
 pub(super) struct SlotArray<T> {
     kind: &'static str,
     pub(super) slots: Slots,
@@ -38,7 +38,7 @@ impl<T: Copy> SlotArray<T> {
     }
 }
 
-/// Which descriptors of an array show an owner, and not the dummy that all were filled with.
+/// Marks the descriptors of an array that refer to an owner. All others hold the default descriptor.
 pub(super) struct WrittenDescriptors(Vec<bool>);
 
 impl WrittenDescriptors {
@@ -46,8 +46,8 @@ impl WrittenDescriptors {
         Self(vec![false; capacity as usize])
     }
 
-    /// Whether the descriptor of a slot has to be written, now that the slot has an owner to show or none. It counts as
-    /// written from now on.
+    /// True if the descriptor of a slot must be written. `has_owner` is the new state of the slot, which counts as
+    /// written from then on.
     pub(super) fn must_write(&mut self, slot: u32, has_owner: bool) -> bool {
         match self.0.get_mut(slot as usize) {
             Some(shown) => std::mem::replace(shown, has_owner) || has_owner,

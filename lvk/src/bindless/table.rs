@@ -1,4 +1,4 @@
-//! The one descriptor set: who sits in which slot, and which slots must be written before the next submission.
+//! The bindless descriptor set: the owner of each slot, and the slots to write before the next submission.
 
 use std::sync::Arc;
 
@@ -16,21 +16,21 @@ use crate::gpu::caps::descriptor_limits::largest_fitting;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::ycbcr::YuvConversion;
 
-/// What a texture's slot shows to shaders.
+/// Views in the slot of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TextureViews {
     pub(crate) sampled: Option<vk::ImageView>,
     pub(crate) storage: Option<vk::ImageView>,
 }
 
-/// Objects that stand in every slot nobody owns.
+/// Default descriptors: objects in every slot without an owner.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DefaultDescriptors {
     pub(crate) sampled: vk::ImageView,
     pub(crate) storage: vk::ImageView,
     pub(crate) sampler: vk::Sampler,
     pub(crate) tlas: Option<vk::AccelerationStructureKHR>,
-    /// Not a dummy: the table is the same for the whole life of the context.
+    /// The TLAS table. Not a default: the buffer is the same for the whole life of the context.
     pub(crate) tlas_table: Option<vk::Buffer>,
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct Bindless {
     pub(crate) set: vk::DescriptorSet,
     pool: vk::DescriptorPool,
     entries: Mutex<BindlessState>,
-    /// Present where shaders look their indices up.
+    /// Present if shaders check their indices.
     pub(crate) checks: Option<IndexChecks>,
     gpu: Arc<Gpu>,
 }
@@ -48,7 +48,7 @@ pub(crate) struct Bindless {
 struct BindlessState {
     defaults: Option<DefaultDescriptors>,
     textures: SlotArray<TextureViews>,
-    /// Of sampled and of storage images: most textures are only one of both.
+    /// State of the descriptors of sampled and of storage images. Most textures have only one of both.
     shown: [WrittenDescriptors; 2],
     samplers: SlotArray<vk::Sampler>,
     tlas: SlotArray<vk::AccelerationStructureKHR>,
@@ -56,7 +56,7 @@ struct BindlessState {
 }
 
 impl BindlessState {
-    /// Whether nothing is to be written, as before most submissions.
+    /// True if no descriptor must be written, as before most submissions.
     fn is_clean(&self) -> bool {
         let arrays = [&self.textures.slots, &self.samplers.slots, &self.tlas.slots];
         arrays.into_iter().all(Slots::is_clean) && self.yuv.is_clean()
@@ -98,7 +98,7 @@ impl Bindless {
         Ok(Self { set_layout, set, pool, entries, checks, gpu: Arc::clone(gpu) })
     }
 
-    /// Puts the dummies into every slot. Nothing has been submitted yet.
+    /// Writes the default descriptors into every slot. No command buffer has been submitted yet.
     pub(crate) fn write_defaults(&self, defaults: DefaultDescriptors) {
         let mut entries = self.lock();
         entries.defaults = Some(defaults);
@@ -113,17 +113,17 @@ impl Bindless {
         self.write_yuv(entries.yuv.all_views());
     }
 
-    /// What stands in the slots of a conversion that nobody owns; before [`write_defaults`](Self::write_defaults).
+    /// Sets the default descriptor of a conversion; must precede [`write_defaults`](Self::write_defaults).
     pub(crate) fn set_yuv_default(&self, conversion: usize, view: vk::ImageView) {
         self.lock().yuv.set_default(conversion, view);
     }
 
-    /// The conversions that the device has.
+    /// Returns the conversions that the device supports.
     pub(crate) fn yuv_conversions(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
         self.lock().yuv.conversions()
     }
 
-    /// A slot for a texture in Y'CbCr, by this conversion or the first of its format.
+    /// Reserves a slot for a texture in Y'CbCr. `None` selects the first conversion of the format.
     pub(crate) fn reserve_yuv(
         &self,
         format: Format,
@@ -137,7 +137,7 @@ impl Bindless {
         self.lock().yuv.set(slot, view);
     }
 
-    /// As [`free_texture`](Self::free_texture).
+    /// Frees a slot of a Y'CbCr texture; see [`free_texture`](Self::free_texture).
     pub(crate) fn free_yuv(&self, slot: u32) {
         self.lock().yuv.free(slot);
     }
@@ -179,7 +179,8 @@ impl Bindless {
         self.lock().tlas.set(slot, Some(tlas));
     }
 
-    /// Puts the dummy back into a slot whose owner the GPU is done with, and lets the slot be taken again.
+    /// Frees the slot of a texture that the GPU no longer uses. The slot is written with the default descriptor and can
+    /// be reserved again.
     pub(crate) fn free_texture(&self, slot: u32) {
         let mut entries = self.lock();
         entries.textures.set(slot, None);
@@ -187,7 +188,7 @@ impl Bindless {
         self.record_free(&TEXTURE_ARRAYS, slot);
     }
 
-    /// As [`free_texture`](Self::free_texture).
+    /// Frees the slot of a sampler; see [`free_texture`](Self::free_texture).
     pub(crate) fn free_sampler(&self, slot: u32) {
         let mut entries = self.lock();
         entries.samplers.set(slot, None);
@@ -195,7 +196,7 @@ impl Bindless {
         self.record_free(&[BindlessArray::Samplers], slot);
     }
 
-    /// As [`free_texture`](Self::free_texture).
+    /// Frees the slot of a TLAS; see [`free_texture`](Self::free_texture).
     pub(crate) fn free_tlas(&self, slot: u32) {
         let mut entries = self.lock();
         entries.tlas.set(slot, None);
@@ -203,7 +204,8 @@ impl Bindless {
         self.record_free(&[BindlessArray::AccelStructs], slot);
     }
 
-    /// The handle of the owner of a slot is gone, and command buffers up to number `newest` were begun before.
+    /// Records that the handle of a slot's owner was destroyed. `newest` returns the number of the last command buffer
+    /// begun before.
     pub(crate) fn record_retired(&self, arrays: &[BindlessArray], slot: u32, newest: impl FnOnce() -> u64) {
         if let Some(checks) = &self.checks {
             let newest = newest();
@@ -211,7 +213,7 @@ impl Bindless {
         }
     }
 
-    /// What a module of this name needs, where indices are checked.
+    /// Returns the check parameters of a module of this name; `None` without index checks.
     pub(crate) fn check_plan(&self, shader: &str) -> Option<CheckPlan> {
         self.checks.as_ref().map(|checks| checks.plan(shader))
     }
@@ -300,8 +302,8 @@ impl Bindless {
             .map(|(first, infos)| self.descriptor_write(binding, first).descriptor_type(ty).image_info(infos))
             .collect();
         if !writes.is_empty() {
-            // SAFETY: the views and samplers are alive; slots in use by the GPU are not among the dirty ones, as
-            // slots are only rewritten when the timeline has passed their last use. The lock serialises updates.
+            // SAFETY: the views and samplers are alive. Dirty slots are not in use by the GPU, as a slot is only
+            // rewritten after the timeline has passed its last use. The lock serialises updates.
             unsafe { self.gpu.device.update_descriptor_sets(&writes, &[]) };
         }
     }
@@ -357,7 +359,7 @@ impl Drop for Bindless {
     }
 }
 
-/// Descriptors of neighbouring slots, so that one write covers many.
+/// Runs of descriptors of consecutive slots, so that one write covers many descriptors.
 struct Runs<T> {
     infos: Vec<T>,
     starts: Vec<(u32, usize)>,
@@ -371,7 +373,7 @@ impl<T> Default for Runs<T> {
 }
 
 impl<T> Runs<T> {
-    /// Adds a slot; slots come in rising order.
+    /// Adds a slot. Slots must be added in ascending order.
     fn push(&mut self, slot: u32, info: T) {
         if self.starts.is_empty() || slot != self.next {
             self.starts.push((slot, self.infos.len()));
@@ -400,7 +402,7 @@ fn image_info(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorIma
 
 type BindingCount = (u32, vk::DescriptorType, u32);
 
-/// The bindings with so many textures and samplers, without those of Y'CbCr.
+/// Returns the bindings with their descriptor counts, without the Y'CbCr binding.
 fn binding_counts(gpu: &Gpu, textures: u32, samplers: u32) -> [BindingCount; 5] {
     let others = DescriptorCounts::new(gpu);
     [
@@ -412,7 +414,7 @@ fn binding_counts(gpu: &Gpu, textures: u32, samplers: u32) -> [BindingCount; 5] 
     ]
 }
 
-/// Whether the device takes a set of this size: its limits of descriptors say nothing of their bytes.
+/// True if the device supports a set of this size. The descriptor limits do not cover the size of descriptors in bytes.
 fn is_supported(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> bool {
     with_layout_info(counts, yuv, |info| {
         let mut support = vk::DescriptorSetLayoutSupport::default();
@@ -423,13 +425,13 @@ fn is_supported(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> bool
 }
 
 fn create_layout(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> Result<vk::DescriptorSetLayout> {
-    // SAFETY: the counts are within the limits of descriptors beside everything else that they count for (`DescriptorCounts`), and the
-    // device was asked whether it supports the layout.
+    // SAFETY: the counts, including all other descriptors of `DescriptorCounts`, are within the descriptor limits, and
+    // the device supports the layout.
     with_layout_info(counts, yuv, |info| unsafe { gpu.device.create_descriptor_set_layout(info, None) })
         .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))
 }
 
-/// Hands the description of the layout on.
+/// Calls `then` with the description of the layout.
 fn with_layout_info<T>(
     counts: &[BindingCount],
     yuv: &[vk::Sampler],
@@ -464,7 +466,8 @@ fn with_layout_info<T>(
     then(&info)
 }
 
-/// The table is written once; slots of everything else change while others are in use.
+/// Returns the flags of a binding. The TLAS table is written once. Slots of all other bindings change while others are
+/// in use.
 fn binding_flags(binding: u32) -> vk::DescriptorBindingFlags {
     use vk::DescriptorBindingFlags as Flags;
     if binding == layout::TLAS_TABLE {

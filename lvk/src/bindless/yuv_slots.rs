@@ -1,4 +1,5 @@
-//! Slots of textures in Y'CbCr: a range of one binding for each conversion, whose sampler lies in the layout.
+//! Slots of Y'CbCr textures: one binding with a range for each conversion. The samplers of the conversions are part of
+//! the layout.
 
 use std::sync::Arc;
 
@@ -11,18 +12,18 @@ use crate::gpu::Gpu;
 use crate::gpu::caps::descriptor_limits::YuvRequest;
 use crate::resource::ycbcr::{YuvConversion, YuvSampler};
 
-/// Conversions of a context, each with its textures.
+/// Conversions of a context with the slots of their textures.
 pub(crate) struct YuvSlots {
     ranges: Vec<ConversionRange>,
-    /// Slots of each conversion that the device has, its dummy included.
+    /// Slots of each supported conversion, including its default descriptor.
     room: u32,
-    /// Descriptors that all slots take: each as many as one of the conversion that takes most.
+    /// Descriptors of all slots. Each slot takes as many as the conversion with the largest need.
     descriptors: u32,
 }
 
 struct ConversionRange {
     desc: YuvConversion,
-    /// The conversion, or what the device lacks for it.
+    /// The conversion, or the feature that the device lacks for it.
     sampler: Result<Arc<YuvSampler>, &'static str>,
     /// First slot in the binding.
     first: u32,
@@ -30,7 +31,7 @@ struct ConversionRange {
     default_view: Option<vk::ImageView>,
 }
 
-/// Where a texture goes, and how it is converted.
+/// The slot of a texture and its conversion.
 pub(crate) struct YuvSlot {
     pub(crate) slot: u32,
     pub(crate) conversion: vk::SamplerYcbcrConversion,
@@ -39,11 +40,10 @@ pub(crate) struct YuvSlot {
 impl YuvSlots {
     const MAX_TEXTURES: u32 = 1_024;
 
-    /// Makes the conversions that the device has, each with room for so many textures, or for as many as the device
-    /// allows.
+    /// Creates the supported conversions, each with slots for `textures` textures or as many as the device allows.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] where the device does not even allow one for each.
+    /// [`Error::LimitExceeded`] if the device does not allow one texture for each conversion.
     pub(crate) fn new(gpu: &Arc<Gpu>, descs: &[YuvConversion], textures: u32) -> Result<Self> {
         let mut samplers = Vec::with_capacity(descs.len());
         for desc in descs {
@@ -66,18 +66,18 @@ impl YuvSlots {
         Ok(Self { ranges, room, descriptors: wish.descriptors * first })
     }
 
-    /// The immutable samplers of the binding, one a slot.
+    /// Returns the immutable samplers of the binding, one for each slot.
     pub(super) fn samplers(&self) -> Vec<vk::Sampler> {
         let made = self.ranges.iter().filter_map(|range| range.sampler.as_ref().ok());
         made.flat_map(|made| std::iter::repeat_n(made.sampler, self.room as usize)).collect()
     }
 
-    /// Descriptors that the slots take of the set, of a stage and of a pool.
+    /// Returns the number of descriptors that the slots take in the set, in a stage and in a pool.
     pub(super) fn descriptors(&self) -> u32 {
         self.descriptors
     }
 
-    /// The conversions that need a dummy, by their numbers.
+    /// Returns the conversions that need a default descriptor, with their numbers.
     pub(crate) fn conversions(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
         let made = |(number, range): (usize, &ConversionRange)| {
             let sampler = range.sampler.as_ref().ok()?;
@@ -86,7 +86,7 @@ impl YuvSlots {
         self.ranges.iter().enumerate().filter_map(made).collect()
     }
 
-    /// Takes a slot for a texture of `format` by this conversion, or by the first of its format.
+    /// Reserves a slot for a texture of `format`. A `conversion` of `None` selects the first of the format.
     pub(super) fn reserve(
         &mut self,
         format: crate::Format,
@@ -127,7 +127,7 @@ impl YuvSlots {
         }
     }
 
-    /// All slots with what stands in them, in rising order.
+    /// Returns all slots with their default views, in ascending order.
     pub(super) fn all_views(&self) -> Vec<(u32, vk::ImageView)> {
         let slots = |range: &ConversionRange| {
             let slots =
@@ -140,12 +140,12 @@ impl YuvSlots {
         self.ranges.iter().flat_map(slots).collect()
     }
 
-    /// Whether no slot is to be written.
+    /// True if no slot must be written.
     pub(super) fn is_clean(&self) -> bool {
         self.ranges.iter().all(|range| range.textures.slots.is_clean())
     }
 
-    /// Slots to write again, in rising order.
+    /// Returns the slots to write with their views, in ascending order.
     pub(super) fn take_dirty(&mut self) -> Vec<(u32, vk::ImageView)> {
         let mut dirty = Vec::new();
         for range in &mut self.ranges {

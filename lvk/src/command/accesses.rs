@@ -1,4 +1,4 @@
-//! Everything one command uses, gathered before the tracker is asked, so that a resource used twice counts once.
+//! All accesses of one command, collected before they go to the tracker, so that a resource used twice counts once.
 
 use std::sync::Arc;
 
@@ -10,31 +10,32 @@ use crate::handle_cache::HandleCache;
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit_barriers::Images;
 
-/// So many are searched one by one, which is faster than a map. Builds of many structures use more.
+/// Up to this length the list is searched linearly, which is faster than a map. Builds of many acceleration structures
+/// exceed it.
 const LINEAR_SEARCH_MAX: usize = 16;
 
-/// The uses of one command. Kept in the command buffer and emptied, so that recording does not allocate.
+/// The accesses of one command. The command buffer keeps and clears it, so that recording does not allocate.
 #[derive(Default)]
 pub(crate) struct CommandAccesses {
     buffers: Vec<(ResourceId, Use)>,
-    /// Where each of `buffers` is, once they are more than a few; empty before.
+    /// Index of each entry of `buffers`, once the list is longer than `LINEAR_SEARCH_MAX`; empty before.
     index_by_id: IdMap<usize>,
-    /// Parts of images, with the rows of their textures.
+    /// Subresources of images, with the indices of their textures in the cache.
     textures: SubresourceAccesses<usize>,
     writers: Vec<(ResourceId, Use)>,
-    /// How many of the textures found the images of the command buffer have.
+    /// Number of cached textures whose images are in the [`Images`] of the command buffer.
     known_images: usize,
 }
 
-/// Textures that a command buffer has found.
+/// The handle cache for the textures that a command buffer uses.
 pub(super) type TextureCache = HandleCache<TextureHandle, Texture>;
 
 impl CommandAccesses {
-    /// The command uses a buffer, or what stands for one.
+    /// Adds an access to a buffer, or to an id that stands for other resources.
     #[inline]
     pub(crate) fn add_id(&mut self, id: ResourceId, next: Use) {
         match self.index_of(id) {
-            // Layouts mean nothing to buffers, so their uses always merge.
+            // Buffers have no layouts, so their uses always merge.
             Some(index) => {
                 let (_, present) = &mut self.buffers[index];
                 present.stages |= next.stages;
@@ -49,7 +50,7 @@ impl CommandAccesses {
         }
     }
 
-    /// Where a buffer that the command uses already is in the list.
+    /// Returns the index of a buffer that the command already uses.
     #[inline]
     fn index_of(&mut self, id: ResourceId) -> Option<usize> {
         if self.buffers.len() < LINEAR_SEARCH_MAX {
@@ -62,20 +63,21 @@ impl CommandAccesses {
         self.index_by_id.get(&id).copied()
     }
 
-    /// The command uses a buffer.
+    /// Adds an access to a buffer.
     #[inline]
     pub(crate) fn add_buffer(&mut self, buffer: &Buffer, next: Use) {
         self.add_id(buffer.id, next);
     }
 
-    /// The command adds to what `add_id` stands for, next to other writers.
+    /// Adds a write of a part of the resource behind `id`. Such writes of different parts need no barriers between each
+    /// other.
     pub(crate) fn add_accumulating(&mut self, id: ResourceId, write: Use) {
         if !self.writers.contains(&(id, write)) {
             self.writers.push((id, write));
         }
     }
 
-    /// The command uses a part of the image that the texture of a row shows.
+    /// Adds an access to subresources of the texture at `index` of the cache.
     #[inline(always)]
     pub(super) fn add_texture(
         &mut self,
@@ -90,7 +92,7 @@ impl CommandAccesses {
             .map_err(|other| access_conflict(cache.object(index), cache.object(other)))
     }
 
-    /// Whether the command needs a barrier behind earlier commands of the same command buffer.
+    /// True if the command needs a barrier after earlier commands of the same command buffer.
     pub(crate) fn needs_barriers(&self, tracker: &Tracker) -> bool {
         let buffer = |(id, next): &(ResourceId, Use)| tracker.needs_barrier_buffer(*id, *next);
         let texture =
@@ -98,7 +100,7 @@ impl CommandAccesses {
         self.buffers.iter().any(buffer) || self.textures.iter().any(texture)
     }
 
-    /// Tells the tracker, which adds the barriers to `out`.
+    /// Passes the accesses to the tracker, which adds the barriers to `out`.
     #[inline(always)]
     pub(super) fn track(
         &mut self,
@@ -142,22 +144,22 @@ impl CommandAccesses {
         self.textures.clear();
     }
 
-    /// Tells the images of textures that were found since. Apart, as most commands find none.
+    /// Adds the images of textures that were cached since the last call. Not inlined, as most commands add none.
     #[inline(never)]
     fn sync_image_cache(&mut self, cache: &TextureCache, images: &mut Images) {
-        for texture in cache.from_index(self.known_images) {
+        for texture in cache.objects_from(self.known_images) {
             images.insert(texture.image.id, texture.image.barrier_image());
         }
         self.known_images = cache.len();
     }
 
-    /// Forgets a command that failed before it was recorded.
+    /// Clears the accesses of a command that failed before it was recorded.
     pub(crate) fn clear(&mut self) {
         self.clear_buffers();
         self.textures.clear();
     }
 
-    /// Forgets the command buffer, for the next one.
+    /// Clears everything for the next command buffer.
     pub(super) fn reset(&mut self) {
         self.clear();
         self.known_images = 0;
@@ -178,7 +180,7 @@ fn access_conflict(texture: &Arc<Texture>, other: &Arc<Texture>) -> Error {
             .to_owned()
     } else {
         format!(
-            "it shows texels that '{}' shows too, and one command uses them in two ways that exclude each other; \
+            "it has texels in common with '{}', and one command uses them in two ways that exclude each other; \
              use a second texture or two commands",
             other.name
         )
@@ -198,7 +200,7 @@ mod tests {
     }
 
     proptest! {
-        /// Few and many, and again after a command was given up.
+        /// With few and with many buffers, and again after a command was cancelled.
         #[test]
         fn a_buffer_used_twice_counts_once(
             commands in prop::collection::vec(prop::collection::vec((0..60_u64, 0..3_usize), 0..120), 1..4)

@@ -1,4 +1,4 @@
-//! From declared uses to recorded barriers.
+//! Turns declared uses into recorded barriers.
 
 use std::sync::Arc;
 
@@ -16,13 +16,13 @@ use crate::submit::Recording;
 use crate::submit::emit_barriers::emit;
 
 impl CommandBuffer {
-    /// The next command uses a buffer.
+    /// Declares that the next command uses a buffer.
     pub(crate) fn use_buffer(&mut self, buffer: &Buffer, next: Use) {
         let RecordingState { accesses, host_reads, .. } = &mut **self.state;
         use_buffer(accesses, host_reads, buffer, next);
     }
 
-    /// The next command uses a part of the image that a texture shows.
+    /// Declares that the next command uses subresources of a texture.
     pub(super) fn use_texture(
         &mut self,
         texture: &Arc<Texture>,
@@ -34,14 +34,14 @@ impl CommandBuffer {
         accesses.add_texture(found_textures, row, part, next)
     }
 
-    /// The next command's shaders trace rays in these stages.
+    /// Declares that the shaders of the next command trace rays in these stages.
     pub(super) fn use_accel_structs(&mut self, stages: Stages) {
         let reads = accel_struct_reads(&self.shared, self.recording.queue_index, stages);
         reads.into_iter().for_each(|(id, read)| self.state.accesses.add_id(id, read));
     }
 
-    /// The pass that begins sees what this command buffer has built: no barrier can be placed once it is open, and only
-    /// then is a pipeline bound that may query rays.
+    /// Makes acceleration structures that this command buffer has built visible to the pass that begins. No barrier can
+    /// be recorded inside the pass, where pipelines that may query rays are bound.
     pub(super) fn use_built_accel_structs(&mut self) {
         let reads = |stages| accel_struct_reads(&self.shared, self.recording.queue_index, stages);
         if let Some(stages) = self.shared.graphics_queries.waiting_stages(&self.recording.tracker, reads) {
@@ -49,10 +49,10 @@ impl CommandBuffer {
         }
     }
 
-    /// The next command's shaders reach these in `stages`.
+    /// Declares that the shaders of the next command access these resources in `stages`.
     #[inline(always)]
     pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
-        // Most lists are empty: asked here, where that is quick.
+        // Most lists are empty, and a check here is cheap.
         if !deps.sampled_images.is_empty() {
             let (usage, next) = (TextureUsage::SAMPLED, Use::shader_read(stages));
             self.use_images(deps.sampled_images, usage, next, |texture| texture.range)?;
@@ -74,7 +74,7 @@ impl CommandBuffer {
         if deps.wait_for.is_empty() { Ok(()) } else { self.wait_for_resource(deps.wait_for) }
     }
 
-    /// The next command's shaders reach a part of each texture, which must have the usage.
+    /// Declares that the shaders of the next command access a part of each texture, which must have the usage.
     #[inline(always)]
     fn use_images(
         &mut self,
@@ -94,7 +94,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// The next command's shaders reach these buffers.
+    /// Declares that the shaders of the next command access these buffers.
     #[inline(never)]
     fn use_buffers(&mut self, handles: &[BufferHandle], next: Use) -> Result<()> {
         let pool = &self.shared.store.buffers;
@@ -106,7 +106,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Records the barriers in front of the next command.
+    /// Records the barriers before the next command.
     #[inline(never)]
     pub(crate) fn flush_barriers(&mut self) {
         self.end_rendering();
@@ -120,8 +120,8 @@ impl CommandBuffer {
         emit(&self.shared.gpu, *commands, barriers, images, last_barrier);
     }
 
-    /// In front of a command that runs shaders: makes what copies wrote readable, runs `gather`, then records the
-    /// barriers; forgets the uses if gathering fails.
+    /// Records the barriers of a command that runs shaders: makes the results of copies visible, runs `gather`, then
+    /// records the barriers. Clears the accesses if `gather` fails.
     pub(super) fn flush_barriers_after(
         &mut self,
         gather: impl FnOnce(&mut Self) -> Result<()>,
@@ -140,7 +140,7 @@ impl CommandBuffer {
     }
 }
 
-/// A command uses a buffer; what it writes in mapped memory is for the host to read afterwards.
+/// Adds an access to a buffer. The end of the recording makes writes to mapped memory visible to the host.
 fn use_buffer(accesses: &mut CommandAccesses, host_reads: &mut Vec<ResourceId>, buffer: &Buffer, next: Use) {
     accesses.add_buffer(buffer, next);
     if next.is_write() && buffer.memory.mapped() && !host_reads.contains(&buffer.id) {
@@ -148,7 +148,7 @@ fn use_buffer(accesses: &mut CommandAccesses, host_reads: &mut Vec<ResourceId>, 
     }
 }
 
-/// Everything that shaders of `stages` read when they trace rays.
+/// Returns the accesses of shaders in `stages` that trace rays.
 fn accel_struct_reads(shared: &DeviceState, queue_index: usize, stages: Stages) -> [(ResourceId, Use); 4] {
     let read = match shared.gpu.caps.software_ray_query() {
         true => Use::software_traversal(stages),

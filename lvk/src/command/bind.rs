@@ -22,14 +22,15 @@ impl CommandBuffer {
         self.push_partial_block(bytes)
     }
 
-    /// Pushes bytes that are not as many as the bound pipeline's block has, or says what is wrong with them.
+    /// Pushes bytes whose number differs from the bound pipeline's block, or returns the error for them.
     #[cold]
     fn push_partial_block(&mut self, bytes: &[u8]) -> Result<()> {
         self.state.push_constants.check_whole(bytes.len())?;
         self.push_constant_bytes(0, bytes)
     }
 
-    /// Sets part of the push constants: `bytes` from `offset` on, both multiples of 4.
+    /// Sets part of the push constants: `bytes` from `offset` on. The offset and the number of bytes are multiples of
+    /// 4.
     pub fn push_constant_bytes(&mut self, offset: u32, bytes: &[u8]) -> Result<()> {
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
         self.state.push_constants.check_range(offset, size)?;
@@ -38,8 +39,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Pushes bytes that the layout has. Inlined where the caller knows how many there are, which then need no call to be
-    /// copied.
+    /// Pushes bytes inside the layout's range. Inlined, so that bytes whose number the caller knows are copied without
+    /// a call.
     #[inline]
     fn record_push(&mut self, offset: u32, bytes: &[u8]) {
         let shared = &self.shared;
@@ -51,7 +52,7 @@ impl CommandBuffer {
         self.state.push_constants.store(offset, bytes);
     }
 
-    /// Binds a pipeline, and the bindless set the first time at its bind point.
+    /// Binds a pipeline, and the bindless set on the first use of its bind point.
     pub(super) fn bind_pipeline(
         &mut self,
         point: vk::PipelineBindPoint,
@@ -76,7 +77,7 @@ impl CommandBuffer {
         );
     }
 
-    /// Whether all these were pushed; see [`word_mask`](super::push_constants::word_mask).
+    /// True if all these 4-byte words were pushed; see [`word_mask`](super::push_constants::word_mask).
     #[inline]
     pub(super) fn has_pushed(&self, needed: u64) -> bool {
         self.state.push_constants.has_pushed(needed)
@@ -88,7 +89,7 @@ impl CommandBuffer {
         self.state.push_constants.check_pushed(pipeline, expected)
     }
 
-    /// Says which of them were never pushed.
+    /// Returns the error for push constants that were never pushed.
     pub(super) fn missing_constants_error(&self, pipeline: &str, expected: u32) -> Error {
         self.state.push_constants.missing_error(pipeline, expected)
     }

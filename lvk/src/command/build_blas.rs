@@ -1,4 +1,4 @@
-//! Builds and refits of acceleration structures.
+//! Builds and refits of BLAS.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ struct BlasPartBuild {
     blas: Arc<Blas>,
     /// Index of the part in `blas`.
     part: usize,
-    /// The Vulkan structure of the part.
+    /// The Vulkan acceleration structure of the part.
     raw: vk::AccelerationStructureKHR,
     refit: bool,
     scratch_bytes: u64,
@@ -48,20 +48,20 @@ impl BlasPartBuild {
 }
 
 impl CommandBuffer {
-    /// Builds bottom-level structures again from their buffers, or refits them
-    /// (`vkCmdBuildAccelerationStructuresKHR`). Contents may have changed, counts may not; for a refit neither may
-    /// indices.
+    /// Rebuilds BLAS from their buffers, or refits them (`vkCmdBuildAccelerationStructuresKHR`). The contents of the
+    /// buffers may have changed, the counts may not. For a refit, the indices may not have changed either.
     ///
-    /// Rays traced later in the same command buffer, or in later submissions, see the result. Where the bounds of a
-    /// structure changed, top-level structures that show it need an update too; and where anything in it did that was made
-    /// without [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), as software may show it in parts.
+    /// Rays traced later in the same command buffer, or in later submissions, see the result. If the bounds of a BLAS
+    /// changed, the TLAS that reference it need an update too. If the BLAS was created without
+    /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), they need an update after any change, as a
+    /// software TLAS may reference parts of the BLAS.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a refit without
-    /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a structure that was compacted, or
-    /// compacted before it was saved, and a structure listed twice; [`WrongQueue`](Error::WrongQueue) on the transfer queue.
-    /// Where there is no memory left for the scratch or tables of what software traces, the command buffer can no longer be
-    /// submitted; for structures themselves it is taken before anything is recorded.
+    /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a BLAS that was compacted, or
+    /// compacted before it was saved, and a BLAS listed twice; [`WrongQueue`](Error::WrongQueue) on the transfer queue.
+    /// If memory for the scratch buffer or for tables of software BVHs runs out, the command buffer can no longer be
+    /// submitted. Memory for the BVHs themselves is allocated before anything is recorded.
     pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
         self.needs_compute(BUILD_ON_QUEUE)?;
         let found: Result<Vec<_>> =
@@ -69,15 +69,15 @@ impl CommandBuffer {
         let found = found?;
         let mut seen = HashSet::with_capacity(found.len());
         if let Some(twice) = found.iter().find(|target| !seen.insert(target.id.0)) {
-            return Err(Error::usage(&twice.name, "the structure is listed twice in one build"));
+            return Err(Error::usage(&twice.name, "the BLAS is listed twice in one build"));
         }
         self.shared.gpu.check_acceleration_structures()?;
         let plan = self.plan_blas_builds(&found, mode, false)?;
         self.record_blas_builds(plan)
     }
 
-    /// Plans builds or refits of BLAS. `is_first` means that nothing is built yet: of what software traces, the CPU has built
-    /// its share already, and no TLAS references the BLAS.
+    /// Plans builds or refits of BLAS. `is_first` means that nothing is built yet, except the software BVHs that the
+    /// CPU builds, and that no TLAS references the BLAS.
     pub(crate) fn plan_blas_builds(
         &self,
         targets: &[Arc<AccelStruct>],
@@ -120,8 +120,8 @@ impl CommandBuffer {
         Ok(BlasBuildPlan { open, parts, software, is_first })
     }
 
-    /// Records builds of parts in batches that share the scratch buffer (`vkCmdBuildAccelerationStructuresKHR`), and then
-    /// those of what software traces.
+    /// Records builds of parts in batches that share the scratch buffer (`vkCmdBuildAccelerationStructuresKHR`), and
+    /// then the builds of the software BVHs.
     pub(crate) fn record_blas_builds(&mut self, plan: BlasBuildPlan) -> Result<()> {
         let BlasBuildPlan { open, parts, software, is_first } = plan;
         let shared = Arc::clone(&self.shared);
@@ -145,8 +145,8 @@ impl CommandBuffer {
                     .map(|(build, offset)| build.input().build(build.raw, build.refit, base + offset))
                     .collect();
                 let ranges: Vec<_> = builds.iter().map(|build| &build.input().ranges[..]).collect();
-                // SAFETY: inputs, structures and scratch memory are alive, checked, aligned and large enough; barriers
-                // keep them apart from other commands.
+                // SAFETY: inputs, acceleration structures and scratch memory are alive, checked, aligned and large
+                // enough; barriers keep them apart from other commands.
                 unsafe { ext.cmd_build_acceleration_structures(self.raw(), &infos, &ranges) };
             }
         }
@@ -170,7 +170,7 @@ impl CommandBuffer {
         build.read_buffers.iter().for_each(|buffer| self.use_buffer(buffer, Use::accel_build_input()));
     }
 
-    /// Returns what the next build does to the BVH that the CPU made.
+    /// Returns the effect of the next build on the BVH that the CPU built.
     fn cpu_bvh_update(&self, target: &AccelStruct, blas: &Blas, refit: bool) -> CpuBvhUpdate {
         let Some(software) = blas.software.as_ref().filter(|software| software.is_built_on_cpu()) else {
             return CpuBvhUpdate::None;
@@ -182,18 +182,17 @@ impl CommandBuffer {
         }
     }
 
-    /// A command failed with a part of it recorded: the command buffer cannot be submitted any more.
+    /// Poisons the command buffer, which cannot be submitted any more: a command failed with a part of it recorded.
     #[cold]
     pub(super) fn poison(&mut self, name: &str, error: Error) -> Error {
         self.state.poisoned.get_or_insert_with(|| name.to_owned());
         error
     }
 
-    /// Fails if what was recorded is not whole, or no longer fits what was submitted since.
+    /// Fails if the recording is incomplete, or no longer fits the submissions since.
     pub(crate) fn check_submittable(&self) -> Result<()> {
         if let Some(name) = &self.state.poisoned {
-            let message =
-                "a command on it failed half recorded; give the command buffer up and record it anew";
+            let message = "a command on it failed with only a part recorded; drop the command buffer and record a new one";
             return Err(Error::usage(name, message));
         }
         self.state.open_builds.iter().try_for_each(OpenBuild::check_not_moved)?;
@@ -201,25 +200,25 @@ impl CommandBuffer {
         self.state.tlas_trackers.as_ref().map_or(Ok(()), |updates| updates.check())
     }
 
-    /// Refits since the last rebuild of a bottom-level structure, before the next command.
+    /// Returns the refits since the last rebuild of a BLAS, before the next command.
     fn refit_count(&self, target: &AccelStruct) -> Result<u32> {
         let submitted = target.blas()?.refit_count();
         Ok(self.state.refits.get(&target.id.0).copied().unwrap_or(submitted))
     }
 
-    /// Finds the buffers that builds of the BLAS read.
+    /// Returns the buffers that builds of the BLAS read.
     pub(crate) fn build_input_buffers(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
         let buffers = blas.geometries.iter().flat_map(|geometry| geometry.buffers());
         buffers.map(|handle| self.shared.store.buffers.get(handle)).collect()
     }
 
-    /// The next command reads bottom-level structures, whichever it may be.
+    /// Declares that the next command may read any BLAS.
     pub(crate) fn use_all_blas(&mut self, read: Use) {
         self.state.accesses.add_id(self.shared.all_blas, read);
         self.state.accesses.add_id(self.shared.new_blas[self.recording.queue_index], read);
     }
 
-    /// Keeps a scratch buffer that a larger one has replaced until the GPU is done with it.
+    /// Frees a scratch buffer that a larger one has replaced, once the GPU is done with it.
     pub(crate) fn free_replaced_scratch(&self, replaced: Option<Arc<Buffer>>) {
         if let Some(buffer) = replaced {
             self.shared.free_later(DeferredObject::Buffer(buffer));
@@ -227,7 +226,7 @@ impl CommandBuffer {
     }
 }
 
-/// Whether the build after so many refits is one too, or why it cannot be made.
+/// Returns true if the next build is a refit, after `refits` refits. Fails if the BLAS does not allow that build.
 fn resolve_refit(target: &AccelStruct, body: &BlasStructures, mode: BuildMode, refits: u32) -> Result<bool> {
     let possible = target.check_refit().is_ok();
     let refit = match mode {
@@ -237,8 +236,7 @@ fn resolve_refit(target: &AccelStruct, body: &BlasStructures, mode: BuildMode, r
     if refit {
         target.check_refit()?;
     } else if !body.rebuildable {
-        let message =
-            "a compacted or loaded structure has no memory for a rebuild: refit it, or create a new one";
+        let message = "a compacted or loaded BLAS has no memory for a rebuild: refit it, or create a new one";
         return Err(Error::usage(&target.name, message));
     }
     Ok(refit)

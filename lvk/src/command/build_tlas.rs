@@ -18,22 +18,22 @@ use crate::error::{Error, Result, check_limit};
 use crate::resource::Buffer;
 use crate::submit::ownership::QueueAccess;
 
-/// What is known of a structure before the next command.
+/// State of a TLAS before the next command.
 pub(super) struct PreviousState<'a> {
-    /// Instances of the caller and of Vulkan, `None` before the first build.
+    /// Instance counts of the caller and of Vulkan; `None` before the first build.
     pub(super) counts: Option<(u32, u32)>,
     pub(super) refits: u32,
-    /// Whether this command buffer has not updated it.
+    /// True if this command buffer has not updated the TLAS yet.
     pub(super) is_first: bool,
-    /// What it shows, or nothing where some of that is gone or has moved.
+    /// The BLAS that the TLAS references; empty if one of them was destroyed or has moved.
     pub(super) blas_refs: &'a Arc<BlasRefSet>,
-    /// Whether it shows that.
+    /// True if no BLAS that the TLAS references was destroyed or has moved.
     pub(super) is_current: bool,
-    /// When that was looked at.
+    /// Generation at which that was checked.
     pub(super) generation: AccelGeneration,
 }
 
-/// Instances on their way into the build of one structure.
+/// A build of one TLAS, without its instances.
 #[derive(Clone, Copy)]
 pub(super) struct TlasBuildRequest<'a> {
     pub(super) target: &'a AccelStruct,
@@ -42,17 +42,17 @@ pub(super) struct TlasBuildRequest<'a> {
     pub(super) mode: BuildMode,
 }
 
-/// Instances that Vulkan is given.
+/// Instances of a Vulkan build.
 #[derive(Clone, Copy)]
 pub(super) struct VulkanInstances {
     pub(super) address: u64,
     pub(super) count: u32,
-    /// Whether a kernel writes them, into the structure's own records.
+    /// True if a kernel writes them, to the records buffer of the TLAS.
     pub(super) is_from_kernel: bool,
 }
 
 impl CommandBuffer {
-    /// What is known of a structure before the next command.
+    /// State of a TLAS before the next command.
     #[inline(always)]
     pub(super) fn previous_state<'a>(
         &self,
@@ -76,7 +76,7 @@ impl CommandBuffer {
         }
     }
 
-    /// Records the build of what the device traces.
+    /// Records the build of the Vulkan TLAS (`vkCmdBuildAccelerationStructuresKHR`).
     #[inline(always)]
     pub(super) fn build_tlas(
         &mut self,
@@ -98,7 +98,7 @@ impl CommandBuffer {
             target: tlas.structure.as_ref().map_or(vk::AccelerationStructureKHR::null(), |of| of.raw),
             scratch,
         };
-        // SAFETY: instances, structure and scratch memory are alive, checked, aligned and large enough; barriers keep them
+        // SAFETY: instances, TLAS and scratch memory are alive, checked, aligned and large enough; barriers keep them
         // apart from other commands.
         unsafe { build.record(self.shared.gpu.accel_functions()?, self.raw()) };
         if is_first {
@@ -107,8 +107,9 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the commands
-    /// before were such builds too, of other structures, and there is memory left beside theirs; then all may run at once.
+    /// Records the barriers for a build of a TLAS, and returns its scratch memory. A build needs no barriers if the
+    /// commands before were builds of other TLAS and the scratch buffer has memory left for it. Then all of these
+    /// builds may run concurrently.
     #[inline(always)]
     fn join_build_run(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
         let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
@@ -120,7 +121,7 @@ impl CommandBuffer {
         self.begin_build_run(target, bytes, alignment, records)
     }
 
-    /// The same for a build that waits for those before.
+    /// As [`join_build_run`](Self::join_build_run), for a build that waits for earlier ones.
     #[inline(never)]
     fn begin_build_run(
         &mut self,
@@ -146,7 +147,8 @@ impl CommandBuffer {
         Ok(start)
     }
 
-    /// Tells queues and shaders what the structure shows from now on; `None` for what is shown the same as before.
+    /// Publishes the new contents of a TLAS to other queues and to shaders. Returns the arguments of
+    /// `TlasTrackers::record_build`; the BLAS references are `None` if they are unchanged.
     pub(super) fn publish(
         &mut self,
         tlas: &Tlas,
@@ -164,7 +166,7 @@ impl CommandBuffer {
         (RecordedTlasBuild { counts, refit, hit_table_address, generation: previous.generation }, new, source)
     }
 
-    /// Has other queues be done with what is shown, which may come from them.
+    /// References the BLAS for queue synchronisation, as other queues may have built them.
     pub(super) fn reference_blas(&mut self, blas_refs: &BlasRefSet) {
         if self.shared.gpu.queues.has_several() {
             blas_refs
@@ -176,7 +178,7 @@ impl CommandBuffer {
 }
 
 impl TlasBuildRequest<'_> {
-    /// Checks the counts; answers whether it is a refit.
+    /// Checks the instance counts. Returns true for a refit.
     #[inline(always)]
     pub(super) fn check_counts(&self, count: u32, built: u32) -> Result<bool> {
         let Self { target, tlas, previous, mode } = self;
@@ -196,7 +198,7 @@ impl TlasBuildRequest<'_> {
     }
 }
 
-/// Fails where there are more instances of the caller than the structure was made for.
+/// Fails if the caller has more instances than the TLAS was created for.
 pub(super) fn check_capacity(target: &AccelStruct, tlas: &Tlas, count: u64) -> Result<()> {
     check_limit(&target.name, "instance count", count, tlas.capacity.into())
 }
@@ -204,7 +206,7 @@ pub(super) fn check_capacity(target: &AccelStruct, tlas: &Tlas, count: u64) -> R
 #[cold]
 fn capacity_error(target: &AccelStruct, tlas: &Tlas, count: u32, built: u32) -> Error {
     let message = format!(
-        "its {count} instances of split meshes stand for {built}, but there is room for {}; create it with a larger \
+        "its {count} instances of split meshes have {built} parts, but its capacity is {}; create it with a larger \
          capacity or more TlasDesc::parts_per_instance",
         tlas.built_capacity
     );

@@ -35,7 +35,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Runs as many workgroups as three `u32` at `offset` in `arguments` say (`vkCmdDispatchIndirect`).
+    /// Runs as many workgroups along x, y and z as the three `u32` at `offset` in `arguments`
+    /// (`vkCmdDispatchIndirect`).
     ///
     /// `arguments` needs [`BufferUsage::INDIRECT`]; `offset` is a multiple of 4.
     pub fn dispatch_indirect(
@@ -75,7 +76,7 @@ impl CommandBuffer {
     }
 }
 
-/// Fails where there are more workgroups along an axis than the device takes.
+/// Fails if there are more workgroups along an axis than the device supports.
 #[inline]
 fn check_groups(pipeline: &str, groups: [u32; 3], limits: [u32; 3]) -> Result<()> {
     if groups.iter().zip(&limits).all(|(count, limit)| count <= limit) {

@@ -1,4 +1,4 @@
-//! Sizes, compaction and serialisation of bottom-level structures.
+//! Sizes, compaction and serialisation of BLAS.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::resource::{Buffer, QueryPool};
 
 impl CommandBuffer {
-    /// Asks how large each target would be, compacted. Answers arrive in the query's pool.
+    /// Records queries of the compacted size of each target. The results go to the query's pool.
     pub(crate) fn query_compacted_sizes(&mut self, query: &Arc<CompactedSizeQuery>) -> Result<()> {
         for (target, first) in &query.targets {
             let body = target.blas()?.structures();
@@ -42,14 +42,15 @@ impl CommandBuffer {
         let structures: Vec<_> = body.structures.iter().map(|part| part.raw).collect();
         self.state.accesses.add_id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
         self.flush_barriers();
-        // SAFETY: the structures are alive and built; the queries exist and were reset when the pool was made.
+        // SAFETY: the acceleration structures are alive and built; the queries exist and were reset when the pool was
+        // created.
         unsafe {
             ext.cmd_write_acceleration_structures_properties(self.raw(), &structures, ty, pool.raw, first);
         }
         Ok(())
     }
 
-    /// Copies every part into a smaller structure (`vkCmdCopyAccelerationStructureKHR`).
+    /// Copies every part into a smaller acceleration structure (`vkCmdCopyAccelerationStructureKHR`).
     pub(crate) fn copy_compacted(
         &mut self,
         target: &AccelStruct,
@@ -65,7 +66,7 @@ impl CommandBuffer {
                 .src(source.raw)
                 .dst(copy.raw)
                 .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
-            // SAFETY: the source was built to be compacted, and the copy has the size the GPU answered.
+            // SAFETY: the source was built with compaction allowed, and the copy has the size that the GPU returned.
             unsafe { ext.cmd_copy_acceleration_structure(self.raw(), &info) };
         }
         if !may_be_rebuilt(target, to) {
@@ -74,7 +75,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Writes each of `structures`, parts of `target`, as bytes to its address, a multiple of 256 in `buffer`
+    /// Serializes each of `structures`, parts of `target`, to its address, a multiple of 256 in `buffer`
     /// (`vkCmdCopyAccelerationStructureToMemoryKHR`).
     pub(crate) fn serialize_parts(
         &mut self,
@@ -93,17 +94,17 @@ impl CommandBuffer {
                 .src(part.raw)
                 .dst(vk::DeviceOrHostAddressKHR { device_address: *address })
                 .mode(vk::CopyAccelerationStructureModeKHR::SERIALIZE);
-            // SAFETY: the structure is built, and the buffer has the bytes the GPU answered for it.
+            // SAFETY: the acceleration structure is built, and the buffer has the size that the GPU returned for it.
             unsafe { ext.cmd_copy_acceleration_structure_to_memory(self.raw(), &info) };
         }
         Ok(())
     }
 
-    /// Makes the parts from `first` on from bytes at an address for each, a multiple of 256 in `buffer`
+    /// Deserializes the parts from `first` on, each from its address, a multiple of 256 in `buffer`
     /// (`vkCmdCopyMemoryToAccelerationStructureKHR`).
     ///
     /// # Safety
-    /// The driver wrote the bytes, and each structure has the size they say.
+    /// The driver wrote the bytes, and each acceleration structure has the size stored in its bytes.
     pub(crate) unsafe fn deserialize_parts(
         &mut self,
         target: &Arc<AccelStruct>,
@@ -122,13 +123,14 @@ impl CommandBuffer {
                 .src(vk::DeviceOrHostAddressConstKHR { device_address: *address })
                 .dst(part.raw)
                 .mode(vk::CopyAccelerationStructureModeKHR::DESERIALIZE);
-            // SAFETY: the caller's promise, and the driver said that it can read the bytes.
+            // SAFETY: the caller guarantees the contents, and the driver reported that it can read the bytes.
             unsafe { ext.cmd_copy_memory_to_acceleration_structure(self.raw(), &info) };
         }
         Ok(())
     }
 
-    /// Readies a structure whose parts were all made from bytes for what may come.
+    /// Prepares a BLAS whose parts were all deserialized for rebuilds and refits. Frees the inputs of builds if the
+    /// BLAS allows neither.
     pub(crate) fn prepare_deserialized(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
         let body = target.blas()?.structures();
         if may_be_rebuilt(target, &body) {
@@ -138,7 +140,7 @@ impl CommandBuffer {
         self.free_build_inputs(target)
     }
 
-    /// Frees what only builds read.
+    /// Frees the inputs that only builds read.
     fn free_build_inputs(&self, target: &AccelStruct) -> Result<()> {
         let maps = target.blas()?.parts.iter().filter_map(|part| part.map.as_ref());
         maps.filter_map(PrimitiveMap::take_gathered_inputs)
@@ -152,7 +154,7 @@ impl CommandBuffer {
     }
 }
 
-/// Whether another build or a refit of the body can come.
+/// True if the BLAS can be rebuilt or refitted later.
 fn may_be_rebuilt(target: &AccelStruct, body: &BlasStructures) -> bool {
     body.rebuildable || target.check_refit().is_ok()
 }

@@ -1,16 +1,16 @@
-//! What a command reaches through the bindless set or by address, beyond what its arguments say.
+//! Resources that a command accesses through the bindless set or by address, beyond its arguments.
 
 use crate::handle::{AccelStructHandle, BufferHandle, TextureHandle};
 use crate::submit::SubmitHandle;
 
-/// Names resources a draw, dispatch or trace reaches bindlessly, so that the library can place barriers.
+/// The resources that a draw, dispatch or trace accesses bindlessly, so that the library can record barriers.
 ///
-/// Nothing needs to be declared for resources that were only uploaded: they are readable everywhere. Declare what an
-/// earlier command wrote (storage images, buffers, render targets now sampled) and what this command writes.
-/// What another queue wrote, copies included, is named by who reads it here, and so are textures that another queue copies
-/// from meanwhile, and, where another queue used them last, textures with more usages than `SAMPLED`.
-/// Acceleration structures need no declaration: the library reads from the shaders whether they trace rays, and lets a
-/// render pass see what was built before it wherever a graphics pipeline queries rays.
+/// Resources that were only uploaded need no declaration: they are readable everywhere. Declare resources that an
+/// earlier command wrote (storage images, buffers, render targets now sampled) and resources that this command writes.
+/// Also declare resources that this command reads and another queue wrote, by copies too. The same holds for textures
+/// that another queue copies from at the same time, and for textures with more usages than `SAMPLED` that another queue
+/// used last. Acceleration structures need no declaration: the library detects from the shaders whether they trace
+/// rays. If a graphics pipeline queries rays, a render pass sees the builds recorded before it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Dependencies<'a> {
     /// Textures and views that are sampled or fetched: all their mips and layers.
@@ -21,11 +21,11 @@ pub struct Dependencies<'a> {
     pub buffers: &'a [BufferHandle],
     /// Buffers that are only read.
     pub read_buffers: &'a [BufferHandle],
-    /// Acceleration structures that shaders query. Needed only by a render pass, in the same command buffer as the
-    /// build, whose pipelines are made after it began.
+    /// Acceleration structures that shaders query. Needed only by a render pass in the same command buffer as the
+    /// build, if the pass's pipelines are created after it began.
     pub acceleration_structures: &'a [AccelStructHandle],
-    /// Submissions, of whatever queue, that the whole command buffer begins after. Rarely needed: what is named above, and what
-    /// commands name, is waited for without being told. They move no texture to this queue: those with more usages than `SAMPLED`
-    /// are named above.
+    /// Submissions, of any queue, that the whole command buffer begins after. Rarely needed: the library waits by
+    /// itself for the resources named above and for those that commands name. A submission listed here moves no texture
+    /// to this queue: declare textures with more usages than `SAMPLED` above.
     pub wait_for: &'a [SubmitHandle],
 }

@@ -1,4 +1,4 @@
-//! Runs the library's own compute shaders between the caller's commands, and leaves no trace of them.
+//! Runs the library's own compute shaders between the caller's commands, and restores the caller's compute state.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const KIND_BOXES: u32 = 3;
 const BOX_BYTES: u64 = 24;
 
 impl CommandBuffer {
-    /// Gathers indices and AABBs for the parts of BLAS that are built, or refitted where the flag says so. A refit moves
+    /// Gathers indices and AABBs for the parts of BLAS that are built, or refitted if the flag is true. A refit moves
     /// vertices or AABBs, never indices.
     pub(super) fn gather_inputs<'a>(
         &mut self,
@@ -61,7 +61,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Where the inputs of a geometry lie.
+    /// Returns the address and the layout of a geometry's inputs.
     fn gather_source(&mut self, geometry: &BlasGeometry) -> Result<GatherPushConstants> {
         let push = |source: u64, kind, box_stride| GatherPushConstants {
             source: source & !3,
@@ -89,8 +89,8 @@ impl CommandBuffer {
         Ok(push(buffer.address + offset, kind, stride))
     }
 
-    /// Runs a kernel several times, each with its push constants and number of invocations; barriers are in place.
-    /// Afterwards the caller's pipeline and push constants are as before.
+    /// Runs a kernel several times, each with its push constants and number of invocations. Expects its barriers to be
+    /// recorded. Restores the caller's pipeline and push constants afterwards.
     pub(super) fn dispatch_kernel_runs<'a>(
         &mut self,
         kernel: Kernel,
@@ -105,14 +105,14 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// The pipeline of a kernel.
+    /// Returns the pipeline of a kernel.
     pub(crate) fn kernel_pipeline(&self, kernel: Kernel) -> Result<Arc<ComputePipeline>> {
         let shared = &self.shared;
         shared.kernels.pipeline_of(&shared.gpu, &shared.layout, shared.pipeline_base().cache, kernel)
     }
 
-    /// Runs a kernel that is bound, or is to be bound first. Barriers are in place;
-    /// [`restore_compute`](Self::restore_compute) comes after the last.
+    /// Dispatches a kernel, after binding `pipeline` if there is one. Expects its barriers to be recorded. Call
+    /// [`restore_compute`](Self::restore_compute) after the last dispatch.
     pub(crate) fn dispatch_kernel(
         &self,
         pipeline: Option<&Arc<ComputePipeline>>,
@@ -122,7 +122,7 @@ impl CommandBuffer {
         let (device, raw) = (&self.shared.gpu.device, self.raw());
         let (point, stages) = (vk::PipelineBindPoint::COMPUTE, vk::ShaderStageFlags::ALL);
         // SAFETY: the pipeline lives as long as the context; it uses no descriptors, and its push constants and
-        // groups are within every device's limits.
+        // workgroups are within every device's limits.
         unsafe {
             if let Some(pipeline) = pipeline {
                 device.cmd_bind_pipeline(raw, point, pipeline.raw);
@@ -132,7 +132,7 @@ impl CommandBuffer {
         }
     }
 
-    /// Has the caller's pipeline and push constants as they were before the kernels.
+    /// Restores the caller's compute pipeline and push constants after kernels.
     pub(crate) fn restore_compute(&self) {
         let (device, raw) = (&self.shared.gpu.device, self.raw());
         // SAFETY: the pipeline is alive, and the bytes lie inside the push constants of the layout.

@@ -1,4 +1,4 @@
-//! Command buffers. Every command checks its arguments, places the barriers it needs and records itself.
+//! Command buffers: every command checks its arguments, records the barriers it needs and then itself.
 
 pub(crate) mod accesses;
 pub(crate) mod barriers;
@@ -46,13 +46,13 @@ pub(crate) use recording_state::RecordingStatePool;
 
 /// Records commands for one submission.
 ///
-/// Take one from [`Context::acquire_command_buffer`](crate::Context::acquire_command_buffer) or
-/// [`acquire_command_buffer_on`](crate::Context::acquire_command_buffer_on) a queue, and hand it to
-/// [`Context::submit`](crate::Context::submit). Several may be recorded side by side on different threads; the GPU
-/// sees them in the order of submission. Barriers, descriptor sets and the lifetime of everything used are the
-/// library's business. A command that answers an error has recorded nothing; the command buffer stays usable. The exceptions are
-/// builds that run out of memory half way: they say so, and [`Context::submit`](crate::Context::submit) refuses the command buffer.
-/// Dropping a command buffer gives it up.
+/// [`Context::acquire_command_buffer`](crate::Context::acquire_command_buffer) and
+/// [`acquire_command_buffer_on`](crate::Context::acquire_command_buffer_on) return a command buffer, and
+/// [`Context::submit`](crate::Context::submit) takes it. Several may be recorded at the same time on different threads;
+/// the GPU executes them in the order of submission. The library records the barriers, binds the descriptor sets and
+/// keeps the used objects alive. A command that returns an error has recorded nothing, and the command buffer stays
+/// usable. The exceptions are builds that run out of memory half way, as their documentation says:
+/// [`Context::submit`](crate::Context::submit) then rejects the command buffer. Dropping a command buffer discards it.
 pub struct CommandBuffer {
     pub(crate) shared: Arc<DeviceState>,
     queue: Queue,
@@ -62,28 +62,30 @@ pub struct CommandBuffer {
     compute: Option<Arc<ComputePipeline>>,
     ray_tracing: Option<Arc<RayTracingPipeline>>,
     open_labels: u32,
-    /// Whether a render pass is open; it stays so where its value was forgotten instead of dropped.
+    /// True while a render pass is open. Stays true if the [`RenderPass`](render::pass::RenderPass) was forgotten
+    /// instead of dropped.
     rendering: bool,
-    /// Whether one was ever begun.
+    /// True once a render pass was begun.
     had_pass: bool,
-    /// Views that the open pass draws at once: every query takes so many. 1 outside of passes.
+    /// Views that the open pass draws at once, and the number of queries that each query command uses; 1 outside of
+    /// passes.
     views: u32,
-    /// Small regions of staging memory come from here.
+    /// Staging chunk that small regions are allocated from.
     staged: StagingChunk,
-    /// Present where the command buffer is profiled.
+    /// `Some` if the command buffer is profiled.
     scopes: Option<Box<Scopes>>,
 }
 
-/// What is left of a command buffer once it is complete.
+/// The part of a command buffer that is kept after its recording has ended.
 pub(crate) struct FinishedRecording {
-    /// What becomes true when it is submitted.
+    /// Effects of the commands, applied when the command buffer is submitted.
     pub(crate) state: Box<RecordingState>,
-    /// Present where it was profiled.
+    /// `Some` if the command buffer was profiled.
     pub(crate) scopes: Option<Box<Scopes>>,
 }
 
 impl CommandBuffer {
-    /// Commands go to `recording`, and what is to be remembered of them to `state`, which are empty.
+    /// Creates a command buffer that records into `recording` and `state`, both empty.
     pub(crate) fn new(
         shared: &Arc<DeviceState>,
         queue: Queue,
@@ -110,23 +112,23 @@ impl CommandBuffer {
         }
     }
 
-    /// The Vulkan command buffer, for commands the library does not have.
+    /// Returns the Vulkan command buffer, for commands the library does not have.
     ///
-    /// What is recorded this way is not tracked: the caller places its barriers, and leaves images in the layout it
-    /// found them in. Pipelines and push constants must be bound again afterwards, and so must the bindless set
-    /// ([`Context::raw_descriptor_set`](crate::Context::raw_descriptor_set)) where another set took its place.
+    /// The library does not track commands recorded this way: the caller records their barriers, and leaves images in
+    /// the layout they had before. Pipelines and push constants must be bound again afterwards. So must the bindless
+    /// set ([`Context::raw_descriptor_set`](crate::Context::raw_descriptor_set)) if another set replaced it.
     #[inline]
     pub fn raw(&self) -> vk::CommandBuffer {
         self.recording.commands
     }
 
-    /// Whether the command buffer was made by the context with these parts.
+    /// True if the command buffer was created by the context that owns `shared`.
     pub(crate) fn belongs_to(&self, shared: &Arc<DeviceState>) -> bool {
         Arc::ptr_eq(&self.shared, shared)
     }
 
-    /// Fails where images of a swapchain are used that the presentation engine has, and where another queue uses what only the
-    /// graphics queue may.
+    /// Fails if the command buffer uses swapchain images that the presentation engine owns. On queues other than the
+    /// graphics queue, also fails if it uses resources that only the graphics queue may use.
     pub(crate) fn check_images(&self) -> Result<()> {
         if self.queue != Queue::Graphics {
             self.shared.submitter.check_queue(&self.recording.tracker)?;
@@ -150,7 +152,7 @@ impl CommandBuffer {
         (recording, FinishedRecording { state, scopes: self.scopes.take() })
     }
 
-    /// The host sees what was written in mapped memory.
+    /// Makes writes to mapped memory visible to the host.
     fn make_visible_to_host(&mut self) {
         let RecordingState { accesses: uses, host_reads, .. } = &mut **self.state;
         host_reads.drain(..).for_each(|id| uses.add_id(id, Use::host_read()));

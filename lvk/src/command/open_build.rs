@@ -1,4 +1,4 @@
-//! Builds that a command buffer has recorded, and what becomes of them when it is submitted or dropped.
+//! Recorded builds of a command buffer, and their effects when it is submitted or dropped.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::BlasStructures;
 use crate::error::{Error, Result};
 
-/// A build that is recorded; until it is submitted the body must not be replaced by a compacted one.
+/// A recorded build. Until it is submitted, compaction must not replace the acceleration structures.
 pub(crate) struct OpenBuild {
     pub(super) target: Arc<AccelStruct>,
     pub(super) refit: bool,
@@ -15,19 +15,19 @@ pub(crate) struct OpenBuild {
     submitted: bool,
 }
 
-/// What a build does to the tree that the CPU made of a structure for software to trace.
+/// Effect of a build on the BVH that the CPU built for software traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CpuBvhUpdate {
-    /// Nothing: there is none, or it was moved before.
+    /// No effect: there is no such BVH, or a BVH of the GPU has replaced it.
     None,
-    /// Refits it where it lies.
+    /// Refits it in place.
     Refit,
-    /// Puts one of the GPU in its place, elsewhere.
+    /// Replaces it with a BVH that the GPU builds, which may lie elsewhere.
     Replace,
 }
 
 impl OpenBuild {
-    /// Keeps what stands for a bottom-level structure in place, and answers it.
+    /// Opens a build of a BLAS, and returns it with the acceleration structures that it keeps from being replaced.
     pub(super) fn for_blas(target: &Arc<AccelStruct>) -> Result<(Self, Arc<BlasStructures>)> {
         let body = target.blas()?.open_build();
         Ok((
@@ -41,25 +41,25 @@ impl OpenBuild {
         ))
     }
 
-    /// A top-level structure stays what it is.
+    /// Opens a build of a TLAS, which compaction never replaces.
     pub(super) fn for_tlas(target: Arc<AccelStruct>) -> Self {
         Self { target, refit: false, bvh_update: CpuBvhUpdate::None, submitted: false }
     }
 
-    /// Fails if a submission since it was recorded has moved the tree that it refits.
+    /// Fails if a submission since the recording has moved the BVH that the build refits.
     pub(super) fn check_not_moved(&self) -> Result<()> {
         let software = self.target.blas().ok().and_then(|blas| blas.software.as_ref());
         if self.bvh_update == CpuBvhUpdate::Refit
             && software.is_some_and(|software| software.moved_storage().is_some())
         {
             let message =
-                "a refit was recorded, but a submission since then has rebuilt the structure; record it anew";
+                "a refit was recorded, but a submission since then has rebuilt the BLAS; record it anew";
             return Err(Error::usage(&self.target.name, message));
         }
         Ok(())
     }
 
-    /// It went to the GPU with this timeline value.
+    /// Marks the build as submitted with this timeline value.
     pub(crate) fn mark_submitted(mut self, value: u64) {
         self.target.mark_used_by_submission(value);
         self.submitted = true;

@@ -1,4 +1,4 @@
-//! The last command of a picture.
+//! The last command that uses a swapchain image.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::resource::Texture;
 
 impl CommandBuffer {
-    /// Readies an image of a swapchain for the presentation engine. Nothing may use it afterwards.
+    /// Transitions a swapchain image to the layout for presentation. No later command may use it.
     pub(crate) fn release_image(&mut self, texture: &Arc<Texture>) -> Result<()> {
         self.make_visible();
         self.use_texture(texture, texture.range, Use::present())?;

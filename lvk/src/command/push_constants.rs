@@ -5,16 +5,16 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 
-/// What is known of the push constants: which were pushed, and what the last bound pipeline wants.
+/// State of the push constants: the pushed bytes, and the block of the pipeline bound last.
 #[derive(Debug)]
 pub(super) struct PushConstants {
-    /// A bit for each 4 bytes: enough, as the layout has at most 256 bytes.
+    /// A bit for each pushed 4-byte word. 64 bits suffice, as the layout has at most 256 bytes.
     pushed: u64,
-    /// The bytes themselves, for the library to push again what it overwrote.
+    /// The pushed bytes, from which the library restores the ones that its kernels overwrote.
     bytes: [u8; Self::MAX_BYTES],
     expected_block: Option<(Arc<str>, u32)>,
-    /// How many bytes make up the whole block of the last bound pipeline, padding included that the layout has; none where it
-    /// has none.
+    /// Numbers of bytes that count as the whole block of the pipeline bound last, with padding as far as the layout has
+    /// it. Empty if the pipeline has no block.
     whole: Range<u32>,
 }
 
@@ -25,13 +25,14 @@ impl Default for PushConstants {
 }
 
 impl PushConstants {
-    /// As the layout of all pipelines has at most.
+    /// Most push constant bytes that a pipeline layout has.
     const MAX_BYTES: usize = 256;
 
-    /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
+    /// Rust structs are padded to their alignment, while GLSL blocks end with their last member. 16 bytes is the
+    /// largest alignment.
     const MAX_TAIL_PADDING: u32 = 16;
 
-    /// Nothing is bound, and nothing pushed.
+    /// Resets to the state with no bound pipeline and no pushed bytes.
     pub(super) fn clear(&mut self) {
         if self.pushed != 0 {
             self.pushed = 0;
@@ -41,7 +42,7 @@ impl PushConstants {
         self.whole = 0..0;
     }
 
-    /// A pipeline with a block of so many bytes is bound, of a layout with so many.
+    /// Records that a pipeline with a block of `expected` bytes was bound. Its layout has `layout_bytes`.
     pub(super) fn expect_block(&mut self, pipeline: &Arc<str>, expected: u32, layout_bytes: u32) {
         self.expected_block = Some((Arc::clone(pipeline), expected));
         let most = expected.next_multiple_of(Self::MAX_TAIL_PADDING).min(layout_bytes);
@@ -54,13 +55,13 @@ impl PushConstants {
         self.whole.contains(&size) && size.is_multiple_of(4)
     }
 
-    /// True if all these 4-byte units were pushed; see [`word_mask`].
+    /// True if all these 4-byte words were pushed; see [`word_mask`].
     #[inline]
     pub(super) fn has_pushed(&self, needed: u64) -> bool {
         self.pushed & needed == needed
     }
 
-    /// Everything pushed so far, zero where nothing was.
+    /// Returns the bytes up to the last pushed one; bytes that were not pushed are zero.
     pub(super) fn pushed_bytes(&self) -> &[u8] {
         let words = u64::BITS - self.pushed.leading_zeros();
         &self.bytes[..4 * words as usize]
@@ -71,7 +72,7 @@ impl PushConstants {
         let start = offset as usize;
         let Some(kept) = self.bytes.get_mut(start..start + bytes.len()) else { return };
         kept.copy_from_slice(bytes);
-        // Written only where it changes: draws ask for it right away.
+        // Written only if it changes, as a draw reads it right afterwards.
         let words = word_mask(offset, bytes.len() as u32);
         if self.pushed & words != words {
             self.pushed |= words;
@@ -117,7 +118,7 @@ impl PushConstants {
         }
     }
 
-    /// Says how many bytes the pipeline reads and how many of them were pushed.
+    /// Returns the error that names the number of bytes the pipeline reads and of those that were pushed.
     #[cold]
     pub(super) fn missing_error(&self, pipeline: &str, expected: u32) -> Error {
         let pushed = 4 * (self.pushed & word_mask(0, expected)).count_ones();
@@ -127,7 +128,7 @@ impl PushConstants {
     }
 }
 
-/// A bit for each 4 bytes of `size` from `offset` on, all multiples of 4.
+/// Returns a bit for each 4-byte word of the `size` bytes from `offset` on. Both are multiples of 4.
 #[inline]
 pub(super) fn word_mask(offset: u32, size: u32) -> u64 {
     let below = |end: u32| u64::MAX.checked_shr(64_u32.saturating_sub(end / 4)).unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Queries: timestamps, and what happens between a begin and an end.
+//! Queries: timestamps, and counts between a begin and an end.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,11 +14,12 @@ use crate::resource::query_pool::QueryKind;
 use crate::submit::ownership::QueueAccess;
 
 impl CommandBuffer {
-    /// Makes queries ready to be written again (`vkCmdResetQueryPool`).
+    /// Resets queries, so that they can be written again (`vkCmdResetQueryPool`).
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for open ones;
-    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue, which may use new pools, and those reset on others.
+    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue, which may use new pools, and pools that another queue
+    /// has reset.
     pub fn reset_queries(&mut self, pool: QueryPoolHandle, queries: Range<u32>) -> Result<()> {
         self.needs_compute("a reset of queries")?;
         let pool = self.shared.store.query_pools.get(pool)?;
@@ -40,10 +41,10 @@ impl CommandBuffer {
     /// reset since it was last written.
     ///
     /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of another kind, and
-    /// where this command buffer has written the query already. What earlier command buffers have written,
-    /// [`Context::submit`](crate::Context::submit) checks. [`Unsupported`](Error::Unsupported) on queues of the device that
-    /// have no timestamps ([`QueueInfo::timestamp_bits`](crate::QueueInfo::timestamp_bits)).
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of another kind, and for
+    /// a query that this command buffer has written already. [`Context::submit`](crate::Context::submit) checks the
+    /// writes of earlier command buffers. [`Unsupported`](Error::Unsupported) on queues of the device that have no
+    /// timestamps ([`QueueInfo::timestamp_bits`](crate::QueueInfo::timestamp_bits)).
     pub fn write_timestamp(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
         pool.check_range(query, self.views)?;
@@ -57,24 +58,25 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Begins to count: samples that pass, or what the stages do (`vkCmdBeginQuery`), up to
-    /// [`end_query`](Self::end_query). Passes may lie in between. The query must have been reset since it was last used.
+    /// Begins a query that counts samples that pass, or the work of the stages (`vkCmdBeginQuery`), up to
+    /// [`end_query`](Self::end_query). Passes may lie in between. The query must have been reset since it was last
+    /// used.
     ///
     /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of timestamps, while
-    /// another query of the same kind is open, and where this command buffer has used the query already. What earlier
-    /// command buffers have used, [`Context::submit`](crate::Context::submit) checks.
-    /// [`Unsupported`](Error::Unsupported) for statistics behind a render pass on lavapipe, which crashes there;
-    /// [`WrongQueue`](Error::WrongQueue) on another queue than the graphics queue.
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of timestamps, and for a
+    /// query that this command buffer has used already. Also [`InvalidUsage`](crate::Error::InvalidUsage) while another
+    /// query of the same kind is open. [`Context::submit`](crate::Context::submit) checks the queries of earlier
+    /// command buffers. [`Unsupported`](Error::Unsupported) for statistics after a render pass on lavapipe, which
+    /// crashes there; [`WrongQueue`](Error::WrongQueue) on queues other than the graphics queue.
     pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.end_rendering();
         self.begin_query_at(pool, query)
     }
 
-    /// Ends what [`begin_query`](Self::begin_query) began (`vkCmdEndQuery`).
+    /// Ends the query that [`begin_query`](Self::begin_query) began (`vkCmdEndQuery`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) where the query is not open, or was begun in a render pass.
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) if the query is not open, or was begun in a render pass.
     pub fn end_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.end_rendering();
         self.end_query_at(pool, query)
@@ -97,7 +99,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// lavapipe 25.0 crashes where pipeline statistics begin outside of render passes after one.
+    /// Fails for pipeline statistics on lavapipe that begin outside of render passes after one: lavapipe 25.0 crashes
+    /// there.
     fn check_statistics(&self, kind: QueryKind) -> Result<()> {
         let gpu = &self.shared.gpu;
         let outside = self.had_pass && !self.rendering;
@@ -115,14 +118,14 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Ends what was begun in the pass that ends now; that it is open is an error of the submission.
+    /// Ends the queries that were begun in the pass that ends now. The submission reports each of them as an error.
     pub(super) fn end_pass_queries(&mut self) {
         for open in self.state.queries.take_pass_queries() {
             self.record_end_query(&open.pool, open.query);
         }
     }
 
-    /// Ends what is still open.
+    /// Ends the queries that are still open.
     pub(super) fn end_open_queries(&mut self) {
         self.end_rendering();
         for open in self.state.queries.take_open_queries() {
@@ -135,36 +138,37 @@ impl CommandBuffer {
         unsafe { self.shared.gpu.device.cmd_end_query(self.raw(), pool.raw, query) };
     }
 
-    /// Other queues wait for what this one does to pools.
+    /// References the query pools for queue synchronisation.
     pub(super) fn reference_query_pools(&mut self) {
         if self.shared.gpu.queues.has_several() {
             self.recording.references.extend(self.state.queries.pools().map(|id| (id, QueueAccess::Write)));
         }
     }
 
-    /// Fails where a query is open, or is written again without a reset.
+    /// Fails if a query is open, or is written again without a reset.
     pub(crate) fn check_queries(&self) -> Result<()> {
         self.state.queries.check_submit()
     }
 }
 
 impl RenderPass<'_> {
-    /// As [`CommandBuffer::write_timestamp`], between draws. Devices that draw in tiles answer times of the whole pass.
-    /// In a pass with a view mask, this and the following queries are written, one for each view.
+    /// As [`CommandBuffer::write_timestamp`], between draws. Tile-based devices return times of the whole pass. In a
+    /// pass with a view mask, this and the following queries are written, one for each view.
     pub fn write_timestamp(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.cmd.write_timestamp(pool, query)
     }
 
-    /// As [`CommandBuffer::begin_query`], to be ended in the same pass. In a pass with a view mask, this and the following
-    /// queries are taken, one for each view: the result is their sum, which drivers may put into the first alone.
+    /// As [`CommandBuffer::begin_query`], to be ended in the same pass. In a pass with a view mask, this and the
+    /// following queries are used, one for each view. The result is their sum, which drivers may put into the first
+    /// alone.
     pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.cmd.begin_query_at(pool, query)
     }
 
-    /// Ends what [`begin_query`](Self::begin_query) began in this pass (`vkCmdEndQuery`).
+    /// Ends the query that [`begin_query`](Self::begin_query) began in this pass (`vkCmdEndQuery`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) where the query is not open, or was begun before the pass.
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) if the query is not open, or was begun before the pass.
     pub fn end_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.cmd.end_query_at(pool, query)
     }

@@ -1,4 +1,4 @@
-//! What a command buffer does to queries, for the checks while it is recorded and when it is submitted.
+//! Query usage of a command buffer, for checks during the recording and at the submission.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::resource::query_reset_state::QueryResetState;
 pub(super) struct QueryUsage {
     pools: Vec<(Arc<QueryPool>, QueryResetState)>,
     open: Vec<OpenQuery>,
-    /// A query that was begun in a render pass and left open at its end.
+    /// The error for a query that was begun in a render pass and left open at its end.
     unended_error: Option<Error>,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct QueryUsage {
 pub(super) struct OpenQuery {
     pub(super) pool: Arc<QueryPool>,
     pub(super) query: u32,
-    /// Where it was begun, and must be ended.
+    /// True if the query was begun in a render pass, and must be ended there.
     pub(super) in_pass: bool,
 }
 
@@ -35,13 +35,13 @@ impl QueryUsage {
         }
     }
 
-    /// `count` queries from `query` on are written.
+    /// Records that `count` queries from `query` on are written.
     pub(super) fn record_write(&mut self, pool: &Arc<QueryPool>, query: u32, count: u32) {
         let marks = self.reset_state(pool);
         (query..query + count).for_each(|query| marks.write(query));
     }
 
-    /// Fails where one of the queries is open.
+    /// Fails if one of the queries is open.
     pub(super) fn check_reset(&self, pool: &Arc<QueryPool>, queries: std::ops::Range<u32>) -> Result<()> {
         let open = |open: &&OpenQuery| Arc::ptr_eq(&open.pool, pool) && queries.contains(&open.query);
         match self.open.iter().find(open) {
@@ -53,13 +53,13 @@ impl QueryUsage {
         }
     }
 
-    /// Queries are reset.
+    /// Records that queries are reset.
     pub(super) fn record_reset(&mut self, pool: &Arc<QueryPool>, queries: std::ops::Range<u32>) {
         let marks = self.reset_state(pool);
         queries.for_each(|query| marks.reset(query));
     }
 
-    /// Fails where a query of the same kind is open.
+    /// Fails if a query of the same kind is open.
     pub(super) fn check_begin(&self, pool: &QueryPool) -> Result<()> {
         match self.open.iter().find(|open| open.pool.kind.raw() == pool.kind.raw()) {
             None => Ok(()),
@@ -73,7 +73,7 @@ impl QueryUsage {
         }
     }
 
-    /// Fails where an open query counts stages that pipelines with mesh shaders do not have.
+    /// Fails if an open query counts stages that pipelines with mesh shaders do not have.
     pub(super) fn check_mesh_draw(&self) -> Result<()> {
         match self.open.iter().find(|open| open.pool.kind == QueryKind::PipelineStatistics) {
             None => Ok(()),
@@ -88,13 +88,13 @@ impl QueryUsage {
         }
     }
 
-    /// The query is open from now on, and takes `count` of its pool.
+    /// Records that a query is open from now on. It uses `count` queries of its pool.
     pub(super) fn record_begin(&mut self, pool: Arc<QueryPool>, query: u32, count: u32, in_pass: bool) {
         self.record_write(&pool, query, count);
         self.open.push(OpenQuery { pool, query, in_pass });
     }
 
-    /// Closes a query.
+    /// Records the end of a query.
     pub(super) fn record_end(&mut self, pool: &Arc<QueryPool>, query: u32, in_pass: bool) -> Result<()> {
         let same = |open: &OpenQuery| Arc::ptr_eq(&open.pool, pool) && open.query == query;
         let Some(place) = self.open.iter().position(same) else {
@@ -109,7 +109,8 @@ impl QueryUsage {
         Ok(())
     }
 
-    /// Takes the queries out that were begun in a pass that ends now. That they are open is a mistake.
+    /// Removes and returns the queries that were begun in the pass that ends now. They should have been ended, so their
+    /// error is kept for the submission.
     pub(super) fn take_pass_queries(&mut self) -> Vec<OpenQuery> {
         let open: Vec<_> = self.open.extract_if(.., |open| open.in_pass).collect();
         if let Some(first) = open.first() {
@@ -118,12 +119,12 @@ impl QueryUsage {
         open
     }
 
-    /// Takes all open queries out.
+    /// Removes and returns all open queries.
     pub(super) fn take_open_queries(&mut self) -> Vec<OpenQuery> {
         std::mem::take(&mut self.open)
     }
 
-    /// Fails where the command buffer cannot be submitted after those before it.
+    /// Fails if the command buffer cannot be submitted after those before it.
     pub(super) fn check_submit(&self) -> Result<()> {
         if let Some(error) = self.unended_error.clone().or_else(|| self.open.first().map(not_ended_error)) {
             return Err(error);
@@ -131,19 +132,19 @@ impl QueryUsage {
         self.pools.iter().try_for_each(|(pool, marks)| pool.check_submit(marks))
     }
 
-    /// The command buffer was submitted.
+    /// Applies the writes and resets to the pools, once the command buffer is submitted.
     pub(super) fn apply_submission(&self) {
         self.pools.iter().for_each(|(pool, marks)| pool.mark_submitted(marks));
     }
 
-    /// Forgets everything; keeps the memory.
+    /// Clears everything and keeps the memory.
     pub(super) fn clear(&mut self) {
         self.pools.clear();
         self.open.clear();
         self.unended_error = None;
     }
 
-    /// The pools that the command buffer writes or resets.
+    /// Returns the pools that the command buffer writes or resets.
     pub(super) fn pools(&self) -> impl Iterator<Item = ResourceId> {
         self.pools.iter().map(|(pool, _)| pool.id)
     }

@@ -1,5 +1,5 @@
-//! What the command buffers of a queue cannot do. Refused alike everywhere, whether the device would do it or not, but for
-//! steps of copies and timestamps, which are the device's.
+//! Checks for commands that the queue of a command buffer does not support. They are the same on every device, even if
+//! the device could run the command. Only the granularity of copies and timestamps depend on the device.
 
 use ash::vk;
 
@@ -13,21 +13,21 @@ use crate::submit::SubmitHandle;
 use crate::submit::ownership::QueueAccess;
 use crate::submit::queue::stages_of;
 
-/// What builds are called.
+/// The name of builds in error messages.
 pub(crate) const BUILD_ON_QUEUE: &str = "a build of acceleration structures";
 
 impl CommandBuffer {
-    /// The queue that the command buffer was acquired for.
+    /// Returns the queue that the command buffer was acquired for.
     pub fn queue(&self) -> Queue {
         self.queue
     }
 
-    /// Its queue's. What is on queue 0 runs in order with what the graphics queue gets.
+    /// Returns the index of its queue. Work on queue index 0 runs in order with the work of the graphics queue.
     pub(crate) fn queue_index(&self) -> usize {
         self.recording.queue_index
     }
 
-    /// Fails unless this is for the graphics queue.
+    /// Fails unless the command buffer is for the graphics queue.
     pub(super) fn needs_graphics(&self, command: &'static str) -> Result<()> {
         match self.queue {
             Queue::Graphics => Ok(()),
@@ -35,13 +35,13 @@ impl CommandBuffer {
         }
     }
 
-    /// Fails if this is for the transfer queue.
+    /// Fails if the command buffer is for the transfer queue.
     #[inline]
     pub(super) fn needs_compute(&self, command: &'static str) -> Result<()> {
         needs_compute(self.queue, command)
     }
 
-    /// Fails where the device's queue has no timestamps.
+    /// Fails if the device's queue has no timestamps.
     pub(super) fn needs_timestamps(&self) -> Result<()> {
         if self.shared.gpu.caps.queue(self.queue).timestamp_bits > 0 {
             return Ok(());
@@ -49,7 +49,7 @@ impl CommandBuffer {
         Err(self.shared.gpu.unsupported(&format!("timestamps on the {} queue", self.queue.label())))
     }
 
-    /// Fails where copies on this queue cannot have such a region.
+    /// Fails if copies on this queue do not support the region.
     pub(super) fn check_copy(&self, texture: &Texture, region: &Region) -> Result<()> {
         if self.queue == Queue::Graphics {
             return Ok(());
@@ -75,7 +75,7 @@ impl CommandBuffer {
         Err(Error::usage(&texture.name, message))
     }
 
-    /// The command buffer begins after these submissions.
+    /// Makes the command buffer begin after these submissions.
     pub(super) fn wait_for_resource(&mut self, submissions: &[SubmitHandle]) -> Result<()> {
         for submission in submissions.iter().filter(|submission| **submission != SubmitHandle::default()) {
             if submission.context != self.shared.store.context_id {
@@ -87,12 +87,12 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// The command buffer begins after a submission of the first queue.
+    /// Makes the command buffer begin after the submission with this timeline value of the first queue.
     pub(crate) fn wait_for_all_writes(&mut self, value: u64) {
         self.recording.after.max_with_value(0, value);
     }
 
-    /// The command buffer uses something that needs no barriers within a queue.
+    /// References a resource that needs no barriers within a queue, for queue synchronisation.
     #[inline]
     pub(crate) fn reference_resource(&mut self, id: ResourceId, access: QueueAccess) {
         if self.shared.gpu.queues.has_several() {
@@ -117,17 +117,19 @@ pub(crate) fn needs_compute(queue: Queue, command: &'static str) -> Result<()> {
     }
 }
 
-/// Copies leave things readable everywhere: by what the queue can name, and on others by a semaphore.
+/// Returns `read` limited to the stages of a queue. Copies make their results readable by all stages of their own
+/// queue; other queues see them through a semaphore.
 pub(super) fn limited_to_queue(queue_index: usize, read: Use) -> Use {
     if queue_index == 0 {
         return read;
     }
     let own = read.limited_to(stages_of(Queue::ALL[queue_index]));
-    // A queue that runs no shaders reads in its own way.
+    // A queue without shaders reads by transfers only.
     if own.stages.is_empty() { Use::transfer_read().with_layout(read.layout) } else { own }
 }
 
-/// Whether a copy may have this offset and extent of a mip's side, where a granularity counts blocks of so many texels.
+/// True if a copy may have this offset and extent along a mip of `side` texels. The granularity counts blocks of
+/// `block` texels.
 fn is_on_granularity(granularity: u32, block: u32, (offset, extent, side): (u32, u32, u32)) -> bool {
     if granularity == 0 {
         return offset == 0 && extent == side;

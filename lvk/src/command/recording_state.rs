@@ -1,4 +1,4 @@
-//! What a command buffer notes while it is recorded, with memory that is used again.
+//! Recording state of a command buffer, with memory that is reused.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use crate::lock_order::{Mutex, Rank};
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit_barriers::LastBarrier;
 
-/// Lists and maps of one command buffer.
+/// Recording state of one command buffer: lists and maps.
 #[derive(Default)]
 pub(crate) struct RecordingState {
     pub(super) buffer_cache: HandleCache<BufferHandle, Buffer>,
@@ -34,25 +34,25 @@ pub(crate) struct RecordingState {
     pub(super) push_constants: PushConstants,
     pub(super) host_reads: Vec<ResourceId>,
     pub(super) pending_visibility: Vec<PendingVisibility>,
-    /// Present once a top-level structure was updated.
+    /// `Some` once a TLAS was updated.
     pub(super) tlas_trackers: Option<Box<TlasTrackers>>,
-    /// Builds of top-level structures that run side by side.
+    /// Builds of TLAS that run concurrently.
     pub(super) build_run: ConcurrentBuilds,
     pub(super) open_builds: Vec<OpenBuild>,
-    /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
+    /// Refits since the last rebuild of each BLAS that this command buffer builds, by its id.
     pub(super) refits: HashMap<u64, u32>,
     pub(super) size_queries: Vec<Arc<CompactedSizeQuery>>,
     pub(super) queries: QueryUsage,
-    /// Bottom-level structures that are built elsewhere from here on, by their ids.
+    /// Ids of BLAS whose CPU-built BVH is replaced from here on.
     pub(crate) moved_blas: HashSet<u64>,
-    /// Bottom-level structures that the host placed in top-level ones where it knew them to lie, by their ids.
+    /// BLAS that the host referenced in a software TLAS by the addresses they had then, by their ids.
     pub(crate) placed_blas: HashMap<u64, Arc<AccelStruct>>,
-    /// What a command failed on with only a part of it recorded.
+    /// The name of the object for which a command failed with only a part of it recorded.
     pub(super) poisoned: Option<String>,
 }
 
 impl RecordingState {
-    /// The command buffer went to the GPU with this timeline value: what it noted becomes true.
+    /// Applies the effects of the commands, once the command buffer is submitted with this timeline value.
     pub(crate) fn apply_submission(&mut self, shared: &DeviceState, value: u64) {
         if let Some(updates) = &mut self.tlas_trackers {
             shared.apply_tlas_updates(updates, |target| target.mark_used_by_submission(value));
@@ -62,14 +62,14 @@ impl RecordingState {
         self.queries.apply_submission();
     }
 
-    /// Forgets everything, and keeps the memory.
+    /// Clears everything and keeps the memory.
     fn clear(&mut self) {
         let Self {
             buffer_cache,
             texture_cache,
             accesses,
             barriers,
-            // What barriers are called is the same for every command buffer.
+            // The translation of a barrier is the same for every command buffer.
             last_barrier: _,
             sets_bound,
             push_constants,
@@ -105,16 +105,16 @@ impl RecordingState {
     }
 }
 
-/// Notes that no command buffer has at the moment, empty.
+/// Recording states that no command buffer uses at the moment, all cleared.
 #[expect(clippy::vec_box, reason = "handed on as pointers")]
 pub(crate) struct RecordingStatePool(Mutex<Vec<Box<RecordingState>>>);
 
 impl RecordingStatePool {
-    /// More than this are let go, and so are those of very many instances.
+    /// Most states that the pool keeps. It does not keep states with memory for very many instances either.
     const MAX_SPARE: usize = 8;
 
     pub(crate) fn new() -> Self {
-        Self(Mutex::new(Rank::SpareNotes, Vec::new()))
+        Self(Mutex::new(Rank::RecordingStates, Vec::new()))
     }
 
     pub(crate) fn acquire(&self) -> Box<RecordingState> {

@@ -1,16 +1,16 @@
-//! How one command uses parts of textures: disjoint parts, each with one use.
+//! Texture accesses of one command: disjoint subresources, each with one use.
 
 use crate::barrier::{ResourceId, Subresources, Use};
 
-/// Parts of images with their uses, and with whom to name in errors.
+/// Subresources of images with their uses, and with their owners for error messages.
 ///
-/// Parts of one image never overlap: what is used twice counts once, with both uses.
+/// Entries of one image never overlap: subresources used twice have one entry, with both uses merged.
 #[derive(Debug)]
 pub(super) struct SubresourceAccesses<T> {
     accesses: Vec<SubresourceAccess<T>>,
 }
 
-/// A part of an image and what a command does to it.
+/// Subresources of an image and their use by a command.
 #[derive(Debug, Clone)]
 pub(super) struct SubresourceAccess<T> {
     pub(super) id: ResourceId,
@@ -20,10 +20,10 @@ pub(super) struct SubresourceAccess<T> {
 }
 
 impl<T: Clone> SubresourceAccesses<T> {
-    /// Adds a use. Fails with the owner of an earlier use of the same texels that excludes this one.
+    /// Adds a use. Fails with the owner of an earlier use of the same texels that conflicts with this one.
     #[inline]
     pub(super) fn add(&mut self, id: ResourceId, part: Subresources, next: Use, owner: T) -> Result<(), T> {
-        // Most commands use one image; what is written here and in the list at once need not wait in memory between.
+        // Most commands use one image. Its entry is written directly to the list, without a copy in memory between.
         if self.accesses.is_empty() {
             self.accesses.push(SubresourceAccess { id, part, next, owner });
             return Ok(());
@@ -43,7 +43,7 @@ impl<T: Clone> SubresourceAccesses<T> {
         }
     }
 
-    /// Adds a use of texels of which the part at this place is the first to have some.
+    /// Adds a use of texels. The entry at `index` is the first that overlaps them.
     fn merge_at(&mut self, index: usize, new: SubresourceAccess<T>) -> Result<(), T> {
         let first = &mut self.accesses[index];
         if first.part == new.part {
@@ -53,7 +53,7 @@ impl<T: Clone> SubresourceAccesses<T> {
         self.split_and_merge(index, new)
     }
 
-    /// Adds a use of texels of which some, from the part at `first` on, are used already.
+    /// Adds a use of texels that overlap entries from `first` on. Splits entries whose use differs.
     fn split_and_merge(&mut self, first: usize, new: SubresourceAccess<T>) -> Result<(), T> {
         let mut rest = vec![new.part];
         for index in first..self.accesses.len() {
@@ -121,7 +121,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against a map that has one entry for each mip of each layer.
+        /// Compares with a map that has one entry for each mip of each layer.
         #[test]
         fn every_subresource_has_the_merged_use_of_all_who_name_it(
             added in prop::collection::vec((0..2_u64, part(), 0..4_usize), 1..8)

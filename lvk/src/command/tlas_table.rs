@@ -1,4 +1,4 @@
-//! The table of all TLAS: the addresses of their hit remap tables and of what software traces.
+//! The table of all TLAS: the addresses of their hit remap tables and of their software TLAS.
 
 use std::sync::Arc;
 
@@ -12,7 +12,8 @@ use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::software_ray_query::tlas::SoftwareTlas;
 
 impl CommandBuffer {
-    /// Tells shaders where the rows of the structure lie, unless they know. Answers what it tells.
+    /// Writes the entry of a TLAS in the TLAS table, unless it is up to date. Returns the address of the hit remap
+    /// table that it writes, 0 for none.
     #[inline(always)]
     pub(super) fn write_hit_table_entry(
         &mut self,
@@ -20,7 +21,7 @@ impl CommandBuffer {
         is_built: bool,
         blas_refs: &BlasRefSet,
     ) -> Option<u64> {
-        // At first the entry is that of the slot's last owner.
+        // Before the first build, the entry is that of the slot's previous owner.
         if is_built && tlas.hit_table.get().is_none() {
             return None;
         }
@@ -29,14 +30,15 @@ impl CommandBuffer {
         Some(rows)
     }
 
-    /// Structures that this command buffer takes to have no rows, though a submission since it was recorded has given them some:
-    /// their slots, with what the table has to say of them first.
+    /// Returns the slots and table entries of TLAS that this command buffer expects to have no hit remap table,
+    /// although a submission since its recording has added one. The entries must be written before the command buffer
+    /// runs.
     pub(crate) fn entries_without_hit_table(&self) -> Vec<(u32, [u64; 2])> {
         let Some(updates) = &self.state.tlas_trackers else { return Vec::new() };
         updates.with_unexpected_hit_table().map(|tlas| (tlas.slot, tlas_table_entry(tlas, 0))).collect()
     }
 
-    /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.
+    /// Writes an entry of the TLAS table: the addresses of the hit remap table and of the software TLAS, 0 for none.
     pub(crate) fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
@@ -49,12 +51,12 @@ impl CommandBuffer {
         }
     }
 
-    /// Has shaders see nothing in slots whose structures are gone.
+    /// Clears the table entries of slots whose TLAS were destroyed.
     pub(crate) fn clear_tlas_entries(&mut self, slots: &[u32]) {
         slots.iter().for_each(|slot| self.write_tlas_table(*slot, [0; 2]));
     }
 
-    /// Empties the table that says where rows lie.
+    /// Clears the whole TLAS table.
     pub(crate) fn clear_tlas_table(&mut self) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
@@ -65,7 +67,7 @@ impl CommandBuffer {
     }
 }
 
-/// What the table says of a structure with these rows.
+/// Returns the table entry of a TLAS whose hit remap table is at the address `rows`.
 fn tlas_table_entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
     [rows, tlas.software.as_ref().map_or(0, SoftwareTlas::address)]
 }

@@ -36,7 +36,7 @@ impl CommandBuffer {
         self.trace_rays_with(0, size, dependencies)
     }
 
-    /// As [`trace_rays`](Self::trace_rays), with the ray generation shader at place `ray_gen` of the pipeline's list.
+    /// As [`trace_rays`](Self::trace_rays), with the ray generation shader at index `ray_gen` of the pipeline's list.
     pub fn trace_rays_with(
         &mut self,
         ray_gen: u32,
@@ -66,11 +66,11 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Runs the ray generation shader at place `ray_gen` as often as three `u32` at `offset` in `arguments` say: width,
-    /// height and depth, of which any may be 0 (`vkCmdTraceRaysIndirectKHR`).
+    /// Runs the ray generation shader at index `ray_gen` with a size from a buffer (`vkCmdTraceRaysIndirectKHR`). Three
+    /// `u32` at `offset` in `arguments` hold the width, height and depth, of which any may be 0.
     ///
-    /// `arguments` needs [`INDIRECT`](crate::BufferUsage::INDIRECT); `offset` is a multiple of 4. That the size is
-    /// within the device's limits is up to whoever writes it.
+    /// `arguments` needs [`INDIRECT`](crate::BufferUsage::INDIRECT); `offset` is a multiple of 4. The caller keeps the
+    /// size in the buffer within the device's limits.
     ///
     /// # Errors
     /// [`Unsupported`](Error::Unsupported) without
@@ -108,7 +108,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// The bound pipeline and its table, if everything its shaders need was pushed.
+    /// Returns the bound pipeline and the regions of its shader binding table. Fails unless all push constants of its
+    /// shaders were pushed.
     fn check_trace(&self, ray_gen: u32) -> Result<(Arc<RayTracingPipeline>, TraceRegions)> {
         let pipeline = self.ray_tracing.clone();
         let pipeline =

@@ -1,5 +1,5 @@
-//! Updates of a TLAS: its list of instances is written by the host where it knows the addresses, and by a kernel where
-//! BLAS have parts or maps, or may move.
+//! Updates of a TLAS. The host writes the list of instances if it knows the addresses. A kernel writes it if BLAS have
+//! parts or maps, or may move.
 
 use std::sync::Arc;
 
@@ -26,13 +26,13 @@ use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::upload::staging::StagingChunk;
 
-/// Addresses of instances must be a multiple of this.
+/// Alignment of instance addresses, in bytes.
 const INSTANCE_ALIGNMENT: u64 = 16;
 
-/// Instances that the host has written as Vulkan reads them.
+/// Instances that the host has written in Vulkan's format.
 struct StagedInstances {
     address: u64,
-    /// What they refer to; `None` for what was known.
+    /// The BLAS that they reference; `None` if the set is unchanged.
     blas_refs: Option<Arc<BlasRefSet>>,
 }
 
@@ -41,65 +41,67 @@ struct KernelInstances {
     address: u64,
     built_count: u32,
     blas_refs: Arc<BlasRefSet>,
-    /// Kept where they may have to be written again.
+    /// Kept if the instances may have to be written again.
     source: Option<Arc<InstanceSource>>,
 }
 
 impl KernelInstances {
-    /// What Vulkan is given.
+    /// Returns the instances for the Vulkan build.
     fn build_instances(&self) -> VulkanInstances {
         VulkanInstances { address: self.address, count: self.built_count, is_from_kernel: true }
     }
 
-    /// What a structure shows with them.
+    /// Returns the change of the TLAS contents that these instances cause.
     fn into_change(self, count: u32, refit: bool) -> TlasChange {
         let Self { built_count, blas_refs, source, .. } = self;
         TlasChange { count, built_count, blas_refs: Some(blas_refs), source, refit }
     }
 }
 
-/// So many instances are written without a list of what they refer to.
+/// Largest number of instances that are written without collecting the BLAS they reference.
 const MAX_UNCHANGED_INSTANCES: usize = StagingChunk::MAX_BYTES as usize / INSTANCE_BYTES;
 
 impl CommandBuffer {
-    /// Shows other instances in a top-level structure: at most its capacity, and for a refit as many as before
-    /// (`vkCmdBuildAccelerationStructuresKHR`). The instances are copied at once.
+    /// Replaces the instances of a TLAS: at most its capacity, and for a refit as many as before
+    /// (`vkCmdBuildAccelerationStructuresKHR`). The call copies the instances.
     ///
     /// # Errors
     /// [`LimitExceeded`](Error::LimitExceeded) over the capacity; [`InvalidUsage`](Error::InvalidUsage) for numbers
     /// that do not fit their bits, transforms that are not finite, and refits that are not allowed;
-    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue. Where the device and software both trace, and there is no memory
-    /// for software's half of the update, the command buffer can no longer be submitted.
+    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue. If both the device and software trace, and memory for
+    /// the software part of the update runs out, the command buffer can no longer be submitted.
     pub fn update_tlas(
         &mut self,
         tlas: AccelStructHandle,
         instances: &[TlasInstance],
         mode: BuildMode,
     ) -> Result<()> {
-        self.needs_compute("an update of a top-level structure")?;
+        self.needs_compute("an update of a TLAS")?;
         self.with_tlas_trackers(|cmd, updates| {
             let index = updates.index_of_handle(&cmd.shared.store.accel_structs, tlas)?;
             cmd.update_entry(updates, index, instances, mode)
         })
     }
 
-    /// As [`update_tlas`](Self::update_tlas), with instances that lie in a buffer: written by a compute shader, say,
+    /// As [`update_tlas`](Self::update_tlas), with instances in a buffer, for example written by a compute shader
     /// earlier in the same command buffer.
     ///
-    /// Split meshes take the room of their parts for every record, since the host does not know who refers to them. From
-    /// one refit to the next a record may come to name another structure of the list, but it may not begin or cease to
-    /// name one that exists: Vulkan takes that for an instance that comes or goes.
+    /// If the list of BLAS has split meshes, every record takes as many Vulkan instances as the mesh with the most
+    /// parts. The host does not know which BLAS a record references. From one refit to the next a record may change to
+    /// another BLAS of the list. It may not change between an existing BLAS and none: Vulkan treats that as an instance
+    /// that is added or removed.
     ///
     /// # Errors
-    /// As [`update_tlas`](Self::update_tlas), but the records themselves are not checked; and
-    /// [`InvalidUsage`](Error::InvalidUsage) for a buffer without the usage, or too small.
+    /// As [`update_tlas`](Self::update_tlas), except that the records themselves are not checked. Also
+    /// [`InvalidUsage`](Error::InvalidUsage) for a buffer without
+    /// [`BufferUsage::STORAGE`](crate::BufferUsage::STORAGE), or too small.
     pub fn update_tlas_from_buffer(
         &mut self,
         tlas: AccelStructHandle,
         instances: &DeviceInstances<'_>,
         mode: BuildMode,
     ) -> Result<()> {
-        self.needs_compute("an update of a top-level structure")?;
+        self.needs_compute("an update of a TLAS")?;
         self.with_tlas_trackers(|cmd, updates| {
             let index = updates.index_of_handle(&cmd.shared.store.accel_structs, tlas)?;
             cmd.update_entry_from_buffer(updates, index, instances, mode)
@@ -119,7 +121,7 @@ impl CommandBuffer {
         })
     }
 
-    /// Writes the instances of a structure again, as what it shows has moved, and builds it.
+    /// Writes the instances of a TLAS again, as BLAS that it references have moved, and rebuilds it.
     pub(crate) fn rewrite_tlas(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
         let tlas = target.tlas()?;
         let contents = tlas.contents().clone();
@@ -140,7 +142,7 @@ impl CommandBuffer {
         })
     }
 
-    /// Has `record_build` keep what it updates.
+    /// Runs `record` with the TLAS trackers of the command buffer.
     #[inline(always)]
     fn with_tlas_trackers(
         &mut self,
@@ -152,7 +154,8 @@ impl CommandBuffer {
         recorded
     }
 
-    /// Shows instances of the host in the structure of a row. Mostly few, and of the same structures as before.
+    /// Updates the TLAS of an entry with instances of the host. Most updates have few instances, of the same BLAS as
+    /// before.
     #[inline(always)]
     fn update_entry(
         &mut self,
@@ -178,7 +181,7 @@ impl CommandBuffer {
         self.update_changed(updates, index, instances, mode)
     }
 
-    /// Builds from instances that Vulkan can read, of what was shown before.
+    /// Builds from instances in Vulkan's format that reference the same BLAS as before.
     #[inline(always)]
     fn build_unchanged(
         &mut self,
@@ -201,7 +204,7 @@ impl CommandBuffer {
         })
     }
 
-    /// Builds from instances that the host has written with addresses. Answers whether it is a refit.
+    /// Builds from instances that the host has written with addresses. Returns true for a refit.
     #[inline(always)]
     fn build_from_addresses(
         &mut self,
@@ -215,7 +218,7 @@ impl CommandBuffer {
         Ok(refit)
     }
 
-    /// As [`update_entry`](Self::update_entry), of whatever structures.
+    /// As [`update_entry`](Self::update_entry), for instances of any BLAS.
     #[inline(never)]
     fn update_changed(
         &mut self,
@@ -250,7 +253,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Builds from instances that a kernel writes; where the device has no structures of its own, only checks.
+    /// Builds from instances that a kernel writes. On a device without acceleration structures, only checks the
+    /// instances.
     #[inline(never)]
     fn update_with_kernel(
         &mut self,
@@ -276,7 +280,7 @@ impl CommandBuffer {
         Ok(kernel_instances.into_change(count, refit))
     }
 
-    /// Shows instances that lie in a buffer in the structure of a row.
+    /// Updates the TLAS of an entry with instances in a buffer.
     fn update_entry_from_buffer(
         &mut self,
         updates: &mut TlasTrackers,
@@ -314,7 +318,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Builds what the device traces from instances that lie in a buffer.
+    /// Builds the Vulkan TLAS from instances in a buffer.
     fn build_from_buffer(
         &mut self,
         update: TlasBuildRequest<'_>,
@@ -331,7 +335,8 @@ impl CommandBuffer {
         Ok(kernel_instances.into_change(instances.count, refit))
     }
 
-    /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
+    /// Applies the updates recorded so far as if they were submitted. Only for the command buffer that is submitted
+    /// before every other one.
     pub(crate) fn apply_tlas_updates(&mut self) {
         let RecordingState { tlas_trackers, build_run, open_builds, .. } = &mut **self.state;
         build_run.stop();
@@ -342,7 +347,7 @@ impl CommandBuffer {
         }
     }
 
-    /// Builds from what a kernel writes, which is recorded.
+    /// Builds from the instances of a kernel that is already recorded.
     fn build_from_kernel(
         &mut self,
         target: &AccelStruct,
@@ -355,14 +360,15 @@ impl CommandBuffer {
         built.map_err(|error| self.poison(&target.name, error))
     }
 
-    /// Software's half of an update failed. Where the device has one, that is recorded.
+    /// Returns the error of the software part of an update. Poisons the command buffer if the device part is already
+    /// recorded.
     #[cold]
     fn fail_after_device_build(&mut self, target: &AccelStruct, tlas: &Tlas, error: Error) -> Error {
         if tlas.structure.is_some() { self.poison(&target.name, error) } else { error }
     }
 
-    /// Writes a few instances of just what is `previous`, which still stands. Answers their address; `None` for any others, wrong
-    /// ones among them.
+    /// Writes a few instances that reference exactly the BLAS of `previous`, which is current. Returns their address,
+    /// or `None` for any other instances, including invalid ones.
     #[inline(always)]
     fn try_stage_unchanged(
         &mut self,
@@ -381,7 +387,8 @@ impl CommandBuffer {
         Ok(alike.then_some(address))
     }
 
-    /// Writes instances with addresses; `None` where a kernel is needed. `previous` is what was shown before, if that still stands.
+    /// Writes instances with addresses; returns `None` if a kernel is needed. `previous` has the BLAS referenced before
+    /// if they are all current, else none.
     fn stage_instances(
         &mut self,
         name: &str,
@@ -408,7 +415,7 @@ impl CommandBuffer {
         })
     }
 
-    /// Instances for the kernel, and the owners of those for further parts.
+    /// Returns the kernel's input: the instances, and the owners of the instances for extra parts.
     fn host_source(
         &mut self,
         name: &str,
@@ -442,7 +449,7 @@ impl CommandBuffer {
         Ok((source, blas_refs))
     }
 
-    /// Bytes for the kernel to read: in a buffer of their own if they are to be kept, else in staging memory.
+    /// Writes bytes for the kernel to read: to a buffer of their own if they are to be kept, else to staging memory.
     fn source_bytes(
         &mut self,
         name: &str,
@@ -460,7 +467,7 @@ impl CommandBuffer {
         Ok(InstanceBytes { address: buffer.address, buffer: Some(buffer) })
     }
 
-    /// The caller's buffer as a source.
+    /// Returns the caller's buffer as the kernel's input.
     fn device_source(
         &self,
         name: &str,
@@ -493,7 +500,7 @@ impl CommandBuffer {
         Ok((blas_refs, source))
     }
 
-    /// Copies the caller's buffer where structures may move later, since it may have other contents by then.
+    /// Copies the caller's buffer if BLAS may move later, since its contents may have changed by then.
     fn keep_source_copy(
         &mut self,
         name: &str,
@@ -519,7 +526,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Has the kernel write the instances and their rows.
+    /// Records the kernel that writes the instances and their hit remap entries.
     fn record_instances(
         &mut self,
         target: &AccelStruct,
@@ -534,7 +541,7 @@ impl CommandBuffer {
             true => Some(tlas.hit_table_buffer(gpu, name)?),
             false => None,
         };
-        // A refit may neither add nor remove instances, but records may come to name meshes of other parts.
+        // A refit may neither add nor remove instances, but records may change to BLAS with another number of parts.
         let keep_active = source.copies > 1 && target.flags.contains(BuildFlags::ALLOW_UPDATE);
         self.record_instance_kernel(&source, &blas_refs, &records, rows.as_deref(), keep_active)?;
         let source = blas_refs.may_move.then(|| Arc::new(source));
@@ -588,7 +595,8 @@ impl CommandBuffer {
         )
     }
 
-    /// The address of bytes that the GPU may read until the command buffer is done.
+    /// Writes bytes to staging memory, where the GPU may read them until the command buffer is done. Returns their
+    /// address.
     fn stage_bytes(&mut self, bytes: u64, fill: impl FnOnce(&mut [u8])) -> Result<u64> {
         let sequence = self.recording.staging_key();
         let (address, ()) =

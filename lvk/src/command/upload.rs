@@ -1,4 +1,4 @@
-//! Uploads that were waiting become copies.
+//! Records pending uploads as copies.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::upload::copy_regions::CopyRegion;
 use crate::upload::pending::{BufferUploads, TextureUpload, UsedPage, write_round_ends};
 
 impl CommandBuffer {
-    /// Records what was waiting: buffers with one barrier for all and one copy for each page of each, textures with one
+    /// Records pending uploads: buffers with one barrier for all and one copy for each page of each, textures with one
     /// barrier for all that do not write the same texels.
     pub(crate) fn record_uploads(&mut self, uploads: PendingUploads) -> Result<()> {
         let PendingUploads { buffers, textures, pages, .. } = uploads;
@@ -55,7 +55,7 @@ impl CommandBuffer {
         }
     }
 
-    /// Copies pieces of one page.
+    /// Copies the regions of one staging page.
     fn copy_page_regions(&self, pieces: &[CopyRegion], pages: &[UsedPage], target: vk::Buffer) {
         let page = pieces.first().and_then(|first| pages.iter().find(|used| used.page == first.page));
         let Some(page) = page else { return };
@@ -65,7 +65,7 @@ impl CommandBuffer {
             size: piece.bytes,
         };
         let copies: Vec<_> = pieces.iter().map(copy).collect();
-        // SAFETY: the pieces lie inside the page and the buffer, and none overlaps another.
+        // SAFETY: the regions lie inside the page and the buffer, and none overlaps another.
         unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), page.raw, target, &copies) };
     }
 

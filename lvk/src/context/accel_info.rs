@@ -1,4 +1,4 @@
-//! What acceleration structures take, and how far their builds are.
+//! Memory use and build progress of acceleration structures.
 
 use super::Context;
 use crate::accel::AccelStruct;
@@ -9,80 +9,80 @@ use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
 
-/// How far the compaction of a structure is.
+/// Compaction state of a BLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Compaction {
-    /// Not asked for.
+    /// Not requested.
     None,
-    /// Asked for by [`Context::compact`].
+    /// Requested with [`Context::compact`], and not carried out yet.
     Pending,
     /// Done.
     Done {
-        /// Bytes of memory before, of all that [`AccelStructInfo::structure_bytes`] counts.
+        /// Bytes of memory before the compaction. Counts the same memory as [`AccelStructInfo::structure_bytes`].
         before_bytes: u64,
-        /// Bytes of memory since.
+        /// Bytes of memory after the compaction.
         after_bytes: u64,
     },
-    /// It was not possible, mostly because the copy had no room beside the structure, within the budget or on the
-    /// device; a warning says more. The structure is as it was. [`Context::compact`] tries again.
+    /// Not possible. Usually the budget or the device had no memory for the copy beside the original. A warning in the
+    /// log gives the reason. The BLAS is unchanged. [`Context::compact`] tries again.
     Failed,
 }
 
-/// What is known of an acceleration structure.
+/// Type, memory use and compaction state of an acceleration structure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AccelStructInfo {
-    /// Its debug name.
+    /// Debug name.
     pub name: String,
-    /// Whether it is a top-level structure.
+    /// True for a TLAS, false for a BLAS.
     pub is_top_level: bool,
-    /// Structures that stand for it: more than 1 if the mesh was split.
+    /// Number of Vulkan acceleration structures behind the handle. More than 1 if the mesh was split.
     pub parts: u32,
-    /// Whether the primitives were put into another order, or split: hits need `lvkPrimitiveIndex` then.
+    /// True if the primitives were reordered or split. Shaders must then use `lvkPrimitiveIndex` for hits.
     pub is_remapped: bool,
-    /// Bytes of memory of its structures: the device's, and those that software traces.
+    /// Bytes of memory of the acceleration structure: of the device's, and of the BVHs for software ray queries.
     pub structure_bytes: u64,
-    /// Bytes of buffers that the library keeps for it: maps of primitives, gathered inputs, instances. Gathered inputs
-    /// go with the compaction of a structure without [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE),
-    /// which nothing builds again.
+    /// Bytes of buffers that the library keeps for the acceleration structure: primitive maps, gathered inputs,
+    /// instances. Compaction frees the gathered inputs of a BLAS without
+    /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), because that BLAS is never built again.
     pub table_bytes: u64,
-    /// Its compaction.
+    /// Compaction state.
     pub compaction: Compaction,
 }
 
 /// Memory of acceleration structures.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AccelMemory {
-    /// Every structure that has a handle.
+    /// All acceleration structures that have a handle.
     pub structures: Vec<AccelStructInfo>,
-    /// Bytes of all structures, those included that wait for the GPU to be done with them.
+    /// Bytes of all acceleration structures, including destroyed ones that the GPU may still use.
     pub structure_bytes: u64,
-    /// Bytes of shared buffers that are not in use.
+    /// Unused bytes of shared buffers.
     pub spare_bytes: u64,
-    /// Bytes of the scratch buffer.
+    /// Bytes of the scratch buffers.
     pub scratch_bytes: u64,
 }
 
-/// How many of some structures are built.
+/// Number of acceleration structures of a list that are built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BuildProgress {
-    /// Structures whose first build the GPU has done.
+    /// Acceleration structures whose first build the GPU has finished.
     pub built: usize,
-    /// All structures asked about.
+    /// All acceleration structures of the list.
     pub total: usize,
 }
 
 impl Context {
-    /// Bytes an acceleration structure took when it was created, and takes to build.
+    /// Returns the bytes that an acceleration structure took when it was created, and the scratch bytes of its builds.
     pub fn accel_struct_sizes(&self, handle: AccelStructHandle) -> Result<AccelStructSizes> {
         Ok(self.device_state().store.accel_structs.get(handle)?.sizes)
     }
 
-    /// What is known of an acceleration structure now.
+    /// Returns the current type, memory use and compaction state of an acceleration structure.
     pub fn accel_struct_info(&self, handle: AccelStructHandle) -> Result<AccelStructInfo> {
         Ok(accel_struct_info_of(&*self.device_state().store.accel_structs.get(handle)?))
     }
 
-    /// Memory of all acceleration structures, one by one and together.
+    /// Returns the memory of all acceleration structures, one by one and in total.
     pub fn accel_memory(&self) -> AccelMemory {
         let shared = self.device_state();
         AccelMemory {
@@ -99,7 +99,7 @@ impl Context {
         }
     }
 
-    /// How many of these structures the GPU has built for the first time. Does not wait.
+    /// Returns how many of these acceleration structures the GPU has built for the first time. Does not wait.
     pub fn build_progress(&self, structures: &[AccelStructHandle]) -> Result<BuildProgress> {
         let submitter = &self.device_state().submitter;
         let mut built = 0;

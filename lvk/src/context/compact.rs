@@ -1,4 +1,4 @@
-//! Compaction: asked for, carried out once the GPU has said how small structures can be.
+//! Compaction of BLAS. A request is carried out once the GPU has returned the compacted sizes.
 
 use std::sync::{Arc, Weak};
 
@@ -18,30 +18,31 @@ use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryPoolDesc;
 
 impl Context {
-    /// Asks for bottom-level structures to be copied into as little memory as they need. Nothing waits.
+    /// Requests that BLAS are copied into as little memory as they need. Does not wait.
     ///
-    /// The sizes are asked of the GPU before the next submission; at a later submission, or frame, that finds the
-    /// answers there, the copies are made and the structures' handles stand for them. Top-level structures that refer
-    /// to a copied one are written and built again before that submission. The old memory is freed when the GPU is done
-    /// with it. [`accel_struct_info`](Self::accel_struct_info) tells how far things are and what was saved. A compacted
-    /// structure may be refitted, but not rebuilt. While a command buffer that builds a structure is not submitted yet,
-    /// its copy waits: [`next_frame`](Self::next_frame) and [`flush`](Self::flush) are good moments.
+    /// The library queries the sizes on the GPU before the next submission. A later submission or frame finds the
+    /// results and records the copies. The handles then refer to the copies. Every TLAS that references a copied BLAS
+    /// is written and built again before that submission. The old memory is freed when the GPU is done with it.
+    /// [`accel_struct_info`](Self::accel_struct_info) returns the progress and the saved bytes. A compacted BLAS may be
+    /// refitted, but not rebuilt. While a command buffer that builds the BLAS is not submitted yet, the copy waits:
+    /// [`next_frame`](Self::next_frame) and [`flush`](Self::flush) are good moments.
     ///
-    /// A copy needs room beside what it replaces. One that has none waits for the others, whose memory comes back, and
-    /// [fails](crate::Compaction::Failed) when there is still none then; nothing else does for it. Structures that are
-    /// compacted already, or about to be, are left alone. What software traces is never larger than it needs to be: where
-    /// nothing else is traced, compaction is done at once, saves nothing, and leaves rebuilds possible.
+    /// A copy needs memory beside the original. A copy without memory waits until other compactions free theirs. It
+    /// [fails](crate::Compaction::Failed) if there is still no memory then; nothing else fails because of it. Already
+    /// compacted BLAS, and those with a pending compaction, are left unchanged. BVHs for software ray queries are never
+    /// larger than needed. With software ray queries only, compaction is done at once, saves nothing, and
+    /// rebuilds stay possible.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a structure without [`BuildFlags::ALLOW_COMPACTION`], and then nothing
-    /// is asked for.
+    /// [`InvalidUsage`](Error::InvalidUsage) for a BLAS without [`BuildFlags::ALLOW_COMPACTION`]. Then no compaction of
+    /// the call is requested.
     pub fn compact(&self, structures: &[AccelStructHandle]) -> Result<()> {
         let mut targets = Vec::with_capacity(structures.len());
         for handle in structures {
             let target = self.device_state().store.accel_structs.get(*handle)?;
             if !target.flags.contains(BuildFlags::ALLOW_COMPACTION) {
                 target.blas()?;
-                let message = "compaction needs BuildFlags::ALLOW_COMPACTION when the structure is created";
+                let message = "compaction needs BuildFlags::ALLOW_COMPACTION when the BLAS is created";
                 return Err(Error::usage(&target.name, message));
             }
             targets.push(target);
@@ -51,7 +52,7 @@ impl Context {
             let blas = target.blas()?;
             let compacted = blas.structures().compacted_from.is_some();
             if self.device_state().gpu.accel.is_none() {
-                // What software traces has the size it needs from the start.
+                // BVHs for software ray queries have the size they need from the start.
                 blas.set_compaction_state(CompactionState::Idle);
                 continue;
             }
@@ -85,23 +86,23 @@ impl Context {
         asked.map(|()| Some(query))
     }
 
-    /// Carries out compactions whose sizes are known, and builds top-level structures again that refer to what they
-    /// replaced. What fails stays as it was, with a warning: no submission of the caller fails for it.
+    /// Records compactions whose sizes are known, and rebuilds each TLAS that references a replaced BLAS. A failed
+    /// compaction leaves its BLAS unchanged and logs a warning. It never fails a submission of the caller.
     pub(super) fn advance_compactions(&self) {
         let mut compactions = self.lock_compactions();
         let advanced = if compactions.is_empty() { Ok(()) } else { self.advance_all(&mut compactions) };
         drop(compactions);
         if let Err(error) = advanced {
-            log::warn!("compaction does not go on: {error}");
+            log::warn!("compaction failed to advance: {error}");
         }
         if self.device_state().take_tlas_outdated()
             && let Err(error) = self.rewrite_outdated_tlas()
         {
-            log::warn!("a top-level structure still refers to structures from before compaction: {error}");
+            log::warn!("a TLAS still references BLAS from before their compaction: {error}");
         }
     }
 
-    /// Copies that have no room wait for those that have, which give memory back.
+    /// Advances all compactions. Copies without memory wait for other copies, which free memory.
     fn advance_all(&self, compactions: &mut Compactions) -> Result<()> {
         let shared = self.device_state();
         let (submitted, completed) = (shared.submitter.last_submitted(), shared.submitter.completed_up_to()?);
@@ -141,7 +142,7 @@ impl Context {
         Ok(())
     }
 
-    /// Copies one structure, unless a build of it was recorded meanwhile.
+    /// Copies one BLAS, unless a build of it was recorded since the size query.
     fn record_compaction(
         &self,
         target: &Arc<AccelStruct>,
@@ -171,14 +172,14 @@ impl Context {
         blas.set_compaction_state(CompactionState::None);
         let freed = Arc::downgrade(&old);
         shared.free_later(DeferredObject::BlasStorage(old));
-        // Its handle may be gone, and nobody else keep it until the copy is made.
+        // The caller may have destroyed the handle, and nothing else keeps the copy alive until it is made.
         shared.free_later(DeferredObject::BlasStorage(blas.structures()));
         shared.mark_tlas_outdated();
         Ok(CompactionStep::Copied(freed))
     }
 
-    /// Structures are looked for again once the command buffer is open: what another thread destroys before does not wait
-    /// for it.
+    /// Writes and builds again each TLAS that references replaced BLAS. Collects them a second time once the command
+    /// buffer is open: objects that another thread destroys earlier do not wait for that command buffer.
     fn rewrite_outdated_tlas(&self) -> Result<()> {
         if self.outdated_tlas().is_empty() {
             return Ok(());
@@ -188,7 +189,7 @@ impl Context {
         })
     }
 
-    /// Top-level structures that refer to what compaction has replaced.
+    /// Returns each TLAS that references a BLAS which compaction has replaced.
     fn outdated_tlas(&self) -> Vec<Arc<AccelStruct>> {
         let mut all = self.device_state().store.accel_structs.all_objects();
         all.retain(|object| object.tlas().is_ok_and(|tlas| tlas.contents().blas_refs.is_outdated()));
@@ -200,18 +201,18 @@ impl Context {
     }
 }
 
-/// What became of a copy.
+/// Result of one attempt to copy a BLAS.
 enum CompactionStep {
-    /// It is recorded; this is what it takes the place of.
+    /// The copy is recorded. Holds the replaced structures.
     Copied(Weak<BlasStructures>),
-    /// A build is not submitted yet, or there is no more room than before.
+    /// A build is not submitted yet, or no memory was freed since the last attempt.
     Retry,
-    /// The sizes are those of an earlier build.
+    /// The sizes belong to an earlier build.
     QueryAgain,
 }
 
 fn abort_compaction(target: &Arc<AccelStruct>, error: &Error) {
-    log::warn!("structure '{}' stays uncompacted: {error}", target.name);
+    log::warn!("BLAS '{}' stays uncompacted: {error}", target.name);
     cancel_compactions(std::slice::from_ref(target), CompactionState::Failed);
 }
 

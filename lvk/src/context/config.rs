@@ -1,4 +1,4 @@
-//! How a context is made.
+//! The description of a context.
 
 use std::path::Path;
 
@@ -19,86 +19,92 @@ pub struct ContextDesc<'a> {
     pub application_name: &'a str,
     /// The Vulkan loader to open instead of the system's `libvulkan.so.1`.
     pub vulkan_library: Option<&'a Path>,
-    /// The device to use: its number in [`Context::devices`](crate::Context::devices) or part of its name. The
-    /// environment variable `LVK_DEVICE` goes before it. Without either the best device that has what is required.
+    /// The device to use: its index in [`Context::devices`](crate::Context::devices) or part of its name. The
+    /// environment variable `LVK_DEVICE` takes precedence. Without either, the best device that meets the requirements
+    /// is used.
     pub device: Option<&'a str>,
-    /// How much the validation layer checks.
+    /// Amount of checking by the validation layer.
     pub validation: ValidationMode,
-    /// Where messages of the layer go; all go to the `log` crate too.
+    /// Receiver of the validation layer's messages. All messages go to the `log` crate too.
     pub validation_sink: Option<ValidationSink>,
-    /// Whether Vulkan objects get their debug names, and command buffers their labels. Without an answer they do where
-    /// somebody reads them: with the validation layer, or when a debugger or profiler of frames says that it is there
-    /// (`vkGetPhysicalDeviceToolProperties`). Elsewhere a name costs no call of the driver. The library's own errors and
-    /// reports always have names.
+    /// Enables debug names of Vulkan objects and labels of command buffers. `None` enables them where a tool reads
+    /// them: with the validation layer, or when a frame debugger or profiler is attached
+    /// (`vkGetPhysicalDeviceToolProperties`). Otherwise names cause no driver calls. The library's own errors and
+    /// reports always use the names.
     pub debug_names: Option<bool>,
-    /// Have shaders look every index of a bindless array up before they use it: a wrong one is written down, with the name
-    /// of the object it belonged to, for [`Context::index_faults`](crate::Context::index_faults), and the dummy of slot 0
-    /// stands in. For debugging: every access costs several reads of memory, command buffers no longer overlap, and pipelines
-    /// are compiled anew in every run. See the manual's page on [debugging](crate::manual::debugging).
+    /// Makes shaders check every index of a bindless array before use. A wrong index is recorded with the name of the
+    /// object that it belonged to, for [`Context::index_faults`](crate::Context::index_faults); the access uses the
+    /// default descriptor of slot 0. For debugging only: every access costs several memory reads, command buffers no
+    /// longer overlap, and pipelines are compiled again in every run. See the manual's page on
+    /// [debugging](crate::manual::debugging).
     pub check_indices: bool,
-    /// Ray tracing pipelines.
+    /// Request for ray tracing pipelines.
     pub ray_tracing_pipeline: FeatureRequest,
-    /// Ray queries in any shader stage, and who walks their trees; [`Capabilities`](crate::Capabilities) says which it
-    /// became and why.
+    /// Request for ray queries in any shader stage, and for the hardware or software path of their traversal.
+    /// [`Capabilities`](crate::Capabilities) reports the chosen path and the reason.
     pub ray_query: RayQueryRequest,
-    /// Whether queues for compute and transfer run beside the one for everything; with `check_indices` they never do.
+    /// Use of compute and transfer queues beside the graphics queue. With `check_indices` they are never used.
     pub queues: QueueRequest,
-    /// Optional features that are needed: only devices that have them all are considered.
+    /// Required optional features. Only devices that have all of them are considered.
     pub required_features: &'a [OptionalFeature],
-    /// Extensions and features of the caller's own; only devices that have the extensions are considered.
+    /// Extensions and features that the application requests itself. Only devices with these extensions are considered.
     pub user_extensions: UserExtensions<'a>,
-    /// A window that the device must be able to show pictures in; swapchains without a window of their own take it, see
-    /// [`Context::create_swapchain`](crate::Context::create_swapchain). `None` for contexts without windows, which use no
-    /// extension of any window system.
+    /// A window that the device must be able to present to. Swapchains without a window of their own use it, see
+    /// [`Context::create_swapchain`](crate::Context::create_swapchain). `None` for contexts without windows, which use
+    /// no extension of any window system.
     #[cfg(feature = "window")]
     pub window: Option<std::sync::Arc<dyn crate::WindowHandles>>,
-    /// Another device to rehearse on this one, also by the requirements above; none for the device as it is.
+    /// A weaker device to emulate on this device. It applies to the requirements above as well. `None` uses the device
+    /// as it is.
     pub profile: Option<&'a DeviceProfile>,
-    /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
+    /// Number of frames that the CPU may be ahead of the GPU, 1 to 8. See
+    /// [`Context::next_frame`](crate::Context::next_frame).
     pub frames_in_flight: u32,
-    /// Staging memory that is kept, in bytes. Uploads are submitted on their own once they fill half of it; single ones that
-    /// are larger take more for a while.
+    /// Staging memory that is kept, in bytes. Uploads are submitted automatically once they fill half of it. A larger
+    /// single upload takes more memory temporarily.
     pub staging_bytes: u64,
-    /// Most scratch memory for the builds of acceleration structures, in bytes, buffers included that a larger one has
-    /// replaced while the GPU still used them. One build that needs more gets it.
+    /// Maximum scratch memory for builds of acceleration structures, in bytes. Counts replaced buffers that the GPU
+    /// still uses. One build that needs more gets it.
     pub scratch_budget_bytes: u64,
-    /// Most memory for acceleration structures, in bytes. A creation that would exceed it fails and leaves nothing
-    /// behind; compaction gives some back.
+    /// Maximum memory for acceleration structures, in bytes. A creation that would exceed it fails and leaves no object
+    /// behind. Compaction frees some of it.
     ///
-    /// The structures count, of both levels and all parts, and those too that wait for the GPU to be done with them.
-    /// What does not: unused room in the buffers that small ones share and scratch memory
-    /// ([`AccelMemory`](crate::AccelMemory) tells both), and the tables and gathered inputs of meshes that are split or
-    /// reordered ([`AccelStructInfo::table_bytes`](crate::AccelStructInfo::table_bytes)).
+    /// The budget counts BLAS and TLAS with all parts, including destroyed ones that the GPU may still use. It does not
+    /// count unused space in shared buffers, scratch memory ([`AccelMemory`](crate::AccelMemory) reports both), or the
+    /// tables and gathered inputs of meshes that are split or reordered
+    /// ([`AccelStructInfo::table_bytes`](crate::AccelStructInfo::table_bytes)).
     pub accel_budget_bytes: u64,
-    /// Room for textures in the bindless set; clamped to what the device allows beside everything else in the set, and
-    /// to [`Limits::max_bindless_textures`](crate::Limits::max_bindless_textures).
+    /// Number of texture slots in the bindless set. It is clamped to the number that the device allows beside the other bindings
+    /// of the set, and to [`Limits::max_bindless_textures`](crate::Limits::max_bindless_textures).
     pub max_textures: u32,
-    /// How textures in Y'CbCr may be converted. What the device lacks of it is an error only when such a texture is made.
+    /// Y'CbCr conversions that textures may use. A conversion that the device lacks is an error only when such a
+    /// texture is created.
     pub yuv: &'a [YuvConversion],
-    /// Room for textures of each of these conversions, at most 1,024, and at most what half of the device's descriptors
-    /// make.
+    /// Number of texture slots for each of these conversions: at most 1,024, and at most half of the device's
+    /// descriptors.
     pub max_yuv_textures: u32,
-    /// A file that keeps compiled pipelines from one run to the next (`VkPipelineCache`). It is read at the start,
-    /// replaced by [`Context::save_pipeline_cache`](crate::Context::save_pipeline_cache) and at the end of the context.
+    /// A file that keeps compiled pipelines between runs (`VkPipelineCache`). It is read at the start. It is replaced
+    /// by [`Context::save_pipeline_cache`](crate::Context::save_pipeline_cache) and at the end of the context.
     ///
-    /// A file that is damaged, or of another device or driver, is dropped with a warning to the `log` crate, never an
-    /// error. Drivers trust what is in it, so it belongs into a folder that nobody else can write.
+    /// A file that is damaged, or of another device or driver, is ignored with a warning to the `log` crate, and is
+    /// never an error. Drivers trust its contents, so keep it in a folder that only the program can write to.
     pub pipeline_cache: Option<&'a Path>,
-    /// A folder that keeps the SPIR-V of GLSL modules from one run to the next, each under a checksum of its text, its
-    /// defines, the library's preamble for the device and the version of the compiler; what it includes is compared as well,
-    /// text by text. It is made when needed, several contexts may share it, and above 64 MiB what was not used for longest
-    /// is removed; files of others are left alone.
+    /// A folder that keeps the SPIR-V of GLSL modules between runs. The key of a file is a checksum of the source, the
+    /// defines, the library's preamble for the device and the compiler version. Included sources are compared in full
+    /// as well. The folder is created when needed, and several contexts may share it. Above 64 MiB, the least recently
+    /// used files are removed; files of other programs are left unchanged.
     ///
-    /// A file that is damaged, or of another version, is dropped with a warning to the `log` crate and made anew, never an
-    /// error. What the compiler warns of is said when it compiles, not when its words are found. Keep the folder where only
-    /// the program writes it, and give builds with another version of the `glslang` crate one of their own.
+    /// A file that is damaged, or of another version, is ignored with a warning to the `log` crate and written again,
+    /// and is never an error. Compiler warnings are reported when a module is compiled, not when it is found in the
+    /// cache. Keep the folder where only the program writes to it. Use another folder for builds with another version
+    /// of the `glslang` crate.
     pub shader_cache: Option<&'a Path>,
-    /// A folder that keeps the trees that the CPU builds where software traces, from one run to the next, each under the
-    /// checksum of the primitives and settings it was built from. It is made when needed, and never emptied.
+    /// A folder that keeps the BVHs that the CPU builds for software ray queries between runs. The key of a file is the
+    /// checksum of the primitives and settings of the build. The folder is created when needed and never emptied.
     ///
-    /// A file that is damaged, or of another version, is dropped with a warning to the `log` crate and made anew, never an
-    /// error. Keep the folder where only the program writes it. Without the feature `software-ray-query` the folder is left
-    /// alone.
+    /// A file that is damaged, or of another version, is ignored with a warning to the `log` crate and written again,
+    /// and is never an error. Keep the folder where only the program writes to it. Without the feature
+    /// `software-ray-query` the folder is not used.
     pub tree_cache: Option<&'a Path>,
 }
 
@@ -135,13 +141,13 @@ impl Default for ContextDesc<'_> {
 }
 
 impl ContextDesc<'_> {
-    /// The window that the device must be able to present to.
+    /// Returns the window that the device must be able to present to.
     #[cfg(feature = "window")]
     pub(crate) fn window_ref(&self) -> Option<WindowRef<'_>> {
         self.window.as_deref()
     }
 
-    /// The window that the device must be able to present to: none.
+    /// Returns `None`: without the feature `window` the device need not present.
     #[cfg(not(feature = "window"))]
     pub(crate) fn window_ref(&self) -> Option<WindowRef<'_>> {
         None

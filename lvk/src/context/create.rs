@@ -1,4 +1,4 @@
-//! Creates objects.
+//! Creation of buffers, samplers, shader modules, pipelines and query pools.
 
 use std::sync::Arc;
 
@@ -19,11 +19,11 @@ use crate::resource::sampler::SamplerDesc;
 use crate::resource::{Buffer, QueryPool, Sampler};
 use crate::shader::{ShaderCache, ShaderCacheStats, ShaderModuleDesc, find_raw_hit_builtin};
 
-/// Objects that take no bindless slot.
+/// Slot of objects that take no bindless slot.
 pub(super) const NO_SLOT: u32 = 0;
 
 impl Context {
-    /// Creates a buffer (`vkCreateBuffer`). Its first contents are there for every command submitted afterwards.
+    /// Creates a buffer (`vkCreateBuffer`). Every command submitted afterwards sees its initial contents.
     pub fn create_buffer(&self, desc: &BufferDesc<'_>) -> Result<Holder<BufferHandle>> {
         let buffer = Buffer::new(&self.device_state().gpu, desc, InternalUsage::NONE)?;
         let staged = desc.data.filter(|data| !buffer.write_initial(data));
@@ -45,10 +45,10 @@ impl Context {
         Ok(Holder::new(self, shared.store.samplers.insert(sampler), slot))
     }
 
-    /// Compiles GLSL or takes SPIR-V (`vkCreateShaderModule`).
+    /// Creates a shader module from GLSL or SPIR-V (`vkCreateShaderModule`).
     ///
     /// # Errors
-    /// [`Shader`](Error::Shader) with the compiler's text and the caller's own line numbers;
+    /// [`Shader`](Error::Shader) with the compiler's message and the caller's own line numbers;
     /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, such as
     /// those of the task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
@@ -64,18 +64,18 @@ impl Context {
         Ok(Holder::new(self, shared.store.shader_modules.insert(module), NO_SLOT))
     }
 
-    /// How many modules made from GLSL were found in the folder of
-    /// [`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache), and how many were not; zeros without a folder.
+    /// Returns how many GLSL modules were found in the folder of
+    /// [`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache), and how many were not. Zeros without a folder.
     pub fn shader_cache_stats(&self) -> ShaderCacheStats {
         self.device_state().shader_cache.as_ref().map(ShaderCache::counts).unwrap_or_default()
     }
 
-    /// Creates a graphics pipeline (`vkCreateGraphicsPipelines`) of a vertex shader, or of a mesh shader with or without
-    /// a task shader.
+    /// Creates a graphics pipeline (`vkCreateGraphicsPipelines`) from a vertex shader, or from a mesh shader with or
+    /// without a task shader.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) when the stages do not go together, or the shaders and the description
-    /// disagree; [`Unsupported`](Error::Unsupported) for mesh shaders and for formats that the device lacks;
+    /// [`InvalidUsage`](Error::InvalidUsage) when the stages do not match, or the shaders and the description disagree;
+    /// [`Unsupported`](Error::Unsupported) for mesh shaders and for formats that the device lacks;
     /// [`LimitExceeded`](Error::LimitExceeded) for workgroups and outputs of mesh shaders, and for targets.
     pub fn create_render_pipeline(
         &self,
@@ -99,11 +99,12 @@ impl Context {
         Ok(Holder::new(self, shared.store.compute_pipelines.insert(pipeline), NO_SLOT))
     }
 
-    /// Creates a pool of queries (`vkCreateQueryPool`), all ready to be written.
+    /// Creates a query pool (`vkCreateQueryPool`). All of its queries are reset and ready to be written.
     ///
     /// # Errors
-    /// [`Unsupported`](Error::Unsupported) where the device lacks the kind, [`LimitExceeded`](Error::LimitExceeded) for
-    /// more than 65,536 queries, and [`InvalidUsage`](Error::InvalidUsage) for none.
+    /// [`Unsupported`](Error::Unsupported) where the device lacks the kind of query,
+    /// [`LimitExceeded`](Error::LimitExceeded) for more than 65,536 queries, and [`InvalidUsage`](Error::InvalidUsage)
+    /// for a count of 0.
     pub fn create_query_pool(&self, desc: &QueryPoolDesc<'_>) -> Result<Holder<QueryPoolHandle>> {
         let pool = QueryPool::new(&self.device_state().gpu, desc)?;
         Ok(Holder::new(self, self.device_state().store.query_pools.insert(pool), NO_SLOT))
@@ -120,7 +121,8 @@ impl Context {
     }
 }
 
-/// On drivers and profiles whose meshes are split or reordered, hits have other numbers than the caller's.
+/// Warns about shaders that use raw hit ids, on drivers and profiles whose meshes are split or reordered. Raw ids there
+/// differ from the caller's ids.
 fn warn_of_raw_hit_ids(caps: &Capabilities, desc: &ShaderModuleDesc<'_>) {
     if !(caps.prefers_spatial_order || caps.profile.is_some()) {
         return;

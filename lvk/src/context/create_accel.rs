@@ -1,4 +1,4 @@
-//! Creates acceleration structures. Their builds run before the next submission, or at once on a queue.
+//! Creation of acceleration structures. Builds run before the next submission, or at once on a given queue.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ use crate::software_ray_query::create::software_tlas;
 use crate::submit::SubmitHandle;
 
 impl Context {
-    /// Creates a bottom-level structure from geometries and builds it before the next submission.
+    /// Creates a BLAS from geometries and builds it before the next submission.
     ///
     /// See [`create_blas_batch`](Self::create_blas_batch).
     pub fn create_blas(&self, desc: &BlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
@@ -35,24 +35,26 @@ impl Context {
         made.pop().ok_or_else(|| Error::usage(desc.debug_name, "nothing was built"))
     }
 
-    /// Creates many bottom-level structures and builds them together, within the scratch budget
+    /// Creates several BLAS and builds them together, within the scratch budget
     /// ([`ContextDesc::scratch_budget_bytes`](crate::ContextDesc)).
     ///
-    /// Nothing waits: a batch whose builds fill the scratch budget several times goes to the GPU in as many submissions
-    /// at once, the last of them before the next submission of the caller, who may use the handles in it.
-    /// [`build_progress`](Self::build_progress) says how far the GPU is. Small structures share buffers.
+    /// Usually does not wait. A batch that fills the scratch budget several times is sent as several submissions at
+    /// once. The last of them runs before the caller's next submission, which may use the handles.
+    /// [`build_progress`](Self::build_progress) returns how many builds are finished. Small BLAS share buffers.
     ///
-    /// A mesh that would exceed the device's limits for scratch memory, structure size or primitives is cut into
-    /// spatially compact parts behind its one handle; see [`PrimitiveOrder`](crate::PrimitiveOrder) for meshes that are
-    /// put into another order. Both read the inputs of the whole batch back first, and that does wait. Both go by the
-    /// contents of the buffers now; later contents may be anything. Where software traces, the CPU builds its structures but
-    /// those with [`BuildFlags::FAST_BUILD`](crate::BuildFlags::FAST_BUILD): that too reads inputs back, and takes a second for
-    /// some 600,000 triangles on one core.
+    /// A mesh that would exceed the device's limits for scratch memory, structure size or primitives is split into
+    /// spatially compact parts behind its one handle. For meshes that are reordered see
+    /// [`PrimitiveOrder`](crate::PrimitiveOrder). Splitting and reordering first read back the inputs of the whole
+    /// batch, which waits for the GPU. Both use the contents of the buffers at the time of the call; later contents may
+    /// differ. For software ray queries the CPU builds the BVHs, except those with
+    /// [`BuildFlags::FAST_BUILD`](crate::BuildFlags::FAST_BUILD). CPU builds read the inputs back too, and take about a
+    /// second for 600,000 triangles on one core.
     ///
     /// # Errors
-    /// Typed, and nothing of the batch is left behind: formats, index types and counts that the device does not take,
-    /// buffers that are too small or lack [`BufferUsage::ACCEL_INPUT`], a memory budget that is used up
-    /// ([`ContextDesc::accel_budget_bytes`](crate::ContextDesc)).
+    /// Typed errors. A failed batch leaves no object behind. Reasons are formats, index types and counts that the
+    /// device does not support, buffers that are too small or lack
+    /// [`BufferUsage::ACCEL_INPUT`](crate::BufferUsage::ACCEL_INPUT), and an exhausted
+    /// memory budget ([`ContextDesc::accel_budget_bytes`](crate::ContextDesc)).
     pub fn create_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Holder<AccelStructHandle>>> {
         let (holders, objects) = self.new_blas_batch(descs)?;
         for (batch, is_last) in self.scratch_batches(&objects)? {
@@ -67,15 +69,18 @@ impl Context {
         Ok(holders)
     }
 
-    /// As [`create_blas_batch`](Self::create_blas_batch), but built at once, on a queue: on [`Queue::Compute`] beside what is
-    /// drawn and traced meanwhile, which does not wait for it. What shows the structures afterwards
-    /// ([`update_tlas`](crate::CommandBuffer::update_tlas)) does, on any queue. Who would rather not have a frame wait asks
-    /// [`is_done`](Self::is_done) for the answered submission first. What is said there of reading back and of builds by the CPU
-    /// holds here too: only with [`BuildFlags::FAST_BUILD`](crate::BuildFlags::FAST_BUILD) does the caller never wait. Frames do not wait for it, as for any that is
-    /// [in the background](Self::submit_in_background).
+    /// Creates several BLAS like [`create_blas_batch`](Self::create_blas_batch), and builds them at once on a queue.
+    ///
+    /// On [`Queue::Compute`] the builds run beside other rendering and ray tracing, which does not wait for them. A
+    /// later command that references the BLAS ([`update_tlas`](crate::CommandBuffer::update_tlas)) waits for the
+    /// builds, on any queue. To keep a frame from waiting, check [`is_done`](Self::is_done) of the returned submission
+    /// first. Inputs are read back and BVHs are built on the CPU as in `create_blas_batch`. The call is certain not to
+    /// wait only with [`BuildFlags::FAST_BUILD`](crate::BuildFlags::FAST_BUILD). Frames do not wait for the builds, as
+    /// for any submission [in the background](Self::submit_in_background).
     ///
     /// # Errors
-    /// As [`create_blas_batch`](Self::create_blas_batch), and [`WrongQueue`](crate::Error::WrongQueue) for the transfer queue.
+    /// As [`create_blas_batch`](Self::create_blas_batch), and [`WrongQueue`](crate::Error::WrongQueue) for the transfer
+    /// queue.
     pub fn create_blas_batch_on(
         &self,
         queue: Queue,
@@ -93,7 +98,7 @@ impl Context {
         Ok((holders, built))
     }
 
-    /// Makes the BLAS of a batch; nothing is built yet.
+    /// Creates the BLAS of a batch without building them.
     fn new_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<NewBatch> {
         let shared = self.device_state();
         let inputs = self.plan_blas_inputs(descs)?;
@@ -119,11 +124,8 @@ impl Context {
         Ok((holders, objects))
     }
 
-    /// Splits BLAS into batches whose first builds fill the scratch budget. The last batch has `true`.
-    fn scratch_batches<'a>(
-        &self,
-        objects: &'a [Arc<AccelStruct>],
-    ) -> Result<Vec<(&'a [Arc<AccelStruct>], bool)>> {
+    /// Splits BLAS into batches whose first builds fill the scratch budget. The flag is true for the last batch.
+    fn scratch_batches<'a>(&self, objects: &'a [Arc<AccelStruct>]) -> Result<Vec<BlasBatch<'a>>> {
         let budget = self.device_state().scratch[0].tiers.batch_bytes();
         let (mut batches, mut first, mut scratch) = (Vec::new(), 0, 0_u64);
         for (index, object) in objects.iter().enumerate() {
@@ -138,13 +140,12 @@ impl Context {
         Ok(batches)
     }
 
-    /// Creates a top-level structure and builds it before the next submission. [`Holder::index`] is its element of
-    /// `kTLAS[]`.
+    /// Creates a TLAS and builds it before the next submission. [`Holder::index`] is its element of `kTLAS[]`.
     ///
     /// # Errors
     /// As [`CommandBuffer::update_tlas`](crate::CommandBuffer::update_tlas), and
-    /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the device takes, or whose structure or scratch
-    /// memory would be larger than it takes.
+    /// [`LimitExceeded`](Error::LimitExceeded) if the number of instances, the size of the TLAS or its scratch memory
+    /// exceeds the device's limit.
     pub fn create_tlas(&self, desc: &TlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
         let shared = self.device_state();
         shared.gpu.check_acceleration_structures()?;
@@ -162,10 +163,13 @@ impl Context {
     }
 }
 
-/// Handles of structures, and what they name.
+/// BLAS that are built together, and true for the last batch.
+type BlasBatch<'a> = (&'a [Arc<AccelStruct>], bool);
+
+/// Handles of the new BLAS, and the objects behind them.
 type NewBatch = (Vec<Holder<AccelStructHandle>>, Vec<Arc<AccelStruct>>);
 
-/// Makes a top-level structure for a slot the caller reserved, whatever it takes; nothing is built yet.
+/// Creates a TLAS of any size for a slot that the caller has reserved, without building it.
 pub(super) fn new_tlas(shared: &DeviceState, desc: &TlasDesc<'_>, slot: u32) -> Result<AccelStruct> {
     let limits = PartLimits { structure_bytes: u64::MAX, scratch_bytes: u64::MAX, primitives: u64::MAX };
     new_tlas_within_limits(shared, desc, slot, &limits)
@@ -198,7 +202,7 @@ fn new_tlas_within_limits(
     Ok(AccelStruct::new(name, desc.flags, sizes, AccelKind::Tlas(tlas)))
 }
 
-/// Instances Vulkan will be given.
+/// Returns the number of instances in the Vulkan build, with an instance for each part of a split BLAS.
 fn built_count(shared: &DeviceState, desc: &TlasDesc<'_>) -> Result<u32> {
     let find = |handle| shared.blas_ref(handle);
     let (known, mut memory) = (Arc::default(), PlanMemory::default());
@@ -206,7 +210,7 @@ fn built_count(shared: &DeviceState, desc: &TlasDesc<'_>) -> Result<u32> {
     Ok(plan.built_count)
 }
 
-/// Room for what the device traces.
+/// Creates the acceleration structure that the hardware traces, for `built_capacity` instances.
 fn hardware_tlas(
     shared: &DeviceState,
     desc: &TlasDesc<'_>,
@@ -215,7 +219,7 @@ fn hardware_tlas(
 ) -> Result<(RawAccelStruct, AccelStructSizes)> {
     let name = desc.debug_name;
     let sizes = BuildInput::from_instances(desc.flags, 0, built_capacity).query_sizes(&shared.gpu)?;
-    check_limit(name, "size of the structure in bytes", sizes.structure_bytes, limits.structure_bytes)?;
+    check_limit(name, "size of the TLAS in bytes", sizes.structure_bytes, limits.structure_bytes)?;
     check_limit(name, "scratch of a build in bytes", sizes.scratch_bytes(), limits.scratch_bytes)?;
     let ty = vk::AccelerationStructureTypeKHR::TOP_LEVEL;
     let bytes = sizes.structure_bytes;

@@ -1,4 +1,4 @@
-//! Creates many pipelines at once.
+//! Creation of many pipelines at once.
 
 use super::Context;
 use super::holder::Holder;
@@ -9,8 +9,8 @@ use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::graphics_desc::RenderPipelineDesc;
 
 impl Context {
-    /// [`create_render_pipeline`](Self::create_render_pipeline) for each description, on all cores of the CPU. Answers in
-    /// the order of the descriptions; one that fails stops no other.
+    /// Calls [`create_render_pipeline`](Self::create_render_pipeline) for each description, on all CPU cores. Returns
+    /// the results in the order of the descriptions. A failed description does not stop the others.
     pub fn create_render_pipelines(
         &self,
         descs: &[RenderPipelineDesc<'_>],
@@ -18,8 +18,8 @@ impl Context {
         parallel_map(descs, |desc| self.create_render_pipeline(desc))
     }
 
-    /// [`create_compute_pipeline`](Self::create_compute_pipeline) for each description, on all cores of the CPU. Answers
-    /// in the order of the descriptions; one that fails stops no other.
+    /// Calls [`create_compute_pipeline`](Self::create_compute_pipeline) for each description, on all CPU cores. Returns
+    /// the results in the order of the descriptions. A failed description does not stop the others.
     pub fn create_compute_pipelines(
         &self,
         descs: &[ComputePipelineDesc<'_>],

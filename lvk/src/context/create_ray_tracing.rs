@@ -1,4 +1,4 @@
-//! Creates ray tracing pipelines and the libraries they are linked from.
+//! Creation of ray tracing pipelines and of the libraries they are linked from.
 
 use std::sync::Arc;
 
@@ -12,15 +12,14 @@ use crate::pipeline::ray_tracing_library::RayTracingLibraryDesc;
 use crate::pipeline::{RayTracingLibrary, RayTracingPipeline};
 
 impl Context {
-    /// Creates a ray tracing pipeline with its shader binding table (`vkCreateRayTracingPipelinesKHR`), compiled on as
-    /// many cores as the driver uses.
+    /// Creates a ray tracing pipeline with its shader binding table (`vkCreateRayTracingPipelinesKHR`). It is compiled
+    /// on as many cores as the driver uses.
     ///
     /// # Errors
-    /// [`Unsupported`](Error::Unsupported) without
-    /// [`ray_tracing_pipeline`](crate::Capabilities::ray_tracing_pipeline);
-    /// [`LimitExceeded`](Error::LimitExceeded) for a recursion or a shader record beyond the device's;
+    /// [`Unsupported`](Error::Unsupported) without [`ray_tracing_pipeline`](crate::Capabilities::ray_tracing_pipeline);
+    /// [`LimitExceeded`](Error::LimitExceeded) for a recursion depth or a shader record beyond the device's limit;
     /// [`InvalidUsage`](Error::InvalidUsage) for a module of another stage, more records than shaders, or a library
-    /// that does not agree with the pipeline.
+    /// that does not match the pipeline.
     pub fn create_ray_tracing_pipeline(
         &self,
         desc: &RayTracingPipelineDesc<'_>,
@@ -37,13 +36,13 @@ impl Context {
         Ok(holder)
     }
 
-    /// Compiles shaders that several ray tracing pipelines have in common (`vkCreateRayTracingPipelinesKHR` with
+    /// Compiles shaders that several ray tracing pipelines share (`vkCreateRayTracingPipelinesKHR` with
     /// `VK_PIPELINE_CREATE_LIBRARY_BIT_KHR`).
     ///
     /// # Errors
     /// [`Unsupported`](Error::Unsupported) without [`pipeline_libraries`](crate::Capabilities::pipeline_libraries);
     /// [`InvalidUsage`](Error::InvalidUsage) without any shader, and where a shader's payload or hit attributes are
-    /// larger than the description says; else as
+    /// larger than the description allows; otherwise as
     /// [`create_ray_tracing_pipeline`](Self::create_ray_tracing_pipeline).
     pub fn create_ray_tracing_library(
         &self,
@@ -55,27 +54,27 @@ impl Context {
         Ok(Holder::new(self, shared.store.ray_tracing_libraries.insert(library), NO_SLOT))
     }
 
-    /// Bytes of stack each ray of a pipeline needs, as set when it is bound
-    /// (`vkCmdSetRayTracingPipelineStackSizeKHR`). Whoever binds the raw pipeline has to set it too.
+    /// Returns the bytes of stack that each ray of a pipeline needs. They are set when the pipeline is bound
+    /// (`vkCmdSetRayTracingPipelineStackSizeKHR`). Code that binds the raw pipeline must set them as well.
     pub fn ray_tracing_stack_bytes(&self, pipeline: RayTracingPipelineHandle) -> Result<u32> {
         Ok(self.device_state().store.ray_tracing_pipelines.get(pipeline)?.stack_bytes)
     }
 
-    /// Writes what was compiled so far to the file of
-    /// [`ContextDesc::pipeline_cache`](crate::ContextDesc::pipeline_cache), which is replaced at once. The end of the
-    /// context does so too.
+    /// Writes all pipelines compiled so far to the file of
+    /// [`ContextDesc::pipeline_cache`](crate::ContextDesc::pipeline_cache). The file is replaced in one step. The end
+    /// of the context writes it as well.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) where the context was given no file; [`File`](Error::File) when it cannot
-    /// be written, for instance because its folder does not exist.
+    /// [`InvalidUsage`](Error::InvalidUsage) for a context without such a file; [`File`](Error::File) when it cannot be
+    /// written, for instance because its folder does not exist.
     pub fn save_pipeline_cache(&self) -> Result<()> {
         let message = "name a file in ContextDesc::pipeline_cache to keep compiled pipelines";
         let cache = self.device_state().pipeline_cache.as_ref();
         cache.ok_or_else(|| Error::usage("save_pipeline_cache", message))?.save()
     }
 
-    /// Bytes of compiled pipelines that the context started with from its file; 0 where it has none, or the file was
-    /// dropped because it is damaged or of another device or driver.
+    /// Returns the bytes of compiled pipelines that the context loaded from its file. 0 without a file, or if the file
+    /// was ignored because it is damaged or of another device or driver.
     pub fn pipeline_cache_loaded_bytes(&self) -> u64 {
         self.device_state().pipeline_cache.as_ref().map_or(0, |cache| cache.loaded_bytes)
     }

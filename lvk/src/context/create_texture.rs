@@ -1,4 +1,4 @@
-//! Creates textures and views of them.
+//! Creation of textures and texture views.
 
 use super::Context;
 use super::holder::Holder;
@@ -13,7 +13,8 @@ use crate::resource::view::TextureViewDesc;
 
 impl Context {
     /// Creates a texture (`vkCreateImage`). [`Holder::index`] is its element of `kTextures2D[]`, `kTextures3D[]`,
-    /// `kTexturesCube[]` and the storage images; of a texture in Y'CbCr it is the number for `textureBindlessYUV`. Its first contents are there for every command submitted afterwards.
+    /// `kTexturesCube[]` and the storage images. For a Y'CbCr texture it is the index for `textureBindlessYUV`. Every
+    /// command submitted afterwards sees the initial contents.
     pub fn create_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
         let holder = if desc.format.is_yuv() { self.new_yuv(desc)? } else { self.new_texture(desc)? };
         self.fill_texture(holder.handle(), desc)?;
@@ -52,18 +53,19 @@ impl Context {
         Ok(Holder::new(self, shared.store.textures.insert(texture), place.slot))
     }
 
-    /// Creates a view of a texture (`vkCreateImageView`): a texture that shows some mips and layers of another one, as
-    /// another kind or in another format, or with its channels in another order.
+    /// Creates a view of a texture (`vkCreateImageView`): a texture with some mips and layers of another texture. It
+    /// may have another kind, another compatible format, or swizzled channels.
     ///
-    /// It has a number and a handle of its own and goes wherever a texture does: shaders, [`Dependencies`](crate::Dependencies),
-    /// render passes, copies. The texels live until the last handle that shows them is destroyed and the GPU is done.
-    /// Barriers follow the texels, whoever names them.
+    /// The view has its own slot and handle and can be used like any texture: in shaders,
+    /// [`Dependencies`](crate::Dependencies), render passes and copies. The image lives until the last handle that
+    /// refers to it is destroyed and the GPU is done. Barriers are tracked for the image, whichever handle a command
+    /// uses.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for mips and layers that the texture does not have, for cubes of anything but
-    /// six square layers, for a format that is not among the [`view_formats`](TextureDesc::view_formats), and for usages
-    /// that the texture was not made for or that the format or the swizzle exclude;
-    /// [`StaleHandle`](Error::StaleHandle); [`LimitExceeded`](Error::LimitExceeded) when all numbers of textures are taken.
+    /// [`InvalidUsage`](Error::InvalidUsage) for mips and layers that the texture does not have, for cubes of anything
+    /// but six square layers, for a format that is not among the [`view_formats`](TextureDesc::view_formats), and for
+    /// usages that the texture was not created with or that the format or the swizzle exclude;
+    /// [`StaleHandle`](Error::StaleHandle); [`LimitExceeded`](Error::LimitExceeded) when all texture slots are taken.
     pub fn create_texture_view(&self, desc: &TextureViewDesc<'_>) -> Result<Holder<TextureHandle>> {
         let shared = self.device_state();
         let missing = || Error::usage(desc.debug_name, "give the view a texture");
@@ -79,7 +81,7 @@ impl Context {
         Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
     }
 
-    /// Writes the first contents at once, which nothing has to wait for then.
+    /// Writes the initial contents with a host copy, so that no submission is needed.
     fn fill_with_host_copy(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
         let (shared, image) = (self.device_state(), &texture.image);
         let range = image.barrier_image().range(image.shape.all_subresources());
@@ -88,7 +90,7 @@ impl Context {
         Ok(())
     }
 
-    /// Uploads the first contents; without any, shaders may still read what is there.
+    /// Uploads the initial contents. Without contents, makes the texture readable by shaders.
     fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
         let texture = self.device_state().store.textures.get(handle)?;
         let Some(data) = desc.data else {
@@ -119,7 +121,7 @@ impl Context {
     }
 }
 
-/// Fails unless the first contents are as many bytes as they should be. The texture has so many mips.
+/// Fails unless the initial contents have the expected number of bytes. `mips` is the texture's number of mips.
 pub(super) fn check_data_size(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
     let wrong = |message: String| Err(Error::usage(desc.debug_name, message));
     let Some(data) = desc.data else {
@@ -133,7 +135,7 @@ pub(super) fn check_data_size(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
     let count = mips_in_data(desc, mips);
     if count > mips || (desc.generate_mips && count != 1) {
         return wrong(format!(
-            "the data has {count} mips; the texture has {mips}, and others are generated from one alone"
+            "the data has {count} mips; the texture has {mips}, and mips are generated from a single one"
         ));
     }
     let sizes = (0..count).map(|mip| {
@@ -152,7 +154,7 @@ fn mips_in_data(desc: &TextureDesc<'_>, mips: u32) -> u32 {
     if desc.data_mips == 0 { mips } else { desc.data_mips }
 }
 
-/// What shaders see of a texture.
+/// Returns the views that the bindless slots of a texture hold.
 pub(super) fn default_views(texture: &Texture) -> Result<TextureViews> {
     let sampled = texture.usage.contains(TextureUsage::SAMPLED);
     let storage = texture.usage.contains(TextureUsage::STORAGE);

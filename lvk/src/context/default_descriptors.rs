@@ -1,4 +1,4 @@
-//! What stands in bindless slots that nobody owns: a texture that is seen at once, a sampler, an empty structure.
+//! The default descriptors in unused bindless slots: a texture in striking colours, a sampler, an empty TLAS.
 
 use std::sync::Arc;
 
@@ -15,12 +15,12 @@ use crate::resource::sampler::SamplerDesc;
 use crate::resource::texture_desc::{TextureDesc, TextureUsage};
 use crate::resource::{Sampler, Texture};
 
-/// The slot of the dummies.
+/// The slot of the default descriptors.
 const DEFAULT_SLOT: u32 = 0;
 const MAGENTA: [u8; 4] = [255, 0, 255, 255];
 const BLACK: [u8; 4] = [0, 0, 0, 255];
 
-/// Makes the dummies and puts them into every slot. They live as long as the context.
+/// Creates the default objects and writes their descriptors into every slot. They live as long as the context.
 pub(super) fn fill_default_descriptors(ctx: &Context) -> Result<()> {
     let shared = ctx.device_state();
     let sampled = checker_texture(ctx, TextureUsage::SAMPLED)?;
@@ -42,12 +42,13 @@ pub(super) fn fill_default_descriptors(ctx: &Context) -> Result<()> {
     });
     textures.extend([sampled, storage]);
     let objects = DefaultObjects { _textures: textures, _sampler: sampler, _tlas: tlas };
-    // The cell is empty: this runs once, while the context is made.
+    // The cell is empty: this runs once, while the context is created.
     let _ = shared.default_objects.set(objects);
     Ok(())
 }
 
-/// Two textures, so that what a shader stores into an empty slot is not seen by those who sample one.
+/// Creates a default texture. Sampled and storage slots get one each, so that a store into an unused storage slot does
+/// not change what shaders sample from an unused slot.
 fn checker_texture(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
     let desc = TextureDesc { extent: [2, 2], usage, debug_name: "dummy texture", ..Default::default() };
     let texture = Arc::new(Texture::new(&ctx.device_state().gpu, &desc, DEFAULT_SLOT)?);
@@ -56,7 +57,7 @@ fn checker_texture(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
     Ok(texture)
 }
 
-/// A black picture for each conversion.
+/// Creates a black texture for each Y'CbCr conversion.
 fn default_yuv_textures(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
     let shared = ctx.device_state();
     let mut defaults = Vec::new();

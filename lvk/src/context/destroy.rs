@@ -1,4 +1,4 @@
-//! Destroys objects, once the GPU is done with them.
+//! Destruction of objects, once the GPU is done with them.
 
 use super::Context;
 use crate::device_state::{DeferredObject, DeviceState};
@@ -7,15 +7,15 @@ use crate::handle::{
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
 
-/// Handles whose objects a context can destroy: all of them.
+/// A handle whose object a context can destroy. All handles implement it.
 pub trait Destroy: Handle {
     #[doc(hidden)]
     fn destroy_in(self, ctx: &Context);
 }
 
 impl Context {
-    /// Destroys an object. Its handle is stale from now on; its memory goes when the last command buffer that may use
-    /// it is done. Does nothing for a stale handle, nor for an image of a swapchain.
+    /// Destroys an object. The handle is stale from then on. Memory is freed when the last command buffer that may use
+    /// the object is done. Does nothing for a stale handle or for an image of a swapchain.
     pub fn destroy<H: Destroy>(&self, handle: H) {
         handle.destroy_in(self);
     }
@@ -45,7 +45,7 @@ destroy! {
 }
 
 impl Destroy for TextureHandle {
-    /// Images of a swapchain go with it.
+    /// Does nothing for images of a swapchain: they are destroyed with the swapchain.
     fn destroy_in(self, ctx: &Context) {
         let shared: &DeviceState = ctx.device_state();
         let textures = &shared.store.textures;
@@ -59,14 +59,14 @@ impl Destroy for TextureHandle {
 }
 
 impl Destroy for ShaderModuleHandle {
-    /// Pipelines do not need their modules once they are created.
+    /// Destroys the module. Pipelines do not need their modules after creation.
     fn destroy_in(self, ctx: &Context) {
         drop(ctx.device_state().store.shader_modules.remove(self));
     }
 }
 
 impl Destroy for RayTracingLibraryHandle {
-    /// Pipelines linked from the library keep it.
+    /// Removes the handle. Pipelines that are linked from the library keep the library.
     fn destroy_in(self, ctx: &Context) {
         drop(ctx.device_state().store.ray_tracing_libraries.remove(self));
     }

@@ -1,4 +1,4 @@
-//! What textures the device can make.
+//! Queries of texture formats and texture support.
 
 use super::Context;
 use super::create_texture::check_data_size;
@@ -11,33 +11,34 @@ use crate::resource::texture_desc::TextureDesc;
 
 /// Depth formats, the best first.
 const DEPTH: [Format; 3] = [Format::D32Float, Format::X8D24Unorm, Format::D16Unorm];
-/// The same with stencil.
+/// Depth-stencil formats, the best first.
 const DEPTH_STENCIL: [Format; 2] = [Format::D32FloatS8, Format::D24UnormS8];
 
 impl Context {
-    /// What the device can do with 2D textures of a format (`vkGetPhysicalDeviceFormatProperties`).
+    /// Returns the uses of 2D textures of a format that the device supports (`vkGetPhysicalDeviceFormatProperties`).
     pub fn format_support(&self, format: Format) -> FormatSupport {
         FormatSupport::new(&self.device_state().gpu, format)
     }
 
-    /// Whether [`create_texture`](Self::create_texture) would take the description, short of memory and of numbers for
-    /// shaders (`vkGetPhysicalDeviceImageFormatProperties`).
+    /// Checks that [`create_texture`](Self::create_texture) supports the description, apart from memory and free
+    /// texture slots (`vkGetPhysicalDeviceImageFormatProperties`).
     ///
     /// # Errors
-    /// Those that it would answer.
+    /// Those of `create_texture`.
     pub fn supports_texture(&self, desc: &TextureDesc<'_>) -> Result<()> {
         let plan = check_image(&self.device_state().gpu, desc)?;
         check_data_size(desc, plan.mips)
     }
 
-    /// The sizes of fragments that the device has, from large to small; empty where it lacks
+    /// Returns the fragment sizes that the device supports, from large to small. Empty without
     /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate)
     /// (`vkGetPhysicalDeviceFragmentShadingRatesKHR`).
     pub fn shading_rates(&self) -> &[FragmentSize] {
         self.device_state().gpu.shading_rates.as_ref().map_or(&[], |rates| &rates.sizes)
     }
 
-    /// The best format of depth, with stencil or without, that can be drawn to and sampled here; `None` where there is none.
+    /// Returns the best depth format, with or without stencil, that can be rendered to and sampled on this device.
+    /// `None` if there is none.
     pub fn depth_format(&self, stencil: bool) -> Option<Format> {
         let formats: &[Format] = if stencil { &DEPTH_STENCIL } else { &DEPTH };
         formats.iter().copied().find(|format| {

@@ -1,4 +1,4 @@
-//! Frames in flight: the CPU may be so many frames ahead of the GPU, and no more.
+//! Frames in flight: limits how many frames the CPU may be ahead of the GPU.
 
 use std::collections::VecDeque;
 
@@ -9,13 +9,14 @@ use crate::submit::ownership::PerQueue;
 /// A frame about to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// Counts up from 0.
+    /// Frame number, counting from 0.
     pub number: u64,
-    /// Counts round below the frames in flight: the GPU is done with everything the last frame of this index used.
+    /// Frame number modulo the frames in flight. The GPU is done with everything that the previous frame of this index
+    /// used.
     pub index: usize,
 }
 
-/// The last submission before each of the latest frames.
+/// The last submissions before each of the latest frames.
 #[derive(Debug)]
 pub(super) struct FrameRing {
     in_flight: usize,
@@ -31,8 +32,8 @@ impl FrameRing {
         Self { in_flight, next: 0, ends: VecDeque::with_capacity(in_flight) }
     }
 
-    /// Starts a frame, with `submitted` the last submissions before it, one for each queue. Answers the frame and the
-    /// submissions to wait for: the last ones of the frame that used its index before.
+    /// Starts a frame. `submitted` holds the last submission before it, for each queue. Returns the frame and the
+    /// submissions to wait for: the last ones of the previous frame with the same index.
     fn start_frame(&mut self, submitted: PerQueue<u64>) -> (Frame, PerQueue<u64>) {
         if self.next > 0 {
             self.ends.push_back(submitted);
@@ -46,9 +47,9 @@ impl FrameRing {
 }
 
 impl Context {
-    /// Starts a frame: waits until the GPU is done with the frame that last had the same index, so that one set of
-    /// per-frame buffers for each index is enough. On other queues that is so for what was [submitted](Self::submit), not for
-    /// what was [in the background](Self::submit_in_background).
+    /// Starts a frame. Waits until the GPU is done with the previous frame of the same index. One set of per-frame
+    /// buffers for each index is therefore enough. On other queues this holds for [`submit`](Self::submit), but not for
+    /// [`submit_in_background`](Self::submit_in_background).
     pub fn next_frame(&self) -> Result<Frame> {
         let submitted = self.device_state().submitter.foreground_values();
         let (frame, wait_for) = {
@@ -62,7 +63,7 @@ impl Context {
         Ok(frame)
     }
 
-    /// How many frames the CPU may be ahead of the GPU.
+    /// Returns the number of frames that the CPU may be ahead of the GPU.
     pub fn frames_in_flight(&self) -> usize {
         self.inner.frames.lock().in_flight
     }

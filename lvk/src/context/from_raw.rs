@@ -1,4 +1,4 @@
-//! A context on a device that somebody else has made.
+//! Creation of a context on a device that the application has created.
 
 use std::sync::Arc;
 
@@ -10,35 +10,38 @@ use crate::gpu::Gpu;
 use crate::gpu::start::external::RawContext;
 
 impl Context {
-    /// Makes a context on an instance, device and queues of the caller's own, which stay the caller's: nothing of them is
-    /// destroyed.
+    /// Creates a context on the caller's instance, device and queues. The caller keeps their ownership: the context
+    /// destroys none of them.
     ///
-    /// Of `desc` what belongs to the making of devices is ignored: the library, the device, validation and its sink,
-    /// required features, the profile, and extra extensions. Its wishes about ray tracing count as far as `raw` allows them.
+    /// Members of `desc` that configure device creation are ignored: the library, the device, validation and its sink,
+    /// required features, the profile, and user extensions. Its ray tracing requests apply as far as `raw` allows them.
     ///
     /// # Safety
-    /// The handles must belong together and live until the last clone, holder and command buffer of the context is gone.
-    /// What `raw` says is on must have been turned on when the device was made; besides it every feature that
-    /// [`Context::new`](Self::new) needs of a device must be on: `bufferDeviceAddress`, `timelineSemaphore`,
-    /// `synchronization2`, `dynamicRendering`, `maintenance4`, `scalarBlockLayout`, `hostQueryReset`, `independentBlend`,
-    /// `runtimeDescriptorArray`, `descriptorBindingPartiallyBound`, `descriptorBindingUpdateUnusedWhilePending`,
-    /// `descriptorBindingSampledImageUpdateAfterBind`, `descriptorBindingStorageImageUpdateAfterBind`,
-    /// `shaderSampledImageArrayNonUniformIndexing`, `shaderStorageImageArrayNonUniformIndexing`,
-    /// `shaderSampledImageArrayDynamicIndexing`, `shaderStorageImageArrayDynamicIndexing`,
-    /// `shaderStorageImageWriteWithoutFormat` and `fragmentStoresAndAtomics`; and what shaders use of
-    /// `shaderTerminateInvocation`, `shaderDemoteToHelperInvocation`, `shaderZeroInitializeWorkgroupMemory`,
-    /// `shaderIntegerDotProduct`, `shaderSubgroupExtendedTypes` and `vulkanMemoryModel`, which every such device has. Whoever else uses one of the queues does so within
-    /// [`with_raw_queue`](Self::with_raw_queue) or [`with_raw_queue_of`](Self::with_raw_queue_of), or while nobody uses the context.
+    /// The handles must belong together and live until the last clone, holder and command buffer of the context is
+    /// dropped. Everything that `raw` declares as enabled must have been enabled at device creation. In addition every
+    /// feature that [`Context::new`](Self::new) needs of a device must be enabled: `bufferDeviceAddress`,
+    /// `timelineSemaphore`, `synchronization2`, `dynamicRendering`, `maintenance4`, `scalarBlockLayout`,
+    /// `hostQueryReset`, `independentBlend`, `runtimeDescriptorArray`, `descriptorBindingPartiallyBound`,
+    /// `descriptorBindingUpdateUnusedWhilePending`, `descriptorBindingSampledImageUpdateAfterBind`,
+    /// `descriptorBindingStorageImageUpdateAfterBind`, `shaderSampledImageArrayNonUniformIndexing`,
+    /// `shaderStorageImageArrayNonUniformIndexing`, `shaderSampledImageArrayDynamicIndexing`,
+    /// `shaderStorageImageArrayDynamicIndexing`, `shaderStorageImageWriteWithoutFormat` and `fragmentStoresAndAtomics`.
+    /// The same holds for those of `shaderTerminateInvocation`, `shaderDemoteToHelperInvocation`,
+    /// `shaderZeroInitializeWorkgroupMemory`, `shaderIntegerDotProduct`, `shaderSubgroupExtendedTypes` and
+    /// `vulkanMemoryModel` that shaders use; every such device has these. Other code must use the queues only within
+    /// [`with_raw_queue`](Self::with_raw_queue) or [`with_raw_queue_of`](Self::with_raw_queue_of), or while no thread
+    /// uses the context.
     ///
     /// # Errors
-    /// [`NoDevice`](crate::Error::NoDevice) where the device lacks what the library needs;
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) where the device cannot have what it is said to have, an extension is
-    /// missing from the list, or a queue family cannot do what its queue is for; [`Unsupported`](crate::Error::Unsupported) for
-    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) without the feature `software-ray-query`.
+    /// [`NoDevice`](crate::Error::NoDevice) where the device lacks a requirement of the library;
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) where the device cannot have a declared feature, an extension is
+    /// missing from the list, or a queue family lacks a capability that its queue needs;
+    /// [`Unsupported`](crate::Error::Unsupported) for [`RayQueryRequest::Software`](crate::RayQueryRequest::Software)
+    /// without the feature `software-ray-query`.
     pub unsafe fn from_raw(raw: RawContext<'_>, desc: &ContextDesc<'_>) -> Result<Self> {
         desc.ray_query.check()?;
         let queues = requested_queues(desc);
-        // SAFETY: by the caller.
+        // SAFETY: by the caller's promise.
         let gpu = unsafe {
             Gpu::from_raw(raw, desc.ray_tracing_pipeline, desc.ray_query, desc.debug_names, queues)?
         };

@@ -1,4 +1,4 @@
-//! The owner of an object: destroys it when it goes out of scope.
+//! Ownership of an object: destroys the object when the owner is dropped.
 
 use std::fmt;
 use std::ops::Deref;
@@ -6,9 +6,9 @@ use std::ops::Deref;
 use super::Context;
 use super::destroy::Destroy;
 
-/// Owns the object behind a handle and destroys it on drop, once the GPU is done with it.
+/// Owner of the object behind a handle. Dropping it destroys the object once the GPU is done with it.
 ///
-/// Derefs to the handle, so `&holder` or `*holder` goes wherever a handle is wanted.
+/// Derefs to the handle, so `&holder` or `*holder` can be used in place of a handle.
 #[must_use = "dropping the holder destroys the object"]
 pub struct Holder<H: Destroy> {
     ctx: Context,
@@ -21,19 +21,20 @@ impl<H: Destroy> Holder<H> {
         Self { ctx: ctx.clone(), handle, index }
     }
 
-    /// The handle, by value.
+    /// Returns the handle.
     pub fn handle(&self) -> H {
         self.handle
     }
 
-    /// The number by which shaders reach the object: an element of `kTextures2D[]`, `kSamplers[]`, `kTLAS[]`.
+    /// Returns the bindless index of the object in shaders: an element of `kTextures2D[]`, `kSamplers[]`, `kTLAS[]`.
     ///
-    /// 0, the dummy, for objects that take no bindless slot (buffers are reached by address).
+    /// 0, the default descriptor, for objects without a bindless slot (shaders access buffers by address).
     pub fn index(&self) -> u32 {
         self.index
     }
 
-    /// Gives ownership up: the object lives until [`Context::destroy`] or the end of the context.
+    /// Releases ownership and returns the handle. The object lives until [`Context::destroy`] or the end of the
+    /// context.
     pub fn release(self) -> H {
         let holder = std::mem::ManuallyDrop::new(self);
         // SAFETY: `holder` is never dropped nor read again, so the context clone is moved out exactly once.

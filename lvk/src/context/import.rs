@@ -1,4 +1,4 @@
-//! Images and buffers of somebody else's as objects of a context, and semaphores both ways.
+//! Import of external images and buffers, and submissions with external semaphores.
 
 use ash::vk;
 
@@ -14,30 +14,33 @@ use crate::resource::{Buffer, Texture};
 use crate::submit::emit_barriers::layout_from_vulkan;
 use crate::submit::{Submission, SubmitHandle};
 
-/// Describes an image of somebody else's.
+/// Describes an external image to import.
 #[derive(Debug, Clone)]
 pub struct ImportedTexture<'a> {
-    /// The image, with memory.
+    /// The image, bound to memory.
     pub image: vk::Image,
-    /// What it was made with: kind, format, extent, mips (0 stands for all), samples, usage and view formats. `data` and
-    /// `generate_mips` are of no use.
+    /// The creation parameters of the image: kind, format, extent, mips (0 for all), samples, usage and view formats.
+    /// `data` and `generate_mips` are ignored.
     pub desc: TextureDesc<'a>,
-    /// The layout all of it is in when the context may first use it: `UNDEFINED`, `GENERAL`, `READ_ONLY_OPTIMAL`,
-    /// `COLOR_ATTACHMENT_OPTIMAL`, `DEPTH_STENCIL_ATTACHMENT_OPTIMAL`, `TRANSFER_SRC_OPTIMAL` or `TRANSFER_DST_OPTIMAL`.
+    /// Layout of the whole image when the context first uses it: `UNDEFINED`, `GENERAL`, `READ_ONLY_OPTIMAL`,
+    /// `COLOR_ATTACHMENT_OPTIMAL`, `DEPTH_STENCIL_ATTACHMENT_OPTIMAL`, `TRANSFER_SRC_OPTIMAL` or
+    /// `TRANSFER_DST_OPTIMAL`.
     pub layout: vk::ImageLayout,
-    /// It was made with `VK_SHARING_MODE_CONCURRENT` for the families of all queues
-    /// ([`Context::raw_queue_family_of`]). Otherwise it belongs to that of the graphics queue, and no other queue uses it.
+    /// True if the object was created with `VK_SHARING_MODE_CONCURRENT` for the families of all queues
+    /// ([`Context::raw_queue_family_of`]). Otherwise it belongs to the graphics queue's family, and other queues must
+    /// not use it.
     pub concurrent: bool,
 }
 
-/// Describes a buffer of somebody else's.
+/// Describes an external buffer to import.
 #[derive(Debug, Clone, Copy)]
 pub struct ImportedBuffer<'a> {
-    /// The buffer, with memory, made with `SHADER_DEVICE_ADDRESS`, `TRANSFER_SRC` and `TRANSFER_DST` besides its usage.
+    /// The buffer, bound to memory. It was created with `SHADER_DEVICE_ADDRESS`, `TRANSFER_SRC` and `TRANSFER_DST`
+    /// besides its usage.
     pub buffer: vk::Buffer,
-    /// Its size in bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// What it was made for.
+    /// Usage that the buffer was created with.
     pub usage: BufferUsage,
     /// As [`ImportedTexture::concurrent`].
     pub concurrent: bool,
@@ -45,42 +48,42 @@ pub struct ImportedBuffer<'a> {
     pub debug_name: &'a str,
 }
 
-/// A semaphore of somebody else's that a submission waits for.
+/// An external semaphore that a submission waits for.
 #[derive(Debug, Clone, Copy)]
 pub struct RawWait {
     /// The semaphore, binary or timeline.
     pub semaphore: vk::Semaphore,
-    /// The value to wait for; of no use for binary ones.
+    /// The timeline value to wait for. Ignored for binary semaphores.
     pub value: u64,
     /// The stages that wait.
     pub stages: vk::PipelineStageFlags2,
 }
 
-/// A semaphore of somebody else's that a submission signals when all of it is done.
+/// An external semaphore that a submission signals when all of its work is done.
 #[derive(Debug, Clone, Copy)]
 pub struct RawSignal {
     /// The semaphore, binary or timeline.
     pub semaphore: vk::Semaphore,
-    /// The value to signal; of no use for binary ones.
+    /// The timeline value to signal. Ignored for binary semaphores.
     pub value: u64,
 }
 
 impl Context {
-    /// Makes an image of somebody else's a texture. It stays theirs: the end of the handle destroys the library's views of
-    /// it, and never the image.
+    /// Imports an external image as a texture. The caller keeps ownership of the image: destroying the handle destroys
+    /// the library's views, and never the image.
     ///
-    /// Barriers follow it like any other texture, from the layout it is said to be in. To give it back,
-    /// [`CommandBuffer::release_texture`] brings it into a layout; after others have used it,
-    /// [`acquire_texture`](Self::acquire_texture) says in which one it is.
+    /// Barriers are tracked as for any other texture, starting from the declared layout.
+    /// [`CommandBuffer::release_texture`] transitions the image to a layout for external use. After external use,
+    /// [`acquire_texture`](Self::acquire_texture) sets its current layout.
     ///
     /// # Safety
-    /// The image belongs to this device and the graphics queue's family, or was made for concurrent use, is as described, and lives
-    /// until the handle is destroyed and the GPU is done with it. What others did to it is waited for, by a semaphore of
-    /// [`submit_with`](Self::submit_with) or by having finished.
+    /// The image belongs to this device and the graphics queue's family, or was created for concurrent use. It matches
+    /// the description, and lives until the handle is destroyed and the GPU is done with it. External accesses are
+    /// finished, or the submission waits for them with a semaphore of [`submit_with`](Self::submit_with).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a null image, a layout that is not in the list, and what no texture can be;
-    /// [`Unsupported`](Error::Unsupported) and [`LimitExceeded`](Error::LimitExceeded) as of
+    /// [`InvalidUsage`](Error::InvalidUsage) for a null image, a layout that is not in the list, and descriptions that
+    /// no texture can have; [`Unsupported`](Error::Unsupported) and [`LimitExceeded`](Error::LimitExceeded) as in
     /// [`create_texture`](Self::create_texture).
     pub unsafe fn import_texture(&self, import: &ImportedTexture<'_>) -> Result<Holder<TextureHandle>> {
         let (shared, desc) = (self.device_state(), &import.desc);
@@ -108,21 +111,22 @@ impl Context {
         Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
     }
 
-    /// Makes a buffer of somebody else's a buffer of the context. It stays theirs and is never destroyed; the host's
-    /// mapping of it, if there is one, is theirs too.
+    /// Imports an external buffer. The caller keeps ownership of the buffer and of its host mapping, if there is one.
+    /// The context never destroys it.
     ///
     /// # Safety
-    /// The buffer belongs to this device, is as described, and lives until the handle is destroyed and the GPU is done
-    /// with it. What others wrote is waited for, by a semaphore of [`submit_with`](Self::submit_with) or by having finished.
+    /// The buffer belongs to this device, matches the description, and lives until the handle is destroyed and the GPU
+    /// is done with it. External writes are finished, or the submission waits for them with a semaphore of
+    /// [`submit_with`](Self::submit_with).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a null buffer or no bytes.
+    /// [`InvalidUsage`](Error::InvalidUsage) for a null buffer or a size of 0.
     pub unsafe fn import_buffer(&self, import: &ImportedBuffer<'_>) -> Result<Holder<BufferHandle>> {
         if import.buffer == vk::Buffer::null() || import.size_bytes == 0 {
             return Err(Error::usage(import.debug_name, "the buffer to import is null or has no bytes"));
         }
         let name = import.debug_name;
-        // SAFETY: by the caller.
+        // SAFETY: by the caller's promise.
         let buffer = unsafe {
             Buffer::import(&self.device_state().gpu, import.buffer, import.size_bytes, import.usage, name)
         };
@@ -133,14 +137,13 @@ impl Context {
         Ok(Holder::new(self, handle, super::create::NO_SLOT))
     }
 
-    /// Others have used an imported texture, which is in `layout` now, all of it.
+    /// Acquires an imported texture after external use. `layout` is the current layout of the whole image.
     ///
     /// # Safety
-    /// It is, once what the next submission waits for is there.
+    /// The image is in that layout once the waits of the next submission are satisfied.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a layout that is not in the list of
-    /// [`ImportedTexture::layout`].
+    /// [`InvalidUsage`](Error::InvalidUsage) for a layout that is not in the list of [`ImportedTexture::layout`].
     pub unsafe fn acquire_texture(&self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.device_state().store.textures.get(texture)?;
         let layout = layout_from_vulkan(layout).map_err(|why| Error::usage(&texture.name, why))?;
@@ -148,12 +151,12 @@ impl Context {
         Ok(())
     }
 
-    /// As [`submit`](Self::submit), waiting for semaphores of somebody else's before the first of it, uploads included, and
-    /// signalling others after the last.
+    /// Submits like [`submit`](Self::submit), with external semaphores. Waits for `waits` before the first command,
+    /// including uploads, and signals `signals` after the last.
     ///
     /// # Safety
-    /// The semaphores belong to this device. Binary ones have a signal under way that nobody else waits for, or are not
-    /// signalled; the values of timelines rise, and those waited for will come.
+    /// The semaphores belong to this device. A binary semaphore to wait for has a pending signal and no other waiter. A
+    /// binary semaphore to signal is unsignalled. Timeline values rise, and the values to wait for will be signalled.
     ///
     /// # Errors
     /// As [`submit`](Self::submit).
@@ -172,13 +175,14 @@ impl Context {
         self.submit_with_semaphores(cmd, Submission { waits, signals, exchanges, ..Submission::default() })
     }
 
-    /// The timeline semaphore of what is submitted to the graphics queue; [`SubmitHandle::raw_value`] is the value that a
-    /// submission reaches. Others may wait for it, and must not signal it.
+    /// Returns the timeline semaphore of submissions to the graphics queue. [`SubmitHandle::raw_value`] is the value
+    /// that a submission reaches. External code may wait for it, and must not signal it.
     pub fn raw_timeline(&self) -> vk::Semaphore {
         self.raw_timeline_of(Queue::Graphics)
     }
 
-    /// As [`raw_timeline`](Self::raw_timeline), of another queue; queues that share hardware share it too.
+    /// Returns the timeline semaphore of a queue, like [`raw_timeline`](Self::raw_timeline). Queues that share hardware
+    /// share the semaphore.
     pub fn raw_timeline_of(&self, queue: Queue) -> vk::Semaphore {
         let shared = self.device_state();
         shared.submitter.timeline(shared.gpu.queues.queue_index(queue)).raw

@@ -1,4 +1,4 @@
-//! The wrong indices that shaders have used.
+//! Report of the wrong bindless indices that shaders have used.
 
 use super::Context;
 use crate::bindless::index_checks::{IndexChecks, IndexFault};
@@ -6,12 +6,12 @@ use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 
 impl Context {
-    /// Every wrong index of a bindless array that shaders have used so far, in the order of arrays, indices and shaders.
-    /// Submits what waits and waits for the GPU.
+    /// Returns every wrong index of a bindless array that shaders have used so far, in the order of arrays, indices and
+    /// shaders. Submits pending work and waits for the GPU.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) unless [`ContextDesc::check_indices`](crate::ContextDesc::check_indices) is
-    /// set.
+    /// [`InvalidUsage`](Error::InvalidUsage) unless [`ContextDesc::check_indices`](crate::ContextDesc::check_indices)
+    /// is set.
     pub fn index_faults(&self) -> Result<Vec<IndexFault>> {
         let message = "set ContextDesc::check_indices to have indices checked";
         let checks = self.device_state().bindless.checks.as_ref();

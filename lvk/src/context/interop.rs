@@ -1,4 +1,4 @@
-//! The Vulkan objects behind a context and its handles, for engines that mix in calls of their own.
+//! The Vulkan objects behind a context and its handles, for engines that make Vulkan calls of their own.
 
 use ash::vk;
 
@@ -13,77 +13,79 @@ use crate::queue::Queue;
 use crate::resource::texture_desc::TextureUsage;
 
 impl Context {
-    /// The instance.
+    /// Returns the Vulkan instance.
     pub fn raw_instance(&self) -> &ash::Instance {
         &self.device_state().gpu.instance.raw
     }
 
-    /// The loader's entry points.
+    /// Returns the entry points of the Vulkan loader.
     pub fn raw_entry(&self) -> &ash::Entry {
         &self.device_state().gpu.instance.entry
     }
 
-    /// The device. Destroying what the library owns, or using its queue while it submits, is the caller's fault.
+    /// Returns the Vulkan device. The caller must not destroy objects of the library, or use a queue while the library
+    /// submits to it.
     pub fn raw_device(&self) -> &ash::Device {
         &self.device_state().gpu.device
     }
 
-    /// The physical device.
+    /// Returns the physical device.
     pub fn raw_physical_device(&self) -> vk::PhysicalDevice {
         self.device_state().gpu.physical()
     }
 
-    /// Family of the queue for everything.
+    /// Returns the family of the graphics queue.
     pub fn raw_queue_family(&self) -> u32 {
         self.raw_queue_family_of(Queue::Graphics)
     }
 
-    /// Family of the device's queue behind one of the library's.
+    /// Returns the family of the device queue behind a queue of the library.
     pub fn raw_queue_family_of(&self, queue: Queue) -> u32 {
         self.device_state().gpu.queues.family(queue.index())
     }
 
-    /// Runs `call` with the queue for everything locked, so that it may submit. It must neither use the context nor drop
-    /// holders or command buffers: these wait for the queue.
+    /// Calls `call` with the graphics queue locked, so that it may submit. `call` must neither use the context nor drop
+    /// holders or command buffers: these wait for the lock of the queue.
     pub fn with_raw_queue<T>(&self, call: impl FnOnce(vk::Queue) -> T) -> T {
         self.with_raw_queue_of(Queue::Graphics, call)
     }
 
-    /// As [`with_raw_queue`](Self::with_raw_queue), with the device's queue behind one of the library's, which others may share.
+    /// Calls `call` with the device queue behind a queue of the library locked, like
+    /// [`with_raw_queue`](Self::with_raw_queue). Several queues of the library may share that device queue.
     pub fn with_raw_queue_of<T>(&self, queue: Queue, call: impl FnOnce(vk::Queue) -> T) -> T {
         call(*self.device_state().gpu.queues.raw(queue.index()))
     }
 
-    /// The layout all pipelines share: the bindless set and the push constants of every stage.
+    /// Returns the layout that all pipelines share: the bindless set and the push constants of every stage.
     pub fn raw_pipeline_layout(&self) -> vk::PipelineLayout {
         self.device_state().layout.raw
     }
 
-    /// The bindless set.
+    /// Returns the bindless descriptor set.
     pub fn raw_descriptor_set(&self) -> vk::DescriptorSet {
         self.device_state().bindless.set
     }
 
-    /// The buffer behind a handle.
+    /// Returns the buffer behind a handle.
     pub fn raw_buffer(&self, buffer: BufferHandle) -> Result<vk::Buffer> {
         Ok(self.device_state().store.buffers.get(buffer)?.raw)
     }
 
-    /// The image behind a handle; that of the texture which a view shows.
+    /// Returns the image behind a handle. For a view this is the image of the viewed texture.
     pub fn raw_image(&self, texture: TextureHandle) -> Result<vk::Image> {
         Ok(self.device_state().store.textures.get(texture)?.image.raw)
     }
 
-    /// The view shaders sample.
+    /// Returns the view that shaders sample.
     pub fn raw_image_view(&self, texture: TextureHandle) -> Result<vk::ImageView> {
         self.device_state().store.textures.get(texture)?.sampled_view()
     }
 
-    /// The view that render passes draw to: a layer, or a slice of a volume, of a mip.
+    /// Returns the view that render passes draw to: one layer, or one slice of a volume, of a mip.
     ///
     /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) if the texture is no [`TARGET`](TextureUsage::TARGET) or has no such
-    /// mip or layer.
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) if the texture lacks the usage [`TARGET`](TextureUsage::TARGET) or
+    /// has no such mip or layer.
     pub fn raw_target_view(&self, texture: TextureHandle, mip: u32, layer: u32) -> Result<vk::ImageView> {
         let texture = self.device_state().store.textures.get(texture)?;
         texture.check_usage(TextureUsage::TARGET)?;
@@ -91,28 +93,28 @@ impl Context {
         texture.target_view(mip, layer)
     }
 
-    /// The sampler behind a handle.
+    /// Returns the sampler behind a handle.
     pub fn raw_sampler(&self, sampler: SamplerHandle) -> Result<vk::Sampler> {
         Ok(self.device_state().store.samplers.get(sampler)?.raw)
     }
 
-    /// The graphics pipeline behind a handle.
+    /// Returns the graphics pipeline behind a handle.
     pub fn raw_render_pipeline(&self, pipeline: RenderPipelineHandle) -> Result<vk::Pipeline> {
         Ok(self.device_state().store.render_pipelines.get(pipeline)?.raw)
     }
 
-    /// The compute pipeline behind a handle.
+    /// Returns the compute pipeline behind a handle.
     pub fn raw_compute_pipeline(&self, pipeline: ComputePipelineHandle) -> Result<vk::Pipeline> {
         Ok(self.device_state().store.compute_pipelines.get(pipeline)?.raw)
     }
 
-    /// The ray tracing pipeline behind a handle.
+    /// Returns the ray tracing pipeline behind a handle.
     pub fn raw_ray_tracing_pipeline(&self, pipeline: RayTracingPipelineHandle) -> Result<vk::Pipeline> {
         Ok(self.device_state().store.ray_tracing_pipelines.get(pipeline)?.raw)
     }
 
-    /// The acceleration structures behind a handle: one, or the parts of a split mesh. Compaction puts others in
-    /// their place, and destroys these once the GPU is done with them.
+    /// Returns the Vulkan acceleration structures behind a handle: one, or the parts of a split mesh. Compaction
+    /// replaces them, and destroys the old ones once the GPU is done with them.
     pub fn raw_accel_structs(
         &self,
         structure: AccelStructHandle,
@@ -120,7 +122,7 @@ impl Context {
         Ok(self.raw_structures(structure)?.into_iter().map(|(raw, _)| raw).collect())
     }
 
-    /// The device addresses of the same, as instances hold them.
+    /// Returns the device addresses of the Vulkan acceleration structures behind a handle, as instances hold them.
     pub fn accel_struct_addresses(&self, structure: AccelStructHandle) -> Result<Vec<u64>> {
         Ok(self.raw_structures(structure)?.into_iter().map(|(_, address)| address).collect())
     }

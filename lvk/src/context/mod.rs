@@ -1,4 +1,4 @@
-//! The facade users hold: a context creates objects, moves data, hands out command buffers and submits them.
+//! The public facade: a context creates objects, transfers data, and acquires and submits command buffers.
 
 pub(crate) mod accel_info;
 mod compact;
@@ -44,11 +44,11 @@ use crate::lock_order::Mutex;
 use frame::FrameRing;
 use prologue::Prologue;
 
-/// A Vulkan device with everything made from it.
+/// A Vulkan device with all objects created on it.
 ///
-/// Cloning is cheap and gives the same context. All methods take `&self` and may be called from any thread. The
-/// device goes when the last clone, holder and command buffer are gone; objects still alive then are reported to the
-/// `log` crate by name.
+/// Cloning is cheap and returns the same context. All methods take `&self` and may be called from any thread. The
+/// device is destroyed when the last clone, holder and command buffer are dropped. Objects that are still alive then
+/// are reported to the `log` crate by name.
 #[derive(Clone)]
 pub struct Context {
     inner: Arc<ContextInner>,
@@ -59,27 +59,27 @@ struct ContextInner {
     prologue: Mutex<Prologue>,
     frames: Mutex<FrameRing>,
     recording_states: RecordingStatePool,
-    /// Compactions under way.
+    /// Pending compactions.
     compactions: Mutex<Compactions>,
-    /// For swapchains that name none.
+    /// Default window for swapchains without a window of their own.
     #[cfg(feature = "window")]
     window: Option<Arc<dyn crate::gpu::start::window::WindowHandles>>,
     shared: Arc<DeviceState>,
 }
 
 impl Context {
-    /// What the device can do.
+    /// Returns the capabilities of the device.
     pub fn capabilities(&self) -> &Capabilities {
         &self.device_state().gpu.caps
     }
 
-    /// How much of each heap of memory there is, may be used and is used
-    /// (`vkGetPhysicalDeviceMemoryProperties2`, with `VK_EXT_memory_budget` where the device has it).
+    /// Returns the size, the budget and the use of each memory heap (`vkGetPhysicalDeviceMemoryProperties2`, with
+    /// `VK_EXT_memory_budget` where the device has it).
     pub fn memory_budget(&self) -> MemoryBudget {
         self.device_state().gpu.memory_budget()
     }
 
-    /// The messages of the validation layer so far.
+    /// Returns the messages of the validation layer so far.
     pub fn validation(&self) -> &ValidationSink {
         self.device_state().gpu.instance.sink()
     }

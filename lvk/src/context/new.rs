@@ -1,4 +1,4 @@
-//! Makes a context.
+//! Creation of a context.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64};
@@ -37,13 +37,14 @@ use crate::submit::profiler::Profiler;
 use crate::upload::{BufferRecycler, Staging};
 
 impl Context {
-    /// Opens Vulkan and makes a device that has what `desc` requires.
+    /// Loads Vulkan and creates a device that meets the requirements of `desc`.
     ///
     /// # Errors
     /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
-    /// reason for each device when none will do; [`Unsupported`](crate::Error::Unsupported) when validation is wanted
-    /// and its layer is missing, the instance has no extension of [`ContextDesc::user_extensions`], or
-    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) is asked for without the feature `software-ray-query`.
+    /// reason for each device when no device is suitable; [`Unsupported`](crate::Error::Unsupported) when validation is
+    /// required and its layer is missing, the instance has no extension of [`ContextDesc::user_extensions`], or
+    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) is requested without the feature
+    /// `software-ray-query`.
     pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
         desc.ray_query.check()?;
         let sink = desc.validation_sink.clone().unwrap_or_default();
@@ -70,7 +71,7 @@ impl Context {
         Self::with_gpu(Arc::new(Gpu::new(instance, &request)?), desc)
     }
 
-    /// Of `desc` what does not belong to the making of devices.
+    /// Creates a context on a device. Uses the members of `desc` that do not configure device creation.
     pub(super) fn with_gpu(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
         let shared = Arc::new(new_device_state(gpu, desc)?);
         let inner = ContextInner {
@@ -87,9 +88,9 @@ impl Context {
         Ok(context)
     }
 
-    /// What every device of the machine can do, in the order of their numbers.
+    /// Returns the capabilities of all devices of the machine, in the order of their indices.
     ///
-    /// `vulkan_library` is the loader to open, the system's without one.
+    /// `vulkan_library` is the loader to open; `None` opens the system's loader.
     pub fn devices(vulkan_library: Option<&Path>) -> Result<Vec<Capabilities>> {
         let instance = Instance::new(&InstanceDesc {
             application_name: "lvk",
@@ -104,7 +105,8 @@ impl Context {
     }
 }
 
-/// The shaders' looks at indices are written down by one command buffer after the other.
+/// Returns the queues to request. Index checks need a shared queue, because command buffers record faults one after the
+/// other.
 pub(super) fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
     if desc.check_indices { QueueRequest::Shared } else { desc.queues }
 }
@@ -142,7 +144,7 @@ fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState
     })
 }
 
-/// An entry for each element of `kTLAS[]`.
+/// Creates the table with an entry for each element of `kTLAS[]`.
 fn new_tlas_table(gpu: &Arc<Gpu>) -> Result<Option<Arc<Buffer>>> {
     if !gpu.has_acceleration_structures() {
         return Ok(None);
@@ -155,7 +157,7 @@ fn new_tlas_table(gpu: &Arc<Gpu>) -> Result<Option<Arc<Buffer>>> {
     Ok(Some(Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?)))
 }
 
-/// One scratch buffer is no larger than what a build may take.
+/// Creates a scratch buffer that is no larger than the limit of one build.
 fn new_scratch(gpu: &Gpu, budget_bytes: u64) -> ScratchBuffer {
     let limits = &gpu.caps.limits;
     let largest = limits.max_buffer_bytes.min(limits.max_accel_scratch_bytes);

@@ -1,4 +1,4 @@
-//! Decides of what parts a bottom-level structure consists, and in which order their primitives are built.
+//! Planning of a BLAS: its split into parts, and the order of its primitives.
 
 use std::sync::Arc;
 
@@ -22,33 +22,34 @@ use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::blas::{SoftwareBlas, max_sizes};
 
-/// Meshes of fewer primitives are built as given: no order makes them slow.
+/// Meshes with fewer primitives are built in the given order, which is never slow for them.
 const MIN_REORDERED_PRIMITIVES: u64 = 64;
 
-/// The input of a BLAS: the matrices that are given by value, and the parts to build.
+/// The input of a BLAS: the transform matrices given by value, and the parts to build.
 pub(crate) struct BlasInputs {
     pub(crate) transforms: Option<Buffer>,
-    /// None where only software traces.
+    /// Empty if only software ray queries are used.
     pub(crate) parts: Vec<BlasPart>,
 }
 
-/// What becomes of a mesh.
+/// Treatment of a mesh.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum BlasPlan {
     /// One part in the given order.
     Whole,
     /// One part, in a better order if there is one.
     Reordered,
-    /// Several parts, each in a better order or not.
+    /// Several parts. `order` requests a better order for each.
     Split { order: bool },
 }
 
 impl Context {
-    /// Bytes a bottom-level structure would take in one piece (`vkGetAccelerationStructureBuildSizesKHR`, raised to
-    /// what the context's [`DeviceProfile`](crate::DeviceProfile) says); at most, where only software traces it.
+    /// Returns the bytes that an unsplit BLAS would take (`vkGetAccelerationStructureBuildSizesKHR`, raised to the
+    /// values of the context's [`DeviceProfile`](crate::DeviceProfile)). With software ray queries only, this is an
+    /// upper bound.
     pub fn blas_sizes(&self, desc: &BlasDesc<'_>) -> Result<AccelStructSizes> {
         let shared = self.device_state();
-        // Size queries only see whether a matrix has an address.
+        // Size queries only depend on the presence of a matrix address.
         const PLACEHOLDER_ADDRESS: u64 = 16;
         check_desc(shared, desc)?;
         let input = build_input(shared, desc, Some(PLACEHOLDER_ADDRESS))?;
@@ -64,7 +65,7 @@ impl Context {
         let converted =
             descs.iter().map(|desc| convert_geometries(shared, desc)).collect::<Result<Vec<_>>>()?;
         if shared.gpu.accel.is_none() {
-            // Software has no parts; the descriptions are checked as for hardware.
+            // Software BVHs have no parts. The descriptions are checked as for hardware.
             let checked = |(transforms, _)| BlasInputs { transforms, parts: Vec::new() };
             return Ok(converted.into_iter().map(checked).collect());
         }
@@ -93,7 +94,7 @@ impl Context {
         Ok(inputs)
     }
 
-    /// Makes a part of a mesh with the input `whole`. Its tables are uploaded before the next submission.
+    /// Creates a part of a mesh with the input `whole`. Its tables are uploaded before the next submission.
     pub(super) fn new_part(
         &self,
         desc: &BlasDesc<'_>,
@@ -112,8 +113,8 @@ impl Context {
     }
 }
 
-/// Checks the geometries of a BLAS and converts them, once for all of its size queries and builds. Makes the buffer of the
-/// matrices that are given by value.
+/// Checks and converts the geometries of a BLAS, once for all of its size queries and builds. Creates the buffer of the
+/// transform matrices given by value.
 pub(crate) fn convert_geometries(
     shared: &DeviceState,
     desc: &BlasDesc<'_>,
@@ -131,7 +132,7 @@ fn check_desc(shared: &DeviceState, desc: &BlasDesc<'_>) -> Result<()> {
     desc.flags.check_blas(&shared.gpu, desc.debug_name)
 }
 
-/// Converts the mesh as a whole. `transforms` is the address of the matrices that are given by value.
+/// Converts the whole mesh. `transforms` is the address of the transform matrices given by value.
 fn build_input(shared: &DeviceState, desc: &BlasDesc<'_>, transforms: Option<u64>) -> Result<BuildInput> {
     let find = |handle| shared.store.buffers.get(handle);
     BuildInput::from_geometries(&shared.gpu, desc.debug_name, desc.geometries, desc.flags, &find, transforms)
@@ -183,7 +184,8 @@ fn choose_plan(gpu: &Gpu, desc: &BlasDesc<'_>, whole: &AccelStructSizes) -> Blas
     }
 }
 
-/// Scratch is given at an aligned address, which may take up to the alignment of what the limit allows.
+/// Returns the limits of one part. The scratch address is aligned, so up to `scratch_alignment` bytes of the allowed
+/// scratch memory are lost.
 pub(super) fn part_limits(limits: &Limits) -> PartLimits {
     PartLimits {
         structure_bytes: limits.max_accel_structure_bytes,
@@ -214,7 +216,7 @@ fn split_into_parts(
     Ok(plans)
 }
 
-/// Puts the primitives of each geometry of a part into a better order.
+/// Reorders the primitives of each geometry of a part if that is worthwhile.
 fn reorder_part(plan: &mut PartPlan, bounds: &[Vec<Bounds>]) {
     for (numbers, bounds) in plan.geometries.iter_mut().zip(bounds) {
         let of_part: Vec<_> = numbers.iter().map(|number| bounds[*number as usize]).collect();
@@ -225,7 +227,7 @@ fn reorder_part(plan: &mut PartPlan, bounds: &[Vec<Bounds>]) {
     }
 }
 
-/// The whole mesh in a better order; none where the given one is good.
+/// Returns the whole mesh in a better order, or `None` if the given order is good.
 fn reordered_whole(bounds: &[Vec<Bounds>]) -> Option<PartPlan> {
     let given = |bounds: &Vec<Bounds>| (0..bounds.len() as u32).collect::<Vec<_>>();
     let mut plan = PartPlan { geometries: bounds.iter().map(given).collect() };

@@ -1,4 +1,4 @@
-//! What runs before the next submission: uploads, then builds and the like.
+//! The work that runs before the next submission: uploads, builds of acceleration structures and others.
 
 use std::sync::Arc;
 
@@ -13,19 +13,19 @@ use crate::resource::{Buffer, Texture};
 use crate::submit::SubmitHandle;
 use crate::upload::PendingUploads;
 
-/// What runs before the next submission.
+/// The work that runs before the next submission.
 #[derive(Default)]
 pub(super) struct Prologue {
-    /// Run after what `commands` holds.
+    /// Uploads that run after `commands`.
     uploads: PendingUploads,
     commands: Option<CommandBuffer>,
-    /// The last submission that was made to get staging memory back.
+    /// The last submission made to free staging memory.
     made_room: SubmitHandle,
 }
 
 impl Context {
-    /// Records into the command buffer that runs before the next submission. What it holds stays there whatever
-    /// becomes of `new_command_buffer`.
+    /// Records into the command buffer that runs before the next submission. Its earlier commands stay there even if
+    /// `record` fails.
     pub(crate) fn record_in_prologue<T>(
         &self,
         record: impl FnOnce(&mut CommandBuffer) -> Result<T>,
@@ -33,13 +33,13 @@ impl Context {
         let mut pending = self.lock_prologue();
         let cmd = self.prologue_command_buffer(&mut pending)?;
         let result = record(cmd);
-        // It goes before whatever is submitted next, so commands recorded from now on may rely on it.
+        // This command buffer runs before the next submission, so commands recorded from now on may rely on it.
         cmd.apply_tlas_updates();
         result
     }
 
-    /// The command buffer that runs before the next submission, with all uploads so far. What it records next may be for
-    /// those who have the slots of structures that are gone.
+    /// Returns the command buffer that runs before the next submission, with all uploads so far. Clears the TLAS table
+    /// entries of freed slots first, because the next commands may belong to new owners of these slots.
     pub(super) fn prologue_command_buffer<'a>(
         &self,
         pending: &'a mut Prologue,
@@ -60,7 +60,7 @@ impl Context {
         Ok(cmd)
     }
 
-    /// The command buffer that goes before the submission made next, if there is anything to be done.
+    /// Takes the command buffer that runs before the next submission, if there is pending work.
     pub(super) fn take_prologue(&self, pending: &mut Prologue) -> Result<Option<CommandBuffer>> {
         self.drop_dead_uploads(&mut pending.uploads);
         if !pending.uploads.is_empty() {
@@ -69,16 +69,16 @@ impl Context {
         Ok(pending.commands.take())
     }
 
-    /// Textures that are gone need no contents.
+    /// Drops uploads to destroyed textures, which need no contents.
     fn drop_dead_uploads(&self, uploads: &mut PendingUploads) {
         for gone in uploads.drain_dead() {
             self.device_state().free_now(DeferredObject::TextureRef(gone));
         }
     }
 
-    /// Writes bytes of a buffer before the next submission. They are copied before the lock is taken.
+    /// Writes bytes of a buffer before the next submission. The bytes are copied before the lock is taken.
     pub(super) fn upload_to_buffer(&self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
-        // So that uploads side by side are side by side in staging memory, too, and become one copy.
+        // Adjacent uploads are thereby adjacent in staging memory too, and become one copy.
         const ALIGNMENT: u64 = 4;
         target.check_range(offset, bytes.len() as u64)?;
         if bytes.is_empty() {
@@ -90,7 +90,7 @@ impl Context {
         self.flush_if_over_budget(pending)
     }
 
-    /// Writes texels, tightly packed, before the next submission. They are copied before the lock is taken.
+    /// Writes tightly packed texels before the next submission. The texels are copied before the lock is taken.
     pub(super) fn upload_texture_object(
         &self,
         target: &Arc<Texture>,
@@ -101,7 +101,8 @@ impl Context {
         self.upload_region(target, region, bytes)
     }
 
-    /// As [`upload_texture_object`](Self::upload_texture_object), with as many bytes as the region has.
+    /// Uploads like [`upload_texture_object`](Self::upload_texture_object), for `bytes` of exactly the size of the
+    /// region.
     pub(super) fn upload_region(&self, target: &Arc<Texture>, region: Region, bytes: &[u8]) -> Result<()> {
         // A multiple of 16 suits texels and blocks of every size.
         const ALIGNMENT: u64 = 16;
@@ -115,15 +116,15 @@ impl Context {
         self.flush_if_over_budget(pending)
     }
 
-    /// Lets shaders read a new texture that has no contents.
+    /// Makes a new texture without contents readable by shaders.
     pub(super) fn make_texture_visible(&self, texture: &Arc<Texture>) -> Result<()> {
         texture.image.add_texture()?;
         self.lock_prologue().uploads.add_new_texture(Arc::clone(texture));
         Ok(())
     }
 
-    /// Submits uploads that have come to fill half of the staging memory, so that it comes back while the other half is
-    /// filled. Where the GPU does not keep up, waits for the half before.
+    /// Submits uploads that fill half of the staging memory, so that this half is copied while the caller fills the
+    /// other half. If the GPU is slower than the caller, waits for the previous half.
     fn flush_if_over_budget(&self, pending: Guard<'_, Prologue>) -> Result<()> {
         if pending.uploads.bytes() < self.device_state().staging.half_bytes() {
             return Ok(());

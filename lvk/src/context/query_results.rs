@@ -1,4 +1,4 @@
-//! Reads what queries measured.
+//! Results of queries and of calibrated timestamps.
 
 use std::time::Duration;
 
@@ -9,10 +9,10 @@ use crate::handle::QueryPoolHandle;
 use crate::resource::query_pool::PipelineStatistics;
 
 impl Context {
-    /// Milliseconds of `count` timestamps since an arbitrary start that all share; `None` where none was written yet
-    /// (`vkGetQueryPoolResults`). Does not wait.
+    /// Returns `count` timestamps in milliseconds since an arbitrary start that all timestamps share. `None` for a
+    /// timestamp that is not written yet (`vkGetQueryPoolResults`). Does not wait.
     ///
-    /// The clock of a device begins anew after `2^`[`timestamp_bits`](crate::Limits::timestamp_bits) ticks.
+    /// The device's clock wraps after `2^`[`timestamp_bits`](crate::Limits::timestamp_bits) ticks.
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of another kind.
@@ -20,9 +20,9 @@ impl Context {
         self.device_state().store.query_pools.get(pool)?.milliseconds(first, count)
     }
 
-    /// The numbers of queries from `first` on, as many as `out` has room for: ticks of
-    /// [`timestamp_period_ns`](crate::Limits::timestamp_period_ns) for timestamps, samples for occlusion. `None` where
-    /// the GPU is not there yet or the query was reset (`vkGetQueryPoolResults`). Neither waits nor allocates.
+    /// Reads the results of `out.len()` queries from `first` on: ticks of
+    /// [`timestamp_period_ns`](crate::Limits::timestamp_period_ns) for timestamps, samples for occlusion. `None` if the
+    /// GPU has not reached the query or the query was reset (`vkGetQueryPoolResults`). Neither waits nor allocates.
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of pipeline
@@ -33,8 +33,8 @@ impl Context {
         pool.read(first, out)
     }
 
-    /// What the stages did between begin and end of a query; `None` where the GPU is not there yet or the query was
-    /// reset (`vkGetQueryPoolResults`). Does not wait.
+    /// Returns the pipeline statistics between begin and end of a query. `None` if the GPU has not reached the end or
+    /// the query was reset (`vkGetQueryPoolResults`). Does not wait.
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, and for pools of another kind.
@@ -42,13 +42,13 @@ impl Context {
         self.device_state().store.query_pools.get(pool)?.statistics(query)
     }
 
-    /// Reads the clocks of GPU and host at one moment (`vkGetCalibratedTimestampsKHR`), so that timestamps can be laid
-    /// beside what the host did. Does not wait.
+    /// Reads the clocks of GPU and host at one moment (`vkGetCalibratedTimestampsKHR`), so that GPU timestamps can be
+    /// compared with host times. Does not wait.
     ///
     /// # Errors
     /// [`Unsupported`](crate::Error::Unsupported) without
-    /// [`Capabilities::calibrated_timestamps`](crate::Capabilities::calibrated_timestamps), and where the driver knows
-    /// no `CLOCK_MONOTONIC`.
+    /// [`Capabilities::calibrated_timestamps`](crate::Capabilities::calibrated_timestamps), and where the driver does
+    /// not support `CLOCK_MONOTONIC`.
     pub fn calibrated_timestamps(&self) -> Result<CalibratedTimestamps> {
         let gpu = &self.device_state().gpu;
         let clock =

@@ -1,4 +1,4 @@
-//! Reads the inputs of meshes back, to learn where their primitives lie.
+//! Reads mesh inputs back to compute the bounds of their primitives.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -16,25 +16,25 @@ use crate::format::IndexFormat;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 
-/// Most bytes read back at once: inputs of a whole scene may be more than there is readback memory for.
+/// Maximum bytes of one readback. The inputs of a whole scene may exceed the readback memory.
 const MAX_READ_BYTES: u64 = 64 << 20;
 
-/// Bytes of a buffer: its handle, where they start, how many.
+/// A range of a buffer: handle, offset in bytes, size in bytes.
 type InputRange = (BufferHandle, u64, u64);
 
-/// Pieces of buffers that are read together, each once.
+/// Buffer ranges that are read together, each once.
 #[derive(Default)]
 pub(crate) struct InputBytes {
     index_by_range: HashMap<InputRange, usize>,
-    /// Buffer and first byte in it.
+    /// Each buffer, and the offset of its first byte.
     buffers: Vec<(Arc<Buffer>, u64)>,
-    /// Where each piece of the list lies in `bytes`.
+    /// Position of each range of the list in `bytes`.
     ranges: Vec<Range<u64>>,
     bytes: Vec<u8>,
 }
 
 impl Context {
-    /// The boxes of the primitives of each geometry of each mesh. Waits for the GPU.
+    /// Returns the bounds of the primitives of each geometry of each mesh. Waits for the GPU.
     pub(super) fn read_bounds(&self, descs: &[&BlasDesc<'_>]) -> Result<Vec<Vec<Vec<Bounds>>>> {
         let pieces = self.read_inputs(descs)?;
         let of_mesh =
@@ -42,7 +42,7 @@ impl Context {
         Ok(descs.iter().map(of_mesh).collect())
     }
 
-    /// The inputs of meshes. Waits for the GPU.
+    /// Reads the inputs of meshes. Waits for the GPU.
     pub(crate) fn read_inputs(&self, descs: &[&BlasDesc<'_>]) -> Result<InputBytes> {
         let mut pieces = InputBytes::default();
         for geometry in descs.iter().flat_map(|desc| desc.geometries) {
@@ -101,7 +101,7 @@ impl InputBytes {
     }
 }
 
-/// Which of `ranges`, which follow each other, reach into `window`, and what of them lies in it.
+/// Returns the indices of consecutive `ranges` that overlap `window`, with the overlapping part of each.
 fn overlaps(ranges: &[Range<u64>], window: Range<u64>) -> impl Iterator<Item = (usize, Range<u64>)> {
     let first = ranges.partition_point(|range| range.end <= window.start);
     let inside = ranges[first..].iter().take_while(move |range| range.start < window.end);
@@ -109,7 +109,7 @@ fn overlaps(ranges: &[Range<u64>], window: Range<u64>) -> impl Iterator<Item = (
     (first..).zip(inside.map(common))
 }
 
-/// What of its buffers a geometry reads.
+/// Returns the buffer ranges that a geometry reads.
 fn input_ranges(geometry: &BlasGeometry) -> impl Iterator<Item = InputRange> {
     let pieces = match geometry {
         BlasGeometry::Aabbs(boxes) => {
@@ -144,7 +144,7 @@ fn matrix_range(triangles: &Triangles) -> Option<InputRange> {
     }
 }
 
-/// Bytes from the first to the end of the last element.
+/// Returns the bytes from the start of the first element to the end of the last.
 fn span_bytes(count: u32, stride: u64, packed: u64) -> u64 {
     let stride = if stride == 0 { packed } else { stride };
     if count == 0 { 0 } else { u64::from(count - 1) * stride + packed }
@@ -157,7 +157,7 @@ fn geometry_bounds(geometry: &BlasGeometry, pieces: &InputBytes) -> Vec<Bounds> 
     }
 }
 
-/// A geometry as it was read.
+/// Returns the input bytes of a geometry.
 pub(crate) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a InputBytes) -> GeometryBytes<'a> {
     match geometry {
         BlasGeometry::Aabbs(boxes) => {
@@ -174,7 +174,7 @@ pub(crate) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a InputBytes
             };
             let of_triangles = index_range(triangles).map(|piece| pieces.bytes_of(piece)).unwrap_or_default();
             let indices = match triangles.indices.map(|indices| indices.format) {
-                // Structures are not built from 8-bit indices.
+                // Acceleration structures are not built from 8-bit indices.
                 None | Some(IndexFormat::U8) => IndexBytes::None,
                 Some(IndexFormat::U16) => IndexBytes::U16(of_triangles),
                 Some(IndexFormat::U32) => IndexBytes::U32(of_triangles),

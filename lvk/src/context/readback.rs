@@ -1,4 +1,4 @@
-//! Bytes on their way from the GPU to the host.
+//! Asynchronous readback from the GPU to the host.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,32 +14,32 @@ use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::resource::region::TextureRegion;
 use crate::submit::SubmitHandle;
 
-/// Bytes that the GPU copies for the host, from [`Context::read_buffer_later`] and [`Context::read_texture_later`].
+/// Bytes that the GPU copies to the host, from [`Context::read_buffer_later`] and [`Context::read_texture_later`].
 ///
-/// They are those of the moment of the call: what is submitted afterwards does not change them. Dropping it gives them
-/// up.
+/// The contents are those at the time of the call: later submissions do not change them. Dropping the object discards
+/// the bytes.
 #[derive(Clone)]
 pub struct Readback {
-    /// `None` for no bytes at all.
+    /// `None` for a size of 0.
     target: Option<Arc<Buffer>>,
     submission: SubmitHandle,
     ctx: Context,
 }
 
 impl Readback {
-    /// Whether the bytes are there. Does not wait (`vkGetSemaphoreCounterValue`).
+    /// Returns true if the bytes are available. Does not wait (`vkGetSemaphoreCounterValue`).
     pub fn is_ready(&self) -> Result<bool> {
         self.ctx.is_done(self.submission)
     }
 
-    /// The bytes; waits for the GPU where they are not there yet (`vkWaitSemaphores`).
+    /// Returns the bytes. Waits for the GPU if they are not available yet (`vkWaitSemaphores`).
     pub fn wait(&self) -> Result<Vec<u8>> {
         let mut bytes = vec![0; self.target.as_ref().map_or(0, |target| target.size_bytes as usize)];
         self.wait_into(&mut bytes)?;
         Ok(bytes)
     }
 
-    /// The submission that copies the bytes.
+    /// Returns the submission that copies the bytes.
     pub fn submission(&self) -> SubmitHandle {
         self.submission
     }
@@ -61,8 +61,7 @@ impl std::fmt::Debug for Readback {
 }
 
 impl Context {
-    /// Has bytes of a buffer in any memory copied for the host, after everything submitted so far, and does not wait for
-    /// them.
+    /// Starts a copy of bytes of a buffer in any memory to the host, after everything submitted so far. Does not wait.
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a range that ends before it begins or outside of the buffer;
@@ -75,7 +74,8 @@ impl Context {
         self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]))
     }
 
-    /// Has texels copied for the host, tightly packed, row by row and layer by layer, after everything submitted so far, and does not wait for them.
+    /// Starts a copy of texels to the host, tightly packed, row by row and layer by layer, after everything submitted
+    /// so far. Does not wait.
     ///
     /// # Errors
     /// As [`download_texture`](Self::download_texture).
@@ -85,8 +85,9 @@ impl Context {
         self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&find()?, region, target, 0))
     }
 
-    /// Submits a copy into a new buffer. What `record` copies it finds by its handle, or the caller holds it until the copy is
-    /// done: what another thread destroys before the command buffer is open does not wait for that.
+    /// Submits a copy into a new buffer. `record` looks up its source by handle, or the caller keeps the source alive
+    /// until the copy is done. An object that another thread destroys before the command buffer is open does not wait
+    /// for the copy.
     pub(super) fn read_later(
         &self,
         size: u64,
@@ -106,7 +107,7 @@ impl Context {
         let target = Arc::new(Buffer::new(&self.device_state().gpu, &desc, InternalUsage::NONE)?);
         let mut cmd = self.acquire_command_buffer()?;
         record(&mut cmd, &target)?;
-        // Before the submission: should that fail half-way, the GPU may yet write the buffer.
+        // Before the submission: if that fails half-way, the GPU may still write the buffer.
         self.device_state().free_later(DeferredObject::Buffer(Arc::clone(&target)));
         let submission = self.submit(cmd)?;
         Ok(Readback { target: Some(target), submission, ctx: self.clone() })

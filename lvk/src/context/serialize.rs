@@ -1,4 +1,4 @@
-//! Bottom-level structures as bytes, so that a scene can be kept on disk.
+//! Serialisation of BLAS to bytes, so that a scene can be kept on disk.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -29,26 +29,26 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::{Buffer, QueryPool};
 
-/// Addresses of serialised structures are multiples of this.
+/// Alignment of the addresses of serialised BLAS.
 const ALIGNMENT: u64 = 256;
-/// Bytes of parts that go through one buffer, which devices bound; a larger part goes alone.
+/// Maximum bytes of parts that share one buffer, because devices limit buffer sizes. A larger part has a buffer alone.
 const MAX_GROUP_BYTES: u64 = 256 << 20;
 
-/// A structure from [`Context::load_or_create_blas`].
+/// Result of [`Context::load_or_create_blas`].
 pub struct LoadedBlas {
-    /// The structure.
+    /// The BLAS.
     pub blas: Holder<AccelStructHandle>,
-    /// Why the bytes were not used and the structure was built instead; `None` where they were.
+    /// Reason why the bytes were not used and the BLAS was built instead; `None` if the bytes were used.
     pub rejected: Option<Error>,
 }
 
 impl Context {
-    /// A bottom-level structure as bytes, for a file that [`load_blas`](Self::load_blas) reads on the same device with
-    /// the same driver (`vkCmdCopyAccelerationStructureToMemoryKHR`). Waits for the GPU.
+    /// Serialises a BLAS to bytes for a file. [`load_blas`](Self::load_blas) reads it on the same device with the same
+    /// driver (`vkCmdCopyAccelerationStructureToMemoryKHR`). Waits for the GPU.
     ///
-    /// Where only software traces, what it does serves every device with the same version of the library.
+    /// With software ray queries only, the bytes work on every device with the same version of the library.
     ///
-    /// Keep the file where only the program writes it: its checksum finds damage, not intent.
+    /// Keep the file where only the program writes to it: its checksum detects damage, not manipulation.
     pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
         let object = self.device_state().store.accel_structs.get(handle)?;
         let blas = object.blas()?;
@@ -66,21 +66,21 @@ impl Context {
         Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }))
     }
 
-    /// Makes a bottom-level structure from what [`serialize_blas`](Self::serialize_blas) wrote
-    /// (`vkCmdCopyMemoryToAccelerationStructureKHR`). `desc` is what it was created from: flags, kinds and counts of
-    /// its geometries must be the same, and so must vertex formats, numbers of vertices, kinds of indices, and whether
-    /// there is a matrix; its buffers are what a refit reads.
+    /// Creates a BLAS from the bytes of [`serialize_blas`](Self::serialize_blas)
+    /// (`vkCmdCopyMemoryToAccelerationStructureKHR`). `desc` is the description of the original. Flags, kinds and
+    /// counts of its geometries must be the same. So must vertex formats, numbers of vertices, kinds of indices, and
+    /// the presence of a matrix. A refit reads the buffers of `desc`.
     ///
     /// # Errors
     /// [`Serialized`](Error::Serialized) for bytes that are damaged, of another mesh, or of another device or driver.
     ///
     /// # Safety
-    /// `bytes` are what [`serialize_blas`](Self::serialize_blas) wrote, whole or damaged by accident, but not made up to
-    /// look like it. Damage, and sizes and counts that contradict the mesh, are found and refused; but what the driver
-    /// wrote of a structure only the driver can read, and it takes it for its own: made-up contents send the GPU to any
-    /// address. A file that others can write is no source.
+    /// `bytes` come from [`serialize_blas`](Self::serialize_blas), complete or accidentally damaged, but not forged.
+    /// Damage is detected, and so are sizes and counts that contradict the mesh; such bytes are rejected. But only the
+    /// driver can read the driver's data, and the driver trusts it: forged contents can make the GPU access any
+    /// address. Do not load a file that other programs can write to.
     ///
-    /// Where only software traces, made-up contents are refused or harmless too: every place, count and reference is
+    /// With software ray queries only, forged contents are rejected or harmless: every offset, count and reference is
     /// checked before a shader follows it.
     pub unsafe fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
         self.device_state().gpu.check_acceleration_structures()?;
@@ -94,15 +94,15 @@ impl Context {
             bytes.push(self.check_driver(part).map_err(|reason| rejected_error(desc, reason))?);
         }
         let inputs = self.loaded_inputs(desc, &blob, &bytes)?;
-        // SAFETY: the caller vouches for what the driver wrote; all else is checked.
+        // SAFETY: the caller vouches for the driver's data; everything else is checked.
         unsafe { self.deserialize(desc, &blob, inputs, &bytes) }
     }
 
-    /// As [`load_blas`](Self::load_blas), and as [`create_blas`](Self::create_blas) where there are no bytes or they
-    /// cannot be used.
+    /// Creates a BLAS like [`load_blas`](Self::load_blas), or like [`create_blas`](Self::create_blas) if there are no
+    /// bytes or they cannot be used.
     ///
     /// # Safety
-    /// As [`load_blas`](Self::load_blas): nobody made the bytes up.
+    /// As [`load_blas`](Self::load_blas): the bytes are not forged.
     pub unsafe fn load_or_create_blas(
         &self,
         desc: &BlasDesc<'_>,
@@ -130,9 +130,7 @@ impl Context {
         self.device_state().free_later(DeferredObject::QueryPool(Arc::clone(&pool)));
         self.wait(self.submit(cmd)?)?;
         let sizes: Option<Vec<_>> = pool.values(0, count)?.into_iter().collect();
-        sizes.ok_or_else(|| {
-            Error::usage(&object.name, "the device did not answer the size of a serialised structure")
-        })
+        sizes.ok_or_else(|| Error::usage(&object.name, "the device returned no size for a serialised BLAS"))
     }
 
     fn serialize_parts(
@@ -149,7 +147,7 @@ impl Context {
         Ok(all)
     }
 
-    /// Parts that go through one buffer.
+    /// Serialises parts that share one buffer.
     fn serialize_group(
         &self,
         object: &AccelStruct,
@@ -174,7 +172,7 @@ impl Context {
         Ok(places.offsets.iter().zip(sizes).map(part).collect())
     }
 
-    /// The words of a part's table.
+    /// Reads the words of a part's primitive map.
     fn read_primitive_map(&self, shape: &BlasPart) -> Result<Option<Vec<u32>>> {
         let Some(map) = &shape.map else { return Ok(None) };
         let ranges = &shape.input.ranges;
@@ -192,15 +190,16 @@ impl Context {
         Ok(Some(words))
     }
 
-    /// Room for serialised structures, wherever the buffer's address lies.
+    /// Creates a buffer for serialised parts, with space to align its address.
     fn blob_buffer(&self, name: &str, bytes: u64) -> Result<Arc<Buffer>> {
         let desc = BufferDesc { size_bytes: bytes + ALIGNMENT, debug_name: name, ..Default::default() };
         Ok(Arc::new(Buffer::new(&self.device_state().gpu, &desc, InternalUsage::NONE)?))
     }
 
-    /// Whether the driver can read a part, by the head it wrote itself; answers how large the structure will be.
+    /// Checks by the header of a part that the driver can read it. Returns the size of its acceleration structure in
+    /// bytes.
     fn check_driver(&self, part: &BlasFilePart) -> Result<u64, String> {
-        let damaged = || "the driver's head is damaged".to_owned();
+        let damaged = || "the driver's header is damaged".to_owned();
         let version = part.version_data().ok_or_else(damaged)?;
         let number = |at: usize| {
             let bytes = part.driver.get(at..at + 8)?.try_into().ok()?;
@@ -243,7 +242,7 @@ impl Context {
             |bytes: &u64| RawAccelStruct::new(&shared.gpu, &shared.accel_storage, name, ty, *bytes);
         let structures = bytes.iter().map(structure).collect::<Result<Vec<_>>>()?;
         let body = BlasStructures { structures, compacted_from: None, rebuildable };
-        // What software traces beside it is built anew: the file is the driver's.
+        // The file contains the driver's data only, so BVHs for software ray queries are built again.
         let built = self.software_blobs(std::slice::from_ref(desc))?.pop().flatten();
         let software = self.software_blas(desc, built.as_ref())?;
         let handle = shared.store.accel_structs.insert(new_blas_object(desc, inputs, body, software));
@@ -254,17 +253,17 @@ impl Context {
         let sizes: Vec<_> = blob.parts.iter().map(|part| part.driver.len() as u64).collect();
         for group in group_by_bytes(&sizes, self.max_group_bytes()) {
             let (first, parts) = (group.start, &blob.parts[group.clone()]);
-            // SAFETY: the caller's promise; the structures have the sizes the data says.
+            // SAFETY: the caller's promise; the acceleration structures have the sizes that the data states.
             unsafe { self.deserialize_group(&object, first, parts, &sizes[group]) }?;
         }
         self.record_in_prologue(|cmd| cmd.prepare_deserialized(&object))?;
         Ok(holder)
     }
 
-    /// Parts from `first` on, which go through one buffer.
+    /// Deserialises parts from `first` on, which share one buffer.
     ///
     /// # Safety
-    /// The driver wrote the parts' data, and the structures have the sizes it says.
+    /// The driver wrote the parts' data, and the acceleration structures have the sizes that the data states.
     unsafe fn deserialize_group(
         &self,
         object: &Arc<AccelStruct>,
@@ -290,12 +289,12 @@ impl Context {
         recorded
     }
 
-    /// Bytes of parts that go through one buffer.
+    /// Returns the maximum bytes of parts that share one buffer.
     fn max_group_bytes(&self) -> u64 {
         MAX_GROUP_BYTES.min(self.device_state().gpu.caps.limits.max_accel_structure_bytes)
     }
 
-    /// The input of a loaded BLAS, with the tables of its parts. `bytes` is how large each part will be.
+    /// Returns the input of a loaded BLAS, with the tables of its parts. `bytes` holds the size of each part.
     fn loaded_inputs(&self, desc: &BlasDesc<'_>, blob: &BlasFile, bytes: &[u64]) -> Result<BlasInputs> {
         let shared = self.device_state();
         let (transforms, whole) = convert_geometries(shared, desc)?;
@@ -320,7 +319,8 @@ impl Context {
     }
 }
 
-/// The primitives of each part, or none for the mesh as it is; `None` where they do not make up the mesh.
+/// Returns the primitives of each part, or `None` for a part that is the unchanged mesh. Returns `None` if the parts do
+/// not make up the mesh.
 fn part_plans_from_file(blob: &BlasFile, counts: &[u32]) -> Option<Vec<Option<PartPlan>>> {
     if let [BlasFilePart { map: None, .. }] = &blob.parts[..] {
         return Some(vec![None]);
@@ -335,7 +335,7 @@ fn rejected_error(desc: &BlasDesc<'_>, reason: impl Into<String>) -> Error {
     Error::Serialized { object: desc.debug_name.to_owned(), reason: reason.into() }
 }
 
-/// Parts of these sizes in groups of at most so many bytes, or of one part that is larger.
+/// Groups parts of these sizes into groups of at most `most` bytes. A larger part has a group alone.
 fn group_by_bytes(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
     let (mut groups, mut start, mut sum) = (Vec::new(), 0, 0_u64);
     for (index, size) in sizes.iter().map(|size| size.next_multiple_of(ALIGNMENT)).enumerate() {
@@ -351,7 +351,7 @@ fn group_by_bytes(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
     groups
 }
 
-/// Where each of several blobs starts.
+/// The offset of each of several blobs.
 struct AlignedOffsets {
     offsets: Vec<u64>,
     total: u64,
@@ -376,7 +376,7 @@ fn file_geometry(geometry: &BlasGeometry) -> BlasFileGeometry {
             vertex_format: triangles.vertex_format.raw().as_raw().cast_unsigned(),
             vertex_count: triangles.vertex_count,
             indices: match triangles.indices.map(|indices| indices.format) {
-                // Structures are not built from 8-bit indices.
+                // Acceleration structures are not built from 8-bit indices.
                 None | Some(IndexFormat::U8) => BlasFileIndices::None,
                 Some(IndexFormat::U16) => BlasFileIndices::U16,
                 Some(IndexFormat::U32) => BlasFileIndices::U32,
@@ -408,7 +408,8 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Groups have each part once and in order, take as many as they may, and no group more than one part for nothing.
+        /// Groups contain each part once and in order, are as large as allowed, and hold one part only if it must be
+        /// alone.
         #[test]
         fn groups_are_as_large_as_they_may_be(
             sizes in prop::collection::vec(1..5_000_u64, 0..40),

@@ -1,4 +1,4 @@
-//! Hands command buffers to the GPU and waits for them.
+//! Acquisition and submission of command buffers, and waits for submissions.
 
 use ash::vk;
 
@@ -9,18 +9,18 @@ use crate::queue::Queue;
 use crate::submit::{Recording, Submission, SubmitHandle};
 
 impl Context {
-    /// Starts recording a command buffer for the graphics queue, which takes every command. Any number may be recorded at once, on
-    /// any threads.
+    /// Starts recording a command buffer for the graphics queue, which supports every command. Any number of command
+    /// buffers may be recorded at once, on any threads.
     pub fn acquire_command_buffer(&self) -> Result<CommandBuffer> {
         self.acquire_command_buffer_on(Queue::Graphics)
     }
 
-    /// As [`acquire_command_buffer`](Self::acquire_command_buffer), for a queue.
+    /// Starts recording a command buffer for a queue, like [`acquire_command_buffer`](Self::acquire_command_buffer).
     ///
-    /// All queues exist on every device. [`Capabilities::queue`](crate::Capabilities::queue) says which have hardware of their
-    /// own; what goes to the others runs on the graphics queue, one after the other. What a command buffer uses is waited for
-    /// and moved between queues when it is submitted; see the manual's page on
-    /// [queues](crate::manual::queues_and_uploads).
+    /// All queues exist on every device. [`Capabilities::queue`](crate::Capabilities::queue) returns which have
+    /// hardware of their own. Work for the other queues runs on the graphics queue, one command buffer after the other.
+    /// A submission waits for the resources that the command buffer uses and transfers them between queues; see the
+    /// manual's page on [queues](crate::manual::queues_and_uploads).
     pub fn acquire_command_buffer_on(&self, queue: Queue) -> Result<CommandBuffer> {
         let shared = self.device_state();
         let (finished, recording) = shared.submitter.collect_and_acquire(queue)?;
@@ -29,33 +29,37 @@ impl Context {
         cmd
     }
 
-    /// A command buffer without commands.
+    /// Returns a command buffer without commands.
     pub(super) fn new_command_buffer(&self, queue: Queue, recording: Box<Recording>) -> CommandBuffer {
         CommandBuffer::new(self.device_state(), queue, recording, self.inner.recording_states.acquire())
     }
 
-    /// Submits a command buffer to the queue it was acquired for, after uploads and builds made before (`vkQueueSubmit2`). Does
-    /// not wait.
+    /// Submits a command buffer to its queue, after all earlier uploads and builds (`vkQueueSubmit2`). Does not wait.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, refits a top-level
-    /// structure whose number of instances another submission changed meanwhile, refits or shows what software traces and
-    /// another submission rebuilt meanwhile, left a query open, writes one that was
-    /// written and not reset, or uses an image of a swapchain that is not [taken](Self::next_image); and on other queues
-    /// than the graphics queue for images of windows, and for what was [imported](Self::import_texture) without being concurrent. A failure of Vulkan
-    /// itself leaves the context without a known state: this and every later submission answers it, and a new context is
-    /// needed.
+    /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer
+    /// - belongs to another context,
+    /// - refits a TLAS whose number of instances another submission has changed since recording,
+    /// - refits or references a software-traced BLAS that another submission has rebuilt since recording,
+    /// - leaves a query open, or writes a query that was written and not reset,
+    /// - uses an image of a swapchain that is not [acquired](Self::next_image),
+    /// - is for another queue than the graphics queue, and uses an image of a window or an object that was
+    ///   [imported](Self::import_texture) without being concurrent.
+    ///
+    /// A failure of Vulkan itself leaves the context in an unknown state. This and every later submission returns it,
+    /// and the application needs a new context.
     pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
         self.submit_with_semaphores(cmd, Submission::default())
     }
 
-    /// As [`submit`](Self::submit), but [`next_frame`](Self::next_frame) never waits for it: for work on other queues that goes on
-    /// over several frames. Buffers for each [`Frame::index`](crate::Frame::index) are not for such work.
+    /// Submits like [`submit`](Self::submit), but [`next_frame`](Self::next_frame) never waits for the submission. Use
+    /// it for work on other queues that takes several frames. Such work must not use buffers that belong to a
+    /// [`Frame::index`](crate::Frame::index).
     pub fn submit_in_background(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
         self.submit_with_semaphores(cmd, Submission { in_background: true, ..Submission::default() })
     }
 
-    /// As [`submit`](Self::submit), with what `more` has besides recordings.
+    /// Submits like [`submit`](Self::submit), with the semaphores and flags of `more`. Its recordings are ignored.
     pub(super) fn submit_with_semaphores(
         &self,
         cmd: CommandBuffer,
@@ -81,7 +85,7 @@ impl Context {
         }
         let prelude = self.take_prologue(&mut pending)?;
         if prelude.is_some() {
-            // Uploads wait as well, whichever stages were named.
+            // Uploads must wait as well, whichever stages the caller named.
             let all = vk::PipelineStageFlags2::ALL_COMMANDS;
             more.waits.iter_mut().for_each(|wait| wait.stage_mask = all);
         }
@@ -89,7 +93,7 @@ impl Context {
             return self.send_to_queue(prelude, Some(cmd), more);
         }
         if prelude.is_some() {
-            // The first of it all waits, and the rest behind it.
+            // Only the first submission has the waits. The main submission runs after it.
             let waits = std::mem::take(&mut more.waits);
             let before = self.send_to_queue(prelude, None, Submission { waits, ..Submission::default() })?;
             cmd.wait_for_all_writes(before.value);
@@ -130,18 +134,18 @@ impl Context {
         Ok(self.submit_handle(values.last()))
     }
 
-    /// Submits uploads and builds that wait for the next submission, if there are any, to the graphics queue. Answers the last
-    /// submission there.
+    /// Submits pending uploads and builds, if there are any, to the graphics queue. Returns the last submission of that
+    /// queue.
     pub fn flush(&self) -> Result<SubmitHandle> {
         self.advance_compactions();
-        // Textures without contents that are gone by now need nothing submitted.
+        // Destroyed textures without contents then need no submission.
         self.device_state().collect_known()?;
         let mut pending = self.lock_prologue();
         let Some(cmd) = self.take_prologue(&mut pending)? else {
             return Ok(self.submit_handle(self.device_state().submitter.last_of_queues()[0]));
         };
         let flushed = self.send_to_queue(Some(cmd), None, Submission::default())?;
-        // Command buffers that are acquired ask how far the GPU is; this one was not.
+        // Acquiring a command buffer collects finished work; this one was not acquired.
         self.device_state().collect()?;
         Ok(flushed)
     }
@@ -156,13 +160,13 @@ impl Context {
         self.device_state().collect_known()
     }
 
-    /// Whether a submission is done. Does not wait.
+    /// Returns true if a submission is done. Does not wait.
     pub fn is_done(&self, submission: SubmitHandle) -> Result<bool> {
         self.check_submitted(submission)?;
         self.device_state().submitter.is_done(submission.value)
     }
 
-    /// Submits what waits for the next submission, and waits until the GPU has nothing left to do.
+    /// Submits pending work, and waits until the GPU is idle.
     pub fn wait_idle(&self) -> Result<()> {
         self.flush()?;
         self.wait_submitted()
@@ -175,7 +179,7 @@ impl Context {
         self.device_state().collect_known()
     }
 
-    /// Names the submission with this value of the timeline.
+    /// Returns the handle of the submission with this timeline value.
     pub(super) fn submit_handle(&self, value: u64) -> SubmitHandle {
         SubmitHandle { value, context: self.device_state().store.context_id }
     }

@@ -1,4 +1,4 @@
-//! Moves data between host and GPU.
+//! Data transfer between host and GPU.
 
 use std::ptr::NonNull;
 use std::sync::Arc;
@@ -11,29 +11,29 @@ use crate::resource::Buffer;
 use crate::resource::region::TextureRegion;
 
 impl Context {
-    /// The address by which shaders reach a buffer (`vkGetBufferDeviceAddress`).
+    /// Returns the address of a buffer in shaders (`vkGetBufferDeviceAddress`).
     pub fn buffer_address(&self, buffer: BufferHandle) -> Result<u64> {
         Ok(self.device_state().store.buffers.get(buffer)?.address)
     }
 
-    /// The address of a byte of a buffer.
+    /// Returns the address of a byte of a buffer.
     ///
     /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) for bytes behind its end.
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for an offset beyond the end of the buffer.
     pub fn buffer_address_at(&self, buffer: BufferHandle, offset: u64) -> Result<u64> {
         let buffer = self.device_state().store.buffers.get(buffer)?;
         buffer.check_range(offset, 1)?;
         Ok(buffer.address + offset)
     }
 
-    /// The bytes of a buffer in [`HostVisible`](crate::MemoryKind::HostVisible) or [`Readback`](crate::MemoryKind::Readback) memory, for
-    /// callers that write or read in place.
+    /// Returns the mapped bytes of a buffer in [`HostVisible`](crate::MemoryKind::HostVisible) or
+    /// [`Readback`](crate::MemoryKind::Readback) memory, for access in place.
     ///
-    /// The pointer is good until the buffer's handle is destroyed. The memory is coherent: what the host writes is there for
-    /// every command submitted afterwards, and what commands wrote is there once their submission is
-    /// [waited](Self::wait) for, provided that they named the buffer; nothing has to be flushed or invalidated. The GPU may
-    /// use the bytes at any time, so it is the caller who keeps both apart, and no reference to them should be made while it
-    /// may write.
+    /// The pointer is valid until the buffer's handle is destroyed. The memory is coherent, so no flush or invalidation
+    /// is needed. Host writes are visible to every command submitted afterwards. Writes of commands are visible once
+    /// the caller has [waited](Self::wait) for their submission, if the commands named the buffer. The GPU may use the
+    /// bytes at any time: the caller must synchronise the accesses, and must not hold a reference to the bytes while
+    /// the GPU may write them.
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for buffers in device memory.
@@ -47,7 +47,7 @@ impl Context {
 
     /// Writes bytes into a buffer.
     ///
-    /// Mapped memory is written at once: the caller sees to it that the GPU does not use these bytes meanwhile, for
+    /// Mapped memory is written at once. The caller must ensure that the GPU does not use these bytes meanwhile, for
     /// instance with one buffer for each frame in flight. Device memory is written before the next submission, after
     /// everything submitted so far.
     pub fn upload_buffer(&self, buffer: BufferHandle, offset: u64, bytes: &[u8]) -> Result<()> {
@@ -80,18 +80,19 @@ impl Context {
     pub fn upload_texture(&self, texture: TextureHandle, region: &TextureRegion, bytes: &[u8]) -> Result<()> {
         let texture = self.device_state().store.textures.get(texture)?;
         if texture.lent {
-            let message = "images of windows come and go with frames; copy into it with a command buffer";
+            let message = "images of windows cannot be uploaded to; copy into them with a command buffer";
             return Err(Error::usage(&texture.name, message));
         }
         self.upload_texture_object(&texture, region, bytes)
     }
 
-    /// Reads texels, tightly packed, row by row and layer by layer, after everything submitted so far. Waits for the GPU.
+    /// Reads texels, tightly packed, row by row and layer by layer, after everything submitted so far. Waits for the
+    /// GPU.
     pub fn download_texture(&self, texture: TextureHandle, region: &TextureRegion) -> Result<Vec<u8>> {
         self.read_texture_later(texture, region)?.wait()
     }
 
-    /// Runs a copy into a readback buffer, waits, and reads it. For `record` the same goes as in
+    /// Records a copy into a readback buffer, waits, and reads the bytes. `record` must meet the conditions of
     /// [`read_later`](Self::read_later).
     pub(crate) fn read_back(
         &self,

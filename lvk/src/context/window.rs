@@ -1,4 +1,4 @@
-//! Swapchains: made, drawn into, shown.
+//! Swapchains: creation, acquisition and presentation of images.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ use crate::swapchain::state::{
 use crate::swapchain::surface::{Surface, SurfaceState};
 
 impl Destroy for SwapchainHandle {
-    /// Its images go too, whoever has one.
+    /// Destroys the swapchain and its images, including an acquired one.
     fn destroy_in(self, ctx: &Context) {
         if let Ok(swapchain) = ctx.device_state().store.swapchains.remove(self) {
             ctx.retire_swapchain(swapchain);
@@ -39,12 +39,12 @@ impl Destroy for SwapchainHandle {
 impl Context {
     /// Creates a swapchain for a window (`vkCreateSwapchainKHR`). See [`manual::windows`](crate::manual::windows).
     ///
-    /// A window that is minimised may get its images later: then [`SwapchainInfo::extent`] is zero.
+    /// A minimised window may get its images later: until then [`SwapchainInfo::extent`] is zero.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) without a window, and for a window that has a swapchain already;
-    /// [`Unsupported`](Error::Unsupported) where the context was made without a window, where the device cannot present to
-    /// it, and for usages that images of the window cannot have.
+    /// [`Unsupported`](Error::Unsupported) where the context was created without a window, where the device cannot
+    /// present to the window, and for usages that images of the window cannot have.
     pub fn create_swapchain(&self, desc: &SwapchainDesc<'_>) -> Result<Holder<SwapchainHandle>> {
         let shared = self.device_state();
         let name = desc.debug_name;
@@ -72,15 +72,16 @@ impl Context {
         Ok(holder)
     }
 
-    /// The next image to draw into (`vkAcquireNextImageKHR`), for one [`present`](Self::present). `None` where nothing can
-    /// be shown for now: the window is minimised, hidden, or being resized; go on with the next frame.
+    /// Acquires the next image to draw into (`vkAcquireNextImageKHR`), for one [`present`](Self::present). Returns
+    /// `None` if no image can be presented at the moment, because the window is minimised, hidden or being resized. The
+    /// application then continues with the next frame.
     ///
-    /// Waits for the presentation engine where it has all images, a second at most. Makes the swapchain anew where the
-    /// window has changed, without waiting for the GPU. An image that was not presented comes again; the value that stood
-    /// for it is worth nothing from then on.
+    /// Waits for at most a second if the presentation engine holds all images. Recreates the swapchain if the window
+    /// has changed, without waiting for the GPU. An acquired image that was not presented is returned again; the
+    /// earlier value for it is then invalid.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) when the window is gone, [`StaleHandle`](Error::StaleHandle).
+    /// [`InvalidUsage`](Error::InvalidUsage) when the window is destroyed, [`StaleHandle`](Error::StaleHandle).
     pub fn next_image(&self, swapchain: SwapchainHandle) -> Result<Option<SwapchainImage>> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
@@ -102,14 +103,15 @@ impl Context {
         Ok(image)
     }
 
-    /// Submits a command buffer that draws into an image, and shows the image when that is done (`vkQueuePresentKHR`).
+    /// Submits a command buffer that draws into an image, and presents the image when the submission is done
+    /// (`vkQueuePresentKHR`).
     ///
-    /// Other command buffers may have drawn into it before. A swapchain that no longer fits its window is not an error: it
-    /// is made anew by the next [`next_image`](Self::next_image).
+    /// Earlier command buffers may have drawn into the image as well. A swapchain that is out of date is not an error:
+    /// the next [`next_image`](Self::next_image) recreates it.
     ///
     /// # Errors
-    /// Those of [`submit`](Self::submit), after which the image is as it was before; [`InvalidUsage`](Error::InvalidUsage)
-    /// for an image that was given out again, or whose swapchain was made anew.
+    /// Those of [`submit`](Self::submit), which leave the image as it was before; [`InvalidUsage`](Error::InvalidUsage)
+    /// for an image that was acquired again since, or whose swapchain was recreated.
     pub fn present(&self, mut cmd: CommandBuffer, image: SwapchainImage) -> Result<SubmitHandle> {
         let shared = self.device_state();
         self.check_same_context(&cmd)?;
@@ -135,7 +137,7 @@ impl Context {
         let more = Submission { signals: vec![drawn], presented, ..Submission::default() };
         let submission = self.submit_with_semaphores(cmd, more)?;
         let answer = current.chain.present(index, mode, &shown.sync);
-        // Whatever the window has come to, the engine waits for the semaphore and signals the fence.
+        // Even if the window has changed, the engine waits for the semaphore and signals the fence.
         shown.sync.presented = !matches!(answer, Err(Failure::Other(_)));
         if came_back {
             resources.set_presents_done_at(submission.value);
@@ -147,8 +149,8 @@ impl Context {
         Ok(submission)
     }
 
-    /// The window has this size in pixels now; a 0 says that it is minimised. Costs nothing where nothing changed. Needed
-    /// on Wayland only, and for windows that are minimised without becoming small.
+    /// Sets the size of the window in pixels; a 0 means that the window is minimised. Costs nothing if the size is
+    /// unchanged. Needed only on Wayland, and for windows that are minimised without a change of size.
     pub fn resize_swapchain(&self, swapchain: SwapchainHandle, extent: [u32; 2]) -> Result<()> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut state = object.lock();
@@ -159,9 +161,8 @@ impl Context {
         Ok(())
     }
 
-    /// Changes how pictures come to the screen, to the first of `wishes` that there is, or [`PresentMode::Fifo`]. Where the
-    /// device cannot change it for a single picture, the swapchain is made anew by the next
-    /// [`next_image`](Self::next_image).
+    /// Sets the present mode to the first supported mode of `wishes`, or to [`PresentMode::Fifo`]. If the device cannot
+    /// change the mode of a single image, the next [`next_image`](Self::next_image) recreates the swapchain.
     pub fn set_present_mode(&self, swapchain: SwapchainHandle, wishes: &[PresentMode]) -> Result<()> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut state = object.lock();
@@ -178,11 +179,11 @@ impl Context {
         Ok(())
     }
 
-    /// What the swapchain is like at the moment.
+    /// Returns the current properties of the swapchain.
     ///
     /// # Errors
-    /// [`StaleHandle`](Error::StaleHandle); [`Unsupported`](Error::Unsupported) where it would have no images now, as its
-    /// window takes none of the formats.
+    /// [`StaleHandle`](Error::StaleHandle); [`Unsupported`](Error::Unsupported) if a recreated swapchain would have no
+    /// images, because the window supports none of the formats.
     pub fn swapchain_info(&self, swapchain: SwapchainHandle) -> Result<SwapchainInfo> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
@@ -214,7 +215,7 @@ impl Context {
         })
     }
 
-    /// Gives up the images of a swapchain, and what its handle named.
+    /// Retires the images of a swapchain, and defers the destruction of the swapchain.
     fn retire_swapchain(&self, swapchain: Arc<Swapchain>) {
         let mut guard = swapchain.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
@@ -224,13 +225,13 @@ impl Context {
         self.device_state().free_later(DeferredObject::Swapchain(swapchain));
     }
 
-    /// Another thread may have destroyed the swapchain while this one waited for its lock.
+    /// Fails if another thread destroyed the swapchain while this one waited for its lock.
     fn check_alive(&self, swapchain: SwapchainHandle) -> Result<()> {
         self.device_state().store.swapchains.get(swapchain).map(drop)
     }
 }
 
-/// A swapchain under its lock, with what images are made of.
+/// A locked swapchain with the context and name that its images are created with.
 struct LiveBackend<'a> {
     ctx: &'a Context,
     name: &'a Arc<str>,
@@ -243,8 +244,8 @@ impl PresentBackend for LiveBackend<'_> {
         Ok(choose::choose_extent(&state.limits, self.resources.config.extent))
     }
 
-    /// A lost surface is rare, and its swapchains have to be gone before the window can have another: here the GPU is
-    /// waited for.
+    /// Waits for the GPU: a lost surface is rare, and its swapchains must be destroyed before the window can have
+    /// another surface.
     fn recreate_surface(&mut self) -> Result<(), Failure> {
         self.resources.wait_for_presents()?;
         self.retire_current();
@@ -253,7 +254,7 @@ impl PresentBackend for LiveBackend<'_> {
         self.resources.surface = None;
         self.surface().map(drop).map_err(|failure| match failure {
             Failure::Other(error) => {
-                log::warn!("{}: its window takes no other surface: {error}", self.name);
+                log::warn!("{}: its window supports no other surface: {error}", self.name);
                 Failure::SurfaceLost
             }
             failure => failure,
@@ -279,7 +280,7 @@ impl PresentBackend for LiveBackend<'_> {
 
     fn acquire(&mut self) -> Result<Acquired, Failure> {
         let submitter = &self.ctx.device_state().submitter;
-        // Only the graphics queue has anything of windows, so work of others in the background holds nothing up.
+        // Only the graphics queue uses images of windows, so background work of other queues delays nothing.
         let completed = submitter.timeline(0).query_completed()?;
         self.resources.destroy_finished(completed);
         let Some(current) = &self.resources.current else { return Err(Failure::OutOfDate) };
@@ -302,7 +303,7 @@ impl PresentBackend for LiveBackend<'_> {
 }
 
 impl LiveBackend<'_> {
-    /// The surface; another one where the last was lost.
+    /// Returns the surface. Creates another one if the last was lost.
     fn surface(&mut self) -> Result<Arc<Surface>, Failure> {
         if let Some(surface) = &self.resources.surface {
             return Ok(Arc::clone(surface));
@@ -311,7 +312,7 @@ impl LiveBackend<'_> {
         Ok(Arc::clone(self.resources.surface.insert(surface)))
     }
 
-    /// What the Vulkan swapchain is to be like, and the modes there are.
+    /// Returns the supported present modes, and the creation parameters of the Vulkan swapchain.
     fn choose_chain(
         &self,
         surface: &Surface,
@@ -324,7 +325,7 @@ impl LiveBackend<'_> {
         let offered = surface.formats()?;
         let (format, color_space) = choose::choose_surface_format(&wishes.color_spaces, &offered, usable)
             .ok_or_else(|| {
-                refused(format!("the window takes no format that can be used for {:?}", wishes.usage))
+                refused(format!("the window supports no format with the usage {:?}", wishes.usage))
             })?;
         let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
         let usage = raw_usage(wishes.usage, format) | copies;
@@ -363,7 +364,7 @@ impl LiveBackend<'_> {
         Ok(images)
     }
 
-    /// One image as a texture with a number of its own.
+    /// Creates the texture of one swapchain image, with a slot of its own.
     fn new_image(&self, chain: &Arc<Chain>, plan: &ChainPlan, raw: vk::Image) -> Result<ChainImage> {
         let shared = self.ctx.device_state();
         let sync = PresentSync::new(&shared.gpu, self.name)?;
@@ -387,7 +388,7 @@ impl LiveBackend<'_> {
         Ok(ChainImage { texture: handle, object: shared.store.textures.get(handle)?, sync })
     }
 
-    /// Gives up the Vulkan swapchain. Its images and presents live on until nothing uses them.
+    /// Retires the Vulkan swapchain. Its images and presents live until they are no longer in use.
     fn retire_current(&mut self) {
         let Some(current) = self.resources.current.take() else { return };
         let syncs = self.retire_images(current.images);
@@ -398,7 +399,7 @@ impl LiveBackend<'_> {
         }
     }
 
-    /// Destroys the textures of images, and waits on the GPU for those that were taken and not used.
+    /// Destroys the textures of images. Submits waits for images that were acquired and not used.
     fn retire_images(&mut self, images: Vec<ChainImage>) -> Vec<PresentSync> {
         let shared = self.ctx.device_state();
         let mut waits = Vec::new();
@@ -417,7 +418,7 @@ impl LiveBackend<'_> {
         syncs
     }
 
-    /// A semaphore that was signalled can be used again only after a wait.
+    /// Submits waits for signalled semaphores, which can be used again only after a wait.
     fn wait_for_semaphores(&self, semaphores: &[vk::Semaphore]) {
         let wait = |semaphore: &vk::Semaphore| {
             vk::SemaphoreSubmitInfo::default()
@@ -427,7 +428,7 @@ impl LiveBackend<'_> {
         let waits = semaphores.iter().map(wait).collect();
         let submission = Submission { waits, ..Submission::default() };
         if let Err(error) = self.ctx.device_state().submitter.submit(submission, || {}).1 {
-            log::error!("{}: an image that was taken cannot be given back: {error}", self.name);
+            log::error!("{}: an acquired image cannot be released: {error}", self.name);
         }
     }
 }

@@ -3,62 +3,63 @@
 use std::fmt;
 use std::ops::Range;
 
-/// What a driver with `VK_EXT_device_fault` ([`OptionalFeature::DeviceFault`](crate::OptionalFeature)) says of the fault
-/// that lost the device.
+/// Fault report of a lost device, from a driver with `VK_EXT_device_fault`
+/// ([`OptionalFeature::DeviceFault`](crate::OptionalFeature)).
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DeviceFault {
-    /// The driver's own words.
+    /// Description by the driver.
     pub description: String,
-    /// Addresses that have to do with the fault.
+    /// Addresses related to the fault.
     pub addresses: Vec<FaultAddress>,
-    /// Codes that the vendor's tools understand.
+    /// Codes for the vendor's tools.
     pub vendor: Vec<VendorFault>,
 }
 
-/// An address that has to do with a fault.
+/// An address related to a fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FaultAddress {
-    /// What happened there.
+    /// Kind of the address.
     pub kind: FaultKind,
-    /// The address, in the space of [`Context::buffer_address`](crate::Context::buffer_address), as the driver reported it.
+    /// The address as the driver reported it, in the address space of
+    /// [`Context::buffer_address`](crate::Context::buffer_address).
     pub address: u64,
-    /// The addresses among which the true one is.
+    /// Range of addresses that contains the true address.
     pub range: Range<u64>,
 }
 
-/// What happened at an address.
+/// Kind of a fault address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// A read of what nobody has.
+    /// Read of unallocated memory.
     InvalidRead,
-    /// A write to what nobody has.
+    /// Write to unallocated memory.
     InvalidWrite,
-    /// An instruction taken from where none is.
+    /// Instruction fetch from an address without instructions.
     InvalidExecute,
-    /// Where an instruction stood that may have to do with the fault.
+    /// Address of an instruction that may be related to the fault.
     Instruction,
-    /// Where an instruction stood that was not valid.
+    /// Address of an invalid instruction.
     InvalidInstruction,
-    /// Where the instruction stood that made the fault.
+    /// Address of the instruction that caused the fault.
     FaultingInstruction,
-    /// Something else, by Vulkan's number.
+    /// Another kind, with Vulkan's number.
     Other(i32),
 }
 
-/// A code of the vendor's.
+/// A vendor-specific fault code.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VendorFault {
-    /// The driver's own words.
+    /// Description by the driver.
     pub description: String,
     /// The code.
     pub code: u64,
-    /// What belongs to the code.
+    /// Data of the code.
     pub data: u64,
 }
 
 impl fmt::Display for DeviceFault {
-    /// In one line, for messages.
+    /// Formats the report in one line, for messages.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{}", self.description)?;
         for FaultAddress { kind, range, .. } in &self.addresses {

@@ -1,4 +1,4 @@
-//! The one error type of the library.
+//! The error type of the library.
 
 pub(crate) mod device_fault;
 
@@ -13,76 +13,77 @@ use device_fault::DeviceFault;
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What went wrong, separated by who can mend it.
-///
-/// * the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
-///   [`WrongQueue`](Error::WrongQueue),
-///   [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants), [`Serialized`](Error::Serialized),
-///   [`OverBudget`](Error::OverBudget);
-/// * the device or its driver lacks something: [`NoVulkan`](Error::NoVulkan), [`NoDevice`](Error::NoDevice),
-///   [`Unsupported`](Error::Unsupported), [`LimitExceeded`](Error::LimitExceeded);
-/// * bad luck: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory), [`OutOfHostMemory`](Error::OutOfHostMemory),
-///   [`File`](Error::File), [`DeviceLost`](Error::DeviceLost), [`Vulkan`](Error::Vulkan).
+/// Errors of the library, in three groups by remedy:
+/// * mistakes of the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
+///   [`WrongQueue`](Error::WrongQueue), [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants),
+///   [`Serialized`](Error::Serialized), [`OverBudget`](Error::OverBudget);
+/// * missing support by the device or its driver: [`NoVulkan`](Error::NoVulkan),
+///   [`NoDevice`](Error::NoDevice), [`Unsupported`](Error::Unsupported),
+///   [`LimitExceeded`](Error::LimitExceeded);
+/// * failures at run time: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory),
+///   [`OutOfHostMemory`](Error::OutOfHostMemory), [`File`](Error::File), [`DeviceLost`](Error::DeviceLost),
+///   [`Vulkan`](Error::Vulkan).
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The Vulkan loader could not be opened or has no usable instance.
     #[error("no Vulkan on this machine: {reason}; install a Vulkan driver and its loader (libvulkan.so.1)")]
     NoVulkan {
-        /// What the loader answered.
+        /// The loader's error.
         reason: String,
     },
-    /// Devices exist, but none has what the caller requires.
+    /// Devices exist, but none has the features that the caller requires.
     #[error("no Vulkan device has what was required: {reasons}")]
     NoDevice {
-        /// What was wrong with the wish, if anything, then each device with what it lacks, separated by `; `.
+        /// The problem with the requested device, if any, then each device with the features it lacks,
+        /// separated by `; `.
         reasons: String,
     },
-    /// The device, its driver or a layer lacks what a call needs.
+    /// The device, its driver or a layer lacks a feature that a call needs.
     #[error("{what} is not supported: {why}")]
     Unsupported {
         /// The feature, extension, format or layer.
         what: String,
-        /// Why it is missing, and what to do instead.
+        /// The reason, and the remedy.
         why: String,
     },
-    /// A size or count is over a limit of the device.
+    /// A size or count exceeds a limit of the device.
     #[error("{object}: {what} is {requested}, the device takes at most {limit}")]
     LimitExceeded {
         /// Debug name of the object.
         object: String,
-        /// Which size or count.
+        /// Name of the size or count.
         what: &'static str,
-        /// What was asked for.
+        /// The requested value.
         requested: u64,
-        /// What the device allows.
+        /// The device's limit.
         limit: u64,
     },
-    /// The handle's object was destroyed, or belongs to another context.
+    /// The object of the handle was destroyed, or belongs to another context.
     #[error("stale {kind} handle: the object was destroyed or belongs to another context")]
     StaleHandle {
-        /// Which kind of object the handle names.
+        /// Kind of the object.
         kind: &'static str,
     },
-    /// A call was made with arguments or in a state that cannot work.
+    /// A call has invalid arguments, or is invalid in the current state.
     #[error("{object}: {message}")]
     InvalidUsage {
         /// Debug name of the object or name of the call.
         object: String,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         message: String,
     },
-    /// The queue of a command buffer does not take a command.
+    /// The queue of a command buffer does not support a command.
     #[error("{command} cannot be recorded for the {} queue; acquire a command buffer on {remedy}", queue.label())]
     WrongQueue {
         /// The command.
         command: &'static str,
         /// The queue of the command buffer.
         queue: Queue,
-        /// Which queues take it.
+        /// Queues that support the command.
         remedy: &'static str,
     },
-    /// The bytes pushed do not fit the push-constant block of the bound pipeline.
+    /// The pushed bytes do not fit the push-constant block of the bound pipeline.
     #[error(
         "pipeline '{pipeline}' declares {expected} bytes of push constants, but {offset} + {size} bytes were pushed; \
          make the Rust struct match the shader's block"
@@ -90,11 +91,11 @@ pub enum Error {
     PushConstants {
         /// Debug name of the pipeline.
         pipeline: String,
-        /// Bytes the shader declares.
+        /// Number of bytes that the shader declares.
         expected: u32,
         /// Offset of the push, in bytes.
         offset: u32,
-        /// Bytes pushed.
+        /// Number of bytes pushed.
         size: u32,
     },
     /// A shader did not compile, or its SPIR-V cannot be used.
@@ -102,7 +103,7 @@ pub enum Error {
     Shader {
         /// Debug name of the module.
         name: String,
-        /// The compiler's text, with the line numbers of the caller's own source.
+        /// Output of the compiler, with the line numbers of the caller's source.
         log: String,
     },
     /// A file could not be written.
@@ -110,30 +111,31 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What failed and why.
+        /// The failed operation and the reason.
         message: String,
     },
     /// Serialised bytes of an acceleration structure cannot be used.
     #[error("{object}: {reason}; build it anew and serialise that")]
     Serialized {
-        /// Debug name of the structure that was to be.
+        /// Debug name of the acceleration structure to be created.
         object: String,
-        /// Whether they are damaged, of another mesh, or of another device or driver.
+        /// The problem: damaged bytes, bytes of another mesh, or of another device or driver.
         reason: String,
     },
-    /// An acceleration structure does not fit the budget of the context.
+    /// An acceleration structure exceeds the budget of the context.
     #[error(
         "'{object}' needs {bytes} bytes, but acceleration structures have {used} of their budget of {budget} in use; \
          destroy or compact some, or raise ContextDesc::accel_budget_bytes"
     )]
     OverBudget {
-        /// Debug name of the structure.
+        /// Debug name of the acceleration structure.
         object: String,
-        /// Bytes it needs.
+        /// Required bytes.
         bytes: u64,
-        /// Bytes of all structures alive, those included that wait for the GPU to be done with them.
+        /// Bytes of all live acceleration structures, including those that wait for the GPU before they are
+        /// freed.
         used: u64,
-        /// [`ContextDesc::accel_budget_bytes`](crate::ContextDesc).
+        /// The budget, [`ContextDesc::accel_budget_bytes`](crate::ContextDesc), in bytes.
         budget: u64,
     },
     /// Device memory is exhausted.
@@ -141,7 +143,7 @@ pub enum Error {
     OutOfDeviceMemory {
         /// Debug name of the object.
         object: String,
-        /// Bytes asked for.
+        /// Requested bytes.
         bytes: u64,
     },
     /// Host memory is exhausted.
@@ -150,27 +152,27 @@ pub enum Error {
         /// The Vulkan command that failed.
         call: &'static str,
     },
-    /// The device was lost; the context cannot be used any more.
+    /// The device is lost, and the context cannot be used any more.
     #[error("the device was lost in {call}{}; create a new context", fault_suffix(fault))]
     DeviceLost {
         /// The Vulkan command that reported the loss.
         call: &'static str,
-        /// What the driver says of the fault, where it can and the loss was noticed by submitting or waiting.
+        /// Fault report of the driver, if it provides one and a submission or wait detected the loss.
         fault: Option<Arc<DeviceFault>>,
     },
-    /// Any other answer of the driver.
+    /// Any other error of the driver.
     #[error("{call} failed: {result}")]
     Vulkan {
         /// The Vulkan command that failed.
         call: &'static str,
-        /// What it returned.
+        /// The returned error.
         #[source]
         result: vk::Result,
     },
 }
 
 impl Error {
-    /// Wraps the driver's answer to `call`.
+    /// Converts the result of `call` to an error.
     pub(crate) fn vulkan(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
         move |result| match result {
             vk::Result::ERROR_DEVICE_LOST => Self::DeviceLost { call, fault: None },
@@ -182,12 +184,12 @@ impl Error {
         }
     }
 
-    /// A mistake of the caller about `object`.
+    /// Returns the error for a mistake of the caller about `object`.
     pub(crate) fn usage(object: impl Into<String>, message: impl Into<String>) -> Self {
         Self::InvalidUsage { object: object.into(), message: message.into() }
     }
 
-    /// A feature the device lacks.
+    /// Returns the error for a feature that the device lacks.
     pub(crate) fn unsupported(what: impl Into<String>, why: impl Into<String>) -> Self {
         Self::Unsupported { what: what.into(), why: why.into() }
     }
@@ -197,7 +199,7 @@ fn fault_suffix(fault: &Option<Arc<DeviceFault>>) -> String {
     fault.as_ref().map(|fault| format!(" ({fault})")).unwrap_or_default()
 }
 
-/// Fails with [`Error::LimitExceeded`] if `requested` is over `limit`.
+/// Returns [`Error::LimitExceeded`] if `requested` exceeds `limit`.
 pub(crate) fn check_limit(object: &str, what: &'static str, requested: u64, limit: u64) -> Result<()> {
     if requested <= limit {
         return Ok(());

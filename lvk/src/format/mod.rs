@@ -1,4 +1,4 @@
-//! Formats: of texels, with the sizes of what copies move, of vertices, and of indices.
+//! Formats of texels, vertices and indices, with the byte sizes of copies.
 
 mod table;
 mod vertex;
@@ -10,20 +10,20 @@ pub use vertex::{IndexFormat, VertexFormat};
 
 use table::CompatibilityClass;
 
-/// Which part of the texels a transfer moves or a view shows.
+/// Part of the texels that a copy moves or a view accesses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Aspect {
-    /// The colour, or the depth; of a format of stencil alone, that.
+    /// The colour or the depth. For stencil-only formats, the stencil.
     #[default]
     Main,
-    /// The stencil, one byte a texel.
+    /// The stencil, one byte per texel.
     Stencil,
-    /// A plane of a format in Y'CbCr, from 0 on. Its texels count by themselves: of colour differences there are half as many
-    /// columns and rows.
+    /// A plane of a Y'CbCr format, counted from 0. The plane has its own texel grid: planes of colour
+    /// differences have half the columns and rows.
     Plane(u8),
 }
 
-/// How shaders read colours.
+/// Numeric type with which shaders read colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NumericFormat {
     Float,
@@ -31,39 +31,40 @@ pub(crate) enum NumericFormat {
     Sint,
 }
 
-/// One aspect of a format, as copies name and pack it.
+/// One aspect of a format in copies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct CopyAspect {
     pub(crate) aspect: vk::ImageAspectFlags,
-    /// Width and height of the smallest piece that can be copied, in texels.
+    /// Width and height of the smallest copyable block, in texels.
     pub(crate) block: [u32; 2],
     pub(crate) block_bytes: u32,
-    /// Texels of the image along x and y for one of the aspect.
+    /// Number of image texels per aspect texel, along x and y.
     pub(crate) shrink: u32,
 }
 
 impl CopyAspect {
-    /// Bytes of a box of texels, tightly packed; what is not a whole block counts as one.
+    /// Returns the bytes of a region of texels, tightly packed. Partial blocks count as whole blocks.
     pub(crate) fn bytes(&self, [width, height, depth]: [u32; 3]) -> u64 {
         let blocks = self.block_count([width, height]).map(u64::from);
         let layers = [depth.into(), self.block_bytes.into()];
         layers.into_iter().chain(blocks).fold(1, u64::saturating_mul)
     }
 
-    /// Width, height and depth of the aspect where the image has these.
+    /// Returns the width, height and depth of the aspect in an image of this extent.
     pub(crate) fn aspect_extent(&self, [width, height, depth]: [u32; 3]) -> [u32; 3] {
         [width.div_ceil(self.shrink), height.div_ceil(self.shrink), depth]
     }
 
-    /// Columns and rows of blocks that cover so many texels.
+    /// Returns the columns and rows of blocks that cover this extent in texels.
     pub(crate) fn block_count(&self, extent: [u32; 2]) -> [u32; 2] {
         [extent[0].div_ceil(self.block[0]), extent[1].div_ceil(self.block[1])]
     }
 }
 
 impl Format {
-    /// Bytes of a box of texels, width x height x depth, as uploads and downloads move it, tightly packed: the colour, or
-    /// the depth without its stencil, or all planes one after the other. Compressed formats round up to whole [blocks](Self::block_extent).
+    /// Returns the bytes of a region of width x height x depth texels in uploads and downloads, tightly
+    /// packed. They contain the colour, or the depth without its stencil, or all planes one after the other.
+    /// Compressed formats round up to whole [blocks](Self::block_extent).
     pub fn bytes(self, extent: [u32; 3]) -> u64 {
         let Some(main) = self.copy_aspect(Aspect::Main) else {
             return self.planes().map(|plane| plane.bytes(plane.aspect_extent(extent))).sum();
@@ -71,24 +72,24 @@ impl Format {
         main.bytes(extent)
     }
 
-    /// Width and height of a block in texels: 4 x 4 of BC and ETC2, up to 12 x 12 of ASTC, and 1 x 1 of everything that is
-    /// not compressed.
+    /// Returns the width and height of a block in texels: 4 x 4 for BC and ETC2, up to 12 x 12 for ASTC, and
+    /// 1 x 1 for uncompressed formats.
     pub fn block_extent(self) -> [u32; 2] {
         self.block().texels
     }
 
-    /// Whether texels are compressed in blocks.
+    /// True if texels are compressed in blocks.
     pub fn is_compressed(self) -> bool {
         self.class() == CompatibilityClass::TexelBlock
     }
 
-    /// Whether texels are in Y'CbCr, in several planes.
+    /// True if texels are in Y'CbCr, in several planes.
     pub fn is_yuv(self) -> bool {
         matches!(self.class(), CompatibilityClass::TwoPlanes | CompatibilityClass::ThreePlanes)
     }
 
-    /// The format in which a plane is seen by itself: numbers of 16 bits where 10 of them count. `None` where there is no such
-    /// plane.
+    /// Returns the format for accessing a single plane. It has 16-bit channels for 10-bit formats. `None` if
+    /// the format has no such plane.
     pub fn plane_format(self, plane: u8) -> Option<Self> {
         let wide = self.block().bytes == 2;
         match (self.class(), plane) {
@@ -101,27 +102,27 @@ impl Format {
         }
     }
 
-    /// Whether texels hold depth, with or without stencil.
+    /// True if texels hold depth, with or without stencil.
     pub fn is_depth(self) -> bool {
         matches!(self.class(), CompatibilityClass::Depth | CompatibilityClass::DepthStencil)
     }
 
-    /// Whether texels hold stencil.
+    /// True if texels hold stencil.
     pub fn has_stencil(self) -> bool {
         matches!(self.class(), CompatibilityClass::Stencil | CompatibilityClass::DepthStencil)
     }
 
-    /// Whether texels hold colour: neither depth nor stencil.
+    /// True if texels hold colour: neither depth nor stencil.
     pub fn is_color(self) -> bool {
         !self.is_depth() && !self.has_stencil()
     }
 
-    /// Whether shaders read texels as unsigned integers.
+    /// True if shaders read texels as unsigned integers.
     pub fn is_uint(self) -> bool {
         matches!(self.class(), CompatibilityClass::Uint | CompatibilityClass::Stencil)
     }
 
-    /// Whether shaders read texels as signed integers.
+    /// True if shaders read texels as signed integers.
     pub fn is_sint(self) -> bool {
         self.class() == CompatibilityClass::Sint
     }
@@ -134,7 +135,7 @@ impl Format {
         }
     }
 
-    /// All aspects, as barriers name them.
+    /// Returns all aspects for barriers.
     pub(crate) fn aspects(self) -> vk::ImageAspectFlags {
         match self.class() {
             CompatibilityClass::Depth => vk::ImageAspectFlags::DEPTH,
@@ -144,7 +145,7 @@ impl Format {
         }
     }
 
-    /// An aspect as copies move it, `None` where the format lacks it.
+    /// Returns an aspect for copies. `None` if the format lacks it.
     pub(crate) fn copy_aspect(self, aspect: Aspect) -> Option<CopyAspect> {
         match aspect {
             Aspect::Main => (!self.is_yuv()).then(|| self.main_aspect()),
@@ -165,7 +166,7 @@ impl Format {
         CopyAspect { aspect, block: block.texels, block_bytes: block.bytes, shrink: 1 }
     }
 
-    /// A plane as copies name it.
+    /// Returns a plane for copies.
     fn plane(self, plane: u8) -> Option<CopyAspect> {
         const ASPECTS: [vk::ImageAspectFlags; 3] =
             [vk::ImageAspectFlags::PLANE_0, vk::ImageAspectFlags::PLANE_1, vk::ImageAspectFlags::PLANE_2];
@@ -179,14 +180,14 @@ impl Format {
         (0..3).filter_map(move |plane| self.plane(plane))
     }
 
-    /// The aspects that together are all of the texels that uploads move.
+    /// Returns the aspects that together contain all texels of an upload.
     pub(crate) fn uploaded_aspects(self) -> impl Iterator<Item = Aspect> {
         let planes = (0..3).filter(move |plane| self.plane_format(*plane).is_some()).map(Aspect::Plane);
         (!self.is_yuv()).then_some(Aspect::Main).into_iter().chain(planes)
     }
 
-    /// Whether images of one format may be seen in the other: colours of the same number of bytes, and of compressed
-    /// ones the same compression.
+    /// True if an image of one format can have a view in the other. Colour formats need the same number of
+    /// bytes, compressed formats the same compression.
     pub(crate) fn is_viewable_as(self, other: Self) -> bool {
         if self.is_compressed() || other.is_compressed() {
             return self == other
@@ -200,13 +201,14 @@ impl Format {
             || self == other
     }
 
-    /// Vulkan counts the two forms of each compression, linear or unsigned and the other, one after the other.
+    /// Returns the number of the compression. Vulkan numbers the two variants of each compression
+    /// consecutively: linear or unsigned, then sRGB or signed.
     fn compression_family(self) -> Option<i32> {
         const FIRST: i32 = vk::Format::BC1_RGB_UNORM_BLOCK.as_raw();
         self.is_compressed().then(|| (self.raw().as_raw() - FIRST) / 2)
     }
 
-    /// Alpha alone is a class of its own.
+    /// True for the alpha-only format, which is a compatibility class of its own.
     fn is_alpha(self) -> bool {
         self == Self::A8Unorm
     }

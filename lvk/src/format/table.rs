@@ -1,30 +1,30 @@
-//! The table of texel formats: what Vulkan calls each, how large its blocks are, and what they hold.
+//! The table of texel formats: Vulkan format, block size and class of contents.
 
 use ash::vk;
 
-/// The smallest piece of a format that can be copied.
+/// The smallest block of a format that can be copied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct TexelBlock {
-    /// Width and height in texels: 1 for formats that are not compressed.
+    /// Width and height in texels: 1 for uncompressed formats.
     pub(super) texels: [u32; 2],
-    /// Of depth with stencil those of the depth alone, of planes those of Y.
+    /// Size in bytes. For depth with stencil, the size of the depth alone; for planar formats, the size of Y.
     pub(super) bytes: u32,
 }
 
-/// What texels hold.
+/// Class of the contents of texels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CompatibilityClass {
     Float,
     Uint,
     Sint,
-    /// Compressed colours, which shaders see as floats.
+    /// Compressed colours, which shaders read as floats.
     TexelBlock,
     Depth,
     Stencil,
     DepthStencil,
-    /// Y'CbCr in a plane of Y and one of both differences, which have half the width and height.
+    /// Y'CbCr in two planes: Y, and both colour differences with half the width and height.
     TwoPlanes,
-    /// The same with a plane for each difference.
+    /// Y'CbCr in three planes, one for each colour difference.
     ThreePlanes,
 }
 
@@ -46,8 +46,8 @@ macro_rules! formats {
         }
 
         impl Format {
-            /// Every format of the library. What a device can do with one says
-            /// [`Context::format_support`](crate::Context::format_support).
+            /// All formats of the library. [`Context::format_support`](crate::Context::format_support)
+            /// returns a device's support for each.
             pub const ALL: &'static [Self] = &[$(Self::$name),*];
 
             pub(crate) fn raw(self) -> vk::Format {
@@ -102,7 +102,7 @@ formats! {
     Bgra8Unorm = B8G8R8A8_UNORM, texel(4), Float;
     /// Four 8-bit channels, blue first, colour encoded as sRGB.
     Bgra8Srgb = B8G8R8A8_SRGB, texel(4), Float;
-    /// One 8-bit normalised channel that shaders see as alpha (`VK_KHR_maintenance5`).
+    /// One 8-bit normalised channel that shaders read as alpha (`VK_KHR_maintenance5`).
     A8Unorm = A8_UNORM_KHR, texel(1), Float;
     /// One 16-bit normalised channel.
     R16Unorm = R16_UNORM, texel(2), Float;
@@ -152,12 +152,12 @@ formats! {
     Rgba32Sint = R32G32B32A32_SINT, texel(16), Sint;
     /// Four 32-bit floats.
     Rgba32Float = R32G32B32A32_SFLOAT, texel(16), Float;
-    /// Red and blue of 5 bits, green of 6, normalised, red in the highest bits of a word.
+    /// Red and blue with 5 bits, green with 6, normalised. Red is in the highest bits of a word.
     R5G6B5Unorm = R5G6B5_UNORM_PACK16, texel(2), Float;
-    /// Three 5-bit normalised channels and 1 bit of alpha, which is the highest.
+    /// Three 5-bit normalised channels, and 1 bit of alpha in the highest bit.
     A1Rgb5Unorm = A1R5G5B5_UNORM_PACK16, texel(2), Float;
-    /// Three 5-bit normalised channels, blue above green above red, and 1 bit of alpha, which is the highest
-    /// (`VK_KHR_maintenance5`).
+    /// Three 5-bit normalised channels, from the highest bits blue, green, red, below 1 bit of alpha in the
+    /// highest bit (`VK_KHR_maintenance5`).
     A1Bgr5Unorm = A1B5G5R5_UNORM_PACK16_KHR, texel(2), Float;
     /// Three 10-bit normalised channels and 2 bits of alpha, red in the lowest bits.
     Rgb10A2Unorm = A2B10G10R10_UNORM_PACK32, texel(4), Float;
@@ -167,11 +167,11 @@ formats! {
     Bgr10A2Unorm = A2R10G10B10_UNORM_PACK32, texel(4), Float;
     /// Three small unsigned floats.
     Rg11B10Float = B10G11R11_UFLOAT_PACK32, texel(4), Float;
-    /// Three 9-bit mantissas with one exponent of 5 bits.
+    /// Three 9-bit mantissas with a shared exponent of 5 bits.
     Rgb9E5Float = E5B9G9R9_UFLOAT_PACK32, texel(4), Float;
     /// 16-bit normalised depth.
     D16Unorm = D16_UNORM, texel(2), Depth;
-    /// 24-bit normalised depth; a transfer moves 4 bytes, the highest of which means nothing.
+    /// 24-bit normalised depth. A copy moves 4 bytes, of which the highest is unused.
     X8D24Unorm = X8_D24_UNORM_PACK32, texel(4), Depth;
     /// Float depth.
     D32Float = D32_SFLOAT, texel(4), Depth;
@@ -289,12 +289,14 @@ formats! {
     Astc12x12Unorm = ASTC_12X12_UNORM_BLOCK, block([12, 12], 16), TexelBlock;
     /// ASTC: blocks of 12 x 12 texels in 16 bytes, colour encoded as sRGB.
     Astc12x12Srgb = ASTC_12X12_SRGB_BLOCK, block([12, 12], 16), TexelBlock;
-    /// Y'CbCr, 8 bits: a plane of Y, and one of Cb and Cr with half the width and height.
+    /// Y'CbCr, 8 bits: a plane of Y, and a plane of Cb and Cr with half the width and height.
     Nv12 = G8_B8R8_2PLANE_420_UNORM, texel(1), TwoPlanes;
-    /// Y'CbCr, 8 bits: planes of Y, Cb and Cr, the last two with half the width and height.
+    /// Y'CbCr, 8 bits: planes of Y, Cb and Cr. The last two have half the width and height.
     Yuv420p8 = G8_B8_R8_3PLANE_420_UNORM, texel(1), ThreePlanes;
-    /// Y'CbCr, 10 bits in the upper ones of 16: a plane of Y, and one of Cb and Cr with half the width and height.
+    /// Y'CbCr, 10 bits in the upper bits of 16: a plane of Y, and a plane of Cb and Cr with half the width
+    /// and height.
     P010 = G10X6_B10X6R10X6_2PLANE_420_UNORM_3PACK16, texel(2), TwoPlanes;
-    /// Y'CbCr, 10 bits in the upper ones of 16: planes of Y, Cb and Cr, the last two with half the width and height.
+    /// Y'CbCr, 10 bits in the upper bits of 16: planes of Y, Cb and Cr. The last two have half the width and
+    /// height.
     Yuv420p10 = G10X6_B10X6_R10X6_3PLANE_420_UNORM_3PACK16, texel(2), ThreePlanes;
 }

@@ -4,12 +4,12 @@ use ash::vk;
 
 macro_rules! vertex_formats {
     ($($(#[$meta:meta])* $name:ident = $raw:ident, $bytes:literal, $component:literal, $position:literal;)*) => {
-        /// Format of a vertex attribute. Floats, and what is normalised, are `float` and its vectors in shaders, other
-        /// integers `int` or `uint` and theirs.
+        /// Format of a vertex attribute. Shaders read floats and normalised values as `float` and its
+        /// vectors, other integers as `int` or `uint` and their vectors.
         ///
-        /// Positions that an acceleration structure is built from are floats, half floats, [`Snorm16x2`](Self::Snorm16x2),
-        /// [`Snorm16x4`](Self::Snorm16x4), [`Unorm8x4`](Self::Unorm8x4) or [`U32`](Self::U32), as far as the device takes
-        /// them; [`F32x3`](Self::F32x3) always works.
+        /// Acceleration structures can be built from positions as floats, half floats,
+        /// [`Snorm16x2`](Self::Snorm16x2), [`Snorm16x4`](Self::Snorm16x4), [`Unorm8x4`](Self::Unorm8x4) or
+        /// [`U32`](Self::U32), if the device supports the format. [`F32x3`](Self::F32x3) always works.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
         #[non_exhaustive]
         pub enum VertexFormat {
@@ -26,21 +26,21 @@ macro_rules! vertex_formats {
                 }
             }
 
-            /// Bytes of one attribute.
+            /// Returns the size of one attribute in bytes.
             pub fn size_bytes(self) -> u32 {
                 match self {
                     $(Self::$name => $bytes,)*
                 }
             }
 
-            /// Bytes of one component: the alignment of addresses and strides.
+            /// Returns the size of one component in bytes, which is the alignment of addresses and strides.
             pub(crate) fn component_bytes(self) -> u32 {
                 match self {
                     $(Self::$name => $component,)*
                 }
             }
 
-            /// Whether acceleration structures can be built from it, as far as the library goes.
+            /// True if the library can build acceleration structures from positions of this format.
             pub(crate) fn is_position(self) -> bool {
                 match self {
                     $(Self::$name => $position,)*
@@ -88,7 +88,7 @@ vertex_formats! {
     I8x4 = R8G8B8A8_SINT, 4, 1, false;
     /// Four bytes.
     U8x4 = R8G8B8A8_UINT, 4, 1, false;
-    /// Three normalised 10-bit integers from the lowest bits on, and one of 2 bits.
+    /// Three normalised 10-bit integers, starting at the lowest bits, and one of 2 bits.
     Unorm10x3A2 = A2B10G10R10_UNORM_PACK32, 4, 4, false;
     /// One 32-bit integer.
     I32 = R32_SINT, 4, 4, false;
@@ -111,7 +111,8 @@ vertex_formats! {
 /// Format of indices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum IndexFormat {
-    /// 8-bit indices, for draws alone ([`OptionalFeature::IndexTypeUint8`](crate::OptionalFeature::IndexTypeUint8)).
+    /// 8-bit indices, for draws only
+    /// ([`OptionalFeature::IndexTypeUint8`](crate::OptionalFeature::IndexTypeUint8)).
     U8,
     /// 16-bit indices.
     U16,
@@ -129,7 +130,7 @@ impl IndexFormat {
         }
     }
 
-    /// Bytes of one index.
+    /// Returns the size of one index in bytes.
     pub fn size_bytes(self) -> u32 {
         match self {
             Self::U8 => 1,

@@ -1,4 +1,4 @@
-//! The clocks of device and host, read at one moment.
+//! The clocks of device and host, read at the same time.
 
 use std::time::Duration;
 
@@ -8,20 +8,21 @@ use super::caps::features::Calibration;
 use super::start::instance::Instance;
 use crate::error::{Error, Result};
 
-/// One moment on the clock of the GPU and on that of the host.
+/// One instant on the clock of the GPU and on the clock of the host.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CalibratedTimestamps {
     /// Milliseconds on the scale of [`Context::timestamps_ms`](crate::Context::timestamps_ms).
     pub gpu_ms: f64,
     /// Time of the host's `CLOCK_MONOTONIC`, which [`Instant`](std::time::Instant) counts on Linux.
     pub host: Duration,
-    /// How far apart the two readings may be.
+    /// Maximum time between the two readings.
     pub deviation: Duration,
 }
 
 impl CalibratedTimestamps {
-    /// When the host's clock showed what the GPU's showed at `gpu_ms`; zero for times before the host's clock began or
-    /// that are no time. The clocks drift apart: take pairs anew every second or so.
+    /// Converts a GPU time to a time of the host's clock. Returns zero for times before the start of the
+    /// host's clock and for values that are not finite. The clocks drift apart: read a new pair about every
+    /// second.
     pub fn host_at(&self, gpu_ms: f64) -> Duration {
         let apart = Duration::try_from_secs_f64((gpu_ms - self.gpu_ms).abs() * 1e-3).unwrap_or_default();
         if gpu_ms < self.gpu_ms { self.host.saturating_sub(apart) } else { self.host.saturating_add(apart) }
@@ -35,7 +36,7 @@ pub(crate) enum HostClock {
 }
 
 impl HostClock {
-    /// `None` where the device or the driver cannot, or only with another clock of the host.
+    /// `None` if the device or the driver cannot read both clocks, or supports only another host clock.
     pub(crate) fn new(
         instance: &Instance,
         device: &ash::Device,
@@ -63,7 +64,8 @@ impl HostClock {
         needed.iter().all(|domain| domains.contains(domain)).then_some(clock)
     }
 
-    /// Ticks of the device, nanoseconds of the host, and how many nanoseconds they may be apart.
+    /// Returns the ticks of the device, the nanoseconds of the host, and the maximum deviation in
+    /// nanoseconds.
     pub(crate) fn read(&self) -> Result<(u64, u64, u64)> {
         let infos = [vk::TimeDomainKHR::DEVICE, vk::TimeDomainKHR::CLOCK_MONOTONIC]
             .map(|domain| vk::CalibratedTimestampInfoKHR::default().time_domain(domain));

@@ -1,4 +1,4 @@
-//! Chooses a physical device and makes the logical one, with its queue and its memory allocator.
+//! Selects a physical device and creates the logical device, its queues and its memory allocator.
 
 use std::ffi::CStr;
 use std::sync::atomic::AtomicU32;
@@ -32,33 +32,34 @@ use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
 
-/// What the caller asks of a device.
+/// Requirements of the caller for a device.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeviceRequest<'a> {
-    /// Number or part of the name.
+    /// Index, or part of the name.
     pub(crate) wish: Option<&'a str>,
     pub(crate) pipeline: FeatureRequest,
     pub(crate) query: RayQueryRequest,
-    /// Optional features that only devices which have them all will do for.
+    /// Required optional features. Devices that lack one are not considered.
     pub(crate) required: &'a [OptionalFeature],
     pub(crate) profile: Option<&'a DeviceProfile>,
     pub(crate) extra: UserExtensions<'a>,
-    /// Whether objects get names for debuggers; where somebody reads them without it.
+    /// True to name objects for debuggers. `None`: name them if the validation layer or a debugger reads the
+    /// names.
     pub(crate) debug_names: Option<bool>,
     pub(crate) queues: QueueRequest,
-    /// A window that the device has to present to.
+    /// A window that the device must be able to present to.
     pub(crate) window: Option<WindowRef<'a>>,
 }
 
-/// One logical device with everything made from it that is not a resource. It knows no resource.
+/// One logical device with its functions, queues and memory. It is independent of resources.
 pub(crate) struct Gpu {
     pub(crate) device: ash::Device,
     pub(crate) caps: Capabilities,
-    /// Those that are on.
+    /// Features that are enabled.
     pub(crate) features: Features,
-    /// What was applied to `caps`; the default where the caller gave none.
+    /// The profile applied to `caps`; the default profile if the caller gave none.
     pub(crate) profile: DeviceProfile,
-    /// SPIR-V capabilities that the caller's own extensions allow.
+    /// SPIR-V capabilities that the caller's additional extensions allow.
     pub(crate) extra_capabilities: Vec<u32>,
     pub(crate) queues: Queues,
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
@@ -66,30 +67,31 @@ pub(crate) struct Gpu {
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
     pub(crate) shading_rates: Option<ShadingRates>,
     pub(crate) local_read: Option<ash::khr::dynamic_rendering_local_read::Device>,
-    /// Writes first contents of images, where that is the faster way.
+    /// Writes the first contents of images from the host. `None` where that is not the faster way.
     pub(crate) host_copies: Option<HostImageCopy>,
     /// Reads the clocks of device and host together.
     pub(crate) host_clock: Option<HostClock>,
-    /// Samplers alive with a border colour of their own, of which a device has few.
+    /// Number of live samplers with a custom border colour. Devices allow few of them.
     pub(crate) custom_borders: AtomicU32,
-    /// Present where the context is for windows.
+    /// `None` if the context does not present to windows.
     #[cfg(feature = "window")]
     pub(crate) windows: Option<super::start::surface::WindowFunctions>,
     physical: vk::PhysicalDevice,
-    /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
+    /// Sets names and labels. `None` if no tool reads them, because each name costs as much as creating a
+    /// small buffer.
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
     pub(super) device_fault: Option<ash::ext::device_fault::Device>,
     memory: Mutex<Option<DeviceMemory>>,
     pub(super) heap_use: HeapUse,
     pub(super) format_answers: FormatFeatureCache,
     pub(super) image_limits: ImageLimitCache,
-    /// Somebody else made the device, and destroys it.
+    /// True if the caller created the device and destroys it.
     is_foreign: bool,
-    /// Declared last: destroyed after the device.
+    /// Declared last, so that it is destroyed after the device.
     pub(crate) instance: Instance,
 }
 
-/// What was made, or given.
+/// The device and its parts, created by the library or given by the caller.
 struct DeviceParts {
     device: ash::Device,
     caps: Capabilities,
@@ -106,7 +108,7 @@ impl Gpu {
         let memory = match DeviceMemory::new(&instance.raw, &device, chosen.raw) {
             Ok(memory) => memory,
             Err(error) => {
-                // SAFETY: nothing was made from the device yet.
+                // SAFETY: nothing was created from the device yet.
                 with_exclusive_device_lock(caps.driver_id, || unsafe { device.destroy_device(None) });
                 return Err(error);
             }
@@ -123,10 +125,10 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// On a device of somebody else's.
+    /// Wraps a device that the caller created.
     ///
     /// # Safety
-    /// As of [`Context::from_raw`](crate::Context::from_raw).
+    /// The requirements of [`Context::from_raw`](crate::Context::from_raw).
     pub(crate) unsafe fn from_raw(
         raw: RawContext<'_>,
         pipeline: FeatureRequest,
@@ -202,33 +204,33 @@ impl Gpu {
         }
     }
 
-    /// The queue for everything; Vulkan wants one thread at a time on it.
+    /// Locks the Vulkan queue for graphics and compute, which only one thread may use at a time.
     #[cfg(feature = "window")]
     pub(crate) fn graphics_queue(&self) -> Guard<'_, vk::Queue> {
         self.queues.raw(0)
     }
 
-    /// The memory of objects, `None` only while the context is being torn down.
+    /// Locks the memory allocator. `None` only while the context is being destroyed.
     pub(super) fn memory(&self) -> Guard<'_, Option<DeviceMemory>> {
         self.memory.lock()
     }
 
-    /// How many descriptors a context may have.
+    /// Returns the descriptor limits of the device.
     pub(crate) fn descriptor_limits(&self) -> DescriptorLimits {
         DescriptorLimits::query(&self.instance.raw, self.physical)
     }
 
-    /// The functions of `VK_KHR_acceleration_structure`, or the error that says what the device lacks.
+    /// Returns the functions of `VK_KHR_acceleration_structure`, or an error that names the missing feature.
     pub(crate) fn accel_functions(&self) -> Result<&ash::khr::acceleration_structure::Device> {
         self.accel.as_ref().ok_or_else(|| self.unsupported("acceleration structures"))
     }
 
-    /// Whether there are acceleration structures, the device's or the library's own.
+    /// True if acceleration structures exist, built by the device or by the library.
     pub(crate) fn has_acceleration_structures(&self) -> bool {
         self.accel.is_some() || self.caps.software_ray_query()
     }
 
-    /// Fails unless there are acceleration structures of either form.
+    /// Returns an error unless acceleration structures of either kind exist.
     pub(crate) fn check_acceleration_structures(&self) -> Result<()> {
         if self.has_acceleration_structures() {
             Ok(())
@@ -237,17 +239,17 @@ impl Gpu {
         }
     }
 
-    /// The functions of `VK_KHR_ray_tracing_pipeline`, or the error that says what the device lacks.
+    /// Returns the functions of `VK_KHR_ray_tracing_pipeline`, or an error that names the missing feature.
     pub(crate) fn ray_tracing_functions(&self) -> Result<&ash::khr::ray_tracing_pipeline::Device> {
         self.ray_tracing.as_ref().ok_or_else(|| self.unsupported("ray tracing pipelines"))
     }
 
-    /// The functions of `VK_EXT_mesh_shader`, or the error that says what the device lacks.
+    /// Returns the functions of `VK_EXT_mesh_shader`, or an error that names the missing feature.
     pub(crate) fn mesh_functions(&self) -> Result<&ash::ext::mesh_shader::Device> {
         self.mesh.as_ref().ok_or_else(|| self.unsupported("mesh shaders"))
     }
 
-    /// The functions of windows, or the error that says how to get them.
+    /// Returns the functions for windows, or an error that says how to enable them.
     #[cfg(feature = "window")]
     pub(crate) fn window_functions(&self) -> Result<&super::start::surface::WindowFunctions> {
         self.windows.as_ref().ok_or_else(|| {
@@ -258,7 +260,7 @@ impl Gpu {
         })
     }
 
-    /// An [`Error::Unsupported`] that names the device.
+    /// Returns an [`Error::Unsupported`] that names the device.
     pub(crate) fn unsupported(&self, what: &str) -> Error {
         let profile = Some(&self.profile).filter(|profile| profile.has_restrictions());
         let profile = profile.map(|profile| format!("the device profile '{}' hides it, ", profile.name));
@@ -268,7 +270,7 @@ impl Gpu {
         Error::unsupported(what, format!("the device '{}' has none: {reason}", self.caps.device_name))
     }
 
-    /// Fails unless the device has `feature`; `what` is refused, by name.
+    /// Returns an error unless the device has `feature`. `what` is the refused operation in the error.
     pub(crate) fn require(&self, feature: OptionalFeature, what: &str) -> Result<()> {
         if self.caps.has(feature) {
             return Ok(());
@@ -283,33 +285,34 @@ impl Gpu {
         Err(Error::unsupported(what, format!("the device '{}' lacks {name}: {why}", self.caps.device_name)))
     }
 
-    /// Fails unless the device draws so many views at once.
+    /// Returns an error unless the device can draw the views of `view_mask` in one pass.
     pub(crate) fn check_view_mask(&self, name: &str, view_mask: u32) -> Result<()> {
         self.require(OptionalFeature::Multiview, &format!("the view mask {view_mask:#b} of '{name}'"))?;
         let views = u64::from(u32::BITS - view_mask.leading_zeros());
         check_limit(name, "count of views, up to the highest bit", views, self.caps.limits.max_views.into())
     }
 
-    /// Milliseconds since an arbitrary start of what a timestamp counts.
+    /// Converts timestamp ticks to milliseconds since an arbitrary start.
     pub(crate) fn milliseconds(&self, ticks: u64) -> f64 {
         let limits = &self.caps.limits;
         let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
         (ticks & mask) as f64 * f64::from(limits.timestamp_period_ns) * 1e-6
     }
 
-    /// How many ticks `later` is behind `earlier`, of whatever queues both are; the clock begins anew in between.
+    /// Returns the ticks from `earlier` to `later`, which may come from different queues. The counter may
+    /// wrap once in between.
     pub(crate) fn ticks_since(&self, earlier: u64, later: u64) -> u64 {
         let bits = Queue::ALL.map(|queue| self.caps.queue(queue).timestamp_bits);
         later.wrapping_sub(earlier) & shared_timestamp_bits(bits)
     }
 
-    /// How many ticks `earlier` is before `later`, of whatever queues both are; `None` where it is not.
+    /// Returns the ticks from `earlier` to `later`, which may come from different queues. `None` if `later`
+    /// is not later.
     pub(crate) fn ticks_until(&self, earlier: u64, later: u64) -> Option<u64> {
         let (ticks, back) = (self.ticks_since(earlier, later), self.ticks_since(later, earlier));
         (ticks > 0 && ticks <= back).then_some(ticks)
     }
 
-    /// The physical device.
     pub(crate) fn physical(&self) -> vk::PhysicalDevice {
         self.physical
     }
@@ -321,13 +324,14 @@ impl Drop for Gpu {
         if self.is_foreign {
             return;
         }
-        // SAFETY: everything made from the device is gone: the context destroys its objects before its `Gpu`.
+        // SAFETY: all objects of the device are destroyed: the context destroys them before its `Gpu`.
         let destroy = || unsafe { self.device.destroy_device(None) };
         with_exclusive_device_lock(self.caps.driver_id, destroy);
     }
 }
 
-/// True if objects get names: as the caller says, or where the layer or a debugger reads them.
+/// True if objects get names: as requested by the caller, or else if the validation layer or a debugger reads
+/// them.
 fn should_name_objects(instance: &Instance, device: vk::PhysicalDevice, requested: Option<bool>) -> bool {
     instance.debug_utils
         && requested.unwrap_or_else(|| instance.validated || has_debugger(&instance.raw, device))
@@ -356,14 +360,14 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     Ok(chosen)
 }
 
-/// Has one queue for all where that is asked for.
+/// Uses one Vulkan queue for all queues if requested.
 fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
     if request == QueueRequest::Shared {
         device.set_queues([device.places[0]; 3]);
     }
 }
 
-/// The device as the choice sees it, under the profile.
+/// Returns the properties of the device that the selection depends on, with the profile applied.
 fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
     let found = device.capabilities.clone();
     if let Some(profile) = request.profile {
@@ -409,7 +413,8 @@ fn missing_requirement(name: &str, hidden_by: Option<&DeviceProfile>) -> String 
     }
 }
 
-/// Makes the device; when that fails with optional ray tracing on, tries once more without and says why.
+/// Creates the device. If that fails with optional ray tracing enabled, tries again without it and stores the
+/// reason.
 fn create_with_fallback(
     instance: &Instance,
     chosen: &PhysicalDevice,
@@ -428,8 +433,8 @@ fn create_with_fallback(
     caps.limits.max_bindless_tlas = 0;
     caps.ray_query = false;
     caps.choose_ray_tracing(FeatureRequest::Off, request.query);
-    caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing answered {first}"));
-    log::warn!("{}: ray tracing is off: vkCreateDevice with it answered {first}", caps.device_name);
+    caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing returned {first}"));
+    log::warn!("{}: ray tracing is off: vkCreateDevice with it returned {first}", caps.device_name);
     let (device, features) =
         create(instance, chosen, &caps, &request.extra).map_err(Error::vulkan("vkCreateDevice"))?;
     Ok((device, caps, features))
@@ -445,7 +450,7 @@ fn create(
     let extensions = device_extensions(&features, caps, extra);
     let mut chain = features;
     let mut all = vk::PhysicalDeviceFeatures2::default().features(chain.core);
-    // What is pushed below goes in front of the caller's chain, which stays as it is.
+    // The structures pushed below precede the caller's chain, which stays unchanged.
     all.p_next = extra.feature_chain();
     let all = all.push_next(&mut chain.v11).push_next(&mut chain.v12).push_next(&mut chain.v13);
     let mut all = chain.ext.append_to_chain(all, &|name| extensions.contains(&name));
@@ -456,13 +461,14 @@ fn create(
         .queue_create_infos(&queues)
         .enabled_extension_names(&names)
         .push_next(&mut all);
-    // SAFETY: every pointer in `info` lives until the end of this function; the caller vouches for its own chain.
+    // SAFETY: every pointer in `info` lives until the end of this function. The caller guarantees the
+    // validity of its own chain.
     let make = || unsafe { instance.raw.create_device(chosen.raw, &info, None) };
     let device = with_exclusive_device_lock(caps.driver_id, make)?;
     Ok((device, features))
 }
 
-/// Each family once, with as many queues as are needed to have the last one.
+/// Returns one create info per queue family, with enough queues to include the highest index in use.
 fn queue_infos<'a>(
     places: &[QueueLocation; 3],
     priorities: &'a [f32; 3],
@@ -479,7 +485,8 @@ fn queue_infos<'a>(
     lasts.into_iter().map(info).collect()
 }
 
-/// GPU-assisted validation finds no access out of bounds where the driver has to make it harmless.
+/// Returns the features to enable. `robustBufferAccess` is left out for GPU-assisted validation, which finds no
+/// out-of-bounds access if the driver makes it harmless.
 fn enabled_features(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
     let mut features = Features::supported_subset(&chosen.features, caps.optional);
     features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
@@ -491,7 +498,7 @@ fn enabled_features(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabil
     features
 }
 
-/// Each once.
+/// Returns the extensions to enable, without duplicates.
 fn device_extensions<'a>(
     features: &Features,
     caps: &Capabilities,

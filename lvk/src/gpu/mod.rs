@@ -1,4 +1,4 @@
-//! One logical device: instance, choice, features, memory, debugging. It knows no resource.
+//! One logical device: instance, selection, features, memory, debugging. It is independent of resources.
 
 pub(crate) mod calibrated_timestamps;
 pub(crate) mod caps;

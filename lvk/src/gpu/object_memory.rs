@@ -1,4 +1,4 @@
-//! Memory for a device's buffers and images.
+//! Memory for the buffers and images of a device.
 
 use ash::vk;
 use gpu_allocator::AllocationError;
@@ -35,14 +35,15 @@ impl Gpu {
         Ok(allocated)
     }
 
-    /// Names a block of memory after what lies at its start.
+    /// Names a memory block after the object at its start.
     fn name_block(&self, allocated: &ObjectMemory, name: &str) {
         if self.names_objects() && allocated.offset == 0 {
             self.name(allocated.raw, &format!("memory from '{name}' on"));
         }
     }
 
-    /// Memory that the device has only while a pass needs it; `None` where it has no such kind.
+    /// Allocates lazily allocated memory, which exists only while a render pass needs it. `None` if the
+    /// device has no such memory type.
     pub(crate) fn allocate_lazy(
         &self,
         name: &str,
@@ -55,7 +56,7 @@ impl Gpu {
         };
         let info =
             vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(kind);
-        // SAFETY: the type is one of the device's.
+        // SAFETY: the memory type is one of the device's.
         unsafe { self.device.allocate_memory(&info, None) }.map(Some).map_err(|result| match result {
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
                 Error::OutOfDeviceMemory { object: name.to_owned(), bytes: requirements.size }
@@ -64,7 +65,7 @@ impl Gpu {
         })
     }
 
-    /// Gives memory back.
+    /// Frees memory.
     pub(crate) fn free(&self, memory: ObjectMemory) {
         self.heap_use.remove(&memory);
         let freed = self.memory().as_mut().map_or(Ok(()), |all| all.free(memory));
@@ -74,7 +75,7 @@ impl Gpu {
     }
 }
 
-/// The first of these kinds of memory, of those in `bits`, that is only there when needed.
+/// Returns the first lazily allocated memory type among those in `bits`.
 fn lazy_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
     let lazy =
         |kind: &vk::MemoryType| kind.property_flags.contains(vk::MemoryPropertyFlags::LAZILY_ALLOCATED);

@@ -1,4 +1,4 @@
-//! Queries to a device: formats, images, shading rates, memory, and its fault where it is lost.
+//! Queries to a device: formats, images, shading rates, memory, and the fault of a lost device.
 
 use std::sync::Arc;
 
@@ -16,22 +16,24 @@ use crate::error::{Error, Result};
 use crate::format::Format;
 
 impl Gpu {
-    /// Features of images of `format` in optimal tiling; none where a feature that the format needs is off.
+    /// Returns the features of images of `format` in optimal tiling. Empty if a feature that the format needs
+    /// is disabled.
     pub(crate) fn format_features(&self, format: Format) -> vk::FormatFeatureFlags {
         self.format_answers.image_features(&self.instance.raw, self.physical(), &self.caps, format)
     }
 
-    /// Features of buffers of `format`.
+    /// Returns the features of buffers of `format`.
     pub(crate) fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         format_properties(&self.instance.raw, self.physical(), format).buffer_features
     }
 
-    /// Limits of an image of this description, or the driver's refusal.
+    /// Returns the limits of an image of this description, or the driver's error.
     pub(crate) fn image_limits(&self, info: &vk::ImageCreateInfo<'_>) -> ImageLimitsResult {
         self.image_limits.image_limits(&self.instance.raw, self.physical(), info)
     }
 
-    /// How many samples a pixel a plain target of `format` may have; none where it cannot be a target.
+    /// Returns the sample counts that a plain render target of `format` may have. Empty if the format cannot
+    /// be a target.
     pub(crate) fn target_samples(
         &self,
         format: vk::Format,
@@ -45,12 +47,13 @@ impl Gpu {
         self.image_limits(&info).map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts)
     }
 
-    /// True if the host can write images of this description, and the device samples them as fast as others.
+    /// True if the host can write images of this description without making sampling on the device slower.
     pub(crate) fn host_copies_stay_optimal(&self, info: &vk::ImageCreateInfo<'_>) -> bool {
         host_copies_stay_optimal(&self.instance.raw, self.physical(), info)
     }
 
-    /// Fails unless the device has the rate with so many samples a pixel; `name` is refused.
+    /// Returns an error unless the device has the rate with `samples` samples per pixel. `name` is the object
+    /// in the error.
     pub(crate) fn check_shading_rate(&self, name: &str, rate: &ShadingRate, samples: u32) -> Result<()> {
         let what = format!("the shading rate {:?} of '{name}'", rate.size);
         self.require(OptionalFeature::PipelineShadingRate, &what)?;
@@ -70,13 +73,13 @@ impl Gpu {
         }
     }
 
-    /// Sizes, budgets and uses of the heaps of memory.
+    /// Returns sizes, budgets and uses of the memory heaps.
     pub(crate) fn memory_budget(&self) -> MemoryBudget {
         let is_measured = self.caps.has(OptionalFeature::MemoryBudget);
         self.heap_use.query_budget(&self.instance.raw, self.physical(), is_measured)
     }
 
-    /// As [`Error::vulkan`], with what the device says of its fault where it is lost.
+    /// As [`Error::vulkan`], with the device's fault report if the device is lost.
     pub(crate) fn vulkan_error(&self, call: &'static str) -> impl FnOnce(vk::Result) -> Error + '_ {
         move |result| match result {
             vk::Result::ERROR_DEVICE_LOST => {

@@ -1,4 +1,4 @@
-// Gathers the indices or boxes of a part of a mesh: input i of the part is input numbers[i] of the mesh.
+// Gathers the indices or AABBs of a part of a mesh: input i of the part is input numbers[i] of the mesh.
 layout(local_size_x = 64) in;
 
 const uint kNoIndices = 0u;
@@ -14,8 +14,8 @@ layout(push_constant, scalar) uniform Push {
     Gathered gathered;
     uint count;
     uint kind;
-    uint oddHalf;      // 1 if the first 16-bit index lies behind `source` by two bytes
-    uint boxStride;    // bytes from one box to the next
+    uint oddHalf;      // 1 if the first 16-bit index is two bytes after `source`
+    uint boxStride;    // bytes from one AABB to the next
 };
 
 Words at(uvec2 base, uint index, uint stride) {

@@ -1,5 +1,5 @@
-// Puts the addresses of structures into instances that name them by entry, and writes the row of each instance: the
-// map of its primitives and the caller's instance. Entries that do not exist become instances that no ray meets.
+// Writes the addresses of BLASes into instances that name them by entry, and the hit remap entry of each instance: the
+// map of its primitives and the caller's instance. An entry that does not exist becomes an instance that no ray hits.
 layout(local_size_x = 64) in;
 
 struct Entry { uint first; uint count; };
@@ -17,18 +17,18 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) writeonly buffer Ro
 layout(push_constant, scalar) uniform Push {
     Source source;
     Target target;
-    uvec2 rows;        // 0 if nobody asks for rows
+    uvec2 rows;        // hit remap table; 0 without one
     Entries entries;
     Parts parts;
-    uvec2 owners;      // of the instances behind the caller's; 0 if there are none
+    uvec2 owners;      // of the instances after the caller's; 0 without such instances
     uint count;        // instances in `source`
-    uint copies;       // most parts of an entry; copy p of the list shows part p
+    uint copies;       // maximum parts of an entry; copy p of the list has part p
     uint entryCount;
     uint userCount;
-    uint keepActive;   // not 0: copies without a part of their own stay in the tree, for no ray to meet
+    uint keepActive;   // not 0: copies without a part of their own stay in the tree, but no ray hits them
 };
 
-// The custom index without the mask above it: no ray has a bit in common with 0.
+// Keeps the custom index and clears the mask above it: no ray has a bit in common with 0.
 const uint kNoMask = 0x00ffffffu;
 
 void main() {

@@ -1,4 +1,4 @@
-//! The library's own compute shaders. Their SPIR-V is kept beside their GLSL, so that no compiler is needed.
+//! The library's own compute shaders. Their SPIR-V is stored beside their GLSL, so that no compiler is needed.
 
 use std::sync::Arc;
 
@@ -15,11 +15,11 @@ use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 /// Invocations of a workgroup of the kernels that prepare inputs.
 pub(crate) const GROUP_SIZE: u32 = 64;
 
-/// Every kernel: its name, the path of its SPIR-V below `src` without the ending, and the GLSL files of the same folder
-/// that are concatenated to its source. A group of kernels is compiled where its `cfg` holds.
+/// Declares every kernel: its name, the path of its SPIR-V below `src` without the extension, and the GLSL files of the
+/// same folder that are concatenated to its source. A group of kernels is compiled if its `cfg` holds.
 macro_rules! kernels {
     ($(#[cfg($when:meta)] { $($(#[$doc:meta])* $name:ident = $file:literal, [$($piece:literal),*];)* })*) => {
-        /// Which of the library's compute shaders.
+        /// The library's compute shaders.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
         pub(crate) enum Kernel {
             $($($(#[$doc])* #[cfg($when)] $name,)*)*
@@ -40,7 +40,7 @@ macro_rules! kernels {
                 }
             }
 
-            /// Where the words lie, and the pieces they come from.
+            /// Returns the path of the SPIR-V, and the files of the source.
             #[cfg(all(test, feature = "glsl"))]
             fn source(self) -> (&'static str, &'static [&'static str]) {
                 match self {
@@ -53,76 +53,76 @@ macro_rules! kernels {
 
 kernels! {
     #[cfg(all())] {
-        /// Gathers the indices or boxes of a part of a mesh.
+        /// Gathers the indices or AABBs of a part of a mesh.
         Gather = "kernels/gather", ["gather.comp.glsl"];
-        /// Puts addresses into instances and writes their rows.
+        /// Writes addresses and hit remap entries of instances.
         Instances = "kernels/instances", ["instances.comp.glsl"];
     }
     #[cfg(feature = "software-ray-query")] {
-        /// Forgets what an earlier build left in the scratch memory.
+        /// Resets the scratch memory after an earlier build.
         BuildReset = "software_ray_query/kernels/reset", ["job.glsl", "reset.comp.glsl"];
-        /// Boxes of triangles and boxes.
+        /// Computes the bounds of triangles and AABBs.
         BuildPrimitives = "software_ray_query/kernels/primitives",
             ["job.glsl", "box.glsl", "bounds.glsl", "input.glsl", "primitives.comp.glsl"];
-        /// Boxes of instances, and the instances as the structure keeps them.
+        /// Computes the bounds of instances, and writes the instance records of the TLAS.
         BuildInstances = "software_ray_query/kernels/instances",
             ["job.glsl", "box.glsl", "bounds.glsl", "instance.glsl", "instances.comp.glsl"];
-        /// Codes of places.
+        /// Computes the Morton codes of primitives.
         BuildCodes = "software_ray_query/kernels/codes", ["job.glsl", "box.glsl", "code.glsl", "codes.comp.glsl"];
-        /// Counts digits of codes.
+        /// Counts the digits of codes.
         SortCount = "software_ray_query/kernels/sort_count", ["job.glsl", "rank.glsl", "sort_count.comp.glsl"];
         /// Sums the counts.
         SortScan = "software_ray_query/kernels/sort_scan", ["job.glsl", "rank.glsl", "sort_scan.comp.glsl"];
-        /// Moves codes to where they belong.
+        /// Moves codes to their sorted positions.
         SortScatter = "software_ray_query/kernels/sort_scatter", ["job.glsl", "rank.glsl", "sort_scatter.comp.glsl"];
-        /// The hierarchy.
+        /// Builds the hierarchy.
         BuildTree = "software_ray_query/kernels/tree",
             ["job.glsl", "arrivals.glsl", "tree.glsl", "tree.comp.glsl"];
-        /// No child has arrived at any node.
+        /// Resets the arrival counters of nodes.
         ResetArrivals = "software_ray_query/kernels/arrivals", ["job.glsl", "arrivals.glsl", "arrivals.comp.glsl"];
-        /// Boxes of binary nodes, and better places for them.
+        /// Fits the bounds of binary nodes, and improves the tree by rotations.
         BuildImprove = "software_ray_query/kernels/improve",
             ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl",
              "arrivals.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "improve.comp.glsl"];
-        /// A level of wide nodes, of binary ones.
+        /// Collapses binary nodes to one level of wide nodes.
         Collapse = "software_ray_query/kernels/collapse",
             ["job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl", "node.glsl",
              "wide.glsl", "encode.glsl", "collapse.glsl", "collapse.comp.glsl"];
-        /// Everything of a bottom-level structure but its nodes.
+        /// Writes all parts of a BLAS except its nodes.
         Place = "software_ray_query/kernels/place",
             ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
              "arrivals.glsl", "node.glsl", "wide.glsl", "packed.glsl", "place.glsl",
              "place.comp.glsl"];
-        /// Boxes of wide nodes, where there was no room for those made of binary ones.
+        /// Fits the bounds of packed wide nodes, which replace collapsed nodes that did not fit.
         FitPacked = "software_ray_query/kernels/fit_packed",
             ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
              "arrivals.glsl", "node.glsl", "wide.glsl", "encode.glsl", "packed.glsl",
              "fit_wide.glsl", "fit_packed.comp.glsl"];
-        /// Boxes of binary nodes.
+        /// Fits the bounds of binary nodes.
         FitBinary = "software_ray_query/kernels/fit",
             ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
              "arrivals.glsl", "node.glsl", "no_rotation.glsl", "fit.glsl", "fit.comp.glsl"];
-        /// Boxes of wide nodes.
+        /// Fits the bounds of wide nodes.
         FitWide = "software_ray_query/kernels/fit_wide",
             ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
              "wide.glsl", "encode.glsl", "fit_wide.glsl", "fit_wide.comp.glsl"];
-        /// Primitives of leaves from inputs that moved.
+        /// Rewrites the primitives of leaves from moved inputs.
         RefitLeaves = "software_ray_query/kernels/refit",
             ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
              "arrivals.glsl", "wide.glsl", "refit.glsl", "refit.comp.glsl"];
-        /// The binary tree of a whole bottom-level structure by one workgroup.
+        /// Builds the binary tree of a whole BLAS by one workgroup.
         BuildSmallBlas = "software_ray_query/kernels/small_blas",
             ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "input.glsl",
              "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
              "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
              "small_blas.comp.glsl", "small.glsl"];
-        /// The rest of such a structure by one workgroup.
+        /// Builds the rest of such a BLAS by one workgroup.
         BuildSmallWide = "software_ray_query/kernels/small_wide",
             ["shared.glsl", "job.glsl", "box.glsl", "input.glsl", "leaf.glsl",
              "kept_any.glsl", "leaf_write.glsl", "arrivals.glsl", "node.glsl", "wide.glsl",
              "encode.glsl", "collapse.glsl", "packed.glsl", "place.glsl", "fit_wide.glsl",
              "meet.glsl", "small_wide.comp.glsl"];
-        /// A whole top-level structure by one workgroup.
+        /// Builds a whole TLAS by one workgroup.
         BuildSmallTlas = "software_ray_query/kernels/small_tlas",
             ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "instance.glsl",
              "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
@@ -139,7 +139,7 @@ pub(crate) struct GatherPushConstants {
     pub(crate) source: u64,
     pub(crate) gathered: u64,
     pub(crate) count: u32,
-    /// 0 no indices, 1 of 16 bits, 2 of 32 bits, 3 boxes.
+    /// 0: no indices, 1: 16-bit indices, 2: 32-bit indices, 3: AABBs.
     pub(crate) kind: u32,
     pub(crate) odd_half: u32,
     pub(crate) box_stride: u32,
@@ -160,11 +160,11 @@ pub(crate) struct InstancesPushConstants {
     pub(crate) entry_count: u32,
     pub(crate) user_count: u32,
     pub(crate) keep_active: u32,
-    /// Fills the block to the alignment of its addresses.
+    /// Pads the block to the alignment of its addresses.
     pub(crate) unused: u32,
 }
 
-/// The pipelines, each made when first needed.
+/// The pipelines of the kernels, each created at its first use.
 pub(crate) struct Kernels {
     pipelines: [Mutex<Option<Arc<ComputePipeline>>>; Kernel::ALL.len()],
 }
@@ -174,7 +174,7 @@ impl Kernels {
         Self { pipelines: [const { Mutex::new(Rank::Kernels, None) }; Kernel::ALL.len()] }
     }
 
-    /// The pipeline of a kernel.
+    /// Returns the pipeline of a kernel.
     pub(crate) fn pipeline_of(
         &self,
         gpu: &Arc<Gpu>,
@@ -215,13 +215,14 @@ impl Kernel {
     }
 }
 
-/// Workgroups along x and y for so many invocations; see [`spread_workgroups`].
+/// Returns the workgroup counts along x and y for `invocations`; see [`spread_workgroups`].
 pub(crate) fn workgroup_counts(invocations: u32) -> [u32; 3] {
     spread_workgroups(invocations.div_ceil(GROUP_SIZE))
 }
 
-/// At least so many workgroups, and one, along x and y, within what every device takes along an axis. The shader finds
-/// its number by both.
+/// Returns counts along x and y for at least `groups` workgroups, and at least one.
+///
+/// The counts are within the limit along an axis that every device supports. The shader computes its index from both.
 pub(crate) fn spread_workgroups(groups: u32) -> [u32; 3] {
     const MAX_GROUPS: u32 = 65_535;
     let groups = groups.max(1);
@@ -242,7 +243,7 @@ mod tests {
         }
     }
 
-    /// Compares the words of a file with its source, or writes them anew.
+    /// Compares the words of a file with its source, or rewrites them.
     #[cfg(feature = "glsl")]
     fn expect_words(path: &std::path::Path, text: &str) {
         let desc = ShaderModuleDesc {
@@ -262,7 +263,7 @@ mod tests {
         }
     }
 
-    /// `LVK_UPDATE_KERNELS=1 cargo test -p lvk kernel` writes the words anew.
+    /// `LVK_UPDATE_KERNELS=1 cargo test -p lvk kernel` rewrites the words.
     #[cfg(feature = "glsl")]
     #[test]
     fn the_words_are_those_of_the_source() {

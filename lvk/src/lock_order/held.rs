@@ -1,4 +1,4 @@
-//! What this thread holds, where debug assertions are on; nothing otherwise.
+//! Locks that the current thread holds. Tracked with debug assertions only.
 
 #[cfg(debug_assertions)]
 pub(super) use checked::*;
@@ -13,11 +13,11 @@ mod checked {
     use crate::lock_order::Rank;
 
     thread_local! {
-        // Without a destructor, so that objects of other thread-local variables can still be destroyed.
+        // The type has no destructor, so destructors of other thread-local variables can still take locks.
         static HELD: Cell<Ranks> = const { Cell::new(Ranks::NONE) };
     }
 
-    /// The place of one lock in the order.
+    /// The rank of one lock.
     #[derive(Debug, Clone, Copy)]
     pub(in crate::lock_order) struct LockPlace(Rank);
 
@@ -27,7 +27,7 @@ mod checked {
         }
     }
 
-    /// A set of ranks, a bit for each.
+    /// A set of ranks, one bit for each.
     #[derive(Clone, Copy, PartialEq, Eq)]
     pub(in crate::lock_order) struct Ranks(u64);
 
@@ -46,7 +46,7 @@ mod checked {
             Self(self.0 & !other.0)
         }
 
-        /// Whether a thread that has these may wait for another one.
+        /// True if a thread that holds these locks may wait for a lock of rank `next`.
         pub(in crate::lock_order) const fn may_take(self, next: Rank) -> bool {
             self.0 >> next.first_in_the_way() == 0
         }
@@ -58,7 +58,7 @@ mod checked {
         }
     }
 
-    /// A lock that this thread has, or waits for.
+    /// A lock that this thread holds or waits for.
     pub(in crate::lock_order) struct HeldLock(Ranks);
 
     impl HeldLock {
@@ -72,12 +72,12 @@ mod checked {
 
     impl Drop for HeldLock {
         fn drop(&mut self) {
-            // Guards need not go in the order in which they came.
+            // Guards may be dropped in any order.
             HELD.set(HELD.get().without(self.0));
         }
     }
 
-    /// What a thread holds that waits for others.
+    /// Locks held by a thread that waits for other threads.
     #[derive(Debug, Clone, Copy)]
     pub(in crate::lock_order) struct HeldLocks(Ranks);
 
@@ -86,13 +86,13 @@ mod checked {
             Self(HELD.get())
         }
 
-        /// As long as the answer lives, this thread is taken to hold it, too.
+        /// Treats the locks as held by this thread too, as long as the returned value lives.
         pub(in crate::lock_order) fn assume(self) -> Assumed {
             Assumed { before: HELD.replace(HELD.get().union(self.0)) }
         }
     }
 
-    /// Locks that somebody else holds.
+    /// Locks of a waiting thread, treated as held by the thread that works for it.
     pub(in crate::lock_order) struct Assumed {
         before: Ranks,
     }

@@ -1,9 +1,12 @@
-//! Locks that are taken in one order, so that no two threads ever wait for each other. Where debug assertions are on, each
-//! thread knows what it holds, and taking a lock out of order is an error: every test checks the order along its way.
-//! Otherwise these are the locks of the standard library, which are used nowhere else.
+//! Locks with a fixed order, which prevents deadlocks between threads.
 //!
-//! A `OnceLock` is a lock only while it is initialised. Those of the library are made of values that exist by then, or by a
-//! question to the driver, and so take no lock but that of [`Rank::ValidationMessages`]; keep it so.
+//! With debug assertions, each thread records the locks that it holds, and taking a lock out of order panics.
+//! So every test checks the order on its code path. Without debug assertions these are the locks of the
+//! standard library, which are used nowhere else.
+//!
+//! A `OnceLock` is a lock only during its initialisation. The library initialises them from values that
+//! already exist, or by a query to the driver. Their initialisation therefore takes no lock except that of
+//! [`Rank::ValidationMessages`], and this must stay so.
 
 #![expect(clippy::disallowed_types, reason = "everybody else is to use these")]
 
@@ -19,14 +22,14 @@ use held::{HeldLock, LockPlace};
 
 pub(crate) use rank::Rank;
 
-/// A mutex with a place in the order. A thread that panicked with it does not close it to others.
+/// A mutex with a rank in the lock order. It is not poisoned if a thread panics while it holds the lock.
 #[derive(Debug)]
 pub(crate) struct Mutex<T> {
     inner: std::sync::Mutex<T>,
     rank: LockPlace,
 }
 
-/// Access to what a [`Mutex`] holds.
+/// Access to the value of a [`Mutex`].
 pub(crate) struct Guard<'a, T> {
     inner: MutexGuard<'a, T>,
     _held: HeldLock,
@@ -44,7 +47,7 @@ impl<T> Mutex<T> {
         Guard { inner: self.inner.lock().unwrap_or_else(PoisonError::into_inner), _held }
     }
 
-    /// What nobody else can have.
+    /// Returns the value without locking, by unique access.
     pub(crate) fn get_mut(&mut self) -> &mut T {
         self.inner.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
@@ -66,21 +69,21 @@ impl<T> DerefMut for Guard<'_, T> {
     }
 }
 
-/// A lock for many readers or one writer, with a place in the order. A thread that panicked with it does not close it to
-/// others.
+/// A read-write lock with a rank in the lock order. It is not poisoned if a thread panics while it holds the
+/// lock.
 #[derive(Debug)]
 pub(crate) struct RwLock<T> {
     inner: std::sync::RwLock<T>,
     rank: LockPlace,
 }
 
-/// Shared access to what an [`RwLock`] holds.
+/// Shared access to the value of an [`RwLock`].
 pub(crate) struct ReadGuard<'a, T> {
     inner: RwLockReadGuard<'a, T>,
     _held: HeldLock,
 }
 
-/// Access to what an [`RwLock`] holds.
+/// Exclusive access to the value of an [`RwLock`].
 pub(crate) struct WriteGuard<'a, T> {
     inner: RwLockWriteGuard<'a, T>,
     _held: HeldLock,
@@ -91,14 +94,14 @@ impl<T> RwLock<T> {
         Self { inner: std::sync::RwLock::new(value), rank: LockPlace::new(rank) }
     }
 
-    /// Waits until nobody writes.
+    /// Waits until no thread holds the lock for writing.
     #[inline]
     pub(crate) fn read(&self) -> ReadGuard<'_, T> {
         let _held = HeldLock::new(self.rank);
         ReadGuard { inner: self.inner.read().unwrap_or_else(PoisonError::into_inner), _held }
     }
 
-    /// Waits until nobody reads or writes.
+    /// Waits until no thread holds the lock.
     #[inline]
     pub(crate) fn write(&self) -> WriteGuard<'_, T> {
         let _held = HeldLock::new(self.rank);
@@ -131,18 +134,18 @@ impl<T> DerefMut for WriteGuard<'_, T> {
     }
 }
 
-/// What a thread holds while it waits for threads that work for it: locks that these must not wait for.
+/// Locks held by a thread that waits for worker threads. The workers must not wait for these locks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HeldLocks(held::HeldLocks);
 
 impl HeldLocks {
-    /// Of this thread.
+    /// Returns the locks of the current thread.
     #[inline]
     pub(crate) fn of_current_thread() -> Self {
         Self(held::HeldLocks::of_current_thread())
     }
 
-    /// Works for the one who waits.
+    /// Runs `work` on behalf of the waiting thread.
     #[inline]
     pub(crate) fn run_with<R>(self, work: impl FnOnce() -> R) -> R {
         let _assumed = self.0.assume();
@@ -150,7 +153,7 @@ impl HeldLocks {
     }
 }
 
-/// Without the check, locks and guards are what they are made of.
+/// Without the check, locks and guards have the size of the standard types.
 #[cfg(not(debug_assertions))]
 const _: () = {
     use std::mem::{needs_drop, size_of};

@@ -1,81 +1,83 @@
 //! The order of all locks of the library.
 
-/// Which lock. Those down to [`AccelBlocks`](Self::AccelBlocks) have an order: while one is held, those further down may be
-/// taken. All others are leaves: under a leaf nothing is taken but [`ValidationMessages`](Self::ValidationMessages), which
-/// any call of Vulkan may take.
+/// Rank of a lock. The ranks down to [`AccelBlocks`](Self::AccelBlocks) are ordered: while a lock of one of
+/// them is held, locks of later ranks may be taken. All other ranks are leaves. While a leaf is held, no lock
+/// may be taken except [`ValidationMessages`](Self::ValidationMessages), which any Vulkan call may take.
 ///
-/// No lock is taken under itself or under another one of its rank, not even to read twice: a thread that waits to write
-/// would keep the second reader out, and that one would keep the first.
+/// No lock may be taken again by its holder, nor together with another lock of the same rank, not even for
+/// reading twice. A waiting writer would block the second read, while the first read blocks the writer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Rank {
-    /// A swapchain: taken first, as presenting submits.
+    /// A swapchain. It is taken first, because presenting submits.
+    #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only windows have swapchains"))]
     Swapchain,
-    /// Compactions under way: they record copies that run before the next submission.
+    /// Compactions in progress. They record copies that run before the next submission.
     Compactions,
-    /// What runs before the next submission.
+    /// Work that runs before the next submission.
     Pending,
-    /// What a top-level structure shows: whether that is outdated is known by the structures it refers to.
+    /// BLAS references of a TLAS. The referenced BLAS determine if these are outdated.
     TlasContents,
-    /// The scratch buffer of builds, which may be made anew.
+    /// The scratch buffer of builds, which may be recreated.
     Scratch,
-    /// States, command buffers and garbage of what is submitted.
+    /// Resource states, command buffers and garbage of submissions.
     Submitter,
-    /// The bindless set, written right before a submission.
+    /// The bindless set, which is written right before a submission.
     Bindless,
-    /// Memory that acceleration structures share: structures come and go under any lock above.
+    /// Memory shared by acceleration structures, which are created and destroyed under any lock above.
     AccelBlocks,
     /// Frames in flight. The first leaf.
     Frames,
-    /// Mapped buffers that nobody uses.
+    /// Mapped buffers that are not in use.
     SpareBuffers,
-    /// Which bytes of staging memory are taken.
+    /// Allocated ranges of staging memory.
     Staging,
     /// The objects of one kind, by handle.
     Store,
-    /// What changes in a bottom-level structure with builds and compaction.
+    /// State of a BLAS that builds and compaction change.
     BlasState,
-    /// How many builds the sizes of a compaction are of.
+    /// Number of builds that the queried compaction sizes belong to.
     SizeQuery,
     /// Inputs gathered for a part of a mesh.
     GatheredInputs,
-    /// Slots of top-level structures that are gone.
+    /// Descriptor slots of destroyed TLAS.
     FreedTlas,
     /// The views of a texture.
     Views,
-    /// Which queries of a pool are written.
+    /// Written queries of a query pool.
     QueryResetState,
     /// The bytes of a mapped buffer.
     BufferBytes,
-    /// A pipeline of the library's own, which is made under the lock.
+    /// A pipeline of the library, which is created under the lock.
     Kernels,
     /// The file of a pipeline cache.
     PipelineCacheFile,
     /// The folder of compiled shaders.
     ShaderCacheFolder,
-    /// What was measured.
+    /// Measurements of the profiler.
     Profiler,
-    /// Notes that no command buffer has.
-    SpareNotes,
-    /// What the device allows for images.
+    /// Unused recording states of command buffers.
+    RecordingStates,
+    /// Cached image limits of the device.
     ImageLimitCache,
-    /// Who has which bindless slot, where indices are checked.
+    /// Owners of the bindless slots, where indices are checked.
     SlotOwners,
-    /// Work that threads share.
+    /// Work shared between threads.
     SharedWork,
     /// A queue of the device.
     Queue,
     /// Device memory.
     Memory,
-    /// Devices that come and go, beside ray tracing pipelines that do: of a driver that locks up over them.
+    /// Creation and destruction of devices and ray tracing pipelines, on a driver that deadlocks if they are
+    /// concurrent.
     DeviceLifetime,
-    /// Messages of the validation layer, which come while Vulkan is called: under any other lock.
+    /// Messages of the validation layer, which arrive during Vulkan calls, under any other lock.
     ValidationMessages,
 }
 
 #[cfg(debug_assertions)]
 impl Rank {
-    /// All of them, in their order.
+    /// All ranks, in their order.
     pub(super) const ALL: [Self; 31] = [
         Self::Swapchain,
         Self::Compactions,
@@ -100,7 +102,7 @@ impl Rank {
         Self::PipelineCacheFile,
         Self::ShaderCacheFolder,
         Self::Profiler,
-        Self::SpareNotes,
+        Self::RecordingStates,
         Self::ImageLimitCache,
         Self::SlotOwners,
         Self::SharedWork,
@@ -113,7 +115,8 @@ impl Rank {
     const FIRST_LEAF: u8 = Self::Frames as u8;
     const LAST: u8 = Self::ValidationMessages as u8;
 
-    /// The first of those that keep this one from being taken: of leaves all.
+    /// Returns the lowest rank whose lock must not be held when this one is taken. For leaves this is the
+    /// first leaf.
     pub(super) const fn first_in_the_way(self) -> u8 {
         let own = self as u8;
         if own < Self::FIRST_LEAF || own == Self::LAST { own } else { Self::FIRST_LEAF }

@@ -1,4 +1,4 @@
-//! The order of locks, on real locks and on all schedules of made-up threads.
+//! Tests of the lock order, with real locks and with all schedules of simulated threads.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::held::Ranks;
 use super::*;
 
-/// How a lock is taken.
+/// Kind of lock operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Way {
     Lock,
@@ -18,13 +18,13 @@ enum Way {
 
 const WAYS: [Way; 3] = [Way::Lock, Way::Read, Way::Write];
 
-/// A lock of each kind, of one rank.
+/// One lock of each kind, all of one rank.
 struct Locks {
     mutex: Mutex<()>,
     shared: RwLock<()>,
 }
 
-/// Whichever guard there is.
+/// A guard of either lock.
 enum TakenLock<'a> {
     Lock { _guard: Guard<'a, ()> },
     Read { _guard: ReadGuard<'a, ()> },
@@ -45,7 +45,7 @@ impl Locks {
     }
 }
 
-/// What the check has to allow, as the documentation of [`Rank`] says it.
+/// Returns true if the documentation of [`Rank`] allows `second` after `first`.
 fn may_follow(first: Rank, second: Rank) -> bool {
     let is_leaf = |rank: Rank| rank as u8 >= Rank::Frames as u8;
     match second {
@@ -155,10 +155,10 @@ fn locks_are_free_of_the_check_where_a_thread_ends() {
     assert_eq!(Arc::strong_count(&locks), 1);
 }
 
-/// One step of a made-up thread: which lock it takes, and how.
+/// One step of a simulated thread: the index of the lock, and the operation.
 type LockStep = (usize, Way);
 
-/// What each thread is still to take and has. A writer that waits keeps readers out, as real locks may.
+/// Locks that each thread will take and holds. A waiting writer blocks readers, as real locks may do.
 struct Threads {
     wanted: Vec<Vec<LockStep>>,
     held: Vec<Vec<LockStep>>,
@@ -166,7 +166,7 @@ struct Threads {
 }
 
 impl Threads {
-    /// Lets a thread take its next lock, or give all back; `false` where it has to wait.
+    /// Lets a thread take its next lock, or release all locks at the end. Returns false if it has to wait.
     fn step(&mut self, thread: usize) -> bool {
         let Some(&next) = self.wanted[thread].get(self.held[thread].len()) else {
             self.held[thread].clear();
@@ -199,7 +199,7 @@ impl Threads {
     }
 }
 
-/// Whether the check lets a thread take all these, one under the other.
+/// True if the check lets a thread take all these locks, each while it holds the previous ones.
 fn is_allowed(list: &[LockStep]) -> bool {
     let mut held = Ranks::NONE;
     list.iter().all(|(place, _)| {
@@ -210,7 +210,7 @@ fn is_allowed(list: &[LockStep]) -> bool {
     })
 }
 
-/// Lists in which most pairs are in order, as those of random places hardly ever are.
+/// Generates lists in which most pairs are in order, which is rare for uniformly random indices.
 fn lists() -> impl Strategy<Value = Vec<Vec<LockStep>>> {
     let way = prop::sample::select(&WAYS[..]);
     let step = (0..Rank::ALL.len(), way);
@@ -225,7 +225,7 @@ fn lists() -> impl Strategy<Value = Vec<Vec<LockStep>>> {
 }
 
 proptest! {
-    /// Any schedule of threads whose every step the check allows comes to its end.
+    /// Any schedule of threads whose every step passes the check runs to its end.
     #[test]
     fn what_the_check_allows_never_stands_still(
         lists in lists(),
@@ -246,7 +246,7 @@ proptest! {
         }
     }
 
-    /// Real locks say the same as sets of ranks.
+    /// Real locks and sets of ranks give the same results.
     #[test]
     fn guards_and_sets_agree(list in lists().prop_map(|lists| lists.concat())) {
         let locks = Rank::ALL.map(Locks::new);

@@ -1,23 +1,23 @@
-//! How colours are combined with what is in a target, and which channels are written.
+//! Blending of colours into a target, and the mask of the channels that are written.
 
 use ash::vk;
 use bitflags::bitflags;
 
-/// What a colour is multiplied by before both are combined (`VkBlendFactor`). The source is what the fragment shader
-/// puts out, the target what is there.
+/// A factor that the source or target colour is multiplied by (`VkBlendFactor`). The source is the output of the
+/// fragment shader. The target is the value already in the colour target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum BlendFactor {
     /// 0.
     Zero,
     /// 1.
     One,
-    /// The source's own channels.
+    /// The source's channels.
     SrcColor,
-    /// 1 minus the source's own channels.
+    /// 1 minus the source's channels.
     OneMinusSrcColor,
-    /// The target's own channels.
+    /// The target's channels.
     DstColor,
-    /// 1 minus the target's own channels.
+    /// 1 minus the target's channels.
     OneMinusDstColor,
     /// The source's alpha.
     SrcAlpha,
@@ -29,22 +29,22 @@ pub enum BlendFactor {
     OneMinusDstAlpha,
     /// The channels of [`RenderPass::blend_constants`](crate::RenderPass::blend_constants).
     ConstantColor,
-    /// 1 minus those.
+    /// 1 minus the channels of [`RenderPass::blend_constants`](crate::RenderPass::blend_constants).
     OneMinusConstantColor,
     /// The alpha of [`RenderPass::blend_constants`](crate::RenderPass::blend_constants).
     ConstantAlpha,
-    /// 1 minus that.
+    /// 1 minus the alpha of [`RenderPass::blend_constants`](crate::RenderPass::blend_constants).
     OneMinusConstantAlpha,
-    /// The lesser of the source's alpha and 1 minus the target's; 1 for alpha.
+    /// The lesser of the source's alpha and 1 minus the target's alpha. For the alpha channel the factor is 1.
     SrcAlphaSaturate,
     /// The channels of the shader's second output, `layout(location = 0, index = 1)`
     /// ([`OptionalFeature::DualSourceBlend`](crate::OptionalFeature::DualSourceBlend)).
     Src1Color,
-    /// 1 minus those.
+    /// 1 minus the channels of the shader's second output.
     OneMinusSrc1Color,
-    /// The alpha of that output.
+    /// The alpha of the shader's second output.
     Src1Alpha,
-    /// 1 minus that.
+    /// 1 minus the alpha of the shader's second output.
     OneMinusSrc1Alpha,
 }
 
@@ -83,7 +83,7 @@ impl BlendFactor {
     }
 }
 
-/// How source and target are combined once they are multiplied (`VkBlendOp`).
+/// The operation that combines source and target after the multiplication by their factors (`VkBlendOp`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum BlendOp {
     /// Source + target.
@@ -93,9 +93,9 @@ pub enum BlendOp {
     Subtract,
     /// Target - source.
     ReverseSubtract,
-    /// The lesser; factors do not count.
+    /// The lesser of source and target. Factors are ignored.
     Min,
-    /// The greater; factors do not count.
+    /// The greater of source and target. Factors are ignored.
     Max,
 }
 
@@ -111,25 +111,25 @@ impl BlendOp {
     }
 }
 
-/// How some of the channels are combined: `source * factor op target * factor`.
+/// Blend equation of some of the channels: `source * factor op target * factor`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BlendComponent {
     /// Factor of the source.
     pub source: BlendFactor,
     /// Factor of the target.
     pub target: BlendFactor,
-    /// What is done with both.
+    /// Operation that combines both products.
     pub op: BlendOp,
 }
 
 impl BlendComponent {
-    /// The sum of both, multiplied by their factors.
+    /// Returns an equation that adds source and target, multiplied by their factors.
     pub const fn sum(source: BlendFactor, target: BlendFactor) -> Self {
         Self { source, target, op: BlendOp::Add }
     }
 }
 
-/// How a colour is combined with what is in the target.
+/// Blend equations of a colour target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Blend {
     /// Red, green and blue.
@@ -150,7 +150,7 @@ impl Blend {
     /// `source + target`.
     pub const ADDITIVE: Self = Self::both(BlendComponent::sum(BlendFactor::One, BlendFactor::One));
 
-    /// Colour and alpha alike.
+    /// Returns the same equation for colour and alpha.
     pub const fn both(part: BlendComponent) -> Self {
         Self { color: part, alpha: part }
     }
@@ -159,12 +159,12 @@ impl Blend {
         [self.color.source, self.color.target, self.alpha.source, self.alpha.target]
     }
 
-    /// Whether the fragment shader's second output counts.
+    /// True if a factor uses the fragment shader's second output.
     pub(super) fn is_dual_source(self) -> bool {
         self.factors().into_iter().any(BlendFactor::is_src1)
     }
 
-    /// Whether the pass's constants count.
+    /// True if a factor uses the blend constants of the pass.
     pub(super) fn uses_constants(self) -> bool {
         self.factors().into_iter().any(BlendFactor::is_constant)
     }
@@ -185,7 +185,7 @@ bitflags! {
     }
 }
 
-/// What Vulkan takes for one target. Vulkan's bits of channels are those of [`ColorWriteMask`].
+/// Returns Vulkan's blend state of one target. The bits of [`ColorWriteMask`] are those of `VkColorComponentFlags`.
 pub(super) fn blend_state(
     blend: Option<Blend>,
     write: ColorWriteMask,

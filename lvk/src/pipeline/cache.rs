@@ -1,4 +1,4 @@
-//! The pipeline cache of a context: compiled shaders, kept in a file from one run to the next.
+//! The pipeline cache of a context: compiled shaders, kept in a file between runs.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -12,20 +12,21 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
 
-/// The cache of a context that was given a file. Written and destroyed on drop.
+/// The pipeline cache of a context that has a cache file. The file is written and the cache destroyed on drop.
 pub(crate) struct PipelineCache {
     pub(crate) raw: vk::PipelineCache,
-    /// Bytes of compiled shaders the file had for this device and driver.
+    /// Bytes of compiled shaders that the file held for this device and driver.
     pub(crate) loaded_bytes: u64,
     path: PathBuf,
     owner: CacheOwner,
-    /// Checksum of the data in the file, as far as known. Held while the file is written.
+    /// Checksum of the data in the file, if known. The lock is held while the file is written.
     on_disk: Mutex<Option<u64>>,
     gpu: Arc<Gpu>,
 }
 
 impl PipelineCache {
-    /// Starts from the file. Where there is none, or it cannot be used, starts empty and says so to the `log` crate.
+    /// Creates the cache from the file. If the file is missing or unusable, the cache starts empty and a message goes
+    /// to the `log` crate.
     pub(crate) fn new(gpu: &Arc<Gpu>, path: &Path) -> Result<Self> {
         let owner = cache_owner(gpu);
         let file = read_if_present(path);
@@ -54,7 +55,7 @@ impl PipelineCache {
         self.write(true)
     }
 
-    /// Writes the file, unless it need not be and nothing is new.
+    /// Writes the file. Without `always`, an unchanged file is not written again.
     fn write(&self, always: bool) -> Result<()> {
         // SAFETY: the cache is alive.
         let data = unsafe { self.gpu.device.get_pipeline_cache_data(self.raw) }
@@ -78,12 +79,12 @@ impl Drop for PipelineCache {
         if let Err(error) = self.write(false) {
             log::warn!("{error}");
         }
-        // SAFETY: no pipeline is being created: everything that does holds the context.
+        // SAFETY: no pipeline is being created: every function that creates one holds the context.
         unsafe { self.gpu.device.destroy_pipeline_cache(self.raw, None) };
     }
 }
 
-/// The bytes of the file, if it can be read. A first run has none.
+/// Returns the bytes of the file if it can be read. At the first run there is no file.
 fn read_if_present(path: &Path) -> Option<Vec<u8>> {
     let error = match read_file(path, MAX_BYTES) {
         Ok(file) => return Some(file),
@@ -98,13 +99,13 @@ fn read_if_present(path: &Path) -> Option<Vec<u8>> {
     None
 }
 
-/// A cache that starts from `data`, or empty where the driver does not take it.
+/// Creates a cache from `data`, or an empty one if the driver rejects `data`.
 fn create_from<'a>(gpu: &Gpu, path: &Path, data: &'a [u8]) -> Result<(vk::PipelineCache, &'a [u8])> {
     match create_cache(gpu, data) {
         Ok(raw) => Ok((raw, data)),
         Err(result) if data.is_empty() => Err(Error::vulkan("vkCreatePipelineCache")(result)),
         Err(result) => {
-            log::warn!("the pipeline cache '{}' is dropped: the driver answers {result}", path.display());
+            log::warn!("the pipeline cache '{}' is dropped: the driver returns {result}", path.display());
             let raw = create_cache(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache"))?;
             Ok((raw, &[]))
         }

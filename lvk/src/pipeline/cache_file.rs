@@ -1,19 +1,19 @@
-//! The file that keeps compiled pipelines: who wrote it, and whether it is whole.
+//! The format of the pipeline cache file: its owner, its checksum and the data of Vulkan.
 
 use crate::cache_file::checksum;
 
-/// The device and the driver whose compiled shaders a file holds.
+/// The device and the driver that compiled the shaders of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct CacheOwner {
     pub(crate) vendor: u32,
     pub(crate) device: u32,
     pub(crate) driver_version: u32,
     pub(crate) driver_uuid: [u8; 16],
-    /// `pipelineCacheUUID`, which drivers change with the format of what they compile.
+    /// `pipelineCacheUUID`; drivers change it with the format of their compiled shaders.
     pub(crate) cache_uuid: [u8; 16],
 }
 
-/// Why a file is not used.
+/// The reason why a file is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum CacheRejection {
     #[error("it is no pipeline cache")]
@@ -30,14 +30,15 @@ pub(crate) enum CacheRejection {
 
 const MAGIC: [u8; 8] = *b"lvkpipes";
 const FORMAT: u32 = 1;
-/// Magic, format, driver version, driver UUID, length of Vulkan's data, checksum of everything else.
+/// Size of the header: magic, format, driver version, driver UUID, length of Vulkan's data, checksum of everything
+/// else.
 const HEADER_BYTES: usize = 48;
 const CHECKSUM_AT: usize = 40;
-/// `VkPipelineCacheHeaderVersionOne`: length, version, vendor, device, UUID.
+/// Size of `VkPipelineCacheHeaderVersionOne`: length, version, vendor, device, UUID.
 const VULKAN_HEADER_BYTES: usize = 32;
 const VULKAN_HEADER_VERSION: u32 = 1;
 
-/// The file for Vulkan's `data`.
+/// Returns the file that holds Vulkan's `data`.
 pub(crate) fn encode_file(owner: &CacheOwner, data: &[u8]) -> Vec<u8> {
     let mut file = Vec::with_capacity(HEADER_BYTES + data.len());
     file.extend(MAGIC);
@@ -51,7 +52,7 @@ pub(crate) fn encode_file(owner: &CacheOwner, data: &[u8]) -> Vec<u8> {
     file
 }
 
-/// Vulkan's data in a file that is whole and was written by `owner`.
+/// Returns Vulkan's data of a file that is complete and was written by `owner`.
 pub(crate) fn decode_file<'a>(owner: &CacheOwner, file: &'a [u8]) -> Result<&'a [u8], CacheRejection> {
     if !file.starts_with(&MAGIC) {
         return Err(CacheRejection::NoCache);
@@ -75,7 +76,8 @@ pub(crate) fn decode_file<'a>(owner: &CacheOwner, file: &'a [u8]) -> Result<&'a 
     Ok(data)
 }
 
-/// Fails unless the driver would take the data. It has to ignore foreign data by itself; not every driver does.
+/// Fails unless Vulkan's own header matches the driver. Drivers must ignore foreign data themselves, but not every
+/// driver does.
 fn check_vulkan_header(owner: &CacheOwner, data: &[u8]) -> Result<(), CacheRejection> {
     let Some(header) = data.get(..VULKAN_HEADER_BYTES) else { return Err(CacheRejection::Damaged) };
     let length = read_word(header, 0).map_or(0, |length| length as usize);
@@ -110,7 +112,7 @@ mod tests {
         cache_uuid: [9; 16],
     };
 
-    /// What a driver of `owner` would give, with `body` behind its header.
+    /// Returns cache data as a driver of `owner` writes it, with `body` after the header.
     fn data_of(owner: &CacheOwner, body: &[u8]) -> Vec<u8> {
         let words = [32, VULKAN_HEADER_VERSION, owner.vendor, owner.device];
         let header = words.iter().flat_map(|word| word.to_le_bytes()).chain(owner.cache_uuid);

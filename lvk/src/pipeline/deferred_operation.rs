@@ -1,4 +1,4 @@
-//! Compiles a ray tracing pipeline on all cores, by a deferred host operation of Vulkan.
+//! Compilation of a ray tracing pipeline on all cores, by a deferred host operation of Vulkan.
 
 use std::thread;
 
@@ -10,24 +10,24 @@ use crate::gpu::Gpu;
 use crate::gpu::start::driver_workarounds::with_shared_device_lock;
 use crate::parallel::{core_count, run_on_threads};
 
-/// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
-/// use for.
+/// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`). The number of threads is limited by the driver and by the
+/// cores of the machine.
 ///
 /// # Safety
-/// `info` is valid for the device, and `cache` is a cache of it or null.
+/// `info` is valid for the device, and `cache` is a cache of the device or null.
 pub(crate) unsafe fn compile(
     gpu: &Gpu,
     cache: vk::PipelineCache,
     info: &vk::RayTracingPipelineCreateInfoKHR<'_>,
 ) -> Result<vk::Pipeline> {
-    // NVIDIA's driver 580 crashes after deferring what has nothing to compile, only libraries to link.
+    // NVIDIA's driver 580 crashes after a deferred creation that compiles no shader and only links libraries.
     let operation = if info.stage_count > 0 { Some(DeferredOperation::new(gpu)?) } else { None };
     let deferred = operation.as_ref().map_or(vk::DeferredOperationKHR::null(), |operation| operation.raw);
     let ext = gpu.ray_tracing_functions()?;
     let create = ext.fp().create_ray_tracing_pipelines_khr;
     let mut raw = vk::Pipeline::null();
-    // SAFETY: the caller vouches for the description. It and `raw` stay where they are until the driver is done with
-    // them, since `finish` returns no sooner.
+    // SAFETY: the caller guarantees that the description is valid. The description and `raw` do not move until the
+    // driver is done with them, since `finish` returns no sooner.
     let mut start =
         || unsafe { create(ext.device(), deferred, cache, 1, info, std::ptr::null(), &raw mut raw) };
     let result = with_shared_device_lock(gpu.caps.driver_id, || match (start(), &operation) {
@@ -39,7 +39,7 @@ pub(crate) unsafe fn compile(
     Ok(raw)
 }
 
-/// A deferred operation, destroyed on drop. What was deferred to it must be finished by then.
+/// A deferred operation, destroyed on drop. The work deferred to it must be finished by then.
 struct DeferredOperation {
     raw: vk::DeferredOperationKHR,
     ext: Device,
@@ -54,7 +54,7 @@ impl DeferredOperation {
         Ok(Self { raw, ext })
     }
 
-    /// Does the work that was deferred, and answers what came of it.
+    /// Executes the deferred work and returns its result.
     fn finish(&self) -> vk::Result {
         // SAFETY: the operation is alive until `self` is dropped.
         let useful = unsafe { self.ext.get_deferred_operation_max_concurrency(self.raw) };
@@ -72,7 +72,7 @@ impl DeferredOperation {
 
 impl Drop for DeferredOperation {
     fn drop(&mut self) {
-        // SAFETY: nothing was deferred, or `finish` has seen its end.
+        // SAFETY: no work was deferred, or `finish` has waited for its end.
         unsafe { self.ext.destroy_deferred_operation(self.raw, None) };
     }
 }
@@ -81,10 +81,10 @@ fn result_code(outcome: Result<(), vk::Result>) -> vk::Result {
     outcome.err().unwrap_or(vk::Result::SUCCESS)
 }
 
-/// Joins an operation from `threads` threads, this one among them, until `result` answers something final.
+/// Joins an operation from `threads` threads, the calling thread included, until `result` returns a final code.
 ///
-/// A thread that cannot be started is done without. A join that fails, for lack of memory, is tried again: the driver
-/// still holds what the operation was given, so there is no way back before its end.
+/// A thread that cannot be started is left out. A join that fails for lack of memory is repeated: until the operation
+/// ends, the driver still holds its parameters, so the creation cannot be aborted.
 fn join_with_threads(
     threads: usize,
     join: &(impl Fn() -> vk::Result + Sync),
@@ -100,7 +100,7 @@ fn join_with_threads(
     }
 }
 
-/// Works on an operation until nothing is left for this thread.
+/// Works on an operation until there is no work left for this thread.
 fn join_until_done(join: &impl Fn() -> vk::Result) {
     while join() == vk::Result::THREAD_IDLE_KHR {
         thread::yield_now();
@@ -117,14 +117,14 @@ mod tests {
 
     use super::*;
 
-    /// A driver with `left` pieces of work, which hands out one for each join.
+    /// A test double of a driver with `left` pieces of work. Each join executes one piece.
     struct Driver {
         left: AtomicUsize,
         done: AtomicUsize,
         all: usize,
         workers: Mutex<HashSet<ThreadId>>,
         outcome: vk::Result,
-        /// Joins that fail before the first one works.
+        /// Number of joins that fail before the first one succeeds.
         failures: AtomicUsize,
     }
 

@@ -10,47 +10,47 @@ use crate::resource::sampler::CompareOp;
 pub struct DepthTest {
     /// Format of the depth target.
     pub format: Format,
-    /// A fragment passes if its depth compares so with the target's.
+    /// Comparison of the fragment's depth with the target's depth. A fragment passes if the comparison is true.
     pub compare: CompareOp,
-    /// Whether passing fragments write their depth.
+    /// True if passing fragments write their depth.
     pub write: bool,
 }
 
 impl DepthTest {
-    /// The part that a pass may replace.
+    /// Returns the state that a pass may replace.
     pub(crate) fn dynamic_state(&self) -> DepthState {
         DepthState { compare: self.compare, write: self.write }
     }
 }
 
-/// A depth test in place of the pipeline's own; see [`RenderPass::depth_state`](crate::RenderPass::depth_state).
+/// A depth test that replaces the pipeline's own; see [`RenderPass::depth_state`](crate::RenderPass::depth_state).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DepthState {
-    /// A fragment passes if its depth compares so with the target's.
+    /// Comparison of the fragment's depth with the target's depth. A fragment passes if the comparison is true.
     pub compare: CompareOp,
-    /// Whether passing fragments write their depth.
+    /// True if passing fragments write their depth.
     pub write: bool,
 }
 
-/// What becomes of a stencil value (`VkStencilOp`).
+/// An operation on a stencil value (`VkStencilOp`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum StencilOp {
-    /// It stays.
+    /// Keeps the value.
     #[default]
     Keep,
-    /// 0.
+    /// Sets 0.
     Zero,
-    /// The reference.
+    /// Sets the reference.
     Replace,
-    /// One more, at most 255.
+    /// Adds 1, up to 255.
     IncrementClamp,
-    /// One less, at least 0.
+    /// Subtracts 1, down to 0.
     DecrementClamp,
-    /// All bits inverted.
+    /// Inverts all bits.
     Invert,
-    /// One more, and 0 behind 255.
+    /// Adds 1; 255 becomes 0.
     IncrementWrap,
-    /// One less, and 255 behind 0.
+    /// Subtracts 1; 0 becomes 255.
     DecrementWrap,
 }
 
@@ -69,17 +69,17 @@ impl StencilOp {
     }
 }
 
-/// Stencil test of the faces of one side. The default passes and changes nothing.
+/// Stencil test of front or back faces. The default always passes and changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct StencilFace {
-    /// A fragment passes if the reference compares so with the target's value, both masked by
-    /// [`read_mask`](Self::read_mask).
+    /// Comparison of the reference with the target's value, both masked by [`read_mask`](Self::read_mask). A fragment
+    /// passes if the comparison is true.
     pub compare: CompareOp,
-    /// What becomes of the value where a fragment fails.
+    /// Operation if a fragment fails the stencil test.
     pub fail: StencilOp,
-    /// Where it passes here and fails the depth test.
+    /// Operation if a fragment passes the stencil test and fails the depth test.
     pub depth_fail: StencilOp,
-    /// Where it passes both.
+    /// Operation if a fragment passes both tests.
     pub pass: StencilOp,
     /// Bits that are compared.
     pub read_mask: u8,
@@ -119,29 +119,29 @@ impl StencilFace {
     }
 }
 
-/// Stencil test of a pipeline. The reference is that of
+/// Stencil test of a pipeline. The reference is
 /// [`RenderPass::stencil_reference`](crate::RenderPass::stencil_reference).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct StencilTest {
-    /// Of front faces, lines and points.
+    /// Test of front faces, lines and points.
     pub front: StencilFace,
-    /// Of back faces.
+    /// Test of back faces.
     pub back: StencilFace,
 }
 
 impl StencilTest {
-    /// Both sides alike.
+    /// Returns the same test for front and back faces.
     pub const fn both(face: StencilFace) -> Self {
         Self { front: face, back: face }
     }
 
-    /// Whether any value may change.
+    /// True if the test may change stencil values.
     pub(crate) fn writes(&self) -> bool {
         self.front.writes() || self.back.writes()
     }
 }
 
-/// What Vulkan takes for both tests.
+/// Returns Vulkan's state of both tests.
 pub(super) fn depth_stencil_state(
     depth: Option<DepthTest>,
     stencil: Option<StencilTest>,

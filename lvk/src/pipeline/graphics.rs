@@ -1,4 +1,4 @@
-//! Graphics pipelines, built of small steps.
+//! Graphics pipelines, created in small steps.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::gpu::caps::shading_rate::ShadingRate;
 
-/// Where a pipeline gets its primitives from, which decides how it is drawn.
+/// The source of a pipeline's primitives. It decides which draw commands the pipeline takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FrontEnd {
     /// A vertex shader: draws of vertices.
@@ -34,18 +34,18 @@ pub(crate) enum FrontEnd {
     TaskAndMesh,
 }
 
-/// The state that a pipeline leaves to the pass, which sets it when the pipeline is bound.
+/// The state that is not part of the pipeline. The pass sets it when the pipeline is bound.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PassState {
-    /// The pipeline tests depth, so by default.
+    /// Default depth state; `None` without a depth test.
     pub(crate) depth: Option<DepthState>,
-    /// It offsets depths, so by default.
+    /// Default depth bias; `None` without a depth bias.
     pub(crate) bias: Option<DepthBias>,
-    /// It tests stencil, against the pass's reference.
+    /// True if the pipeline tests stencil against the pass's reference.
     pub(crate) stencil: bool,
-    /// It blends with the pass's constants.
+    /// True if the pipeline blends with the pass's constants.
     pub(crate) blend_constants: bool,
-    /// Its fragments have a size, this by default.
+    /// Default shading rate; `None` for pipelines without a shading rate.
     pub(crate) shading_rate: Option<ShadingRate>,
 }
 
@@ -82,12 +82,12 @@ impl PassState {
 pub(crate) struct RenderPipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) push_constant_bytes: u32,
-    /// Stages in which rays are queried.
+    /// Stages that run ray queries.
     pub(crate) query_stages: Stages,
     pub(crate) front_end: FrontEnd,
     pub(crate) shape: RenderingFormats,
     pub(crate) pass_state: PassState,
-    /// Stencil values may change.
+    /// True if draws may change stencil values.
     pub(crate) writes_stencil: bool,
     pub(crate) vertex_binding_count: u32,
     /// Targets that the fragment shader reads.
@@ -189,7 +189,7 @@ fn create_pipeline(
     Ok(made.map_err(|(_, result)| Error::vulkan("vkCreateGraphicsPipelines")(result))?[0])
 }
 
-/// Pipelines with a rate draw in passes that have rates too.
+/// Returns the creation flags. Pipelines with a shading rate may be used in passes with a shading rate attachment.
 fn create_flags(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> vk::PipelineCreateFlags {
     let rates = desc.shading_rate.is_some() && gpu.caps.has(OptionalFeature::AttachmentShadingRate);
     match rates {
@@ -223,7 +223,7 @@ fn vertex_attributes(desc: &RenderPipelineDesc<'_>) -> Vec<vk::VertexInputAttrib
     desc.vertex_attributes.iter().map(raw).collect()
 }
 
-/// Targets that the shader puts nothing out for are left alone.
+/// Returns the blend state of each target. A target without an output of the fragment shader is not written.
 fn blend_states(
     desc: &RenderPipelineDesc<'_>,
     modules: &RenderModules,

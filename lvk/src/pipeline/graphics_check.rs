@@ -1,4 +1,4 @@
-//! Whether a graphics pipeline can be: its stages, targets and vertex input against each other and the device.
+//! Checks of a graphics pipeline: stages, targets and vertex input against each other and the device.
 
 use ash::vk;
 
@@ -16,7 +16,7 @@ use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::shader::{Primitive, ShaderStage};
 
-/// Fails unless the description names stages that go together.
+/// Fails unless the stages of the description can be combined.
 pub(super) fn check_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
     let name = desc.debug_name;
     let message = match (desc.vertex, desc.task, desc.mesh) {
@@ -67,7 +67,7 @@ fn check_optional_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()>
     }
 }
 
-/// Fails unless the modules are of their stages and everything fits the device.
+/// Fails unless each module has the right stage and the pipeline is within the limits of the device.
 pub(super) fn check_modules(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let name = desc.debug_name;
     let stages = [
@@ -147,7 +147,7 @@ fn task_memory(limits: &MeshLimits) -> WorkgroupMemoryLimits {
     }
 }
 
-/// A mesh workgroup has the payload of its task workgroup.
+/// Returns the memory limits of a mesh workgroup, which also holds the payload of its task workgroup.
 fn mesh_memory(limits: &MeshLimits) -> WorkgroupMemoryLimits {
     WorkgroupMemoryLimits {
         shared: limits.max_mesh_shared_bytes,
@@ -156,7 +156,7 @@ fn mesh_memory(limits: &MeshLimits) -> WorkgroupMemoryLimits {
     }
 }
 
-/// Fails unless the geometry shader takes the primitives that come to it.
+/// Fails unless the geometry shader takes the primitives of the stage before it.
 fn check_geometry(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let Some(geometry) = &modules.geometry else { return Ok(()) };
     let of_patches = || modules.tess_eval.as_ref().and_then(|eval| eval.reflection.primitive);
@@ -176,7 +176,7 @@ fn check_geometry(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Res
     Err(Error::usage(desc.debug_name, message))
 }
 
-/// Fails unless each location the vertex shader reads has an attribute, and no location has two.
+/// Fails unless each location that the vertex shader reads has exactly one attribute.
 fn check_locations(name: &str, desc: &RenderPipelineDesc<'_>, inputs: &[u32]) -> Result<()> {
     let mut given: Vec<u32> = desc.vertex_attributes.iter().map(|attribute| attribute.location).collect();
     given.sort_unstable();
@@ -193,7 +193,7 @@ fn check_locations(name: &str, desc: &RenderPipelineDesc<'_>, inputs: &[u32]) ->
     }
 }
 
-/// Fails unless the device fetches each format from where the attribute is.
+/// Fails unless the device can fetch each format at the offset and stride of its attribute.
 fn check_vertex_formats(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
     for attribute in desc.vertex_attributes {
         let (format, unit) = (attribute.format, attribute.format.component_bytes());
@@ -204,7 +204,7 @@ fn check_vertex_formats(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> 
         let stride = desc.vertex_bindings.get(attribute.binding as usize).map_or(0, |binding| binding.stride);
         if !stride.is_multiple_of(unit) || !attribute.offset.is_multiple_of(unit) {
             let message = format!(
-                "vertex attribute {} lies at {} of {stride} bytes, its components of {format:?} at multiples of {unit}",
+                "vertex attribute {} has the offset {} and the stride {stride}; {format:?} needs multiples of {unit} bytes",
                 attribute.location, attribute.offset
             );
             return Err(Error::usage(desc.debug_name, message));

@@ -1,4 +1,4 @@
-//! What a caller says about a graphics pipeline.
+//! Descriptions of graphics pipelines.
 
 use super::blend::{Blend, ColorWriteMask};
 use super::depth_stencil::{DepthTest, StencilTest};
@@ -9,12 +9,12 @@ use crate::format::{Format, VertexFormat};
 use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::handle::ShaderModuleHandle;
 
-/// A buffer slot of vertex attributes.
+/// A vertex buffer slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct VertexBinding {
-    /// From one vertex (or instance) to the next, in bytes.
+    /// Distance between consecutive vertices or instances, in bytes.
     pub stride: u32,
-    /// Advances once for each instance instead of each vertex.
+    /// True if the attributes advance once for each instance instead of each vertex.
     pub per_instance: bool,
 }
 
@@ -36,19 +36,19 @@ pub struct VertexAttribute {
 pub struct ColorTarget {
     /// Format of the target.
     pub format: Format,
-    /// How colours are combined; `None` replaces.
+    /// Blending of the output with the target; `None` replaces the target's value.
     pub blend: Option<Blend>,
     /// Channels that are written.
     pub write: ColorWriteMask,
 }
 
 impl ColorTarget {
-    /// Replaced in all channels.
+    /// Returns a target whose channels are all replaced.
     pub const fn new(format: Format) -> Self {
         Self { format, blend: None, write: ColorWriteMask::all() }
     }
 
-    /// Combined with what is there, in all channels.
+    /// Returns a target whose channels are all blended.
     pub const fn blended(format: Format, blend: Blend) -> Self {
         Self { format, blend: Some(blend), write: ColorWriteMask::all() }
     }
@@ -63,62 +63,64 @@ impl From<Format> for ColorTarget {
 /// Describes a graphics pipeline.
 #[derive(Debug, Clone, Copy)]
 pub struct RenderPipelineDesc<'a> {
-    /// The vertex shader; none where there is a mesh shader.
+    /// The vertex shader; `None` in pipelines with a mesh shader.
     pub vertex: Option<ShaderModuleHandle>,
-    /// Decides how many mesh workgroups run; only in front of a mesh shader, and optional there.
+    /// Task shader: decides how many mesh workgroups run. Optional, and only valid with a mesh shader.
     pub task: Option<ShaderModuleHandle>,
-    /// Makes vertices and primitives itself, in place of a vertex shader
+    /// Mesh shader: outputs vertices and primitives, in place of a vertex shader
     /// ([`Capabilities::mesh_shader`](crate::Capabilities::mesh_shader)).
     pub mesh: Option<ShaderModuleHandle>,
-    /// Tessellation control shader (hull): how finely each patch is divided. With an evaluation shader behind it, and
-    /// [`Topology::Patches`] ([`OptionalFeature::TessellationShader`](crate::OptionalFeature::TessellationShader)).
+    /// Tessellation control shader (hull): decides how finely each patch is divided. It needs an evaluation shader,
+    /// [`Topology::Patches`] and [`OptionalFeature::TessellationShader`](crate::OptionalFeature::TessellationShader).
     pub tess_control: Option<ShaderModuleHandle>,
-    /// Tessellation evaluation shader (domain): where the vertices of a divided patch are.
+    /// Tessellation evaluation shader (domain): computes the vertices of a divided patch.
     pub tess_eval: Option<ShaderModuleHandle>,
-    /// Geometry shader: primitives out of primitives
-    /// ([`OptionalFeature::GeometryShader`](crate::OptionalFeature::GeometryShader)).
+    /// Geometry shader: outputs primitives for each input primitive. Needs
+    /// [`OptionalFeature::GeometryShader`](crate::OptionalFeature::GeometryShader).
     pub geometry: Option<ShaderModuleHandle>,
-    /// The fragment shader; without one only depth and stencil are written.
+    /// The fragment shader; `None` writes only depth and stencil.
     pub fragment: Option<ShaderModuleHandle>,
-    /// What vertices make; a mesh shader says so itself.
+    /// Primitives that the vertices form; ignored with a mesh shader, which declares its own.
     pub topology: Topology,
-    /// Which faces are left out.
+    /// Faces that are culled.
     pub cull: CullMode,
-    /// Which winding is the front.
+    /// Winding of front faces.
     pub front_face: FrontFace,
-    /// What is drawn of triangles.
+    /// Rendered part of a triangle: its inside, its edges or its vertices.
     pub polygon: PolygonMode,
-    /// Width of lines in pixels, within [`Limits::line_width`](crate::Limits::line_width); all but 1 need
+    /// Width of lines in pixels, within [`Limits::line_width`](crate::Limits::line_width). Any other width than 1 needs
     /// [`OptionalFeature::WideLines`](crate::OptionalFeature::WideLines).
     pub line_width: f32,
-    /// Offset of the depths of triangles, which [`RenderPass::depth_bias`](crate::RenderPass::depth_bias) may replace;
-    /// `None` for none.
+    /// Offset of the depths of triangles; `None` for no offset.
+    /// [`RenderPass::depth_bias`](crate::RenderPass::depth_bias) may replace it.
     pub depth_bias: Option<DepthBias>,
-    /// Depths beyond the viewport's range are clamped to it in place of clipped
-    /// ([`OptionalFeature::DepthClamp`](crate::OptionalFeature::DepthClamp)).
+    /// True if depths beyond the viewport's range are clamped to it instead of clipped. Needs
+    /// [`OptionalFeature::DepthClamp`](crate::OptionalFeature::DepthClamp).
     pub depth_clamp: bool,
-    /// Vertex buffers; empty when the shader pulls its vertices by address.
+    /// Vertex buffers; empty if the shader reads its vertices by address.
     pub vertex_bindings: &'a [VertexBinding],
     /// Attributes read from the vertex buffers.
     pub vertex_attributes: &'a [VertexAttribute],
-    /// Colour targets, in the order of the shader's outputs. Those it has no output for are left as they are.
+    /// Colour targets, in the order of the shader's outputs. Targets without an output are not changed.
     pub color: &'a [ColorTarget],
     /// Depth test; `None` draws without depth.
     pub depth: Option<DepthTest>,
-    /// Stencil test; `None` draws without stencil. The format of [`depth`](Self::depth) has to hold stencil.
+    /// Stencil test; `None` draws without stencil. The format of [`depth`](Self::depth) must contain stencil.
     pub stencil: Option<StencilTest>,
-    /// Samples a pixel, as the targets have them ([`TextureDesc::samples`](crate::TextureDesc::samples)).
+    /// Number of samples per pixel; equals that of the targets ([`TextureDesc::samples`](crate::TextureDesc::samples)).
     pub samples: u32,
-    /// The alpha of the first output decides how many of a pixel's samples are covered.
+    /// True if the alpha of the first output decides how many of a pixel's samples are covered.
     pub alpha_to_coverage: bool,
-    /// The fragment shader runs for at least this part of a pixel's samples, 0 to 1; for each sample where it reads
-    /// `gl_SampleID`. All but 0 need [`OptionalFeature::SampleRateShading`](crate::OptionalFeature::SampleRateShading).
+    /// Minimum fraction of a pixel's samples for which the fragment shader runs, 0 to 1. A shader that reads
+    /// `gl_SampleID` runs for each sample. Any other value than 0 needs
+    /// [`OptionalFeature::SampleRateShading`](crate::OptionalFeature::SampleRateShading).
     pub sample_shading: f32,
-    /// Views that each draw makes at once, a bit for each, as the pass has them
-    /// ([`RenderPassDesc::view_mask`](crate::RenderPassDesc::view_mask)); 0 for one picture.
+    /// Bit mask of the views that each draw renders; 0 without multiview. Must equal
+    /// [`RenderPassDesc::view_mask`](crate::RenderPassDesc::view_mask).
     pub view_mask: u32,
-    /// How many pixels a fragment covers, which [`RenderPass::shading_rate`](crate::RenderPass::shading_rate) may replace;
-    /// `None` for one, and for passes without [`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate). Needs
+    /// Pixels that a fragment covers; `None` for one pixel.
+    /// [`RenderPass::shading_rate`](crate::RenderPass::shading_rate) may replace it. Passes with
+    /// [`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate) do not take pipelines with `None`. Needs
     /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
     pub shading_rate: Option<ShadingRate>,
     /// Values of specialization constants.
@@ -128,7 +130,7 @@ pub struct RenderPipelineDesc<'a> {
 }
 
 impl RenderPipelineDesc<'_> {
-    /// What its passes have to be like.
+    /// Returns the formats, samples and views that a pass must have to use the pipeline.
     pub(super) fn rendering_formats(&self) -> RenderingFormats {
         let colors = self.color.iter().map(|target| target.format);
         RenderingFormats::new(colors, self.depth.map(|depth| depth.format), self.samples, self.view_mask)

@@ -1,4 +1,4 @@
-//! What a graphics pipeline reads and writes of the targets of its passes.
+//! Targets of a pass that a graphics pipeline reads and writes.
 
 use ash::vk;
 
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::format::{Format, NumericFormat};
 use crate::shader::InputRead;
 
-/// Fails unless the pipeline has the targets that its fragment shader reads, as it reads them.
+/// Fails unless the pipeline has each target that its fragment shader reads, with the type that the shader declares.
 pub(super) fn check_inputs(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let Some(fragment) = &modules.fragment else { return Ok(()) };
     let colors: Vec<Format> = desc.color.iter().map(|target| target.format).collect();
@@ -28,7 +28,7 @@ pub(super) fn check_inputs(desc: &RenderPipelineDesc<'_>, modules: &RenderModule
     })
 }
 
-/// What a pipeline says of the targets of its passes.
+/// Targets of a pipeline, as far as reads of input attachments depend on them.
 struct InputTargets<'a> {
     colors: &'a [Format],
     depth: Option<Format>,
@@ -56,7 +56,7 @@ impl InputTargets<'_> {
         if written { Err(READS_WRITTEN.to_owned()) } else { Ok(()) }
     }
 
-    /// How shaders read the target.
+    /// Returns the numeric format that shaders must use to read the target.
     fn numeric_format(&self, input: InputAttachment) -> Result<NumericFormat, String> {
         let lacking = |what: &str| format!("but it draws to {what}");
         let depth = self.depth.ok_or_else(|| lacking("no depth target"));
@@ -74,7 +74,8 @@ impl InputTargets<'_> {
     }
 }
 
-/// Depth tests run before or beside fragments, so that nobody could say what they read.
+/// End of the error message for a target that is read and written. Depth tests run before or while fragments are
+/// shaded, so the value of such a read is undefined.
 pub(crate) const READS_WRITTEN: &str = "which the pipeline also writes; turn the writes off";
 
 fn subpass_input(numbers: NumericFormat) -> &'static str {
@@ -85,13 +86,13 @@ fn subpass_input(numbers: NumericFormat) -> &'static str {
     }
 }
 
-/// The targets that the fragment shader reads.
+/// Returns the targets that the fragment shader reads.
 pub(super) fn inputs_read(modules: &RenderModules) -> InputAttachmentMask {
     let fragment = modules.fragment.iter();
     fragment.flat_map(|module| module.reflection.input_reads.iter().map(|read| read.input)).collect()
 }
 
-/// The targets that draws may change.
+/// Returns the targets that draws may change.
 pub(super) fn inputs_written(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> InputAttachmentMask {
     let colors = (0..).zip(desc.color).filter(|(place, target)| writes_color(modules, *place, target));
     let depth = desc.depth.filter(|depth| depth.write).map(|_| InputAttachment::Depth);
@@ -99,14 +100,14 @@ pub(super) fn inputs_written(desc: &RenderPipelineDesc<'_>, modules: &RenderModu
     colors.map(|(place, _)| InputAttachment::Color(place)).chain(depth).chain(stencil).collect()
 }
 
-/// Whether draws may change the colour target: where the shader puts nothing out, Vulkan leaves open what would be written.
+/// True if draws may change the colour target. Vulkan leaves undefined what is written to a target without an output.
 pub(super) fn writes_color(modules: &RenderModules, place: u32, target: &ColorTarget) -> bool {
     let puts_out = |outputs: u32| outputs & 1_u32.checked_shl(place).unwrap_or(0) != 0;
     !target.write.is_empty()
         && modules.fragment.as_ref().is_some_and(|module| puts_out(module.reflection.outputs))
 }
 
-/// Where shaders find the targets that they read: at the library's places, or at Vulkan's own.
+/// Input attachment indices of the targets, by which shaders read them.
 #[derive(Debug)]
 pub(crate) struct InputIndices {
     colors: Vec<u32>,
@@ -115,7 +116,8 @@ pub(crate) struct InputIndices {
 }
 
 impl InputIndices {
-    /// For pipelines that read targets, and passes with so many colour targets, on devices with `limit` places.
+    /// Returns the library's indices, for pipelines that read targets and passes with `colors` colour targets. `limit`
+    /// is the number of input attachments of the device.
     pub(crate) fn new(colors: u32, limit: u32) -> Self {
         let within = |input: InputAttachment| {
             let place = input.index();
@@ -128,7 +130,7 @@ impl InputIndices {
         }
     }
 
-    /// The same for Vulkan.
+    /// Returns the indices in Vulkan's form.
     pub(crate) fn raw(&self) -> vk::RenderingInputAttachmentIndexInfoKHR<'_> {
         vk::RenderingInputAttachmentIndexInfoKHR::default()
             .color_attachment_input_indices(&self.colors)
@@ -137,7 +139,8 @@ impl InputIndices {
     }
 }
 
-/// What Vulkan takes for pipelines that say nothing: colours at their numbers, depth and stencil nowhere.
+/// Returns Vulkan's default for pipelines without explicit indices: colour targets by number, depth and stencil without
+/// index.
 pub(crate) fn default_indices(colors: u32) -> vk::RenderingInputAttachmentIndexInfoKHR<'static> {
     vk::RenderingInputAttachmentIndexInfoKHR { color_attachment_count: colors, ..Default::default() }
 }

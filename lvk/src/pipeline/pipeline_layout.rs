@@ -1,7 +1,7 @@
 //! The one pipeline layout: the bindless set, the set of a pass's own targets, and push constants for every stage.
 //!
-//! Because all pipelines share it, the bindless set is bound once for each bind point of a command buffer, and push constants
-//! survive a change of pipeline.
+//! All pipelines share this layout. Therefore the bindless set is bound once for each bind point of a command buffer,
+//! and push constants survive a change of pipeline.
 
 use std::sync::Arc;
 
@@ -11,11 +11,11 @@ use crate::bindless::input_attachments::InputAttachmentLayout;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
-/// What every pipeline is made with.
+/// Objects that the creation of every pipeline needs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PipelineBase {
     pub(crate) layout: vk::PipelineLayout,
-    /// Of compiled shaders; null where the context keeps none.
+    /// The pipeline cache; null if the context has none.
     pub(crate) cache: vk::PipelineCache,
 }
 
@@ -23,13 +23,13 @@ pub(crate) struct PipelineBase {
 pub(crate) struct PipelineLayout {
     pub(crate) raw: vk::PipelineLayout,
     pub(crate) push_constant_bytes: u32,
-    /// Of the second set; none on devices whose shaders cannot read what their pass draws.
+    /// Layout of the second set; `None` on devices whose shaders cannot read the targets of their pass.
     pub(crate) inputs: Option<InputAttachmentLayout>,
     gpu: Arc<Gpu>,
 }
 
 impl PipelineLayout {
-    /// Vulkan promises 128 bytes of push constants; more than this is not used.
+    /// Upper limit of push constants. Vulkan guarantees 128 bytes; the library uses at most this many.
     const MAX_PUSH_CONSTANT_BYTES: u32 = 256;
 
     pub(crate) fn new(gpu: &Arc<Gpu>, set: vk::DescriptorSetLayout) -> Result<Self> {

@@ -1,26 +1,26 @@
-//! From primitives to fragments: topology, faces, polygon modes, depth bias, samples.
+//! Topology, faces, polygon modes and depth bias of graphics pipelines.
 
 use ash::vk;
 
 use crate::shader::Primitive;
 
-/// What vertices make.
+/// Primitives that vertices form (`VkPrimitiveTopology`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Topology {
     /// Points.
     Points,
-    /// Every two vertices are a line.
+    /// Every two vertices form a line.
     Lines,
     /// Each vertex continues the line.
     LineStrip,
-    /// Every three vertices are a triangle.
+    /// Every three vertices form a triangle.
     #[default]
     Triangles,
-    /// Each vertex makes a triangle with the two before.
+    /// Each vertex forms a triangle with the previous two.
     TriangleStrip,
-    /// Each vertex makes a triangle with the one before and the first.
+    /// Each vertex forms a triangle with the previous one and the first.
     TriangleFan,
-    /// So many vertices at a time are a patch, for the tessellation stages; 1 to
+    /// Every `points` vertices form a patch, for the tessellation stages; 1 to
     /// [`Limits::max_patch_points`](crate::Limits::max_patch_points).
     Patches {
         /// Vertices of a patch.
@@ -41,7 +41,7 @@ impl Topology {
         }
     }
 
-    /// What its vertices make; `None` for patches, whose shader decides.
+    /// Returns the primitive that the vertices form; `None` for patches, whose shader decides.
     pub(super) fn primitive(self) -> Option<Primitive> {
         match self {
             Self::Points => Some(Primitive::Points),
@@ -51,25 +51,25 @@ impl Topology {
         }
     }
 
-    /// Vertices of a patch; 0 for all else.
+    /// Returns the number of vertices of a patch; 0 for all other topologies.
     pub(super) fn patch_points(self) -> u32 {
         if let Self::Patches { points } = self { points } else { 0 }
     }
 }
 
-/// Which faces are left out.
+/// Faces that are culled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum CullMode {
     /// Both faces are drawn.
     #[default]
     None,
-    /// Front faces are left out.
+    /// Front faces are culled.
     Front,
-    /// Back faces are left out.
+    /// Back faces are culled.
     Back,
 }
 
-/// Which winding is the front, as seen in Vulkan's clip space (y down).
+/// Winding of front faces, as seen in Vulkan's clip space (y down).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum FrontFace {
     /// Counter-clockwise.
@@ -79,34 +79,34 @@ pub enum FrontFace {
     Clockwise,
 }
 
-/// What is drawn of a triangle (`VkPolygonMode`); all but
-/// [`Fill`](Self::Fill) need [`OptionalFeature::FillModeNonSolid`](crate::OptionalFeature::FillModeNonSolid).
+/// Rendered part of a triangle (`VkPolygonMode`). All but [`Fill`](Self::Fill) need
+/// [`OptionalFeature::FillModeNonSolid`](crate::OptionalFeature::FillModeNonSolid).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum PolygonMode {
-    /// Its inside.
+    /// The inside.
     #[default]
     Fill,
-    /// Its edges.
+    /// The edges.
     Line,
-    /// Its corners.
+    /// The vertices.
     Point,
 }
 
-/// An offset of the depths of triangles: `constant * r + slope * m`, with the least difference `r` that the depth target
-/// resolves and the greatest slope `m` of the triangle's depth over a pixel.
+/// An offset of the depths of triangles: `constant * r + slope * m`. `r` is the least difference that the depth target
+/// resolves. `m` is the greatest slope of the triangle's depth over a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DepthBias {
-    /// Factor of the least difference.
+    /// Factor of the least difference `r`.
     pub constant: f32,
-    /// Factor of the slope.
+    /// Factor of the slope `m`.
     pub slope: f32,
-    /// Greatest offset, or least where it is negative; 0 for no bound. Any other needs
+    /// Greatest offset, or the least offset if negative; 0 for no limit. Any other value than 0 needs
     /// [`OptionalFeature::DepthBiasClamp`](crate::OptionalFeature::DepthBiasClamp).
     pub clamp: f32,
 }
 
 impl DepthBias {
-    /// Whether each part is a number.
+    /// True if all values are finite.
     pub(crate) fn is_finite(&self) -> bool {
         [self.constant, self.slope, self.clamp].iter().all(|part| part.is_finite())
     }

@@ -1,11 +1,11 @@
-//! Rasterization and multisample state of a graphics pipeline for Vulkan.
+//! Rasterization and multisample state of a graphics pipeline in Vulkan's form.
 
 use ash::vk;
 
 use super::graphics_desc::RenderPipelineDesc;
 use super::rasterization::{CullMode, FrontFace, PolygonMode};
 
-/// Rasterization state of a pipeline for Vulkan.
+/// Returns Vulkan's rasterization state of a pipeline.
 pub(super) fn rasterization(
     desc: &RenderPipelineDesc<'_>,
 ) -> vk::PipelineRasterizationStateCreateInfo<'static> {
@@ -32,7 +32,7 @@ pub(super) fn rasterization(
         .depth_bias_enable(desc.depth_bias.is_some())
 }
 
-/// Multisample state of a pipeline for Vulkan. A number of samples is its own bit.
+/// Returns Vulkan's multisample state of a pipeline. The value of a `VkSampleCountFlagBits` is its number of samples.
 pub(super) fn multisampling(
     desc: &RenderPipelineDesc<'_>,
 ) -> vk::PipelineMultisampleStateCreateInfo<'static> {

@@ -25,18 +25,18 @@ use crate::shader::ShaderStage;
 pub(crate) struct RayTracingPipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) push_constant_bytes: u32,
-    /// What a trace needs for each ray.
+    /// Stack size of one ray, in bytes.
     pub(crate) stack_bytes: u32,
     pub(crate) name: Arc<str>,
     pub(crate) table: Arc<Buffer>,
     _libraries: Vec<Arc<RayTracingLibrary>>,
     plan: SbtPlan,
-    /// Address of the first region: the table's, rounded up.
+    /// Address of the first region: the address of the table's buffer, rounded up to the base alignment.
     base: u64,
     gpu: Arc<Gpu>,
 }
 
-/// What a trace passes to Vulkan.
+/// Regions of the shader binding table that a trace passes to Vulkan.
 pub(crate) struct TraceRegions {
     pub(crate) ray_gen: vk::StridedDeviceAddressRegionKHR,
     pub(crate) miss: vk::StridedDeviceAddressRegionKHR,
@@ -44,14 +44,14 @@ pub(crate) struct TraceRegions {
     pub(crate) callable: vk::StridedDeviceAddressRegionKHR,
 }
 
-/// The bytes to put into a new pipeline's table, and where.
+/// Contents of a new pipeline's shader binding table, and their offset in the buffer.
 pub(crate) struct SbtContents {
     pub(crate) offset: u64,
     pub(crate) bytes: Vec<u8>,
 }
 
 impl RayTracingPipeline {
-    /// Makes the pipeline; the caller uploads the table's contents.
+    /// Creates the pipeline. The caller uploads the contents of the shader binding table.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         base: PipelineBase,
@@ -107,7 +107,7 @@ impl RayTracingPipeline {
 
     fn handles(&self, group_count: u32, handle_bytes: u32) -> Result<Vec<u8>> {
         let bytes = group_count as usize * handle_bytes as usize;
-        // SAFETY: the pipeline has these groups and the size is theirs.
+        // SAFETY: the pipeline has these groups, and the size is that of their handles.
         unsafe {
             self.gpu.ray_tracing_functions()?.get_ray_tracing_shader_group_handles(
                 self.raw,
@@ -119,7 +119,7 @@ impl RayTracingPipeline {
         .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR"))
     }
 
-    /// The table as a trace from ray generation shader `index` sees it.
+    /// Returns the regions of the shader binding table for a trace from ray generation shader `index`.
     pub(crate) fn trace_regions(&self, index: u32) -> Result<TraceRegions> {
         let region = |region: &SbtRegion| vk::StridedDeviceAddressRegionKHR {
             device_address: if region.size == 0 { 0 } else { self.base + region.offset },
@@ -155,7 +155,7 @@ fn linked_libraries(libraries: &[Arc<RayTracingLibrary>]) -> LinkedLibraries {
     }
 }
 
-/// The records of all parts of a pipeline, as its table has them.
+/// Returns the shader records of all parts of a pipeline, in the order of the shader binding table.
 fn linked_records<'a>(parts: &[&'a CompiledGroups]) -> PerRegion<Vec<&'a [u8]>> {
     let of = |region: fn(&CompiledGroups) -> &Vec<Box<[u8]>>| {
         parts.iter().flat_map(|part| region(part)).map(|record| &**record).collect()
@@ -168,7 +168,7 @@ fn linked_records<'a>(parts: &[&'a CompiledGroups]) -> PerRegion<Vec<&'a [u8]>> 
     }
 }
 
-/// What every shader of the pipeline needs; asks of no shader that a group does not have.
+/// Returns the largest stack size of each kind of shader. Only shaders that a group contains are queried.
 fn stack_sizes(
     ext: &ash::khr::ray_tracing_pipeline::Device,
     pipeline: vk::Pipeline,

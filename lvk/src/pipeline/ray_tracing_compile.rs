@@ -1,4 +1,4 @@
-//! Compiles shader groups to a ray tracing pipeline or to a library.
+//! Compilation of shader groups to a ray tracing pipeline or to a library.
 
 use std::sync::Arc;
 
@@ -17,11 +17,11 @@ use crate::gpu::Gpu;
 #[derive(Default)]
 pub(super) struct LinkedLibraries {
     pub(super) raw: Vec<vk::Pipeline>,
-    /// A ray generation shader of one of them.
+    /// A ray generation shader of one of the libraries.
     pub(super) ray_gen: Option<Arc<ShaderModule>>,
 }
 
-/// Fails unless the device takes the depth of recursion, and what libraries have to agree on.
+/// Fails unless the device supports the recursion depth and the interface that libraries must agree on.
 pub(super) fn check_interface(gpu: &Gpu, desc: &RayTracingPipelineDesc<'_>) -> Result<()> {
     let (name, limits) = (desc.debug_name, &gpu.caps.limits);
     if desc.max_recursion == 0 {
@@ -32,7 +32,7 @@ pub(super) fn check_interface(gpu: &Gpu, desc: &RayTracingPipelineDesc<'_>) -> R
     check_limit(name, "hit attributes in bytes", attributes, limits.max_hit_attribute_bytes.into())
 }
 
-/// Compiles groups as a pipeline that is linked with `libraries`, or as a library, as `flags` say.
+/// Compiles groups as a pipeline that is linked with `libraries`, or as a library, depending on `flags`.
 pub(super) fn compile_groups(
     gpu: &Gpu,
     base: PipelineBase,
@@ -64,13 +64,13 @@ pub(super) fn compile_groups(
         groups.check_sizes(desc)?;
         info = info.library_info(&linked).library_interface(&interface);
     }
-    // SAFETY: modules, layout and libraries are alive, the recursion depth is within the limit, and the libraries
-    // were made with the same layout and agree on the interface.
+    // SAFETY: modules, layout and libraries are alive, the recursion depth is within the limit, and the libraries were
+    // created with the same layout and agree on the interface.
     unsafe { compile(gpu, base.cache, &info) }
 }
 
-/// A stage in no group, for lavapipe: it hands push constants only to pipelines that were given a ray generation shader
-/// outside of their libraries.
+/// Returns a stage that is part of no group, for lavapipe. It passes push constants only to pipelines that have a ray
+/// generation shader outside of their libraries.
 fn placeholder_stage(
     gpu: &Gpu,
     groups: &ShaderGroups,

@@ -3,23 +3,23 @@
 use super::stage::SpecializationConstant;
 use crate::handle::{RayTracingLibraryHandle, ShaderModuleHandle};
 
-/// Shaders that run when a ray meets a geometry. With an intersection shader the group is for boxes, without for
-/// triangles.
+/// Shaders that run when a ray meets a geometry. A group with an intersection shader is for AABBs; a group without one
+/// is for triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HitGroup<'a> {
-    /// Runs for the closest hit.
+    /// Shader of the closest hit.
     pub closest_hit: Option<ShaderModuleHandle>,
-    /// Runs for hits of geometry that is not opaque, and may ignore them.
+    /// Shader of each hit of geometry that is not opaque. It may ignore the hit.
     pub any_hit: Option<ShaderModuleHandle>,
-    /// Decides whether a ray hits what is in a box.
+    /// Shader that decides whether a ray hits the object inside an AABB.
     pub intersection: Option<ShaderModuleHandle>,
-    /// Bytes the group's shaders read through `shaderRecordEXT`; see [`record_bytes`].
+    /// Bytes that the group's shaders read through `shaderRecordEXT`; see [`record_bytes`].
     pub record: &'a [u8],
 }
 
-/// The bytes of a shader record: what a shader reads as a block `layout(shaderRecordEXT, scalar) buffer`.
+/// Returns the bytes of a shader record. Shaders read them as a block `layout(shaderRecordEXT, scalar) buffer`.
 ///
-/// The struct must be laid out as the block: `#[repr(C)]` and `scalar` agree where every member is aligned to its
+/// The struct must have the layout of the block: `#[repr(C)]` and `scalar` agree if every member is aligned to its
 /// largest scalar.
 pub fn record_bytes<T: bytemuck::NoUninit>(record: &T) -> &[u8] {
     bytemuck::bytes_of(record)
@@ -27,11 +27,11 @@ pub fn record_bytes<T: bytemuck::NoUninit>(record: &T) -> &[u8] {
 
 /// Describes a ray tracing pipeline. The order of the lists is the order of the shader binding table.
 ///
-/// The shaders of `libraries` stand behind the pipeline's own in each of the four lists, library by library: with two
-/// own miss shaders, the first miss shader of the first library has the miss index 2.
+/// The shaders of `libraries` follow the pipeline's own in each of the four lists, library by library. With two own
+/// miss shaders, the first miss shader of the first library has the miss index 2.
 #[derive(Debug, Clone, Copy)]
 pub struct RayTracingPipelineDesc<'a> {
-    /// Ray generation shaders; traces name one by its place, the first by default. At least one.
+    /// Ray generation shaders, at least one. A trace selects one by its index; the default is the first.
     pub ray_gen: &'a [ShaderModuleHandle],
     /// Miss shaders, by the miss index of `traceRayEXT`.
     pub miss: &'a [ShaderModuleHandle],
@@ -39,25 +39,26 @@ pub struct RayTracingPipelineDesc<'a> {
     pub hit_groups: &'a [HitGroup<'a>],
     /// Callable shaders, by the index of `executeCallableEXT`.
     pub callable: &'a [ShaderModuleHandle],
-    /// Bytes the ray generation shaders read through `shaderRecordEXT`, in the order of `ray_gen`; see
+    /// Bytes that the ray generation shaders read through `shaderRecordEXT`, in the order of `ray_gen`; see
     /// [`record_bytes`]. Shaders beyond the end of the list have no record.
     pub ray_gen_records: &'a [&'a [u8]],
-    /// As `ray_gen_records`, for `miss`.
+    /// Records of the miss shaders, in the order of `miss`; see `ray_gen_records`.
     pub miss_records: &'a [&'a [u8]],
-    /// As `ray_gen_records`, for `callable`.
+    /// Records of the callable shaders, in the order of `callable`; see `ray_gen_records`.
     pub callable_records: &'a [&'a [u8]],
-    /// Libraries whose shaders belong to the pipeline too. They may be destroyed before it.
+    /// Libraries whose shaders are linked into the pipeline. They may be destroyed before the pipeline.
     pub libraries: &'a [RayTracingLibraryHandle],
     /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays.
     pub max_recursion: u32,
     /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others.
     pub max_callable_depth: u32,
-    /// Largest payload of any shader in bytes. Counts only with libraries: see
+    /// Largest payload of any shader in bytes. Used only with libraries: see
     /// [`RayTracingLibraryDesc`](crate::RayTracingLibraryDesc).
     pub max_payload_bytes: u32,
-    /// Largest hit attributes of any shader in bytes, as `max_payload_bytes`; those of triangles have 8.
+    /// Largest hit attributes of any shader in bytes. Used only with libraries. The attributes of triangles have 8
+    /// bytes.
     pub max_hit_attribute_bytes: u32,
-    /// Values of specialization constants, of the pipeline's own shaders.
+    /// Values of specialization constants of the pipeline's own shaders.
     pub specialization: &'a [SpecializationConstant],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,

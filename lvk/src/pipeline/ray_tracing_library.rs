@@ -17,9 +17,9 @@ use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 
 /// Describes a library: shader groups that are compiled once and linked into any number of pipelines by
-/// [`RayTracingPipelineDesc::libraries`]. At least one shader or hit group.
+/// [`RayTracingPipelineDesc::libraries`]. A library has at least one shader or hit group.
 ///
-/// `max_recursion`, `max_payload_bytes` and `max_hit_attribute_bytes` must be those of the pipelines.
+/// `max_recursion`, `max_payload_bytes` and `max_hit_attribute_bytes` must equal those of the pipelines.
 #[derive(Debug, Clone, Copy)]
 pub struct RayTracingLibraryDesc<'a> {
     /// Ray generation shaders.
@@ -30,17 +30,17 @@ pub struct RayTracingLibraryDesc<'a> {
     pub hit_groups: &'a [HitGroup<'a>],
     /// Callable shaders.
     pub callable: &'a [ShaderModuleHandle],
-    /// As [`RayTracingPipelineDesc::ray_gen_records`].
+    /// See [`RayTracingPipelineDesc::ray_gen_records`].
     pub ray_gen_records: &'a [&'a [u8]],
-    /// As [`RayTracingPipelineDesc::miss_records`].
+    /// See [`RayTracingPipelineDesc::miss_records`].
     pub miss_records: &'a [&'a [u8]],
-    /// As [`RayTracingPipelineDesc::callable_records`].
+    /// See [`RayTracingPipelineDesc::callable_records`].
     pub callable_records: &'a [&'a [u8]],
-    /// As [`RayTracingPipelineDesc::max_recursion`].
+    /// See [`RayTracingPipelineDesc::max_recursion`].
     pub max_recursion: u32,
-    /// As [`RayTracingPipelineDesc::max_payload_bytes`].
+    /// See [`RayTracingPipelineDesc::max_payload_bytes`].
     pub max_payload_bytes: u32,
-    /// As [`RayTracingPipelineDesc::max_hit_attribute_bytes`].
+    /// See [`RayTracingPipelineDesc::max_hit_attribute_bytes`].
     pub max_hit_attribute_bytes: u32,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
@@ -69,7 +69,7 @@ impl Default for RayTracingLibraryDesc<'_> {
 }
 
 impl<'a> RayTracingLibraryDesc<'a> {
-    /// The pipeline with these shaders.
+    /// Returns the description of a pipeline with these shaders.
     fn as_pipeline(&self) -> RayTracingPipelineDesc<'a> {
         RayTracingPipelineDesc {
             ray_gen: self.ray_gen,
@@ -89,18 +89,18 @@ impl<'a> RayTracingLibraryDesc<'a> {
     }
 }
 
-/// A library, destroyed on drop.
+/// A ray tracing library, destroyed on drop.
 pub(crate) struct RayTracingLibrary {
     pub(crate) raw: vk::Pipeline,
     pub(crate) groups: CompiledGroups,
-    /// One of its ray generation shaders.
+    /// A ray generation shader of the library.
     pub(super) ray_gen: Option<Arc<ShaderModule>>,
     pub(crate) name: Arc<str>,
     interface: LibraryInterface,
     gpu: Arc<Gpu>,
 }
 
-/// What libraries and the pipelines linked from them must have in common.
+/// Values that must be equal in a library and the pipelines linked from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct LibraryInterface {
     recursion: u32,
@@ -117,7 +117,7 @@ impl LibraryInterface {
         }
     }
 
-    /// The first difference to the interface of a pipeline: the field, the pipeline's value and this one's.
+    /// Returns the first difference from the interface of a pipeline: field name, pipeline's value, library's value.
     fn difference(&self, pipeline: &Self) -> Option<(&'static str, u32, u32)> {
         let fields = [
             ("max_recursion", pipeline.recursion, self.recursion),
@@ -166,7 +166,7 @@ impl RayTracingLibrary {
         })
     }
 
-    /// Fails unless the pipeline agrees with the library.
+    /// Fails unless the pipeline has the interface of the library.
     pub(crate) fn check_interface(&self, pipeline: &RayTracingPipelineDesc<'_>) -> Result<()> {
         let Some((field, wanted, own)) = self.interface.difference(&LibraryInterface::from_desc(pipeline))
         else {

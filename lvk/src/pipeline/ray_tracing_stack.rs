@@ -1,4 +1,4 @@
-//! How much stack the shaders of a ray tracing pipeline need.
+//! Stack size of ray tracing pipelines.
 
 use crate::shader::ShaderStage;
 
@@ -14,7 +14,7 @@ pub(crate) struct StackSizes {
 }
 
 impl StackSizes {
-    /// Takes in one shader of one group.
+    /// Adds one shader of one group.
     pub(crate) fn add(&mut self, stage: ShaderStage, bytes: u64) {
         let largest = match stage {
             ShaderStage::RayGen => &mut self.ray_gen,
@@ -28,11 +28,12 @@ impl StackSizes {
         *largest = bytes.max(*largest);
     }
 
-    /// The stack of one ray in bytes: Vulkan's "Ray Tracing Pipeline Stack" with `callable_depth` in place of its 2.
+    /// Returns the stack size of one ray in bytes: Vulkan's "Ray Tracing Pipeline Stack", with `callable_depth` in
+    /// place of its 2.
     ///
-    /// A ray generation shader traces a ray, whose closest-hit or miss shader traces the next, `recursion` rays deep.
-    /// Intersection and any-hit shaders trace none, so only those of the last ray can lie on top; callable shaders
-    /// may lie on top of anything.
+    /// A ray generation shader traces a ray, whose closest-hit or miss shader traces the next ray, up to a depth of
+    /// `recursion`. Intersection and any-hit shaders trace no rays, so only those of the last ray can be on top of the
+    /// stack. Callable shaders may be on top of any shader.
     pub(crate) fn pipeline_bytes(&self, recursion: u32, callable_depth: u32) -> u32 {
         let shade = self.closest_hit.max(self.miss);
         let last = shade.max(self.intersection.saturating_add(self.any_hit));
@@ -69,7 +70,7 @@ mod tests {
         sizes
     }
 
-    /// The deepest stack by trying every chain of calls, without the formula.
+    /// Returns the deepest stack by trying every chain of calls, without the formula.
     fn deepest(shaders: &[(ShaderStage, u64)], recursion: u32, callable_depth: u32) -> u64 {
         let of = |stage| {
             let all = shaders.iter().filter(move |(other, _)| *other == stage);

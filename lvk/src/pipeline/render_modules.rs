@@ -39,7 +39,7 @@ impl RenderModules {
         before.into_iter().chain([&self.geometry, &self.fragment]).filter_map(Option::as_deref)
     }
 
-    /// Stages of the pipeline in which rays are queried.
+    /// Returns the stages of the pipeline that run ray queries.
     pub(super) fn query_stages(&self) -> Stages {
         let stage = |module: &ShaderModule| match module.stage {
             ShaderStage::Fragment => Stages::FRAGMENT,

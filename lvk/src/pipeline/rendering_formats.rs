@@ -1,26 +1,27 @@
-//! What a graphics pipeline and the passes it draws in have to agree on.
+//! Properties that must be equal in a graphics pipeline and the passes that use it.
 
 use std::fmt;
 
 use crate::format::Format;
 
-/// Formats, samples and views of targets. Compared at each bind, so it is plain data.
+/// Formats, samples and views of targets. Plain data, because it is compared at each bind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct RenderingFormats {
-    /// From the first on, without gaps.
+    /// Formats of the colour targets, without gaps.
     colors: [Option<Format>; Self::MAX_COLORS],
     pub(crate) depth: Option<Format>,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub(crate) samples: u32,
-    /// The views that are drawn at once, 0 without multiview.
+    /// Bit mask of the views of a draw; 0 without multiview.
     pub(crate) view_mask: u32,
 }
 
 impl RenderingFormats {
-    /// As [`Limits::max_color_targets`](crate::Limits::max_color_targets) at most.
+    /// Upper limit of [`Limits::max_color_targets`](crate::Limits::max_color_targets).
     pub(crate) const MAX_COLORS: usize = 8;
 
-    /// Further colours than the most are left out: both sides have checked their number.
+    /// Creates the formats. Colours beyond [`MAX_COLORS`](Self::MAX_COLORS) are ignored, since pipelines and passes
+    /// have checked the count.
     pub(crate) fn new(
         colors: impl IntoIterator<Item = Format>,
         depth: Option<Format>,

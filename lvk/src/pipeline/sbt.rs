@@ -3,7 +3,7 @@
 use super::sbt_order::PerRegion;
 use crate::error::{Result, check_limit};
 
-/// What a device asks of shader binding tables (`VkPhysicalDeviceRayTracingPipelinePropertiesKHR`), in bytes.
+/// Limits of shader binding tables (`VkPhysicalDeviceRayTracingPipelinePropertiesKHR`), in bytes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SbtLimits {
     /// Size of a shader group handle.
@@ -16,7 +16,7 @@ pub(crate) struct SbtLimits {
     pub(crate) max_stride: u32,
 }
 
-/// The handles of a pipeline's shader groups as Vulkan gives them, and which of them each place of the table takes.
+/// The handles of a pipeline's shader groups in Vulkan's order, and the order of the shader binding table.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroupHandles<'a> {
     pub(crate) bytes: &'a [u8],
@@ -24,29 +24,29 @@ pub(crate) struct GroupHandles<'a> {
     pub(crate) order: &'a [usize],
 }
 
-/// One region, in bytes from the base-aligned start of the table; all zero where there is no such shader.
+/// One region, in bytes from the base-aligned start of the shader binding table; all zero if the region is empty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct SbtRegion {
     /// Start of the first record.
     pub(crate) offset: u64,
     /// Distance between records.
     pub(crate) stride: u64,
-    /// All records.
+    /// Size of all records.
     pub(crate) size: u64,
 }
 
 impl SbtRegion {
-    /// The start of every record.
+    /// Returns the start of every record.
     fn records(self) -> impl Iterator<Item = u64> {
         let count = self.size.checked_div(self.stride).unwrap_or(0);
         (0..count).map(move |index| self.offset + index * self.stride)
     }
 }
 
-/// Where every record goes.
+/// Position of every record.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct SbtPlan {
-    /// One region of a single record for each ray generation shader, since Vulkan takes exactly one record there.
+    /// One region of a single record for each ray generation shader. Vulkan takes exactly one record in that region.
     pub(crate) ray_gen: Vec<SbtRegion>,
     /// Miss shaders.
     pub(crate) miss: SbtRegion,
@@ -59,20 +59,21 @@ pub(crate) struct SbtPlan {
 }
 
 impl SbtPlan {
-    /// Start and longest length of every record, in the order of the table.
+    /// Returns the start and the largest size of every record, in the order of the table.
     fn records(&self) -> impl Iterator<Item = (u64, u64)> {
         let regions = self.ray_gen.iter().copied().chain([self.miss, self.hit, self.callable]);
         regions.flat_map(|region| region.records().map(move |start| (start, region.stride)))
     }
 }
 
-/// Places all records: strides are multiples of the handle alignment, regions start at multiples of the base alignment.
+/// Computes the position of all records. Strides are multiples of the handle alignment; regions start at multiples of
+/// the base alignment.
 ///
-/// `records` has the user's bytes behind the handle of each group.
+/// `records` holds the caller's bytes, which follow the handle of each group.
 ///
 /// # Errors
-/// [`Error::LimitExceeded`](crate::error::Error::LimitExceeded) if a record with its handle is longer than the
-/// device's largest stride.
+/// [`Error::LimitExceeded`](crate::error::Error::LimitExceeded) if a record with its handle is longer than the device's
+/// largest stride.
 pub(crate) fn plan_sbt(
     pipeline: &str,
     limits: &SbtLimits,
@@ -107,10 +108,9 @@ pub(crate) fn plan_sbt(
     })
 }
 
-/// Fills the table with the handle of each group and the user's bytes behind it. Bytes that belong to no record become
-/// zero.
+/// Writes the handle of each group and the caller's bytes into the table. Bytes outside of the records become zero.
 ///
-/// What does not fit into `out`, or is missing from `handles`, is left out.
+/// Bytes that do not fit into `out` and handles missing from `handles` are left out.
 pub(crate) fn write_sbt(
     plan: &SbtPlan,
     limits: &SbtLimits,
@@ -130,12 +130,14 @@ pub(crate) fn write_sbt(
     }
 }
 
-/// Bytes to allocate so that the table still fits once the buffer's address is rounded up to the base alignment.
+/// Returns the size of the table's buffer. The table fits even after the buffer's address is rounded up to the base
+/// alignment.
 pub(crate) fn sbt_buffer_bytes(plan: &SbtPlan, base_alignment: u32) -> u64 {
     plan.bytes + u64::from(base_alignment.saturating_sub(1))
 }
 
-/// Saturates instead of wrapping: a size near the top of the range is over every limit anyway.
+/// Rounds up to a multiple of `alignment`. Saturates instead of wrapping, since a size near the top of the range
+/// exceeds every limit.
 fn align_up(value: u64, alignment: u32) -> u64 {
     value.checked_next_multiple_of(u64::from(alignment.max(1))).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,4 @@
-//! In which order shader groups stand in a shader binding table.
+//! Order of the shader groups in a shader binding table.
 
 /// One value for each region of a shader binding table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -23,16 +23,16 @@ impl<T> PerRegion<T> {
         }
     }
 
-    /// The values in the order of the table: ray generation, miss, hit, callable.
+    /// Returns the values in the order of the table: ray generation, miss, hit, callable.
     pub(crate) fn into_array(self) -> [T; 4] {
         [self.ray_gen, self.miss, self.hit, self.callable]
     }
 }
 
-/// For each place of the table, the group that stands there, by its number in the pipeline.
+/// Returns the group number of each record of the shader binding table.
 ///
-/// `parts` are the numbers of groups of the pipeline itself and of each library. Vulkan numbers the groups part by
-/// part; the table has them region by region, and within a region part by part.
+/// `parts` holds the group counts of the pipeline itself and of each library. Vulkan numbers the groups part by part.
+/// The table is ordered by region, and within a region by part.
 pub(crate) fn sbt_order(parts: &[PerRegion<usize>]) -> Vec<usize> {
     let mut order: PerRegion<Vec<usize>> = PerRegion::default();
     let mut next = 0;
@@ -58,7 +58,7 @@ mod tests {
     }
 
     proptest! {
-        /// Labels each group with (region, part, place), numbers them as Vulkan does, and expects sorted labels.
+        /// Labels each group with (region, part, index), numbers the groups as Vulkan does, and expects sorted labels.
         #[test]
         fn the_table_has_region_by_region_and_part_by_part(parts in prop::collection::vec(part(), 0..5)) {
             let mut labels = Vec::new();

@@ -1,4 +1,4 @@
-//! The shader groups of a pipeline or library, and the modules they are made of.
+//! The shader groups of a pipeline or library, and their modules.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use crate::error::{Error, Result};
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 
-/// What a pipeline needs to know of shader groups once they are compiled, its own or a library's.
+/// Properties of compiled shader groups that a pipeline needs, of its own groups or of a library's.
 #[derive(Debug, Default)]
 pub(crate) struct CompiledGroups {
-    /// The user's bytes of each group.
+    /// The caller's record bytes of each group.
     pub(crate) records: PerRegion<Vec<Box<[u8]>>>,
     /// Every shader of every group, with the group's number.
     pub(crate) shaders: Vec<(u32, ShaderStage)>,
@@ -23,12 +23,12 @@ pub(crate) struct CompiledGroups {
 }
 
 impl CompiledGroups {
-    /// Number of groups of each region.
+    /// Returns the number of groups of each region.
     pub(crate) fn counts(&self) -> PerRegion<usize> {
         self.records.as_ref().map(Vec::len)
     }
 
-    /// Number of groups.
+    /// Returns the number of all groups.
     pub(crate) fn len(&self) -> usize {
         self.counts().into_array().into_iter().sum()
     }
@@ -37,7 +37,7 @@ impl CompiledGroups {
 /// Shader groups about to be compiled.
 #[derive(Default)]
 pub(crate) struct ShaderGroups {
-    /// Each module once.
+    /// Modules, without duplicates.
     pub(crate) modules: Vec<Arc<ShaderModule>>,
     pub(crate) infos: Vec<vk::RayTracingShaderGroupCreateInfoKHR<'static>>,
     pub(crate) list: CompiledGroups,
@@ -45,7 +45,7 @@ pub(crate) struct ShaderGroups {
 }
 
 impl ShaderGroups {
-    /// Groups in the order of a table: ray generation, miss, hit, callable.
+    /// Collects the groups in the order of a shader binding table: ray generation, miss, hit, callable.
     pub(crate) fn collect(desc: &RayTracingPipelineDesc<'_>, find: ModuleLookup<'_>) -> Result<Self> {
         let mut groups = Self::default();
         for handle in desc.ray_gen {
@@ -66,7 +66,7 @@ impl ShaderGroups {
         Ok(groups)
     }
 
-    /// Fails if a payload or hit attributes are larger than the description says.
+    /// Fails if a payload or hit attributes are larger than the limits of the description.
     pub(crate) fn check_sizes(&self, desc: &RayTracingPipelineDesc<'_>) -> Result<()> {
         for module in &self.modules {
             let sizes = module.reflection.ray_interface;
@@ -115,7 +115,7 @@ impl ShaderGroups {
         Ok(())
     }
 
-    /// The place among the stages of a module of the group at hand; the same module takes one place.
+    /// Returns the stage index of a module in the group being added. A module that is used again keeps its index.
     fn stage_index(
         &mut self,
         handle: Option<ShaderModuleHandle>,
@@ -154,7 +154,7 @@ fn collect_records(desc: &RayTracingPipelineDesc<'_>) -> Result<PerRegion<Vec<Bo
     })
 }
 
-/// One record for each shader: those that are left out are empty.
+/// Returns one record for each shader. Missing records are empty.
 fn pad_records(pipeline: &str, kind: &str, shaders: usize, records: &[&[u8]]) -> Result<Vec<Box<[u8]>>> {
     if records.len() > shaders {
         let message =

@@ -26,7 +26,7 @@ pub(crate) struct ShaderModule {
 }
 
 impl ShaderModule {
-    /// `bindless` knows whether the indices of modules that are not the library's own are checked.
+    /// Creates a module. If `bindless` has index checks, modules other than the library's own are instrumented.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         desc: &ShaderModuleDesc<'_>,
@@ -57,7 +57,7 @@ impl ShaderModule {
             None => words,
         };
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words are a whole module for a stage and features of this device.
+        // SAFETY: the words are a complete module for a stage and features of this device.
         let raw = unsafe { gpu.device.create_shader_module(&info, None) }
             .map_err(Error::vulkan("vkCreateShaderModule"))?;
         gpu.name(raw, desc.debug_name);
@@ -65,7 +65,7 @@ impl ShaderModule {
         Ok(Self { raw, stage: desc.stage, reflection, name, gpu: Arc::clone(gpu) })
     }
 
-    /// Fails unless the module is of `stage`.
+    /// Fails unless the module has the stage `stage`.
     pub(crate) fn check_stage(&self, stage: ShaderStage) -> Result<()> {
         if self.stage == stage {
             return Ok(());
@@ -77,12 +77,13 @@ impl ShaderModule {
 
 impl Drop for ShaderModule {
     fn drop(&mut self) {
-        // SAFETY: pipelines do not need a module once they are created.
+        // SAFETY: pipelines do not need their modules after creation.
         unsafe { self.gpu.device.destroy_shader_module(self.raw, None) };
     }
 }
 
-/// The module with its indices checked; as it is, with a warning, where that cannot be.
+/// Returns the module with index checks. If the checks cannot be added, logs a warning and returns the module
+/// unchanged.
 fn with_index_checks(gpu: &Gpu, desc: &ShaderModuleDesc<'_>, words: Vec<u32>, plan: &CheckPlan) -> Vec<u32> {
     use ShaderStage::{Geometry, TessControl, TessEval, Vertex};
     let writes = match desc.stage {

@@ -37,7 +37,7 @@ pub enum SpecializationValue {
 }
 
 impl SpecializationValue {
-    /// The value as the shader gets it, in the low half where it has 32 bits.
+    /// Returns the bits of the value; 32-bit values are in the low half.
     pub(super) fn bits(self) -> u64 {
         match self {
             Self::U32(value) => value.into(),
@@ -58,14 +58,14 @@ impl SpecializationValue {
     }
 }
 
-/// Specialization constants in the form Vulkan takes.
+/// Specialization constants in Vulkan's form.
 pub(crate) struct Specialization {
     entries: Vec<vk::SpecializationMapEntry>,
     data: Vec<u8>,
 }
 
 impl Specialization {
-    /// Checks that some module of the pipeline declares each constant, with as many bits.
+    /// Fails unless a module of the pipeline declares each constant with the same number of bits.
     pub(crate) fn new<'a>(
         pipeline: &str,
         constants: &[SpecializationConstant],
@@ -115,7 +115,7 @@ impl Specialization {
     }
 }
 
-/// The stage of a module.
+/// Returns Vulkan's description of a module's stage.
 pub(crate) fn stage_info<'a>(
     module: &ShaderModule,
     specialization: &'a vk::SpecializationInfo<'a>,

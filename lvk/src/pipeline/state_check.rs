@@ -1,4 +1,5 @@
-//! Whether the fixed state of a graphics pipeline can be: raster, stencil and blending, against each other and the device.
+//! Checks of the fixed state of a graphics pipeline: rasterization, stencil and blending against each other and the
+//! device.
 
 use ash::vk;
 use spirv::Capability;
@@ -11,7 +12,7 @@ use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::shader::ShaderStage;
 
-/// Fails unless the device has what the state asks for.
+/// Fails unless the device supports the fixed state.
 pub(super) fn check_state(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     check_raster(gpu, desc)?;
     check_samples(gpu, desc)?;
@@ -50,7 +51,8 @@ fn check_line_width(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
     Err(Error::usage(name, format!("lines are {least} to {most} pixels wide, not {width}")))
 }
 
-/// Pipelines without targets of their own take what the device has for passes without any.
+/// Fails unless all targets support the sample count. For a pipeline without targets, the device's sample counts of
+/// passes without attachments apply.
 fn check_samples(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
     let (name, samples) = (desc.debug_name, desc.samples);
     if !samples.is_power_of_two() || samples > 64 {
@@ -66,7 +68,7 @@ fn check_samples(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
         }
     }
     if !(0.0..=1.0).contains(&desc.sample_shading) {
-        let message = format!("sample_shading is a part from 0 to 1, not {}", desc.sample_shading);
+        let message = format!("sample_shading is a fraction from 0 to 1, not {}", desc.sample_shading);
         return Err(Error::usage(name, message));
     }
     if desc.sample_shading > 0.0 {
@@ -85,7 +87,8 @@ fn check_stencil(desc: &RenderPipelineDesc<'_>) -> Result<()> {
     Err(Error::usage(desc.debug_name, message))
 }
 
-/// Stages before rasterisation need features of their own to run for several views, and may not choose the layer.
+/// Fails unless the stages support the view mask. Stages before rasterisation need features of their own for several
+/// views, and may not write the layer.
 fn check_views(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     if desc.view_mask == 0 {
         return Ok(());
@@ -111,7 +114,8 @@ fn check_views(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules
     }
 }
 
-/// Stages before rasterisation say rates by primitive, which is a feature of its own.
+/// Fails unless the device supports the shading rates. Rates per primitive, written before rasterisation, need a
+/// feature of their own.
 fn check_rates(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let name = desc.debug_name;
     for module in modules.iter().filter(|module| module.stage != ShaderStage::Fragment) {
@@ -127,7 +131,8 @@ fn check_rates(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules
     desc.shading_rate.map_or(Ok(()), |rate| gpu.check_shading_rate(name, &rate, desc.samples))
 }
 
-/// A second source stands in one target alone, and the fragment shader has to put it out.
+/// Fails unless dual source blending is possible: it takes exactly one target, and the fragment shader must write the
+/// second source.
 fn check_dual_source_blend(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let name = desc.debug_name;
     if !desc.color.iter().filter_map(|target| target.blend).any(|blend| blend.is_dual_source()) {
@@ -135,7 +140,7 @@ fn check_dual_source_blend(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &R
     }
     gpu.require(OptionalFeature::DualSourceBlend, &format!("a second blend source in pipeline '{name}'"))?;
     if desc.color.len() > 1 {
-        return Err(Error::usage(name, "a second blend source takes all outputs; draw to one colour target"));
+        return Err(Error::usage(name, "a second blend source allows one colour target only; draw to one"));
     }
     match &modules.fragment {
         Some(fragment) if fragment.reflection.second_output => Ok(()),

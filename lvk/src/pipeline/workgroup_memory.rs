@@ -1,22 +1,22 @@
-//! Whether what the invocations of a workgroup share, with the specialization constants at hand, fits the device.
+//! Check of the shared memory and payload of a workgroup, with the given specialization constants, against the device.
 
 use super::shader_module::ShaderModule;
 use super::stage::SpecializationConstant;
 use crate::error::{Result, check_limit};
 use crate::shader::SharedBytes;
 
-/// The most bytes of a workgroup of a stage.
+/// Memory limits of a workgroup of a stage, in bytes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WorkgroupMemoryLimits {
-    /// What its invocations share.
+    /// Limit of shared memory.
     pub(super) shared: u32,
-    /// What goes from a task to its mesh workgroups.
+    /// Limit of the payload that a task workgroup passes to its mesh workgroups.
     pub(super) payload: u32,
-    /// Both together.
+    /// Limit of shared memory and payload together.
     pub(super) together: u32,
 }
 
-/// Fails if a workgroup of `module` shares more than `limits` allow.
+/// Fails if a workgroup of `module` uses more memory than `limits` allow.
 pub(super) fn check_workgroup_memory(
     pipeline: &str,
     module: &ShaderModule,

@@ -1,4 +1,4 @@
-//! Whether a module's workgroup, with the specialization constants at hand, fits the device.
+//! Check of the size of a workgroup, with the given specialization constants, against the device.
 
 use super::shader_module::ShaderModule;
 use super::stage::SpecializationConstant;
@@ -6,9 +6,9 @@ use crate::error::{Error, Result, check_limit};
 
 /// The largest workgroup of a stage.
 pub(super) struct WorkgroupLimits {
-    /// Most invocations for each axis.
+    /// Most invocations along each axis.
     pub(super) size: [u32; 3],
-    /// Most invocations altogether.
+    /// Most invocations in total.
     pub(super) invocations: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Buffers: every one has a device address, and shaders reach it by that alone.
+//! Buffers. Every buffer has a device address, and shaders access buffers only by address.
 
 use std::ptr::NonNull;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::gpu::memory::allocator::{Mapping, MemoryKind, ObjectMemory};
 use crate::lock_order::{Mutex, Rank};
 
 bitflags! {
-    /// What a buffer is used for, besides copies and access by address, which are always allowed.
+    /// Allowed uses of a buffer (`VkBufferUsageFlags`). Copies and access by address are always allowed.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
     pub struct BufferUsage: u32 {
         /// Read and written by shaders through its address.
@@ -24,7 +24,7 @@ bitflags! {
         const VERTEX = 1 << 2;
         /// Holds arguments of indirect draws and dispatches.
         const INDIRECT = 1 << 3;
-        /// Holds vertices, indices or boxes an acceleration structure is built from.
+        /// Holds vertices, indices or AABBs from which an acceleration structure is built.
         const ACCEL_INPUT = 1 << 4;
     }
 }
@@ -32,13 +32,13 @@ bitflags! {
 /// Describes a buffer.
 #[derive(Debug, Clone, Copy)]
 pub struct BufferDesc<'a> {
-    /// Size in bytes, at least 1. With `data` and 0, the size of the data.
+    /// Size in bytes, at least 1. 0 with `data` is the size of the data.
     pub size_bytes: u64,
-    /// What the buffer is used for.
+    /// Allowed uses of the buffer.
     pub usage: BufferUsage,
-    /// Where the buffer lives.
+    /// Memory type of the buffer.
     pub memory: MemoryKind,
-    /// First contents, at most `size_bytes`.
+    /// Initial contents, at most `size_bytes`.
     pub data: Option<&'a [u8]>,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
@@ -66,24 +66,24 @@ pub(crate) struct Buffer {
     pub(crate) memory: MemoryKind,
     pub(crate) name: String,
     allocation: Option<ObjectMemory>,
-    /// Somebody else made it, and destroys it.
+    /// True if the buffer was created outside of the library, which then does not destroy it.
     is_foreign: bool,
     /// Held while the host copies to or from the mapping, so that threads do not race for the same bytes.
     copying: Mutex<()>,
     gpu: Arc<Gpu>,
 }
 
-/// What only the library makes buffers for.
+/// Buffer usage that only the library itself needs.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct InternalUsage {
     pub(crate) raw: vk::BufferUsageFlags,
-    /// Of the address, in bytes.
+    /// Alignment of the address, in bytes.
     pub(crate) alignment: u64,
 }
 
 impl InternalUsage {
     pub(crate) const NONE: Self = Self { raw: vk::BufferUsageFlags::empty(), alignment: 1 };
-    /// Structures that software traces, whose nodes should not lie across cache lines.
+    /// Usage of acceleration structures for software traversal. Their nodes should not cross cache lines.
     pub(crate) const SOFTWARE_STRUCTURES: Self = Self { alignment: 256, ..Self::NONE };
     pub(crate) const ACCEL_STORAGE: Self =
         Self { raw: vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR, alignment: 256 };
@@ -92,16 +92,18 @@ impl InternalUsage {
 }
 
 impl Buffer {
-    /// Matrices and instances of builds, and the largest texels, lie at multiples of this; drivers may ask for less.
+    /// Minimum alignment of buffers, which drivers may not require. Matrices and instances of builds, and the largest
+    /// texels, need it.
     pub(crate) const ALIGNMENT: u64 = 16;
-    /// Memory behind each buffer under GPU-assisted validation, for which what lies in some other buffer is no error.
+    /// Memory after each buffer under GPU-assisted validation, which does not report an access that ends in another
+    /// buffer.
     const GAP_BYTES: u64 = 4096;
 
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &BufferDesc<'_>, internal: InternalUsage) -> Result<Self> {
         let name = desc.debug_name;
         let size = check_size(gpu, desc)?;
         let usage = raw_usage(gpu, desc.usage, name)? | internal.raw;
-        // Kernels read 16-bit indices by whole words.
+        // Kernels read 16-bit indices as whole 32-bit words.
         let mut info = vk::BufferCreateInfo::default().size(size.next_multiple_of(4)).usage(usage);
         let families = gpu.queues.families();
         if families.len() > 1 {
@@ -128,10 +130,10 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// A buffer of somebody else's.
+    /// Wraps a buffer that was created outside of the library.
     ///
     /// # Safety
-    /// It is as described, has memory and an address, and outlives what is made of it.
+    /// The buffer matches the parameters, has memory and a device address, and outlives every object that uses it.
     pub(crate) unsafe fn import(
         gpu: &Arc<Gpu>,
         raw: vk::Buffer,
@@ -140,7 +142,7 @@ impl Buffer {
         name: &str,
     ) -> Self {
         let info = vk::BufferDeviceAddressInfo::default().buffer(raw);
-        // SAFETY: by the caller.
+        // SAFETY: guaranteed by the caller.
         let address = unsafe { gpu.device.get_buffer_device_address(&info) };
         Self {
             raw,
@@ -195,12 +197,12 @@ impl Buffer {
         Err(Error::usage(&self.name, format!("create the buffer with {usage:?} in its usage")))
     }
 
-    /// Start of the mapped memory, `None` in device memory.
+    /// Returns the start of the mapped memory; `None` for device memory.
     pub(crate) fn mapped(&self) -> Option<NonNull<u8>> {
         self.mapping().map(|mapping| mapping.0)
     }
 
-    /// The same, to be kept with the buffer.
+    /// Returns the mapping, which the caller must keep together with the buffer.
     pub(crate) fn mapping(&self) -> Option<Mapping> {
         if !self.memory.mapped() {
             return None;
@@ -208,19 +210,20 @@ impl Buffer {
         self.allocation.as_ref()?.mapping()
     }
 
-    /// Writes the first contents of a buffer that nothing has used yet, where its memory happens to be in reach of the host,
-    /// as device memory is on some devices. `false` if it is not; the bytes fit the buffer.
+    /// Writes the initial contents of a buffer that no command has used yet, if its memory is visible to the host. Some
+    /// devices have host-visible device memory. Returns `false` if the memory is not visible. The bytes must fit the
+    /// buffer.
     pub(crate) fn write_initial(&self, bytes: &[u8]) -> bool {
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
         let reached = self.allocation.as_ref().filter(|own| own.properties.contains(coherent));
         let Some(start) = reached.and_then(ObjectMemory::mapped) else { return false };
         debug_assert!(bytes.len() as u64 <= self.size_bytes);
-        // SAFETY: the mapping has the buffer's size and lives as long as `self`, which nobody else knows yet.
+        // SAFETY: the mapping has the buffer's size and lives as long as `self`, which no other thread uses yet.
         unsafe { start.as_ptr().copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
         true
     }
 
-    /// Has `fill` write all of the mapped memory. `false` if the buffer is not mapped.
+    /// Calls `fill` with all of the mapped memory. Returns `false` if the buffer is not mapped.
     pub(crate) fn fill_with(&self, fill: impl FnOnce(&mut [u8])) -> bool {
         let Some(start) = self.mapped() else { return false };
         let _copying = self.copying.lock();
@@ -229,7 +232,7 @@ impl Buffer {
         true
     }
 
-    /// Writes mapped memory. `false` if the buffer is not mapped; the range must have been checked.
+    /// Writes mapped memory. Returns `false` if the buffer is not mapped. The range must have been checked.
     pub(crate) fn write(&self, offset: u64, bytes: &[u8]) -> bool {
         let Some(start) = self.mapped() else { return false };
         debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
@@ -241,7 +244,7 @@ impl Buffer {
         true
     }
 
-    /// Reads mapped memory. `false` if the buffer is not mapped; the range must have been checked.
+    /// Reads mapped memory. Returns `false` if the buffer is not mapped. The range must have been checked.
     pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> bool {
         let Some(start) = self.mapped() else { return false };
         debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
@@ -285,7 +288,7 @@ fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsag
     if usage.contains(BufferUsage::ACCEL_INPUT) && !gpu.has_acceleration_structures() {
         return Err(gpu.unsupported(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
     }
-    // The library's own builders read inputs as any shader does.
+    // The library's own builders read inputs like any other shader.
     let accel_input = match gpu.accel {
         Some(_) => vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR,
         None => vk::BufferUsageFlags::STORAGE_BUFFER,

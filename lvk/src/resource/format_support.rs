@@ -1,4 +1,4 @@
-//! What a device can do with a format.
+//! Uses of a format that a device supports.
 
 use ash::vk;
 
@@ -7,28 +7,28 @@ use super::texture_desc::TextureUsage;
 use crate::format::Format;
 use crate::gpu::Gpu;
 
-/// What 2D textures of one format can be used for; the default is nothing.
+/// Supported uses of 2D textures of one format; the default is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FormatSupport {
-    /// Sampled and fetched by shaders.
+    /// Shaders can sample and fetch it.
     pub sampled: bool,
-    /// Sampled with [`Filter::Linear`](crate::Filter).
+    /// Shaders can sample it with [`Filter::Linear`](crate::Filter).
     pub linear: bool,
-    /// Sampled with the least or greatest texel in place of the mean.
+    /// Samplers can return the least or greatest texel instead of the mean.
     pub min_max: bool,
-    /// Stored to and loaded by shaders.
+    /// Shaders can store to it and load from it.
     pub storage: bool,
-    /// Changed by atomic operations of shaders.
+    /// Shaders can apply atomic operations to it.
     pub storage_atomic: bool,
-    /// A colour or depth target of passes.
+    /// Passes can use it as a colour or depth target.
     pub target: bool,
-    /// Blended with as a colour target.
+    /// Passes can blend into it as a colour target.
     pub blend: bool,
-    /// Scaled from by blits.
+    /// Blits can read from it.
     pub blit_source: bool,
-    /// Scaled to by blits.
+    /// Blits can write to it.
     pub blit_target: bool,
-    /// Numbers of samples a pixel that targets may have, added up: 5 is 1 and 4; 0 where there are no targets of it.
+    /// Sum of the sample counts per pixel that targets may have: 5 is 1 and 4. 0 if the format cannot be a target.
     pub samples: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Which textures get their first contents from the host itself, and how.
+//! Initial contents of textures that the host writes itself (`vkCopyMemoryToImageEXT`).
 
 use ash::vk;
 
@@ -7,16 +7,17 @@ use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
 use crate::error::Result;
 use crate::gpu::Gpu;
 
-/// Most bytes that are written by the host: with up to so many llvmpipe 25.0 is done in a half to an eighth of the time that a
-/// copy out of staging memory takes, with four times as many it takes longer.
+/// Largest contents that the host writes. Up to this size, llvmpipe 25.0 needs an eighth to a half of the time of a
+/// copy from staging memory. At four times this size it needs longer than the copy.
 const MAX_BYTES: usize = 256 << 10;
 
-/// Whether an image of this description is to be filled by the host: it is only ever sampled, and loses nothing by it.
+/// True if the host should write the contents of an image of this description. Such an image is only sampled, and the
+/// device samples it as fast as other images.
 pub(super) fn can_fill_from_host(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_>) -> bool {
     gpu.host_copies.is_some() && is_plain(desc) && gpu.host_copies_stay_optimal(info)
 }
 
-/// Whether a texture has contents from the start, not too many, and is sampled, in its own format and no other way.
+/// True if the texture has initial contents of at most [`MAX_BYTES`] and is only sampled, in its own format.
 fn is_plain(desc: &TextureDesc<'_>) -> bool {
     let planes = desc.format.aspects().as_raw().count_ones();
     desc.data.is_some_and(|data| data.len() <= MAX_BYTES)
@@ -29,8 +30,8 @@ fn is_plain(desc: &TextureDesc<'_>) -> bool {
         && planes == 1
 }
 
-/// Writes the first contents of a new image that [`can_fill_from_host`], region by region, each with all of its bytes.
-/// `range` is the whole image.
+/// Writes the initial contents of a new image for which [`can_fill_from_host`] is true. Each region has all of its
+/// bytes. `range` is the whole image.
 pub(crate) fn fill_from_host(
     gpu: &Gpu,
     image: vk::Image,
@@ -48,7 +49,8 @@ pub(crate) fn fill_from_host(
         copy
     };
     let copies_to_make: Vec<_> = contents.iter().map(copy).collect();
-    // SAFETY: the image is new and made for it; the regions are different mips of it and have all their bytes.
+    // SAFETY: the image is new and has the usage for host copies; the regions are different mips of the image and have
+    // all their bytes.
     unsafe { copies.write_image(image, range, &copies_to_make) }
 }
 

@@ -1,4 +1,4 @@
-//! An image with its memory, shared by the textures that show it or parts of it.
+//! An image with its memory, shared by all textures that are views of it.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::{MemoryKind, ObjectMemory};
 use crate::handle::{Handle, TextureHandle};
 
-/// An image with memory, destroyed on drop. The tracker knows it by `id`, whichever texture names it.
+/// An image with memory, destroyed on drop. The tracker identifies it by `id`, no matter which texture is used.
 pub(crate) struct Image {
     pub(crate) raw: vk::Image,
     pub(crate) id: ResourceId,
@@ -29,24 +29,24 @@ pub(crate) struct Image {
     volume: bool,
     pub(crate) shape: TextureShape,
     pub(crate) usage: TextureUsage,
-    /// Samples a texel.
+    /// Samples per texel.
     pub(crate) samples: u32,
-    /// What other formats views may have.
+    /// Other formats that views may have.
     pub(crate) view_formats: Vec<Format>,
-    /// Whether six layers can be seen as a cube.
+    /// True if cube views of six layers are possible.
     pub(crate) cube_compatible: bool,
-    /// Textures with a handle, or waiting to be destroyed, that show the image.
+    /// Number of textures of the image that have a handle or wait for their destruction.
     handles: AtomicU32,
-    /// Whether the image lives in passes only.
+    /// True if the image exists only inside of passes.
     pub(crate) transient: bool,
     memory: Option<Memory>,
-    /// Whether it belongs to one family of queues at a time.
+    /// True if one queue family owns the image at a time.
     is_exclusive: bool,
-    /// Whether the host writes its first contents.
+    /// True if the host writes the initial contents.
     pub(crate) host_filled: bool,
-    /// Somebody else made it, and destroys it.
+    /// True if the image was created outside of the library, which then does not destroy it.
     is_foreign: bool,
-    /// Who that is, where it has to be kept.
+    /// External owner of the image, if it must be kept alive.
     owner: Option<Arc<dyn Any + Send + Sync>>,
     gpu: Arc<Gpu>,
 }
@@ -54,22 +54,23 @@ pub(crate) struct Image {
 /// Memory of an image.
 enum Memory {
     Managed(ObjectMemory),
-    /// Of its own, only there while a pass needs it.
+    /// Lazily allocated memory, which exists only while a pass needs it.
     Lazy(vk::DeviceMemory),
 }
 
-/// An image as barriers and clears name its parts.
+/// An image with the properties that barriers and clears need.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BarrierImage {
     pub(crate) raw: vk::Image,
-    /// Whether it belongs to one family of queues at a time.
+    /// True if one queue family owns the image at a time.
     pub(crate) is_exclusive: bool,
     aspects: vk::ImageAspectFlags,
     volume: bool,
 }
 
 impl BarrierImage {
-    /// A part of the image with all its aspects. Of volumes all slices are meant, which is what one layer may mean too.
+    /// Returns a part of the image with all its aspects. For volumes the range covers all slices, which one layer may
+    /// mean too.
     pub(crate) fn range(&self, part: Subresources) -> vk::ImageSubresourceRange {
         let layer_count = if self.volume { vk::REMAINING_ARRAY_LAYERS } else { part.layer_count };
         vk::ImageSubresourceRange { layer_count, ..raw_range(self.aspects, part) }
@@ -77,7 +78,7 @@ impl BarrierImage {
 }
 
 impl Image {
-    /// An image for one texture.
+    /// Creates an image for one texture.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>) -> Result<Self> {
         let plan = check_image(gpu, desc)?;
         let formats: Vec<_> = [desc.format].iter().chain(desc.view_formats).map(|f| f.raw()).collect();
@@ -103,7 +104,7 @@ impl Image {
         Ok(image)
     }
 
-    /// An image of somebody else's, which is as described, for one texture.
+    /// Wraps an image that was created outside of the library, for one texture. The image must match the description.
     pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image) -> Result<Self> {
         Ok(Self::from_raw(gpu, desc, &check_image(gpu, desc)?, raw, true))
     }
@@ -138,14 +139,14 @@ impl Image {
         }
     }
 
-    /// The same, which keeps its owner as long as it is used.
+    /// Adds an owner that is kept alive as long as the image is used.
     #[cfg(feature = "window")]
     pub(crate) fn with_external_owner(mut self, owner: Arc<dyn Any + Send + Sync>) -> Self {
         self.owner = Some(owner);
         self
     }
 
-    /// Whether it comes and goes with its owner, which decides when it can be used.
+    /// True if the image has an external owner, which decides when the image can be used and when it is destroyed.
     pub(crate) fn has_external_owner(&self) -> bool {
         self.owner.is_some()
     }
@@ -169,7 +170,7 @@ impl Image {
         bound.map_err(Error::vulkan("vkBindImageMemory"))
     }
 
-    /// One more texture shows the image. Fails where the last one is already gone.
+    /// Adds a texture of the image. Fails if the last texture is already destroyed.
     pub(crate) fn add_texture(&self) -> Result<()> {
         let more = |count: u32| (count > 0).then_some(count + 1);
         match self.handles.fetch_update(Ordering::AcqRel, Ordering::Acquire, more) {
@@ -178,12 +179,12 @@ impl Image {
         }
     }
 
-    /// A texture of the image is gone; answers whether it was the last.
+    /// Removes a texture of the image. Returns true if it was the last.
     pub(crate) fn remove_texture(&self) -> bool {
         self.handles.fetch_sub(1, Ordering::AcqRel) == 1
     }
 
-    /// Which of the image's usages a view in `format` can have.
+    /// Returns the usages of the image that a view in `format` can have.
     pub(crate) fn usage_in(&self, format: Format) -> TextureUsage {
         if self.view_formats.is_empty() {
             return self.usage;
@@ -191,18 +192,18 @@ impl Image {
         self.usage & usage_from_features(self.gpu.format_features(format))
     }
 
-    /// Width, height and slices of a mip.
+    /// Returns width, height and slices of a mip.
     pub(crate) fn mip_extent(&self, mip: u32) -> [u32; 3] {
         let [width, height] = self.extent;
         [width, height, self.depth].map(|side| (side >> mip.min(31)).max(1))
     }
 
-    /// Whether views may have this format.
+    /// True if views may have this format.
     pub(crate) fn has_format(&self, format: Format) -> bool {
         format == self.format || self.view_formats.contains(&format)
     }
 
-    /// What barriers have to know of the image.
+    /// Returns the properties of the image that barriers need.
     pub(crate) fn barrier_image(&self) -> BarrierImage {
         BarrierImage {
             raw: self.raw,
@@ -222,23 +223,24 @@ impl Drop for Image {
         if self.is_foreign {
             return;
         }
-        // SAFETY: the owners have waited until the GPU is done with the image, and their views are gone.
+        // SAFETY: the owners have waited until the GPU is done with the image, and its views are destroyed.
         unsafe { self.gpu.device.destroy_image(self.raw, None) };
         match self.memory.take() {
             Some(Memory::Managed(memory)) => self.gpu.free(memory),
-            // SAFETY: the image that was bound to it is gone.
+            // SAFETY: the image that was bound to the memory is destroyed.
             Some(Memory::Lazy(memory)) => unsafe { self.gpu.device.free_memory(memory, None) },
             None => {}
         }
     }
 }
 
-/// Whether all queues may use an image without moving it: what is only copied and sampled loses nothing by that.
+/// True if all queues may use the image without an ownership transfer. An image that is only copied and sampled loses
+/// no performance by concurrent sharing.
 fn is_shared(desc: &TextureDesc<'_>) -> bool {
     desc.usage == TextureUsage::SAMPLED
 }
 
-/// A part of an image by its Vulkan name.
+/// Returns Vulkan's description of a part of an image.
 pub(crate) fn raw_range(aspect_mask: vk::ImageAspectFlags, part: Subresources) -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange {
         aspect_mask,

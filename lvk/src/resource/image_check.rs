@@ -1,4 +1,4 @@
-//! Whether an image can be: its shape, samples and formats against each other and the device.
+//! Checks of an image description: shape, samples and formats against each other and the device.
 
 use ash::vk;
 
@@ -11,13 +11,13 @@ use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
 use crate::gpu::caps::optional_features::OptionalFeature;
 
-/// What follows from a description that the device can make an image of.
+/// Properties derived from a valid image description.
 pub(crate) struct ImagePlan {
     pub(crate) mips: u32,
     pub(crate) flags: vk::ImageCreateFlags,
 }
 
-/// Checks a description against the device.
+/// Checks an image description against the device.
 pub(crate) fn check_image(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<ImagePlan> {
     let mips = check_shape(gpu, desc)?;
     check_view_formats(desc)?;
@@ -27,13 +27,13 @@ pub(crate) fn check_image(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<ImagePlan
 }
 
 impl ImagePlan {
-    /// The description for Vulkan.
+    /// Returns the description in Vulkan's form.
     pub(crate) fn info(&self, desc: &TextureDesc<'_>) -> vk::ImageCreateInfo<'static> {
         image_info(desc, self.mips).flags(self.flags)
     }
 }
 
-/// Checks the shape and answers the number of mips.
+/// Checks the shape and returns the number of mips.
 fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     let name = desc.debug_name;
     let [width, height] = desc.extent;
@@ -62,7 +62,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     Ok(if desc.mips == 0 { full } else { desc.mips })
 }
 
-/// Fails unless the texture may have as many samples a texel, for all that does not depend on the device.
+/// Fails unless the texture may have its number of samples per texel. Limits of the device are not checked here.
 fn check_samples(desc: &TextureDesc<'_>) -> Result<()> {
     let wrong =
         |message: &str| Err(Error::usage(desc.debug_name, format!("{} samples: {message}", desc.samples)));
@@ -84,7 +84,7 @@ fn check_samples(desc: &TextureDesc<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Fails where a texture that lives in passes only is anything but a target.
+/// Fails if a transient texture is not a plain target.
 fn check_transient(desc: &TextureDesc<'_>) -> Result<()> {
     let target = desc.usage - TextureUsage::INPUT == TextureUsage::TARGET && desc.data.is_none();
     if desc.memory == TextureMemory::Device || target {
@@ -95,7 +95,7 @@ fn check_transient(desc: &TextureDesc<'_>) -> Result<()> {
     Err(Error::usage(desc.debug_name, message))
 }
 
-/// Fails where fragment shaders could not read the target in its own pass.
+/// Fails unless fragment shaders can read the target in its own pass.
 fn check_input(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
     let name = desc.debug_name;
     if !desc.usage.contains(TextureUsage::INPUT) {
@@ -117,7 +117,7 @@ fn check_input(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Fails where the texture cannot hold shading rates.
+/// Fails unless the texture can hold shading rates.
 fn check_rates(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
     let name = desc.debug_name;
     if !desc.usage.contains(TextureUsage::SHADING_RATE) {
@@ -135,7 +135,7 @@ fn check_rates(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
     ))
 }
 
-/// Fails where a texture in Y'CbCr is anything but a plain picture.
+/// Fails if a Y'CbCr texture is not a plain 2D texture.
 fn check_yuv(desc: &TextureDesc<'_>) -> Result<()> {
     if !desc.format.is_yuv() {
         return Ok(());
@@ -148,7 +148,7 @@ fn check_yuv(desc: &TextureDesc<'_>) -> Result<()> {
         return wrong("two columns and two rows share a colour, so width and height are even");
     }
     if desc.usage != TextureUsage::SAMPLED || !desc.view_formats.is_empty() {
-        return wrong("textures in Y'CbCr are sampled only, and their planes seen in formats of their own");
+        return wrong("textures in Y'CbCr can only be sampled; view their planes in formats of their own");
     }
     if desc.swizzle != Swizzle::IDENTITY || desc.generate_mips {
         return wrong("textures in Y'CbCr have neither a swizzle nor mips");
@@ -180,7 +180,7 @@ fn check_sides(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
     if matches!(desc.kind, TextureKind::CubeArray { .. }) { check_cube_arrays(gpu) } else { Ok(()) }
 }
 
-/// Fails if the texture is larger than what passes draw to.
+/// Fails if the texture is larger than the largest target of passes.
 fn check_target_size(desc: &TextureDesc<'_>, limits: &Limits) -> Result<()> {
     if !desc.usage.contains(TextureUsage::TARGET) {
         return Ok(());
@@ -190,12 +190,12 @@ fn check_target_size(desc: &TextureDesc<'_>, limits: &Limits) -> Result<()> {
     check_limit(desc.debug_name, "height of a target in pixels", desc.extent[1].into(), height.into())
 }
 
-/// Fails unless the device has arrays of cubes.
+/// Fails unless the device supports arrays of cubes.
 pub(crate) fn check_cube_arrays(gpu: &Gpu) -> Result<()> {
     if gpu.caps.cube_arrays { Ok(()) } else { Err(gpu.unsupported("arrays of cubes (imageCubeArray)")) }
 }
 
-/// Fails unless all formats are colours of texels of one size, or of one compression.
+/// Fails unless all formats are colour formats of the same texel size, or of the same compression.
 fn check_view_formats(desc: &TextureDesc<'_>) -> Result<()> {
     let alike = |other: &Format| desc.format.is_color() && other.is_viewable_as(desc.format);
     match desc.view_formats.iter().find(|other| !alike(other)) {
@@ -211,11 +211,11 @@ fn check_view_formats(desc: &TextureDesc<'_>) -> Result<()> {
     }
 }
 
-/// Views of other formats and kinds have to be allowed when the image is made.
+/// Returns the creation flags. Views of other formats and kinds must be allowed when the image is created.
 fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
     use vk::ImageCreateFlags as Flags;
     let formats = match desc.view_formats {
-        // Its planes can be seen by themselves.
+        // Views can be created of its planes.
         [] if desc.format.is_yuv() => Flags::MUTABLE_FORMAT,
         [] => Flags::empty(),
         _ => Flags::MUTABLE_FORMAT | Flags::EXTENDED_USAGE,
@@ -223,7 +223,7 @@ fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
     let cube = formats | Flags::CUBE_COMPATIBLE;
     match desc.kind {
         TextureKind::Cube | TextureKind::CubeArray { .. } => cube,
-        // Passes draw to slices by 2D views of them.
+        // Passes draw to slices through 2D views.
         TextureKind::D3 { .. } if desc.usage.contains(TextureUsage::TARGET) => {
             formats | Flags::TYPE_2D_ARRAY_COMPATIBLE
         }
@@ -260,7 +260,7 @@ fn image_info(desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateInfo<'static>
         .initial_layout(vk::ImageLayout::UNDEFINED)
 }
 
-/// Asks the device whether the format can be used this way, and how large.
+/// Fails unless the device supports the format with this usage and size.
 fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_>) -> Result<()> {
     let name = desc.debug_name;
     let refused = || {

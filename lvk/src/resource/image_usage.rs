@@ -1,11 +1,11 @@
-//! Usages of images, to Vulkan and from the features of formats.
+//! Conversion of texture usages to Vulkan, and from the features of formats.
 
 use ash::vk;
 
 use super::texture_desc::TextureUsage;
 use crate::format::Format;
 
-/// A usage by its Vulkan name.
+/// Returns Vulkan's flags of a usage.
 pub(crate) fn raw_usage(usage: TextureUsage, format: Format) -> vk::ImageUsageFlags {
     let target = if format.is_color() {
         vk::ImageUsageFlags::COLOR_ATTACHMENT
@@ -23,7 +23,7 @@ pub(crate) fn raw_usage(usage: TextureUsage, format: Format) -> vk::ImageUsageFl
     pairs.iter().filter(|(bit, _)| usage.contains(*bit)).fold(none, |all, (_, raw)| all | *raw)
 }
 
-/// What a format with these features can be used for.
+/// Returns the usages that a format with these features supports.
 pub(crate) fn usage_from_features(features: vk::FormatFeatureFlags) -> TextureUsage {
     use vk::FormatFeatureFlags as Features;
     let attachment = Features::COLOR_ATTACHMENT | Features::DEPTH_STENCIL_ATTACHMENT;

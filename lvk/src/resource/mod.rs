@@ -1,4 +1,4 @@
-//! Resources: one file for each kind of object, with its description, creation and end.
+//! Resources: one file for each kind of object, with its description, creation and destruction.
 
 pub(crate) mod buffer;
 pub(crate) mod format_support;

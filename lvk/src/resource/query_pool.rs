@@ -1,4 +1,4 @@
-//! Pools of queries: times, samples that passed, and what the pipeline's stages did.
+//! Pools of queries: timestamps, occlusion and pipeline statistics.
 
 use std::sync::Arc;
 
@@ -12,25 +12,25 @@ use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::lock_order::{Guard, Mutex, Rank};
 
-/// What the queries of a pool measure.
+/// Measurement of the queries of a pool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum QueryKind {
-    /// When the GPU gets to a place in a command buffer (`VK_QUERY_TYPE_TIMESTAMP`).
+    /// The time at which the GPU reaches a command (`VK_QUERY_TYPE_TIMESTAMP`).
     #[default]
     Timestamps,
-    /// How many samples pass the depth and stencil tests between begin and end (`VK_QUERY_TYPE_OCCLUSION`).
+    /// The number of samples that pass the depth and stencil tests between begin and end (`VK_QUERY_TYPE_OCCLUSION`).
     Occlusion {
-        /// Count them exactly (`VK_QUERY_CONTROL_PRECISE_BIT`), which needs
-        /// [`Capabilities::precise_occlusion`](crate::Capabilities::precise_occlusion). Otherwise the number is 0 where
-        /// none passed and anything else where some did.
+        /// Counts exactly (`VK_QUERY_CONTROL_PRECISE_BIT`); needs
+        /// [`Capabilities::precise_occlusion`](crate::Capabilities::precise_occlusion). Otherwise the number is 0 if no
+        /// sample passed, and any other number if some did.
         precise: bool,
     },
-    /// How often the stages ran between begin and end (`VK_QUERY_TYPE_PIPELINE_STATISTICS`), as
-    /// [`PipelineStatistics`] without task and mesh shaders, which may not draw in between. Needs
+    /// [`PipelineStatistics`] between begin and end, without task and mesh shaders
+    /// (`VK_QUERY_TYPE_PIPELINE_STATISTICS`). Draws of mesh shaders are not allowed in between. Needs
     /// [`Capabilities::pipeline_statistics`](crate::Capabilities::pipeline_statistics).
     PipelineStatistics,
-    /// The same of fragment, compute, task and mesh shaders alone, which is all that Vulkan counts of pipelines with mesh
-    /// shaders. Needs [`OptionalFeature::MeshShaderQueries`].
+    /// [`PipelineStatistics`] between begin and end, only of fragment, compute, task and mesh shaders. Vulkan counts
+    /// nothing else for pipelines with mesh shaders. Needs [`OptionalFeature::MeshShaderQueries`].
     MeshStatistics,
 }
 
@@ -50,7 +50,7 @@ impl QueryKind {
         }
     }
 
-    /// As error messages say it.
+    /// Returns the name for error messages.
     pub(crate) fn label(self) -> &'static str {
         match self {
             Self::Timestamps => "timestamps",
@@ -60,7 +60,7 @@ impl QueryKind {
         }
     }
 
-    /// The bits of what is counted, in the order of the fields of [`PipelineStatistics`]; none where it is no statistics.
+    /// Returns the bits of the statistics, in the order of the fields of [`PipelineStatistics`]; empty for other kinds.
     pub(crate) fn statistics(self) -> vk::QueryPipelineStatisticFlags {
         let bits = match self {
             Self::Timestamps | Self::Occlusion { .. } => 0,
@@ -92,7 +92,7 @@ impl QueryKind {
 /// Describes a pool of queries.
 #[derive(Debug, Clone, Copy)]
 pub struct QueryPoolDesc<'a> {
-    /// What all of them measure.
+    /// Measurement of all queries of the pool.
     pub kind: QueryKind,
     /// Number of queries, 1 to 65,536.
     pub count: u32,
@@ -106,34 +106,34 @@ impl Default for QueryPoolDesc<'_> {
     }
 }
 
-/// How often the stages of pipelines ran, and what they passed on (`VkQueryPipelineStatisticFlagBits`).
+/// Invocations of pipeline stages and the primitives that they output (`VkQueryPipelineStatisticFlagBits`).
 ///
-/// Drivers may count more or fewer than an ideal machine: vertices shared by triangles may be shaded once or each time,
-/// and invocations that only serve derivatives may count. What no pipeline in between has stays 0.
+/// Drivers may count more or fewer than an ideal machine. Vertices shared by triangles may be shaded once or each time,
+/// and invocations that only serve derivatives may count. Stages that no pipeline between begin and end has stay 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-#[repr(C)] // in the order of Vulkan's bits, in which it writes them
+#[repr(C)] // Vulkan writes the values in the order of its bits
 pub struct PipelineStatistics {
-    /// Vertices that draws asked for.
+    /// Vertices of draws.
     pub input_vertices: u64,
-    /// Primitives that draws asked for.
+    /// Primitives of draws.
     pub input_primitives: u64,
     /// Invocations of vertex shaders.
     pub vertex_invocations: u64,
     /// Invocations of geometry shaders.
     pub geometry_invocations: u64,
-    /// Primitives that geometry shaders made.
+    /// Primitives that geometry shaders output.
     pub geometry_primitives: u64,
-    /// Primitives that came to clipping.
+    /// Primitives that reached clipping.
     pub clipped_primitives: u64,
-    /// Primitives that clipping passed on.
+    /// Primitives that clipping output.
     pub rasterized_primitives: u64,
     /// Invocations of fragment shaders.
     pub fragment_invocations: u64,
-    /// Patches that tessellation control shaders worked on.
+    /// Patches that tessellation control shaders processed.
     pub tessellation_patches: u64,
     /// Invocations of tessellation evaluation shaders.
     pub tessellation_invocations: u64,
-    /// Invocations of compute shaders, those of the library's own kernels included.
+    /// Invocations of compute shaders, including the library's own kernels.
     pub compute_invocations: u64,
     /// Invocations of task shaders; only [`QueryKind::MeshStatistics`] counts them.
     pub task_invocations: u64,
@@ -143,12 +143,12 @@ pub struct PipelineStatistics {
 
 impl PipelineStatistics {
     const FIELDS: usize = 13;
-    /// The bits of the fields down to the compute shaders.
+    /// Bits of the fields from the first to the compute shaders.
     const PLAIN_BITS: u32 = (1 << 11) - 1;
-    /// The bits of fragment, compute, task and mesh shaders.
+    /// Bits of fragment, compute, task and mesh shaders.
     const MESH_BITS: u32 = 1 << 7 | 0b111 << 10;
 
-    /// From the numbers of these bits, the lowest first.
+    /// Creates statistics from the numbers of these bits, the lowest bit first.
     fn from_values(bits: u32, numbers: &[u64]) -> Self {
         let mut fields = [0; Self::FIELDS];
         let counted = fields.iter_mut().enumerate().filter(|(bit, _)| bits >> bit & 1 != 0);
@@ -160,12 +160,12 @@ impl PipelineStatistics {
 /// A query pool, destroyed on drop.
 pub(crate) struct QueryPool {
     pub(crate) raw: vk::QueryPool,
-    /// For waits between queues.
+    /// Identifies the pool in the synchronisation of queues.
     pub(crate) id: ResourceId,
     pub(crate) kind: QueryKind,
     pub(crate) count: u32,
     pub(crate) name: String,
-    /// What everything submitted so far does to the queries.
+    /// State of the queries after all submitted command buffers.
     reset_state: Mutex<QueryResetState>,
     gpu: Arc<Gpu>,
 }
@@ -182,7 +182,7 @@ impl QueryPool {
         Self::with_type(gpu, desc, desc.kind.raw())
     }
 
-    /// A pool whose queries are of type `ty`, which the description need not know.
+    /// Creates a pool of queries of type `ty`, which may differ from the kind of the description.
     pub(crate) fn with_type(gpu: &Arc<Gpu>, desc: &QueryPoolDesc<'_>, ty: vk::QueryType) -> Result<Self> {
         let mut info = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(desc.count);
         if ty == vk::QueryType::PIPELINE_STATISTICS {
@@ -214,7 +214,7 @@ impl QueryPool {
         Err(Error::usage(&self.name, message))
     }
 
-    /// Fails where the pool is of a kind that `call` has nothing to do with.
+    /// Fails with the message `call` unless the kind of the pool fits.
     pub(crate) fn check_kind(&self, fits: bool, call: &str) -> Result<()> {
         if fits {
             return Ok(());
@@ -222,7 +222,7 @@ impl QueryPool {
         Err(Error::usage(&self.name, format!("its queries are {}; {call}", self.kind.label())))
     }
 
-    /// Fails where a command buffer that does `next` writes a query twice without a reset in between.
+    /// Fails if a command buffer with the state `next` writes a query twice without a reset in between.
     pub(crate) fn check_submit(&self, next: &QueryResetState) -> Result<()> {
         match self.reset_state().first_conflict(next) {
             None => Ok(()),
@@ -230,25 +230,25 @@ impl QueryPool {
         }
     }
 
-    /// Says that a query would be written twice.
+    /// Returns the error for a query that would be written twice.
     pub(crate) fn not_reset_error(&self, query: u32) -> Error {
         let message = format!("query {query} was written before; reset it first with reset_queries");
         Error::usage(&self.name, message)
     }
 
-    /// A command buffer that does `next` was submitted.
+    /// Records that a command buffer with the state `next` was submitted.
     pub(crate) fn mark_submitted(&self, next: &QueryResetState) {
         self.reset_state().append(next);
     }
 
-    /// Milliseconds of each timestamp since an arbitrary start; `None` where none was written yet.
+    /// Returns milliseconds of each timestamp since an arbitrary start; `None` for timestamps that are not written yet.
     pub(crate) fn milliseconds(&self, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
         self.check_kind(self.kind == QueryKind::Timestamps, "times come from a pool of timestamps")?;
         let milliseconds = |ticks: u64| self.gpu.milliseconds(ticks);
         Ok(self.values(first, count)?.into_iter().map(|ticks| ticks.map(milliseconds)).collect())
     }
 
-    /// The number of each query; `None` where it is not there yet (`vkGetQueryPoolResults`).
+    /// Returns the number of each query; `None` if it is not available yet (`vkGetQueryPoolResults`).
     pub(crate) fn values(&self, first: u32, count: u32) -> Result<Vec<Option<u64>>> {
         self.check_range(first, count)?;
         let mut values = vec![None; count as usize];
@@ -256,7 +256,7 @@ impl QueryPool {
         Ok(values)
     }
 
-    /// As [`values`](Self::values), without an allocation.
+    /// Reads the numbers into `out`, as [`values`](Self::values) without an allocation.
     pub(crate) fn read(&self, first: u32, out: &mut [Option<u64>]) -> Result<()> {
         const AT_ONCE: usize = 32;
         self.check_range(first, u32::try_from(out.len()).unwrap_or(u32::MAX))?;
@@ -271,7 +271,7 @@ impl QueryPool {
         Ok(())
     }
 
-    /// What the stages did; `None` where it is not there yet.
+    /// Returns the statistics of a query; `None` if they are not available yet.
     pub(crate) fn statistics(&self, query: u32) -> Result<Option<PipelineStatistics>> {
         let bits = self.kind.statistics().as_raw();
         self.check_kind(bits != 0, "statistics come from a pool of pipeline or mesh statistics")?;
@@ -282,7 +282,7 @@ impl QueryPool {
         }
     }
 
-    /// Reads the `N - 1` numbers of these bits, where they are there.
+    /// Reads the `N - 1` numbers of these bits, if they are available.
     fn statistic_values<const N: usize>(&self, query: u32, bits: u32) -> Result<Option<PipelineStatistics>> {
         let mut raw = [[0_u64; N]];
         self.results(query, &mut raw)?;
@@ -290,10 +290,10 @@ impl QueryPool {
         Ok((*ready != 0).then(|| PipelineStatistics::from_values(bits, numbers)))
     }
 
-    /// Numbers with their availability behind them, for queries of the pool.
+    /// Reads the numbers of queries of the pool. The availability follows the numbers of each query.
     fn results<T: Copy>(&self, first: u32, raw: &mut [T]) -> Result<()> {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
-        // SAFETY: the queries exist, and a `T` holds the numbers and the availability of one.
+        // SAFETY: the queries exist, and a `T` holds the numbers and the availability of one query.
         match unsafe { self.gpu.device.get_query_pool_results(self.raw, first, raw, flags) } {
             Ok(()) | Err(vk::Result::NOT_READY) => Ok(()),
             Err(result) => Err(Error::vulkan("vkGetQueryPoolResults")(result)),

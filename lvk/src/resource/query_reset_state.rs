@@ -1,28 +1,28 @@
-//! Which queries of a pool may be written: each once after it was reset.
+//! Tracks which queries of a pool may be written: each query once after a reset.
 
-/// The query was written before it was reset here: it must be ready before the command buffer.
+/// The first write comes before any reset here: the query must be reset before the command buffer.
 const NEEDED: u8 = 1;
-/// It was reset last.
+/// The last operation was a reset.
 const RESET: u8 = 2;
-/// It was written last.
+/// The last operation was a write.
 const WRITTEN: u8 = 4;
 
-/// What one command buffer does to the queries of one pool, or what all submitted ones have done.
+/// State of the queries of one pool after one command buffer, or after all submitted command buffers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct QueryResetState(Vec<u8>);
 
 impl QueryResetState {
-    /// Nothing was done to `count` queries.
+    /// Creates the state of `count` queries without any operation.
     pub(crate) fn new(count: u32) -> Self {
         Self(vec![0; count as usize])
     }
 
-    /// Whether the query may be written, as far as is known here.
+    /// True if the operations recorded here allow a write of the query.
     pub(crate) fn is_ready(&self, query: u32) -> bool {
         self.0.get(query as usize).is_some_and(|mark| mark & WRITTEN == 0)
     }
 
-    /// The query is written.
+    /// Records a write of the query.
     pub(crate) fn write(&mut self, query: u32) {
         if let Some(mark) = self.0.get_mut(query as usize) {
             let needed = if *mark & RESET == 0 { NEEDED } else { 0 };
@@ -30,21 +30,21 @@ impl QueryResetState {
         }
     }
 
-    /// The query is reset.
+    /// Records a reset of the query.
     pub(crate) fn reset(&mut self, query: u32) {
         if let Some(mark) = self.0.get_mut(query as usize) {
             *mark = (*mark & NEEDED) | RESET;
         }
     }
 
-    /// The first query that `next`, which runs after this, writes although it was written and not reset.
+    /// Returns the first query that `next` writes although it was written and not reset. `next` runs after this state.
     pub(crate) fn first_conflict(&self, next: &Self) -> Option<u32> {
         let mut pairs = self.0.iter().zip(&next.0);
         let place = pairs.position(|(before, after)| before & WRITTEN != 0 && after & NEEDED != 0);
         place.map(|place| place as u32)
     }
 
-    /// `next` runs after this.
+    /// Appends the operations of `next`, which runs after this state.
     pub(crate) fn append(&mut self, next: &Self) {
         for (mark, after) in self.0.iter_mut().zip(&next.0) {
             let last = after & (RESET | WRITTEN);
@@ -60,7 +60,8 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Command buffers are accepted exactly where one after the other never writes a query twice without a reset.
+        /// Command buffers are accepted exactly if, one after the other, they never write a query twice without a
+        /// reset.
         #[test]
         fn split_over_command_buffers_or_not_the_rule_is_one(
             buffers in prop::collection::vec(prop::collection::vec((0..4_u32, any::<bool>()), 0..12), 0..6)
@@ -76,7 +77,7 @@ mod tests {
                         local.reset(query);
                         after[place] = false;
                     } else if !local.is_ready(query) {
-                        // Refused while it is recorded: the rest of the command buffer goes on.
+                        // The write is refused during recording. The rest of the command buffer is recorded.
                         refused = true;
                         prop_assert!(after[place]);
                     } else {

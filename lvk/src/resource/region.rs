@@ -1,33 +1,34 @@
-//! Parts of textures as callers name them, checked against the texture and made definite.
+//! Regions of textures: the caller's descriptions, checked against the texture and resolved to exact sizes.
 
 use ash::vk;
 
 use crate::barrier::Subresources;
 use crate::format::{Aspect, CopyAspect};
 
-/// Part of a texture: a rectangle of one mip of some layers, or a box of one mip of a volume.
+/// Part of a texture: a rectangle of one mip of some layers, or a 3D region of one mip of a volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct TextureRegion {
-    /// Mip level; of a view, counted from its first.
+    /// Mip level; in a view, relative to its first mip.
     pub mip: u32,
-    /// First layer or cube face; of a view, counted from its first.
+    /// First layer or cube face; in a view, relative to its first layer.
     pub layer: u32,
-    /// Number of layers; 0 is all from `layer` on. Their texels follow each other.
+    /// Number of layers; 0 is all from `layer` on. The texels of consecutive layers follow each other.
     pub layers: u32,
-    /// First column and row, in texels; multiples of the [block](crate::Format::block_extent).
+    /// First column and row, in texels. Must be multiples of the [block](crate::Format::block_extent).
     pub offset: [u32; 2],
-    /// Width and height in texels; `[0, 0]` is everything from `offset` on. Multiples of the block, or up to the edge.
+    /// Width and height in texels; `[0, 0]` is all from `offset` on. Must be multiples of the block, or end at the
+    /// edge.
     pub extent: [u32; 2],
-    /// First slice of a volume; 0 for everything else.
+    /// First slice of a volume; 0 for all other kinds.
     pub z: u32,
-    /// Number of slices; 0 is all from `z` on. 0 or 1 for everything but volumes.
+    /// Number of slices; 0 is all from `z` on. Must be 0 or 1 for all kinds but volumes.
     pub depth: u32,
-    /// Which part of each texel.
+    /// Aspect of each texel.
     pub aspect: Aspect,
 }
 
 impl Default for TextureRegion {
-    /// The first mip of the first layer.
+    /// Returns the first mip of the first layer.
     fn default() -> Self {
         Self {
             mip: 0,
@@ -55,16 +56,16 @@ pub struct TextureRange {
     pub layers: u32,
 }
 
-/// What regions lie in: the part of an image that a texture shows.
+/// Bounds of the regions of a texture: the part of the image that the texture covers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextureBounds {
-    /// Mips and layers, as part of the image.
+    /// Mips and layers, in the numbering of the image.
     pub(crate) view_range: Subresources,
     /// Width, height and slices of mip 0 of the image.
     pub(crate) extent: [u32; 3],
 }
 
-/// A region that exists, with all its sizes known. Mips and layers count in the image.
+/// A checked region with all sizes resolved. Mips and layers are in the numbering of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Region {
     pub(crate) mip: u32,
@@ -76,13 +77,13 @@ pub(crate) struct Region {
 }
 
 impl TextureBounds {
-    /// Width, height and slices of a mip, counted from the first that is shown.
+    /// Returns width, height and slices of a mip, relative to the first mip of the texture.
     pub(crate) fn mip_extent(&self, mip: u32) -> [u32; 3] {
         let mip = self.view_range.base_mip.saturating_add(mip).min(31);
         self.extent.map(|side| (side >> mip).max(1))
     }
 
-    /// Makes a region of an aspect, `part` of the texels, definite; or says what is wrong with it.
+    /// Checks a region of the aspect `part` and resolves its sizes. The error is a message.
     pub(crate) fn resolve(&self, region: &TextureRegion, part: CopyAspect) -> Result<Region, String> {
         let view_range = self.view_range;
         let layers = resolve_count(region.layer, region.layers, view_range.layer_count);
@@ -114,14 +115,14 @@ impl TextureBounds {
         Ok(Region { mip, layer, layers, offset, extent, part })
     }
 
-    /// Makes a range definite, as part of the image.
+    /// Checks a range and resolves its counts, in the numbering of the image.
     pub(crate) fn resolve_range(&self, range: &TextureRange) -> Result<Subresources, String> {
         let view_range = self.view_range;
         let mips = resolve_count(range.base_mip, range.mips, view_range.mip_count);
         let layers = resolve_count(range.base_layer, range.layers, view_range.layer_count);
         let Some((mip_count, layer_count)) = mips.zip(layers) else {
             let (mips, layers) = (view_range.mip_count, view_range.layer_count);
-            return Err(format!("{range:?} does not exist: it has {mips} mips and {layers} layers"));
+            return Err(format!("{range:?} does not exist: the texture has {mips} mips and {layers} layers"));
         };
         let (base_mip, base_layer) =
             (view_range.base_mip + range.base_mip, view_range.base_layer + range.base_layer);
@@ -130,24 +131,24 @@ impl TextureBounds {
 }
 
 impl Region {
-    /// Bytes of the texels, tightly packed.
+    /// Returns the size of the texels in bytes, tightly packed.
     pub(crate) fn bytes(&self) -> u64 {
         self.part.bytes(self.extent).saturating_mul(self.layers.into())
     }
 
-    /// A region at the place of `other` that is as large.
+    /// Returns a region at the position of `other` with the size of this one.
     pub(crate) fn sized_like(&self, other: &TextureRegion) -> TextureRegion {
         let [width, height, depth] = self.extent;
         TextureRegion { extent: [width, height], depth, layers: self.layers, ..*other }
     }
 
-    /// The mip and the layers, as barriers name them.
+    /// Returns the mip and the layers for barriers.
     pub(crate) fn subresources(&self) -> Subresources {
         let Self { mip: base_mip, layer: base_layer, layers: layer_count, .. } = *self;
         Subresources { base_mip, mip_count: 1, base_layer, layer_count }
     }
 
-    /// The same as copies and blits name them.
+    /// Returns the mip and the layers for copies and blits.
     pub(crate) fn raw_layers(&self) -> vk::ImageSubresourceLayers {
         vk::ImageSubresourceLayers {
             aspect_mask: self.part.aspect,
@@ -157,25 +158,25 @@ impl Region {
         }
     }
 
-    /// The first corner.
+    /// Returns the offset of the first texel.
     pub(crate) fn raw_offset(&self) -> vk::Offset3D {
         let [x, y, z] = self.offset.map(|place| place as i32);
         vk::Offset3D { x, y, z }
     }
 
-    /// Size of the box.
+    /// Returns the size of the region.
     pub(crate) fn raw_extent(&self) -> vk::Extent3D {
         let [width, height, depth] = self.extent;
         vk::Extent3D { width, height, depth }
     }
 
-    /// First corner and the one behind the last.
+    /// Returns the offset of the first texel and the offset past the last texel, for blits.
     pub(crate) fn raw_corners(&self) -> [vk::Offset3D; 2] {
         let [x, y, z] = [0, 1, 2].map(|axis| (self.offset[axis] + self.extent[axis]) as i32);
         [self.raw_offset(), vk::Offset3D { x, y, z }]
     }
 
-    /// The copy from or to a buffer in which the bytes start at `buffer_offset`, tightly packed.
+    /// Returns the copy from or to a buffer in which the bytes start at `buffer_offset`, tightly packed.
     pub(crate) fn buffer_copy(&self, buffer_offset: u64) -> vk::BufferImageCopy {
         vk::BufferImageCopy {
             buffer_offset,
@@ -188,8 +189,8 @@ impl Region {
     }
 }
 
-/// How many of `whole` things from `first` on are meant, all of them where `count` is 0; `None` where there are not so
-/// many.
+/// Returns the number of elements from `first` on in an array of `whole` elements. A `count` of 0 means all of them.
+/// `None` if the elements do not exist.
 fn resolve_count(first: u32, count: u32, whole: u32) -> Option<u32> {
     let rest = whole.checked_sub(first).filter(|rest| *rest > 0)?;
     match count {
@@ -204,7 +205,7 @@ fn missing_message(mip: u32, layer: u32, count: u32, view_range: Subresources) -
         0 | 1 => format!("layer {layer}"),
         count => format!("{count} layers from {layer} on"),
     };
-    format!("mip {mip} of {which} does not exist: it has {mips} mips and {layers} layers")
+    format!("mip {mip} of {which} does not exist: the texture has {mips} mips and {layers} layers")
 }
 
 #[cfg(test)]
@@ -259,7 +260,7 @@ mod tests {
             prop_assert_eq!(found.bytes(), count * u64::from(part.block_bytes));
         }
 
-        /// The whole of a mip always exists, and naming its sizes says the same as leaving them out.
+        /// The whole of a mip always exists, and explicit sizes are equal to omitted sizes.
         #[test]
         fn zero_is_all_there_is((bounds, format) in bounds(), mip in 0..3_u32) {
             let part = format.copy_aspect(Aspect::Main).unwrap();

@@ -9,7 +9,7 @@ use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
 
-/// How texels are interpolated.
+/// Interpolation of texels (`VkFilter`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Filter {
     /// The nearest texel.
@@ -28,25 +28,25 @@ impl Filter {
     }
 }
 
-/// What lies outside of 0..1.
+/// Result of a lookup at coordinates outside of 0..1 (`VkSamplerAddressMode`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum AddressMode {
-    /// The texture again.
+    /// Repeats the texture.
     #[default]
     Repeat,
-    /// The texture again, mirrored each time.
+    /// Repeats the texture, mirrored each time.
     MirroredRepeat,
-    /// The texel at the edge.
+    /// Returns the texel at the edge.
     ClampToEdge,
-    /// The [`border`](SamplerDesc::border) of the sampler.
+    /// Returns the [`border`](SamplerDesc::border) of the sampler.
     ClampToBorder,
-    /// The texture mirrored once, then the texel at the edge
+    /// Mirrors the texture once, then returns the texel at the edge
     /// ([`OptionalFeature::MirrorClampToEdge`](crate::OptionalFeature)).
     MirrorClampToEdge,
 }
 
-/// What lies beyond the edge of a texture under [`AddressMode::ClampToBorder`]. Textures of integers take those whose names
-/// say so, all others the rest.
+/// Colour beyond the edge of a texture under [`AddressMode::ClampToBorder`] (`VkBorderColor`). Integer textures need an
+/// integer colour, all other textures one of the others.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum BorderColor {
     /// All channels 0.
@@ -56,16 +56,17 @@ pub enum BorderColor {
     OpaqueBlack,
     /// All channels 1.
     OpaqueWhite,
-    /// All channels 0, of integers.
+    /// All channels 0, for integer textures.
     TransparentBlackInteger,
-    /// Channels 0, alpha 1, of integers.
+    /// Channels 0, alpha 1, for integer textures.
     OpaqueBlackInteger,
-    /// All channels 1, of integers.
+    /// All channels 1, for integer textures.
     OpaqueWhiteInteger,
-    /// Any colour ([`OptionalFeature::CustomBorderColorWithoutFormat`](crate::OptionalFeature)), which devices may round to the
-    /// precision of the texture that is sampled; a device has [few](crate::Limits::max_custom_borders) such samplers at a time.
+    /// Any colour ([`OptionalFeature::CustomBorderColorWithoutFormat`](crate::OptionalFeature)). Devices may round it
+    /// to the precision of the sampled texture. The number of such samplers at a time is
+    /// [limited](crate::Limits::max_custom_borders).
     Custom([f32; 4]),
-    /// The same of integers.
+    /// Any colour, for integer textures; see [`Custom`](BorderColor::Custom).
     CustomInteger([u32; 4]),
 }
 
@@ -83,7 +84,7 @@ impl BorderColor {
         }
     }
 
-    /// The colour, where it is the caller's own.
+    /// Returns the colour if it is a custom one.
     fn custom_color(self) -> Option<vk::ClearColorValue> {
         match self {
             Self::Custom(float32) => Some(vk::ClearColorValue { float32 }),
@@ -93,16 +94,17 @@ impl BorderColor {
     }
 }
 
-/// What becomes of the texels that a filter reads (`VkSamplerReductionMode`).
+/// Reduction of the texels that a filter reads (`VkSamplerReductionMode`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum SamplerReductionMode {
-    /// Their weighted mean.
+    /// The weighted mean.
     #[default]
     Mean,
-    /// The least of those with a weight, channel by channel, for formats with
+    /// The least texel with a weight, channel by channel. Needs a format with
     /// [`FormatSupport::min_max`](crate::FormatSupport).
     Min,
-    /// The greatest.
+    /// The greatest texel with a weight, channel by channel. Needs a format with
+    /// [`FormatSupport::min_max`](crate::FormatSupport).
     Max,
 }
 
@@ -116,7 +118,7 @@ impl SamplerReductionMode {
     }
 }
 
-/// A comparison, of depths or of a reference with a texel.
+/// A comparison of depths, or of a reference with a texel (`VkCompareOp`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum CompareOp {
     /// Never passes.
@@ -164,15 +166,15 @@ pub struct SamplerDesc<'a> {
     pub mip_filter: Filter,
     /// Addressing along u, v and w.
     pub address: [AddressMode; 3],
-    /// Largest anisotropy, 1 to 16; clamped to the device's.
+    /// Largest anisotropy, 1 to 16; clamped to the limit of the device.
     pub max_anisotropy: f32,
-    /// Makes a comparison sampler, read through `kSamplersShadow[]`.
+    /// Comparison of a comparison sampler, which shaders read through `kSamplersShadow[]`; `None` for other samplers.
     pub compare: Option<CompareOp>,
-    /// What lies beyond the edge where an address clamps to the border.
+    /// Colour beyond the edge under [`AddressMode::ClampToBorder`].
     pub border: BorderColor,
-    /// What becomes of the texels that are read; not beside a comparison.
+    /// Reduction of the texels that are read. Must be the mean in comparison samplers.
     pub reduction: SamplerReductionMode,
-    /// Added to the level of detail; at most [`Limits::max_lod_bias`](crate::Limits), in either direction.
+    /// Value added to the level of detail; its magnitude is at most [`Limits::max_lod_bias`](crate::Limits).
     pub lod_bias: f32,
     /// Smallest and largest level of detail.
     pub lod_range: [f32; 2],
@@ -203,7 +205,7 @@ pub(crate) struct Sampler {
     pub(crate) raw: vk::Sampler,
     pub(crate) slot: u32,
     pub(crate) name: String,
-    /// Given back after the sampler is gone.
+    /// Released after the sampler is destroyed.
     _custom_border: Option<CustomBorder>,
     gpu: Arc<Gpu>,
 }
@@ -240,7 +242,7 @@ impl Drop for Sampler {
     }
 }
 
-/// One of the few border colours that the device can keep.
+/// One of the limited number of custom border colours of the device.
 struct CustomBorder(Arc<Gpu>);
 
 impl CustomBorder {
@@ -260,7 +262,7 @@ impl Drop for CustomBorder {
     }
 }
 
-/// Fails unless the device can make the sampler.
+/// Fails unless the device can create the sampler.
 fn check_sampler(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
     let wrong = |message: &str| Err(Error::usage(desc.debug_name, message));
     let [min_lod, max_lod] = desc.lod_range;
@@ -273,7 +275,7 @@ fn check_sampler(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
         return wrong(&format!("the level of detail can be biased by {limit}, not by {}", desc.lod_bias));
     }
     if desc.compare.is_some() && desc.reduction != SamplerReductionMode::Mean {
-        return wrong("what comparisons answer is only averaged; leave the reduction at Mean");
+        return wrong("comparison samplers take the mean of their results; leave the reduction at Mean");
     }
     let needed = [
         (desc.address.contains(&AddressMode::MirrorClampToEdge), OptionalFeature::MirrorClampToEdge),

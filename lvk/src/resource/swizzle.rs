@@ -1,8 +1,8 @@
-//! Which channels of a texel shaders see.
+//! Mapping of the channels of a texel to the channels that shaders read.
 
 use ash::vk;
 
-/// Where a channel of what a shader samples comes from.
+/// Source of a channel that a shader samples (`VkComponentSwizzle`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Channel {
     /// Always 0.
@@ -19,25 +19,25 @@ pub enum Channel {
     Alpha,
 }
 
-/// Which channels of a texel the four that a shader samples are (`VkComponentMapping`).
+/// Sources of the four channels that a shader samples (`VkComponentMapping`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Swizzle {
-    /// What shaders see as red.
+    /// Source of the red channel.
     pub red: Channel,
-    /// What shaders see as green.
+    /// Source of the green channel.
     pub green: Channel,
-    /// What shaders see as blue.
+    /// Source of the blue channel.
     pub blue: Channel,
-    /// What shaders see as alpha.
+    /// Source of the alpha channel.
     pub alpha: Channel,
 }
 
 impl Swizzle {
-    /// Every channel is itself.
+    /// Every channel is mapped to itself.
     pub const IDENTITY: Self =
         Self { red: Channel::Red, green: Channel::Green, blue: Channel::Blue, alpha: Channel::Alpha };
 
-    /// What a view with this swizzle of a view with the `first` one shows.
+    /// Returns the swizzle of a view with this swizzle of a view with the swizzle `first`.
     pub(crate) fn compose(self, first: Self) -> Self {
         let through = |channel| match channel {
             Channel::Zero | Channel::One => channel,

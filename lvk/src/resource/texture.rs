@@ -1,4 +1,4 @@
-//! Textures: what handles name. An image or a part of it, with its views and its place in the bindless arrays.
+//! Textures, the objects of texture handles: an image or a part of it, with its views and its bindless slot.
 
 use std::sync::Arc;
 
@@ -16,36 +16,36 @@ use crate::error::{Error, Result};
 use crate::format::{Aspect, CopyAspect, Format};
 use crate::gpu::Gpu;
 
-/// Mips and layers of an image as one kind and format. Several textures may show the same image.
+/// Mips and layers of an image, with one kind and format. Several textures may share one image.
 pub(crate) struct Texture {
     /// Dropped before the image.
     views: ViewCache,
     pub(crate) image: Arc<Image>,
     pub(crate) kind: TextureKind,
     pub(crate) format: Format,
-    /// The part of the image that is shown.
+    /// The part of the image that the texture covers.
     pub(crate) range: Subresources,
-    /// The part of the image that storage accesses reach: one mip. Kept, as dispatches ask for it again and again.
+    /// The part of the image that storage accesses reach: one mip. Cached, because every dispatch needs it.
     pub(crate) stored_part: Subresources,
     pub(crate) usage: TextureUsage,
     pub(crate) slot: u32,
     pub(crate) name: String,
-    /// Which part of the texels of the image.
+    /// Aspect of the image that the texture covers.
     aspect: Aspect,
     swizzle: Swizzle,
-    /// How texels in Y'CbCr are converted; null for all others.
+    /// Conversion of Y'CbCr texels; null for all other formats.
     conversion: vk::SamplerYcbcrConversion,
-    /// It belongs to the owner of its image, who alone destroys it.
+    /// True if the image has an external owner, which alone destroys the texture.
     pub(crate) lent: bool,
 }
 
 impl Texture {
-    /// A texture with an image of its own.
+    /// Creates a texture with an image of its own.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, slot: u32) -> Result<Self> {
         Self::with_conversion(gpu, desc, slot, vk::SamplerYcbcrConversion::null())
     }
 
-    /// As [`new`](Self::new), for texels in Y'CbCr, which are converted so.
+    /// Creates a texture in Y'CbCr with this conversion; see [`new`](Self::new).
     pub(crate) fn with_conversion(
         gpu: &Arc<Gpu>,
         desc: &TextureDesc<'_>,
@@ -55,12 +55,12 @@ impl Texture {
         Ok(Self { conversion, ..Self::from_image(gpu, desc, Image::new(gpu, desc)?, slot) })
     }
 
-    /// A texture with an image of somebody else's, which is as described.
+    /// Creates a texture of an image that was created outside of the library. The image must match the description.
     pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image, slot: u32) -> Result<Self> {
         Ok(Self::from_image(gpu, desc, Image::import(gpu, desc, raw)?, slot))
     }
 
-    /// The texture of an image, which is as described.
+    /// Creates a texture of an image, which must match the description.
     pub(crate) fn from_image(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, image: Image, slot: u32) -> Self {
         Self {
             views: ViewCache::new(gpu),
@@ -79,7 +79,8 @@ impl Texture {
         }
     }
 
-    /// A texture that shows part of this one. The caller has the image [shared](Image::add_texture) before it is used.
+    /// Creates a texture of a part of this one. The caller must call [`Image::add_texture`] before the new texture is
+    /// used.
     pub(crate) fn view(&self, desc: &TextureViewDesc<'_>, slot: u32) -> Result<Self> {
         let view_range = self.check_view(desc)?;
         Ok(Self {
@@ -99,12 +100,12 @@ impl Texture {
         })
     }
 
-    /// The view shaders sample: every mip and layer.
+    /// Returns the view that shaders sample: every mip and layer.
     pub(crate) fn sampled_view(&self) -> Result<vk::ImageView> {
         self.raw_view(self.range, raw_kind(self.kind), TextureUsage::SAMPLED)
     }
 
-    /// The view shaders write: mip 0, every layer.
+    /// Returns the view that shaders write: mip 0, every layer.
     pub(crate) fn storage_view(&self) -> Result<vk::ImageView> {
         let kind = match self.kind {
             TextureKind::Cube | TextureKind::CubeArray { .. } => vk::ImageViewType::TYPE_2D_ARRAY,
@@ -113,28 +114,28 @@ impl Texture {
         self.raw_view(self.stored_part, kind, TextureUsage::STORAGE)
     }
 
-    /// The view a render pass draws to: a mip of a layer, or of a slice.
+    /// Returns the view that a render pass draws to: a mip of a layer, or of a slice.
     pub(crate) fn target_view(&self, mip: u32, layer: u32) -> Result<vk::ImageView> {
         self.raw_view(self.subresource(mip, layer), vk::ImageViewType::TYPE_2D, self.target_usage())
     }
 
-    /// The view a render pass draws several layers or slices to.
+    /// Returns the view of several layers or slices that a render pass draws to.
     pub(crate) fn layered_target_view(&self, mip: u32, layer: u32, count: u32) -> Result<vk::ImageView> {
         let range = Subresources { layer_count: count, ..self.subresource(mip, layer) };
         self.raw_view(range, vk::ImageViewType::TYPE_2D_ARRAY, self.target_usage())
     }
 
-    /// The view a render pass takes its shading rates from.
+    /// Returns the view that a render pass reads its shading rates from.
     pub(crate) fn rate_view(&self, mip: u32, layer: u32) -> Result<vk::ImageView> {
         self.raw_view(self.subresource(mip, layer), vk::ImageViewType::TYPE_2D, TextureUsage::SHADING_RATE)
     }
 
-    /// One view serves both as a target and as what shaders read of it.
+    /// Returns the usage of target views. One view serves both as a target and as an input attachment.
     fn target_usage(&self) -> TextureUsage {
         TextureUsage::TARGET | (self.usage & TextureUsage::INPUT)
     }
 
-    /// The view that fragment shaders of a pass read, which draws to it: one aspect.
+    /// Returns the view that fragment shaders read in the pass that draws to the texture. The view has one aspect.
     pub(crate) fn input_view(
         &self,
         part: Subresources,
@@ -167,7 +168,8 @@ impl Texture {
         Err(Error::usage(&self.name, format!("slice {layer} does not exist: mip {mip} has {slices}")))
     }
 
-    /// The part of the image that a pass uses which draws to the mip of the layers or slices: slices are not tracked.
+    /// Returns the part of the image that a pass uses if it draws to the mip of the layers or slices. Slices are not
+    /// tracked separately.
     pub(crate) fn attachment_subresources(&self, mip: u32, layer: u32, count: u32) -> Subresources {
         if self.kind.is_3d() {
             return self.subresource(mip, 0);
@@ -199,17 +201,18 @@ impl Texture {
         self.views.get_or_create(&self.image, info, &self.name)
     }
 
-    /// Number of mips.
+    /// Returns the number of mips.
     pub(crate) fn mips(&self) -> u32 {
         self.range.mip_count
     }
 
-    /// Number of layers.
+    /// Returns the number of layers.
     pub(crate) fn layers(&self) -> u32 {
         self.range.layer_count
     }
 
-    /// One mip of one layer, counted from the texture's own first ones, as part of the image.
+    /// Returns one mip of one layer in the numbering of the image. `mip` and `layer` are relative to the first ones of
+    /// the texture.
     pub(crate) fn subresource(&self, mip: u32, layer: u32) -> Subresources {
         let Subresources { base_mip, base_layer, .. } = self.range;
         Subresources {
@@ -220,29 +223,29 @@ impl Texture {
         }
     }
 
-    /// Width and height of a mip.
+    /// Returns width and height of a mip.
     pub(crate) fn mip_extent(&self, mip: u32) -> [u32; 2] {
         let [width, height, _] = self.bounds().mip_extent(mip);
         [width, height]
     }
 
-    /// Slices of a mip: 1 for all but volumes.
+    /// Returns the slices of a mip: 1 for all kinds but volumes.
     pub(crate) fn mip_depth(&self, mip: u32) -> u32 {
         self.bounds().mip_extent(mip)[2]
     }
 
-    /// What regions lie in.
+    /// Returns the bounds of the texture's regions.
     pub(crate) fn bounds(&self) -> TextureBounds {
         let [width, height] = self.image.extent;
         TextureBounds { view_range: self.range, extent: [width, height, self.image.depth] }
     }
 
-    /// Whether shaders reach it through the sampler of its conversion.
+    /// True if shaders access the texture through the sampler of its Y'CbCr conversion.
     pub(crate) fn is_yuv(&self) -> bool {
         self.format.is_yuv()
     }
 
-    /// All aspects that the texture shows; none of planes, which are only copied and sampled.
+    /// Returns all aspects that the texture covers. Empty for textures of a plane, which are only copied and sampled.
     pub(crate) fn view_aspects(&self) -> vk::ImageAspectFlags {
         match self.aspect {
             Aspect::Main => self.image.format.aspects(),
@@ -251,7 +254,7 @@ impl Texture {
         }
     }
 
-    /// An aspect of what the texture shows, as copies move it.
+    /// Returns an aspect of the texture for copies.
     pub(crate) fn copy_aspect(&self, aspect: Aspect) -> Result<CopyAspect> {
         let own = if self.aspect == Aspect::Main { aspect } else { self.aspect };
         let view_range = aspect == Aspect::Main || aspect == own;
@@ -262,7 +265,7 @@ impl Texture {
         })
     }
 
-    /// Fails for textures that live in passes only.
+    /// Fails for transient textures, which exist only inside of passes.
     pub(crate) fn check_not_transient(&self) -> Result<()> {
         if !self.image.transient {
             return Ok(());
@@ -279,7 +282,7 @@ impl Texture {
         self.bounds().resolve(region, part).map_err(|message| Error::usage(&self.name, message))
     }
 
-    /// Checks a range of mips and layers and resolves it.
+    /// Checks a range of mips and layers and resolves its counts.
     pub(crate) fn resolve_range(&self, range: &TextureRange) -> Result<Subresources> {
         self.check_not_transient()?;
         self.bounds().resolve_range(range).map_err(|message| Error::usage(&self.name, message))
@@ -291,8 +294,9 @@ impl Texture {
         if mip < mips && layer < layers {
             return Ok(());
         }
-        let message =
-            format!("mip {mip} of layer {layer} does not exist: it has {mips} mips and {layers} layers");
+        let message = format!(
+            "mip {mip} of layer {layer} does not exist: the texture has {mips} mips and {layers} layers"
+        );
         Err(Error::usage(&self.name, message))
     }
 
@@ -305,7 +309,7 @@ impl Texture {
         let format = self.format;
         let message = if self.image.usage.contains(usage) {
             format!(
-                "it cannot be used for {usage:?} as {format:?} with its swizzle and usage; make another view of it"
+                "the texture cannot be used for {usage:?} as {format:?} with its swizzle and usage; make another view of it"
             )
         } else {
             format!("create the texture with {usage:?} in its usage")
@@ -313,7 +317,7 @@ impl Texture {
         Err(Error::usage(&self.name, message))
     }
 
-    /// Fails for textures of several samples a texel, which `what` cannot read or write.
+    /// Fails for textures with several samples per texel. `what` begins the error message.
     pub(crate) fn check_one_sample(&self, what: &str) -> Result<()> {
         if self.image.samples == 1 {
             return Ok(());
@@ -323,7 +327,7 @@ impl Texture {
         Err(Error::usage(&self.name, message))
     }
 
-    /// Resolves a region to which `bytes` are uploaded, tightly packed.
+    /// Resolves the region of an upload of `bytes`, tightly packed.
     pub(crate) fn check_upload(&self, region: &TextureRegion, bytes: u64) -> Result<Region> {
         let region = self.resolve_region(region)?;
         self.check_one_sample("uploads write")?;
@@ -335,7 +339,7 @@ impl Texture {
         Err(Error::usage(&self.name, message))
     }
 
-    /// Decides what a view of the texture shows.
+    /// Checks the description of a view and resolves its defaults.
     fn check_view(&self, desc: &TextureViewDesc<'_>) -> Result<ResolvedView> {
         let kind = desc.kind.unwrap_or_else(|| match self.kind {
             TextureKind::D2Array { layers } => {
@@ -368,7 +372,7 @@ impl Texture {
         }
         if kind.is_cube() && !self.image.cube_compatible {
             return wrong(format!(
-                "'{}' has no six square layers that the device takes for a cube",
+                "'{}' has no six square layers of which the device can create a cube view",
                 self.name
             ));
         }
@@ -396,7 +400,7 @@ impl Texture {
         Ok(ResolvedView { kind, format, range, usage, aspect })
     }
 
-    /// The mips and layers of a view, as part of the image.
+    /// Returns the mips and layers of a view in the numbering of the image.
     fn check_view_range(&self, desc: &TextureViewDesc<'_>, kind: TextureKind) -> Result<Subresources> {
         let mips = if desc.mips == 0 { self.mips().saturating_sub(desc.base_mip) } else { desc.mips };
         let layers = kind.layers();
@@ -423,7 +427,7 @@ impl Texture {
     }
 }
 
-/// What a view shows.
+/// A view description with all defaults resolved.
 struct ResolvedView {
     kind: TextureKind,
     format: Format,
@@ -432,7 +436,7 @@ struct ResolvedView {
     aspect: Aspect,
 }
 
-/// The first mip of a part.
+/// Returns the first mip of a part.
 fn one_mip(part: Subresources) -> Subresources {
     Subresources { mip_count: 1, ..part }
 }

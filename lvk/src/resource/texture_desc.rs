@@ -1,4 +1,4 @@
-//! What callers say of a texture: its shape, format and uses.
+//! Descriptions of textures: shape, format and uses.
 
 use bitflags::bitflags;
 
@@ -6,7 +6,7 @@ use super::swizzle::Swizzle;
 use crate::format::Format;
 
 bitflags! {
-    /// What a texture is used for, besides copies, which are always allowed.
+    /// Allowed uses of a texture (`VkImageUsageFlags`). Copies are always allowed.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     pub struct TextureUsage: u32 {
         /// Sampled or fetched by shaders.
@@ -15,13 +15,12 @@ bitflags! {
         const STORAGE = 1 << 1;
         /// A colour or depth target of render passes.
         const TARGET = 1 << 2;
-        /// A target that fragment shaders of its own pass read too, by
-        /// [`RenderPassDesc::local_read`](crate::RenderPassDesc::local_read). Goes with `TARGET`; needs
+        /// A target that fragment shaders can also read in the pass that draws to it, by
+        /// [`RenderPassDesc::local_read`](crate::RenderPassDesc::local_read). Must be combined with `TARGET`; needs
         /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
         const INPUT = 1 << 3;
-        /// Shading rates of passes
-        /// ([`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate)), of one sample and the format
-        /// [`R8Uint`](Format::R8Uint). Needs
+        /// Shading rates of passes ([`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate)). The texture
+        /// must have one sample and the format [`R8Uint`](Format::R8Uint). Needs
         /// [`OptionalFeature::AttachmentShadingRate`](crate::OptionalFeature::AttachmentShadingRate).
         const SHADING_RATE = 1 << 4;
     }
@@ -30,8 +29,8 @@ bitflags! {
 /// Shape of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum TextureKind {
-    /// One row of texels, which is not drawn to: an element of what `LVK_TEXTURES(texture1D, kTextures1D)` declares in a
-    /// shader.
+    /// One row of texels, which cannot be a target. Shaders declare the array with
+    /// `LVK_TEXTURES(texture1D, kTextures1D)`.
     D1,
     /// One 2D image: an element of `kTextures2D[]`.
     #[default]
@@ -41,15 +40,15 @@ pub enum TextureKind {
         /// Number of layers, at least 1.
         layers: u32,
     },
-    /// Slices of a volume: an element of `kTextures3D[]`. Its mips halve in depth too; it has one layer.
+    /// Slices of a volume: an element of `kTextures3D[]`. Each mip has half the depth too. A volume has one layer.
     D3 {
         /// Number of slices of mip 0, at least 1.
         depth: u32,
     },
     /// Six faces in the order +X -X +Y -Y +Z -Z: an element of `kTexturesCube[]`.
     Cube,
-    /// Cubes, each with six layers: an element of what `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray)` declares
-    /// in a shader. Needs [`Capabilities::cube_arrays`](crate::Capabilities).
+    /// Cubes with six layers each. Shaders declare the array with `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray)`.
+    /// Needs [`Capabilities::cube_arrays`](crate::Capabilities).
     CubeArray {
         /// Number of cubes, at least 1.
         cubes: u32,
@@ -57,7 +56,7 @@ pub enum TextureKind {
 }
 
 impl TextureKind {
-    /// Images of one mip; faces of cubes count each. Slices of a volume are no layers.
+    /// Returns the number of layers of one mip. Each face of a cube is a layer; slices of a volume are not.
     pub fn layers(self) -> u32 {
         match self {
             Self::D1 | Self::D2 | Self::D3 { .. } => 1,
@@ -67,69 +66,73 @@ impl TextureKind {
         }
     }
 
-    /// Slices of mip 0: 1 for all but volumes.
+    /// Returns the number of slices of mip 0: 1 for all kinds but volumes.
     pub fn depth(self) -> u32 {
         if let Self::D3 { depth } = self { depth } else { 1 }
     }
 
-    /// Whether layers are faces.
+    /// True if layers are faces of cubes.
     pub(crate) fn is_cube(self) -> bool {
         matches!(self, Self::Cube | Self::CubeArray { .. })
     }
 
-    /// Whether the texture is a volume.
+    /// True if the texture is a volume.
     pub(crate) fn is_3d(self) -> bool {
         matches!(self, Self::D3 { .. })
     }
 }
 
-/// Where a texture lives.
+/// Memory of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum TextureMemory {
-    /// In memory of its own.
+    /// Device memory.
     #[default]
     Device,
-    /// Only inside of render passes, on devices that can (`VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT`); elsewhere in memory of
-    /// its own. Such a texture is a [`TextureUsage::TARGET`], perhaps an [`INPUT`](TextureUsage::INPUT) too, and nothing else:
-    /// passes neither load nor store it, and it is not copied, cleared by command or sampled.
+    /// Lazily allocated memory, which exists only inside of render passes (`VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT`).
+    /// Devices without such memory use device memory. The usage must be [`TextureUsage::TARGET`], optionally with
+    /// [`INPUT`](TextureUsage::INPUT). Passes neither load nor store the texture, and it cannot be copied, cleared by a
+    /// command or sampled.
     Transient,
 }
 
 /// Describes a texture.
 #[derive(Debug, Clone, Copy)]
 pub struct TextureDesc<'a> {
-    /// Shape.
+    /// Shape of the texture.
     pub kind: TextureKind,
     /// Format of the texels.
     pub format: Format,
-    /// Width and height of mip 0 in texels; the height of a row is 1.
+    /// Width and height of mip 0 in texels. The height of a `D1` texture is 1.
     pub extent: [u32; 2],
     /// Number of mips; 0 is the whole chain down to one texel.
     pub mips: u32,
-    /// Samples a texel: 1, or a power of two for a multisampled target, an element of `kTextures2DMS[]`. It has one mip,
-    /// is `D2` or `D2Array`, and takes no data: passes and clears write it, resolves read it.
-    /// [`Limits::color_samples`](crate::Limits) says which counts there are.
+    /// Samples per texel: 1, or a power of two for a multisampled target, an element of `kTextures2DMS[]`. A
+    /// multisampled texture has one mip and is `D2` or `D2Array`. It takes no data: passes and clears write it,
+    /// resolves read it. [`Limits::color_samples`](crate::Limits) holds the supported counts.
     pub samples: u32,
-    /// What the texture is used for.
+    /// Allowed uses of the texture.
     pub usage: TextureUsage,
-    /// Where the texture lives.
+    /// Memory of the texture.
     pub memory: TextureMemory,
-    /// Other colour formats, of texels of the same size, in which
-    /// [`Context::create_texture_view`](crate::Context::create_texture_view) may show the texels. A usage is then enough if
-    /// one of all these formats has it; the texture itself keeps what its own format can.
+    /// Other colour formats with the same texel size that views may have
+    /// ([`Context::create_texture_view`](crate::Context::create_texture_view)). With such formats, a usage is allowed
+    /// if at least one of all the formats supports it. The texture itself has the usages that its own format supports.
     ///
-    /// Any (`VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT`) may cost the compression of the image, so list none without need.
+    /// Any entry (`VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT`) may disable the compression of the image, so list only the
+    /// formats that are needed.
     pub view_formats: &'a [Format],
-    /// Which channels of a texel the four that shaders sample are. Storage images and targets show the channels as they are.
+    /// Sources of the four channels that shaders sample. Storage images and targets are not swizzled.
     pub swizzle: Swizzle,
-    /// First contents, tightly packed: of each mip in turn, from 0 on, all layers or slices one after the other. Of depth
-    /// with stencil the depth; of Y'CbCr all planes one after the other.
+    /// Initial contents, tightly packed: mip by mip from 0 on, with all layers or slices of a mip in order. Formats
+    /// with depth and stencil take the depth only. Y'CbCr formats take all planes in order.
     pub data: Option<&'a [u8]>,
-    /// Number of mips that `data` has; 0 is all.
+    /// Number of mips in `data`; 0 is all.
     pub data_mips: u32,
-    /// Which of [`ContextDesc::yuv`](crate::ContextDesc) converts a texture in Y'CbCr; `None` is the first of its format.
+    /// Index of the conversion of a Y'CbCr texture in [`ContextDesc::yuv`](crate::ContextDesc). `None` is the first one
+    /// of the format.
     pub conversion: Option<usize>,
-    /// Fills the other mips by halving the last of `data`, which holds one (colour formats the device can filter).
+    /// True if the other mips are created by halving the last mip of `data`, which has one mip. Needs a colour format
+    /// that the device can filter.
     pub generate_mips: bool,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,

@@ -1,4 +1,4 @@
-//! Views: how shaders and passes see a part of an image.
+//! Views: the form in which shaders and passes access a part of an image.
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
@@ -15,16 +15,16 @@ use crate::gpu::Gpu;
 use crate::handle::TextureHandle;
 use crate::lock_order::{Mutex, Rank};
 
-/// Describes a view: a texture that shows mips and layers of another one, perhaps as another kind or format.
+/// Describes a view: a texture of some mips and layers of another texture, optionally with another kind or format.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TextureViewDesc<'a> {
-    /// The texture to show, which may be a view itself: mips and layers then count from its first ones.
+    /// The viewed texture. It may be a view itself; mips and layers are then relative to its first ones.
     pub texture: Option<TextureHandle>,
-    /// Shape, which also says how many layers there are from [`base_layer`](Self::base_layer) on: 1, those of the array,
-    /// or the 6 of each cube. `None` is the shape of the texture, for arrays with all layers or whole cubes from
-    /// `base_layer` on, for volumes with the depth of `base_mip`.
+    /// Shape of the view. It also defines the number of layers from [`base_layer`](Self::base_layer) on: 1, the layers
+    /// of an array, or 6 for each cube. `None` is the shape of the texture. Arrays then have all layers, or whole
+    /// cubes, from `base_layer` on. Volumes have the depth of `base_mip`.
     ///
-    /// Cubes can be made of square arrays of at least six layers. Volumes are seen as volumes only, of all their slices.
+    /// Cube views are possible of square arrays of at least six layers. Views of volumes are volumes with all slices.
     pub kind: Option<TextureKind>,
     /// First mip.
     pub base_mip: u32,
@@ -32,22 +32,22 @@ pub struct TextureViewDesc<'a> {
     pub mips: u32,
     /// First layer.
     pub base_layer: u32,
-    /// Format shaders and passes take the texels for: the texture's own, or one of its
-    /// [`view_formats`](crate::TextureDesc::view_formats). `None` is the texture's.
+    /// Format of the texels for shaders and passes: the texture's own, or one of its
+    /// [`view_formats`](crate::TextureDesc::view_formats). `None` is the texture's own.
     pub format: Option<Format>,
-    /// Which part of the texels shaders sample: the stencil of a format that has it is an element of `kTexturesU2D[]`. A
-    /// plane of a format in Y'CbCr is a texture of [its own format](Format::plane_format).
+    /// Aspect of the texels that shaders sample. The stencil of a format with stencil is an element of
+    /// `kTexturesU2D[]`. A plane of a Y'CbCr format is a texture of [its own format](Format::plane_format).
     pub aspect: Aspect,
-    /// Channels as shaders sample them. Storage images and targets show the channels as they are.
+    /// Sources of the channels that shaders sample. Storage images and targets are not swizzled.
     pub swizzle: Swizzle,
-    /// What the view is used for, of what its texture was made for. `None` is all of it that the format and the swizzle
-    /// allow.
+    /// Allowed uses of the view, a subset of the uses of its texture. `None` is every use that the format and the
+    /// swizzle allow.
     pub usage: Option<TextureUsage>,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
 
-/// Everything a Vulkan view is made of, beside its image.
+/// Properties of a Vulkan view, without its image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct ViewInfo {
     pub(crate) kind: vk::ImageViewType,
@@ -56,13 +56,13 @@ pub(crate) struct ViewInfo {
     pub(crate) range: Subresources,
     pub(crate) swizzle: Swizzle,
     pub(crate) usage: vk::ImageUsageFlags,
-    /// How texels in Y'CbCr are converted; null for all others.
+    /// Conversion of Y'CbCr texels; null for all other formats.
     pub(crate) conversion: vk::SamplerYcbcrConversion,
 }
 
-/// The Vulkan views of one texture, made when they are first needed and destroyed on drop.
+/// The Vulkan views of one texture, created on first use and destroyed on drop.
 pub(crate) struct ViewCache {
-    /// The one that was needed first, of most textures the only one.
+    /// The view that was created first; most textures have no other.
     first: OnceLock<(ViewInfo, vk::ImageView)>,
     others: Mutex<HashMap<ViewInfo, vk::ImageView>>,
     gpu: Arc<Gpu>,
@@ -74,13 +74,13 @@ impl ViewCache {
         Self { first: OnceLock::new(), others, gpu: Arc::clone(gpu) }
     }
 
-    /// The view of this description, of the image that all views of the cache are of.
+    /// Returns the view of this description. All views of the cache must be of the same image.
     pub(crate) fn get_or_create(&self, image: &Image, info: ViewInfo, name: &str) -> Result<vk::ImageView> {
         if let Some(view) = self.find_cached(&info) {
             return Ok(view);
         }
         let mut others = self.others.lock();
-        // Another thread may have made it while this one waited.
+        // Another thread may have created the view while this one waited.
         if let Some(view) = self.find_cached(&info).or_else(|| others.get(&info).copied()) {
             return Ok(view);
         }
@@ -126,7 +126,7 @@ impl Drop for ViewCache {
     }
 }
 
-/// A kind by its Vulkan name.
+/// Returns Vulkan's view type of a kind.
 pub(crate) fn raw_kind(kind: TextureKind) -> vk::ImageViewType {
     match kind {
         TextureKind::D1 => vk::ImageViewType::TYPE_1D,

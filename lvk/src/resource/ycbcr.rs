@@ -1,5 +1,5 @@
-//! Textures in Y'CbCr: how their texels become colours. The conversions are fixed when the context is made, as their samplers
-//! lie in the layout of the descriptor set.
+//! Conversion of Y'CbCr textures to colours. The conversions are fixed at the creation of the context, because their
+//! samplers are part of the layout of the descriptor set.
 
 use std::sync::Arc;
 
@@ -10,55 +10,55 @@ use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
 
-/// The matrix between Y'CbCr and colours.
+/// The matrix between Y'CbCr and colours (`VkSamplerYcbcrModelConversion`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum YuvModel {
-    /// BT.601, of standard definition.
+    /// BT.601, for standard definition.
     Bt601,
-    /// BT.709, of high definition.
+    /// BT.709, for high definition.
     #[default]
     Bt709,
-    /// BT.2020 without constant luminance, of ultra high definition.
+    /// BT.2020 without constant luminance, for ultra high definition.
     Bt2020,
 }
 
-/// Which numbers of a plane are black and white.
+/// Range of the numbers of a plane between black and white (`VkSamplerYcbcrRange`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum YuvRange {
-    /// 16 to 235 of 255, and 16 to 240 of colour differences; of 10 bits four times as much.
+    /// 16 to 235 of 255, and 16 to 240 for colour differences; with 10 bits four times these numbers.
     #[default]
     Narrow,
-    /// All.
+    /// All numbers.
     Full,
 }
 
-/// Where a colour difference lies among the two texels of an axis that share it.
+/// Position of a colour difference between the two texels of an axis that share it (`VkChromaLocation`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ChromaSite {
-    /// At the first.
+    /// At the first texel.
     #[default]
     Cosited,
-    /// Between them.
+    /// Between both texels.
     Midpoint,
 }
 
-/// How texels in Y'CbCr become colours when they are sampled (`VkSamplerYcbcrConversion`).
+/// Conversion of Y'CbCr texels to colours during sampling (`VkSamplerYcbcrConversion`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct YuvConversion {
-    /// One of the formats that [are in Y'CbCr](Format::is_yuv).
+    /// One of the [Y'CbCr formats](Format::is_yuv).
     pub format: Format,
     /// The matrix.
     pub model: YuvModel,
-    /// Which numbers are black and white.
+    /// Range of the numbers between black and white.
     pub range: YuvRange,
-    /// Where colour differences lie along x and y.
+    /// Position of colour differences along x and y.
     pub chroma: [ChromaSite; 2],
-    /// How texels and colour differences are interpolated. Addresses beyond the edge are clamped to it.
+    /// Interpolation of texels and colour differences. Addresses beyond the edge are clamped to the edge.
     pub filter: Filter,
 }
 
 impl YuvConversion {
-    /// What a context has unless it is told otherwise: every format by BT.709 with the narrow range.
+    /// Default conversions of a context: every format by BT.709 with the narrow range.
     pub const DEFAULT: [Self; 4] = [
         Self::new(Format::Nv12),
         Self::new(Format::Yuv420p8),
@@ -66,7 +66,7 @@ impl YuvConversion {
         Self::new(Format::Yuv420p10),
     ];
 
-    /// A format by BT.709 with the narrow range.
+    /// Returns the conversion of a format by BT.709 with the narrow range.
     pub const fn new(format: Format) -> Self {
         let chroma = [ChromaSite::Cosited; 2];
         Self { format, model: YuvModel::Bt709, range: YuvRange::Narrow, chroma, filter: Filter::Linear }
@@ -89,7 +89,7 @@ impl YuvConversion {
             .chroma_filter(self.filter.raw())
     }
 
-    /// What a device with these features of the format lacks for the conversion.
+    /// Returns a message if the conversion needs more than these features of the format.
     fn missing_feature(&self, features: vk::FormatFeatureFlags) -> Option<&'static str> {
         use vk::FormatFeatureFlags as Features;
         let linear =
@@ -101,30 +101,30 @@ impl YuvConversion {
         } else if self.chroma.contains(&ChromaSite::Cosited)
             && !features.contains(Features::COSITED_CHROMA_SAMPLES)
         {
-            Some("the device takes no cosited colour differences; say ChromaSite::Midpoint")
+            Some("the device does not support cosited colour differences; use ChromaSite::Midpoint")
         } else if self.chroma.contains(&ChromaSite::Midpoint)
             && !features.contains(Features::MIDPOINT_CHROMA_SAMPLES)
         {
-            Some("the device takes no colour differences at midpoints; say ChromaSite::Cosited")
+            Some("the device does not support colour differences at midpoints; use ChromaSite::Cosited")
         } else if self.filter == Filter::Linear && !features.contains(linear) {
-            Some("the device does not interpolate the format; say Filter::Nearest")
+            Some("the device does not interpolate the format; use Filter::Nearest")
         } else {
             None
         }
     }
 }
 
-/// A conversion that the device has, with its sampler; destroyed on drop.
+/// A supported conversion with its sampler, destroyed on drop.
 pub(crate) struct YuvSampler {
     pub(crate) conversion: vk::SamplerYcbcrConversion,
     pub(crate) sampler: vk::Sampler,
-    /// Descriptors that one texture takes of the pool.
+    /// Descriptors of the pool that one texture needs.
     pub(crate) descriptors: u32,
     gpu: Arc<Gpu>,
 }
 
 impl YuvSampler {
-    /// The sampler, or what the device lacks for it.
+    /// Creates the sampler. The inner error names the feature that the device lacks.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &YuvConversion) -> Result<Result<Self, &'static str>> {
         if let Some(lack) = desc.missing_feature(gpu.format_features(desc.format)) {
             return Ok(Err(lack));
@@ -155,7 +155,7 @@ impl YuvSampler {
 
 impl Drop for YuvSampler {
     fn drop(&mut self) {
-        // SAFETY: the set whose layout names the sampler is gone, and so are the views of the conversion.
+        // SAFETY: the set whose layout contains the sampler is destroyed, and so are the views with the conversion.
         unsafe {
             self.gpu.device.destroy_sampler(self.sampler, None);
             self.gpu.device.destroy_sampler_ycbcr_conversion(self.conversion, None);
@@ -163,7 +163,7 @@ impl Drop for YuvSampler {
     }
 }
 
-/// Descriptors that a texture of the format takes (`combinedImageSamplerDescriptorCount`).
+/// Returns the number of descriptors that a texture of the format needs (`combinedImageSamplerDescriptorCount`).
 fn descriptor_count(gpu: &Gpu, format: Format) -> u32 {
     let info = vk::PhysicalDeviceImageFormatInfo2::default()
         .format(format.raw())
@@ -173,7 +173,7 @@ fn descriptor_count(gpu: &Gpu, format: Format) -> u32 {
         .flags(vk::ImageCreateFlags::MUTABLE_FORMAT);
     let mut yuv = vk::SamplerYcbcrConversionImageFormatProperties::default();
     let mut all = vk::ImageFormatProperties2::default().push_next(&mut yuv);
-    // SAFETY: the physical device belongs to the instance; where it refuses, nothing was written.
+    // SAFETY: the physical device belongs to the instance; on failure nothing was written.
     let asked = unsafe {
         gpu.instance.raw.get_physical_device_image_format_properties2(gpu.physical(), &info, &mut all)
     };

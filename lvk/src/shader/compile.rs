@@ -1,4 +1,4 @@
-//! Gets SPIR-V words out of what the caller gave.
+//! Produces SPIR-V words from a shader source.
 
 #[cfg(feature = "glsl")]
 use super::front_end::compile_cached;
@@ -10,9 +10,10 @@ use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
 use crate::error::Error;
 use crate::error::Result;
 
-/// The module's SPIR-V: version 1.6 for GLSL, the caller's own words, checked for their structure, otherwise.
+/// Returns the SPIR-V of a module.
 ///
-/// What is compiled is looked up in `cache` first.
+/// GLSL is compiled to SPIR-V 1.6, or loaded from `cache` if it was compiled before. SPIR-V words are returned
+/// unchanged after a check of their structure.
 pub(crate) fn compile(
     desc: &ShaderModuleDesc<'_>,
     options: &CompileOptions,

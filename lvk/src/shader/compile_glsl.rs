@@ -1,4 +1,4 @@
-//! GLSL to SPIR-V without a context.
+//! Compiles GLSL to SPIR-V without a context.
 
 use super::ShaderModuleDesc;
 use super::compile::compile;
@@ -7,16 +7,18 @@ use super::spirv::reflect::reflect;
 use crate::error::Result;
 use crate::gpu::caps::capabilities::Capabilities;
 
-/// The SPIR-V that a context on a device with `capabilities` would make of `desc`, for caches and tools that compile
-/// ahead of time; no device is opened. [`ShaderSource::Spirv`](super::ShaderSource::Spirv) takes it.
+/// Compiles `desc` to the SPIR-V that a context on a device with `capabilities` produces, without opening a device.
 ///
-/// What the preamble offers depends on what the device can do: the words are good for devices that have at least
-/// [`Capabilities::formatless_storage_read`] and [`Capabilities::position_fetch`] as given here. With
-/// `Capabilities::default()`, which has nothing, they are good for every device, as far as the text itself is.
+/// Caches and tools use it to compile ahead of time. [`ShaderSource::Spirv`](super::ShaderSource::Spirv) accepts the
+/// result.
+///
+/// The preamble depends on the device. The words are valid on every device that has at least
+/// [`Capabilities::formatless_storage_read`] and [`Capabilities::position_fetch`] as given here.
+/// `Capabilities::default()` has neither, so its words need nothing of the device that the text itself does not need.
 ///
 /// # Errors
-/// [`Error::Shader`](crate::Error::Shader) with the compiler's text, or when the module declares resources outside of
-/// the bindless set.
+/// [`Error::Shader`](crate::Error::Shader) with the compiler's text, or if the module declares resources outside the
+/// bindless set.
 pub fn compile_glsl(desc: &ShaderModuleDesc<'_>, capabilities: &Capabilities) -> Result<Vec<u32>> {
     let words = compile(desc, &CompileOptions::from_capabilities(capabilities), None)?;
     reflect(desc.debug_name, desc.stage, &words)?;

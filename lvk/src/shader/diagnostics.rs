@@ -1,11 +1,11 @@
-//! Turns the compiler's log into text about the caller's own lines.
+//! Converts the compiler's log to messages with line numbers of the caller's text.
 
-/// What glslang prints for a failed `#include`; the reason is ours.
+/// The message that glslang prints for a failed `#include`; the library supplies the reason.
 const INCLUDE_FAILED: &str = "Could not process include directive";
 
-/// The errors of `log`, one a line: `line 3: ..` for the shader's text, `file.glsl:3: ..` for an included one.
+/// Returns the errors of `log`, one a line: `line 3: ..` for the shader's text, `file.glsl:3: ..` for an included file.
 ///
-/// `include_failures` are the reasons for failed `#include`s, in the order of the log.
+/// `include_failures` are the reasons for the failed `#include`s, in the order of the log.
 pub(super) fn errors(log: &str, include_failures: Vec<String>) -> String {
     let mut reasons = include_failures.into_iter();
     let mut lines: Vec<String> = Vec::new();
@@ -28,7 +28,7 @@ pub(super) fn errors(log: &str, include_failures: Vec<String>) -> String {
     lines.join("\n")
 }
 
-/// The warnings of `log`, in the form of [`errors`].
+/// Returns the warnings of `log`, in the form of [`errors`].
 pub(super) fn warnings(log: &str) -> Vec<String> {
     let warnings = log.lines().filter_map(|line| line.strip_prefix("WARNING: "));
     warnings.map(split_place).map(|(place, text)| format!("{place}{text}")).collect()
@@ -40,7 +40,7 @@ fn is_noise(message: &str) -> bool {
         || message.trim().is_empty()
 }
 
-/// Splits `0:12: text` into `line 12: ` and `text`; keeps `name:12: ` as it is.
+/// Splits `0:12: text` into `line 12: ` and `text`. Keeps `name:12: ` unchanged.
 fn split_place(message: &str) -> (String, &str) {
     let message = message.trim_end();
     for (at, _) in message.match_indices(": ") {

@@ -1,4 +1,4 @@
-//! SPIR-V that was compiled from GLSL, kept in a folder from one run to the next.
+//! Disk cache of SPIR-V that was compiled from GLSL.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -9,33 +9,35 @@ use super::disk_file::{CachedModule, Fingerprint, Included, decode_file, encode_
 use crate::cache_file::{read_file, replace_file};
 use crate::lock_order::{Mutex, Rank};
 
-/// A folder holds at most this; beyond it what was not used for longest goes until three quarters are left.
+/// Maximum size of a cache folder in bytes. If a folder exceeds it, the least recently used files are removed until the
+/// folder is three quarters full.
 const MAX_BYTES: u64 = 64 << 20;
 const EXTENSION: &str = ".spirv";
-/// Digits of a key in a file's name.
+/// Digits of a key in a file name.
 const KEY_DIGITS: usize = 32;
 
-/// How often modules made from GLSL were found compiled ([`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache)).
+/// Counts of cache hits and misses of modules created from GLSL
+/// ([`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ShaderCacheStats {
-    /// Modules whose words were found.
+    /// Modules whose words were in the cache.
     pub found: u64,
-    /// Modules that were compiled and kept.
+    /// Modules that were compiled and stored.
     pub compiled: u64,
 }
 
-/// A folder of compiled modules, each in a file named after what it was compiled from.
+/// A folder of compiled modules. Each file is named after the fingerprint of its compilation's inputs.
 pub(crate) struct ShaderCache {
     folder: PathBuf,
     most_bytes: u64,
-    /// Bytes in the folder, once somebody had to know.
+    /// Bytes in the folder; `None` until the first module is stored.
     bytes: Mutex<Option<u64>>,
     found: AtomicU64,
     compiled: AtomicU64,
 }
 
 impl ShaderCache {
-    /// In this folder, which need not exist.
+    /// Creates a cache in `folder`, which need not exist.
     pub(crate) fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -51,7 +53,7 @@ impl ShaderCache {
         ShaderCacheStats { found: load(&self.found), compiled: load(&self.compiled) }
     }
 
-    /// The words of an earlier compilation, if `is_same` says that what it included is still the same.
+    /// Returns the words of an earlier compilation, if `is_same` accepts its includes as unchanged.
     pub(super) fn load(
         &self,
         key: Fingerprint,
@@ -82,7 +84,7 @@ impl ShaderCache {
         Some(entry.words)
     }
 
-    /// Keeps the words of a compilation. No trouble with files is an error.
+    /// Stores the words of a compilation. A file error is logged, not returned.
     pub(super) fn store(&self, key: Fingerprint, entry: &CachedModule) {
         self.compiled.fetch_add(1, Ordering::Relaxed);
         let path = self.path(key);
@@ -95,7 +97,7 @@ impl ShaderCache {
         self.count_bytes(file.len() as u64);
     }
 
-    /// Counts a new file, and removes old ones where there are too many.
+    /// Adds a new file to the folder's size. Removes old files if the folder is too large.
     fn count_bytes(&self, bytes: u64) {
         let mut total = self.bytes.lock();
         let now = match *total {
@@ -121,7 +123,7 @@ struct CacheFile {
     bytes: u64,
 }
 
-/// The files of the cache in a folder; others are left alone.
+/// Returns the cache files of a folder, without foreign files.
 fn cache_files(folder: &Path) -> Vec<CacheFile> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let kept = |entry: std::fs::DirEntry| {
@@ -131,7 +133,7 @@ fn cache_files(folder: &Path) -> Vec<CacheFile> {
     entries.flatten().filter_map(kept).collect()
 }
 
-/// Whether the name is that of a compiled shader, or of what a crash has left of writing one.
+/// True if the name is that of a compiled shader, or of a temporary file that a crash left behind.
 fn is_ours(name: &std::ffi::OsStr) -> bool {
     let parts = name.to_str().and_then(|name| name.split_at_checked(KEY_DIGITS));
     parts.is_some_and(|(key, rest)| {
@@ -140,7 +142,7 @@ fn is_ours(name: &std::ffi::OsStr) -> bool {
     })
 }
 
-/// Removes what was not used for longest until at most `target` bytes are left; answers how many are.
+/// Removes the least recently used files until at most `target` bytes are left. Returns the bytes that are left.
 fn trim(mut files: Vec<CacheFile>, target: u64) -> u64 {
     files.sort_by_key(|file| file.used);
     let mut left: u64 = files.iter().map(|file| file.bytes).sum();
@@ -148,14 +150,14 @@ fn trim(mut files: Vec<CacheFile>, target: u64) -> u64 {
         if left <= target {
             break;
         }
-        // Another context may have been faster.
+        // Another context may have removed the file first.
         let _ = std::fs::remove_file(&file.path);
         left -= file.bytes;
     }
     left
 }
 
-/// Notes that a file was used; where the folder cannot be written, its age decides instead.
+/// Updates the file's modification time. In a folder without write access, the file's age decides instead.
 fn mark_used(path: &Path) {
     let file = std::fs::File::options().append(true).open(path);
     let _ = file.and_then(|file| file.set_modified(SystemTime::now()));

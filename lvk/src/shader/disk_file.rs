@@ -1,17 +1,17 @@
-//! The file of a compiled module: what it was compiled from, what it included, and its words.
+//! The file format of a compiled module: the fingerprint of its inputs, its includes, and its words.
 
 use crate::cache_file::fingerprint;
 
 const MAGIC: [u8; 8] = *b"lvkspirv";
-/// Changes with the passes behind the compiler and with the form of files.
+/// Version of the file format and of the passes that run after the compiler.
 const VERSION: u32 = 1;
-/// The crates of the compiler, whose words a file holds; a test compares them with the lock file.
+/// The crates of the compiler that produced a file's words; a test compares them with the lock file.
 const COMPILER: &str = "glslang 0.9.1, glslang-sys 0.9.2+e1b562a";
-/// Magic, version, reserved, key, checksum of everything behind it.
+/// Bytes of the header: magic, version, a reserved word, key, and the checksum of everything after it.
 const HEADER_BYTES: usize = 40;
 const MAX_NAME_BYTES: usize = 1 << 16;
 
-/// Two checksums: what is told apart by both is taken for different.
+/// Two checksums. Inputs are different if one of the checksums differs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Fingerprint(pub(super) [u64; 2]);
 
@@ -20,7 +20,7 @@ impl Fingerprint {
         Self([1, 2].map(|seed| fingerprint(bytes, seed)))
     }
 
-    /// Of the compiler and of everything a compilation is given; `parts` are kept apart by their lengths.
+    /// Returns the fingerprint of the compiler and all inputs of a compilation. The lengths of `parts` separate them.
     pub(super) fn from_input<'a>(numbers: &[u32], parts: impl Iterator<Item = &'a [u8]>) -> Self {
         let mut all = Vec::new();
         all.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
@@ -32,28 +32,28 @@ impl Fingerprint {
     }
 }
 
-/// An `#include` that the compiler asked for.
+/// An `#include` that the compiler requested.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Included {
-    /// Written with quotes, not with angles.
+    /// True if the directive has quotes, false if it has angle brackets.
     pub(super) local: bool,
-    /// How deep it lies: 1 in the module's own text.
+    /// Nesting depth of the directive: 1 in the module's own text.
     pub(super) depth: u32,
     /// The name in the directive.
     pub(super) name: String,
-    /// Of the text that was found.
+    /// Fingerprint of the included text.
     pub(super) text: Fingerprint,
 }
 
-/// What a file holds.
+/// The content of a cache file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct CachedModule {
-    /// In the order in which the compiler asked.
+    /// The includes, in the order of the compiler's requests.
     pub(super) included: Vec<Included>,
     pub(super) words: Vec<u32>,
 }
 
-/// The file for a module that was compiled from `key`.
+/// Returns the file of a module that was compiled from `key`.
 pub(super) fn encode_file(key: Fingerprint, entry: &CachedModule) -> Vec<u8> {
     let body = encode_body(entry);
     let mut file = Vec::with_capacity(HEADER_BYTES + body.len());
@@ -66,7 +66,7 @@ pub(super) fn encode_file(key: Fingerprint, entry: &CachedModule) -> Vec<u8> {
     file
 }
 
-/// What the file holds, if it is whole and was compiled from `key`.
+/// Returns the content of the file, if the file is complete and was compiled from `key`.
 pub(super) fn decode_file(key: Fingerprint, file: &[u8]) -> Result<CachedModule, &'static str> {
     if !file.starts_with(&MAGIC) {
         return Err("it is no compiled shader");

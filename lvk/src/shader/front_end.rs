@@ -1,4 +1,4 @@
-//! GLSL to SPIR-V by glslang.
+//! Compiles GLSL to SPIR-V by glslang.
 
 use std::sync::LazyLock;
 
@@ -16,7 +16,7 @@ use super::spirv::passes::strip_unused_bindings::strip_unused_bindings;
 use super::{ShaderCache, ShaderModuleDesc, ShaderStage, diagnostics, preamble};
 use crate::error::Result;
 
-/// The words of `text`: those of an earlier run where `cache` has them.
+/// Returns the words of `text`, from `cache` if it has them.
 pub(super) fn compile_cached(
     desc: &ShaderModuleDesc<'_>,
     text: &str,
@@ -41,9 +41,9 @@ pub(super) fn compile_cached(
     Ok(entry.words)
 }
 
-/// Of all that decides about the words but what the includes hold.
+/// Returns the fingerprint of all inputs of a compilation except the included texts.
 fn fingerprint(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Fingerprint {
-    // The name is part of the words only where they name their source.
+    // Only words with debug information contain the module's name.
     let name = if desc.debug_info { desc.debug_name } else { "" };
     let parts = [preamble, text, name].into_iter().chain(desc.includes.iter().map(|(name, _)| *name));
     let dirs = desc.include_dirs.iter().map(|dir| dir.as_os_str().as_encoded_bytes());
@@ -51,7 +51,7 @@ fn fingerprint(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Finge
     Fingerprint::from_input(&numbers, parts.map(str::as_bytes).chain(dirs))
 }
 
-/// Compiles, and tells what was included.
+/// Compiles `text`, and returns the words with the includes.
 fn translate(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Result<CachedModule> {
     let name = desc.debug_name;
     let mut includes = Includes::new(desc.includes, desc.include_dirs);
@@ -98,7 +98,7 @@ fn to_spirv(
     shader.compile()
 }
 
-/// Wide enough never to stand in the way: the device's own limits are checked when a pipeline is made.
+/// Limits that never restrict a shader: pipeline creation checks the limits of the device.
 static LIMITS: LazyLock<ResourceLimits> = LazyLock::new(|| {
     let mut limits = ResourceLimits::default();
     limits.set_max_compute_work_group_size_x(GROUP);

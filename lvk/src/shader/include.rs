@@ -1,4 +1,4 @@
-//! Finds what `#include` names.
+//! Resolves `#include` directives.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -9,25 +9,25 @@ use super::disk_file::{Fingerprint, Included};
 use super::preamble;
 use super::sanitize;
 
-/// Deeper nesting is taken for a mistake; the compiler recurses on it.
+/// Maximum nesting of includes. The compiler recurses on them, so deeper nesting is an error.
 const MAX_DEPTH: usize = 64;
 
-/// Answers the compiler's `#include` directives from the caller's list, folders, and the library's own files.
+/// Resolves the compiler's `#include` directives from the caller's list, folders, and the library's own files.
 pub(super) struct Includes<'a> {
     listed: &'a [(&'a str, &'a str)],
     dirs: &'a [&'a Path],
     open: Vec<IncludeOrigin>,
     once: HashSet<IncludeOrigin>,
-    /// Why each directive failed, in the order the compiler met them.
+    /// The error of each failed directive, in the order of the compiler's requests.
     failures: Vec<String>,
-    /// What was answered, in order, and the texts with their names, each once.
+    /// The resolved directives in order, and the included texts with their names, each once.
     included: Vec<Included>,
     texts: Vec<(String, String)>,
-    /// Depth and name of the directive that failed last, if it was written with quotes.
+    /// Depth and name of the directive that failed last, if it has quotes.
     refused: Option<(usize, String)>,
 }
 
-/// Where an included text came from; equal for equal files.
+/// The source of an included text; equal for equal files.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum IncludeOrigin {
     Library(&'static str),
@@ -49,8 +49,8 @@ impl<'a> Includes<'a> {
         }
     }
 
-    /// Whether directives like those of an earlier compilation find the same texts still. The compiler asks the same again
-    /// as long as it is given the same.
+    /// True if the directives of an earlier compilation still resolve to the same texts. With the same inputs, the
+    /// compiler requests the same directives.
     pub(super) fn finds_unchanged(mut self, earlier: &[Included]) -> bool {
         earlier.iter().enumerate().all(|(index, earlier)| {
             let ty = if earlier.local { IncludeType::Local } else { IncludeType::System };
@@ -59,12 +59,12 @@ impl<'a> Includes<'a> {
         })
     }
 
-    /// What was found: the directives in order, and the texts with their names.
+    /// Returns the resolved directives in order, and the texts with their names.
     pub(super) fn into_included(self) -> (Vec<Included>, Vec<(String, String)>) {
         (self.included, self.texts)
     }
 
-    /// The reasons for the compiler's "could not process include" messages, in order.
+    /// Returns the reasons for the compiler's "could not process include" messages, in order.
     pub(super) fn into_failures(self) -> Vec<String> {
         self.failures
     }
@@ -84,7 +84,7 @@ impl<'a> Includes<'a> {
         if once {
             self.once.insert(place.clone());
         }
-        // A file may include itself once over: its include guard makes the second text empty.
+        // A file may include itself once: its include guard makes the second text empty.
         if self.open.iter().filter(|open| **open == place).count() > 1 {
             return Err(format!("'{shown}' includes itself; put #pragma once into it"));
         }
@@ -154,7 +154,7 @@ impl<'a> Includes<'a> {
         }
     }
 
-    /// ` (included by b.glsl, included by a.glsl)`, innermost first.
+    /// Returns ` (included by b.glsl, included by a.glsl)`, innermost first.
     fn include_chain(&self) -> String {
         if self.open.is_empty() {
             return String::new();
@@ -168,7 +168,7 @@ impl<'a> Includes<'a> {
 impl IncludeHandler for Includes<'_> {
     fn include(&mut self, ty: IncludeType, name: &str, _: &str, depth: usize) -> Option<IncludeResult> {
         let local = ty == IncludeType::Local;
-        // What "" did not find the compiler asks for again with <>, under the same message.
+        // If a "" directive fails, the compiler requests it again with <>, under the same message.
         if self.refused.take() == Some((depth, name.to_owned())) && !local {
             return None;
         }
@@ -192,7 +192,7 @@ impl IncludeOrigin {
         match self {
             Self::Library(name) => (*name).to_owned(),
             Self::Listed(name) => name.clone(),
-            // The compiler quotes the name in a directive.
+            // The compiler puts the name in quotes.
             Self::File(path) => path
                 .display()
                 .to_string()
@@ -212,7 +212,7 @@ fn canonicalize(path: PathBuf) -> PathBuf {
     path.canonicalize().unwrap_or(path)
 }
 
-/// `a/./b/../c` as `a/c`; none if it leaves the root.
+/// Normalizes `a/./b/../c` to `a/c`. Returns `None` if the path leaves the root.
 fn normalize_path(path: &str) -> Option<String> {
     let mut parts: Vec<&str> = Vec::new();
     for part in path.split('/') {
@@ -225,7 +225,8 @@ fn normalize_path(path: &str) -> Option<String> {
     Some(parts.join("/"))
 }
 
-/// The text with its `#pragma once` line emptied, and whether there was one; the compiler does not know the pragma.
+/// Returns the text with its `#pragma once` line emptied, and true if it has such a line. The compiler does not
+/// support the pragma.
 fn without_pragma_once(text: &str) -> (String, bool) {
     let is_once = |line: &str| {
         let directive = line.trim_start().strip_prefix('#').unwrap_or_default();

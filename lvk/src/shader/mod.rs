@@ -1,4 +1,4 @@
-//! Shader modules: GLSL to SPIR-V, includes, and what a module tells about itself.
+//! Shader modules: compilation of GLSL to SPIR-V, includes, and reflection.
 
 mod compile;
 #[cfg(feature = "glsl")]

@@ -1,33 +1,33 @@
-//! What compilation depends on beside the source, and its error.
+//! Inputs of a compilation beside the source, and its error.
 
 use crate::error::Error;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::ray_query_path::RayQueryPath;
 
-/// What the preamble must know of the device.
+/// Properties of the device that the preamble depends on.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CompileOptions {
     /// The device loads from storage images without a format (`shaderStorageImageReadWithoutFormat`).
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) formatless_read: bool,
-    /// The device fetches the corners of triangles that were hit (`VK_KHR_ray_tracing_position_fetch`).
+    /// The device can fetch the vertex positions of hit triangles (`VK_KHR_ray_tracing_position_fetch`).
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) position_fetch: bool,
-    /// The library walks ray queries itself.
+    /// The library traverses acceleration structures of ray queries itself.
     pub(crate) software_ray_query: bool,
-    /// Helper invocations of fragment shaders have no arrays that work.
+    /// Arrays do not work in helper invocations of fragment shaders on the device.
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) helpers_lose_arrays: bool,
     /// The device is a CPU.
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) is_cpu: bool,
-    /// It gathers 64 bits for each lane as fast as 32.
+    /// The device gathers 64 bits for each invocation as fast as 32.
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) gathers_pairs: bool,
 }
 
 impl CompileOptions {
-    /// For a device with these capabilities.
+    /// Returns the options for a device with these capabilities.
     pub(crate) fn from_capabilities(device: &Capabilities) -> Self {
         Self {
             formatless_read: device.formatless_storage_read,

@@ -1,4 +1,4 @@
-//! The text in front of every GLSL shader, generated from the binding numbers.
+//! Generates the text before every GLSL shader from the binding numbers.
 
 use std::fmt::Write;
 
@@ -11,7 +11,7 @@ use crate::software_ray_query;
 /// Helpers and resource arrays for every stage.
 const BINDLESS: &str = include_str!("glsl/bindless.glsl");
 
-/// The files behind `#include <lvk/..>`.
+/// Returns the names and texts of the library's files for `#include <lvk/..>`.
 pub(super) fn library() -> impl Iterator<Item = (&'static str, &'static str)> {
     CORE_LIBRARY.iter().chain(software_ray_query::GLSL).copied()
 }
@@ -26,7 +26,8 @@ const CORE_LIBRARY: &[(&str, &str)] = &[
     ("lvk/tlas_table.glsl", include_str!("glsl/tlas_table.glsl")),
 ];
 
-/// On in every stage; an extension asks nothing of the device until its types or functions are used.
+/// Extensions that are enabled in every stage. An extension needs no device feature until its types or functions are
+/// used.
 const EXTENSIONS: [&str; 25] = [
     "GL_GOOGLE_include_directive",
     "GL_GOOGLE_cpp_style_line_directive",
@@ -55,7 +56,7 @@ const EXTENSIONS: [&str; 25] = [
     "GL_KHR_shader_subgroup_quad",
 ];
 
-/// Everything in front of the caller's first line, which stays line 1.
+/// Returns the text before the caller's first line, which stays line 1.
 pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[(&str, &str)]) -> String {
     let mut text = String::from("#version 460\n");
     for extension in EXTENSIONS.into_iter().chain(stage_extensions(stage)) {
@@ -101,7 +102,7 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
     text
 }
 
-/// How fragment shaders declare the targets of their pass that they read.
+/// Declares the defines for input attachments of fragment shaders.
 fn declare_input_attachments(text: &mut String) {
     push_define(text, "LVK_INPUT_SET", &layout::INPUT_SET.to_string());
     for (name, input) in [

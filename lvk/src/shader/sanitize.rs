@@ -1,6 +1,6 @@
-//! Makes a GLSL text safe for the compiler: ASCII only, no NUL, no `#version` of its own.
+//! Prepares a GLSL text for the compiler: ASCII only, no NUL, no `#version` of its own.
 
-/// What is wrong with a text, and on which of its lines (from 1).
+/// An error in a text, and its line (from 1).
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct SourceError {
     pub(super) line: usize,
@@ -15,9 +15,9 @@ enum ScanState {
     BlockComment,
 }
 
-/// The text with every character of a comment that is not ASCII replaced, one for one in lines.
+/// Returns the text with every non-ASCII character in a comment replaced by one `?`; lines stay the same.
 ///
-/// The compiler cuts messages at bytes, so that other characters could reach us as broken UTF-8.
+/// The compiler cuts messages at bytes, which can split other characters into invalid UTF-8.
 pub(super) fn to_ascii(text: &str) -> Result<String, SourceError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut out = String::with_capacity(text.len());
@@ -57,7 +57,7 @@ fn next_state(state: ScanState, previous: char, c: char) -> ScanState {
     }
 }
 
-/// Takes out a leading `#version 450` or `#version 460` and keeps its line.
+/// Removes a leading `#version 450` or `#version 460` and keeps its line.
 pub(super) fn without_version(text: &str) -> Result<String, SourceError> {
     let start = first_code(text);
     let Some(directive) = version_directive(&text[start..]) else {
@@ -77,7 +77,7 @@ pub(super) fn without_version(text: &str) -> Result<String, SourceError> {
     Ok(format!("{}{}", &text[..start], &text[start + directive.len()..]))
 }
 
-/// Offset of the first byte that is neither white space nor comment.
+/// Returns the offset of the first byte that is neither white space nor part of a comment.
 fn first_code(text: &str) -> usize {
     let mut rest = text.trim_start();
     loop {
@@ -95,7 +95,7 @@ fn first_code(text: &str) -> usize {
     }
 }
 
-/// The `#version` directive at the start of `text`, without a comment behind it.
+/// Returns the `#version` directive at the start of `text`, without a comment after it.
 fn version_directive(text: &str) -> Option<&str> {
     let line = text.lines().next()?;
     let rest = line.strip_prefix('#')?.trim_start().strip_prefix("version")?;

@@ -1,4 +1,4 @@
-//! What a caller says about a shader module.
+//! Description of a shader module.
 
 use std::path::Path;
 
@@ -23,29 +23,29 @@ pub enum ShaderStage {
     Task,
     /// Mesh stage.
     Mesh,
-    /// Ray generation: where a ray tracing pipeline starts.
+    /// Ray generation stage, the start of a ray tracing pipeline.
     RayGen,
-    /// Called when a ray hits nothing.
+    /// Called for a ray without a hit.
     Miss,
     /// Called for the closest hit of a ray.
     ClosestHit,
     /// Called for each hit of geometry that is not opaque, to accept or ignore it.
     AnyHit,
-    /// Intersects a ray with what a box contains.
+    /// Intersects a ray with the content of an AABB.
     Intersection,
     /// Called by index from other ray tracing stages.
     Callable,
 }
 
 impl ShaderStage {
-    /// Whether the stage belongs to a ray tracing pipeline.
+    /// True if the stage belongs to a ray tracing pipeline.
     #[must_use]
     pub fn is_ray_tracing(self) -> bool {
         use ShaderStage::{AnyHit, Callable, ClosestHit, Intersection, Miss, RayGen};
         matches!(self, RayGen | Miss | ClosestHit | AnyHit | Intersection | Callable)
     }
 
-    /// The Vulkan stage bit.
+    /// Returns the Vulkan stage bit.
     #[must_use]
     pub fn raw(self) -> vk::ShaderStageFlags {
         match self {
@@ -66,7 +66,7 @@ impl ShaderStage {
         }
     }
 
-    /// The stage's name in messages.
+    /// Returns the stage's name for messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Vertex => "vertex",
@@ -86,7 +86,7 @@ impl ShaderStage {
         }
     }
 
-    /// Every stage.
+    /// All stages.
     pub(crate) const ALL: [Self; 14] = [
         Self::Vertex,
         Self::TessControl,
@@ -111,22 +111,22 @@ impl ShaderStage {
 pub enum ShaderSource<'a> {
     /// GLSL 4.60 for Vulkan, compiled to SPIR-V 1.6 when the module is created; the entry point is `main`.
     ///
-    /// Needs the feature `glsl` (on by default); without it, creating the module is
-    /// [`Error::Unsupported`](crate::Error::Unsupported). See [`ShaderModuleDesc`] for what the text may use.
+    /// Needs the feature `glsl` (on by default). Without it, creating the module fails with
+    /// [`Error::Unsupported`](crate::Error::Unsupported). See [`ShaderModuleDesc`] for the features of the text.
     Glsl(&'a str),
     /// SPIR-V words up to version 1.6, in the byte order of the machine, with an entry point `main`.
     ///
-    /// The structure is checked (header, instruction lengths, entry point, bindings), the semantics are not: run a
-    /// validator over SPIR-V of doubtful origin.
+    /// The structure is checked (header, instruction lengths, entry point, bindings). The semantics are not: run a
+    /// validator over SPIR-V from an unknown source.
     Spirv(&'a [u32]),
 }
 
 /// Describes a shader module.
 ///
-/// # What GLSL text may use
+/// # Features of GLSL text
 ///
-/// The text needs no `#version` (450 and 460 are accepted) and declares no descriptors: a preamble does, in every stage.
-/// Line numbers in messages are those of the text.
+/// The text needs no `#version` (450 and 460 are accepted) and declares no descriptors: a preamble declares them in
+/// every stage. Line numbers in messages are those of the text.
 ///
 /// ```glsl
 /// layout(local_size_x = 8, local_size_y = 8) in;
@@ -144,21 +144,21 @@ pub enum ShaderSource<'a> {
 ///   the indices of a texture and a sampler, which need not be uniform: `textureBindless2D(tex, smp, uv)`, `..2DLod`,
 ///   `..2DGrad`, `..2DGather`, `..2DShadow(tex, smp, vec3(uv, reference))`, `..2DArray[Lod]`, `..3D[Lod]`,
 ///   `..Cube[Lod]`, `textureBindlessFetch2D(tex, texel, lod)` (`FetchU2D`, `FetchI2D`), `textureBindlessSize2D(tex)`
-///   (`Size2DArray`, `Size3D`, `SizeCube`), `textureBindlessQueryLevels2D(tex)` (`QueryLevelsCube`). Those without an
-///   explicit level use derivatives in fragment shaders and mip level 0 in every other stage. `..2DArrayShadow`
-///   and `..CubeShadow` take the reference behind the coordinates; `..2DGatherShadow(tex, smp, uv, reference)` and
-///   `..2DGatherChannel(tex, smp, uv, channel)` (`2DArray`, `Cube`) gather. Of multisampled textures,
-///   `kTextures2DMS`, there are `textureBindlessFetch2DMS(tex, texel, sample)`, `..Size2DMS` and `..Samples2DMS`.
-/// * Textures of other shapes are declared once at global scope: `LVK_TEXTURES(utexture3D, kVolumes);`. After
-///   `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray);` there are `textureBindlessCubeArray[Lod]` with the number of
+///   (`Size2DArray`, `Size3D`, `SizeCube`), `textureBindlessQueryLevels2D(tex)` (`QueryLevelsCube`). Helpers without
+///   an explicit level use derivatives in fragment shaders and mip level 0 in every other stage. `..2DArrayShadow`
+///   and `..CubeShadow` take the reference after the coordinates. `..2DGatherShadow(tex, smp, uv, reference)` and
+///   `..2DGatherChannel(tex, smp, uv, channel)` (`2DArray`, `Cube`) gather. Multisampled textures (`kTextures2DMS`)
+///   have `textureBindlessFetch2DMS(tex, texel, sample)`, `..Size2DMS` and `..Samples2DMS`.
+/// * Textures of other shapes: declare them once at global scope, `LVK_TEXTURES(utexture3D, kVolumes);`.
+///   `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray);` enables `textureBindlessCubeArray[Lod]` with the index of
 ///   the cube as fourth coordinate, `textureBindlessCubeArrayShadow(tex, smp, dirCube, reference)` and
-///   `textureBindlessSizeCubeArray(tex)`; after `LVK_TEXTURES(texture1D, kTextures1D);` there are `textureBindless1D[Lod]`,
+///   `textureBindlessSizeCubeArray(tex)`. `LVK_TEXTURES(texture1D, kTextures1D);` enables `textureBindless1D[Lod]`,
 ///   `textureBindlessFetch1D(tex, texel, lod)` and `textureBindlessSize1D(tex)`.
-/// * Textures in Y'CbCr: `LVK_YUV_TEXTURES(kYuv);` at global scope, then `textureBindlessYUV(kYuv, index, uv)` answers a colour;
-///   the index must be a constant, for instance one of specialisation.
-/// * Storage images: `kImages2D`, `kImages2DArray`, `kImages3D`, `kImagesU2D`, `kImagesI2D` take stores of any format
-///   (and loads where `LVK_FORMATLESS_READ` is defined, that is where the device can load without a format). To load
-///   elsewhere, or to use atomics, name the format once at global scope:
+/// * Textures in Y'CbCr: `LVK_YUV_TEXTURES(kYuv);` at global scope, then `textureBindlessYUV(kYuv, index, uv)` returns
+///   a colour. The index must be a constant, for instance a specialisation constant.
+/// * Storage images: `kImages2D`, `kImages2DArray`, `kImages3D`, `kImagesU2D`, `kImagesI2D` accept stores of any
+///   format. Loads from them need `LVK_FORMATLESS_READ`, which is defined if the device can load without a format. For
+///   other loads and for atomics, name the format once at global scope:
 ///   `LVK_STORAGE_IMAGES_2D(rgba8, kImagesRgba8);`, `LVK_STORAGE_IMAGES_U2D(r32ui, kCounters);`,
 ///   `LVK_STORAGE_IMAGES_I2D(..)`, or `LVK_STORAGE_IMAGES(image3D, r32f, kVolumes);` for the other shapes. Mark an
 ///   index that differs between invocations: `kImages2D[nonuniformEXT(i)]`.
@@ -167,39 +167,41 @@ pub enum ShaderSource<'a> {
 /// * Ray tracing stages: `traceRayEXT(kTLAS[push.tlas], LVK_RAY_FLAG_OPAQUE, ..)`.
 /// * Any stage: `#include <lvk/ray_query.glsl>` for ray queries,
 ///   `lvkRayQueryInitialize(rq, push.tlas, LVK_RAY_FLAG_OPAQUE, 0xFFu, origin, 0.0, direction, 100.0)` and so on.
-/// * Task and mesh stages: `GL_EXT_mesh_shader` is on, so `taskPayloadSharedEXT`, `EmitMeshTasksEXT(x, y, z)`,
-///   `SetMeshOutputsEXT(vertices, primitives)` and `gl_MeshVerticesEXT` are there.
-/// * `LVK_STAGE_FRAGMENT`, `LVK_STAGE_RAY_GEN` and so on are defined for the stage at hand, so that one file serves several.
+/// * Task and mesh stages: `GL_EXT_mesh_shader` is on, with `taskPayloadSharedEXT`, `EmitMeshTasksEXT(x, y, z)`,
+///   `SetMeshOutputsEXT(vertices, primitives)` and `gl_MeshVerticesEXT`.
+/// * `LVK_STAGE_FRAGMENT`, `LVK_STAGE_RAY_GEN` and so on are defined for the current stage, so that one file can serve
+///   several stages.
 ///
 /// Extensions for buffer references, scalar layout, non-uniform indexing, sized integer and float types, subgroup
-/// operations and `debugPrintfEXT` are on; what the text does not use costs nothing and asks nothing of the device.
+/// operations and `debugPrintfEXT` are on. An extension that the text does not use costs nothing and needs no device
+/// feature.
 ///
 /// # Includes
 ///
 /// `#include "name"` is looked up in [`includes`](Self::includes), then beside the including file, then in
-/// [`include_dirs`](Self::include_dirs); `#include <name>` skips the place beside the including file. Names that start
-/// with `lvk/` are the library's. `#pragma once` and include guards both work.
+/// [`include_dirs`](Self::include_dirs). `#include <name>` does not look beside the including file. Names that start
+/// with `lvk/` belong to the library. `#pragma once` and include guards both work.
 #[derive(Debug, Clone, Copy)]
 pub struct ShaderModuleDesc<'a> {
     /// The stage the module is for.
     pub stage: ShaderStage,
     /// The program text.
     pub source: ShaderSource<'a>,
-    /// Files that `#include` finds without a file system: name as written in the directive (with `/`), and text.
+    /// Files for `#include` in memory: name as written in the directive (with `/`), and text.
     pub includes: &'a [(&'a str, &'a str)],
     /// Folders that `#include` searches, in order.
     pub include_dirs: &'a [&'a Path],
-    /// Macros defined in front of the text: name and replacement (may be empty). Ignored for SPIR-V.
+    /// Macros defined before the text: name and replacement (may be empty). Ignored for SPIR-V.
     pub defines: &'a [(&'a str, &'a str)],
-    /// Keep the text, and those of what it includes, in the module (`OpSource`), for debuggers of frames and shaders.
-    /// Ignored for SPIR-V. The numbers of lines are not among it: the compiler's crate does not hand them out.
+    /// Embeds the text and its includes in the module (`OpSource`), for frame and shader debuggers. Ignored for SPIR-V.
+    /// Line numbers are not embedded: the compiler's crate does not provide them.
     pub debug_info: bool,
     /// Name shown in errors and by debugging tools.
     pub debug_name: &'a str,
 }
 
 impl Default for ShaderModuleDesc<'_> {
-    /// An empty vertex shader text; set at least `stage` and `source`.
+    /// Returns an empty vertex shader text; set at least `stage` and `source`.
     fn default() -> Self {
         Self {
             stage: ShaderStage::Vertex,

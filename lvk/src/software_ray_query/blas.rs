@@ -1,4 +1,4 @@
-//! A bottom-level structure of the library's own.
+//! A BLAS for software traversal.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -15,30 +15,30 @@ use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::geometry::BlasGeometry;
 use crate::error::Result;
 
-/// What stands behind the handle of a bottom-level structure for software to trace.
+/// The software half of a BLAS.
 pub(crate) struct SoftwareBlas {
-    /// What instances refer to as long as the handle lives.
+    /// The memory that instances refer to as long as the handle lives.
     pub(crate) storage: Arc<SoftwareAccelStorage>,
     pub(crate) origin: BvhOrigin,
-    /// Where a structure that the CPU built is built again on the GPU: its own body where that has room, else another one, to
-    /// which the body refers then. Made when first needed.
+    /// Target of a rebuild on the GPU of a BLAS that the CPU built. It is `storage` if that is large enough, else other
+    /// memory, and `storage` then contains its address. Created at the first rebuild.
     rebuilt: OnceLock<Arc<SoftwareAccelStorage>>,
-    /// Whether a submission builds it there.
+    /// True once a rebuild into `rebuilt` was submitted.
     has_moved: AtomicBool,
 }
 
-/// Who built it first.
+/// The builder of the first tree.
 pub(crate) enum BvhOrigin {
-    /// The CPU, from inputs that were read back: the better trees.
+    /// The CPU, from inputs that were read back. Its trees are better.
     Cpu {
-        /// How it is refitted, where it may be.
+        /// Plan of refits; `None` without `ALLOW_UPDATE`.
         refit: Option<GpuRefitPlan>,
-        /// How it is rebuilt.
+        /// Plan of rebuilds.
         rebuild: GpuBuildPlan,
-        /// Where it lies, as long as it is neither refitted nor rebuilt.
+        /// The subtrees, valid until a refit or rebuild.
         parts: Arc<RebraidParts>,
     },
-    /// The GPU, as every build of it.
+    /// The GPU, which also builds it again.
     Gpu(GpuBuildPlan),
 }
 
@@ -47,27 +47,27 @@ impl SoftwareBlas {
         Self { storage: body, origin, rebuilt: OnceLock::new(), has_moved: AtomicBool::new(false) }
     }
 
-    /// Where it is rebuilt, once a rebuild was recorded.
+    /// Returns the target of rebuilds, once a rebuild was recorded.
     pub(crate) fn storage_after_rebuild(&self) -> Option<&Arc<SoftwareAccelStorage>> {
         self.rebuilt.get()
     }
 
-    /// Where it lies after everything submitted, if it was rebuilt.
+    /// Returns the memory after everything submitted, if the BLAS was rebuilt.
     pub(crate) fn moved_storage(&self) -> Option<&Arc<SoftwareAccelStorage>> {
         self.rebuilt.get().filter(|_| self.has_moved.load(Ordering::Acquire))
     }
 
-    /// A rebuild was submitted.
+    /// Marks that a rebuild was submitted.
     pub(crate) fn set_moved_storage(&self) {
         self.has_moved.store(true, Ordering::Release);
     }
 
-    /// Whether the CPU has built it first, so that a rebuild puts another tree in its place.
+    /// True if the CPU built the first tree, so that a rebuild replaces it by another one.
     pub(crate) fn is_built_on_cpu(&self) -> bool {
         matches!(self.origin, BvhOrigin::Cpu { .. })
     }
 
-    /// Where it is rebuilt; `make` makes room the first time.
+    /// Returns the target of rebuilds; `make` allocates it the first time.
     pub(crate) fn storage_after_rebuild_or(
         &self,
         make: impl FnOnce() -> Result<SoftwareAccelStorage>,
@@ -79,14 +79,14 @@ impl SoftwareBlas {
         Ok(self.rebuilt.get_or_init(|| rebuilt))
     }
 
-    /// Whether the body has room for what a rebuild makes. Of what may not be refitted, top-level structures may show parts of
-    /// the first tree, which must stay what it was.
+    /// True if a rebuild fits into `storage`. It is false if the BLAS cannot be refitted: TLASes may then reference
+    /// parts of the first tree, which must not change.
     fn rebuilds_in_place(&self) -> bool {
         let room = self.storage.memory_bytes();
         matches!(&self.origin, BvhOrigin::Cpu { refit: Some(_), rebuild, .. } if rebuild.blob_bytes <= room)
     }
 
-    /// Where it lies, if the host knows: then it never was nor will be refitted, nor was a rebuild recorded.
+    /// Returns the subtrees if the host knows them: the BLAS cannot be refitted, and no rebuild was recorded.
     pub(crate) fn rebraid_parts(&self) -> Option<&Arc<RebraidParts>> {
         match &self.origin {
             BvhOrigin::Cpu { refit: None, parts, .. } if self.rebuilt.get().is_none() => Some(parts),
@@ -94,14 +94,14 @@ impl SoftwareBlas {
         }
     }
 
-    /// Bytes of memory.
+    /// Returns the bytes of memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let elsewhere = self.rebuilt.get().filter(|rebuilt| !Arc::ptr_eq(rebuilt, &self.storage));
         let rebuilt = elsewhere.map_or(0, |rebuilt| rebuilt.memory_bytes());
         self.storage.memory_bytes() + rebuilt
     }
 
-    /// Scratch bytes of the first build: none where the CPU has made it.
+    /// Returns the scratch bytes of the first build: 0 if the CPU built it.
     pub(crate) fn initial_scratch_bytes(&self) -> u64 {
         match &self.origin {
             BvhOrigin::Cpu { .. } => 0,
@@ -109,7 +109,7 @@ impl SoftwareBlas {
         }
     }
 
-    /// What it takes and its builds take, with the flags it was made with.
+    /// Returns the sizes of the BLAS and of its builds, with the flags of its creation.
     pub(crate) fn sizes(&self, flags: BuildFlags) -> AccelStructSizes {
         let (rebuild, refit) = match &self.origin {
             BvhOrigin::Cpu { rebuild, refit, .. } => (rebuild, refit.as_ref()),
@@ -124,15 +124,16 @@ impl SoftwareBlas {
     }
 }
 
-/// Bytes for a structure that the CPU built in so many: as many as its rebuild takes, where it may be refitted and that makes
-/// little difference.
+/// Returns the bytes to allocate for a BLAS of `blob_bytes` that the CPU built.
+///
+/// If the BLAS can be refitted and its rebuild needs little more, this is the size of the rebuild.
 pub(crate) fn storage_bytes(blob_bytes: u64, refit: Option<&GpuRefitPlan>, rebuild: &GpuBuildPlan) -> u64 {
     const MAX_REMOVED_SHARE: u64 = 32;
     let in_place = refit.is_some() && rebuild.blob_bytes <= blob_bytes + blob_bytes / MAX_REMOVED_SHARE;
     if in_place { blob_bytes.max(rebuild.blob_bytes) } else { blob_bytes }
 }
 
-/// What structures of these geometries, which have been checked, take at most.
+/// Returns the maximum sizes of a BLAS of these validated geometries.
 pub(crate) fn max_sizes(
     name: &str,
     geometries: &[BlasGeometry],
@@ -140,7 +141,7 @@ pub(crate) fn max_sizes(
 ) -> Result<AccelStructSizes> {
     let plan = gpu_plan(name, geometries, flags)?;
     let of_gpu = refit_scratch_bytes(&plan, flags);
-    // A tree of the CPU has no more nodes than one of two children and one primitive in each leaf.
+    // A tree of the CPU has at most as many nodes as one with two children a node and one primitive a leaf.
     let of_cpu = match builds_on_gpu(flags) || !flags.contains(BuildFlags::ALLOW_UPDATE) {
         true => 0,
         false => GpuRefitPlan {
@@ -157,17 +158,17 @@ pub(crate) fn max_sizes(
     })
 }
 
-/// Scratch bytes of the refit of what the GPU built; 0 where it cannot be refitted.
+/// Returns the scratch bytes of a refit of a BLAS that the GPU built; 0 if it cannot be refitted.
 fn refit_scratch_bytes(plan: &GpuBuildPlan, flags: BuildFlags) -> u64 {
     if flags.contains(BuildFlags::ALLOW_UPDATE) { GpuRefitPlan::from_build(plan).scratch_bytes() } else { 0 }
 }
 
-/// Whether the GPU makes the first build too.
+/// True if the GPU also makes the first build.
 pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
     flags.contains(BuildFlags::FAST_BUILD)
 }
 
-/// A build on the GPU of these geometries, which have been checked.
+/// Returns the plan of a build on the GPU of these validated geometries.
 pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlags) -> Result<GpuBuildPlan> {
     const IMPROVEMENTS: u32 = 2;
     let boxes = geometries.first().is_some_and(BlasGeometry::is_aabbs);
@@ -188,13 +189,13 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
     GpuBuildPlan::blas(name, &shape)
 }
 
-/// Whether leaves that name vertices, of which all are copied, take less than copies of the corners.
+/// True if leaves with vertex indices and a copy of all vertices are smaller than leaves with vertex positions.
 fn saves_memory(naming: LeafKind, primitives: u32, vertices: u32) -> bool {
     let leaves = |kind: LeafKind| u64::from(primitives) * kind.primitive_bytes();
     leaves(naming) + u64::from(vertices) * VERTEX_BYTES < leaves(LeafKind::Triangles)
 }
 
-/// Whether a leaf that names vertices has room for the numbers of geometry and primitive.
+/// True if a leaf with vertex indices has enough bits for the geometry and the primitive.
 fn do_ids_fit(geometries: &[BlasGeometry]) -> bool {
     const MAX_GEOMETRIES: usize = 1 << 8;
     const MAX_PRIMITIVES: u32 = 1 << 24;
@@ -202,7 +203,7 @@ fn do_ids_fit(geometries: &[BlasGeometry]) -> bool {
     geometries.len() <= 1 || (geometries.len() <= MAX_GEOMETRIES && geometries.iter().all(few))
 }
 
-/// How a structure with this header, which the CPU built, is refitted; `None` where it may not be.
+/// Returns the refit plan of a BLAS with this header, which the CPU built; `None` if it cannot be refitted.
 pub(crate) fn refit_plan(header: &BlobHeader, desc: &BlasDesc<'_>) -> Option<GpuRefitPlan> {
     if !desc.flags.contains(BuildFlags::ALLOW_UPDATE) {
         return None;

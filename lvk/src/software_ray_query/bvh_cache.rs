@@ -1,4 +1,4 @@
-//! Trees that the CPU has built, kept in a folder from one run to the next.
+//! Disk cache of trees that the CPU built.
 
 use std::path::{Path, PathBuf};
 
@@ -9,17 +9,17 @@ use super::validate_blob::{self, ExpectedMesh};
 use crate::cache_file::{fingerprint, read_file, replace_file};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
-/// Changes with the builders and with the form of structures.
+/// Version of the builders and of the BLAS format.
 const VERSION: u32 = 5;
-/// Magic, version, reserved, length of the structure, checksum of it.
+/// Bytes of the header: magic, version, a reserved word, and length and checksum of the BLAS.
 const HEADER_BYTES: usize = 32;
 
-/// A folder of built trees, each in a file named after what it was built from.
+/// A folder of built trees. Each file is named after the fingerprint of its build's inputs.
 pub(crate) struct BvhCache {
     folder: PathBuf,
 }
 
-/// What a tree is built from: the primitives and the settings.
+/// Fingerprint of the inputs of a build: the primitives and the settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BvhKey([u64; 2]);
 
@@ -43,13 +43,13 @@ impl BvhKey {
 }
 
 impl BvhCache {
-    /// In this folder, which need not exist.
+    /// Creates a cache in `folder`, which need not exist.
     pub(crate) fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned() }
     }
 
-    /// The tree of an earlier run if it is what is expected, or what `encode_blas` makes, which is kept. No trouble with files
-    /// is an error.
+    /// Returns the tree of an earlier run if it matches `expected`. Otherwise builds and stores it. A file error is
+    /// logged, not returned.
     pub(crate) fn get_or_build(
         &self,
         key: BvhKey,
@@ -144,7 +144,7 @@ mod tests {
         std::fs::write(&path, file).unwrap();
         assert_eq!(get(), built);
         assert_eq!(get(), built);
-        // Sealed as if the library had written it: nothing, and a node that is its own child.
+        // Sealed as if the library had written them: nothing, and a node that is its own child.
         let mut circle = built.clone();
         let node = circle.header().nodes as usize * 16;
         circle.bytes[node + 15] = 1;

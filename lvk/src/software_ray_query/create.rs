@@ -1,7 +1,7 @@
-//! Structures of the library's own: bottom-level ones are built by the CPU when they are created, but those that the GPU
-//! builds.
+//! Creation of BLAS and TLAS for software traversal. The CPU builds the BVH of a BLAS when it is created, unless the
+//! GPU builds it.
 //!
-//! `disabled.rs` has the names that other files use, for builds without the feature `software-ray-query`.
+//! `disabled/create.rs` has the names that other files use, for builds without the feature `software-ray-query`.
 
 use std::sync::Arc;
 
@@ -34,12 +34,12 @@ use crate::software_ray_query::storage::SoftwareAccelStorage;
 use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::software_ray_query::validate_blob::{self, ExpectedMesh};
 
-/// Stands in front of structures that no driver wrote; as long as what drivers begin with.
+/// Marks serialized BVHs that no driver wrote. It is as long as the UUIDs that blobs of drivers begin with.
 const SOFTWARE_BLOB_UUID: [u8; 32] = *b"lvk software structure, form 3\0\0";
 
 impl Context {
-    /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
-    /// the device traces queries itself. Waits for the GPU to read the inputs back.
+    /// Builds the BVHs of meshes on all CPU cores; `None` for those that the GPU builds, and for all if the device
+    /// traces ray queries itself. Waits for the GPU to read the inputs back.
     pub(crate) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<BlasBlob>>> {
         if !self.device_state().gpu.caps.software_ray_query() {
             return Ok(descs.iter().map(|_| None).collect());
@@ -56,7 +56,7 @@ impl Context {
         Ok(parallel_map(descs, |desc| is_of_cpu(&desc).then(|| build(desc))))
     }
 
-    /// The structure of a mesh, of an earlier run where trees are kept.
+    /// Builds the BVH of a mesh, or takes it from an earlier run if the context keeps BVHs in files.
     fn build_on_cpu(&self, mesh: &Mesh, quality: BvhSettings) -> BlasBlob {
         let build = || encode_blas::encode_blas(mesh, quality);
         match &self.device_state().tree_cache {
@@ -68,8 +68,8 @@ impl Context {
         }
     }
 
-    /// Memory for a structure that the CPU built, or that the GPU is to build; nothing where the device traces queries
-    /// itself.
+    /// Allocates memory for a BVH that the CPU built, or that the GPU is to build; `None` if the device traces ray
+    /// queries itself.
     pub(crate) fn software_blas(
         &self,
         desc: &BlasDesc<'_>,
@@ -94,7 +94,7 @@ impl Context {
         Ok(Some(SoftwareBlas::new(Arc::new(body), origin)))
     }
 
-    /// The bytes of what software traces, behind a mark that no driver writes. Waits for the GPU.
+    /// Reads back the bytes of the software BVH, after a mark that no driver writes. Waits for the GPU.
     pub(crate) fn read_software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
         let Some(software) = &blas.software else { return Ok(Vec::new()) };
         let body = software.moved_storage().unwrap_or(&software.storage);
@@ -112,7 +112,7 @@ impl Context {
         Ok(bytes)
     }
 
-    /// A structure of what [`read_software_bytes`](Self::read_software_bytes) answered.
+    /// Creates a BLAS from bytes that [`read_software_bytes`](Self::read_software_bytes) returned.
     pub(crate) fn load_software_blas(
         &self,
         desc: &BlasDesc<'_>,
@@ -146,7 +146,7 @@ impl Context {
         Ok(holder)
     }
 
-    /// Copies what the CPU built.
+    /// Copies a BVH that the CPU built to its storage.
     pub(crate) fn upload_software_blob(&self, target: &Arc<AccelStruct>, blob: &BlasBlob) -> Result<()> {
         let Some(software) = target.blas()?.software.as_ref() else { return Ok(()) };
         let body = &software.storage;
@@ -157,7 +157,7 @@ impl Context {
     }
 }
 
-/// Room for what software traces, where it does.
+/// Allocates a software TLAS; `None` if the device traces ray queries itself.
 pub(crate) fn software_tlas(shared: &DeviceState, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
     if !shared.gpu.caps.software_ray_query() {
         return Ok(None);

@@ -1,22 +1,23 @@
-//! How a structure lies in memory; the same numbers as in `software_ray_query/glsl/software_layout.glsl`.
+//! Memory layout of software acceleration structures; the same numbers as in
+//! `software_ray_query/glsl/software_layout.glsl`.
 //!
-//! A structure is one range of a buffer. Its header says by numbers of 16-byte blocks from its own start where its parts
-//! lie, so that it may be copied as it is.
+//! A BLAS or TLAS is one range of a buffer. Its header has the offsets of its parts in 16-byte blocks from its own
+//! start, so that it can be copied unchanged.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Bytes of a block.
 pub(crate) const BLOCK_BYTES: usize = 16;
-/// Reference to no node, or to no root: the structure is empty.
+/// Reference to no node; as the root, the acceleration structure is empty.
 pub(crate) const NONE: u32 = u32::MAX;
 /// Marks a reference to a leaf.
 pub(crate) const LEAF: u32 = 1 << 31;
-/// Most primitives of a leaf that a reference names.
+/// Maximum primitives of a leaf reference.
 pub(crate) const MAX_LEAF_PRIMITIVES: usize = 16;
-/// Most nodes on a path of a binary tree: the walk pushes an entry for each.
+/// Maximum nodes on a path of a BVH2: the traversal pushes an entry for each.
 pub(crate) const MAX_BVH2_DEPTH: usize = 64;
-/// Most nodes on a path of a wide tree: the walk pushes an entry for each.
+/// Maximum nodes on a path of a BVH8: the traversal pushes an entry for each.
 pub(crate) const MAX_BVH8_DEPTH: usize = 32;
 
 /// [`BlobHeader::format`]: nodes of eight compressed children.
@@ -26,34 +27,34 @@ pub(crate) const FORMAT_BVH2: u32 = 1;
 /// [`MovedHeader::format`].
 pub(crate) const FORMAT_MOVED: u32 = 2;
 
-/// What leaves hold, by the numbers of the structure's header.
+/// Content of leaves, by the number in the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub(crate) enum LeafKind {
-    /// Triangles with their corners, 48 bytes.
+    /// Triangles with vertex positions, 48 bytes.
     Triangles = 0,
-    /// Triangles that name vertices of a copy, 16 bytes.
+    /// Triangles with indices into a copy of the vertices, 16 bytes.
     IndexedTriangles = 1,
-    /// Boxes, 32 bytes.
+    /// AABBs, 32 bytes.
     Boxes = 2,
     /// Instances, 128 bytes.
     Instances = 3,
-    /// Triangles that name vertices of a copy by 21 bits each, 12 bytes.
+    /// Triangles with indices of 21 bits into a copy of the vertices, 12 bytes.
     PackedTriangles = 4,
 }
 
 impl LeafKind {
-    /// The smallest kind of triangles that name vertices of a copy of so many.
+    /// Returns the smallest kind of triangles with indices into a copy of `vertices` vertices.
     pub(crate) fn with_vertex_indices(vertices: usize) -> Self {
         if vertices <= LeafPacked::MAX_VERTICES { Self::PackedTriangles } else { Self::IndexedTriangles }
     }
 
-    /// Whether leaves name vertices of a copy.
+    /// True if leaves have indices into a copy of the vertices.
     pub(crate) fn has_vertex_indices(self) -> bool {
         matches!(self, Self::IndexedTriangles | Self::PackedTriangles)
     }
 
-    /// Bytes of a primitive as the structure keeps it.
+    /// Returns the bytes of a primitive in the leaves.
     pub(crate) fn primitive_bytes(self) -> u64 {
         match self {
             Self::Triangles => 48,
@@ -65,17 +66,17 @@ impl LeafKind {
     }
 }
 
-/// The first 128 bytes of a structure.
+/// The first 128 bytes of an acceleration structure.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct BlobHeader {
     pub(crate) format: u32,
     /// A number of [`LeafKind`].
     pub(crate) leaf_kind: u32,
-    /// A node or a leaf, or [`NONE`].
+    /// Reference to a node or a leaf, or [`NONE`].
     pub(crate) root: u32,
     pub(crate) primitive_count: u32,
-    /// The next four count blocks.
+    /// This offset and the next three count blocks.
     pub(crate) nodes: u32,
     pub(crate) primitives: u32,
     pub(crate) vertices: u32,
@@ -93,11 +94,11 @@ pub(crate) struct BlobHeader {
 impl BlobHeader {
     /// Every geometry is opaque.
     pub(crate) const ALL_OPAQUE: u32 = 1;
-    /// No geometry is.
+    /// No geometry is opaque.
     pub(crate) const NONE_OPAQUE: u32 = 2;
 }
 
-/// A triangle with its corners.
+/// A triangle with vertex positions.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct LeafTriangle {
@@ -110,17 +111,17 @@ pub(crate) struct LeafTriangle {
     pub(crate) opaque: u32,
 }
 
-/// A triangle that names vertices.
+/// A triangle with vertex indices.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct LeafIndexed {
     pub(crate) vertices: [u32; 3],
-    /// With the geometry in the highest 8 bits where there are several.
+    /// Index of the primitive, with the geometry in the highest 8 bits if there are several.
     pub(crate) primitive: u32,
 }
 
-/// As [`LeafIndexed`], with 21 bits for each vertex: of the first and the second in the lowest bits of a word each, of
-/// the third 11 bits above the first's and 10 above the second's.
+/// Like [`LeafIndexed`], with 21 bits for each vertex. The first and the second vertex are in the lowest bits of a word
+/// each. The third has 11 bits above the first and 10 bits above the second.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct LeafPacked {
@@ -131,17 +132,17 @@ pub(crate) struct LeafPacked {
 impl LeafPacked {
     const VERTEX_BITS: u32 = 21;
     const ID_BITS: u32 = u32::BITS - Self::VERTEX_BITS;
-    /// Most vertices that its bits can name.
+    /// Maximum vertices that 21 bits can index.
     pub(crate) const MAX_VERTICES: usize = 1 << Self::VERTEX_BITS;
 
-    /// Of one that names less than [`MAX_VERTICES`](Self::MAX_VERTICES).
+    /// Encodes a leaf whose indices are below [`MAX_VERTICES`](Self::MAX_VERTICES).
     pub(crate) fn encode(leaf: &LeafIndexed) -> Self {
         let [a, b, c] = leaf.vertices;
         let names = [a | c << Self::VERTEX_BITS, b | c >> Self::ID_BITS << Self::VERTEX_BITS];
         Self { names, primitive: leaf.primitive }
     }
 
-    /// What it names; as shaders read it, which take the highest bit of the third name for one of it too.
+    /// Returns the vertex indices. The highest bit of the third index is part of it, as in shaders.
     pub(crate) fn vertices(&self) -> [u32; 3] {
         let [a, b] = self.names;
         let name = |word| word & (Self::MAX_VERTICES as u32 - 1);
@@ -149,19 +150,19 @@ impl LeafPacked {
     }
 }
 
-/// A box.
+/// An AABB.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct LeafBox {
     pub(crate) low: Vec3,
     pub(crate) primitive: u32,
     pub(crate) high: Vec3,
-    /// With [`LeafBox::OPAQUE`] if it is opaque.
+    /// Index of the geometry, with [`LeafBox::OPAQUE`] if it is opaque.
     pub(crate) geometry: u32,
 }
 
 impl LeafBox {
-    /// Marks the geometry number of an opaque box.
+    /// Marks the geometry index of an opaque AABB.
     pub(crate) const OPAQUE: u32 = 1 << 31;
 }
 
@@ -179,7 +180,7 @@ pub(crate) struct Bvh2NodeRecord {
     pub(crate) reserved1: u32,
 }
 
-/// A row of the table of geometries.
+/// An entry of the table of geometries.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct GeometryRecord {
@@ -188,38 +189,38 @@ pub(crate) struct GeometryRecord {
     pub(crate) reserved: [u32; 3],
 }
 
-/// What stands at the start of a structure that has moved.
+/// The start of a BLAS that has moved.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct MovedHeader {
     /// [`FORMAT_MOVED`].
     pub(crate) format: u32,
     pub(crate) leaf_kind: u32,
-    /// Of the structure that is meant, which has not moved itself.
+    /// Address of the target BLAS, which has not moved itself.
     pub(crate) address: u64,
 }
 
-/// An instance of a bottom-level structure.
+/// An instance of a BLAS.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct InstanceRecord {
-    /// 3 rows of 4 columns.
+    /// Matrix of 3 rows of 4 columns.
     pub(crate) world_to_object: [f32; 12],
-    /// 3 rows of 4 columns.
+    /// Matrix of 3 rows of 4 columns.
     pub(crate) object_to_world: [f32; 12],
     pub(crate) structure: u64,
     /// 24 bits custom index, 8 bits mask.
     pub(crate) custom_index_and_mask: u32,
     /// 24 bits hit-group offset, 8 bits flags.
     pub(crate) hit_group_offset_and_flags: u32,
-    /// The caller's.
+    /// Index of the instance in the caller's list.
     pub(crate) number: u32,
-    /// Where rays start: a node but the first, or a leaf; 0 for the root.
+    /// Entry point of rays: a node except the first, or a leaf; 0 for the root.
     pub(crate) entry: u32,
     pub(crate) reserved: [u32; 2],
 }
 
-/// The reference to `count` primitives of leaves, 1 to [`MAX_LEAF_PRIMITIVES`].
+/// Returns the reference to `count` primitives of leaves, 1 to [`MAX_LEAF_PRIMITIVES`].
 pub(crate) fn leaf(first: u32, count: usize) -> u32 {
     LEAF | (count as u32 - 1) << 27 | first
 }

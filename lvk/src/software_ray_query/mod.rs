@@ -1,12 +1,8 @@
-//! Software ray queries: the BVHs that the library builds and traverses where a device has no ray queries, or slow ones.
+//! Software ray queries: memory layout of BLASes and TLASes, plans of builds and refits on the GPU, and the software
+//! half of BLAS and TLAS objects. [`crate::software_ray_query::bvh`] builds trees on the CPU.
 //!
-//! - `bvh` builds and encodes BVHs on the CPU; `bvh_cache` keeps them on disk, and `validate_blob` checks them.
-//! - `gpu_build` plans builds and refits on the GPU, by the compute shaders in `kernels/`.
-//! - `layout`, `blas`, `tlas` and `storage` describe the memory that shaders traverse with the GLSL in `glsl/`.
-//! - `create` and `record` are the methods of `Context` and `CommandBuffer` that create and build them.
-//!
-//! Without the feature `software-ray-query` the folder `disabled` takes the place of this module: it has the names that the rest
-//! of the crate uses.
+//! `disabled.rs` has the items that the rest of the crate uses, for builds without the feature `software-ray-query`.
+//! The folder `command/software_ray_query` records builds, and `context/software_ray_query` creates objects.
 
 pub(crate) mod blas;
 pub(crate) mod bvh;
@@ -20,7 +16,7 @@ pub(crate) mod storage;
 pub(crate) mod tlas;
 pub(crate) mod validate_blob;
 
-/// The files behind `#include <lvk/software_*.glsl>`.
+/// The files for `#include <lvk/software_*.glsl>`.
 #[cfg(feature = "glsl")]
 pub(crate) const GLSL: &[(&str, &str)] = &[
     ("lvk/software_boxes.glsl", include_str!("glsl/software_boxes.glsl")),

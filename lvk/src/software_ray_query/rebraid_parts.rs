@@ -1,21 +1,21 @@
-//! The largest parts of a structure, from which rays may start in place of its root.
+//! The largest parts of a BLAS. A ray can start at a part instead of the root.
 
 use std::ops::Range;
 
 use crate::accel::primitive_bounds::Bounds;
 
-/// What is below one node or leaf.
+/// The subtree of a node or leaf.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RebraidPart {
-    /// The node or leaf; 0 for the whole.
+    /// Reference to the node or leaf; 0 for the whole BLAS.
     pub(crate) reference: u32,
-    /// Around all of it, in the structure's own space.
+    /// Bounds of the subtree, in the space of the BLAS.
     pub(crate) bounds: Bounds,
-    /// Numbers of its own parts; none where it is not taken apart.
+    /// Indices of its own parts; empty if it is not split.
     pub(crate) below: Range<u32>,
 }
 
-/// A structure that no GPU changes: the whole of it, and parts of it, each primitive in one of those of a part.
+/// The whole of a BLAS that no GPU changes, and its parts. The parts of a part contain each of its primitives once.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RebraidParts {
     pub(crate) whole: RebraidPart,
@@ -23,12 +23,12 @@ pub(crate) struct RebraidParts {
 }
 
 impl RebraidParts {
-    /// A structure that is only taken whole.
+    /// Returns the parts of a BLAS that is not split.
     pub(crate) fn single(bounds: Bounds) -> Self {
         Self { whole: RebraidPart { reference: 0, bounds, below: 0..0 }, parts: Vec::new() }
     }
 
-    /// The parts of a part.
+    /// Returns the parts of a part.
     pub(crate) fn children_of(&self, part: &RebraidPart) -> &[RebraidPart] {
         self.parts.get(part.below.start as usize..part.below.end as usize).unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! A structure in its memory.
+//! Memory of a software acceleration structure.
 
 use std::sync::Arc;
 
@@ -7,32 +7,32 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::resource::Buffer;
 
-/// The memory of a structure of either level.
+/// The memory of a BLAS or TLAS.
 pub(crate) struct SoftwareAccelStorage {
     storage: StorageRange,
-    /// What instances, or the table of top-level structures, refer to.
+    /// Address that instances, or the table of TLASes, refer to.
     pub(crate) address: u64,
 }
 
 impl SoftwareAccelStorage {
-    /// Room for `bytes`; nothing is built yet.
+    /// Allocates `bytes`; nothing is built yet.
     pub(crate) fn new(gpu: &Arc<Gpu>, storage: &AccelStorage, name: &str, bytes: u64) -> Result<Self> {
         let storage = storage.alloc(gpu, name, bytes)?;
         let address = storage.buffer.address + storage.offset;
         Ok(Self { storage, address })
     }
 
-    /// The buffer it lies in.
+    /// Returns the buffer that contains the memory.
     pub(crate) fn buffer(&self) -> &Arc<Buffer> {
         &self.storage.buffer
     }
 
-    /// Where in the buffer.
+    /// Returns the offset in the buffer.
     pub(crate) fn offset(&self) -> u64 {
         self.storage.offset
     }
 
-    /// Bytes of memory it takes.
+    /// Returns the bytes of the memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
         self.storage.bytes
     }

@@ -1,4 +1,4 @@
-//! A top-level structure of the library's own.
+//! A TLAS for software traversal.
 
 use std::sync::Arc;
 
@@ -6,26 +6,26 @@ use super::gpu_build::layout::GpuBuildPlan;
 use super::storage::SoftwareAccelStorage;
 use crate::accel::flags::AccelStructSizes;
 
-/// What stands behind the handle of a top-level structure for software to trace. Every update is a build.
+/// The software half of a TLAS. Every update is a build.
 pub(crate) struct SoftwareTlas {
     pub(crate) storage: Arc<SoftwareAccelStorage>,
     pub(crate) plan: GpuBuildPlan,
-    /// Records that the body has room for: more than instances, as some may be shown in parts.
+    /// Maximum records: more than instances, because re-braiding splits some of them.
     pub(crate) record_capacity: u32,
 }
 
 impl SoftwareTlas {
-    /// The address that the table of top-level structures holds.
+    /// Returns the address for the table of TLASes.
     pub(crate) fn address(&self) -> u64 {
         self.storage.address
     }
 
-    /// Bytes of memory.
+    /// Returns the bytes of memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
         self.storage.memory_bytes()
     }
 
-    /// What it takes and its builds take.
+    /// Returns the sizes of the TLAS and of its builds.
     pub(crate) fn sizes(&self) -> AccelStructSizes {
         AccelStructSizes {
             structure_bytes: self.storage.memory_bytes(),

@@ -1,5 +1,5 @@
-//! Whether bytes from a file are a structure that shaders can walk, and kernels refit: neither damage nor made-up numbers
-//! must send the GPU anywhere.
+//! Validates a BLAS blob from a file: shaders must be able to traverse it, and kernels to refit it. Neither damage nor
+//! forged numbers may make the GPU read or write elsewhere.
 
 use std::ops::Range;
 
@@ -14,17 +14,17 @@ use crate::software_ray_query::layout::{
     BLOCK_BYTES, BlobHeader, Bvh2NodeRecord, FORMAT_BVH2, FORMAT_BVH8, LeafBox, LeafIndexed, LeafPacked, NONE,
 };
 
-/// What a structure is to be of.
+/// The mesh that a blob must be built from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ExpectedMesh {
-    /// Boxes, or triangles.
+    /// True for AABBs, false for triangles.
     pub(crate) is_aabbs: bool,
-    /// Primitives of each geometry.
+    /// Number of primitives of each geometry.
     pub(crate) counts: Vec<u32>,
 }
 
 impl ExpectedMesh {
-    /// What a build of this mesh is of.
+    /// Returns the expectation for a build of this mesh.
     pub(crate) fn from_mesh(mesh: &Mesh) -> Self {
         let mut counts = vec![0; mesh.flags.len()];
         let mut add = |geometry: u32, primitive: u32| {
@@ -45,7 +45,7 @@ impl ExpectedMesh {
         Self { is_aabbs: boxes, counts }
     }
 
-    /// What a structure of this description is of.
+    /// Returns the expectation for a BLAS of this description.
     pub(crate) fn from_desc(desc: &BlasDesc<'_>) -> Self {
         Self {
             is_aabbs: desc.geometries.first().is_some_and(BlasGeometry::is_aabbs),
@@ -53,7 +53,7 @@ impl ExpectedMesh {
         }
     }
 
-    /// More bytes than it has.
+    /// Returns an upper bound of the blob's bytes.
     pub(crate) fn max_blob_bytes(&self) -> u64 {
         /// A node of eight children, a leaf and three vertices, or a geometry.
         const MAX_BYTES_PER_PRIMITIVE: u64 = 256;
@@ -62,14 +62,14 @@ impl ExpectedMesh {
     }
 }
 
-/// What a sound structure says of itself.
+/// Facts of a valid blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ValidatedBlob {
     pub(crate) header: BlobHeader,
     pub(crate) bounds: Bounds,
 }
 
-/// Checks a bottom-level structure; answers what is wrong with it.
+/// Checks a BLAS blob. Returns the first defect as the error.
 pub(crate) fn validate_blob(bytes: &[u8], expected: &ExpectedMesh) -> Result<ValidatedBlob, &'static str> {
     let head = bytes.get(..size_of::<BlobHeader>()).ok_or("its header is cut off")?;
     let header: BlobHeader = bytemuck::pod_read_unaligned(head);
@@ -104,7 +104,7 @@ fn leaf_kind(header: &BlobHeader) -> Option<LeafKind> {
     kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind)
 }
 
-/// The parts of a structure, all of them within its bytes.
+/// The parts of a blob, all of them within its bytes.
 struct BlobSections<'a> {
     bytes: &'a [u8],
     leaf_bytes: usize,
@@ -131,7 +131,7 @@ impl<'a> BlobSections<'a> {
         })
     }
 
-    /// Refits write to one part what they must not find in another.
+    /// True if the parts do not overlap. A refit that writes to one part must not change another.
     fn ranges_disjoint(&self) -> bool {
         let mut parts = [&self.nodes, &self.leaves, &self.vertices, &self.geometries];
         parts.sort_by_key(|part| (part.start, part.end));
@@ -153,7 +153,7 @@ impl<'a> BlobSections<'a> {
     }
 }
 
-/// Whether every path from the root ends in leaves that exist, none is too long and no two meet.
+/// True if every path from the root ends in leaves that exist, no path is too long, and no two paths meet.
 fn is_tree_valid(parts: &BlobSections<'_>, header: &BlobHeader) -> bool {
     let primitives = header.primitive_count as usize;
     match (header.root, header.node_count) {
@@ -165,7 +165,7 @@ fn is_tree_valid(parts: &BlobSections<'_>, header: &BlobHeader) -> bool {
     }
 }
 
-/// Bytes of a node; none for formats that do not exist, and for what has moved to another address.
+/// Returns the bytes of a node; `None` for an unknown format, and for a BLAS that has moved to another address.
 fn node_bytes(header: &BlobHeader) -> Option<usize> {
     const WIDE_BYTES: usize = 80;
     match header.format {
@@ -175,14 +175,14 @@ fn node_bytes(header: &BlobHeader) -> Option<usize> {
     }
 }
 
-/// Vertices up to the last that leaves name.
+/// Returns the number of vertices up to the last one that leaves refer to.
 fn named_vertex_count(leaves: &[u8], kind: LeafKind) -> usize {
     let names = |leaf| leaf_vertices(leaf, kind).into_iter().flatten();
     let all = leaves.chunks_exact(kind.primitive_bytes() as usize).flat_map(names);
     all.max().map_or(0, |last| last as usize + 1)
 }
 
-/// The vertices that a leaf names, if it does.
+/// Returns the vertex indices of a leaf, if it has them.
 fn leaf_vertices(leaf: &[u8], kind: LeafKind) -> Option<[u32; 3]> {
     match kind {
         LeafKind::IndexedTriangles => Some(bytemuck::pod_read_unaligned::<LeafIndexed>(leaf).vertices),
@@ -191,7 +191,7 @@ fn leaf_vertices(leaf: &[u8], kind: LeafKind) -> Option<[u32; 3]> {
     }
 }
 
-/// Whether a leaf's primitive is one of the geometries'.
+/// True if the geometries contain a leaf's primitive.
 fn is_leaf_primitive_valid(leaf: &[u8], kind: LeafKind, counts: &[u32]) -> bool {
     let word = |at: usize| leaf.get(at..at + 4).map_or(NONE, bytemuck::pod_read_unaligned);
     let shared = |word: u32| if counts.len() > 1 { (word >> 24, word & 0x00ff_ffff) } else { (0, word) };
@@ -204,7 +204,7 @@ fn is_leaf_primitive_valid(leaf: &[u8], kind: LeafKind, counts: &[u32]) -> bool 
     counts.get(geometry as usize).is_some_and(|count| primitive < *count)
 }
 
-/// Where `count` elements of `size` bytes lie that begin at a place in blocks.
+/// Returns the byte range of `count` elements of `size` bytes at offset `place` in blocks.
 fn section_range(bytes: &[u8], place: u32, count: usize, size: usize) -> Option<Range<usize>> {
     if count == 0 {
         return Some(0..0);
@@ -229,7 +229,7 @@ mod tests {
     const MOVING: BvhSettings = BvhSettings { low_memory: false, refit: true };
     const SMALL_MOVING: BvhSettings = BvhSettings { low_memory: true, refit: true };
 
-    /// A closed strip through these corners, as triangles of two geometries in turn.
+    /// Returns a closed strip through these vertices, as triangles of two geometries in turn.
     fn mesh(corners: &[[f32; 3]]) -> Mesh {
         let count = corners.len() as u32;
         let vertices: Vec<_> =
@@ -246,7 +246,7 @@ mod tests {
         }
     }
 
-    /// With the vertices that a build of this quality is told.
+    /// Returns the mesh with the vertices that a build with these settings gets.
     fn primitive_ids(mesh: &Mesh, quality: BvhSettings) -> Mesh {
         let vertices = if quality.keeps_given_vertices() { mesh.vertices.clone() } else { Vec::new() };
         Mesh { vertices, ..mesh.clone() }
@@ -270,7 +270,7 @@ mod tests {
         mesh(&vec![[1.0, 2.0, 3.0]; count])
     }
 
-    /// A sound structure of binary nodes.
+    /// Returns a valid BVH2 blob.
     fn built_binary(mesh: &Mesh, quality: BvhSettings) -> (Vec<u8>, ExpectedMesh) {
         let bounds = mesh.bounds();
         let whole = bounds.iter().fold(Bounds::EMPTY, |all, one| all.union(*one));
@@ -289,7 +289,7 @@ mod tests {
         any::<[bool; 2]>().prop_map(|[low_memory, refit]| BvhSettings { low_memory, refit })
     }
 
-    /// A sound structure with what it is to be of.
+    /// Returns a valid blob and its expected mesh.
     fn built(mesh: &Mesh, quality: BvhSettings) -> (Vec<u8>, ExpectedMesh) {
         let blob = encode_blas::encode_blas(&primitive_ids(mesh, quality), quality);
         let expected = ExpectedMesh::from_mesh(mesh);
@@ -297,7 +297,7 @@ mod tests {
         (blob.bytes, expected)
     }
 
-    /// The same structure with leaves that have a word for each vertex.
+    /// Returns the same blob with leaves that have a word for each vertex index.
     fn unpacked((mut bytes, expected): (Vec<u8>, ExpectedMesh)) -> (Vec<u8>, ExpectedMesh) {
         let mut changed = header(&bytes);
         let packed = section_range(&bytes, changed.primitives, changed.primitive_count as usize, 12).unwrap();
@@ -330,7 +330,7 @@ mod tests {
         validate_blob(&bytes, expected).unwrap_err()
     }
 
-    /// As [`refused`], with a word of the part at a place in blocks.
+    /// Like [`refused`], with a word of the part at an offset in blocks.
     fn refused_word(
         mut bytes: Vec<u8>,
         expected: &ExpectedMesh,
@@ -343,8 +343,8 @@ mod tests {
         validate_blob(&bytes, expected).unwrap_err()
     }
 
-    /// Walks every path as shaders do, from the root and from every part that may be shown alone, but fails where these would read
-    /// anything else.
+    /// Traverses every path like shaders do, from the root and from every part that an instance may reference. Fails if
+    /// a shader would read anything else.
     fn traverse(bytes: &[u8]) -> usize {
         let bounds = Bounds { low: Vec3::splat(-9.0), high: Vec3::splat(9.0) };
         let blob = encode_blas::BlasBlob { bytes: bytes.to_vec(), bounds };
@@ -417,7 +417,7 @@ mod tests {
             traverse(&bytes);
         }
 
-        /// As large and as small as numbers are that builds take, many of them in one place.
+        /// The largest and smallest numbers that builds accept, many of them at the same position.
         #[test]
         fn extreme_places_are_built(
             corners in prop::collection::vec(prop::array::uniform3(prop::sample::select(
@@ -431,7 +431,7 @@ mod tests {
             traverse(&bytes);
         }
 
-        /// With every length cut off, and words that are wrong by little, by much, or those of others.
+        /// Every truncated length, and words that are slightly wrong, very wrong, or those of other blobs.
         #[test]
         fn damage_is_refused_or_harmless(
             quality in prop::sample::select(vec![SMALL, MOVING, SMALL_MOVING]),
@@ -522,7 +522,7 @@ mod tests {
         }
     }
 
-    /// Where nothing but the leaf at the root says that the format is one.
+    /// Cases in which only the leaf at the root suggests that the format is valid.
     #[test]
     fn a_leaf_that_says_it_has_moved_is_refused() {
         let (bytes, expected) = built(&row(2), MOVING);
@@ -558,7 +558,7 @@ mod tests {
         }
     }
 
-    /// The first inner child of a wide node that has one.
+    /// Returns the first inner child of a wide node that has one.
     fn first_child(bytes: &[u8], node: u32) -> Option<u32> {
         let at = header(bytes).nodes as usize * BLOCK_BYTES + node as usize * 80;
         (bytes[at + 15] != 0).then(|| bytemuck::pod_read_unaligned(&bytes[at + 16..at + 20]))

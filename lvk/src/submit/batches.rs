@@ -1,22 +1,22 @@
-//! What goes to a queue with one `vkQueueSubmit2`.
+//! The contents of one `vkQueueSubmit2` call.
 
 use ash::vk;
 
 use crate::error::Result;
 use crate::gpu::Gpu;
 
-/// One or two batches, which begin once all that they wait for is there; the last signals. Emptied and filled again, so that
-/// submissions take nothing from the heap.
+/// One or two batches. A batch begins once all of its waits are satisfied, and the last one signals. The lists are
+/// cleared and reused, so that submissions do not allocate on the heap.
 #[derive(Default)]
 pub(super) struct Batches {
     waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
     commands: Vec<vk::CommandBufferSubmitInfo<'static>>,
     signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    /// Where the second batch begins among waits and commands, if there is one.
+    /// Start of the second batch in the waits and commands, if there is a second batch.
     second: Option<(usize, usize)>,
 }
 
-// SAFETY: none of the lists' structures points to a further one.
+// SAFETY: none of the Vulkan structures in the lists has a `pNext` pointer.
 unsafe impl Send for Batches {}
 
 impl Batches {
@@ -27,7 +27,7 @@ impl Batches {
         self.second = None;
     }
 
-    /// What is pushed next waits for these; what was pushed before need not.
+    /// Adds waits for the commands that are pushed next. Commands pushed earlier do not wait for them.
     pub(super) fn wait(&mut self, waits: impl IntoIterator<Item = vk::SemaphoreSubmitInfo<'static>>) {
         let before = self.waits.len();
         self.waits.extend(waits);
@@ -40,12 +40,12 @@ impl Batches {
         self.commands.push(vk::CommandBufferSubmitInfo::default().command_buffer(raw));
     }
 
-    /// Signals when everything is done.
+    /// Signals semaphores when all batches are done.
     pub(super) fn signal(&mut self, signals: impl IntoIterator<Item = vk::SemaphoreSubmitInfo<'static>>) {
         self.signals.extend(signals);
     }
 
-    /// Hands everything to a queue.
+    /// Submits the batches to a queue.
     pub(super) fn submit(&self, gpu: &Gpu, queue_index: usize) -> Result<()> {
         let (waits, commands) = self.second.unwrap_or_default();
         let first = vk::SubmitInfo2::default()

@@ -1,4 +1,4 @@
-//! Which command buffers are free, begun ahead, being recorded, or with the GPU.
+//! State of command buffers: free, begun ahead, being recorded, or submitted.
 
 use std::collections::VecDeque;
 
@@ -11,9 +11,10 @@ use crate::gpu::Gpu;
 #[derive(Default)]
 pub(crate) struct CommandRing {
     queues: PerQueue<QueueCommandBuffers>,
-    /// Sequence numbers of those being recorded, in rising order.
+    /// Sequence numbers of command buffers being recorded, in rising order.
     open: Vec<u64>,
-    /// Of those that never reached the GPU, but have staging memory; until the next collection.
+    /// Sequence numbers of command buffers that were never submitted, but have staging memory. Kept until the next
+    /// collection.
     discarded: Vec<u64>,
     last_sequence: u64,
 }
@@ -21,25 +22,26 @@ pub(crate) struct CommandRing {
 /// Command buffers of one queue.
 #[derive(Default)]
 struct QueueCommandBuffers {
-    /// Begun already, for who comes next.
+    /// A command buffer begun ahead, for the next acquisition.
     begun: Option<Box<Recording>>,
     #[expect(clippy::vec_box, reason = "handed on as pointers")]
     free: Vec<Box<Recording>>,
-    /// In the order of their values.
+    /// Submitted command buffers in the order of their timeline values.
     in_flight: VecDeque<Box<Recording>>,
 }
 
-/// Leave to record a command buffer.
+/// Permission to record a command buffer.
 pub(crate) struct Ticket {
     pub(crate) sequence: u64,
     queue_index: usize,
     begun: Option<Box<Recording>>,
-    /// What is recorded again, if there is any.
+    /// A command buffer to reuse, if one is free.
     free: Option<Box<Recording>>,
 }
 
 impl Ticket {
-    /// Begins the command buffer, which needs no lock. Where that fails, the ring is to be [told](CommandRing::end_recording).
+    /// Begins the command buffer without a lock. If that fails, the caller must call
+    /// [`end_recording`](CommandRing::end_recording).
     pub(crate) fn begin(self, gpu: &Gpu) -> Result<Box<Recording>> {
         let mut recording = match self.begun {
             Some(begun) => begun,
@@ -50,7 +52,7 @@ impl Ticket {
     }
 }
 
-/// Begins what is free, or a new one.
+/// Begins `free`, or a new command buffer.
 pub(crate) fn begin_recording(
     gpu: &Gpu,
     queue_index: usize,
@@ -69,44 +71,44 @@ impl CommandRing {
         Ticket { sequence: self.last_sequence, queue_index, begun, free }
     }
 
-    /// Whether a command buffer of the queue is begun already, for who comes next.
+    /// Returns true if a command buffer of the queue is begun ahead.
     pub(crate) fn has_begun(&self, queue_index: usize) -> bool {
         self.queues[queue_index].begun.is_some()
     }
 
-    /// A command buffer of the queue to begin.
+    /// Takes a free command buffer of the queue, to begin it ahead.
     pub(crate) fn take_free(&mut self, queue_index: usize) -> Option<Box<Recording>> {
         self.queues[queue_index].free.pop()
     }
 
-    /// A command buffer is begun for who comes next. One that another thread began meanwhile is free again.
+    /// Stores a command buffer begun ahead. One that another thread began meanwhile becomes free.
     pub(crate) fn store_begun(&mut self, recording: Box<Recording>) {
         let QueueCommandBuffers { begun, free, .. } = &mut self.queues[recording.queue_index];
         free.extend(begun.replace(recording));
     }
 
-    /// The command buffer of this number is recorded no longer.
+    /// Marks the command buffer of this sequence number as no longer being recorded.
     pub(crate) fn end_recording(&mut self, sequence: u64) {
         if let Ok(place) = self.open.binary_search(&sequence) {
             self.open.remove(place);
         }
     }
 
-    /// The command buffer was submitted, and is done when the queue's timeline reaches its value.
+    /// Stores a submitted command buffer. It is done when the queue's timeline reaches its value.
     pub(crate) fn mark_submitted(&mut self, recording: Box<Recording>) {
         self.end_recording(recording.sequence);
         self.queues[recording.queue_index].in_flight.push_back(recording);
     }
 
-    /// The command buffer was given up before submission.
+    /// Takes back a command buffer that was not submitted.
     pub(crate) fn discard(&mut self, recording: Box<Recording>) {
         self.end_recording(recording.sequence);
         self.discarded.extend(recording.is_staged.then_some(recording.sequence));
         self.queues[recording.queue_index].free.push(recording);
     }
 
-    /// Takes command buffers back that the queues are done with; answers the sequence numbers of those that have staging
-    /// memory, and those given up.
+    /// Takes back command buffers that the queues have finished. Returns the sequence numbers of finished and discarded
+    /// command buffers that have staging memory.
     pub(crate) fn collect(&mut self, completed: &PerQueue<u64>) -> Vec<u64> {
         let mut staged = std::mem::take(&mut self.discarded);
         for (QueueCommandBuffers { free, in_flight, .. }, completed) in self.queues.iter_mut().zip(completed)
@@ -120,22 +122,22 @@ impl CommandRing {
         staged
     }
 
-    /// Sequence number of the command buffer that was taken last.
+    /// Returns the sequence number of the latest command buffer taken.
     pub(crate) fn newest_sequence(&self) -> u64 {
         self.last_sequence
     }
 
-    /// Sequence number of the oldest command buffer being recorded.
+    /// Returns the sequence number of the oldest command buffer being recorded.
     pub(crate) fn oldest_open(&self) -> Option<u64> {
         self.open.first().copied()
     }
 
-    /// Sequence number of the newest command buffer being recorded.
+    /// Returns the sequence number of the newest command buffer being recorded.
     pub(crate) fn newest_open(&self) -> Option<u64> {
         self.open.last().copied()
     }
 
-    /// Destroys everything. The GPU is idle and nothing is being recorded.
+    /// Destroys all command buffers. The GPU is idle and no command buffer is being recorded.
     pub(crate) fn destroy(&mut self, gpu: &Gpu) {
         for QueueCommandBuffers { begun, free, in_flight } in &mut self.queues {
             let all = begun.take().into_iter().chain(free.drain(..)).chain(in_flight.drain(..));

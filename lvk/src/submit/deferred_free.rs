@@ -1,17 +1,17 @@
-//! Things to destroy once neither a command buffer being recorded nor the GPU can use them any more.
+//! Deferred destruction: an item is freed once no open command buffer and no submission can use it.
 
 use std::collections::VecDeque;
 
-/// A queue of things to destroy later.
+/// A queue of items to destroy later.
 ///
-/// A command buffer that was open when a thing was destroyed may use it, so the thing first waits until that command
-/// buffer is submitted or dropped. From then on nothing new can use it, and what was submitted so far bounds how long
-/// the GPU may.
+/// A command buffer that was open when an item was destroyed may use it. The item therefore first waits until that
+/// command buffer is submitted or dropped. After that no new submission can use the item, and the timeline value of the
+/// last submission so far bounds the GPU's use.
 #[derive(Debug)]
 pub(crate) struct DeferredFree<T> {
-    /// Waiting for open command buffers, with the newest of them.
+    /// Items that wait for open command buffers, with the newest such sequence number.
     open: Vec<(T, Option<u64>)>,
-    /// Waiting for the GPU, with the timeline value it must reach; values never fall from front to back.
+    /// Items that wait for the GPU, with the timeline value to reach. Values never fall from front to back.
     stamped: VecDeque<(T, u64)>,
 }
 
@@ -22,18 +22,18 @@ impl<T> Default for DeferredFree<T> {
 }
 
 impl<T> DeferredFree<T> {
-    /// Queues `item`. `newest_open` is the newest sequence number handed out to a command buffer so far; `None` if no
-    /// command buffer can use the item.
+    /// Queues `item`. `newest_open` is the newest sequence number of a command buffer so far; `None` if no command
+    /// buffer can use the item.
     pub(crate) fn push(&mut self, item: T, newest_open: Option<u64>) {
         self.open.push((item, newest_open));
     }
 
-    /// How many things wait.
+    /// Returns the number of waiting items.
     pub(crate) fn len(&self) -> usize {
         self.open.len() + self.stamped.len()
     }
 
-    /// Takes what can be destroyed now.
+    /// Takes the items that can be destroyed now.
     ///
     /// `oldest_open` is the sequence number of the oldest command buffer still being recorded, `submitted` the timeline
     /// value of the last submission and `completed` the one the GPU has reached.
@@ -55,7 +55,7 @@ impl<T> DeferredFree<T> {
         self.stamped.drain(..done).map(|(item, _)| item).collect()
     }
 
-    /// Takes everything, for a device that is idle.
+    /// Takes all items. The device is idle.
     pub(crate) fn drain_all(&mut self) -> Vec<T> {
         let stamped = self.stamped.drain(..).map(|(item, _)| item);
         stamped.chain(self.open.drain(..).map(|(item, _)| item)).collect()
@@ -94,7 +94,7 @@ mod tests {
         ]
     }
 
-    /// Which command buffers may use a destroyed item, and the last submission of any of them.
+    /// The command buffers that may use a destroyed item, and the last submission of any of them.
     struct DeferredItem {
         users: BTreeSet<u64>,
         last_use: u64,

@@ -1,4 +1,4 @@
-//! Turns barriers the tracker decided into one `vkCmdPipelineBarrier2`.
+//! Translates the tracker's barriers into one `vkCmdPipelineBarrier2`.
 
 use ash::vk;
 
@@ -7,10 +7,10 @@ use crate::barrier::{Access, Barriers, IdMap, ImageBarrier, Layout, MemoryBarrie
 use crate::gpu::Gpu;
 use crate::resource::image::BarrierImage;
 
-/// Images a command buffer touches, by the id the tracker knows them by.
+/// Images that a command buffer uses, by the tracker's ids.
 pub(crate) type Images = IdMap<BarrierImage>;
 
-/// The memory barrier that was translated last, as Vulkan reads it: the next one is mostly the same.
+/// The memory barrier translated last, with its Vulkan form. The next barrier is usually the same.
 #[derive(Debug, Default)]
 pub(crate) struct LastBarrier {
     barrier: MemoryBarrier,
@@ -18,7 +18,7 @@ pub(crate) struct LastBarrier {
 }
 
 impl LastBarrier {
-    /// A barrier by its Vulkan names, as `translate` finds them where it is another than the last one.
+    /// Returns the Vulkan form of a barrier. Calls `translate` only if the barrier differs from the last one.
     #[inline]
     fn get_or_translate(
         &mut self,
@@ -32,7 +32,7 @@ impl LastBarrier {
     }
 }
 
-/// Records the barriers, if there are any. `last` is kept from one call to the next, of one device.
+/// Records the barriers, if there are any. `last` is kept between calls for the same device.
 #[inline(always)]
 pub(crate) fn emit(
     gpu: &Gpu,
@@ -72,7 +72,7 @@ fn emit_all(
     }
 }
 
-/// Whether one Vulkan barrier may name all of it.
+/// Returns true if one Vulkan barrier may cover all of the memory barrier.
 #[inline]
 fn is_whole(gpu: &Gpu, memory: &MemoryBarrier) -> bool {
     gpu.caps.hardware_ray_query() || !memory.dst_access.contains(Access::ACCEL_READ)
@@ -88,7 +88,7 @@ fn record_barriers(
     if memory.is_empty() && images.is_empty() {
         return;
     }
-    // A list without barriers stays null: drivers that keep what they are given (Mesa's common code) allocate for others.
+    // An empty list stays null: drivers that copy the lists (Mesa's common code) allocate memory for non-null ones.
     let mut info = vk::DependencyInfo::default();
     if !memory.is_empty() {
         info = info.memory_barriers(memory);
@@ -100,16 +100,16 @@ fn record_barriers(
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }
 
-/// Which side of a change of owner.
+/// Side of a queue family ownership transfer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// The queue gives away, behind everything it has got.
+    /// The queue releases ownership, after all of its earlier work.
     Release,
-    /// The queue takes, in front of everything it gets.
+    /// The queue acquires ownership, before all of its later work.
     Acquire,
 }
 
-/// Records one side of changes of owner; the layouts stay, and a semaphore stands between both sides.
+/// Records one side of queue family ownership transfers. Layouts do not change; a semaphore orders the two sides.
 pub(crate) fn emit_ownership_transfers(
     gpu: &Gpu,
     commands: vk::CommandBuffer,
@@ -179,7 +179,7 @@ fn image_barrier(
     Some(barrier)
 }
 
-/// Stages by their Vulkan names, in the order of their bits.
+/// Vulkan stage flags, in the order of the bits of `Stages`.
 const STAGES: [u64; Stages::COUNT] = {
     use vk::PipelineStageFlags2 as Raw;
     [
@@ -198,7 +198,7 @@ const STAGES: [u64; Stages::COUNT] = {
     ]
 };
 
-/// Accesses by their Vulkan names, in the order of their bits.
+/// Vulkan access flags, in the order of the bits of `Access`.
 const ACCESSES: [u64; 17] = {
     use vk::AccessFlags2 as Raw;
     [
@@ -222,10 +222,10 @@ const ACCESSES: [u64; 17] = {
     ]
 };
 
-/// Bits that are translated at once.
+/// Number of bits that one table look-up translates.
 const AT_ONCE: usize = 6;
 
-/// What each set of so many neighbouring bits is called in Vulkan.
+/// Vulkan flags of each combination of `AT_ONCE` neighbouring bits.
 type Names<const N: usize> = [[u64; 1 << AT_ONCE]; N];
 
 static STAGE_NAMES: Names<2> = flag_table(&STAGES);
@@ -256,13 +256,13 @@ fn combine_flags<const N: usize>(names: &Names<N>, bits: u32) -> u64 {
     all
 }
 
-/// Stages by their Vulkan names, without those whose feature is off.
+/// Returns the Vulkan flags of stages, without stages whose feature is disabled.
 #[inline]
 pub(super) fn vulkan_stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
     stage_names(stages - disabled_stages(gpu))
 }
 
-/// One side of a barrier by its Vulkan names, without what features that are off would do.
+/// Returns the Vulkan flags of one side of a barrier, without stages and accesses of disabled features.
 #[inline]
 fn vulkan_scope(gpu: &Gpu, stages: Stages, access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
     let mut off = Access::empty();
@@ -271,7 +271,7 @@ fn vulkan_scope(gpu: &Gpu, stages: Stages, access: Access) -> (vk::PipelineStage
     (stage_names(stages), vk::AccessFlags2::from_raw(combine_flags(&ACCESS_NAMES, access.bits())))
 }
 
-/// Stages whose feature is off.
+/// Returns the stages whose feature is disabled.
 #[inline]
 fn disabled_stages(gpu: &Gpu) -> Stages {
     let mut off = Stages::empty();
@@ -280,7 +280,7 @@ fn disabled_stages(gpu: &Gpu) -> Stages {
     off
 }
 
-/// Without the stages that are `off`, and without accesses that only these perform: builds copy too.
+/// Removes the stages `off`, and accesses that only these stages perform. (Builds copy as well.)
 #[inline]
 fn without_stages(stages: Stages, access: Access, off: Stages) -> (Stages, Access) {
     let left = stages - off;
@@ -291,7 +291,7 @@ fn stage_names(stages: Stages) -> vk::PipelineStageFlags2 {
     vk::PipelineStageFlags2::from_raw(combine_flags(&STAGE_NAMES, stages.bits().into()))
 }
 
-/// The layout of this name in Vulkan, where it can be that of an image of somebody else's.
+/// Returns the layout for a Vulkan layout. Fails for layouts that an imported image cannot have.
 pub(crate) fn layout_from_vulkan(raw: vk::ImageLayout) -> Result<Layout, String> {
     use Layout::{ColorTarget, DepthTarget, General, ShaderRead, TransferDst, TransferSrc, Undefined};
     let all = [Undefined, General, ShaderRead, ColorTarget, DepthTarget, TransferSrc, TransferDst];
@@ -301,7 +301,7 @@ pub(crate) fn layout_from_vulkan(raw: vk::ImageLayout) -> Result<Layout, String>
     })
 }
 
-/// A layout by its Vulkan name.
+/// Returns the Vulkan form of a layout.
 pub(crate) fn vulkan_layout(layout: Layout) -> vk::ImageLayout {
     match layout {
         Layout::Undefined => vk::ImageLayout::UNDEFINED,
@@ -375,7 +375,7 @@ mod tests {
         )
     }
 
-    /// As [`memory_barrier`], where the device has everything.
+    /// Translates like [`memory_barrier`], for a device with all features.
     fn all_named(barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
         let stages = |stages: Stages| {
             vk::PipelineStageFlags2::from_raw(combine_flags(&STAGE_NAMES, stages.bits().into()))
@@ -394,7 +394,7 @@ mod tests {
     }
 
     proptest! {
-        /// Also for one that differs from the last in a single mask.
+        /// Includes barriers that differ from the last one in a single mask.
         #[test]
         fn a_barrier_has_its_own_names_whatever_came_before(
             barriers in prop::collection::vec(some_barrier(), 0..40)

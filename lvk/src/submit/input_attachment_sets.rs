@@ -1,24 +1,24 @@
-//! Descriptor sets of the passes of one command buffer that read their own targets.
+//! Descriptor sets of input attachments, for passes of one command buffer that read their own targets.
 
 use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
-/// Sets that live as long as the command buffer they stand in, and are written anew when it is recorded again.
+/// Descriptor sets that live as long as the command buffer. They are written again when it is recorded again.
 #[derive(Debug, Default)]
 pub(crate) struct InputSets {
     pools: Vec<vk::DescriptorPool>,
     sets: Vec<vk::DescriptorSet>,
-    /// How many of them the command buffer has taken.
+    /// Number of sets that the command buffer has taken.
     taken: usize,
 }
 
 impl InputSets {
-    /// Sets that are made at once.
+    /// Number of sets that are allocated at once.
     const BATCH: usize = 8;
 
-    /// A set of `count` input attachments that nobody uses.
+    /// Returns an unused set of `count` input attachments.
     pub(crate) fn acquire(
         &mut self,
         gpu: &Gpu,
@@ -32,7 +32,7 @@ impl InputSets {
         Ok(self.sets[self.taken - 1])
     }
 
-    /// The GPU is done with all of them.
+    /// Makes all sets available again. The GPU is done with them.
     pub(crate) fn reset(&mut self) {
         self.taken = 0;
     }
@@ -49,17 +49,17 @@ impl InputSets {
         gpu.name(pool, "input attachments of a command buffer");
         let layouts = [layout; Self::BATCH];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-        // SAFETY: the pool is new and has room for these sets.
+        // SAFETY: the pool is new and has capacity for these sets.
         let sets = unsafe { gpu.device.allocate_descriptor_sets(&info) }
             .map_err(Error::vulkan("vkAllocateDescriptorSets"))?;
         self.sets.extend(sets);
         Ok(())
     }
 
-    /// Destroys all of them. The GPU is done with them.
+    /// Destroys all pools. The GPU is done with their sets.
     pub(crate) fn destroy(self, gpu: &Gpu) {
         for pool in self.pools {
-            // SAFETY: the sets of the pool are in no command buffer that runs.
+            // SAFETY: no running command buffer uses the sets of the pool.
             unsafe { gpu.device.destroy_descriptor_pool(pool, None) };
         }
     }

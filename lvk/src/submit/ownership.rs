@@ -1,70 +1,72 @@
-//! Which queue has what: who wrote last, who has read since, and which waits between queues follow. Decisions only.
+//! Ownership of resources by queues: the last writer, the readers since, and the resulting waits between queues. It
+//! decides only, and records no commands.
 //!
-//! A queue runs command buffers in one order and signals a rising value after each. Its waits hold up everything behind them,
-//! at every stage, so that what a queue has waited for once is there for all it gets later; what the queue waited for had
-//! waited for others in turn. A [`TimelineVector`] says so in a number for each queue.
+//! A queue runs command buffers in order and signals a rising timeline value after each. A wait blocks all later work
+//! of the queue, at every stage. Anything that a queue has waited for once is therefore visible to all of its later
+//! work, together with everything that the signalling queue had waited for before. A [`TimelineVector`] expresses this
+//! as one timeline value for each queue.
 
 use std::collections::VecDeque;
 
 use crate::barrier::{IdMap, ResourceId};
 
-/// Most queues there are.
+/// Maximum number of queues.
 pub(crate) const QUEUE_COUNT: usize = 3;
 
-/// Something for each queue.
+/// A value for each queue.
 pub(crate) type PerQueue<T> = [T; QUEUE_COUNT];
 
-/// A value of each queue: everything up to it is meant; 0 for nothing.
+/// A timeline value for each queue. It stands for all work up to that value; 0 stands for none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct TimelineVector(PerQueue<u64>);
 
-/// What a command buffer does to a resource, as other queues see it.
+/// Access of a command buffer to a resource, as other queues see it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum QueueAccess {
-    /// It may run beside other reads.
+    /// May run concurrently with other reads.
     Read,
-    /// Contents, layout or owner change.
+    /// Changes contents, layout or owner.
     Write,
 }
 
-/// Who has a resource.
+/// The owner and the accesses of a resource.
 #[derive(Debug, Clone, Copy, Default)]
 struct ResourceOwner {
-    /// Who wrote it last.
+    /// Index of the queue that wrote last.
     queue_index: usize,
-    /// When: the value after which the write is done.
+    /// Timeline value at which the last write is done.
     written: u64,
-    /// The last reads since then; 0 for queues that have not read.
+    /// Timeline values of the last reads since then; 0 for queues that have not read.
     read: PerQueue<u64>,
 }
 
-/// Who has every resource, and what each queue has waited for.
+/// The owner of every resource, and the values that each queue has waited for.
 #[derive(Debug, Default)]
 pub(crate) struct Ownership {
     owners: IdMap<ResourceOwner>,
-    /// What everything that a queue gets from now on stands behind.
+    /// For each queue, the values that precede all of its later work.
     waited_for: PerQueue<TimelineVector>,
-    /// The same for each value that is not known to be reached yet, in rising order.
+    /// For each queue, the same at each submitted value that is not known to be reached, in rising order.
     submitted: PerQueue<VecDeque<(u64, TimelineVector)>>,
 }
 
 impl TimelineVector {
-    /// Has `queue_index` at `value` at least.
+    /// Raises the value of `queue_index` to at least `value`.
     pub(crate) fn max_with_value(&mut self, queue_index: usize, value: u64) {
         self.0[queue_index] = self.0[queue_index].max(value);
     }
 
-    /// What either has.
+    /// Raises each value to at least that of `other`.
     pub(crate) fn max_with(&mut self, other: Self) {
         other.values().for_each(|(queue_index, value)| self.max_with_value(queue_index, value));
     }
 
-    /// The value of a queue.
+    /// Returns the value of a queue.
     pub(crate) fn at(&self, queue_index: usize) -> u64 {
         self.0[queue_index]
     }
 
-    /// Queues with a value, and the value.
+    /// Returns the queues with a value above 0, and their values.
     pub(crate) fn values(&self) -> impl Iterator<Item = (usize, u64)> + use<> {
         self.0.into_iter().enumerate().filter(|(_, value)| *value > 0)
     }
@@ -75,23 +77,23 @@ impl TimelineVector {
 }
 
 impl Ownership {
-    /// Whose state of a resource holds; none where nobody has used it.
+    /// Returns the queue whose state of the resource is valid, or `None` if no queue has used the resource.
     pub(crate) fn owner(&self, id: ResourceId) -> Option<usize> {
         self.owners.get(&id).map(|owner| owner.queue_index)
     }
 
-    /// A queue had the resource to itself up to this value.
+    /// Makes a queue the only user of the resource up to this value.
     pub(crate) fn claim(&mut self, id: ResourceId, queue_index: usize, value: u64) {
         self.owners.insert(id, ResourceOwner { queue_index, written: value, read: [0; QUEUE_COUNT] });
     }
 
-    /// The resource is gone.
+    /// Forgets a destroyed resource.
     pub(crate) fn forget(&mut self, id: ResourceId) {
         self.owners.remove(&id);
     }
 
-    /// What `queue_index` gets next, done at `value`, uses a resource. Adds to `waits` what that has to wait for, and answers the queue
-    /// that it takes the resource over from, if the queue itself does not know it.
+    /// Records that the next work of `queue_index`, done at `value`, uses a resource. Adds the required waits to
+    /// `waits`. Returns the previous owner if this queue has not synchronised with it before.
     pub(crate) fn record_access(
         &mut self,
         (queue_index, value): (usize, u64),
@@ -116,8 +118,8 @@ impl Ownership {
         (!is_known).then_some(from)
     }
 
-    /// A queue gets something, done at `value`, that has to wait for `needed`. Answers the waits that do it: none for what the
-    /// queue stands behind anyway, and none that another of them has made.
+    /// Records work of a queue, done at `value`, that must wait for `needed`. Returns the waits that are sufficient.
+    /// They omit what the queue has waited for already, and what another of these waits implies.
     pub(crate) fn record_submission(
         &mut self,
         queue_index: usize,
@@ -142,7 +144,7 @@ impl Ownership {
         needed
     }
 
-    /// The queues are there: what was sent up to then is done, and waits for it cost nothing.
+    /// Records the completed values of the queues. Waits for completed values cost nothing.
     pub(crate) fn mark_completed(&mut self, values: &PerQueue<u64>) {
         for (submitted, value) in self.submitted.iter_mut().zip(values) {
             let done = submitted.partition_point(|(submitted, _)| submitted <= value);
@@ -150,7 +152,7 @@ impl Ownership {
         }
     }
 
-    /// The first value behind this one that the queue was sent.
+    /// Returns the first value after `value` that was submitted to the queue.
     pub(crate) fn first_value_after(&self, queue_index: usize, value: u64) -> Option<u64> {
         let submitted = &self.submitted[queue_index];
         submitted
@@ -158,7 +160,7 @@ impl Ownership {
             .map(|(submitted, _)| *submitted)
     }
 
-    /// What a queue has done and waited for at a value, as far as that is still known.
+    /// Returns the values that a queue has reached or waited for at `value`, if they are still recorded.
     fn waited_for_at(&self, queue_index: usize, value: u64) -> TimelineVector {
         let submitted = &self.submitted[queue_index];
         let place = submitted.partition_point(|(submitted, _)| *submitted < value);

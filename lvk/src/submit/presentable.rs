@@ -1,4 +1,5 @@
-//! Which images of swapchains the presentation engine has, and which submission waits until it has let go of one.
+//! State of swapchain images: the presentation engine or the application owns an image, and the first submission waits
+//! for its acquisition.
 
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use ash::vk;
 use crate::barrier::{IdMap, QueueState, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
 
-/// Every image of a swapchain, until its texture is gone.
+/// Every image of a swapchain, until its texture is destroyed.
 #[derive(Debug, Default)]
 pub(crate) struct Presentables(IdMap<Presentable>);
 
@@ -17,19 +18,19 @@ struct Presentable {
     held: PresentableOwner,
 }
 
-/// Who has an image.
+/// Owner of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PresentableOwner {
     /// The presentation engine.
     Engine,
-    /// The application. The semaphore is signalled when the engine has really let go; the first submission that uses the
-    /// image waits for it, and takes it out.
+    /// The application. The presentation engine signals the semaphore when it has released the image. The first
+    /// submission that uses the image takes the semaphore and waits for it.
     Application(Option<vk::Semaphore>),
-    /// Nobody any more: the swapchain was made anew.
+    /// No owner: the swapchain was recreated.
     Retired,
 }
 
-/// The first submission that uses an acquired image waits at these stages.
+/// Wait of the first submission that uses an acquired image, at these stages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct AcquireWait {
     pub(crate) semaphore: vk::Semaphore,
@@ -37,22 +38,22 @@ pub(crate) struct AcquireWait {
 }
 
 impl Presentables {
-    /// A new image, which the engine has.
+    /// Adds a new image, owned by the presentation engine.
     pub(crate) fn insert(&mut self, id: ResourceId, name: &Arc<str>) {
         self.0.insert(id, Presentable { name: Arc::clone(name), held: PresentableOwner::Engine });
     }
 
-    /// The engine gives an image away and signals `semaphore` once it is done with it.
+    /// Makes the application the owner. The presentation engine signals `semaphore` once it has released the image.
     pub(crate) fn acquire(&mut self, id: ResourceId, semaphore: vk::Semaphore) {
         self.set_owner(id, PresentableOwner::Application(Some(semaphore)));
     }
 
-    /// The image went back to the engine.
+    /// Makes the presentation engine the owner.
     pub(crate) fn present(&mut self, id: ResourceId) {
         self.set_owner(id, PresentableOwner::Engine);
     }
 
-    /// Nothing may use the image any more. Answers the semaphore that nobody has waited for.
+    /// Forbids all later use of the image. Returns the acquire semaphore if no submission has waited for it.
     pub(crate) fn retire(&mut self, id: ResourceId) -> Option<vk::Semaphore> {
         match self.set_owner(id, PresentableOwner::Retired) {
             Some(PresentableOwner::Application(unwaited)) => unwaited,
@@ -60,12 +61,12 @@ impl Presentables {
         }
     }
 
-    /// The image is destroyed.
+    /// Forgets a destroyed image.
     pub(crate) fn forget(&mut self, id: ResourceId) {
         self.0.remove(&id);
     }
 
-    /// Fails where a command buffer uses an image that the application does not have.
+    /// Fails if a command buffer uses an image that the application has not acquired.
     pub(crate) fn check_acquired(&self, tracker: &Tracker) -> Result<()> {
         for (id, image) in &self.0 {
             if tracker.first_stages(*id).is_none() {
@@ -85,7 +86,7 @@ impl Presentables {
         Ok(())
     }
 
-    /// Takes out the waits for images that `tracker` is the first to use. Their contents are undefined from then on.
+    /// Takes the waits for images that `tracker` is the first to use. Their contents become undefined.
     pub(crate) fn take_waits(&mut self, tracker: &Tracker, states: &mut QueueState) -> Vec<AcquireWait> {
         let mut waits = Vec::new();
         for (id, image) in &mut self.0 {

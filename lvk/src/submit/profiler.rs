@@ -1,4 +1,4 @@
-//! Stamps the scopes of command buffers while they are recorded, and reads them once the GPU is done.
+//! GPU profiler: records timestamps of the scopes of command buffers, and reads them once the GPU is done.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -14,26 +14,26 @@ use crate::queue::Queue;
 use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryPoolDesc;
 
-/// The stamps of one command buffer.
+/// Timestamps of one command buffer.
 #[derive(Default)]
 pub(crate) struct Scopes {
-    /// All are done with but the last.
+    /// Query pools. All but the last are full.
     pools: Vec<QueryPool>,
     stamps: Stamps,
-    /// Where each stamp is, counted through all pools.
+    /// Query of each timestamp, counted through all pools.
     query_indices: Vec<usize>,
-    /// The first place that is free.
+    /// The first free query.
     next: usize,
-    /// There was no pool for a stamp: nothing of the command buffer counts.
+    /// True if a query pool could not be created. The command buffer is not measured then.
     broken: bool,
 }
 
-/// Measures command buffers while it is on.
+/// Measures command buffers while it is enabled.
 pub(crate) struct Profiler {
     on: AtomicBool,
-    /// Something is measured, or is to be finished.
+    /// True if a command buffer is measured, or a profile is unfinished.
     busy: AtomicBool,
-    /// How many frames have begun.
+    /// Number of frames begun.
     frames: AtomicU64,
     inner: Mutex<ProfilerState>,
     gpu: Arc<Gpu>,
@@ -43,19 +43,19 @@ pub(crate) struct Profiler {
 struct ProfilerState {
     spare: Vec<QueryPool>,
     in_flight: VecDeque<MeasuredSubmission>,
-    /// The profile that is being put together: which, its first tick, and what is known.
+    /// The unfinished profile: its frame or submission, its first tick, and the result so far.
     open: Option<(ProfilePart, u64, GpuProfile)>,
     last: Option<Arc<GpuProfile>>,
 }
 
-/// Command buffers of one submission.
+/// Measured command buffers of one submission.
 struct MeasuredSubmission {
     value: u64,
     part: ProfilePart,
     scopes: Vec<Scopes>,
 }
 
-/// What a submission belongs to.
+/// The frame or submission that a profile covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ProfilePart {
     Frame(u64),
@@ -75,7 +75,7 @@ impl Profiler {
         }
     }
 
-    /// Measures command buffers begun from now on, or not.
+    /// Enables or disables measurement for command buffers that begin from now on.
     pub(crate) fn set_enabled(&self, on: bool) -> Result<()> {
         if on && self.gpu.caps.limits.timestamp_bits == 0 {
             return Err(self.gpu.unsupported("timestamps on the queue"));
@@ -84,12 +84,12 @@ impl Profiler {
         Ok(())
     }
 
-    /// The frame with this number begins.
+    /// Begins the frame with this number.
     pub(crate) fn begin_frame(&self, number: u64) {
         self.frames.fetch_max(number + 1, Ordering::AcqRel);
     }
 
-    /// Begins to measure a command buffer, if that is wanted.
+    /// Begins to measure a command buffer, if the profiler is enabled.
     pub(crate) fn begin_command_buffer(
         &self,
         commands: vk::CommandBuffer,
@@ -103,8 +103,8 @@ impl Profiler {
         Some(scopes)
     }
 
-    /// Stamps the begin of a scope with this name, or the end of the innermost; a stamp in a pass that draws several
-    /// `views` at once takes as many queries, of which the first counts.
+    /// Writes a timestamp for the begin of the named scope, or for the end of the innermost scope. In a pass with
+    /// several `views`, a timestamp takes that number of queries, and the first of them is used.
     pub(crate) fn stamp(
         &self,
         scopes: &mut Scopes,
@@ -135,7 +135,7 @@ impl Profiler {
         scopes.query_indices.push(place);
     }
 
-    /// A pool of stamps that are ready.
+    /// Returns a query pool for timestamps whose queries are reset.
     fn pool(&self) -> Result<QueryPool> {
         let spare = self.lock().spare.pop();
         let Some(pool) = spare else {
@@ -151,12 +151,12 @@ impl Profiler {
         Ok(pool)
     }
 
-    /// Takes back what a command buffer stamped that was given up.
+    /// Takes back the query pools of a discarded command buffer.
     pub(crate) fn discard(&self, scopes: Scopes) {
         self.lock().spare.extend(scopes.pools);
     }
 
-    /// Command buffers went to the GPU with this timeline value.
+    /// Records the submission of measured command buffers with this timeline value.
     pub(crate) fn submit(&self, value: u64, scopes: Vec<Scopes>) {
         if scopes.is_empty() {
             return;
@@ -166,13 +166,13 @@ impl Profiler {
             begun => ProfilePart::Frame(begun - 1),
         };
         let mut inner = self.lock();
-        // Threads may get here in another order than to the queue.
+        // Threads may arrive here in another order than at the queue.
         let place = inner.in_flight.partition_point(|other| other.value < value);
         inner.in_flight.insert(place, MeasuredSubmission { value, part, scopes });
         self.busy.store(true, Ordering::Release);
     }
 
-    /// Reads what the GPU is done with, up to this value of the timeline.
+    /// Reads the timestamps of submissions up to this timeline value.
     pub(crate) fn collect(&self, completed: u64) -> Result<()> {
         if !self.busy.load(Ordering::Acquire) {
             return Ok(());
@@ -189,7 +189,7 @@ impl Profiler {
         Ok(())
     }
 
-    /// The profile finished last.
+    /// Returns the profile finished last.
     pub(crate) fn last(&self) -> Option<Arc<GpuProfile>> {
         self.lock().last.clone()
     }
@@ -225,7 +225,7 @@ impl ProfilerState {
         let frame = if let ProfilePart::Frame(number) = part { Some(number) } else { None };
         let fresh = || (part, begin, GpuProfile { frame, ..Default::default() });
         let (_, first, profile) = self.open.get_or_insert_with(fresh);
-        // What another queue has begun before all that is known.
+        // Another queue began earlier than all command buffers added so far.
         if let Some(earlier) = gpu.ticks_until(begin, *first) {
             profile.delay(gpu.milliseconds(earlier));
             *first = begin;
@@ -238,7 +238,7 @@ impl ProfilerState {
         }
     }
 
-    /// Closes the profile if nothing can come to it any more, where so many frames have begun.
+    /// Finishes the profile if no more submissions can belong to it, when `begun` frames have begun.
     fn close_finished(&mut self, begun: u64) {
         let Some((part, ..)) = self.open else { return };
         let expected = match part {
@@ -260,7 +260,7 @@ impl ProfilerState {
 }
 
 impl Scopes {
-    /// The time of each stamp; `None` where one is missing.
+    /// Returns the time of each timestamp; `None` if one is not available.
     fn ticks(&self) -> Result<Option<Vec<u64>>> {
         let mut ticks = vec![None; self.next];
         for (pool, part) in self.pools.iter().zip(ticks.chunks_mut(Profiler::STAMPS)) {
@@ -269,7 +269,7 @@ impl Scopes {
         Ok(if self.broken { None } else { self.query_indices.iter().map(|place| ticks[*place]).collect() })
     }
 
-    /// The first of `count` places of one pool.
+    /// Reserves `count` queries of one pool. Returns the first.
     fn reserve_queries(&mut self, count: usize) -> usize {
         let left = Profiler::STAMPS - self.next % Profiler::STAMPS;
         let place = if count <= left { self.next } else { self.next + left };
@@ -285,7 +285,8 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Pools are taken one after the other: each stamp lies within one, behind those before.
+        /// Pools are filled one after the other. The queries of each timestamp lie within one pool, after those of
+        /// earlier ones.
         #[test]
         fn stamps_lie_apart_and_each_in_one_pool(counts in prop::collection::vec(1..33_usize, 0..40)) {
             let (mut scopes, mut end) = (Scopes::default(), 0);

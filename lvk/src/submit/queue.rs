@@ -19,26 +19,26 @@ use crate::gpu::Gpu;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
 
-/// What goes to a queue at once.
+/// The contents of one submission.
 #[derive(Default)]
 pub(crate) struct Submission {
-    /// What everything submitted later relies on.
+    /// Commands that all later submissions rely on.
     pub(crate) prelude: Option<Box<Recording>>,
-    /// Runs behind the prelude, on the same queue if there is one.
+    /// Commands that run after the prelude, on the same queue if there is a prelude.
     pub(crate) main: Option<Box<Recording>>,
-    /// What the first of both waits for, besides images that the presentation engine still has.
+    /// Waits of the first command buffer, besides those for images that the presentation engine still owns.
     pub(crate) waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    /// What is signalled when both are done, besides the timeline.
+    /// Semaphores to signal when both command buffers are done, besides the timeline.
     pub(crate) signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    /// The image of a swapchain that goes to the presentation engine with it: nothing submitted later may use it.
+    /// The swapchain image that is presented after this submission. No later submission may use it.
     pub(crate) presented: Option<ResourceId>,
-    /// Frames do not wait for it.
+    /// True if frames do not wait for the submission.
     pub(crate) in_background: bool,
-    /// It takes from others what it uses, or gives it to them.
+    /// True if the submission exchanges resources with external code, in either direction.
     pub(crate) exchanges: bool,
 }
 
-/// Values of the timeline at which the parts of a submission are done; 0 for what no queue got.
+/// Timeline values at which the parts of a submission are done; 0 for a part that was not submitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct SubmitValues {
     pub(crate) prelude: u64,
@@ -46,15 +46,15 @@ pub(crate) struct SubmitValues {
 }
 
 impl SubmitValues {
-    /// The value at which everything is done.
+    /// Returns the value at which all parts are done.
     pub(crate) fn last(self) -> u64 {
         self.prelude.max(self.main)
     }
 }
 
-/// The queues with everything that changes when something is submitted. `T` is what is destroyed later.
+/// The queues, with all state that changes at a submission. `T` is the type of items that are destroyed later.
 pub(crate) struct Submitter<T> {
-    /// One for each queue: one or all.
+    /// One timeline for each hardware queue: a single one, or one for every queue of the library.
     timelines: Vec<Timeline>,
     inner: Mutex<SubmitterState<T>>,
     gpu: Arc<Gpu>,
@@ -62,26 +62,27 @@ pub(crate) struct Submitter<T> {
 
 struct SubmitterState<T> {
     queue_sync: QueueSync,
-    /// What goes to a queue next; empty between submissions.
+    /// Contents of the next submission. Empty between submissions.
     batches: Batches,
     presentables: Presentables,
-    /// What only the graphics queue may use, with names for messages.
+    /// Resources that only the graphics queue may use, with names for error messages.
     graphics_only: IdMap<Box<str>>,
     ring: CommandRing,
     deferred: DeferredFree<T>,
     /// The last value of each queue that frames wait for.
     foreground: PerQueue<u64>,
-    /// Why a submission failed: what the states say has not happened on the GPU, so nothing more is submitted.
+    /// Error of a failed submission. The tracked states no longer match the GPU, so later submissions return this
+    /// error.
     broken: Option<Error>,
 }
 
-/// What the GPU has finished with.
+/// Work and objects that the GPU is done with.
 pub(crate) struct Finished<T> {
     /// Sequence numbers of command buffers that have staging memory.
     pub(crate) staged: Vec<u64>,
-    /// Things to destroy now.
+    /// Items to destroy now.
     pub(crate) garbage: Vec<T>,
-    /// Everything up to this value is done, on all queues.
+    /// All work up to this value is done, on all queues.
     pub(crate) passed: u64,
 }
 
@@ -118,7 +119,7 @@ impl<T> Submitter<T> {
         self.begin(ticket)
     }
 
-    /// As [`acquire`](Self::acquire), and takes out what the GPU has finished with.
+    /// Starts recording like [`acquire`](Self::acquire), and collects finished work.
     pub(crate) fn collect_and_acquire(&self, queue: Queue) -> Result<(Finished<T>, Result<Box<Recording>>)> {
         #[cfg(any(test, feature = "test-hooks"))]
         crate::test_support::submit_hook::run_submit_hook();
@@ -130,7 +131,7 @@ impl<T> Submitter<T> {
         Ok((finished, self.begin(ticket)))
     }
 
-    /// Begins the command buffer that somebody will acquire next, while the GPU is at work.
+    /// Begins the command buffer for the next acquisition, while the GPU is at work.
     pub(crate) fn begin_ahead(&self, queue_index: usize) {
         let mut inner = self.lock();
         if inner.ring.has_begun(queue_index) {
@@ -138,7 +139,7 @@ impl<T> Submitter<T> {
         }
         let free = inner.ring.take_free(queue_index);
         drop(inner);
-        // Where that fails, whoever acquires one begins another.
+        // On failure, the next acquisition begins a command buffer itself.
         if let Ok(begun) = command_pool::begin_recording(&self.gpu, queue_index, free) {
             self.lock().ring.store_begun(begun);
         }
@@ -149,17 +150,17 @@ impl<T> Submitter<T> {
         ticket.begin(&self.gpu).inspect_err(|_| self.lock().ring.end_recording(sequence))
     }
 
-    /// Gives a command buffer up.
+    /// Discards a command buffer.
     pub(crate) fn discard(&self, recording: Box<Recording>) {
         self.lock().ring.discard(recording);
     }
 
-    /// Only the graphics queue may use a resource from now on.
+    /// Restricts a resource to the graphics queue from now on.
     pub(crate) fn restrict_to_graphics(&self, id: ResourceId, name: &str) {
         self.lock().graphics_only.insert(id, name.into());
     }
 
-    /// Fails where a command buffer, for another queue, uses what only the graphics queue may.
+    /// Fails if a command buffer for another queue uses a resource that is restricted to the graphics queue.
     pub(crate) fn check_queue(&self, tracker: &Tracker) -> Result<()> {
         let inner = self.lock();
         match inner.graphics_only.iter().find(|(id, _)| tracker.uses_resource(**id)) {
@@ -172,15 +173,15 @@ impl<T> Submitter<T> {
         }
     }
 
-    /// Fails where a command buffer uses an image of a swapchain that the application does not have. That is to be known
-    /// before anything is submitted, as a failed submission breaks the queue. The caller keeps other submissions off until
-    /// its own is made.
+    /// Fails if a command buffer uses a swapchain image that the application has not acquired. This must be checked
+    /// before the submission, because a failed submission makes the queue unusable. The caller prevents other
+    /// submissions until its own is complete.
     pub(crate) fn check_presentables(&self, tracker: &Tracker) -> Result<()> {
         self.lock().presentables.check_acquired(tracker)
     }
 
-    /// Submits command buffers in order. `prepare` runs under the lock, right before. Where that fails halfway, queues may have
-    /// got the first of them, as the values tell.
+    /// Submits command buffers in order. `prepare` runs under the lock, right before the submission. On failure, the
+    /// returned values tell which command buffers were submitted.
     pub(crate) fn submit(
         &self,
         mut submission: Submission,
@@ -202,7 +203,7 @@ impl<T> Submitter<T> {
         (values, sent.map(drop))
     }
 
-    /// Answers the value of the last.
+    /// Submits all command buffers. Returns the value of the last.
     fn submit_all(
         &self,
         inner: &mut SubmitterState<T>,
@@ -222,7 +223,7 @@ impl<T> Submitter<T> {
         Ok(value)
     }
 
-    /// Puts the barriers from the queue's state in front of each command buffer.
+    /// Adds each command buffer to the batches, after the barriers from the queue's state.
     fn fill_batches(&self, inner: &mut SubmitterState<T>, submission: &mut Submission) -> Result<()> {
         inner.batches.wait(submission.waits.drain(..));
         inner.batches.signal(submission.signals.drain(..));
@@ -242,7 +243,8 @@ impl<T> Submitter<T> {
         Ok(())
     }
 
-    /// Each command buffer with its own waits, and a value of its own that others may wait for. Answers the last.
+    /// Submits each command buffer with its own waits and timeline value, so that other queues may wait for it. Returns
+    /// the last value.
     fn submit_to_several(&self, inner: &mut SubmitterState<T>, submission: &mut Submission) -> Result<u64> {
         let (has_prelude, exchanges) = (submission.prelude.is_some(), submission.exchanges);
         let mut waits = std::mem::take(&mut submission.waits);
@@ -280,7 +282,7 @@ impl<T> Submitter<T> {
         Ok(commands)
     }
 
-    /// Has a queue give images away.
+    /// Submits the release of images from a queue.
     fn submit_release(
         &self,
         inner: &mut SubmitterState<T>,
@@ -310,13 +312,13 @@ impl<T> Submitter<T> {
         self.submit_batches(inner, release.queue_index, release.value)
     }
 
-    /// Waits for an image that the presentation engine still has.
+    /// Returns the wait for an image that the presentation engine has not released yet.
     fn image_wait(&self, wait: &AcquireWait) -> vk::SemaphoreSubmitInfo<'static> {
         let stages = vulkan_stages(&self.gpu, wait.stages);
         vk::SemaphoreSubmitInfo::default().semaphore(wait.semaphore).stage_mask(stages)
     }
 
-    /// Waits for other queues, at every stage: everything the queue gets later stands behind them too.
+    /// Returns waits for other queues, at every stage: all later work of the queue relies on them.
     fn queue_waits(&self, vector: &TimelineVector) -> impl Iterator<Item = vk::SemaphoreSubmitInfo<'static>> {
         vector.values().map(|(queue_index, value)| {
             vk::SemaphoreSubmitInfo::default()
@@ -326,8 +328,7 @@ impl<T> Submitter<T> {
         })
     }
 
-    /// Hands the batches to a queue, which signals `value` behind them. A value that the queue did not take is not one of those
-    /// that come.
+    /// Submits the batches to a queue and signals `value` after them. The value counts as submitted only on success.
     fn submit_batches(&self, inner: &mut SubmitterState<T>, queue_index: usize, value: u64) -> Result<()> {
         let timeline =
             vk::SemaphoreSubmitInfo::default().semaphore(self.timelines[queue_index].raw).value(value);
@@ -339,33 +340,33 @@ impl<T> Submitter<T> {
         Ok(())
     }
 
-    /// The value of the last submission of all.
+    /// Returns the value of the last submission on any queue.
     pub(crate) fn last_submitted(&self) -> u64 {
         self.lock().queue_sync.last_values().iter().copied().max().unwrap_or_default()
     }
 
-    /// The values of the last submission of each queue.
+    /// Returns the value of the last submission of each queue.
     pub(crate) fn last_of_queues(&self) -> PerQueue<u64> {
         *self.lock().queue_sync.last_values()
     }
 
-    /// The same, of those that frames wait for.
+    /// Returns the value of the last submission of each queue that frames wait for.
     pub(crate) fn foreground_values(&self) -> PerQueue<u64> {
         self.lock().foreground
     }
 
-    /// How many values there were.
+    /// Returns the number of values used so far.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn value_count(&self) -> u64 {
         self.lock().queue_sync.value_count()
     }
 
-    /// The queue of a value.
+    /// Returns the queue that a value belongs to.
     pub(crate) fn queue_of(&self, value: u64) -> usize {
         QueueSync::queue_of(value, self.timelines.len() > 1)
     }
 
-    /// The timeline of a queue.
+    /// Returns the timeline of a queue.
     pub(crate) fn timeline(&self, queue_index: usize) -> &Timeline {
         &self.timelines[queue_index.min(self.timelines.len() - 1)]
     }
@@ -375,23 +376,23 @@ impl<T> Submitter<T> {
         self.timeline(self.queue_of(value)).wait(value)
     }
 
-    /// Blocks until all these are done.
+    /// Blocks until the submissions of all these values are done.
     pub(crate) fn wait_for_queues(&self, values: &PerQueue<u64>) -> Result<()> {
         self.timelines.iter().zip(values).try_for_each(|(timeline, value)| timeline.wait(*value))
     }
 
-    /// Whether the submission of this value is done.
+    /// Returns true if the submission of this value is done.
     pub(crate) fn is_done(&self, value: u64) -> Result<bool> {
         Ok(self.timeline(self.queue_of(value)).query_completed()? >= value)
     }
 
-    /// Up to which value everything is done.
+    /// Returns the value up to which all submissions are done.
     pub(crate) fn completed_up_to(&self) -> Result<u64> {
         let completed = self.completed_values()?;
         Ok(self.lock().queue_sync.completed_up_to(&completed))
     }
 
-    /// Asks how far the queues are.
+    /// Queries the completed values of the queues.
     fn completed_values(&self) -> Result<PerQueue<u64>> {
         let mut completed = [0; QUEUE_COUNT];
         for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
@@ -400,7 +401,7 @@ impl<T> Submitter<T> {
         Ok(completed)
     }
 
-    /// Destroys `item` once no command buffer can use it any more. Answers how many items wait.
+    /// Destroys `item` once no command buffer can use it any more. Returns the number of waiting items.
     pub(crate) fn retire(&self, item: T) -> usize {
         let mut inner = self.lock();
         let newest = inner.ring.newest_open();
@@ -408,24 +409,25 @@ impl<T> Submitter<T> {
         inner.deferred.len()
     }
 
-    /// Number of the command buffer that was last given out to record.
+    /// Returns the sequence number of the latest command buffer acquired.
     pub(crate) fn newest_sequence(&self) -> u64 {
         self.lock().ring.newest_sequence()
     }
 
-    /// How many items wait to be destroyed.
+    /// Returns the number of items that wait for destruction.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn deferred_count(&self) -> usize {
         self.lock().deferred.len()
     }
 
-    /// Takes out what the GPU has finished with.
+    /// Collects finished work.
     pub(crate) fn collect(&self) -> Result<Finished<T>> {
         let completed = self.completed_values()?;
         Ok(self.lock().take_finished(&completed))
     }
 
-    /// As [`collect`](Self::collect), as far as is known without asking the GPU: all that was waited for, at least.
+    /// Collects finished work like [`collect`](Self::collect), but only what is known without a query: at least all
+    /// values that were waited for.
     pub(crate) fn collect_known(&self) -> Finished<T> {
         let mut completed = [0; QUEUE_COUNT];
         for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
@@ -434,18 +436,18 @@ impl<T> Submitter<T> {
         self.lock().take_finished(&completed)
     }
 
-    /// Changes who has the images of swapchains.
+    /// Changes the owners of swapchain images.
     #[cfg(feature = "window")]
     pub(crate) fn with_presentables<R>(&self, change: impl FnOnce(&mut Presentables) -> R) -> R {
         change(&mut self.lock().presentables)
     }
 
-    /// An image of somebody else's is in this layout now.
+    /// Sets the layout of an imported image after external use.
     pub(crate) fn import_texture(&self, id: ResourceId, shape: TextureShape, layout: Layout) {
         self.lock().queue_sync.import_image(id, shape, layout);
     }
 
-    /// The host has written a new image, which is ready to be sampled.
+    /// Records that the host has written a new image, which is ready to be sampled.
     pub(crate) fn mark_host_written(&self, id: ResourceId, shape: TextureShape) {
         self.lock().queue_sync.mark_host_written(id, shape);
     }
@@ -460,7 +462,7 @@ impl<T> Submitter<T> {
         }
     }
 
-    /// Takes everything out that waits for destruction. The GPU is idle.
+    /// Takes all items that wait for destruction. The GPU is idle.
     pub(crate) fn drain(&self) -> Vec<T> {
         let mut inner = self.lock();
         inner.ring.destroy(&self.gpu);
@@ -479,7 +481,7 @@ impl Submission {
 }
 
 impl<T> SubmitterState<T> {
-    /// A command buffer of a queue is about to be recorded.
+    /// Takes a command buffer of a queue to record.
     fn take_ticket(&mut self, queue_index: usize) -> Ticket {
         if queue_index != 0 {
             self.queue_sync.begin_multi_queue();
@@ -487,7 +489,8 @@ impl<T> SubmitterState<T> {
         self.ring.take_ticket(queue_index)
     }
 
-    /// Keeps what a queue got until that is done with it, and takes back what none got. Answers the value.
+    /// Stores a submitted command buffer until its queue is done with it, or takes back one that was not submitted.
+    /// Returns its value.
     fn file_recording(&mut self, recording: Box<Recording>) -> u64 {
         let value = recording.value;
         match value {
@@ -507,7 +510,7 @@ impl<T> SubmitterState<T> {
         Finished { staged, garbage, passed }
     }
 
-    /// Images that the presentation engine still has and a command buffer is the first to use.
+    /// Returns the waits for images that the presentation engine still owns and the command buffer is the first to use.
     fn image_waits(&mut self, recording: &Recording) -> Vec<AcquireWait> {
         self.presentables.take_waits(&recording.tracker, self.queue_sync.graphics_state())
     }
@@ -525,7 +528,7 @@ impl<T> SubmitterState<T> {
         self.queue_sync.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
     }
 
-    /// All of a submission went to its queue.
+    /// Records that all of a submission was sent to its queue.
     fn record_submission(&mut self, submission: &Submission, last: u64) {
         submission.presented.into_iter().for_each(|id| self.presentables.present(id));
         if !submission.in_background {
@@ -535,7 +538,7 @@ impl<T> SubmitterState<T> {
     }
 }
 
-/// What the command buffers of a queue can do.
+/// Returns the stages that command buffers of a queue support.
 pub(crate) fn stages_of(queue: Queue) -> Stages {
     match queue {
         Queue::Graphics => Stages::all() - Stages::SHADING_RATE,

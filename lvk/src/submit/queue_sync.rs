@@ -1,52 +1,53 @@
-//! Command buffers on several queues: which barriers, waits and changes of owner stand in front of each. Decisions only.
+//! Synchronisation of command buffers on several queues: the barriers, waits and ownership transfers before each. It
+//! decides only, and records no commands.
 
 use super::ownership::{Ownership, PerQueue, QUEUE_COUNT, QueueAccess, TimelineVector};
 use crate::barrier::{
     Barriers, Layout, QueueState, ResourceId, Stages, Subresources, TextureShape, TrackedUse, Tracker,
 };
 
-/// What the device has for a queue.
+/// Properties of the device queue behind a queue of the library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct QueueCaps {
-    /// Queues of one domain own images together: a family of queues.
+    /// Index of the ownership domain (queue family). Queues of one domain own images together.
     pub(crate) domain: u32,
-    /// What its command buffers can do.
+    /// Stages that its command buffers support.
     pub(crate) stages: Stages,
 }
 
 /// The state of all resources on every queue.
 ///
-/// As long as only queue 0 is used nothing else is kept but its states.
+/// While only queue 0 is used, only its states are tracked.
 pub(crate) struct QueueSync {
     states: PerQueue<QueueState>,
     queue_caps: PerQueue<QueueCaps>,
     ownership: Ownership,
-    /// Whether another queue than the first was ever wanted.
+    /// True once another queue than the first was requested.
     multi_queue: bool,
-    /// Whether there is another one.
+    /// True if the device has several queues.
     has_several: bool,
     sent: u64,
     last: PerQueue<u64>,
-    /// The last of queue 0 before queues were kept apart.
+    /// The last value of queue 0 before queues were tracked separately.
     last_single_queue: u64,
-    /// The last of queue 0 that everybody relies on.
+    /// The value of the last prelude on queue 0, which all later work relies on.
     prelude: u64,
 }
 
-/// What a command buffer needs in front of it.
+/// The work that a command buffer needs before it.
 #[derive(Debug, Default)]
 pub(crate) struct SubmitPlan {
-    /// To be submitted before, each by itself.
+    /// Releases to submit before the command buffer, one submission each.
     pub(crate) releases: Vec<OwnershipRelease>,
-    /// What the queue signals behind the command buffer.
+    /// The value that the queue signals after the command buffer.
     pub(crate) value: u64,
     pub(crate) waits: TimelineVector,
-    /// What the queue takes from other domains, the other side of the departures.
+    /// Acquire sides of `releases`, on the queue of the command buffer.
     pub(crate) acquires: Vec<OwnershipTransfer>,
     pub(crate) barriers: Barriers,
 }
 
-/// A submission by which a queue gives images to another domain.
+/// A submission in which a queue releases images to another domain.
 #[derive(Debug)]
 pub(crate) struct OwnershipRelease {
     pub(crate) queue_index: usize,
@@ -55,7 +56,7 @@ pub(crate) struct OwnershipRelease {
     pub(crate) parts: Vec<OwnershipTransfer>,
 }
 
-/// A part of an image that changes its owner, and keeps its layout.
+/// A part of an image that changes its owner and keeps its layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct OwnershipTransfer {
     pub(crate) id: ResourceId,
@@ -65,17 +66,18 @@ pub(crate) struct OwnershipTransfer {
     pub(crate) to: usize,
 }
 
-/// A command buffer on its way to a queue.
+/// A command buffer to submit.
 pub(crate) struct SubmitRequest<'a> {
     pub(crate) queue_index: usize,
     pub(crate) tracker: &'a Tracker,
-    /// What it uses that needs no barriers within a queue.
+    /// Resources that need no barriers within a queue.
     pub(crate) references: &'a [(ResourceId, QueueAccess)],
-    /// What else it waits for.
+    /// Further waits.
     pub(crate) after: TimelineVector,
-    /// Whether all that is sent later, on queues that run shaders, relies on it.
+    /// True if all later submissions rely on it, on queues that support shaders.
     pub(crate) is_prelude: bool,
-    /// Whether it waits for others than the queues, or others wait for it: what it uses may have been written by them, or will be.
+    /// True if external semaphores are waited for or signalled. External code may then have written the used resources,
+    /// or may write them later.
     pub(crate) exchanges: bool,
 }
 
@@ -94,12 +96,12 @@ impl QueueSync {
         }
     }
 
-    /// Which queue a value is of.
+    /// Returns the queue that a value belongs to.
     pub(crate) fn queue_of(value: u64, has_several: bool) -> usize {
         if has_several { (value % QUEUE_COUNT as u64) as usize } else { 0 }
     }
 
-    /// Begins to keep the queues apart. What queue 0 has used so far is taken for used until now.
+    /// Begins to track the queues separately. Counts all earlier accesses of queue 0 as lasting until now.
     pub(crate) fn begin_multi_queue(&mut self) {
         if std::mem::replace(&mut self.multi_queue, true) {
             return;
@@ -110,34 +112,37 @@ impl QueueSync {
         self.prelude = self.last[0];
     }
 
-    /// Whether queues are kept apart.
+    /// Returns true if the queues are tracked separately.
     pub(crate) fn is_multi_queue(&self) -> bool {
         self.multi_queue
     }
 
-    /// The value for what `queue_index` gets next. Values rise over all queues, and each queue has its own.
+    /// Returns the value for the next work of `queue_index`. Values rise over all queues, and each belongs to one
+    /// queue.
     pub(crate) fn next_value(&mut self, queue_index: usize) -> u64 {
         self.sent += 1;
         if self.has_several { self.sent * QUEUE_COUNT as u64 + queue_index as u64 } else { self.sent }
     }
 
-    /// What signals this value went to the queue: from now on it may be waited for. A value whose submission failed never comes.
+    /// Records that the work which signals `value` was submitted, so that other work may wait for the value. A value
+    /// whose submission failed is never signalled.
     pub(crate) fn mark_submitted(&mut self, queue_index: usize, value: u64) {
         self.last[queue_index] = value;
     }
 
-    /// The last value of each queue that will come.
+    /// Returns the last value of each queue that will be signalled.
     pub(crate) fn last_values(&self) -> &PerQueue<u64> {
         &self.last
     }
 
-    /// How many values there were.
+    /// Returns the number of values used so far.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn value_count(&self) -> u64 {
         self.sent
     }
 
-    /// Up to which value everything is done, with the queues as far as `completed`: to right before the first that is not.
+    /// Returns the value up to which all work is done, when the queues have reached `completed`. It is one less than
+    /// the first unfinished value.
     pub(crate) fn completed_up_to(&self, completed: &PerQueue<u64>) -> u64 {
         let newest = self.last.iter().copied().max().unwrap_or_default();
         let busy = (0..QUEUE_COUNT).filter(|queue_index| completed[*queue_index] < self.last[*queue_index]);
@@ -146,24 +151,26 @@ impl QueueSync {
             .unwrap_or(newest)
     }
 
-    /// The first value of a busy queue behind one that it has reached; no value is noted as long as queues are not kept apart.
+    /// Returns the first value of a busy queue after one that it has reached. Values are not recorded one by one while
+    /// the queues are not tracked separately.
     fn first_value_after(&self, queue_index: usize, completed: u64) -> u64 {
         let noted = self.multi_queue && (queue_index != 0 || completed >= self.last_single_queue);
         let first = if noted { self.ownership.first_value_after(queue_index, completed) } else { None };
         first.unwrap_or(completed + 1)
     }
 
-    /// The states of queue 0, as long as it is the only one, or for what no other queue has.
+    /// Returns the states of queue 0. Valid while it is the only queue, or for resources that no other queue uses.
     pub(crate) fn graphics_state(&mut self) -> &mut QueueState {
         &mut self.states[0]
     }
 
-    /// Appends a command buffer to queue 0, as long as that is the only one.
+    /// Appends a command buffer to queue 0, while that is the only queue.
     pub(crate) fn submit_single_queue(&mut self, tracker: &Tracker) -> Barriers {
         self.states[0].submit(tracker)
     }
 
-    /// Appends a command buffer to a queue. `is_exclusive` tells which resources belong to one domain at a time.
+    /// Appends a command buffer to a queue. `is_exclusive` returns true for resources that belong to one domain at a
+    /// time.
     pub(crate) fn submit(
         &mut self,
         sent: &SubmitRequest<'_>,
@@ -194,8 +201,8 @@ impl QueueSync {
         SubmitPlan { releases, value, waits, acquires, barriers }
     }
 
-    /// The command buffer uses a resource: what it waits for, and what the queue knows of the resource from now on. What it
-    /// `writes` changes for others, whether its commands change it or not.
+    /// Records the use of a resource by the command buffer: the waits, and the new state of the resource on the queue.
+    /// With `writes`, counts the use as a write for other queues, whether its commands write or not.
     fn record_use(
         &mut self,
         at: (usize, u64),
@@ -217,7 +224,8 @@ impl QueueSync {
         }
     }
 
-    /// Has other domains give away what they have and `queue_index` is to use: one submission for each queue that has any.
+    /// Plans the release of resources that other domains own and `queue_index` uses: one submission for each releasing
+    /// queue.
     fn plan_ownership_transfers(
         &mut self,
         queue_index: usize,
@@ -235,7 +243,7 @@ impl QueueSync {
                 .layouts(used.id)
                 .map(|layouts| layouts.uniform_ranges())
                 .unwrap_or_default();
-            // What was never written has nothing to be moved.
+            // Parts that were never written need no transfer.
             let parts = parts.into_iter().filter(|(_, layout)| *layout != Layout::Undefined);
             transfer.extend(parts.map(|(part, layout)| OwnershipTransfer {
                 id: used.id,
@@ -254,7 +262,7 @@ impl QueueSync {
         (releases, transfer)
     }
 
-    /// The queue waits for those of its domain who read what leaves.
+    /// Plans the release by one queue. It waits for the readers of the parts in its own domain.
     fn plan_release(&mut self, queue_index: usize, parts: Vec<OwnershipTransfer>) -> OwnershipRelease {
         let value = self.next_value(queue_index);
         let mut waits = TimelineVector::default();
@@ -265,7 +273,7 @@ impl QueueSync {
         OwnershipRelease { queue_index, value, waits, parts }
     }
 
-    /// Queue 0 signals something that has no command buffer.
+    /// Returns the value of a signal on queue 0 that has no command buffer.
     pub(crate) fn next_signal_value(&mut self) -> u64 {
         let value = self.next_value(0);
         if self.multi_queue {
@@ -274,7 +282,7 @@ impl QueueSync {
         value
     }
 
-    /// An image of somebody else's is in this layout now, and belongs to queue 0.
+    /// Sets the layout of an imported image, and makes queue 0 its owner.
     pub(crate) fn import_image(&mut self, id: ResourceId, shape: TextureShape, layout: Layout) {
         self.states[0].mark_imported(id, shape, layout);
         if self.multi_queue {
@@ -282,7 +290,7 @@ impl QueueSync {
         }
     }
 
-    /// The host has written a new image, which is ready to be sampled, and belongs to queue 0.
+    /// Records that the host has written a new image, which is ready to be sampled. Makes queue 0 its owner.
     pub(crate) fn mark_host_written(&mut self, id: ResourceId, shape: TextureShape) {
         self.states[0].mark_host_written(id, shape);
         if self.multi_queue {
@@ -290,7 +298,7 @@ impl QueueSync {
         }
     }
 
-    /// The queues are there.
+    /// Records the completed values of the queues.
     pub(crate) fn mark_completed(&mut self, completed: &PerQueue<u64>) {
         if self.multi_queue {
             self.ownership.mark_completed(completed);

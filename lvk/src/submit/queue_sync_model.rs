@@ -1,7 +1,7 @@
-//! A naive model of several queues: who may do what when, by Vulkan's rules for semaphores, barriers and owners.
+//! A naive model of several queues, by Vulkan's rules for semaphores, barriers and queue family ownership.
 //!
-//! It follows every access and every layout transition through all that is submitted later, on every queue, and knows nothing
-//! of clocks, states and who had what.
+//! It follows every access and every layout transition through all later submissions, on every queue. It does not use
+//! timeline vectors, tracked states or owners.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::queue_sync::{OwnershipTransfer, QueueCaps};
 use crate::barrier::model::{Cell, Edge, ModelEvent, Wait, edges, may_follow};
 use crate::barrier::{Layout, Stages, Use};
 
-/// One submission with what stands in front of it.
+/// One submission with its waits, transfers and barriers.
 #[derive(Debug, Clone)]
 pub(super) struct SubmittedWork {
     pub(super) queue_index: usize,
@@ -21,30 +21,30 @@ pub(super) struct SubmittedWork {
     pub(super) events: Vec<ModelEvent>,
 }
 
-/// Everything that was submitted, in this order.
+/// All submissions in order.
 #[derive(Debug, Clone)]
 pub(super) struct History {
     pub(super) queue_caps: [QueueCaps; QUEUE_COUNT],
     pub(super) sent: Vec<SubmittedWork>,
 }
 
-/// What happens to one cell in a submission, after its waits.
+/// Effect of a submission on one cell, after its waits.
 enum QueueCellStep {
     Barrier(Vec<Edge>),
     Access { touch: Use, accumulated: bool },
 }
 
-/// How far something that happened has been waited for on each queue.
+/// Progress of the waits for one access or transition, on each queue.
 struct Reach {
     queue_index: usize,
-    /// The first value of each queue behind which it has happened.
+    /// The first value of each queue whose signal follows the access.
     signalled: [Option<u64>; QUEUE_COUNT],
-    /// How queues that have waited for it stand to it.
+    /// Synchronisation state of each queue that has waited for the access.
     waits: [Option<Wait>; QUEUE_COUNT],
 }
 
 impl History {
-    /// The first violation of any rule, in words.
+    /// Returns the first violation of any rule, as text.
     pub(super) fn violation(&self, cells: &[Cell], exclusive: &dyn Fn(Cell) -> bool) -> Option<String> {
         self.wrong_wait().or_else(|| {
             cells.iter().find_map(|cell| {
@@ -54,7 +54,7 @@ impl History {
         })
     }
 
-    /// Waits are for what was submitted before, on other queues: so no two queues wait for each other.
+    /// Finds a wait for later work or for the same queue. Without such waits no two queues can wait for each other.
     fn wrong_wait(&self) -> Option<String> {
         let mut last = [0; QUEUE_COUNT];
         for sent in &self.sent {
@@ -106,7 +106,7 @@ impl History {
         None
     }
 
-    /// An access or a transition that something later conflicts with and has not waited for.
+    /// Finds an access or a transition that conflicts with a later one which has not waited for it.
     fn hazard(&self, cell: Cell) -> Option<String> {
         for (at, sent) in self.sent.iter().enumerate() {
             let steps = self.steps(sent, cell);
@@ -152,8 +152,9 @@ impl History {
         None
     }
 
-    /// Images that have contents are used by their owner, behind the move that made it so, and both sides of a move match, the
-    /// second behind the first, which is behind what other queues of the owner have done.
+    /// Finds a violation of the ownership rules. Images with contents are used by their owner, after the acquire. Both
+    /// sides of a transfer match, and the acquire follows the release. The release follows all accesses by other queues
+    /// of the owner.
     fn wrong_owner(&self, cell: Cell) -> Option<String> {
         let mut owner: Option<u32> = None;
         let mut moving: Option<(OwnershipTransfer, u64)> = None;
@@ -204,7 +205,7 @@ impl History {
         None
     }
 
-    /// Whether the submission at this place has waited for a value of a queue, itself or by others.
+    /// Returns true if the submission at index `at` has waited for a value of a queue, directly or indirectly.
     fn is_behind(&self, at: usize, queue_index: usize, value: u64) -> bool {
         let start = Wait::for_access(Stages::TRANSFER, crate::barrier::Access::empty());
         let mut reach = Reach::new(queue_index, value, start);
@@ -241,7 +242,7 @@ impl Reach {
         reach
     }
 
-    /// A later submission begins: its waits may bring word of what happened to its queue.
+    /// Begins a later submission: its waits may make the access visible to its queue.
     fn arrive(&mut self, sent: &SubmittedWork) {
         let knows = |(queue_index, value): &(usize, u64)| {
             self.signalled[*queue_index].is_some_and(|first| first <= *value)
@@ -254,7 +255,7 @@ impl Reach {
         self.waits[sent.queue_index] = start;
     }
 
-    /// What is wrong with a later step on a queue.
+    /// Returns the violation by a later step on a queue, if there is one.
     fn first_unordered(
         &mut self,
         queue_index: usize,
@@ -294,7 +295,7 @@ fn covers(transfer: &OwnershipTransfer, cell: Cell) -> bool {
         && (part.base_layer..part.base_layer + part.layer_count).contains(&cell.layer)
 }
 
-/// The stages of the barriers of a submission that its queue does not have.
+/// Returns the stages of a submission's barriers that its queue does not support.
 pub(super) fn external_stages(queue_caps: &[QueueCaps; QUEUE_COUNT], sent: &SubmittedWork) -> Stages {
     let mut stages = Stages::empty();
     for event in &sent.events {
@@ -309,7 +310,7 @@ pub(super) fn external_stages(queue_caps: &[QueueCaps; QUEUE_COUNT], sent: &Subm
     stages - queue_caps[sent.queue_index].stages
 }
 
-/// Each history that waits a little less: without one wait, or for what the queue did before.
+/// Returns each history that waits a little less: without one wait, or for an earlier value of the queue.
 pub(super) fn weaker(history: &History) -> Vec<(String, History)> {
     let mut all = Vec::new();
     let mut values: BTreeMap<usize, Vec<u64>> = BTreeMap::new();

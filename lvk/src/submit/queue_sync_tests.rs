@@ -1,4 +1,5 @@
-//! Queues against the naive [`model`](super::queue_sync_model), over random programs on one to three queues of made-up families.
+//! Tests of queue synchronisation against the naive [`model`](super::queue_sync_model), with random programs on one to
+//! three queues of arbitrary families.
 
 use proptest::prelude::*;
 
@@ -11,7 +12,8 @@ use crate::barrier::{Barriers, Layout, ResourceId, Stages, Subresources, Texture
 use crate::queue::Queue;
 
 const ONE: TextureShape = TextureShape { mips: 1, layers: 1 };
-/// Two buffers, one that is written side by side, and three textures. Of these the last two belong to one domain at a time.
+/// Resources: two buffers, of which one is written concurrently, and three textures. The last two textures belong to
+/// one domain at a time.
 const TEXTURES: [(u64, TextureShape); 3] = [(3, ONE), (4, ONE), (5, TextureShape { mips: 2, layers: 2 })];
 const ACCUMULATED: u64 = 2;
 
@@ -112,7 +114,7 @@ fn cells() -> Vec<Cell> {
     (0..3).map(|id| cell(id, 0, 0)).chain(textures).collect()
 }
 
-/// Stages of shaders on a queue.
+/// Shader stages of a queue.
 fn shaders(queue_index: usize) -> impl Strategy<Value = Stages> {
     let of_lane = [
         vec![Stages::COMPUTE, Stages::FRAGMENT, Stages::FRAGMENT | Stages::PRE_RASTER],
@@ -122,7 +124,7 @@ fn shaders(queue_index: usize) -> impl Strategy<Value = Stages> {
     prop::sample::select(of_lane[queue_index].clone())
 }
 
-/// What commands of a queue do to a buffer or a texture.
+/// Uses of a buffer or a texture by commands of a queue.
 fn touch(queue_index: usize, texture: bool) -> BoxedStrategy<Use> {
     let copies = prop_oneof![Just(Use::transfer_read()), Just(Use::transfer_write())];
     let uses = match (queue_index, texture) {
@@ -178,7 +180,7 @@ fn op(queue_index: usize, simple: bool) -> BoxedStrategy<Op> {
 }
 
 fn command_buffer(queue_index: usize, simple: bool) -> impl Strategy<Value = (usize, Vec<Command>)> {
-    // At most one thing to a resource.
+    // Each command uses a resource at most once.
     let command = prop::collection::vec(op(queue_index, simple), 1..3).prop_map(|mut ops| {
         ops.sort_by_key(|op| op.id);
         ops.dedup_by_key(|op| op.id);
@@ -187,7 +189,7 @@ fn command_buffer(queue_index: usize, simple: bool) -> impl Strategy<Value = (us
     prop::collection::vec(command, 1..4).prop_map(move |commands| (queue_index, commands))
 }
 
-/// Families: all alike, one beside two, three.
+/// Queue families: all the same, two different, three different.
 fn domains() -> impl Strategy<Value = [u32; QUEUE_COUNT]> {
     prop::sample::select(vec![[0, 0, 0], [0, 1, 1], [0, 1, 0], [0, 0, 2], [0, 1, 2]])
 }
@@ -202,8 +204,8 @@ fn program(simple: bool) -> impl Strategy<Value = QueueProgram> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// No hazard, no wrong layout, no use by another than the owner, no wait for what is still to come, and no stage that a
-    /// queue does not have.
+    /// No hazard, no wrong layout, no use by another queue than the owner, no wait for later work, and no stage that a
+    /// queue does not support.
     #[test]
     fn everything_between_queues_is_waited_for_and_moved(program in program(false)) {
         let history = program.run();
@@ -213,9 +215,9 @@ proptest! {
         }
     }
 
-    /// No wait can be left out, and none can be for anything earlier on its queue: none repeats what another implies, and
-    /// nobody waits for the latest of a queue where an earlier submission is all that matters. Once several queues are kept
-    /// apart, that is: what a queue has done before is taken together.
+    /// No wait can be omitted, and none can be for earlier work of its queue. No wait repeats what another implies, and
+    /// no wait is for the latest value of a queue where an earlier one is sufficient. This holds once the queues are
+    /// tracked separately: earlier work of a queue counts as one.
     #[test]
     fn no_wait_is_longer_than_it_must_be(mut program in program(true)) {
         program.buffers.insert(0, (1, Vec::new()));
@@ -226,7 +228,7 @@ proptest! {
         }
     }
 
-    /// As long as only the first queue is used, nothing waits and nothing moves.
+    /// While only the first queue is used, there are no waits and no transfers.
     #[test]
     fn one_queue_waits_for_nothing(program in program(false)) {
         let mut program = program;
@@ -253,7 +255,7 @@ fn run(buffers: Vec<(usize, Command)>) -> History {
     QueueProgram { domains: [0, 1, 2], buffers }.run()
 }
 
-/// The model must be able to fail, in each of its ways.
+/// The model detects each kind of violation.
 #[test]
 fn the_model_finds_what_is_wrong() {
     let write = Use::shader_write(Stages::COMPUTE);
@@ -377,11 +379,11 @@ fn what_others_wrote_or_will_write_is_waited_for_as_if_it_were_written() {
         queue_sync.import_image(id, all, Layout::ShaderRead);
         queue_sync
     };
-    // Others signal the first reader, on another queue; the next reader knows nothing of their semaphore.
+    // External code signals the first reader, on another queue. The next reader does not wait for that semaphore.
     let mut queue_sync = fresh();
     let taken = queue_sync.submit(&SubmitRequest { exchanges: true, ..plain(1, &computed) }, |_| false).value;
     assert_eq!(waits(queue_sync.submit(&plain(0, &drawn), |_| false)), [(1, taken)]);
-    // Others write once the last reader signals, or once what was handed over to them is there.
+    // External code writes after the last reader signals, or after the release to it is done.
     let given: [&[_]; 2] = [&[], &[(id, QueueAccess::Write)]];
     for references in given {
         let mut queue_sync = fresh();
@@ -389,7 +391,7 @@ fn what_others_wrote_or_will_write_is_waited_for_as_if_it_were_written() {
         let sent = SubmitRequest { exchanges: references.is_empty(), references, ..plain(0, &drawn) };
         assert_eq!(waits(queue_sync.submit(&sent, |_| false)), [(1, read)]);
     }
-    // Nobody else is told of it: reads go side by side.
+    // No other queue waits for it: reads run concurrently.
     let mut queue_sync = fresh();
     queue_sync.submit(&plain(1, &computed), |_| false);
     assert_eq!(waits(queue_sync.submit(&plain(0, &drawn), |_| false)), []);
@@ -412,10 +414,10 @@ fn garbage_waits_for_every_queue_that_is_busy_and_for_nothing_before() {
     let [a, b, c] = [0, 1, 0].map(|queue_index| send(&mut queue_sync, queue_index));
     assert!(alone[1] < a && a < b && b < c);
     assert_eq!([a, b, c].map(|value| QueueSync::queue_of(value, true)), [0, 1, 0]);
-    // What was sent before queues were kept apart is not noted one by one.
+    // Submissions from before the queues were tracked separately are not recorded one by one.
     assert_eq!(queue_sync.completed_up_to(&[0, 0, 0]), 0);
     assert_eq!(queue_sync.completed_up_to(&[alone[0], b, 0]), alone[0]);
-    // Up to right before the first that is not done, however long the other queue has done nothing.
+    // The result ends right before the first unfinished value, even if the other queue has been idle for long.
     assert_eq!(queue_sync.completed_up_to(&[alone[1], 0, 0]), a - 1);
     assert_eq!(queue_sync.completed_up_to(&[a, 0, 0]), b - 1);
     assert_eq!(queue_sync.completed_up_to(&[c, 0, 0]), b - 1);
@@ -429,7 +431,7 @@ fn garbage_waits_for_every_queue_that_is_busy_and_for_nothing_before() {
     assert_eq!((one.completed_up_to(&[1, 0, 0]), QueueSync::queue_of(2, false)), (1, 0));
 }
 
-/// A value whose submission failed never comes, so nothing waits for it.
+/// A value whose submission failed is never signalled, so no work waits for it.
 #[test]
 fn what_no_queue_got_is_not_among_what_comes() {
     let queue_caps_of =

@@ -1,4 +1,4 @@
-//! Command buffers with what the tracker knows of them: recorded, run by the GPU, and recorded again with all their memory.
+//! Command buffers with their tracker: recorded, run by the GPU, and recorded again with all their memory.
 
 use ash::vk;
 
@@ -9,29 +9,30 @@ use crate::barrier::{ResourceId, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
-/// A command buffer being recorded, with the GPU, or free.
+/// A command buffer that is being recorded, submitted, or free.
 pub(crate) struct Recording {
-    /// Rises with every command buffer that somebody is given to record; of one begun ahead that of its last time.
+    /// Sequence number. It rises with every acquired command buffer. A command buffer begun ahead keeps its previous
+    /// number.
     pub(crate) sequence: u64,
-    /// What the caller records.
+    /// The command buffer that the caller records.
     pub(crate) commands: vk::CommandBuffer,
     pub(crate) tracker: Tracker,
     pub(crate) images: Images,
-    /// What it uses that needs no barriers on one queue, and waits between several.
+    /// Resources that need no barriers on one queue, and waits between several queues.
     pub(crate) references: Vec<(ResourceId, QueueAccess)>,
-    /// What the caller has it wait for on other queues.
+    /// Values of other queues that the caller makes it wait for.
     pub(crate) after: TimelineVector,
-    /// The queue's.
+    /// Index of its queue.
     pub(crate) queue_index: usize,
-    /// Of the timeline, once the queue has it; 0 before.
+    /// Timeline value, once it is submitted; 0 before.
     pub(super) value: u64,
-    /// Whether staging memory is kept for it.
+    /// True if staging memory is kept for it.
     pub(super) is_staged: bool,
-    /// Of its own, so that any thread may record without a lock.
+    /// Command pool of its own, so that any thread may record without a lock.
     pool: vk::CommandPool,
-    /// See [`prologue`](Self::prologue); made when there is the first barrier for it.
+    /// See [`prologue`](Self::prologue). Allocated at the first barrier.
     prologue: Option<vk::CommandBuffer>,
-    /// Of passes.
+    /// Input attachment sets of its render passes.
     inputs: InputSets,
 }
 
@@ -63,7 +64,7 @@ impl Recording {
         }))
     }
 
-    /// Begins anew. Neither the GPU nor anybody else has the command buffer, and where that fails it is gone.
+    /// Begins recording again. Neither the GPU nor other code uses the command buffer. On failure it is destroyed.
     pub(super) fn begin(mut self: Box<Self>, gpu: &Gpu) -> Result<Box<Self>> {
         match self.reset(gpu).and_then(|()| begin_commands(gpu, self.commands)) {
             Ok(()) => Ok(self),
@@ -81,19 +82,19 @@ impl Recording {
         self.images.clear();
         self.references.clear();
         self.inputs.reset();
-        // SAFETY: nobody has the command buffers of the pool.
+        // SAFETY: the command buffers of the pool are not in use.
         unsafe { gpu.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
             .map_err(Error::vulkan("vkResetCommandPool"))
     }
 
-    /// The number under which staging memory is kept for the command buffer, from now on.
+    /// Returns the key of the staging memory for the command buffer, and marks that memory as in use.
     #[inline]
     pub(crate) fn staging_key(&mut self) -> u64 {
         self.is_staged = true;
         self.sequence
     }
 
-    /// A set of `count` input attachments for a pass of the command buffer.
+    /// Returns a set of `count` input attachments for a render pass of the command buffer.
     pub(crate) fn input_set(
         &mut self,
         gpu: &Gpu,
@@ -103,7 +104,8 @@ impl Recording {
         self.inputs.acquire(gpu, layout, count)
     }
 
-    /// Runs before the caller's commands and holds the barriers between the queue's state and the first uses there.
+    /// Returns the command buffer that runs before the caller's commands. It holds the barriers between the queue's
+    /// state and the first uses of the caller's commands.
     pub(super) fn prologue(&mut self, gpu: &Gpu) -> Result<vk::CommandBuffer> {
         if let Some(made) = self.prologue {
             return Ok(made);
@@ -114,9 +116,9 @@ impl Recording {
         Ok(made)
     }
 
-    /// Neither the GPU nor anybody else has the command buffer.
+    /// Destroys the command buffer. Neither the GPU nor other code uses it.
     pub(super) fn destroy(self, gpu: &Gpu) {
-        // SAFETY: nobody has the command buffers of the pool.
+        // SAFETY: the command buffers of the pool are not in use.
         unsafe { gpu.device.destroy_command_pool(self.pool, None) };
         self.inputs.destroy(gpu);
     }
@@ -127,7 +129,7 @@ fn allocate(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
         .command_pool(pool)
         .level(vk::CommandBufferLevel::PRIMARY)
         .command_buffer_count(1);
-    // SAFETY: the pool is alive, and nobody else uses it.
+    // SAFETY: the pool is alive, and no other thread uses it.
     let made = unsafe { gpu.device.allocate_command_buffers(&info) };
     made.map(|buffers| buffers[0]).map_err(Error::vulkan("vkAllocateCommandBuffers"))
 }

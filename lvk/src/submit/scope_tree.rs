@@ -2,30 +2,30 @@
 
 use std::fmt;
 
-/// What the GPU took for the labelled parts of a frame or a submission.
+/// GPU times of the labelled parts of a frame or a submission.
 ///
-/// See [`Context::set_profiling`](crate::Context::set_profiling). Printed, it is an indented list.
+/// See [`Context::set_profiling`](crate::Context::set_profiling). Its `Display` output is an indented list.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GpuProfile {
     /// [`Frame::number`](crate::Frame::number) of the frame; `None` for a submission outside of frames.
     pub frame: Option<u64>,
-    /// Milliseconds from the first command to the end of the last, what lies outside of labels included.
+    /// Milliseconds from the first command to the end of the last, including commands outside of labels.
     pub ms: f64,
     /// The outermost labels, in the order of the GPU.
     pub scopes: Vec<GpuScope>,
 }
 
-/// What the GPU took between a [`push_label`](crate::CommandBuffer::push_label) and its
-/// [`pop_label`](crate::CommandBuffer::pop_label), or in a render pass with a name.
+/// GPU time between a [`push_label`](crate::CommandBuffer::push_label) and its
+/// [`pop_label`](crate::CommandBuffer::pop_label), or of a named render pass.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GpuScope {
     /// The label.
     pub name: String,
-    /// Milliseconds from the first command of the profile until everything before the scope was done.
+    /// Milliseconds from the first command of the profile until all commands before the scope were done.
     pub start_ms: f64,
-    /// Milliseconds from then until everything in the scope was done.
+    /// Milliseconds from then until all commands of the scope were done.
     pub ms: f64,
-    /// Labels inside of it, in the order of the GPU.
+    /// Labels inside of the scope, in the order of the GPU.
     pub children: Vec<Self>,
 }
 
@@ -40,7 +40,7 @@ impl fmt::Display for GpuProfile {
 }
 
 impl GpuProfile {
-    /// Begins so many milliseconds earlier.
+    /// Moves the begin of the profile `ms` milliseconds earlier.
     pub(super) fn delay(&mut self, ms: f64) {
         self.ms += ms;
         self.scopes.iter_mut().for_each(|scope| scope.delay(ms));
@@ -59,12 +59,13 @@ impl GpuScope {
     }
 }
 
-/// What a command buffer stamped, in order: begins with their names, and ends.
+/// Timestamps of a command buffer in order: `Some` name for a begin, `None` for an end.
 pub(crate) type Stamps = Vec<Option<Box<str>>>;
 
-/// The scopes of one command buffer, whose own begin and end are the outermost stamps.
+/// Returns the scopes of one command buffer. Its own begin and end are the outermost timestamps.
 ///
-/// `ms` are the times of the stamps since the profile began, one for each. `None` where the stamps are not balanced.
+/// `ms` holds the time of each timestamp since the begin of the profile. Returns `None` if begins and ends are not
+/// balanced.
 pub(crate) fn scope_tree(stamps: &[Option<Box<str>>], ms: &[f64]) -> Option<GpuScope> {
     let mut open: Vec<GpuScope> = Vec::new();
     for (stamp, &time) in stamps.iter().zip(ms) {

@@ -1,4 +1,4 @@
-//! Timeline semaphores: one for each queue, a rising number for everything submitted to it.
+//! Timeline semaphores: one for each queue, with a rising value for each of its submissions.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,27 +8,28 @@ use ash::vk;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
-/// Names a submission; compare, copy and wait for it with [`Context::wait`](crate::Context::wait).
+/// Handle of a submission. It can be compared, copied and waited for with [`Context::wait`](crate::Context::wait).
 ///
-/// The default value names "nothing submitted yet" and is always done.
-/// Of one context, later submissions are greater.
+/// The default value stands for "nothing submitted yet" and is always done. Within one context, later submissions are
+/// greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct SubmitHandle {
     /// Value of its queue's timeline once the submission is done.
     pub(crate) value: u64,
-    /// Which context submitted it.
+    /// Id of the context that submitted it.
     pub(crate) context: u64,
 }
 
 impl SubmitHandle {
-    /// The value that [`Context::raw_timeline`](crate::Context::raw_timeline), or
-    /// [`raw_timeline_of`](crate::Context::raw_timeline_of) the queue, reaches when the submission is done.
+    /// Returns the value that the timeline semaphore reaches when the submission is done. The semaphore is
+    /// [`Context::raw_timeline`](crate::Context::raw_timeline), or [`raw_timeline_of`](crate::Context::raw_timeline_of)
+    /// the queue.
     pub fn raw_value(self) -> u64 {
         self.value
     }
 }
 
-/// A timeline semaphore with the last value seen, and the last that will come.
+/// A timeline semaphore with the last value seen, and the last value submitted.
 pub(crate) struct Timeline {
     pub(crate) raw: vk::Semaphore,
     seen: AtomicU64,
@@ -40,24 +41,24 @@ impl Timeline {
     pub(crate) fn new(gpu: &Arc<Gpu>, name: &str) -> Result<Self> {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
-        // SAFETY: timeline semaphores are turned on.
+        // SAFETY: the feature `timelineSemaphore` is enabled.
         let raw = unsafe { gpu.device.create_semaphore(&info, None) }
             .map_err(Error::vulkan("vkCreateSemaphore"))?;
         gpu.name(raw, name);
         Ok(Self { raw, seen: AtomicU64::new(0), sent: AtomicU64::new(0), gpu: Arc::clone(gpu) })
     }
 
-    /// The last value the GPU reached, as far as is known without asking.
+    /// Returns the last value that the GPU is known to have reached, without a query.
     pub(crate) fn last_seen(&self) -> u64 {
         self.seen.load(Ordering::Acquire)
     }
 
-    /// A queue got what signals this value.
+    /// Records that a queue accepted the work that signals this value.
     pub(crate) fn mark_submitted(&self, value: u64) {
         self.sent.fetch_max(value, Ordering::AcqRel);
     }
 
-    /// Asks how far the GPU is, unless it has nothing left to do.
+    /// Queries the value that the GPU has reached, unless all submitted work is known to be done.
     pub(crate) fn query_completed(&self) -> Result<u64> {
         let seen = self.last_seen();
         if seen == self.sent.load(Ordering::Acquire) {

@@ -1,4 +1,4 @@
-//! The Vulkan swapchain, and what each of its images is presented with.
+//! The Vulkan swapchain, and the synchronisation objects that present its images.
 
 use std::sync::Arc;
 
@@ -13,13 +13,13 @@ use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
 
-/// Everything a Vulkan swapchain is made of.
+/// Creation parameters of a Vulkan swapchain.
 #[derive(Debug, Clone)]
 pub(crate) struct ChainPlan {
     pub(crate) extent: [u32; 2],
     pub(crate) format: Format,
     pub(crate) color_space: ColorSpace,
-    /// The first is that of the start; it can change to the others.
+    /// Present modes. The first is the initial one; the swapchain can switch to the others.
     pub(crate) modes: Vec<PresentMode>,
     pub(crate) image_count: u32,
     pub(crate) usage: vk::ImageUsageFlags,
@@ -27,14 +27,14 @@ pub(crate) struct ChainPlan {
     pub(crate) alpha: vk::CompositeAlphaFlagsKHR,
 }
 
-/// A Vulkan swapchain, destroyed on drop. The textures of its images keep it.
+/// A Vulkan swapchain, destroyed on drop. The textures of its images keep it alive.
 pub(crate) struct Chain {
     pub(crate) raw: vk::SwapchainKHR,
     surface: Arc<Surface>,
 }
 
 impl Chain {
-    /// A new swapchain in place of `old`, which can then only present what was taken from it, also where this fails.
+    /// Creates a swapchain that replaces `old`. Even on failure, `old` can then only present images acquired from it.
     pub(crate) fn new(
         surface: &Arc<Surface>,
         plan: &ChainPlan,
@@ -63,14 +63,14 @@ impl Chain {
         if functions.maintenance.is_some() {
             info = info.push_next(&mut changing);
         }
-        // SAFETY: the plan is made from what the surface says it takes; the old swapchain is of the same surface and locked.
+        // SAFETY: the surface supports the plan's parameters; the old swapchain is of the same surface and locked.
         let raw = unsafe { functions.swapchain.create_swapchain(&info, None) }
             .map_err(Failure::from_result("vkCreateSwapchainKHR"))?;
         gpu.name(raw, name);
         Ok(Self { raw, surface: Arc::clone(surface) })
     }
 
-    /// Its images, which it owns.
+    /// Returns the images, which the swapchain owns.
     pub(crate) fn images(&self) -> Result<Vec<vk::Image>, Failure> {
         let functions = &self.gpu().window_functions()?.swapchain;
         // SAFETY: the swapchain is alive.
@@ -78,7 +78,7 @@ impl Chain {
             .map_err(Failure::from_result("vkGetSwapchainImagesKHR"))
     }
 
-    /// Tells the display what the pictures are like, where it can be told.
+    /// Sets the HDR metadata of the images (`vkSetHdrMetadataEXT`), if the device supports it.
     pub(crate) fn set_hdr(&self, hdr: &HdrMetadata) -> Result<(), Failure> {
         if let Some(functions) = &self.gpu().window_functions()?.hdr {
             // SAFETY: the swapchain is alive and locked.
@@ -87,10 +87,11 @@ impl Chain {
         Ok(())
     }
 
-    /// Takes the next image, and signals `semaphore` when the engine has let go of it.
+    /// Acquires the next image. The presentation engine signals `semaphore` when it has released the image.
     pub(crate) fn acquire(&self, semaphore: vk::Semaphore) -> Result<Acquired, Failure> {
         let functions = &self.gpu().window_functions()?.swapchain;
-        // SAFETY: the swapchain is alive and locked, no other image of it is taken, and nothing else uses the semaphore.
+        // SAFETY: the swapchain is alive and locked, no other image of it is acquired, and nothing else uses the
+        // semaphore.
         let answer = unsafe {
             functions.acquire_next_image(self.raw, PRESENT_TIMEOUT_NS, semaphore, vk::Fence::null())
         };
@@ -101,7 +102,8 @@ impl Chain {
         }
     }
 
-    /// Hands an image to the engine, which waits for its [`PresentSync`]. Answers whether the swapchain could be better.
+    /// Presents an image. The presentation engine waits for the image's [`PresentSync`]. Returns true if the swapchain
+    /// is suboptimal.
     pub(crate) fn present(&self, index: u32, mode: PresentMode, sync: &PresentSync) -> Result<bool, Failure> {
         let gpu = self.gpu();
         let functions = gpu.window_functions()?;
@@ -115,7 +117,7 @@ impl Chain {
             info = info.push_next(&mut mode).push_next(&mut fence);
         }
         let queue = gpu.graphics_queue();
-        // SAFETY: the image was acquired, a submission that signals the semaphore is on its way, the fence is not in use,
+        // SAFETY: the image was acquired, a submission that signals the semaphore is pending, the fence is not in use,
         // and swapchain and queue are locked.
         unsafe { functions.swapchain.queue_present(*queue, &info) }
             .map_err(Failure::from_result("vkQueuePresentKHR"))
@@ -129,21 +131,21 @@ impl Chain {
 impl Drop for Chain {
     fn drop(&mut self) {
         if let Ok(functions) = self.gpu().window_functions() {
-            // SAFETY: textures and command buffers that use its images are gone, and so are its presents.
+            // SAFETY: textures and command buffers that use its images are destroyed, and its presents are finished.
             unsafe { functions.swapchain.destroy_swapchain(self.raw, None) };
         }
     }
 }
 
-/// What one image is presented with, destroyed on drop.
+/// Synchronisation objects of one image's presents, destroyed on drop.
 pub(crate) struct PresentSync {
-    /// Signalled by the submission that presents the image, waited for by the engine.
+    /// Signalled by the submission before the present. The presentation engine waits for it.
     pub(crate) drawn: vk::Semaphore,
-    /// Signalled once a present needs nothing of this any more, where the device can.
+    /// Signalled once a present no longer uses these objects, if the device supports present fences.
     shown: Option<vk::Fence>,
-    /// Whether it was presented since it was made.
+    /// True if the image was presented with these objects since its last acquisition.
     pub(crate) presented: bool,
-    /// Whether the engine never ends its presents, as far as the library is told.
+    /// True if the presentation engine never finishes the image's presents, as far as the library can tell. For tests.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) stalls: bool,
     gpu: Arc<Gpu>,
@@ -168,7 +170,8 @@ impl PresentSync {
         Ok(sync)
     }
 
-    /// Readies it for the next present. The engine has given the image back since the last one, so nothing is waited for.
+    /// Resets the objects for the next present. The engine has released the image since the last one, so no wait is
+    /// needed.
     pub(crate) fn reset(&self) -> Result<()> {
         let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(()) };
         if !self.wait(PRESENT_TIMEOUT_NS)? {
@@ -178,7 +181,7 @@ impl PresentSync {
         unsafe { self.gpu.device.reset_fences(&[fence]) }.map_err(Error::vulkan("vkResetFences"))
     }
 
-    /// Whether its presents are over; `None` where nobody can tell.
+    /// Returns true if the presents are finished; `None` if the device cannot tell.
     pub(crate) fn is_done(&self) -> Option<bool> {
         if !self.presented {
             return Some(true);
@@ -187,7 +190,8 @@ impl PresentSync {
         self.shown.map(|fence| unsafe { self.gpu.device.get_fence_status(fence) }.unwrap_or(true))
     }
 
-    /// Waits until its presents are over, where the device can tell, so many nanoseconds at most. Answers whether they are.
+    /// Waits at most `timeout_ns` nanoseconds until the presents are finished, if the device can tell. Returns true if
+    /// they are finished.
     pub(crate) fn wait(&self, timeout_ns: u64) -> Result<bool> {
         let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(true) };
         // SAFETY: the fence is alive and belongs to a present.
@@ -211,7 +215,7 @@ impl Drop for PresentSync {
     }
 }
 
-/// A binary semaphore.
+/// Creates a binary semaphore.
 pub(crate) fn new_semaphore(gpu: &Gpu, name: &str) -> Result<vk::Semaphore> {
     // SAFETY: no preconditions.
     let raw = unsafe { gpu.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }

@@ -1,4 +1,4 @@
-//! What a swapchain is made like, and what an answer of the presentation engine means. Knows no device.
+//! Choice of swapchain parameters, and interpretation of results of the presentation engine. Needs no device.
 
 use ash::vk;
 
@@ -6,22 +6,22 @@ use super::desc::{ColorSpace, PresentMode};
 use crate::error::Error;
 use crate::format::Format;
 
-/// What a surface says of its images.
+/// Limits of a surface for its images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SurfaceLimits {
     pub(crate) min_images: u32,
-    /// 0 where there is no limit.
+    /// 0 means no limit.
     pub(crate) max_images: u32,
-    /// Size of the window; [`ANY_EXTENT`] where the application chooses.
+    /// Size of the window; [`ANY_EXTENT`] if the application chooses the size.
     pub(crate) current: [u32; 2],
     pub(crate) smallest: [u32; 2],
     pub(crate) largest: [u32; 2],
 }
 
-/// The size of windows that take the size of their images.
+/// Extent of windows that adopt the size of their images.
 pub(crate) const ANY_EXTENT: [u32; 2] = [u32::MAX; 2];
 
-/// Size of the images; `None` where nothing can be shown.
+/// Returns the size of the images; `None` if no image can be presented.
 pub(crate) fn choose_extent(limits: &SurfaceLimits, requested: [u32; 2]) -> Option<[u32; 2]> {
     if requested.contains(&0) || limits.largest.contains(&0) {
         return None;
@@ -35,7 +35,7 @@ pub(crate) fn choose_extent(limits: &SurfaceLimits, requested: [u32; 2]) -> Opti
     (!size.contains(&0)).then_some(size)
 }
 
-/// Number of images.
+/// Returns the number of images.
 pub(crate) fn choose_image_count(limits: &SurfaceLimits, requested: u32, mode: PresentMode) -> u32 {
     let least = if mode == PresentMode::Mailbox { 3 } else { 0 };
     let requested = if requested == 0 { limits.min_images.saturating_add(1).max(least) } else { requested };
@@ -43,12 +43,12 @@ pub(crate) fn choose_image_count(limits: &SurfaceLimits, requested: u32, mode: P
     requested.max(limits.min_images).min(most)
 }
 
-/// The first of the wishes that is offered.
+/// Returns the first requested mode that is offered.
 pub(crate) fn choose_present_mode(requested: &[PresentMode], offered: &[PresentMode]) -> PresentMode {
     requested.iter().copied().find(|wish| offered.contains(wish)).unwrap_or_default()
 }
 
-/// Format and colour space of the first wish that there is in a `usable` format.
+/// Returns format and colour space of the first request that is offered in a `usable` format.
 pub(crate) fn choose_surface_format(
     requested: &[ColorSpace],
     offered: &[vk::SurfaceFormatKHR],
@@ -64,7 +64,7 @@ pub(crate) fn choose_surface_format(
     })
 }
 
-/// The one bit of `offered` to use: the first of `requested`, or the lowest.
+/// Returns the composite alpha bit to use: opaque if it is offered, otherwise the lowest offered bit.
 pub(crate) fn choose_composite_alpha(offered: vk::CompositeAlphaFlagsKHR) -> vk::CompositeAlphaFlagsKHR {
     if offered.contains(vk::CompositeAlphaFlagsKHR::OPAQUE) {
         return vk::CompositeAlphaFlagsKHR::OPAQUE;
@@ -73,19 +73,19 @@ pub(crate) fn choose_composite_alpha(offered: vk::CompositeAlphaFlagsKHR) -> vk:
     vk::CompositeAlphaFlagsKHR::from_raw(raw & raw.wrapping_neg())
 }
 
-/// Why the presentation engine did not do what it was asked.
+/// Failure of a call to the presentation engine.
 #[derive(Debug, Clone)]
 pub(crate) enum Failure {
-    /// The swapchain no longer fits its window.
+    /// The swapchain no longer matches its window.
     OutOfDate,
-    /// The surface is gone, though the window may still be there.
+    /// The surface is lost, though the window may still exist.
     SurfaceLost,
-    /// Nothing that another swapchain would help with.
+    /// An error that a new swapchain does not resolve.
     Other(Error),
 }
 
 impl Failure {
-    /// What an answer to `call` means.
+    /// Returns the failure for a result of `call`.
     pub(crate) fn from_result(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
         move |result| match result {
             vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
@@ -103,10 +103,10 @@ impl Failure {
 }
 
 impl Failure {
-    /// What a caller is told who asked for nothing that could be repeated.
+    /// Returns the error for a caller whose request cannot be repeated.
     pub(crate) fn into_error(self, name: &str) -> Error {
         match self {
-            Self::OutOfDate => Error::usage(name, "its window changes at the moment; ask again"),
+            Self::OutOfDate => Error::usage(name, "its window is changing; try again"),
             Self::SurfaceLost => {
                 let message =
                     "its window is gone; destroy the swapchain before its window, and make another one";

@@ -1,4 +1,4 @@
-//! What callers say of a swapchain, and what they are told.
+//! Descriptions and properties of swapchains.
 
 use std::sync::Arc;
 
@@ -9,17 +9,17 @@ use crate::gpu::start::window::WindowHandles;
 use crate::handle::{SwapchainHandle, TextureHandle};
 use crate::resource::texture_desc::TextureUsage;
 
-/// When a picture replaces the one before it on the screen.
+/// Present mode: the moment when an image replaces the previous one on the screen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum PresentMode {
-    /// With the refresh of the screen, every picture in turn; the application waits where it is faster. Always there.
+    /// At the screen refresh, every image in order. The application waits if it is faster. Always supported.
     #[default]
     Fifo,
-    /// As `Fifo`, but a picture that is late comes at once, torn.
+    /// As `Fifo`, but a late image is presented at once, with tearing.
     FifoRelaxed,
-    /// With the refresh of the screen, the newest picture only.
+    /// At the screen refresh, only the newest image.
     Mailbox,
-    /// At once, torn.
+    /// At once, with tearing.
     Immediate,
 }
 
@@ -35,23 +35,23 @@ impl PresentMode {
         }
     }
 
-    /// `None` for modes the library does not have, such as shared ones.
+    /// Returns `None` for modes that the library does not support, such as shared ones.
     pub(crate) fn from_raw(raw: vk::PresentModeKHR) -> Option<Self> {
         Self::ALL.into_iter().find(|mode| mode.raw() == raw)
     }
 }
 
-/// What the numbers in the images of a swapchain mean.
+/// Meaning of the values in swapchain images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ColorSpace {
-    /// sRGB, in a format that encodes what shaders write in linear light (`..Srgb`).
+    /// sRGB, in a format that encodes linear shader output (`..Srgb`).
     Srgb,
-    /// sRGB, encoded by the shaders (`..Unorm`); storage images are of this kind.
+    /// sRGB, encoded by the shaders (`..Unorm`). Required for storage images.
     SrgbEncoded,
-    /// Display P3 with the curve of sRGB, in a format that encodes.
+    /// Display P3 with the sRGB curve, in a format that encodes linear shader output.
     DisplayP3,
-    /// Linear light in half floats with the primaries of sRGB, where 1 is the white of standard pictures and more is
-    /// brighter (scRGB).
+    /// Linear light in half floats with the sRGB primaries (scRGB). 1 is the white of standard dynamic range, and
+    /// larger values are brighter.
     ExtendedSrgbLinear,
     /// BT.2020 with the PQ curve of SMPTE ST 2084 (HDR10), encoded by the shaders.
     Hdr10,
@@ -67,7 +67,7 @@ impl ColorSpace {
         }
     }
 
-    /// Formats that go with it, the best first.
+    /// Returns the formats for this colour space, the best first.
     pub(crate) fn formats(self) -> &'static [Format] {
         match self {
             Self::Srgb | Self::DisplayP3 => &[Format::Bgra8Srgb, Format::Rgba8Srgb],
@@ -78,18 +78,18 @@ impl ColorSpace {
     }
 }
 
-/// What a display is told of pictures in [`ColorSpace::Hdr10`] or brighter than white (`VkHdrMetadataEXT`).
+/// HDR metadata of images in [`ColorSpace::Hdr10`] or brighter than white, for the display (`VkHdrMetadataEXT`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HdrMetadata {
-    /// CIE 1931 chromaticities of red, green and blue of the display that the pictures were made for.
+    /// CIE 1931 chromaticities of red, green and blue of the mastering display.
     pub primaries: [[f32; 2]; 3],
-    /// CIE 1931 chromaticity of its white.
+    /// CIE 1931 chromaticity of its white point.
     pub white_point: [f32; 2],
-    /// Its darkest and brightest light, in cd/m².
+    /// Its minimum and maximum luminance, in cd/m².
     pub luminance: [f32; 2],
-    /// The brightest pixel of all pictures, in cd/m².
+    /// Maximum luminance of any pixel of all images, in cd/m².
     pub max_content_light_level: f32,
-    /// The brightest mean of a picture, in cd/m².
+    /// Maximum of the average luminance of an image, in cd/m².
     pub max_frame_average_light_level: f32,
 }
 
@@ -124,23 +124,23 @@ impl HdrMetadata {
 /// Describes a swapchain.
 #[derive(Debug, Clone)]
 pub struct SwapchainDesc<'a> {
-    /// The window; `None` is the one of the context ([`ContextDesc::window`](crate::ContextDesc)). It is kept until the
-    /// swapchain is gone. A window has one swapchain.
+    /// The window; `None` for the window of the context ([`ContextDesc::window`](crate::ContextDesc)). The swapchain
+    /// keeps the window alive. A window has one swapchain.
     pub window: Option<Arc<dyn WindowHandles>>,
-    /// Width and height of the window in pixels. Window systems that know better are believed; Wayland leaves it to the
-    /// application. A 0 says that the window is minimised.
+    /// Width and height of the window in pixels. The size reported by the window system takes precedence; Wayland
+    /// leaves the size to the application. A 0 means that the window is minimised.
     pub extent: [u32; 2],
-    /// The first of these that there is; [`PresentMode::Fifo`] where there is none of them.
+    /// Requested present modes. The first supported one is used, or [`PresentMode::Fifo`] if none is.
     pub present_modes: &'a [PresentMode],
-    /// The first of these that there is; [`ColorSpace::Srgb`], then [`ColorSpace::SrgbEncoded`], where there is none of
-    /// them.
+    /// Requested colour spaces. The first supported one is used. If none is, [`ColorSpace::Srgb`] and then
+    /// [`ColorSpace::SrgbEncoded`] are tried.
     pub color_spaces: &'a [ColorSpace],
-    /// What the display is told, where the device can tell it.
+    /// HDR metadata for the display, if the device can set them.
     pub hdr: Option<HdrMetadata>,
-    /// What the images are used for, besides copies.
+    /// Uses of the images, besides copies.
     pub usage: TextureUsage,
-    /// Number of images, clamped to what there can be; 0 leaves it to the library: one more than the window system needs
-    /// itself, and at least three for [`PresentMode::Mailbox`].
+    /// Number of images, clamped to the supported range. With 0 the library chooses: one more than the window system
+    /// needs itself, and at least three for [`PresentMode::Mailbox`].
     pub image_count: u32,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
@@ -161,27 +161,29 @@ impl Default for SwapchainDesc<'_> {
     }
 }
 
-/// What a swapchain is at the moment; see [`Context::swapchain_info`](crate::Context::swapchain_info).
+/// Current properties of a swapchain; see [`Context::swapchain_info`](crate::Context::swapchain_info).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SwapchainInfo {
-    /// Width and height of its images; `[0, 0]` where it has none, as the window was minimised since it was made.
+    /// Width and height of its images. `[0, 0]` if there are no images, because the window was minimised since its
+    /// creation.
     pub extent: [u32; 2],
     /// Format of its images.
     pub format: Format,
-    /// What the numbers in them mean.
+    /// Colour space of its images.
     pub color_space: ColorSpace,
-    /// How they come to the screen.
+    /// Present mode of its images.
     pub present_mode: PresentMode,
-    /// The modes there are.
+    /// Supported present modes.
     pub present_modes: Vec<PresentMode>,
     /// Number of images.
     pub image_count: u32,
-    /// How often it was made anew since its creation.
+    /// Number of recreations since its creation.
     pub rebuilds: u64,
 }
 
 /// An image of a swapchain to draw into, between [`Context::next_image`](crate::Context::next_image) and
-/// [`Context::present`](crate::Context::present). Dropped or forgotten, it is what `next_image` answers again.
+/// [`Context::present`](crate::Context::present). If it is dropped or forgotten, `next_image` returns the same image
+/// again.
 #[derive(Debug)]
 pub struct SwapchainImage {
     pub(crate) swapchain: SwapchainHandle,
@@ -193,22 +195,22 @@ pub struct SwapchainImage {
 }
 
 impl SwapchainImage {
-    /// The image as a texture, whose contents are undefined until something is drawn. It belongs to the swapchain.
+    /// Returns the texture of the image. Its contents are undefined until it is drawn to. It belongs to the swapchain.
     pub fn texture(&self) -> TextureHandle {
         self.texture
     }
 
-    /// Its bindless number, as of [`Holder::index`](crate::Holder::index).
+    /// Returns the bindless index of the texture, as [`Holder::index`](crate::Holder::index) does.
     pub fn index(&self) -> u32 {
         self.index
     }
 
-    /// Width and height in pixels.
+    /// Returns width and height in pixels.
     pub fn extent(&self) -> [u32; 2] {
         self.extent
     }
 
-    /// Format of its texels: pipelines that draw to it need it.
+    /// Returns the format of the image. Pipelines that render to it need the format.
     pub fn format(&self) -> Format {
         self.format
     }

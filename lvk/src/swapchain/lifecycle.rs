@@ -1,56 +1,56 @@
-//! The course of a swapchain: when it is made anew, and which image the application has. Knows no device; the
-//! presentation engine is an [`PresentBackend`], so that a scripted one can take its place.
+//! Lifecycle of a swapchain: its recreation, and the image that the application has acquired. Needs no device: the
+//! presentation engine is a [`PresentBackend`], so that tests can use a scripted one.
 
 use super::choose::Failure;
 use crate::error::Result;
 
-/// The presentation engine of a swapchain. It has one implementor beside tests, where a scripted engine takes its place: the
-/// order of recreations after failures can be had from no real one.
+/// The presentation engine of a swapchain. There is one implementor besides the scripted engine of the tests. A real
+/// engine cannot reproduce each order of failures and recreations.
 pub(crate) trait PresentBackend {
-    /// Size that images would have now; `None` where nothing can be shown.
+    /// Returns the size of new images; `None` if no image can be presented.
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure>;
 
-    /// Gives the window another surface, and the swapchain up.
+    /// Retires the swapchain and creates another surface for the window.
     fn recreate_surface(&mut self) -> Result<(), Failure>;
 
-    /// Makes the swapchain anew. Where that fails, there is none.
+    /// Recreates the swapchain. On failure there is no swapchain.
     fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure>;
 
-    /// Takes the next image of the swapchain.
+    /// Acquires the next image of the swapchain.
     fn acquire(&mut self) -> Result<Acquired, Failure>;
 }
 
-/// What the engine answers to those who want an image.
+/// Result of an acquisition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Acquired {
     Image {
         index: u32,
-        /// The window could be shown better by a new swapchain.
+        /// True if a new swapchain would match the window better.
         suboptimal: bool,
     },
-    /// None is free within the time allowed, for example of a hidden window.
+    /// No image became free within the timeout, for example because the window is hidden.
     NotYet,
 }
 
-/// What is known of the swapchain.
+/// Known condition of the swapchain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SwapchainStatus {
     Good,
-    /// Some say so for as long as they live, so that only another size is a reason to make it anew.
+    /// Some swapchains are suboptimal for their whole life, so only another size is a reason to recreate one.
     Suboptimal,
     OutOfDate,
     SurfaceLost,
 }
 
-/// An image that the application has.
+/// An image that the application has acquired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct AcquiredImage {
     pub(crate) index: u32,
-    /// Another one each time the image is given out.
+    /// A new number for each time that the image is returned to the application.
     pub(crate) ticket: u64,
 }
 
-/// Where a swapchain stands.
+/// Lifecycle state of a swapchain.
 #[derive(Debug)]
 pub(crate) struct SwapchainState {
     status: SwapchainStatus,
@@ -60,16 +60,18 @@ pub(crate) struct SwapchainState {
     tickets: u64,
 }
 
-/// A window that changes faster than swapchains are made is left for the next frame.
+/// Maximum number of recreation steps. A window that changes faster than swapchains are created is left for the next
+/// frame.
 const ATTEMPTS: u32 = 4;
 
 impl SwapchainState {
-    /// There is no swapchain yet.
+    /// Creates the state before the first swapchain.
     pub(crate) fn new() -> Self {
         Self { status: SwapchainStatus::OutOfDate, extent: None, acquired: None, tickets: 0 }
     }
 
-    /// The image to draw into; `None` where nothing can be shown for now. What was taken and not presented comes again.
+    /// Returns the image to draw into; `None` if no image can be presented at the moment. An acquired image that was
+    /// not presented is returned again.
     pub(crate) fn acquire_image(
         &mut self,
         name: &str,
@@ -85,12 +87,12 @@ impl SwapchainState {
         }))
     }
 
-    /// Makes the swapchain, if its window has a size.
+    /// Creates the swapchain, if its window has a size.
     pub(crate) fn prepare(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
         self.run_recreating(name, backend, |_, _| Ok(())).map(drop)
     }
 
-    /// Gets the swapchain in order and runs `last`; `None` where nothing can be shown for now.
+    /// Recreates the swapchain if needed and runs `last`. Returns `None` if no image can be presented at the moment.
     fn run_recreating<E: PresentBackend, T>(
         &mut self,
         name: &str,
@@ -119,7 +121,7 @@ impl SwapchainState {
         Ok(None)
     }
 
-    /// One step towards a good swapchain.
+    /// Takes one step towards an up-to-date swapchain.
     fn recreate<T>(&mut self, backend: &mut impl PresentBackend) -> Result<RecreateStep<T>, Failure> {
         match self.status {
             SwapchainStatus::SurfaceLost => {
@@ -152,12 +154,13 @@ impl SwapchainState {
         Ok(Some(index))
     }
 
-    /// The image that the holder of this ticket has; `None` where it was given out again, presented, or is gone.
+    /// Returns the index of the image with this ticket. `None` if it was acquired again or presented, or no longer
+    /// exists.
     pub(crate) fn acquired_index(&self, ticket: u64) -> Option<u32> {
         self.acquired.filter(|_| ticket == self.tickets)
     }
 
-    /// The image was handed to the engine, which answered whether the swapchain could be better.
+    /// Records a present and its result, which is true for a suboptimal swapchain.
     pub(crate) fn record_present(&mut self, answer: Result<bool, Failure>) -> Result<()> {
         self.acquired = None;
         match (self.status, answer) {
@@ -177,14 +180,14 @@ impl SwapchainState {
         Ok(())
     }
 
-    /// The swapchain is to be made anew before its next image.
+    /// Marks the swapchain for recreation before its next image.
     pub(crate) fn mark_out_of_date(&mut self) {
         if self.status != SwapchainStatus::SurfaceLost {
             self.status = SwapchainStatus::OutOfDate;
         }
     }
 
-    /// Size of the images; `None` where there are none.
+    /// Returns the size of the images; `None` if there are none.
     pub(crate) fn extent(&self) -> Option<[u32; 2]> {
         self.extent
     }
@@ -205,26 +208,26 @@ mod tests {
     use super::*;
     use crate::error::Error;
 
-    /// What happens to a scripted engine at one call.
+    /// Event at one call of a scripted engine.
     #[derive(Debug, Clone, Copy)]
     enum SurfaceEvent {
         Calm,
         Resize([u32; 2]),
         Lose,
-        /// No image is free, where one is asked for.
+        /// No image is free at an acquisition.
         Busy,
-        /// The engine says "suboptimal" from here on, whatever the size.
+        /// The engine reports "suboptimal" from here on, whatever the size.
         Grumble,
     }
 
-    /// A window that follows a script and asserts that it is treated as Vulkan demands.
+    /// A window that follows a script and asserts that its caller meets Vulkan's rules.
     #[derive(Debug)]
     struct Scripted {
         script: VecDeque<SurfaceEvent>,
         window: [u32; 2],
         images: Option<[u32; 2]>,
         lost: bool,
-        /// The images no longer fit, and the application was told.
+        /// True if the images no longer match the window, and the engine has reported that.
         told: bool,
         asked: bool,
         acquired: Option<u32>,
@@ -260,7 +263,8 @@ mod tests {
             event
         }
 
-        /// Every other misfit is only suboptimal, as drivers differ.
+        /// Returns the engine's result for the current window, which is true for suboptimal. Every other mismatch is
+        /// only suboptimal, as drivers differ.
         fn misfit(&mut self) -> Result<bool, Failure> {
             if self.lost {
                 return Err(Failure::SurfaceLost);
@@ -322,7 +326,7 @@ mod tests {
         }
     }
 
-    /// What an application does in a frame.
+    /// Action of an application in a frame.
     #[derive(Debug, Clone, Copy)]
     enum ScriptedFrame {
         Present,
@@ -352,7 +356,7 @@ mod tests {
                 state.mark_out_of_date();
                 backend.asked = true;
             }
-            // A window lost twice in one frame counts as gone.
+            // A window lost twice in one frame counts as destroyed.
             let Ok(Some(acquired)) = state.acquire_image("window", backend) else { continue };
             assert_eq!(backend.acquired, Some(acquired.index));
             assert_eq!(state.acquired_index(acquired.ticket), Some(acquired.index));
@@ -368,8 +372,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, cases: 2000, ..ProptestConfig::default() })]
 
-        /// Through resizes, losses and hidden windows: the engine's own assertions hold, and once the window is left
-        /// alone there is a picture of its size every frame, with no swapchain made any more.
+        /// Survives resizes, losses and hidden windows: the engine's assertions hold. Once the window no longer
+        /// changes, each frame has an image of its size, and no more swapchains are created.
         #[test]
         fn every_window_is_followed_and_a_calm_one_is_left_alone(
             script in prop::collection::vec(event(), 0..80), frames in frames()

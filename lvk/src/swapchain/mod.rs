@@ -1,4 +1,4 @@
-//! Images in windows. `choose` and `lifecycle` decide without a device; the other files carry it out.
+//! Presentation to windows. `choose` and `lifecycle` decide without a device; the other files carry out the decisions.
 
 pub(crate) mod chain;
 pub(crate) mod choose;

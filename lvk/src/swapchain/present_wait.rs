@@ -1,14 +1,14 @@
-//! How long a presentation engine is waited for. Knows no device.
+//! Timeout of waits for the presentation engine. Needs no device.
 
 use crate::error::Result;
 
-/// A hidden window may never have an image free, and an engine that is gone never ends a present: the application is not to
-/// stand still for them.
+/// Maximum time to wait for presents, in nanoseconds. A hidden window may never have a free image, and a terminated
+/// engine never finishes a present. The application must not hang because of them.
 pub(super) const PRESENT_TIMEOUT_NS: u64 = 1_000_000_000;
 
-/// Has `wait` wait for each present, so many nanoseconds at most; it answers whether the present is over. Once one has taken all the
-/// patience, the others, which had as much time, are only asked. Answers how many are given up; a failure only when all were
-/// waited for.
+/// Waits for all presents. `wait` gets a present and a timeout in nanoseconds, and returns true if the present is
+/// finished. After the first timeout, the others get a timeout of 0, because they had the same time. Returns the number
+/// of unfinished presents. The first failure is returned only after all presents were waited for.
 pub(super) fn wait_for_all<T>(
     presents: impl Iterator<Item = T>,
     mut wait: impl FnMut(T, u64) -> Result<bool>,

@@ -1,4 +1,4 @@
-//! A swapchain with everything that changes from frame to frame.
+//! A swapchain with all of its state that changes from frame to frame.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
 
-/// What the caller wants of every Vulkan swapchain that is made for this one.
+/// The caller's configuration, for every Vulkan swapchain created for this swapchain.
 #[derive(Debug, Clone)]
 pub(crate) struct SwapchainConfig {
     pub(crate) extent: [u32; 2],
@@ -35,24 +35,24 @@ pub(crate) struct Swapchain {
     state: Mutex<SwapchainInner>,
 }
 
-/// What is locked together.
+/// State under the lock of the swapchain.
 pub(crate) struct SwapchainInner {
     pub(crate) lifecycle: SwapchainState,
     pub(crate) resources: SwapchainResources,
 }
 
-/// What the course is about.
+/// Resources that the lifecycle manages.
 pub(crate) struct SwapchainResources {
     name: Arc<str>,
     pub(crate) config: SwapchainConfig,
     pub(crate) window: Arc<dyn WindowHandles>,
-    /// `None` only after a surface was lost and no other could be made.
+    /// `None` only after a surface was lost and no other could be created.
     pub(crate) surface: Option<Arc<Surface>>,
-    /// `None` where there are no images, for example of a window that is minimised.
+    /// `None` without images, for example for a minimised window.
     pub(crate) current: Option<Current>,
-    /// Semaphores for taking images, each with the value of the timeline from which on it is free.
+    /// Acquire semaphores, each with the timeline value from which on it is free.
     semaphores: Vec<(vk::Semaphore, u64)>,
-    /// The one that was signalled for the image that is taken.
+    /// The semaphore that is signalled for the acquired image.
     pub(crate) signalled: Option<vk::Semaphore>,
     retired: Vec<RetiredChain>,
     pub(crate) rebuilds: u64,
@@ -69,17 +69,17 @@ pub(crate) struct Current {
     pub(crate) chain: Arc<Chain>,
 }
 
-/// An image of it.
+/// An image of the Vulkan swapchain.
 pub(crate) struct ChainImage {
     pub(crate) texture: TextureHandle,
     pub(crate) object: Arc<Texture>,
     pub(crate) sync: PresentSync,
 }
 
-/// A Vulkan swapchain that another has replaced, until its presents are over.
+/// A replaced Vulkan swapchain, kept until its presents are finished.
 struct RetiredChain {
     syncs: Vec<PresentSync>,
-    /// Value of the timeline from which on its presents are over, where fences do not tell.
+    /// Timeline value at which its presents are finished, if the device has no present fences.
     over_at: Option<u64>,
     _chain: Arc<Chain>,
 }
@@ -110,14 +110,14 @@ impl Swapchain {
 }
 
 impl Current {
-    /// The images as barriers know them, in their order.
+    /// Returns the resource ids of the images, in order.
     pub(crate) fn ids(&self) -> Vec<ResourceId> {
         self.images.iter().map(|image| image.object.image.id).collect()
     }
 }
 
 impl SwapchainResources {
-    /// A semaphore that nothing uses, as far as the timeline has come.
+    /// Returns an unused semaphore, when the timeline has reached `completed`.
     pub(crate) fn take_semaphore(&mut self, completed: u64, name: &str) -> Result<vk::Semaphore> {
         match self.semaphores.iter().position(|(_, free_at)| *free_at <= completed) {
             Some(place) => Ok(self.semaphores.swap_remove(place).0),
@@ -125,30 +125,30 @@ impl SwapchainResources {
         }
     }
 
-    /// Gives a semaphore back, which is free when the timeline reaches `free_at`.
+    /// Takes back a semaphore, which is free when the timeline reaches `free_at`.
     pub(crate) fn recycle_semaphore(&mut self, semaphore: vk::Semaphore, free_at: u64) {
         self.semaphores.push((semaphore, free_at));
     }
 
-    /// Keeps the parts of a swapchain that was replaced until its presents are over.
+    /// Keeps a replaced swapchain and its synchronisation objects until its presents are finished.
     pub(crate) fn retire(&mut self, chain: Arc<Chain>, syncs: Vec<PresentSync>) {
         self.retired.push(RetiredChain { syncs, over_at: None, _chain: chain });
     }
 
-    /// An image that was presented is back, and the submission of this value waits for that: presents of the queue before
-    /// that one are over.
+    /// Records that a presented image was acquired again, and that the submission of this value waits for it. Earlier
+    /// presents of the queue are then finished.
     pub(crate) fn set_presents_done_at(&mut self, value: u64) {
         for retired in &mut self.retired {
             retired.over_at.get_or_insert(value);
         }
     }
 
-    /// Destroys what was replaced and is no longer presented.
+    /// Destroys replaced swapchains whose presents are finished.
     pub(crate) fn destroy_finished(&mut self, completed: u64) {
         self.retired.retain(|retired| !retired.is_done(completed));
     }
 
-    /// Waits until all presents are over, but not for an engine that never answers.
+    /// Waits until all presents are finished, but at most for the timeout.
     pub(crate) fn wait_for_presents(&self) -> Result<()> {
         let current = self.current.iter().flat_map(|current| &current.images).map(|image| &image.sync);
         let retired = self.retired.iter().flat_map(|retired| &retired.syncs);
@@ -170,7 +170,7 @@ impl SwapchainResources {
         unsafe { self.gpu.device.queue_wait_idle(*queue) }.map_err(Error::vulkan("vkQueueWaitIdle"))
     }
 
-    /// Destroys what was replaced. Its presents are over, or given up.
+    /// Destroys all replaced swapchains. Their presents are finished or abandoned.
     pub(crate) fn clear_retired(&mut self) {
         self.retired.clear();
     }
@@ -189,7 +189,7 @@ impl RetiredChain {
 impl Drop for SwapchainResources {
     fn drop(&mut self) {
         if let Err(error) = self.wait_for_presents() {
-            log::error!("{}: it is destroyed before its last images were presented: {error}", self.name);
+            log::error!("{}: destroyed before its last images were presented: {error}", self.name);
         }
         let all = self.semaphores.drain(..).map(|(semaphore, _)| semaphore).chain(self.signalled.take());
         for semaphore in all {

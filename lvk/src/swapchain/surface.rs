@@ -1,4 +1,4 @@
-//! A window as Vulkan sees it.
+//! The Vulkan surface of a window.
 
 use std::sync::Arc;
 
@@ -11,21 +11,21 @@ use crate::gpu::Gpu;
 use crate::gpu::start::surface::{WindowFunctions, create_surface};
 use crate::gpu::start::window::WindowHandles;
 
-/// A surface, destroyed on drop. It keeps its window.
+/// A surface, destroyed on drop. It keeps its window alive.
 pub(crate) struct Surface {
     pub(crate) raw: vk::SurfaceKHR,
     pub(crate) gpu: Arc<Gpu>,
     pub(crate) window: Arc<dyn WindowHandles>,
 }
 
-/// What a surface answers when a swapchain is to be made.
+/// Properties of a surface that swapchain creation needs.
 pub(crate) struct SurfaceState {
     pub(crate) limits: SurfaceLimits,
     pub(crate) raw: vk::SurfaceCapabilitiesKHR,
 }
 
 impl Surface {
-    /// The surface of a window that the context's queue can present to.
+    /// Creates the surface of a window that the context's queue can present to.
     pub(crate) fn new(gpu: &Arc<Gpu>, window: &Arc<dyn WindowHandles>, name: &str) -> Result<Self> {
         let functions = gpu.window_functions()?;
         let raw = create_surface(&gpu.instance, window.as_ref())?;
@@ -41,7 +41,7 @@ impl Surface {
         Err(gpu.unsupported("presentation to this window"))
     }
 
-    /// Size and number of images.
+    /// Queries the limits for size and number of images.
     pub(crate) fn state(&self) -> Result<SurfaceState, Failure> {
         let functions = &self.functions()?.surface;
         // SAFETY: the surface belongs to the instance of the device.
@@ -59,7 +59,7 @@ impl Surface {
         Ok(SurfaceState { limits, raw })
     }
 
-    /// Formats with their colour spaces.
+    /// Queries the formats with their colour spaces.
     pub(crate) fn formats(&self) -> Result<Vec<vk::SurfaceFormatKHR>, Failure> {
         let functions = &self.functions()?.surface;
         // SAFETY: as above.
@@ -67,7 +67,7 @@ impl Surface {
             .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceFormatsKHR"))
     }
 
-    /// Modes that the library knows.
+    /// Queries the present modes that the library supports.
     pub(crate) fn present_modes(&self) -> Result<Vec<PresentMode>, Failure> {
         let functions = &self.functions()?.surface;
         // SAFETY: as above.
@@ -77,8 +77,8 @@ impl Surface {
         Ok(modes.into_iter().filter_map(PresentMode::from_raw).collect())
     }
 
-    /// Modes that a swapchain in `mode` can change to without being made anew, `mode` first; nothing else where the device
-    /// cannot change modes.
+    /// Queries the modes that a swapchain in `mode` can switch to without recreation, `mode` first. Returns only `mode`
+    /// if the device cannot switch modes.
     pub(crate) fn compatible_modes(&self, mode: PresentMode) -> Result<Vec<PresentMode>, Failure> {
         let Some(functions) = &self.functions()?.maintenance else { return Ok(vec![mode]) };
         let mut asked = vk::SurfacePresentModeEXT::default().present_mode(mode.raw());
@@ -104,7 +104,7 @@ impl Surface {
 impl Drop for Surface {
     fn drop(&mut self) {
         if let Ok(functions) = self.gpu.window_functions() {
-            // SAFETY: its swapchains keep it, so they are gone; the window is still there.
+            // SAFETY: swapchains keep their surface alive, so they are destroyed; the window still exists.
             unsafe { functions.surface.destroy_surface(self.raw, None) };
         }
     }

@@ -1,4 +1,4 @@
-//! Devices whose queues refuse a submission when they are told to, to see what the library makes of it.
+//! Fault injection: devices whose queues can refuse a submission, to test the library's error handling.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_char};
@@ -9,11 +9,12 @@ thread_local! {
     static INJECT_FAULTS: Cell<bool> = const { Cell::new(false) };
     static REAL: Cell<Option<vk::PFN_vkGetDeviceProcAddr>> = const { Cell::new(None) };
     static SUBMIT: Cell<Option<vk::PFN_vkQueueSubmit2>> = const { Cell::new(None) };
-    /// Submissions of this thread until one fails.
+    /// Submissions of this thread before the one that fails.
     static SUBMITS_LEFT: Cell<Option<u32>> = const { Cell::new(None) };
 }
 
-/// The queues of the device that `make` makes can fail on this thread, until another device is made so.
+/// Runs `make`. Queues of the device that it creates can fail on this thread, until this function creates another
+/// device.
 pub(crate) fn with_failing_queues<T>(make: impl FnOnce() -> T) -> T {
     INJECT_FAULTS.set(true);
     let made = make();
@@ -21,12 +22,12 @@ pub(crate) fn with_failing_queues<T>(make: impl FnOnce() -> T) -> T {
     made
 }
 
-/// After so many submissions of this thread one fails.
+/// Makes one submission of this thread fail, after `submissions` that succeed.
 pub(crate) fn fail_after(submissions: u32) {
     SUBMITS_LEFT.set(Some(submissions));
 }
 
-/// The instance as it is, or one whose devices can fail.
+/// Returns the instance unchanged, or one whose devices can fail.
 pub(crate) fn wrap_fault_injection(raw: ash::Instance) -> ash::Instance {
     if !INJECT_FAULTS.get() {
         return raw;
@@ -41,7 +42,7 @@ pub(crate) fn wrap_fault_injection(raw: ash::Instance) -> ash::Instance {
 /// As `vkGetDeviceProcAddr`.
 unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     let real = REAL.get()?;
-    // SAFETY: the caller's device and name go on to the real function; the name ends with a zero.
+    // SAFETY: the caller's device and name are passed to the real function; the name ends with a zero.
     let (found, name) = unsafe { (real(device, name), CStr::from_ptr(name)) };
     if name != c"vkQueueSubmit2" {
         return found;
@@ -54,7 +55,7 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
 }
 
 /// # Safety
-/// As `vkQueueSubmit2`, on the thread that made the device.
+/// As `vkQueueSubmit2`, on the thread that created the device.
 unsafe extern "system" fn submit(
     queue: vk::Queue,
     count: u32,
@@ -64,7 +65,7 @@ unsafe extern "system" fn submit(
     let submits_left = SUBMITS_LEFT.get();
     SUBMITS_LEFT.set(submits_left.and_then(|submits_left| submits_left.checked_sub(1)));
     match SUBMIT.get() {
-        // SAFETY: the caller's.
+        // SAFETY: the caller upholds the contract of `vkQueueSubmit2`.
         Some(real) if submits_left != Some(0) => unsafe { real(queue, count, infos, fence) },
         _ => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
     }

@@ -1,4 +1,4 @@
-//! What tests outside of the crate reach. No part of the library's interface.
+//! Hooks for tests outside the crate. Not part of the library's interface.
 
 #![allow(missing_docs, reason = "only tests see it")]
 
@@ -14,44 +14,46 @@ use crate::test_support::submit_hook;
 #[cfg(feature = "window")]
 pub use crate::test_support::window::*;
 
-/// A context whose recorded commands do nothing, to measure what the library takes to record them.
+/// Creates a context whose recorded commands do nothing, to measure the library's own recording time.
 pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
     with_null_commands(|| Context::new(desc))
 }
 
-/// The context that `make` makes and uses on this thread can have submissions fail.
+/// Runs `make`. Submissions can fail for the context that it creates, as long as this thread uses it.
 pub fn with_fault_injection<T>(make: impl FnOnce() -> T) -> T {
     fault_injection::with_failing_queues(make)
 }
 
-/// After so many submissions to queues, one that this thread makes of a context made [`with_fault_injection`] is refused.
+/// Makes one submission of this thread fail, after `submissions` queue submissions that succeed. The context must be
+/// created by [`with_fault_injection`].
 pub fn fail_submission_after(submissions: u32) {
     fault_injection::fail_after(submissions);
 }
 
-/// This thread does something that another might do, right before it takes its next command buffer. Locks may be held then:
-/// objects may be destroyed, and nothing submitted.
+/// Runs `deed` on this thread right before it acquires its next command buffer, in place of another thread.
+///
+/// Locks may be held then: `deed` may destroy objects, but must not submit.
 pub fn before_next_command_buffer(deed: impl FnOnce() + 'static) {
     submit_hook::before_next_command_buffer(Box::new(deed));
 }
 
-/// How many submissions there were.
+/// Returns the number of submissions so far.
 pub fn submissions(ctx: &Context) -> u64 {
     ctx.device_state().submitter.value_count()
 }
 
-/// Bytes of the staging memory there is.
+/// Returns the bytes of all staging memory.
 pub fn staging_bytes(ctx: &Context) -> u64 {
     ctx.device_state().staging.total_bytes()
 }
 
-/// Objects that wait to be destroyed.
+/// Returns the number of objects in the deferred-free queue.
 pub fn waiting_objects(ctx: &Context) -> Result<usize> {
     ctx.device_state().collect()?;
     Ok(ctx.device_state().submitter.deferred_count())
 }
 
-/// Compiles every kernel, after telling its name.
+/// Compiles every kernel. Calls `tell` with the kernel's name first.
 pub fn compile_kernels(ctx: &Context, tell: &mut dyn FnMut(&str)) -> Result<()> {
     let shared = ctx.device_state();
     for kernel in Kernel::ALL {

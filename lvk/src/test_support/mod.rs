@@ -1,4 +1,4 @@
-//! Test doubles and hooks for the tests of this workspace. No part of the library's interface.
+//! Test doubles and hooks for the tests of this workspace. Not part of the library's interface.
 #![cfg_attr(not(feature = "test-hooks"), allow(dead_code, reason = "unit tests use only some of it"))]
 
 pub(crate) mod fault_injection;

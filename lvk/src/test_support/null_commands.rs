@@ -1,4 +1,4 @@
-//! Devices whose recorded commands do nothing, to measure what the library itself takes to record.
+//! Devices whose recorded commands do nothing, to measure the library's own recording time.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_char};
@@ -12,7 +12,7 @@ thread_local! {
 
 static REAL: OnceLock<vk::PFN_vkGetDeviceProcAddr> = OnceLock::new();
 
-/// Devices made by `make` on this thread record nothing.
+/// Runs `make`. Devices that it creates on this thread record nothing.
 pub(crate) fn with_null_commands<T>(make: impl FnOnce() -> T) -> T {
     NULL_COMMANDS.set(true);
     let made = make();
@@ -20,7 +20,7 @@ pub(crate) fn with_null_commands<T>(make: impl FnOnce() -> T) -> T {
     made
 }
 
-/// The instance as it is, or one whose devices find empty functions for all commands that are recorded.
+/// Returns the instance unchanged, or one whose devices load an empty function for every recorded command.
 pub(crate) fn wrap_null_commands(raw: ash::Instance) -> ash::Instance {
     if !NULL_COMMANDS.get() {
         return raw;
@@ -35,7 +35,7 @@ pub(crate) fn wrap_null_commands(raw: ash::Instance) -> ash::Instance {
 /// As `vkGetDeviceProcAddr`.
 unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
     let real = REAL.get()?;
-    // SAFETY: the caller's device and name go on to the real function; the name ends with a zero.
+    // SAFETY: the caller's device and name are passed to the real function; the name ends with a zero.
     let (found, name) = unsafe { (real(device, name), CStr::from_ptr(name)) };
     if name.to_bytes().starts_with(b"vkCmd") {
         found.map(|_| nothing as unsafe extern "system" fn())
@@ -44,5 +44,6 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
     }
 }
 
-/// Stands for commands of any arguments: all answer nothing, and their callers clear the arguments up.
+/// Replaces commands with any arguments: all of them return nothing, and in the C calling convention the caller removes
+/// the arguments.
 unsafe extern "system" fn nothing() {}

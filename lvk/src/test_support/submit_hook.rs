@@ -1,4 +1,4 @@
-//! What other threads may do right before one takes a command buffer, for tests to have it done just then.
+//! A hook right before a thread acquires a command buffer, where tests act in place of another thread.
 
 use std::cell::Cell;
 
@@ -8,12 +8,13 @@ thread_local! {
     static NEXT: Cell<Option<SubmitHook>> = const { Cell::new(None) };
 }
 
-/// Runs once, on this thread, right before it takes its next command buffer, under whatever locks it has then.
+/// Sets a hook that runs once, on this thread, right before it acquires its next command buffer. The thread may hold
+/// locks then.
 pub(crate) fn before_next_command_buffer(hook: SubmitHook) {
     NEXT.set(Some(hook));
 }
 
-/// This thread is about to take a command buffer.
+/// Runs the hook of this thread, which is about to acquire a command buffer.
 pub(crate) fn run_submit_hook() {
     if let Some(hook) = NEXT.take() {
         hook();

@@ -1,4 +1,4 @@
-//! What tests make of the presentation engine.
+//! Test hooks for failures of the presentation engine.
 
 #![allow(missing_docs, reason = "only tests see it")]
 
@@ -7,14 +7,15 @@ use crate::error::Result;
 use crate::handle::SwapchainHandle;
 use crate::swapchain::choose::Failure;
 
-/// The presentation engine has lost the surface of a window, as far as the library is told.
+/// Makes the library believe that the presentation engine has lost the surface of a window.
 pub fn lose_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<()> {
     let swapchain = ctx.device_state().store.swapchains.get(swapchain)?;
     swapchain.lock().lifecycle.record_present(Err(Failure::SurfaceLost))
 }
 
-/// The presentation engine never says that one of the pictures that were presented last is shown, as far as the library is told.
-/// Answers whether there is one, and the device could tell.
+/// Makes the library believe that the presentation engine never finishes one of the images that were presented last.
+///
+/// Returns true if there is such an image and the device can report completion.
 pub fn stall_present(ctx: &Context, swapchain: SwapchainHandle) -> Result<bool> {
     let swapchain = ctx.device_state().store.swapchains.get(swapchain)?;
     let mut state = swapchain.lock();

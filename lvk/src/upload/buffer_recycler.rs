@@ -1,4 +1,4 @@
-//! Mapped buffers that are used again instead of made anew.
+//! Recycling of mapped buffers.
 
 use std::sync::Arc;
 
@@ -9,22 +9,22 @@ use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 
-/// A few mapped buffers that nobody uses at the moment.
+/// A few mapped buffers that are not in use.
 pub(crate) struct BufferRecycler {
     buffers: Mutex<Vec<Arc<Buffer>>>,
 }
 
 impl BufferRecycler {
-    /// More than this are let go: a list for each frame in flight, of two structures.
+    /// Maximum number of kept buffers: an instance list for each frame in flight, for two TLAS.
     const MAX_SPARE: usize = 6;
-    /// A buffer this many times too large is not worth its memory.
+    /// A buffer more than this many times too large is not reused.
     const MAX_SIZE_RATIO: u64 = 4;
 
     pub(crate) fn new() -> Self {
         Self { buffers: Mutex::new(Rank::SpareBuffers, Vec::new()) }
     }
 
-    /// A mapped buffer of at least `bytes`.
+    /// Returns a mapped buffer of at least `bytes`.
     pub(crate) fn acquire(&self, gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Arc<Buffer>> {
         if let Some(spare) = self.find_spare(bytes) {
             return Ok(spare);
@@ -43,7 +43,7 @@ impl BufferRecycler {
         Some(buffers.swap_remove(place))
     }
 
-    /// Takes a buffer back that neither the GPU nor anybody else uses any more.
+    /// Takes back a buffer that neither the GPU nor other code uses any more.
     pub(crate) fn recycle(&self, buffer: Arc<Buffer>) {
         let mut buffers = self.buffers.lock();
         if buffer.mapped().is_some() && Arc::strong_count(&buffer) == 1 && buffers.len() < Self::MAX_SPARE {

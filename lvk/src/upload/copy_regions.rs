@@ -1,16 +1,16 @@
-//! Which bytes of a buffer are to be written, and from where: every byte once, as the last write left it.
+//! Copy regions of a buffer: each byte is copied once, from its last write.
 
 use std::collections::BTreeMap;
 
-/// Neighbouring bytes of a buffer, from neighbouring bytes of one page.
+/// A contiguous range of a buffer, copied from a contiguous range of one page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct CopyRegion {
-    /// Where in the buffer, in bytes.
+    /// Offset in the buffer, in bytes.
     pub(crate) target: u64,
     pub(crate) bytes: u64,
-    /// The page they come from.
+    /// The source page.
     pub(crate) page: usize,
-    /// Where in the page, in bytes.
+    /// Offset in the page, in bytes.
     pub(crate) source: u64,
 }
 
@@ -19,26 +19,26 @@ impl CopyRegion {
         self.target + self.bytes
     }
 
-    /// What of the piece begins at `start`, which lies inside of it.
+    /// Returns the rest of the region from `start` on, which lies inside of it.
     fn starting_at(self, start: u64) -> Self {
         let cut = start - self.target;
         Self { target: start, bytes: self.bytes - cut, source: self.source + cut, ..self }
     }
 
-    /// Whether `next` goes on where this ends, on both sides.
+    /// Returns true if `next` is adjacent to the end of this region, in both buffer and page.
     fn is_continued_by(&self, next: &Self) -> bool {
         self.end() == next.target && self.page == next.page && self.source + self.bytes == next.source
     }
 }
 
-/// Pieces of one buffer, none over another, in the order of their targets.
+/// Disjoint copy regions of one buffer, sorted by their offset in it.
 #[derive(Debug, Default)]
 pub(crate) struct CopyRegions {
     by_target: BTreeMap<u64, CopyRegion>,
 }
 
 impl CopyRegions {
-    /// Writes over what was written before.
+    /// Adds a region and removes the bytes that it overwrites from earlier regions.
     pub(crate) fn add(&mut self, new: CopyRegion) {
         if new.bytes == 0 {
             return;
@@ -51,7 +51,7 @@ impl CopyRegions {
         }
     }
 
-    /// Takes `start..end` out of every piece.
+    /// Removes `start..end` from every region.
     fn remove_range(&mut self, start: u64, end: u64) {
         let before = self.by_target.range_mut(..start).next_back();
         if let Some((_, before)) = before
@@ -72,7 +72,7 @@ impl CopyRegions {
         }
     }
 
-    /// The pieces, those of one page together.
+    /// Returns the regions, grouped by page.
     pub(crate) fn split_by_page(&self) -> Vec<CopyRegion> {
         let mut pieces: Vec<_> = self.by_target.values().copied().collect();
         pieces.sort_by_key(|piece| piece.page);
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Against an array that says for each byte where it comes from.
+        /// Compares with an array that holds the source of each byte.
         #[test]
         fn every_byte_comes_from_the_last_write(
             writes in prop::collection::vec((0..60_u64, 0..25_u64, 0..3_usize, 0..4_u64), 0..40)

@@ -1,4 +1,4 @@
-//! From host memory to the GPU.
+//! Uploads from host memory to the GPU.
 
 pub(crate) mod buffer_recycler;
 pub(crate) mod copy_regions;

@@ -1,36 +1,37 @@
-//! Which bytes of which page of staging memory are taken, and by whom.
+//! Allocation of byte ranges in pages of staging memory.
 
-/// A place in a page.
+/// An allocated range of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct PageRange {
     pub(crate) page: usize,
-    /// In the page, in bytes.
+    /// Offset in the page, in bytes.
     pub(crate) offset: u64,
 }
 
-/// What the caller has to do for a place.
+/// Result of an allocation, with the action that the caller must take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PageAllocation {
-    /// The page is there.
+    /// The page exists.
     Existing(PageRange),
-    /// The page is to be made, with so many bytes, and [opened](PageAllocator::page_created) or [forgotten](PageAllocator::forget).
+    /// The caller must create the page with this many bytes. Then it calls
+    /// [`page_created`](PageAllocator::page_created), or on failure [`remove_page`](PageAllocator::remove_page).
     NewPage(PageRange, u64),
 }
 
-/// Pages that are filled from the front, and emptied once nobody reads any of their bytes.
+/// Pages that are filled from the front, and cleared once none of their ranges is in use.
 ///
-/// A place belongs first to who took it; then to a command buffer, by its sequence number; then to nobody.
+/// A range belongs first to its allocator's caller, then to a command buffer, by its sequence number. Then it is free.
 #[derive(Debug)]
 pub(crate) struct PageAllocator {
-    /// Bytes of a page, but for those that hold more in one piece.
+    /// Bytes of a page, except pages with a single larger range.
     page_bytes: u64,
-    /// Empty pages are kept up to so many bytes of all pages.
+    /// Empty pages are kept while all pages together have at most this many bytes.
     keep_bytes: u64,
-    /// `None` for numbers that no page has at the moment.
+    /// Pages by their number; `None` for unused numbers.
     pages: Vec<Option<Page>>,
     /// The page that is being filled.
     current: Option<usize>,
-    /// Sequence numbers, the page of each, and how many of its places they have.
+    /// Sequence number of a command buffer, a page, and the number of ranges of the page that it uses.
     pages_in_use: Vec<(u64, usize, u32)>,
     total_bytes: u64,
 }
@@ -39,7 +40,7 @@ pub(crate) struct PageAllocator {
 struct Page {
     bytes: u64,
     used: u64,
-    /// Places that somebody has.
+    /// Number of ranges in use.
     allocation_count: u32,
 }
 
@@ -55,7 +56,7 @@ impl PageAllocator {
         }
     }
 
-    /// Takes `bytes` whose offset is a multiple of `align`, a power of two.
+    /// Allocates `bytes` at an offset that is a multiple of `align`, a power of two.
     pub(crate) fn allocate(&mut self, bytes: u64, align: u64) -> PageAllocation {
         let fits = |page: &Page| page.fit(bytes, align).map(|offset| (offset, bytes));
         let current = self.current.and_then(|page| Some((page, fits(self.pages[page].as_ref()?)?)));
@@ -84,12 +85,12 @@ impl PageAllocator {
         PageAllocation::NewPage(PageRange { page: number, offset: 0 }, size)
     }
 
-    /// A new page is made: others may have places of it, too.
+    /// Records that a new page is created. Other ranges of it may be allocated from now on.
     pub(crate) fn page_created(&mut self, number: usize) {
         self.choose_current(number);
     }
 
-    /// The page that has most room left is filled next.
+    /// Selects the page to fill next: the one with the most free bytes.
     fn choose_current(&mut self, number: usize) {
         let room = |number: usize| self.pages[number].as_ref().map_or(0, |page| page.bytes - page.used);
         if self.current.is_none_or(|current| room(current) <= room(number)) {
@@ -97,7 +98,7 @@ impl PageAllocator {
         }
     }
 
-    /// `count` places of a page are read by the command buffer `sequence` from now on.
+    /// Records that the command buffer `sequence` uses `count` ranges of a page from now on.
     pub(crate) fn mark_used(&mut self, page: usize, count: u32, sequence: u64) {
         match self.pages_in_use.last_mut() {
             Some((last, of, held)) if *last == sequence && *of == page => *held += count,
@@ -105,7 +106,7 @@ impl PageAllocator {
         }
     }
 
-    /// The command buffer is done. Answers the pages that are no longer wanted.
+    /// Frees the ranges of a finished command buffer. Returns the pages to destroy.
     pub(crate) fn release(&mut self, sequence: u64) -> Vec<usize> {
         let mut held = std::mem::take(&mut self.pages_in_use);
         let mut unwanted = Vec::new();
@@ -119,7 +120,7 @@ impl PageAllocator {
         unwanted
     }
 
-    /// A page could not be made.
+    /// Removes a page that could not be created.
     pub(crate) fn remove_page(&mut self, number: usize) {
         if let Some(page) = self.pages.get_mut(number).and_then(Option::take) {
             self.total_bytes -= page.bytes;
@@ -127,7 +128,7 @@ impl PageAllocator {
         }
     }
 
-    /// Gives back `count` places of a page. Answers the page if it is no longer wanted.
+    /// Frees `count` ranges of a page. Returns the page if it is to be destroyed.
     fn release_ranges(&mut self, number: usize, count: u32) -> Option<usize> {
         let page = self.pages.get_mut(number)?.as_mut()?;
         page.allocation_count -= count;
@@ -142,7 +143,7 @@ impl PageAllocator {
         Some(number)
     }
 
-    /// Bytes of all pages.
+    /// Returns the bytes of all pages.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn total_bytes(&self) -> u64 {
         self.total_bytes
@@ -176,7 +177,7 @@ mod tests {
         },
         GiveBack(prop::sample::Index),
         Release(u64),
-        /// A page that was to be made is there, or cannot be had.
+        /// A requested page is created, or its creation failed.
         Made {
             which: prop::sample::Index,
             succeeds: bool,
@@ -196,7 +197,7 @@ mod tests {
         ]
     }
 
-    /// A place that somebody has, and the command buffer if it is one.
+    /// An allocated range, and its command buffer if it has one.
     #[derive(Debug, Clone, Copy)]
     struct AllocatedRange {
         place: PageRange,
@@ -214,7 +215,7 @@ mod tests {
             let mut pages = PageAllocator::new(100, 250);
             let mut sizes: BTreeMap<usize, u64> = BTreeMap::new();
             let mut taken: Vec<AllocatedRange> = Vec::new();
-            // Nobody uses their places before they are made.
+            // Ranges of pages that are not created yet. They are not used until then.
             let mut unmade: Vec<AllocatedRange> = Vec::new();
             for op in ops {
                 match op {
@@ -285,7 +286,7 @@ mod tests {
             prop_assert!(pages.total_bytes() <= 250, "{} bytes are kept", pages.total_bytes());
         }
 
-        /// What is filled and emptied again and again needs no more than two rounds take.
+        /// Repeated filling and clearing takes no more pages than two rounds need.
         #[test]
         fn steady_use_takes_no_more_pages(bytes in 1..100_u64, count in 1..20_u64, rounds in 3..60_u64) {
             let mut pages = PageAllocator::new(100, 0);

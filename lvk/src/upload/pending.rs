@@ -1,4 +1,4 @@
-//! Uploads that wait for the next submission: where bytes go, as plain values.
+//! Uploads that wait for the next submission, as plain values.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::barrier::{IdMap, ResourceId, Subresources};
 use crate::resource::region::Region;
 use crate::resource::{Buffer, Texture};
 
-/// Uploads in their order, those of a buffer merged.
+/// Uploads in order. Those of one buffer are merged.
 #[derive(Default)]
 pub(crate) struct PendingUploads {
     pub(crate) buffers: Vec<BufferUploads>,
@@ -20,34 +20,36 @@ pub(crate) struct PendingUploads {
     bytes: u64,
 }
 
-/// What is to be written to a buffer.
+/// Pending writes to a buffer.
 pub(crate) struct BufferUploads {
     pub(crate) target: Arc<Buffer>,
     pub(crate) regions: CopyRegions,
 }
 
-/// What is to become of a texture.
+/// A pending write to a texture, or the initialisation of a new one.
 pub(crate) struct TextureUpload {
     pub(crate) target: Arc<Texture>,
-    /// A region with its bytes; `None` for a new texture without contents, which shaders may read all the same.
+    /// A region with its bytes; `None` for a new texture without contents, which shaders may read nevertheless.
     pub(crate) texels: Option<(Region, StagingRegion)>,
 }
 
 impl BufferUploads {
-    /// Whether the buffer was destroyed, and the GPU is done with it: then nobody else holds it, and nobody can get it.
+    /// Returns true if the buffer was destroyed and the GPU is done with it. Then no other reference exists or can be
+    /// created.
     pub(crate) fn is_dead(&self) -> bool {
         Arc::strong_count(&self.target) == 1
     }
 }
 
 impl TextureUpload {
-    /// As [`BufferUploads::is_dead`], with all textures of the image. Listed twice it stays, which does no harm.
+    /// Returns true as [`BufferUploads::is_dead`] does, for all textures of the image. An image with two pending
+    /// uploads stays, which is harmless.
     fn is_dead(&self) -> bool {
         Arc::strong_count(&self.target) == 1 && Arc::strong_count(&self.target.image) == 1
     }
 }
 
-/// A page of staging memory with how many of its regions are to be read.
+/// A page of staging memory, with the number of its regions to read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct UsedPage {
     pub(crate) page: usize,
@@ -60,17 +62,17 @@ impl PendingUploads {
         self.buffers.is_empty() && self.textures.is_empty() && self.pages.is_empty()
     }
 
-    /// Takes out the textures that are gone.
+    /// Removes the uploads of destroyed textures, and returns these textures.
     pub(crate) fn drain_dead(&mut self) -> impl Iterator<Item = Arc<Texture>> {
         self.textures.extract_if(.., |upload| upload.is_dead()).map(|upload| upload.target)
     }
 
-    /// Staged bytes that wait.
+    /// Returns the number of pending staged bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Writes staged bytes to a buffer, over what was to be written there before.
+    /// Adds a write of staged bytes to a buffer. It overwrites earlier pending writes.
     pub(crate) fn add_buffer_upload(
         &mut self,
         target: &Arc<Buffer>,
@@ -87,7 +89,7 @@ impl PendingUploads {
         self.count_page_use(staged, bytes);
     }
 
-    /// Writes staged bytes to a region of a texture.
+    /// Adds a write of staged bytes to a region of a texture.
     pub(crate) fn add_texture_upload(
         &mut self,
         target: Arc<Texture>,
@@ -99,7 +101,7 @@ impl PendingUploads {
         self.count_page_use(staged, bytes);
     }
 
-    /// Makes a new texture readable.
+    /// Adds a new texture without contents, to make it readable.
     pub(crate) fn add_new_texture(&mut self, target: Arc<Texture>) {
         self.textures.push(TextureUpload { target, texels: None });
     }
@@ -113,7 +115,7 @@ impl PendingUploads {
     }
 }
 
-/// Cuts writes of parts of images into rounds, each up to one of the ends, in which no part is written twice.
+/// Splits writes of image parts into rounds in which no part is written twice. Returns the end of each round.
 pub(crate) fn write_round_ends(
     parts: impl IntoIterator<Item = Option<(ResourceId, Subresources)>>,
 ) -> Vec<usize> {

@@ -1,4 +1,4 @@
-//! Staging memory: what the host hands to commands, in pages that are used again.
+//! Staging memory: bytes from the host for commands, in pages that are reused.
 
 use std::sync::Arc;
 
@@ -17,35 +17,36 @@ pub(crate) struct StagingRegion {
     pub(crate) buffer: vk::Buffer,
     pub(crate) offset: u64,
     pub(crate) address: u64,
-    /// Which page they lie in.
+    /// The page that contains the bytes.
     pub(crate) page: usize,
 }
 
-/// A piece of a page that one command buffer cuts small regions from, without the lock. No other region overlaps it.
+/// A range of a page for small regions of one command buffer, allocated without the lock. No other region overlaps it.
 #[derive(Default)]
 pub(crate) struct StagingChunk {
-    /// Keeps the mapping.
+    /// Keeps the mapping alive.
     _page: Option<Arc<Buffer>>,
-    /// Where the host sees the first byte of the page, and the address of that.
+    /// Host mapping of the page, and the device address of its first byte.
     mapping: Option<(Mapping, u64)>,
-    /// Addresses where the next region may begin, and where the chunk ends.
+    /// Address of the next region, and address of the end of the chunk.
     next: u64,
     end: u64,
 }
 
 impl StagingChunk {
     const BYTES: u64 = 4 << 10;
-    /// Larger regions are taken from pages.
+    /// Larger regions are allocated from pages.
     pub(crate) const MAX_BYTES: u64 = Self::BYTES / 4;
 
-    /// A chunk that begins at this place of a page.
+    /// Creates a chunk that begins at this offset of a page.
     fn new(page: Arc<Buffer>, offset: u64) -> Self {
         let next = page.address + offset;
         let mapping = page.mapping().map(|mapping| (mapping, page.address));
         Self { _page: Some(page), mapping, next, end: next + Self::BYTES }
     }
 
-    /// A region at an address of this alignment, a power of two, as the GPU and the host see it, if the chunk has room for it.
+    /// Allocates a region at an address with this alignment, a power of two. Returns its device address and its bytes
+    /// on the host, or `None` if the chunk is full.
     #[inline(always)]
     fn sub_allocate(&mut self, bytes: u64, align: u64) -> Option<(u64, &mut [u8])> {
         let (mapping, start) = self.mapping?;
@@ -60,25 +61,25 @@ impl StagingChunk {
     }
 }
 
-/// Pages of host-visible memory. A region lives until the command buffer it was taken for is done.
+/// Pages of host-visible memory. A region lives until its command buffer is done.
 pub(crate) struct Staging {
-    /// As near to the GPU as the host can write.
+    /// Pages in the host-visible memory nearest to the GPU.
     pages: StagingPool<Buffer>,
-    /// Chunks are cut from these. Small writes beyond the host's caches cost far more than their bytes: the next lock that is
-    /// taken waits until they have gone across the bus.
+    /// Cached pages, for chunks. Small writes to uncached memory cost far more than their bytes: the next lock
+    /// operation waits until they have crossed the bus.
     cached: StagingPool<Buffer>,
     kept_bytes: u64,
     gpu: Arc<Gpu>,
 }
 
 impl Staging {
-    /// Larger pieces get a page of their own.
+    /// Size of a page. A larger region gets a page of its own.
     const PAGE_BYTES: u64 = 4 << 20;
     const MIN_PAGE_BYTES: u64 = 64 << 10;
-    /// Of cached memory.
+    /// Bytes of cached memory that are kept.
     const KEPT_CACHED_BYTES: u64 = 1 << 20;
 
-    /// Keeps pages of `bytes` altogether.
+    /// Creates staging memory that keeps `bytes` of pages.
     pub(crate) fn new(gpu: &Arc<Gpu>, bytes: u64) -> Self {
         let kept_bytes = bytes.max(Self::MIN_PAGE_BYTES);
         let pages = StagingPool::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes);
@@ -86,20 +87,20 @@ impl Staging {
         Self { pages, cached, kept_bytes, gpu: Arc::clone(gpu) }
     }
 
-    /// Half of what is kept: so much may wait while as much is copied.
+    /// Returns half of the kept bytes: one half may be pending while the other is copied.
     pub(crate) fn half_bytes(&self) -> u64 {
         self.kept_bytes / 2
     }
 
-    /// Copies `data` to where the command buffer `sequence` can read it, at an address of this alignment (a power of
-    /// two).
+    /// Copies `data` to memory that the command buffer `sequence` can read, at an address with this alignment (a power
+    /// of two).
     pub(crate) fn write(&self, data: &[u8], align: u64, sequence: u64) -> Result<StagingRegion> {
         let (region, ()) =
             self.write_with(data.len() as u64, align, sequence, |region| region.copy_from_slice(data))?;
         Ok(region)
     }
 
-    /// As [`write`](Self::write), but `fill` writes the bytes in place. Answers what it does.
+    /// Allocates like [`write`](Self::write), and lets `fill` write the bytes in place. Returns the result of `fill`.
     pub(crate) fn write_with<R>(
         &self,
         bytes: u64,
@@ -110,8 +111,8 @@ impl Staging {
         self.fill(bytes, align, Some(sequence), fill)
     }
 
-    /// As [`write_with`](Self::write_with), small regions from a chunk that belongs to the same command buffer. Answers the
-    /// address.
+    /// Allocates like [`write_with`](Self::write_with), but small regions from a chunk of the same command buffer.
+    /// Returns the address.
     #[inline(always)]
     pub(crate) fn write_in<R>(
         &self,
@@ -133,7 +134,7 @@ impl Staging {
         Ok((address, fill(out)))
     }
 
-    /// Takes a new chunk in place of a full one.
+    /// Replaces a full chunk by a new one.
     #[inline(never)]
     fn renew_chunk(&self, chunk: &mut StagingChunk, sequence: u64) -> Result<()> {
         let make = |size| new_page(&self.gpu, size, MemoryKind::Readback);
@@ -143,31 +144,31 @@ impl Staging {
         Ok(())
     }
 
-    /// Copies `data` to where some command buffer will read it; see [`mark_used`](Self::mark_used).
+    /// Copies `data` to memory for a command buffer that is chosen later with [`mark_used`](Self::mark_used).
     pub(crate) fn keep_region(&self, data: &[u8], align: u64) -> Result<StagingRegion> {
         let (region, ()) =
             self.fill(data.len() as u64, align, None, |region| region.copy_from_slice(data))?;
         Ok(region)
     }
 
-    /// `count` regions of a page that were [kept](Self::keep_region) are read by the command buffer `sequence`.
+    /// Records that the command buffer `sequence` reads `count` [kept](Self::keep_region) regions of a page.
     pub(crate) fn mark_used(&self, page: usize, count: u32, sequence: u64) {
         self.pages.mark_used(page, count, sequence);
     }
 
-    /// The command buffer is done with its regions.
+    /// Frees the regions of a finished command buffer.
     pub(crate) fn release(&self, sequence: u64) {
         drop(self.pages.release(sequence));
         drop(self.cached.release(sequence));
     }
 
-    /// Bytes of all pages.
+    /// Returns the bytes of all pages.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn total_bytes(&self) -> u64 {
         self.pages.total_bytes() + self.cached.total_bytes()
     }
 
-    /// The bytes are written without the lock.
+    /// Allocates a region and writes its bytes without holding the lock.
     fn fill<R>(
         &self,
         bytes: u64,
@@ -175,23 +176,24 @@ impl Staging {
         sequence: Option<u64>,
         fill: impl FnOnce(&mut [u8]) -> R,
     ) -> Result<(StagingRegion, R)> {
-        // Pages begin at addresses that are multiples of less than some alignments.
+        // The alignment of pages may be less than `align`.
         let room = bytes + align.saturating_sub(Buffer::ALIGNMENT);
         let make = |size| new_page(&self.gpu, size, MemoryKind::HostVisible);
         let (place, buffer) = self.pages.allocate(room, align.min(Buffer::ALIGNMENT), sequence, make)?;
         let address = (buffer.address + place.offset).next_multiple_of(align.max(1));
         let offset = address - buffer.address;
         let region = StagingRegion { buffer: buffer.raw, offset, address, page: place.page };
-        // SAFETY: `offset + bytes <= place.offset + room` lies inside the mapping, and no other region overlaps this one.
+        // SAFETY: `offset + bytes <= place.offset + room` lies inside the mapping, and no other region overlaps this
+        // one.
         let answer = unsafe { fill_region(offset, bytes, &buffer, fill) }?;
         Ok((region, answer))
     }
 }
 
-/// Has `bytes` of a page written from `offset` on. Answers what `fill` does.
+/// Writes `bytes` of a page from `offset` on with `fill`. Returns the result of `fill`.
 ///
 /// # Safety
-/// They lie inside the mapping of the page, `buffer`, and nobody else has them.
+/// The bytes lie inside the mapping of the page, `buffer`, and no other code uses them.
 #[inline]
 unsafe fn fill_region<R>(
     offset: u64,

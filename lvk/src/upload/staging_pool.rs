@@ -1,4 +1,4 @@
-//! Pages of staging memory that threads share: which bytes are taken is decided under a lock, and pages are made without it.
+//! A thread-safe pool of staging pages. Ranges are allocated under a lock, and pages are created without it.
 
 use std::sync::Arc;
 
@@ -6,14 +6,14 @@ use super::page_allocator::{PageAllocation, PageAllocator, PageRange};
 use crate::error::{Error, Result};
 use crate::lock_order::{Guard, Mutex, Rank};
 
-/// Pages of one kind of memory; `P` is such a page.
+/// Pages of one kind of memory. `P` is the type of a page.
 pub(super) struct StagingPool<P> {
     page_list: Mutex<PageList<P>>,
 }
 
 struct PageList<P> {
     pages: PageAllocator,
-    /// By their numbers; `None` for those that are gone, or being made.
+    /// Pages by their number; `None` for removed pages and pages being created.
     created: Vec<Option<Arc<P>>>,
 }
 
@@ -23,8 +23,9 @@ impl<P> StagingPool<P> {
         Self { page_list: Mutex::new(Rank::Staging, listed) }
     }
 
-    /// A place, with the page it lies in, for the command buffer `sequence`, or for whoever [holds](Self::mark_used) it later. Where no
-    /// page has room, `make` makes one of so many bytes; other threads take places meanwhile.
+    /// Allocates a range, and returns it with its page. It belongs to the command buffer `sequence`, or to the caller
+    /// until [`mark_used`](Self::mark_used). If no page has space, `make` creates one of the given size, while other
+    /// threads can allocate.
     pub(super) fn allocate(
         &self,
         bytes: u64,
@@ -50,19 +51,19 @@ impl<P> StagingPool<P> {
         Ok((place, page.ok_or_else(|| Error::usage("staging", "the page is gone"))?))
     }
 
-    /// `count` places of a page that nobody held yet are read by the command buffer `sequence`.
+    /// Records that the command buffer `sequence` uses `count` ranges of a page that had no command buffer.
     pub(super) fn mark_used(&self, page: usize, count: u32, sequence: u64) {
         self.lock().pages.mark_used(page, count, sequence);
     }
 
-    /// The command buffer is done with its places. Answers pages that nobody wants any more.
+    /// Frees the ranges of a finished command buffer. Returns the pages to destroy.
     pub(super) fn release(&self, sequence: u64) -> Vec<Arc<P>> {
         let PageList { pages, created: made } = &mut *self.lock();
         let unwanted = pages.release(sequence);
         unwanted.into_iter().filter_map(|page| made.get_mut(page)?.take()).collect()
     }
 
-    /// Bytes of all pages.
+    /// Returns the bytes of all pages.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(super) fn total_bytes(&self) -> u64 {
         self.lock().pages.total_bytes()
@@ -74,7 +75,7 @@ impl<P> StagingPool<P> {
 }
 
 impl<P> PageList<P> {
-    /// A page is made, or could not be.
+    /// Adds a created page, or removes a page whose creation failed.
     fn add_page(&mut self, number: usize, made: Result<P>) -> Result<()> {
         let page = made.inspect_err(|_| self.pages.remove_page(number))?;
         self.created.resize_with(self.created.len().max(number + 1), || None);

@@ -54,7 +54,7 @@ impl<'a> Layers<'a> {
     /// Returns what is wrong with the imports of `library`, and with the block itself.
     fn complaints(&self, library: &Crate) -> Vec<String> {
         let mut there: BTreeSet<_> =
-            library.modules.keys().filter_map(|path| path.first().map(String::clone)).collect();
+            library.modules.keys().filter_map(|path| path.first().cloned()).collect();
         there.extend(
             library.modules.keys().map(|path| path.join("::")).filter(|path| self.has_own_layer(path)),
         );

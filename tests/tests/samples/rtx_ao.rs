@@ -61,7 +61,7 @@ fn all_paths_render_the_town() {
 fn the_cache_forgets_what_has_moved() {
     let Some(ctx) = software_device() else { return };
     let mut town = town(&ctx, RayPath::Query, 2, 1);
-    let start = *town.shown();
+    let start = *town.current_view();
     let first = render_image(&mut town);
     town.show(&start);
     assert_eq!(town.passes(), 2, "nothing moved");
@@ -191,7 +191,7 @@ fn it_converges_to_the_reference() {
     assert!(first > 26.0 && second > first + 3.0, "{first} dB, then {second} dB");
 
     let world = World::new();
-    let camera = town.shown().camera;
+    let camera = town.current_view().camera;
     let pixels = even_pixels(&most.1);
     let found =
         pixels.iter().filter_map(|&pixel| Some((pixel, world.openness(&ray_through(&camera, pixel), 1024)?)));

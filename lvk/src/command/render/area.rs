@@ -1,4 +1,4 @@
-//! Which pixels and layers a render pass covers.
+//! The pixels and layers that a render pass covers.
 
 use ash::vk;
 
@@ -14,7 +14,7 @@ pub(super) struct PassArea {
 }
 
 impl PassArea {
-    /// The whole targets, or part of them.
+    /// Returns the given area, or that of the whole targets for `None`.
     pub(super) fn new(area: Option<[u32; 4]>, targets: [u32; 2]) -> Result<Self> {
         let Some([x, y, width, height]) = area else {
             return Ok(Self { offset: [0, 0], extent: targets });
@@ -31,7 +31,7 @@ impl PassArea {
         Err(Error::usage("begin_rendering", message))
     }
 
-    /// Whether all pixels of `other` are in this one.
+    /// True if all pixels of `other` are in this area.
     pub(super) fn contains(self, other: Self) -> bool {
         (0..2).all(|axis| {
             let end = other.offset[axis].checked_add(other.extent[axis]);
@@ -47,7 +47,7 @@ impl PassArea {
     }
 }
 
-/// Layers of each target.
+/// The layers that a pass draws to in each target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct PassLayers {
     count: u32,
@@ -55,7 +55,7 @@ pub(super) struct PassLayers {
 }
 
 impl PassLayers {
-    /// As the pass says: some layers, or the views of a mask.
+    /// Returns the layers of the pass: the number it gives, or the layers of its view mask.
     pub(super) fn new(gpu: &Gpu, desc: &RenderPassDesc<'_>) -> Result<Self> {
         let RenderPassDesc { layers, view_mask, .. } = *desc;
         if view_mask == 0 {
@@ -65,7 +65,7 @@ impl PassLayers {
         }
         gpu.check_view_mask("begin_rendering", view_mask)?;
         if layers > 1 {
-            let message = "a view mask says itself how many layers there are; leave layers 0";
+            let message = "the view mask sets the number of layers; leave layers 0";
             return Err(Error::usage("begin_rendering", message));
         }
         Ok(Self { count: u32::BITS - view_mask.leading_zeros(), view_mask })
@@ -75,12 +75,12 @@ impl PassLayers {
         self.count
     }
 
-    /// Whether the targets are arrays.
+    /// True if the targets are arrays.
     pub(super) fn is_layered(self) -> bool {
         self.count > 1 || self.view_mask != 0
     }
 
-    /// How many queries one takes in the pass: as many as there are views, at least one.
+    /// Returns the number of queries that one query command uses in the pass: the number of views, at least one.
     pub(super) fn query_count(self) -> u32 {
         self.view_mask.count_ones().max(1)
     }

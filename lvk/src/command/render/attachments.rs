@@ -1,4 +1,4 @@
-//! Targets of a render pass: found, checked, and turned into what Vulkan takes.
+//! Targets of a render pass: their checks and their conversion to Vulkan attachments.
 
 use ash::vk;
 
@@ -18,7 +18,7 @@ use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit_barriers::vulkan_layout;
 
-/// The targets of a pass, found and checked.
+/// The checked targets of a pass.
 pub(super) struct PassTargets {
     pub(super) extent: [u32; 2],
     pub(super) area: PassArea,
@@ -33,7 +33,7 @@ pub(super) struct PassTargets {
 }
 
 impl CommandBuffer {
-    /// Finds and checks the targets of a pass; the pass uses them.
+    /// Checks the targets of a pass and declares their uses.
     pub(super) fn use_targets(&mut self, desc: &RenderPassDesc<'_>) -> Result<PassTargets> {
         let gpu = &self.shared.gpu;
         let limit = gpu.caps.limits.max_color_targets;
@@ -118,7 +118,7 @@ impl CommandBuffer {
         self.use_depth_resolve(target, &to, resolve, [&mut targets.depth, &mut targets.stencil])
     }
 
-    /// Finds a target and checks that all targets are equally large, with equally many samples.
+    /// Returns a target. Fails unless all targets have the same extent and number of samples.
     fn checked_target(
         &self,
         handle: TextureHandle,
@@ -143,7 +143,7 @@ impl CommandBuffer {
     }
 }
 
-/// Fails where texels of the target are drawn to by an earlier one.
+/// Fails if an earlier target has some of the target's texels.
 fn check_disjoint(
     target: &PassTarget,
     drawn: &mut Vec<(crate::barrier::ResourceId, Subresources)>,
@@ -183,7 +183,7 @@ fn clear_op_name(format: Format) -> &'static str {
     }
 }
 
-/// Whether the pass needs what was in the target before it, or leaves something for after it.
+/// True if the pass loads the target's previous contents, or stores its contents at the end.
 fn is_loaded_or_stored(texture: &Texture, attachment: &DepthAttachment) -> bool {
     let stencil = attachment.stencil_store || attachment.stencil == StencilLoadOp::Load;
     let depth = attachment.store || attachment.load == DepthLoadOp::Load;
@@ -250,7 +250,8 @@ fn stencil_info(view: vk::ImageView, attachment: &DepthAttachment) -> vk::Render
         .clear_value(vk::ClearValue { depth_stencil })
 }
 
-/// What depth and stencil share. What is only read is not stored either, which would be a write.
+/// Returns the attachment values that depth and stencil share. A read-only target is not stored either, since a store
+/// would be a write.
 fn aspect_info(
     view: vk::ImageView,
     attachment: &DepthAttachment,

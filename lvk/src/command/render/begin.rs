@@ -1,4 +1,4 @@
-//! Begin and end of a render pass, with the barriers in front of it.
+//! Begin and end of a render pass, with the barriers before it.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::command::dependencies::Dependencies;
 use crate::error::{Error, Result};
 use crate::resource::buffer::BufferUsage;
 
-/// How draws read buffers, by the usage that allows it.
+/// Uses of buffers by draws, with the usage that allows each.
 const DRAW_INPUTS: [(BufferUsage, fn() -> Use); 3] = [
     (BufferUsage::INDEX, Use::index),
     (BufferUsage::VERTEX, Use::vertex),
@@ -21,15 +21,16 @@ const DRAW_INPUTS: [(BufferUsage, fn() -> Use); 3] = [
 ];
 
 impl CommandBuffer {
-    /// Begins a render pass (`vkCmdBeginRendering`), which ends when the value is dropped. The viewport covers the targets,
-    /// the scissor the area.
+    /// Begins a render pass (`vkCmdBeginRendering`), which ends when the value is dropped. The viewport covers the
+    /// targets, and the scissor covers the area.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for targets that do not go together, do not exist, or are named twice;
-    /// [`LimitExceeded`](Error::LimitExceeded) for too many colours, layers or views; [`Unsupported`](Error::Unsupported)
-    /// for views without [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview), and for local reads without
-    /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead); [`WrongQueue`](Error::WrongQueue) on another queue than
-    /// the graphics queue.
+    /// [`InvalidUsage`](Error::InvalidUsage) for targets that do not match, do not exist, or are named twice;
+    /// [`LimitExceeded`](Error::LimitExceeded) for too many colour targets, layers or views;
+    /// [`Unsupported`](Error::Unsupported) for views without
+    /// [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview), and for local reads without
+    /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead); [`WrongQueue`](Error::WrongQueue) on queues
+    /// other than the graphics queue.
     pub fn begin_rendering(&mut self, desc: &RenderPassDesc<'_>) -> Result<RenderPass<'_>> {
         self.needs_graphics("a render pass")?;
         let mut targets = None;
@@ -74,7 +75,7 @@ impl CommandBuffer {
         self.had_pass = true;
     }
 
-    /// Ends the pass that is open, if any: everything but draws happens outside of passes.
+    /// Ends the open pass, if any: only draws are recorded inside of passes.
     #[inline]
     pub(in crate::command) fn end_rendering(&mut self) {
         if self.rendering {
@@ -90,7 +91,7 @@ impl CommandBuffer {
         unsafe { self.shared.gpu.device.cmd_end_rendering(self.raw()) };
     }
 
-    /// Buffers the pass depends on may also be its indices, vertices and indirect arguments.
+    /// Declares that draws may read the buffers of `deps` as indices, vertices and indirect arguments.
     fn use_draw_inputs(&mut self, deps: &Dependencies<'_>) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         for handle in deps.buffers.iter().chain(deps.read_buffers) {

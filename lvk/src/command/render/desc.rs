@@ -1,48 +1,48 @@
-//! Targets of a render pass, as callers describe them.
+//! Descriptions of render passes and their targets.
 
 use crate::command::dependencies::Dependencies;
 use crate::gpu::caps::resolve_modes::ResolveMode;
 use crate::handle::TextureHandle;
 
-/// What a colour target holds when the pass begins.
+/// Contents of a colour target when the pass begins (`VkAttachmentLoadOp`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ColorLoadOp {
-    /// What was in it.
+    /// The previous contents.
     Load,
-    /// This colour.
+    /// The given colour.
     Clear([f32; 4]),
-    /// These integers, for targets of an unsigned integer format.
+    /// The given integers, for targets of an unsigned integer format.
     ClearUint([u32; 4]),
-    /// These integers, for targets of a signed integer format.
+    /// The given integers, for targets of a signed integer format.
     ClearSint([i32; 4]),
-    /// Anything; every pixel is drawn.
+    /// Undefined contents; the pass draws every pixel.
     DontCare,
 }
 
-/// What a depth target holds when the pass begins.
+/// Contents of a depth target when the pass begins (`VkAttachmentLoadOp`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthLoadOp {
-    /// What was in it.
+    /// The previous contents.
     Load,
-    /// This depth, 0 to 1.
+    /// The given depth, 0 to 1.
     Clear(f32),
-    /// Anything.
+    /// Undefined contents.
     DontCare,
 }
 
-/// What the stencil of a depth target holds when the pass begins.
+/// Contents of the stencil of a depth target when the pass begins (`VkAttachmentLoadOp`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StencilLoadOp {
-    /// What was in it.
+    /// The previous contents.
     Load,
-    /// This value.
+    /// The given value.
     Clear(u8),
-    /// Anything.
+    /// Undefined contents.
     DontCare,
 }
 
-/// What a multisampled colour target is resolved to at the end of the pass: the mean of a pixel's samples, or the first of
-/// them where they are integers.
+/// The resolve of a multisampled colour target at the end of the pass. Each pixel becomes the mean of its samples, or
+/// the first of them for integer formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Resolve {
     /// A texture of one sample a pixel and the same format, with
@@ -50,12 +50,12 @@ pub struct Resolve {
     pub texture: TextureHandle,
     /// Mip level written; of a view, counted from its first.
     pub mip: u32,
-    /// Layer written, the first of as many as the pass has.
+    /// Layer written: the first of as many as the pass has.
     pub layer: u32,
 }
 
-/// What a multisampled depth target is resolved to at the end of the pass;
-/// [`Limits::depth_resolve`](crate::Limits::depth_resolve) says how it can be.
+/// The resolve of a multisampled depth target at the end of the pass.
+/// [`Limits::depth_resolve`](crate::Limits::depth_resolve) has the supported modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DepthResolve {
     /// A texture of one sample a pixel and the same format, with
@@ -63,11 +63,11 @@ pub struct DepthResolve {
     pub texture: TextureHandle,
     /// Mip level written; of a view, counted from its first.
     pub mip: u32,
-    /// Layer written, the first of as many as the pass has.
+    /// Layer written: the first of as many as the pass has.
     pub layer: u32,
-    /// How depth is resolved; `None` leaves it alone.
+    /// Mode that resolves depth; `None` leaves depth unchanged.
     pub depth: Option<ResolveMode>,
-    /// How stencil is resolved; `None` leaves it alone. Means nothing to formats without stencil.
+    /// Mode that resolves stencil; `None` leaves stencil unchanged. Ignored for formats without stencil.
     pub stencil: Option<ResolveMode>,
 }
 
@@ -78,19 +78,19 @@ pub struct ColorAttachment {
     pub texture: TextureHandle,
     /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer, cube face, or slice of a volume drawn to, the first of them where the pass has several; of a view, counted
-    /// from its first.
+    /// Layer, cube face, or slice of a volume drawn to: the first one if the pass has several. Of a view, counted from
+    /// its first.
     pub layer: u32,
-    /// What it holds when the pass begins.
+    /// Contents when the pass begins.
     pub load: ColorLoadOp,
-    /// Whether what was drawn is kept.
+    /// True if the contents are stored at the end of the pass.
     pub store: bool,
-    /// What several samples a pixel are resolved to; the samples themselves need not be kept.
+    /// Resolve of a multisampled target; the samples themselves need not be stored.
     pub resolve: Option<Resolve>,
 }
 
 impl ColorAttachment {
-    /// The first mip and layer, cleared to a colour and kept.
+    /// Returns a target of the first mip and layer, cleared to a colour and stored.
     pub fn clear(texture: TextureHandle, color: [f32; 4]) -> Self {
         Self { texture, mip: 0, layer: 0, load: ColorLoadOp::Clear(color), store: true, resolve: None }
     }
@@ -103,47 +103,49 @@ pub struct DepthAttachment {
     pub texture: TextureHandle,
     /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer, cube face, or slice of a volume drawn to, the first of them where the pass has several; of a view, counted
-    /// from its first.
+    /// Layer, cube face, or slice of a volume drawn to: the first one if the pass has several. Of a view, counted from
+    /// its first.
     pub layer: u32,
-    /// What it holds when the pass begins.
+    /// Contents when the pass begins.
     pub load: DepthLoadOp,
-    /// Whether the depth is kept.
+    /// True if the depth is stored at the end of the pass.
     pub store: bool,
-    /// What its stencil holds when the pass begins; means nothing to formats without stencil.
+    /// Contents of the stencil when the pass begins; ignored for formats without stencil.
     pub stencil: StencilLoadOp,
-    /// Whether the stencil is kept.
+    /// True if the stencil is stored at the end of the pass.
     pub stencil_store: bool,
-    /// Depth and stencil are loaded and tested, and never written. The texture may be sampled meanwhile, where the pass's
-    /// dependencies list it.
+    /// True if depth and stencil are loaded and tested, but never written. The pass may then also sample the texture,
+    /// if its dependencies list it.
     pub read_only: bool,
-    /// What several samples a pixel are resolved to.
+    /// Resolve of a multisampled target.
     pub resolve: Option<DepthResolve>,
 }
 
-/// Where a render pass takes shading rates from: a texel for each few pixels of the targets, of all layers and views alike.
+/// The texture from which a render pass takes shading rates. A texel covers a block of pixels of the targets, in all
+/// layers and views alike.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ShadingRateAttachment {
-    /// A texture with [`TextureUsage::SHADING_RATE`](crate::TextureUsage::SHADING_RATE), whose texels are as
-    /// [`ShadingRate::texel`](crate::ShadingRate::texel) answers.
+    /// A texture with [`TextureUsage::SHADING_RATE`](crate::TextureUsage::SHADING_RATE).
+    /// [`ShadingRate::texel`](crate::ShadingRate::texel) returns the values of its texels.
     pub texture: TextureHandle,
     /// Mip level read; of a view, counted from its first.
     pub mip: u32,
     /// Layer read; of a view, counted from its first.
     pub layer: u32,
-    /// How many pixels a texel stands for, as [`Limits::shading_rate`](crate::Limits::shading_rate) allows.
+    /// Width and height of the pixels that a texel covers, as [`Limits::shading_rate`](crate::Limits::shading_rate)
+    /// allows.
     pub texel: [u32; 2],
 }
 
 impl ShadingRateAttachment {
-    /// The first mip and layer.
+    /// Returns an attachment of the first mip and layer.
     pub fn new(texture: TextureHandle, texel: [u32; 2]) -> Self {
         Self { texture, mip: 0, layer: 0, texel }
     }
 }
 
 impl DepthAttachment {
-    /// The first mip and layer, cleared to a depth and the stencil 0, and kept.
+    /// Returns a target of the first mip and layer, cleared to a depth and the stencil 0, and stored.
     pub fn clear(texture: TextureHandle, depth: f32) -> Self {
         Self {
             texture,
@@ -158,12 +160,12 @@ impl DepthAttachment {
         }
     }
 
-    /// The first mip and layer, with what is in them, and kept.
+    /// Returns a target of the first mip and layer, with its previous contents, and stored.
     pub fn load(texture: TextureHandle) -> Self {
         Self { load: DepthLoadOp::Load, stencil: StencilLoadOp::Load, ..Self::clear(texture, 0.0) }
     }
 
-    /// The first mip and layer, tested and not written.
+    /// Returns a target of the first mip and layer, tested and not written.
     pub fn read_only(texture: TextureHandle) -> Self {
         Self { read_only: true, ..Self::load(texture) }
     }
@@ -176,26 +178,27 @@ pub struct RenderPassDesc<'a> {
     pub color: &'a [ColorAttachment],
     /// Depth and stencil target.
     pub depth: Option<DepthAttachment>,
-    /// How many layers each target has, from its own first on; 0 and 1 are one. Draws choose theirs by `gl_Layer`, in the
-    /// geometry and mesh stages, and with
+    /// Number of layers drawn to in each target, from the target's own first on; 0 and 1 both mean one. Draws choose
+    /// their layer by `gl_Layer`, in the geometry and mesh stages, and with
     /// [`OptionalFeature::ShaderOutputLayer`](crate::OptionalFeature::ShaderOutputLayer) in the vertex stage.
     pub layers: u32,
-    /// Views that each draw makes at once, a bit for each: bit `i` draws to the layer `i` of each target, counted from the
-    /// target's own first, and shaders know it by `gl_ViewIndex` (`#extension GL_EXT_multiview`). 0 for one picture.
-    /// Needs [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview); at most
+    /// Views that each draw renders at once, a bit for each: bit `i` draws to layer `i` of each target, counted from
+    /// the target's own first. Shaders read the view from `gl_ViewIndex` (`#extension GL_EXT_multiview`). 0 for a pass
+    /// without views. Needs [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview); at most
     /// [`Limits::max_views`](crate::Limits::max_views).
     pub view_mask: u32,
-    /// The pixels that are loaded, cleared, drawn and stored: x, y, width and height. `None` for all.
+    /// The pixels that are loaded, cleared, drawn and stored: x, y, width and height. `None` for all pixels.
     pub area: Option<[u32; 4]>,
-    /// Fragment shaders read those targets that have [`TextureUsage::INPUT`](crate::TextureUsage::INPUT), each at its own
-    /// pixel: what earlier draws of the pass have put there (`LVK_INPUT`, `LVK_DEPTH_INPUT`, `LVK_STENCIL_INPUT` and
-    /// `subpassLoad`). Needs [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
+    /// True if fragment shaders read the targets that have [`TextureUsage::INPUT`](crate::TextureUsage::INPUT). Each
+    /// reads the results of earlier draws of the pass at its own pixel (`LVK_INPUT`, `LVK_DEPTH_INPUT`,
+    /// `LVK_STENCIL_INPUT` and `subpassLoad`). Needs [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
     pub local_read: bool,
-    /// Where pipelines take the sizes of fragments from that combine their
-    /// [`shading_rate`](crate::RenderPipelineDesc::shading_rate) with it.
+    /// Texture of shading rates. Pipelines combine their own [`shading_rate`](crate::RenderPipelineDesc::shading_rate)
+    /// with it.
     pub shading_rate: Option<ShadingRateAttachment>,
-    /// What the pass's shaders reach bindlessly, and what its draws read that was written earlier in the same command
-    /// buffer: no barrier can be placed inside a pass. Acceleration structures need not be listed.
+    /// Resources that the pass's shaders access bindlessly, and resources that its draws read and that were written
+    /// earlier in the same command buffer. No barrier can be recorded inside a pass. Acceleration structures need not
+    /// be listed.
     pub dependencies: Dependencies<'a>,
     /// Name of the pass in debuggers; empty for none.
     pub debug_name: &'a str,

@@ -17,8 +17,8 @@ use crate::resource::Buffer;
 use crate::resource::buffer::BufferUsage;
 
 impl RenderPass<'_> {
-    /// Binds a buffer to a vertex binding of the pipeline, from `offset` bytes on (`vkCmdBindVertexBuffers`): a multiple of 4, so
-    /// that whatever attributes the pipeline has are aligned.
+    /// Binds a buffer to a vertex binding of the pipeline, from `offset` bytes on (`vkCmdBindVertexBuffers`). The
+    /// offset is a multiple of 4, so that all attributes of any pipeline are aligned.
     pub fn bind_vertex_buffer(&mut self, slot: u32, buffer: BufferHandle, offset: u64) -> Result<()> {
         const SLOTS: u32 = 16;
         let buffer = self.cmd.shared.store.buffers.get(buffer)?;
@@ -46,7 +46,7 @@ impl RenderPass<'_> {
         Ok(())
     }
 
-    /// Binds indices, from `offset` bytes on (`vkCmdBindIndexBuffer`).
+    /// Binds an index buffer, from `offset` bytes on (`vkCmdBindIndexBuffer`).
     pub fn bind_index_buffer(
         &mut self,
         buffer: BufferHandle,
@@ -153,7 +153,8 @@ impl RenderPass<'_> {
         Ok(())
     }
 
-    /// One call for all draws, or one for each where the device takes no more.
+    /// Returns the argument offset and the number of draws of each Vulkan call: one call for all draws, or one for each
+    /// if the device has no multi-draw.
     pub(super) fn indirect_calls(
         &self,
         offset: u64,
@@ -192,7 +193,7 @@ impl RenderPass<'_> {
         self.indices.as_ref().ok_or_else(|| Error::usage("draw_indexed", "bind an index buffer first"))
     }
 
-    /// Fails unless a pipeline with a vertex shader is bound with all it reads.
+    /// Fails unless a pipeline with a vertex shader is bound, with all its inputs.
     #[inline]
     pub(super) fn check_draw(&mut self) -> Result<()> {
         self.hazards.drawn = true;
@@ -207,7 +208,7 @@ impl RenderPass<'_> {
         }
     }
 
-    /// What is missing for a draw.
+    /// Returns the error for the state that a draw lacks.
     #[cold]
     fn draw_error(&self) -> Error {
         let pipeline = match self.bound_pipeline("draw") {
@@ -226,7 +227,7 @@ impl RenderPass<'_> {
         self.cmd.missing_constants_error(&pipeline.name, pipeline.push_constant_bytes)
     }
 
-    /// Fails unless a pipeline with a mesh shader is bound with all it reads.
+    /// Fails unless a pipeline with a mesh shader is bound, with all its inputs.
     pub(super) fn check_mesh_draw(&mut self) -> Result<()> {
         self.hazards.drawn = true;
         let pipeline = self.bound_pipeline("draw_mesh_tasks")?;

@@ -9,13 +9,13 @@ use crate::handle::BufferHandle;
 use crate::pipeline::FrontEnd;
 
 impl RenderPass<'_> {
-    /// Runs `groups` workgroups along x, y and z of the task shader of the bound pipeline, or of its mesh shader where it
+    /// Runs `groups` workgroups along x, y and z of the task shader of the bound pipeline, or of its mesh shader if it
     /// has no task shader (`vkCmdDrawMeshTasksEXT`).
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) unless a pipeline with a mesh shader is bound, with its push
     /// constants, and while a query of [`PipelineStatistics`](crate::QueryKind::PipelineStatistics) is open;
-    /// [`LimitExceeded`](crate::Error::LimitExceeded) for more groups than [`MeshLimits`] allows.
+    /// [`LimitExceeded`](crate::Error::LimitExceeded) for more workgroups than [`MeshLimits`] allows.
     pub fn draw_mesh_tasks(&mut self, groups: [u32; 3]) -> Result<()> {
         self.check_mesh_draw()?;
         let pipeline = self.bound_pipeline("draw_mesh_tasks")?;
@@ -29,7 +29,7 @@ impl RenderPass<'_> {
     /// Draws `draw_count` times with arguments (`VkDrawMeshTasksIndirectCommandEXT`, three `u32`) from a buffer with
     /// [`BufferUsage::INDIRECT`](crate::BufferUsage::INDIRECT), `stride` bytes apart (`vkCmdDrawMeshTasksIndirectEXT`).
     ///
-    /// The counts in the buffer are within [`MeshLimits`]: nobody checks them.
+    /// The caller keeps the counts in the buffer within [`MeshLimits`]; the library does not check them.
     pub fn draw_mesh_tasks_indirect(
         &mut self,
         arguments: BufferHandle,

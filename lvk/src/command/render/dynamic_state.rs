@@ -1,11 +1,11 @@
-//! State that a render pass sets in place of its pipelines, as plain values.
+//! Dynamic state of a render pass, as plain values.
 
 use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::PassState;
 use crate::pipeline::depth_stencil::DepthState;
 use crate::pipeline::rasterization::DepthBias;
 
-/// What the pass wants, and what Vulkan's command buffer holds.
+/// The dynamic state that the pass requests, and the state that the Vulkan command buffer holds.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct DynamicState {
     pub(super) stencil_reference: [u8; 2],
@@ -13,7 +13,7 @@ pub(super) struct DynamicState {
     pub(super) current: DynamicValues,
 }
 
-/// Values by state; `None` for one that is not to be set, or is not known.
+/// Values of each dynamic state; `None` for one that is not to be set, or not known.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct DynamicValues {
     pub(super) depth: Option<DepthState>,
@@ -24,13 +24,13 @@ pub(super) struct DynamicValues {
 }
 
 impl DynamicState {
-    /// Whether draws write depth as things stand.
+    /// True if draws write depth in the current state.
     pub(super) fn writes_depth(&self) -> bool {
         self.current.depth.is_some_and(|state| state.write)
     }
 
-    /// What has to be set for a pipeline that leaves `state` to the pass. What a pipeline does not leave is its own, and
-    /// forgotten behind it.
+    /// Returns the values to set for a pipeline with the dynamic state `state`. Binding the pipeline makes all other
+    /// state static, and Vulkan loses its dynamic values.
     pub(super) fn values_for_pipeline(&mut self, state: &PassState) -> DynamicValues {
         let wanted = DynamicValues {
             depth: state.depth,
@@ -50,12 +50,12 @@ impl DynamicState {
     }
 }
 
-/// The value where it is to be set and another one is held.
+/// Returns the wanted value if it differs from the held one.
 fn if_changed<T: PartialEq>(wanted: Option<T>, held: Option<T>) -> Option<T> {
     if wanted == held { None } else { wanted }
 }
 
-/// For pipelines in passes whose depth target is read-only.
+/// The error for pipelines that write in passes whose depth target is read-only.
 pub(super) const READ_ONLY_DEPTH_ERROR: &str =
     "it writes depth or stencil, but the depth target of the pass is read-only; turn the writes off";
 
@@ -81,7 +81,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against a command buffer that forgets each value that a pipeline has of its own.
+        /// Compares with a command buffer that loses each value that is static in a bound pipeline.
         #[test]
         fn every_pipeline_finds_what_it_leaves_to_the_pass(
             binds in prop::collection::vec((state(), 0..3_u8), 1..12)

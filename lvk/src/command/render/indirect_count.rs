@@ -1,4 +1,4 @@
-//! Draws whose number is in a buffer.
+//! Indirect draws whose number is in a buffer.
 
 use std::sync::Arc;
 
@@ -12,21 +12,21 @@ use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 
-/// Where the arguments of draws are, and where their number is. Both buffers have
+/// The buffers with the arguments of draws and with their number. Both have
 /// [`BufferUsage::INDIRECT`](crate::BufferUsage::INDIRECT), and all offsets are multiples of 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IndirectCount {
-    /// The arguments.
+    /// Buffer with the arguments.
     pub arguments: BufferHandle,
-    /// Where the first are, in bytes.
+    /// Offset of the first arguments, in bytes.
     pub offset: u64,
-    /// From one draw's arguments to the next, in bytes: a multiple of 4, at least their size.
+    /// Distance from one draw's arguments to the next, in bytes: a multiple of 4, at least their size.
     pub stride: u32,
-    /// Holds the number of draws, a `u32`.
+    /// Buffer with the number of draws, a `u32`.
     pub count: BufferHandle,
-    /// Where the number is, in bytes.
+    /// Offset of the number, in bytes.
     pub count_offset: u64,
-    /// Most draws, whatever the number is: so many arguments lie in the buffer.
+    /// Most draws, whatever number the buffer has. The arguments of this many draws must lie in the buffer.
     pub max_draws: u32,
 }
 
@@ -35,8 +35,8 @@ impl RenderPass<'_> {
     ///
     /// # Errors
     /// Those of [`draw_indirect`](Self::draw_indirect); [`Unsupported`](crate::Error::Unsupported) without
-    /// [`OptionalFeature::DrawIndirectCount`](crate::OptionalFeature::DrawIndirectCount): leave draws without vertices at
-    /// the end there.
+    /// [`OptionalFeature::DrawIndirectCount`](crate::OptionalFeature::DrawIndirectCount). Without it, use a fixed
+    /// number of draws, the last ones without vertices.
     pub fn draw_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
         self.check_draw()?;
         let command = self.cmd.shared.gpu.device.fp_v1_2().cmd_draw_indirect_count;
@@ -68,7 +68,7 @@ impl RenderPass<'_> {
         self.draw_indirect_count_with(draws, size_of::<vk::DrawMeshTasksIndirectCommandEXT>(), command)
     }
 
-    /// Records one of the three, which all take the same, for arguments of `size` bytes a draw.
+    /// Records one of the three commands, which have the same signature, for arguments of `size` bytes a draw.
     fn draw_indirect_count_with(
         &mut self,
         draws: &IndirectCount,
@@ -77,14 +77,15 @@ impl RenderPass<'_> {
     ) -> Result<()> {
         let [arguments, count] = self.indirect_count_buffers(draws, size as u64)?;
         let IndirectCount { offset, stride, count_offset, max_draws, .. } = *draws;
-        // SAFETY: the pass is ready for such a draw, as in `draw`, and the arguments and their number lie inside the buffers.
+        // SAFETY: the pass is ready for such a draw, as in `draw`, and the arguments and their number lie inside the
+        // buffers.
         unsafe {
             command(self.cmd.raw(), arguments.raw, offset, count.raw, count_offset, max_draws, stride);
         }
         Ok(())
     }
 
-    /// The buffers of arguments and of their number, which the pass reads.
+    /// Returns the buffers of the arguments and of their number, and declares that the pass reads them.
     fn indirect_count_buffers(&mut self, draws: &IndirectCount, size: u64) -> Result<[Arc<Buffer>; 2]> {
         let gpu = &self.cmd.shared.gpu;
         gpu.require(OptionalFeature::DrawIndirectCount, "a number of draws from a buffer")?;

@@ -15,14 +15,14 @@ use crate::resource::texture_desc::TextureUsage;
 /// The targets of a pass that its own fragment shaders can read.
 #[derive(Default)]
 pub(super) struct PassInputAttachments {
-    /// Whether the pass was begun for it.
+    /// True if the pass was begun with `local_read`.
     pub(super) is_enabled: bool,
     pub(super) views: Vec<(InputAttachment, vk::ImageView)>,
     pub(super) mask: InputAttachmentMask,
 }
 
 impl PassInputAttachments {
-    /// None of them yet.
+    /// Creates an empty list. Fails if the pass needs local reads and the device lacks them.
     pub(super) fn new(gpu: &Gpu, desc: &RenderPassDesc<'_>) -> Result<Self> {
         if desc.local_read {
             let name = if desc.debug_name.is_empty() { "without a name" } else { desc.debug_name };
@@ -31,7 +31,7 @@ impl PassInputAttachments {
         Ok(Self { is_enabled: desc.local_read, ..Self::default() })
     }
 
-    /// How the pass uses a target, where it would use it as `plain` without anybody reading it.
+    /// Returns the use of a target in the pass; `plain` is the use without local reads.
     pub(super) fn target_use(&self, target: &PassTarget, plain: Use) -> Use {
         if !self.includes(target) {
             return plain;
@@ -40,12 +40,12 @@ impl PassInputAttachments {
         Use { stages: target.stages | read.stages, access: target.access | read.access, ..target }
     }
 
-    /// Whether shaders can read the target.
+    /// True if shaders can read the target.
     fn includes(&self, target: &PassTarget) -> bool {
         self.is_enabled && target.texture.usage.contains(TextureUsage::INPUT)
     }
 
-    /// The pass draws to this colour target.
+    /// Adds a colour target of the pass.
     pub(super) fn add_color(&mut self, place: u32, target: &PassTarget) -> Result<()> {
         if self.includes(target) {
             self.write_descriptor(InputAttachment::Color(place), target.view()?);
@@ -53,7 +53,7 @@ impl PassInputAttachments {
         Ok(())
     }
 
-    /// The pass draws to this depth target, or only tests it.
+    /// Adds the depth target of the pass, which draws to it or only tests it.
     pub(super) fn add_depth(&mut self, target: &PassTarget) -> Result<()> {
         if !self.includes(target) {
             return Ok(());
@@ -73,7 +73,7 @@ impl PassInputAttachments {
         self.mask.insert(input);
     }
 
-    /// Fails where the pass was begun for nothing.
+    /// Fails if the pass was begun with `local_read` and shaders can read none of its targets.
     pub(super) fn check_desc(&self, desc: &RenderPassDesc<'_>) -> Result<()> {
         if !self.is_enabled || !self.mask.is_empty() {
             return Ok(());
@@ -84,7 +84,7 @@ impl PassInputAttachments {
         Err(Error::usage(name, message))
     }
 
-    /// Fails unless the pass has what a pipeline reads.
+    /// Fails unless the pass has the targets that a pipeline reads.
     pub(super) fn check_reads(&self, pipeline: &RenderPipeline) -> Result<()> {
         let missing = pipeline.reads.without(self.mask);
         if missing.is_empty() { Ok(()) } else { self.missing_input_error(pipeline, missing) }

@@ -1,4 +1,4 @@
-//! Passes whose fragment shaders read what the pass has drawn.
+//! Passes whose fragment shaders read the pass's own targets.
 
 use ash::vk;
 
@@ -15,7 +15,7 @@ use crate::pipeline::local_read::{InputIndices, READS_WRITTEN, default_indices};
 use crate::submit::emit_barriers::vulkan_layout as raw_layout;
 
 impl CommandBuffer {
-    /// Binds the set of the targets that shaders read, whose other places no shader may look at.
+    /// Binds the descriptor set of the targets that shaders read. No shader may read its other bindings.
     pub(super) fn bind_inputs(&mut self, targets: &PassTargets) -> Result<()> {
         let shared = &self.shared;
         let Some(layout) = shared.layout.inputs.as_ref().filter(|_| targets.inputs.is_enabled) else {
@@ -36,7 +36,8 @@ impl CommandBuffer {
             })
             .collect();
         let point = vk::PipelineBindPoint::GRAPHICS;
-        // SAFETY: the views are alive, nobody uses the set yet, and it has the layout of this place in the pipelines' layout.
+        // SAFETY: the views are alive, the set is not in use yet, and it has the layout at `INPUT_SET` of the pipeline
+        // layout.
         unsafe {
             shared.gpu.device.update_descriptor_sets(&writes, &[]);
             let commands = self.recording.commands;
@@ -54,11 +55,12 @@ impl CommandBuffer {
 }
 
 impl RenderPass<'_> {
-    /// What was drawn so far is there for the draws that follow, whose fragment shaders read it at their own pixel, and is
-    /// not changed by them before it was read (`vkCmdPipelineBarrier2` with `VK_DEPENDENCY_BY_REGION_BIT`).
+    /// Makes earlier draws visible to the fragment shaders of later draws, which read the targets at their own pixel.
+    /// Later draws do not change a target before earlier ones have read it (`vkCmdPipelineBarrier2` with
+    /// `VK_DEPENDENCY_BY_REGION_BIT`).
     ///
-    /// Binding a pipeline does this where it reads what was drawn, or draws to what was read, so it is only needed between
-    /// draws with one pipeline that both reads and writes a target.
+    /// Binding a pipeline does the same if it reads targets that were drawn to, or draws to targets that were read. So
+    /// this is only needed between draws with one pipeline that both reads and writes a target.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) in passes that were begun without
@@ -73,7 +75,7 @@ impl RenderPass<'_> {
         Ok(())
     }
 
-    /// A pipeline that the pass has the targets for is bound in place of another.
+    /// Orders earlier draws before the draws with the pipeline `next`, which is bound in place of another one.
     pub(super) fn order_target_accesses(&mut self, next: &RenderPipeline) {
         if !self.targets.inputs.is_enabled {
             return;
@@ -85,7 +87,7 @@ impl RenderPass<'_> {
         self.set_input_indices(!next.reads.is_empty());
     }
 
-    /// Depth is written from here on, other than the bound pipeline says.
+    /// Declares that draws write depth from here on, unlike the state that the bound pipeline was created with.
     pub(super) fn write_depth(&mut self) -> Result<()> {
         let reader =
             self.pipeline.as_ref().filter(|pipeline| pipeline.reads.contains(InputAttachment::Depth));
@@ -109,11 +111,12 @@ impl RenderPass<'_> {
             flags |= vk::DependencyFlags::VIEW_LOCAL;
         }
         let info = vk::DependencyInfo::default().dependency_flags(flags).memory_barriers(&barrier);
-        // SAFETY: a pass is open whose targets are in the layout for this, and all stages are those of fragments.
+        // SAFETY: a pass is open whose targets are in the layout for local reads, and all stages are framebuffer-space
+        // stages.
         unsafe { self.cmd.shared.gpu.device.cmd_pipeline_barrier2(self.cmd.raw(), &info) };
     }
 
-    /// Tells Vulkan where shaders find targets, as their pipeline was told, or was not.
+    /// Sets the indices by which shaders find targets in Vulkan: those of pipelines that read targets, or the defaults.
     fn set_input_indices(&mut self, wanted: bool) {
         let gpu = &self.cmd.shared.gpu;
         let Some(ext) = gpu.local_read.as_ref().filter(|_| wanted != self.hazards.finds_inputs) else {
@@ -123,12 +126,12 @@ impl RenderPass<'_> {
         let colors = self.targets.colors.len() as u32;
         let indices = InputIndices::new(colors, gpu.caps.limits.max_input_attachments);
         let info = if wanted { indices.raw() } else { default_indices(colors) };
-        // SAFETY: a pass with so many colour targets is open.
+        // SAFETY: a pass with `colors` colour targets is open.
         unsafe { ext.cmd_set_rendering_input_attachment_indices(self.cmd.raw(), &info) };
     }
 }
 
-/// Orders draws before and behind, at each pixel, by what they read and write of these targets.
+/// Returns the barrier that orders earlier and later draws at each pixel, by their accesses to these targets.
 fn draw_barrier(inputs: InputAttachmentMask) -> vk::MemoryBarrier2<'static> {
     use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
     let mut stages = Stage::FRAGMENT_SHADER;

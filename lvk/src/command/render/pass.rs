@@ -19,8 +19,8 @@ use crate::pipeline::{FrontEnd, RenderPipeline};
 use crate::resource::Buffer;
 use crate::submit::Recording;
 
-/// A render pass being recorded. It borrows the command buffer, so nothing but draws can be recorded until it is
-/// dropped, which ends the pass (`vkCmdEndRendering`).
+/// A render pass being recorded. It borrows the command buffer, so only draws can be recorded until it is dropped.
+/// Dropping it ends the pass (`vkCmdEndRendering`).
 ///
 /// ```compile_fail,E0499
 /// fn no_dispatch_inside(cmd: &mut lvk::CommandBuffer, pass: &lvk::RenderPassDesc<'_>) -> lvk::Result<()> {
@@ -34,7 +34,7 @@ pub struct RenderPass<'a> {
     pub(super) targets: PassTargets,
     pub(super) dynamic: DynamicState,
     pub(in crate::command) labelled: bool,
-    /// Labels open around the pass.
+    /// Number of labels that are open outside of the pass.
     pub(in crate::command) labels_outside: u32,
     pub(super) hazards: TargetHazards,
     pub(super) pipeline: Option<Arc<RenderPipeline>>,
@@ -43,15 +43,15 @@ pub struct RenderPass<'a> {
     pub(super) vertex_slots: u32,
 }
 
-/// What draws with the bound pipeline need, gathered when it is bound so that a draw looks at no more than this.
+/// Requirements of draws with the bound pipeline. Collected when it is bound, so that a draw checks no more than this.
 pub(super) struct DrawRequirements {
     pub(super) vertex_slots: u32,
-    /// A bit for each 4 bytes of push constants.
+    /// A bit for each 4-byte word of push constants.
     pub(super) push_constants: u64,
 }
 
 impl DrawRequirements {
-    /// Nothing for a pipeline that has no vertex shader.
+    /// Returns `None` for a pipeline without a vertex shader.
     fn for_pipeline(pipeline: &RenderPipeline) -> Option<Self> {
         (pipeline.front_end == FrontEnd::Vertex).then(|| Self {
             vertex_slots: (1 << pipeline.vertex_binding_count) - 1,
@@ -87,7 +87,7 @@ impl<'a> RenderPass<'a> {
         pass
     }
 
-    /// Width and height of the targets in pixels.
+    /// Returns the width and height of the targets in pixels.
     pub fn extent(&self) -> [u32; 2] {
         self.targets.extent
     }
@@ -109,9 +109,8 @@ impl<'a> RenderPass<'a> {
         self.check_shading_rates(&pipeline)?;
         if !pipeline.query_stages.is_empty() {
             self.cmd.use_accel_structs(pipeline.query_stages);
-            let remedy =
-                "create the pipeline before the pass begins, or list a structure in the pass's dependencies";
-            self.track_in_pass("what the pipeline's ray queries see", &pipeline.name, remedy)?;
+            let remedy = "create the pipeline before the pass begins, or list one in the pass's dependencies";
+            self.track_in_pass("an acceleration structure", &pipeline.name, remedy)?;
         }
         self.order_target_accesses(&pipeline);
         let point = vk::PipelineBindPoint::GRAPHICS;
@@ -128,7 +127,8 @@ impl<'a> RenderPass<'a> {
         self.cmd.push_constants(constants)
     }
 
-    /// Maps clip space to pixels: x, y, width, height, and the depth range. Heights may be negative to flip y.
+    /// Sets the rectangle that clip space maps to: x, y, width and height in pixels, and the depth range. The height
+    /// may be negative to flip y.
     pub fn viewport(&mut self, rectangle: [f32; 4], depth: [f32; 2]) -> Result<()> {
         let limits = &self.cmd.shared.gpu.caps.limits;
         let depths = depth.iter().all(|end| (0.0..=1.0).contains(end));
@@ -144,7 +144,7 @@ impl<'a> RenderPass<'a> {
         Ok(())
     }
 
-    /// Draws only inside of a rectangle: offset and extent in pixels, inside the pass's area.
+    /// Limits draws to a rectangle: offset and extent in pixels, inside the pass's area.
     pub fn scissor(&mut self, offset: [u32; 2], extent: [u32; 2]) -> Result<()> {
         let area = self.targets.area;
         let wanted = PassArea { offset, extent };
@@ -161,7 +161,8 @@ impl<'a> RenderPass<'a> {
         self.pipeline.as_deref().ok_or_else(|| Error::usage(call, "bind a render pipeline first"))
     }
 
-    /// The pass reads a buffer; no barrier can be placed any more.
+    /// Declares that the pass reads a buffer. Fails if the read needs a barrier, which cannot be recorded inside the
+    /// pass.
     pub(super) fn read_in_pass(&mut self, buffer: &Buffer, next: Use) -> Result<()> {
         self.cmd.use_buffer(buffer, next);
         self.track_in_pass("the buffer", &buffer.name, "list it in the pass's dependencies")
@@ -211,6 +212,6 @@ fn viewport_fits([x, y, width, height]: [f32; 4], limits: &Limits) -> bool {
     let sides = width > 0.0
         && width <= limits.max_viewport[0] as f32
         && height.abs() <= limits.max_viewport[1] as f32;
-    // Comparisons with what is no number are false.
+    // Comparisons with NaN are false.
     sides && [x, x + width, y, y + height].iter().all(|at| (low..=high).contains(at))
 }

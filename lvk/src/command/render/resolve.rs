@@ -12,7 +12,8 @@ use crate::gpu::caps::resolve_modes::ResolveMode;
 use crate::submit::emit_barriers::vulkan_layout;
 
 impl CommandBuffer {
-    /// A multisampled colour target and what it is resolved to: the pass uses both.
+    /// Declares that the pass uses a multisampled colour target and its resolve target. Returns the attachment with
+    /// both.
     pub(super) fn use_color_resolve(
         &mut self,
         source: &PassTarget,
@@ -29,7 +30,8 @@ impl CommandBuffer {
             .resolve_image_layout(vulkan_layout(Use::resolve_target().layout)))
     }
 
-    /// The same of a depth target, whose depth and stencil are resolved each by its mode.
+    /// As [`use_color_resolve`](Self::use_color_resolve), for a depth target, whose depth and stencil are resolved each
+    /// by its mode.
     pub(super) fn use_depth_resolve(
         &mut self,
         source: &PassTarget,
@@ -65,7 +67,7 @@ impl CommandBuffer {
         if depth.is_none() && stencil.is_none() {
             return Err(Error::usage(name, "give the depth resolve a mode of depth or of stencil"));
         }
-        // Without stencil there is nothing to go together with.
+        // Without stencil, the mode of depth need not match another mode.
         let allowed = match format.has_stencil() {
             true => limits.supports(depth, stencil),
             false => depth.is_none_or(|mode| limits.depth.contains(mode.bit())),
@@ -100,7 +102,7 @@ fn check_resolve(source: &PassTarget, to: &PassTarget) -> Result<()> {
     Ok(())
 }
 
-/// Vulkan leaves no choice.
+/// Returns the only resolve mode that Vulkan allows for a colour format.
 fn color_resolve_mode(format: Format) -> vk::ResolveModeFlags {
     if format.numeric_format() != NumericFormat::Float {
         vk::ResolveModeFlags::SAMPLE_ZERO

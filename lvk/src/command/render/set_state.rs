@@ -12,8 +12,9 @@ use crate::pipeline::depth_stencil::DepthState;
 use crate::pipeline::rasterization::DepthBias;
 
 impl RenderPass<'_> {
-    /// The reference that stencil values are compared with and replaced by, of front and of back faces, for this and later
-    /// pipelines of the pass (`vkCmdSetStencilReference`). 0 at the begin of a pass.
+    /// Sets the stencil references of front and of back faces, for this and later pipelines of the pass
+    /// (`vkCmdSetStencilReference`). Stencil values are compared with them and replaced by them. 0 at the begin of a
+    /// pass.
     pub fn stencil_reference(&mut self, front: u8, back: u8) {
         self.dynamic.stencil_reference = [front, back];
         if self.dynamic.current.stencil_reference.is_some() {
@@ -22,8 +23,8 @@ impl RenderPass<'_> {
         }
     }
 
-    /// The constants of [`BlendFactor::ConstantColor`](crate::BlendFactor::ConstantColor) and its kin, for this and later pipelines
-    /// of the pass (`vkCmdSetBlendConstants`). 0 at the begin of a pass.
+    /// Sets the constants of [`BlendFactor::ConstantColor`](crate::BlendFactor::ConstantColor) and the other constant
+    /// factors, for this and later pipelines of the pass (`vkCmdSetBlendConstants`). 0 at the begin of a pass.
     pub fn blend_constants(&mut self, constants: [f32; 4]) {
         self.dynamic.blend_constants = constants;
         if self.dynamic.current.blend_constants.is_some() {
@@ -32,12 +33,12 @@ impl RenderPass<'_> {
         }
     }
 
-    /// Another depth test than that of the bound pipeline, until a pipeline is bound (`vkCmdSetDepthCompareOp`,
+    /// Replaces the depth test of the bound pipeline until a pipeline is bound (`vkCmdSetDepthCompareOp`,
     /// `vkCmdSetDepthWriteEnable`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a depth test is bound, and for writes in a pass whose
-    /// depth target is read-only.
+    /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a depth test is bound, and for writes in a pass
+    /// whose depth target is read-only.
     pub fn depth_state(&mut self, state: DepthState) -> Result<()> {
         let pipeline = self.bound_pipeline("depth_state")?;
         if pipeline.pass_state.depth.is_none() {
@@ -55,11 +56,11 @@ impl RenderPass<'_> {
         Ok(())
     }
 
-    /// Another depth bias than that of the bound pipeline, until a pipeline is bound (`vkCmdSetDepthBias`).
+    /// Replaces the depth bias of the bound pipeline until a pipeline is bound (`vkCmdSetDepthBias`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a depth bias is bound, and for parts that are no
-    /// numbers; [`Unsupported`](Error::Unsupported) for a bound without
+    /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a depth bias is bound, and for values that are not
+    /// finite; [`Unsupported`](Error::Unsupported) for a clamp without
     /// [`OptionalFeature::DepthBiasClamp`](crate::OptionalFeature::DepthBiasClamp).
     pub fn depth_bias(&mut self, bias: DepthBias) -> Result<()> {
         let pipeline = self.bound_pipeline("depth_bias")?;
@@ -77,14 +78,14 @@ impl RenderPass<'_> {
         Ok(())
     }
 
-    /// The rate of the draws that follow, which the device has.
+    /// Sets the shading rate of the draws that follow. The device must support it.
     pub(super) fn set_shading_rate(&mut self, rate: ShadingRate) {
         let values = DynamicValues { shading_rate: Some(rate), ..Default::default() };
         self.dynamic.current.shading_rate = values.shading_rate;
         self.set_values(&values);
     }
 
-    /// Sets what the pipeline that was bound now leaves to the pass.
+    /// Sets the dynamic state of the pipeline that was just bound.
     pub(super) fn set_pipeline_state(&mut self, state: &PassState) {
         let values = self.dynamic.values_for_pipeline(state);
         if values != DynamicValues::default() {
@@ -94,8 +95,8 @@ impl RenderPass<'_> {
 
     fn set_values(&self, values: &DynamicValues) {
         let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
-        // SAFETY: the command buffer is being recorded, and the device has each state: those of depth are core, and what
-        // needs a feature was refused without it.
+        // SAFETY: the command buffer is being recorded, and the device supports each state: those of depth are core,
+        // and state that needs a feature was rejected without it.
         unsafe {
             if let Some(DepthState { compare, write }) = values.depth {
                 device.cmd_set_depth_compare_op(raw, compare.raw());

@@ -1,4 +1,4 @@
-//! Passes that take the sizes of fragments from a texture, and draws that bring their own.
+//! Shading rates of a pass, from a texture, and of draws.
 
 use ash::vk;
 
@@ -15,7 +15,7 @@ use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit_barriers::vulkan_layout;
 
 impl CommandBuffer {
-    /// Finds and checks where a pass takes its rates from; the pass uses it.
+    /// Checks the shading rate texture of a pass, and declares its use.
     pub(super) fn use_shading_rate_attachment(
         &mut self,
         desc: &RenderPassDesc<'_>,
@@ -53,13 +53,12 @@ fn check_covers_area(texels: [u32; 2], texel: [u32; 2], area: PassArea) -> Resul
 }
 
 impl RenderPass<'_> {
-    /// Another size of fragments than that of the bound pipeline, until a pipeline is bound
-    /// (`vkCmdSetFragmentShadingRateKHR`).
+    /// Replaces the shading rate of the bound pipeline until a pipeline is bound (`vkCmdSetFragmentShadingRateKHR`).
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a
-    /// [`shading_rate`](crate::RenderPipelineDesc::shading_rate) is bound;
-    /// [`Unsupported`](Error::Unsupported) for sizes and combinations that the device lacks.
+    /// [`shading_rate`](crate::RenderPipelineDesc::shading_rate) is bound; [`Unsupported`](Error::Unsupported) for
+    /// fragment sizes and combinations that the device lacks.
     pub fn shading_rate(&mut self, rate: ShadingRate) -> Result<()> {
         let pipeline = self.bound_pipeline("shading_rate")?;
         if pipeline.pass_state.shading_rate.is_none() {
@@ -71,7 +70,7 @@ impl RenderPass<'_> {
         Ok(())
     }
 
-    /// Fails where the pass has rates that the pipeline was not made for.
+    /// Fails if the pass has a shading rate texture and the pipeline was created without a shading rate.
     pub(super) fn check_shading_rates(&self, pipeline: &RenderPipeline) -> Result<()> {
         if self.targets.rates.is_none() || pipeline.pass_state.shading_rate.is_some() {
             return Ok(());

@@ -25,23 +25,23 @@ impl PassTarget {
         }
     }
 
-    /// One aspect of what the pass draws to.
+    /// Returns the view of one aspect of the target.
     pub(super) fn input_view(&self, aspect: vk::ImageAspectFlags) -> Result<vk::ImageView> {
         self.texture.input_view(self.subresources(), self.layers.is_layered(), aspect)
     }
 
-    /// Mip and layers, or slices.
+    /// Returns the mip and the layers, or slices, of the target.
     pub(super) fn subresource_texels(&self) -> Subresources {
         let part = self.texture.subresource(self.mip, self.layer);
         Subresources { layer_count: self.layers.layer_count(), ..part }
     }
 
-    /// Width and height.
+    /// Returns the width and height of the target in pixels.
     pub(super) fn extent(&self) -> [u32; 2] {
         self.texture.mip_extent(self.mip)
     }
 
-    /// The same as barriers know it.
+    /// Returns the subresources of the target as barriers use them.
     pub(super) fn subresources(&self) -> Subresources {
         self.texture.attachment_subresources(self.mip, self.layer, self.layers.layer_count())
     }

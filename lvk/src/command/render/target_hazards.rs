@@ -3,19 +3,19 @@
 use crate::bindless::input_attachments::{InputAttachment, InputAttachmentMask};
 use crate::pipeline::RenderPipeline;
 
-/// What draws of the pass have done to its targets since the last barrier.
+/// Accesses of draws to the targets of the pass since the last barrier.
 #[derive(Default)]
 pub(super) struct TargetHazards {
     pub(super) read: InputAttachmentMask,
     pub(super) written: InputAttachmentMask,
-    /// Whether there was a draw since the bound pipeline was bound, or since the last barrier.
+    /// True if there was a draw since the bound pipeline was bound, or since the last barrier.
     pub(super) drawn: bool,
-    /// Vulkan knows the library's places of targets.
+    /// True if the library's input attachment indices are set in Vulkan.
     pub(super) finds_inputs: bool,
 }
 
 impl TargetHazards {
-    /// Counts what `pipeline` has drawn, while depth was written or not.
+    /// Adds the accesses of the draws with `pipeline`. They also wrote depth if `writes_depth` is true.
     pub(super) fn record_draws(&mut self, pipeline: Option<&RenderPipeline>, writes_depth: bool) {
         if let Some(pipeline) = pipeline.filter(|_| self.drawn) {
             self.read = self.read.union(pipeline.reads);
@@ -27,7 +27,7 @@ impl TargetHazards {
         self.drawn = false;
     }
 
-    /// Whether draws that read and write these have to wait for those before.
+    /// True if draws with these reads and writes have to wait for earlier draws.
     pub(super) fn needs_barrier(&self, reads: InputAttachmentMask, writes: InputAttachmentMask) -> bool {
         self.written.intersects(reads) || self.read.intersects(writes)
     }

@@ -1,4 +1,4 @@
-//! Blits, and the mips made by them.
+//! Blits, and the generation of mips by blits.
 
 use std::sync::Arc;
 
@@ -15,15 +15,15 @@ use crate::resource::region::{Region, TextureRegion};
 use crate::resource::sampler::Filter;
 
 impl CommandBuffer {
-    /// Copies and scales a region, converting the format (`vkCmdBlitImage`). Both regions have equally many layers; a
-    /// volume is scaled in depth too, and only to a volume or one layer. Views count as of the format of the texture they
-    /// show.
+    /// Copies and scales a region, and converts its format (`vkCmdBlitImage`). Both regions have the same number of
+    /// layers. A volume is scaled in depth too, and only to a volume or one layer. A view counts as of the format of
+    /// its texture.
     ///
     /// # Errors
-    /// [`Unsupported`](Error::Unsupported) for formats that the device cannot scale; depth and stencil are scaled one at a
-    /// time, to the nearest texel of the same format. [`InvalidUsage`](Error::InvalidUsage) for regions that do not
-    /// exist or have different numbers of layers, and for multisampled textures; [`WrongQueue`](Error::WrongQueue) on another
-    /// queue than the graphics queue.
+    /// [`Unsupported`](Error::Unsupported) for formats that the device cannot scale. Depth and stencil are scaled one
+    /// at a time, to the nearest texel, and in the same format. [`InvalidUsage`](Error::InvalidUsage) for regions that
+    /// do not exist or have different numbers of layers, and for multisampled textures;
+    /// [`WrongQueue`](Error::WrongQueue) on queues other than the graphics queue.
     pub fn blit_texture(
         &mut self,
         source: TextureHandle,
@@ -55,7 +55,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Fills every mip but the first by halving the one before, for all layers, volumes in depth too.
+    /// Fills every mip but the first by scaling the previous mip to half its size, for all layers. Volumes are halved
+    /// in depth too.
     ///
     /// # Errors
     /// As [`blit_texture`](Self::blit_texture).
@@ -128,7 +129,7 @@ impl CommandBuffer {
     }
 }
 
-/// Whether Vulkan scales between the formats at all.
+/// True if Vulkan supports blits between the formats at all.
 fn is_blit_supported(from: Format, to: Format, filter: Filter) -> bool {
     if from.is_yuv() || to.is_yuv() {
         return false;

@@ -11,17 +11,17 @@ use crate::error::{Error, Result};
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 
-/// Bytes that one command may carry with it.
+/// Most bytes that one `vkCmdUpdateBuffer` takes.
 const INLINE_BYTES: usize = 65_536;
 
-/// Bytes to copy from one buffer to another.
+/// A range of bytes to copy from one buffer to another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BufferCopy {
-    /// Where they begin in the source.
+    /// Offset in the source, in bytes.
     pub source_offset: u64,
-    /// Where they go in the target.
+    /// Offset in the target, in bytes.
     pub target_offset: u64,
-    /// How many they are.
+    /// Number of bytes.
     pub size: u64,
 }
 
@@ -44,11 +44,11 @@ impl CommandBuffer {
         self.copy_buffer_regions(source, target, &[BufferCopy { source_offset, target_offset, size }])
     }
 
-    /// Copies several ranges of bytes by one command (`vkCmdCopyBuffer`).
+    /// Copies several ranges of bytes with one command (`vkCmdCopyBuffer`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for ranges outside of the buffers, for targets that overlap each other, and,
-    /// within one buffer, for any target that overlaps any source. None of the ranges is copied then.
+    /// [`InvalidUsage`](Error::InvalidUsage) for ranges outside of the buffers, for targets that overlap each other,
+    /// and, within one buffer, for any target that overlaps any source. Then none of the ranges is copied.
     pub fn copy_buffer_regions(
         &mut self,
         source: BufferHandle,
@@ -99,8 +99,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Writes bytes that the command buffer takes along, any number at any offset: up to 65,536 of them, offset and number
-    /// multiples of 4, as part of the command (`vkCmdUpdateBuffer`), others by way of the staging ring
+    /// Writes bytes, any number at any offset; the call copies them. Up to 65,536 bytes are part of the command if
+    /// offset and number are multiples of 4 (`vkCmdUpdateBuffer`). Others go through staging memory
     /// (`vkCmdCopyBuffer`).
     pub fn update_buffer(&mut self, buffer: BufferHandle, offset: u64, bytes: &[u8]) -> Result<()> {
         let buffer = self.shared.store.buffers.get(buffer)?;
@@ -137,7 +137,7 @@ impl CommandBuffer {
     }
 }
 
-/// Fails unless all ranges lie in their buffers, and nothing is written that is also read or written twice.
+/// Fails unless all ranges lie in their buffers, and no byte is written twice or both read and written.
 fn check_copies(source: &Buffer, target: &Buffer, regions: &[BufferCopy]) -> Result<()> {
     for region in regions {
         source.check_range(region.source_offset, region.size)?;
@@ -155,7 +155,7 @@ fn check_copies(source: &Buffer, target: &Buffer, regions: &[BufferCopy]) -> Res
     Ok(())
 }
 
-/// First byte of each range that is not empty, and the one behind its last.
+/// Returns the first byte of each range that is not empty, and the byte after its last.
 fn non_empty_ranges(
     regions: &[BufferCopy],
     start: impl Fn(&BufferCopy) -> u64,

@@ -12,31 +12,32 @@ use crate::handle::TextureHandle;
 use crate::resource::Texture;
 use crate::resource::region::TextureRange;
 
-/// What a texture is filled with.
+/// The value that fills a texture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ClearValue {
     /// A colour, for formats that shaders read as floats.
     Color([f32; 4]),
-    /// Unsigned integers, for colours of such a format.
+    /// Unsigned integers, for unsigned integer formats.
     Uint([u32; 4]),
-    /// Signed integers, for colours of such a format.
+    /// Signed integers, for signed integer formats.
     Sint([i32; 4]),
-    /// A depth from 0 to 1; stencil stays.
+    /// A depth from 0 to 1; leaves the stencil unchanged.
     Depth(f32),
-    /// A stencil value from 0 to 255; depth stays.
+    /// A stencil value from 0 to 255; leaves the depth unchanged.
     Stencil(u32),
-    /// Both.
+    /// Depth and stencil.
     DepthStencil(f32, u32),
 }
 
 impl CommandBuffer {
     /// Fills mips and layers of a texture, all slices of volumes, with one value (`vkCmdClearColorImage`,
-    /// `vkCmdClearDepthStencilImage`). A colour is encoded in the format of the texture itself where this is a view of it.
+    /// `vkCmdClearDepthStencilImage`). If the texture is a view, a colour is encoded in the format of the viewed
+    /// texture.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for mips and layers that do not exist, for values that the format does not
-    /// hold or that are out of range, and for compressed formats; [`WrongQueue`](Error::WrongQueue) on the transfer queue, and
-    /// for depth and stencil on another queue than the graphics queue.
+    /// hold or that are out of range, and for compressed formats; [`WrongQueue`](Error::WrongQueue) on the transfer
+    /// queue, and for depth and stencil on queues other than the graphics queue.
     pub fn clear_texture(
         &mut self,
         texture: TextureHandle,
@@ -90,7 +91,8 @@ fn raw_value(value: ClearValue) -> RawClearValue {
     }
 }
 
-/// The aspects that the value fills, where the texture has them and the value is in range.
+/// Returns the aspects that the value fills. Fails if the texture lacks them, or if the value is out of range or of
+/// another kind.
 fn check_value(texture: &Texture, value: ClearValue) -> Result<vk::ImageAspectFlags> {
     use vk::ImageAspectFlags as Aspects;
     let format = texture.image.format;
@@ -110,13 +112,13 @@ fn check_value(texture: &Texture, value: ClearValue) -> Result<vk::ImageAspectFl
         RawClearValue::DepthStencil(value) => (value.depth, value.stencil),
     };
     if !texture.view_aspects().contains(wanted) {
-        return wrong("it does not hold that");
+        return wrong("the texture lacks the aspect");
     }
     if format.is_compressed() || format.is_yuv() {
-        return wrong("its texels are only copied");
+        return wrong("its texels can only be copied");
     }
     if numbers.is_some_and(|numbers| numbers != format.numeric_format()) {
-        return wrong("its numbers are of another kind");
+        return wrong("the numeric formats differ");
     }
     if !(0.0..=1.0).contains(&depth) || stencil > 0xFF {
         return wrong("depths are from 0 to 1, stencil values from 0 to 255");

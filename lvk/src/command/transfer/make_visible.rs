@@ -1,4 +1,4 @@
-//! What copies leave behind is made readable everywhere before shaders run.
+//! Makes the results of copies visible to all stages before shaders run.
 
 use crate::barrier::{Layout, Stages, Use};
 use crate::command::CommandBuffer;
@@ -10,7 +10,7 @@ use crate::submit::Recording;
 use crate::submit::emit_barriers::emit;
 
 impl CommandBuffer {
-    /// Makes what copies touched readable by every shader and every input, with one barrier for all.
+    /// Makes the resources that copies used readable by every shader and every input, with one barrier for all.
     #[inline]
     pub(in crate::command) fn make_visible(&mut self) {
         if !self.state.pending_visibility.is_empty() {
@@ -23,7 +23,7 @@ impl CommandBuffer {
         let Recording { tracker, images, commands, .. } = &mut **self.recording;
         let RecordingState { pending_visibility, barriers, last_barrier, .. } = &mut **self.state;
         barriers.clear();
-        // What was written twice is listed twice; the second read needs no barrier any more.
+        // A resource written twice is listed twice; its second read needs no barrier.
         for written in pending_visibility.drain(..) {
             match written {
                 PendingVisibility::Buffer(buffer) => {
@@ -46,7 +46,7 @@ impl CommandBuffer {
     }
 }
 
-/// How shaders read a texture that no command declares; `None` for textures they do not read.
+/// Returns the use of a texture by shaders without a declaration; `None` if shaders do not read it.
 fn default_use(usage: TextureUsage) -> Option<Use> {
     let read = Use::shader_read(Stages::SHADERS);
     if usage.contains(TextureUsage::SAMPLED) {

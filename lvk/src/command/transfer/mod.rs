@@ -22,13 +22,13 @@ use crate::resource::region::Region;
 pub use buffer::BufferCopy;
 pub use clear::ClearValue;
 
-/// Layout of an image that is copied from.
+/// Layout of the source image of a copy.
 const SOURCE_LAYOUT: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-/// Layout of an image that is copied to.
+/// Layout of the target image of a copy.
 const TARGET_LAYOUT: vk::ImageLayout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
 
 impl CommandBuffer {
-    /// The next command reads one region and writes another.
+    /// Records the barriers for a command that reads one region and writes another.
     fn use_texture_pair(
         &mut self,
         source: &Arc<Texture>,
@@ -46,7 +46,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Both are read by shaders next, where nobody says otherwise.
+    /// Adds both textures to those that are made visible to shaders.
     fn make_pair_visible(&mut self, source: Arc<Texture>, target: Arc<Texture>) {
         self.state.pending_visibility.extend([source, target].map(PendingVisibility::Texture));
     }

@@ -10,15 +10,14 @@ use crate::resource::Texture;
 use crate::resource::region::TextureRegion;
 
 impl CommandBuffer {
-    /// Copies a region of a multisampled colour texture to one of one sample, each texel the mean of its samples, of
-    /// integers one of them (`vkCmdResolveImage`). Both have one format, and both regions have the extent and layers of
-    /// the first.
-    /// Depth and stencil are resolved by passes.
+    /// Resolves a region of a multisampled colour texture to a texture of one sample (`vkCmdResolveImage`). Each texel
+    /// becomes the mean of its samples, or one of them for integer formats. Both textures have the same format, and
+    /// both regions have the extent and layers of `from`. Render passes resolve depth and stencil.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for other numbers of samples, for different formats, for depth, and for
-    /// regions that do not exist; [`Unsupported`](Error::Unsupported) where the format cannot be resolved to;
-    /// [`WrongQueue`](Error::WrongQueue) on another queue than the graphics queue.
+    /// regions that do not exist; [`Unsupported`](Error::Unsupported) if the device cannot resolve to the format;
+    /// [`WrongQueue`](Error::WrongQueue) on queues other than the graphics queue.
     pub fn resolve_texture(
         &mut self,
         source: TextureHandle,
@@ -40,7 +39,8 @@ impl CommandBuffer {
             dst_offset: to.raw_offset(),
             extent: from.raw_extent(),
         };
-        // SAFETY: both regions lie inside their images of one format, the first with several samples, the other with one.
+        // SAFETY: both regions lie inside their images of one format, the first with several samples, the other with
+        // one.
         unsafe {
             let device = &self.shared.gpu.device;
             device.cmd_resolve_image(

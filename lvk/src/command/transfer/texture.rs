@@ -14,8 +14,8 @@ use crate::resource::region::{Region, TextureRegion};
 use crate::resource::{Buffer, Texture};
 
 impl CommandBuffer {
-    /// Copies bytes, tightly packed, row by row and layer by layer, into a region of a texture (`vkCmdCopyBufferToImage`).
-    /// The offset is a multiple of 4 and of the bytes of a texel or block.
+    /// Copies bytes, tightly packed, row by row and layer by layer, into a region of a texture
+    /// (`vkCmdCopyBufferToImage`). The offset is a multiple of 4 and of the size of a texel or block in bytes.
     pub fn copy_buffer_to_texture(
         &mut self,
         source: BufferHandle,
@@ -35,14 +35,14 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Writes texels that the command buffer takes along by way of the staging memory, tightly packed, row by row and layer by
-    /// layer (`vkCmdCopyBufferToImage`). On the transfer queue this streams textures beside what is drawn.
+    /// Writes texels through staging memory (`vkCmdCopyBufferToImage`). The call copies the bytes, which are tightly
+    /// packed, row by row and layer by layer. On the transfer queue this streams textures while other queues draw.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a region that does not exist, another number of bytes than it has, multisampled
-    /// textures, and regions that copies on the queue cannot have
-    /// ([`QueueInfo::copy_granularity`](crate::QueueInfo::copy_granularity)); [`WrongQueue`](Error::WrongQueue) for depth and
-    /// stencil on another queue than the graphics queue.
+    /// [`InvalidUsage`](Error::InvalidUsage) for a region that does not exist, a number of bytes other than the
+    /// region's, multisampled textures, and regions that copies on the queue do not support
+    /// ([`QueueInfo::copy_granularity`](crate::QueueInfo::copy_granularity)); [`WrongQueue`](Error::WrongQueue) for
+    /// depth and stencil on queues other than the graphics queue.
     pub fn update_texture(
         &mut self,
         target: TextureHandle,
@@ -63,7 +63,7 @@ impl CommandBuffer {
     }
 
     /// Copies a region of a texture into a buffer, tightly packed, row by row and layer by layer
-    /// (`vkCmdCopyImageToBuffer`). The offset is a multiple of 4 and of the bytes of a texel or block.
+    /// (`vkCmdCopyImageToBuffer`). The offset is a multiple of 4 and of the size of a texel or block in bytes.
     pub fn copy_texture_to_buffer(
         &mut self,
         source: TextureHandle,
@@ -100,10 +100,10 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Copies texels, or blocks of compressed ones, between textures where they have equally many bytes
-    /// (`vkCmdCopyImage`). Both regions have as many of them as the first, in each direction and in layers or slices;
-    /// slices of a volume may be copied to layers, and layers to slices. Depth and stencil are copied one at a time, and
-    /// between textures of one format.
+    /// Copies texels, or blocks of compressed formats, between textures whose texels or blocks have the same size in
+    /// bytes (`vkCmdCopyImage`). Both regions have as many texels or blocks as `from` in each direction, and as many
+    /// layers or slices. Slices of a volume may be copied to layers, and layers to slices. Depth and stencil are copied
+    /// one at a time, and between textures of one format.
     pub fn copy_texture(
         &mut self,
         source: TextureHandle,
@@ -142,7 +142,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// The copy alone, of bytes to a region that is ready to be written.
+    /// Records only the copy of bytes to a region. Expects its barriers to be recorded.
     pub(in crate::command) fn record_fill_texture(
         &self,
         source: vk::Buffer,
@@ -172,7 +172,7 @@ fn check_packed(buffer: &Buffer, offset: u64, texture: &Texture, region: &Textur
     Ok(region)
 }
 
-/// The region of `target` at the place of `to` that can take what `from` has.
+/// Returns the region of `target` at the offset of `to` that has the size of `from`.
 fn matching_region(source: &Texture, from: &Region, target: &Texture, to: &TextureRegion) -> Result<Region> {
     let part = target.copy_aspect(to.aspect)?;
     check_copyable(source, from, target, part.aspect, part.block_bytes)?;

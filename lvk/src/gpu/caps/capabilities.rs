@@ -1,4 +1,4 @@
-//! The capabilities of a device: what it has, and what of that the library turns on.
+//! The capabilities of a device: its features, and the subset that the library enables.
 
 use ash::vk;
 
@@ -9,15 +9,15 @@ use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::shading_rate::ShadingRateLimits;
 use crate::queue::Queue;
 
-/// Whether the caller needs a feature.
+/// Request of the caller for a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum FeatureRequest {
     /// Only devices that have it are considered.
     Required,
-    /// Used where present.
+    /// Enabled if the device has it.
     #[default]
     Optional,
-    /// Not used even where present.
+    /// Disabled even if the device has it.
     Off,
 }
 
@@ -27,94 +27,97 @@ impl FeatureRequest {
     }
 }
 
-/// What the device of a context can do.
+/// Capabilities of the device of a context.
 #[derive(Debug, Clone, Default)]
 pub struct Capabilities {
-    /// The device's own name.
+    /// Name of the device.
     pub device_name: String,
-    /// The driver's name, for instance `llvmpipe` or `NVIDIA`.
+    /// Name of the driver, for instance `llvmpipe` or `NVIDIA`.
     pub driver_name: String,
-    /// The driver's version text.
+    /// Version text of the driver.
     pub driver_info: String,
     /// Vulkan version of the device as (major, minor, patch).
     pub api_version: (u32, u32, u32),
-    /// Whether the device is a CPU: everything is traced and rasterised in software.
+    /// True if the device is a CPU: it traces and rasterises in software.
     pub is_cpu: bool,
     /// Ray tracing pipelines (`VK_KHR_ray_tracing_pipeline`) can be created and traced.
     pub ray_tracing_pipeline: bool,
-    /// Traces may take their size from a buffer (`rayTracingPipelineTraceRaysIndirect`).
+    /// Trace commands may read their size from a buffer (`rayTracingPipelineTraceRaysIndirect`).
     pub trace_rays_indirect: bool,
     /// Ray tracing pipelines may be linked from libraries (`VK_KHR_pipeline_library`).
     pub pipeline_libraries: bool,
-    /// Shaders may use ray queries, by whom [`ray_query_path`](Self::ray_query_path) says. In
-    /// [`Context::devices`](crate::Context::devices), before anybody has chosen, whether the device itself has them.
+    /// Shaders may use ray queries. [`ray_query_path`](Self::ray_query_path) is the implementation. In
+    /// [`Context::devices`](crate::Context::devices), where no path is selected yet, it is true if the device
+    /// itself has ray queries.
     pub ray_query: bool,
-    /// Who walks the trees of ray queries.
+    /// Implementation of ray queries: the device, or the library in software.
     pub ray_query_path: RayQueryPath,
-    /// Why it is that one.
+    /// Reason for the selection of that path.
     pub ray_query_reason: &'static str,
-    /// Hit shaders and ray queries may read the corners of the triangle that was hit
+    /// Hit shaders and ray queries may fetch the vertex positions of the hit triangle
     /// (`VK_KHR_ray_tracing_position_fetch`).
     pub position_fetch: bool,
-    /// Task and mesh shaders (`VK_EXT_mesh_shader`) can be drawn with.
+    /// Draws may use task and mesh shaders (`VK_EXT_mesh_shader`).
     pub mesh_shader: bool,
-    /// The optional features that are there; [`has`](Self::has) asks for one.
+    /// The optional features that are enabled; see [`has`](Self::has).
     pub optional: FeatureSet,
-    /// Name of the [`DeviceProfile`](crate::DeviceProfile) that was applied: what is said here is what it leaves.
+    /// Name of the applied [`DeviceProfile`](crate::DeviceProfile). These capabilities are already reduced by
+    /// it.
     pub profile: Option<String>,
-    /// Why ray tracing is off although the device offers it: device creation with it failed, and was repeated without.
+    /// Reason why ray tracing is disabled although the device offers it: device creation failed with it, and
+    /// was repeated without it.
     pub ray_tracing_fallback: Option<String>,
-    /// `gl_PrimitiveID` may be read in fragment shaders (`geometryShader`).
+    /// Fragment shaders may read `gl_PrimitiveID` (`geometryShader`).
     pub primitive_id: bool,
-    /// Storage images may be read without a format in the shader (`shaderStorageImageReadWithoutFormat`).
+    /// Shaders may read storage images without declaring a format (`shaderStorageImageReadWithoutFormat`).
     pub formatless_storage_read: bool,
-    /// Arrays of cubes can be made and sampled (`imageCubeArray`).
+    /// Arrays of cube textures can be created and sampled (`imageCubeArray`).
     pub cube_arrays: bool,
     /// Shaders may use 64-bit integers (`shaderInt64`).
     pub shader_int64: bool,
-    /// Shaders may change 64-bit integers in buffers atomically (`shaderBufferInt64Atomics`).
+    /// Shaders may use atomic operations on 64-bit integers in buffers (`shaderBufferInt64Atomics`).
     pub buffer_int64_atomics: bool,
-    /// Several draws may come from one indirect call (`multiDrawIndirect`).
+    /// One indirect command may issue several draws (`multiDrawIndirect`).
     pub multi_draw_indirect: bool,
     /// Occlusion queries may count samples exactly (`occlusionQueryPrecise`).
     pub precise_occlusion: bool,
-    /// Queries may count what the stages of pipelines do (`pipelineStatisticsQuery`).
+    /// Queries may count the work of pipeline stages (`pipelineStatisticsQuery`).
     pub pipeline_statistics: bool,
     /// The clocks of device and host can be read together (`VK_KHR_calibrated_timestamps` or
     /// `VK_EXT_calibrated_timestamps`): see [`Context::calibrated_timestamps`](crate::Context::calibrated_timestamps).
     pub calibrated_timestamps: bool,
-    /// First contents of small textures that are only sampled are written by the host itself (`VK_EXT_host_image_copy`),
-    /// past staging memory and queue, where the device samples them as fast as others. So it is on devices that are CPUs,
-    /// where it was measured to be faster.
+    /// The host itself writes the first contents of small textures that are only sampled
+    /// (`VK_EXT_host_image_copy`), without staging memory and queue. Sampling must not become slower by it.
+    /// It is enabled on CPU devices only, where it was measured to be faster.
     pub host_image_copy: bool,
-    /// Largest sampler anisotropy; 1 where the device has none.
+    /// Maximum sampler anisotropy; 1 if the device does not support it.
     pub max_anisotropy: f32,
-    /// The driver's builder keeps the order of triangles it is given (lavapipe before 26): meshes should be ordered
-    /// spatially first.
+    /// The driver's BVH builder keeps the input order of triangles (lavapipe before 26). Meshes should be
+    /// sorted spatially first.
     pub prefers_spatial_order: bool,
-    /// Arrays that helper invocations of fragment shaders write keep nothing (lavapipe): there, ray queries in software see
-    /// nothing in helper invocations.
+    /// Arrays written by helper invocations of fragment shaders lose their contents (lavapipe). There, ray
+    /// queries in software find no hits in helper invocations.
     pub helpers_lose_arrays: bool,
-    /// Who made the driver (`VkPhysicalDeviceVulkan12Properties::driverID`); 0 below Vulkan 1.2.
+    /// Vendor of the driver (`VkPhysicalDeviceVulkan12Properties::driverID`); 0 below Vulkan 1.2.
     pub driver_id: vk::DriverId,
-    /// What stands behind each queue, in the order of [`Queue::ALL`]; [`queue`](Self::queue) asks for one.
+    /// Properties of each queue, in the order of [`Queue::ALL`]; see [`queue`](Self::queue).
     pub queues: [QueueInfo; 3],
-    /// The numbers behind the limits.
+    /// Numeric limits.
     pub limits: Limits,
 }
 
 impl Capabilities {
-    /// What stands behind a queue.
+    /// Returns the properties of the Vulkan queue behind `queue`.
     pub fn queue(&self, queue: Queue) -> &QueueInfo {
         &self.queues[queue.index()]
     }
 
-    /// Whether the device has `feature`, and it is on.
+    /// True if the device has `feature` and it is enabled.
     pub fn has(&self, feature: OptionalFeature) -> bool {
         self.optional.contains(feature)
     }
 
-    /// Without the optional features of `hidden` and those that cannot be without them.
+    /// Removes the optional features of `hidden`, and those that require them.
     pub(crate) fn remove_features(&mut self, hidden: FeatureSet) {
         let mut left = self.optional.without(hidden);
         if !self.mesh_shader {
@@ -142,7 +145,7 @@ impl Capabilities {
         }
     }
 
-    /// Without the ray tracing that is not to be turned on.
+    /// Removes the ray tracing features that are not to be enabled.
     pub(crate) fn limit_ray_tracing(&mut self, pipeline: bool, query: bool) {
         self.ray_tracing_pipeline &= pipeline;
         self.trace_rays_indirect &= pipeline;
@@ -154,22 +157,22 @@ impl Capabilities {
         self.position_fetch &= self.ray_tracing_pipeline || self.ray_query;
     }
 
-    /// Whether the device itself walks the trees of ray queries (`VK_KHR_ray_query`).
+    /// True if the device itself performs the traversal of ray queries (`VK_KHR_ray_query`).
     pub(crate) fn hardware_ray_query(&self) -> bool {
         self.ray_query_path == RayQueryPath::Hardware
     }
 
-    /// Whether the library does.
+    /// True if the library performs the traversal of ray queries.
     pub(crate) fn software_ray_query(&self) -> bool {
         self.ray_query_path == RayQueryPath::Software
     }
 
-    /// Whether the device builds acceleration structures, for either use of them.
+    /// True if the device builds acceleration structures, for pipelines or for queries.
     pub(crate) fn hardware_acceleration_structures(&self) -> bool {
         self.ray_tracing_pipeline || self.hardware_ray_query()
     }
 
-    /// Turns on what is asked for of what the device has.
+    /// Enables the requested ray tracing features that the device has.
     pub(crate) fn choose_ray_tracing(&mut self, pipeline: FeatureRequest, query: RayQueryRequest) {
         let choice = query.choose(self.ray_query, self.is_cpu);
         self.limit_ray_tracing(pipeline.is_requested(), choice.path == RayQueryPath::Hardware);

@@ -1,51 +1,52 @@
-//! How many descriptors the bindless set may have: each counts for several limits of the device, and all of them hold.
+//! Sizes of the descriptor arrays in the bindless set. Each descriptor counts against several device limits,
+//! and all of them hold.
 
 use ash::vk;
 
 use crate::error::{Result, check_limit};
 
-/// Samplers the library asks for where the device allows more.
+/// Number of samplers that the library requests. Fewer if the device allows fewer.
 const WANTED_SAMPLERS: u32 = 1_024;
-/// Textures at most, whatever the device allows: the library keeps a row for each.
+/// Maximum number of textures on any device, because the library keeps a table entry for each.
 const MAX_TEXTURES: u32 = 1 << 20;
-/// The dummy and one texture.
+/// The default texture and one other texture.
 const MIN_TEXTURES: u32 = 2;
 const OBJECT: &str = "bindless set";
 
-/// Most descriptors of a layout and a pool whose descriptors change while they are bound, in all stages.
+/// Maximum descriptors of a layout and a pool with update-after-bind, over all stages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DescriptorLimits {
-    /// Samplers, those of combined ones included.
+    /// Samplers, including those of combined image samplers.
     pub(crate) samplers: u32,
-    /// Sampled images, those of combined ones included.
+    /// Sampled images, including those of combined image samplers.
     pub(crate) sampled_images: u32,
     pub(crate) storage_images: u32,
-    /// What one stage reaches, colour targets included.
+    /// Resources that one stage accesses, including colour targets.
     pub(crate) resources: u32,
-    /// All kinds in all pools.
+    /// Descriptors of all kinds in all pools.
     pub(crate) in_pools: u32,
 }
 
-/// What a context has beside textures, samplers and conversions of Y'CbCr.
+/// Descriptors of a context beside textures, samplers and Y'CbCr conversions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct ReservedDescriptors {
-    /// Top-level structures and the buffers that describe them.
+    /// TLAS, and the buffers that describe them.
     pub(crate) in_set: u32,
-    /// Targets that shaders of a pass read, and those that it draws.
+    /// Input attachments and colour targets of a pass.
     pub(crate) targets: u32,
 }
 
-/// Textures in Y'CbCr.
+/// Requested textures in Y'CbCr formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct YuvRequest {
     pub(crate) conversions: u32,
-    /// Textures of each, the dummy included.
+    /// Textures of each conversion, including the default texture.
     pub(crate) textures: u32,
-    /// Descriptors that one texture takes.
+    /// Number of descriptors per texture.
     pub(crate) descriptors: u32,
 }
 
-/// What is left for the two arrays that take it.
+/// Sizes of the texture and sampler arrays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DescriptorBudget {
     pub(crate) textures: u32,
@@ -69,20 +70,21 @@ impl DescriptorLimits {
         }
     }
 
-    /// Those of a device.
+    /// Queries the limits of a device.
     pub(crate) fn query(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v12);
-        // SAFETY: the device was enumerated from the instance, and knows the structure, which lives until the call returns.
+        // SAFETY: the device was enumerated from the instance, and supports the structure, which lives until
+        // the call returns.
         unsafe { instance.get_physical_device_properties2(device, &mut all) };
         Self::from_properties(&v12)
     }
 
-    /// Textures that each conversion has room for. They take at most half of what there is, as the other textures need
-    /// the rest.
+    /// Returns the number of Y'CbCr textures per conversion. They take at most half of the descriptors, as
+    /// the other textures need the rest.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where there are too many conversions.
+    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) if there are too many conversions.
     pub(crate) fn yuv_textures(&self, reserved: &ReservedDescriptors, request: &YuvRequest) -> Result<u32> {
         let each = request.descriptors.max(1);
         let most = self.samplers.min(self.sampled_images).min(self.remaining(reserved)) / 2 / each;
@@ -90,7 +92,8 @@ impl DescriptorLimits {
         Ok(request.textures.min(most / request.conversions.max(1)))
     }
 
-    /// Room beside `yuv` descriptors of textures in Y'CbCr. A texture takes a sampled and a storage slot.
+    /// Returns the array sizes beside `yuv` descriptors of Y'CbCr textures. A texture takes a sampled and a
+    /// storage image descriptor.
     pub(crate) fn budget(&self, reserved: &ReservedDescriptors, yuv: u32) -> DescriptorBudget {
         let left = self.remaining(reserved).saturating_sub(yuv);
         let samplers = WANTED_SAMPLERS.min(self.samplers.saturating_sub(yuv)).min(left / 2);
@@ -103,7 +106,7 @@ impl DescriptorLimits {
         DescriptorBudget { textures, samplers }
     }
 
-    /// Descriptors of any kind beside the others, both of a stage and of the pools.
+    /// Returns the number of descriptors of any kind beside the reserved ones, limited by stage and by pools.
     fn remaining(&self, reserved: &ReservedDescriptors) -> u32 {
         let in_stage = self.resources.saturating_sub(reserved.in_set).saturating_sub(reserved.targets);
         in_stage.min(self.in_pools.saturating_sub(reserved.in_set))
@@ -111,20 +114,22 @@ impl DescriptorLimits {
 }
 
 impl DescriptorBudget {
-    /// The textures that a context gets of those it wants.
+    /// Returns the number of textures that a context gets if it requests `wanted`.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where not even one texture fits beside the dummy.
+    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) if not even one texture fits beside the default
+    /// texture.
     pub(crate) fn texture_count(&self, wanted: u32) -> Result<u32> {
         check_limit(OBJECT, "number of textures", MIN_TEXTURES.into(), self.textures.into())?;
         Ok(wanted.clamp(MIN_TEXTURES, self.textures))
     }
 }
 
-/// The most textures up to `wanted` that `fits` allows, as far as halving finds them.
+/// Returns the largest number of textures that satisfies `fits`, found by halving `wanted`.
 ///
 /// # Errors
-/// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where not even one texture fits beside the dummy.
+/// [`Error::LimitExceeded`](crate::Error::LimitExceeded) if not even one texture fits beside the default
+/// texture.
 pub(crate) fn largest_fitting(wanted: u32, fits: impl Fn(u32) -> bool) -> Result<u32> {
     let half = |textures: &u32| (*textures > MIN_TEXTURES).then(|| (textures / 2).max(MIN_TEXTURES));
     let found = std::iter::successors(Some(wanted), half).find(|textures| fits(*textures)).unwrap_or(0);
@@ -164,7 +169,7 @@ mod tests {
         }
     }
 
-    /// Whether Vulkan takes a layout and a pool with these descriptors.
+    /// True if Vulkan allows a layout and a pool with these descriptors.
     fn holds(
         limits: &DescriptorLimits,
         reserved: &ReservedDescriptors,
@@ -216,7 +221,7 @@ mod tests {
         }
     }
 
-    /// What Vulkan promises of every device with `descriptorIndexing`.
+    /// Limits that Vulkan guarantees on every device with `descriptorIndexing`.
     fn promised() -> DescriptorLimits {
         let many = 500_000;
         DescriptorLimits {

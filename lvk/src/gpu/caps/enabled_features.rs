@@ -1,11 +1,11 @@
-//! The features of a device that the library turns on.
+//! The features of a device that the library enables.
 
 use super::features::{FeatureField, Features, NEEDED};
 use super::optional_features::{FeatureSet, OptionalFeature};
 
 impl Features {
-    /// Those of the features found that the library turns on: what it needs, what Vulkan 1.3 promises, the optional
-    /// ones of the set, ray tracing and mesh shaders.
+    /// Returns the subset of the reported features that the library enables: required features, features
+    /// guaranteed by Vulkan 1.3, the optional features of the set, ray tracing and mesh shaders.
     pub(crate) fn supported_subset(found: &Self, optional: FeatureSet) -> Self {
         let mut wanted = Self { subgroups: found.subgroups, ..Self::default() };
         if optional.contains(OptionalFeature::CalibratedTimestamps) {
@@ -20,8 +20,8 @@ impl Features {
     }
 }
 
-/// What every device of Vulkan 1.3 has. Shaders of SPIR-V 1.6 end an invocation by `OpTerminateInvocation`, which no
-/// capability announces.
+/// Features that every Vulkan 1.3 device has. Shaders of SPIR-V 1.6 end an invocation by
+/// `OpTerminateInvocation`, which needs no capability.
 const PROMISED: [FeatureField; 9] = [
     |f| &mut f.core.robust_buffer_access,
     |f| &mut f.v12.descriptor_indexing,
@@ -34,7 +34,7 @@ const PROMISED: [FeatureField; 9] = [
     |f| &mut f.v13.shader_integer_dot_product,
 ];
 
-/// Ray tracing and mesh shaders, which have switches of their own.
+/// Ray tracing and mesh shaders, which have separate flags.
 const APART: [FeatureField; 9] = [
     |f| &mut f.ext.structures.acceleration_structure,
     |f| &mut f.ext.structures.descriptor_binding_acceleration_structure_update_after_bind,

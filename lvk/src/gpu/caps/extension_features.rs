@@ -1,10 +1,10 @@
-//! The feature structures of extensions: one chain to ask the device with and to make it with.
+//! The feature structures of extensions, in one chain for the feature query and for device creation.
 
 use std::ffi::CStr;
 
 use ash::vk;
 
-/// What extensions offer; nothing is on where the device lacks the extension.
+/// Features of extensions. All are false for extensions that the device lacks.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ExtensionFeatures {
     pub(crate) structures: vk::PhysicalDeviceAccelerationStructureFeaturesKHR<'static>,
@@ -22,7 +22,7 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) maintenance5: vk::PhysicalDeviceMaintenance5FeaturesKHR<'static>,
     pub(crate) fault: vk::PhysicalDeviceFaultFeaturesEXT<'static>,
     pub(crate) swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'static>,
-    /// These have no features of their own: whether the device has them.
+    /// Extensions without feature structures: true if the device has them.
     pub(crate) calibrated_timestamps: vk::Bool32,
     pub(crate) memory_budget: vk::Bool32,
     pub(crate) swapchain: vk::Bool32,
@@ -30,7 +30,8 @@ pub(crate) struct ExtensionFeatures {
 }
 
 impl ExtensionFeatures {
-    /// Hangs those structures behind `all` whose extension `has` knows: Vulkan forbids any other.
+    /// Appends to `all` the structures of the extensions for which `has` returns true; Vulkan forbids any
+    /// others.
     pub(crate) fn append_to_chain<'a>(
         &'a mut self,
         mut all: vk::PhysicalDeviceFeatures2<'a>,
@@ -84,7 +85,7 @@ impl ExtensionFeatures {
         all
     }
 
-    /// Notes the extensions without features.
+    /// Records which extensions without feature structures are available.
     pub(crate) fn set_featureless_extensions(&mut self, has: &dyn Fn(&CStr) -> bool) {
         let clocks = has(ash::khr::calibrated_timestamps::NAME) || has(ash::ext::calibrated_timestamps::NAME);
         self.calibrated_timestamps = clocks.into();

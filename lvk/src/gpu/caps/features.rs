@@ -1,4 +1,4 @@
-//! The device features that shaders and pipelines may count on.
+//! The device features that shaders and pipelines may rely on.
 
 use std::ffi::CStr;
 
@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::extension_features::ExtensionFeatures;
 
-/// Features of a device: as found, or those of them that the library turns on.
+/// Features of a device: either as reported, or the subset that the library enables.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Features {
     pub(crate) core: vk::PhysicalDeviceFeatures,
@@ -14,7 +14,7 @@ pub(crate) struct Features {
     pub(crate) v12: vk::PhysicalDeviceVulkan12Features<'static>,
     pub(crate) v13: vk::PhysicalDeviceVulkan13Features<'static>,
     pub(crate) ext: ExtensionFeatures,
-    /// Which extension reads the clocks of device and host together.
+    /// The extension that reads the clocks of device and host together.
     pub(crate) calibration: Calibration,
     pub(crate) subgroups: Subgroups,
 }
@@ -30,17 +30,17 @@ pub(crate) enum Calibration {
     Khr,
 }
 
-/// What subgroups of a device can do.
+/// Subgroup capabilities of a device.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Subgroups {
     pub(crate) operations: vk::SubgroupFeatureFlags,
     pub(crate) stages: vk::ShaderStageFlags,
-    /// Quad operations work in more stages than fragment and compute.
+    /// True if quad operations work in more stages than fragment and compute.
     pub(crate) quads_everywhere: bool,
 }
 
 impl Features {
-    /// Without the ray tracing that is not to be turned on.
+    /// Removes the ray tracing features that are not to be enabled.
     pub(crate) fn limit_ray_tracing(&mut self, pipeline: bool, query: bool) {
         let ext = &mut self.ext;
         ext.ray_tracing.ray_tracing_pipeline &= vk::Bool32::from(pipeline);
@@ -53,7 +53,7 @@ impl Features {
         ext.structures.descriptor_binding_acceleration_structure_update_after_bind &= structures;
     }
 
-    /// Without mesh shaders where they are not to be turned on, or come without tasks.
+    /// Removes mesh shaders if `on` is false or the device has no task shaders.
     pub(crate) fn limit_mesh_shaders(&mut self, on: bool) {
         let mesh = &mut self.ext.mesh;
         if !on || mesh.mesh_shader & mesh.task_shader == vk::FALSE {
@@ -61,7 +61,7 @@ impl Features {
         }
     }
 
-    /// The extensions behind what is on, except those behind the optional features.
+    /// Returns the extensions of the enabled features, except those of the optional features.
     pub(crate) fn extensions(&self) -> impl Iterator<Item = &'static CStr> {
         let ext = &self.ext;
         let clocks = match self.calibration {
@@ -83,7 +83,7 @@ impl Features {
 
 pub(super) type FeatureField = fn(&mut Features) -> &mut vk::Bool32;
 
-/// What the library cannot do without.
+/// Features that the library requires.
 #[rustfmt::skip]
 pub(super) const NEEDED: [(FeatureField, &str); 19] = [
     (|f| &mut f.core.shader_storage_image_write_without_format, "shaderStorageImageWriteWithoutFormat"),
@@ -107,7 +107,7 @@ pub(super) const NEEDED: [(FeatureField, &str); 19] = [
     (|f| &mut f.v13.maintenance4, "maintenance4"),
 ];
 
-/// The names of features that the library cannot do without and the device lacks.
+/// Returns the names of required features that the device lacks.
 pub(crate) fn missing_required(found: &Features) -> Vec<String> {
     let mut found = *found;
     let lacking = NEEDED.iter().filter(|(field, _)| *field(&mut found) == vk::FALSE);

@@ -1,4 +1,4 @@
-//! What the device can do with formats. Each is asked for once: a device never changes its answer.
+//! Format features of the device. Each format is queried once, because the result never changes.
 
 use std::sync::OnceLock;
 
@@ -8,7 +8,7 @@ use super::capabilities::Capabilities;
 use super::optional_features::OptionalFeature;
 use crate::format::Format;
 
-/// The answers so far, by [`Format::ALL`].
+/// Cached results, in the order of [`Format::ALL`].
 pub(crate) struct FormatFeatureCache([OnceLock<vk::FormatFeatureFlags>; Format::ALL.len()]);
 
 impl Default for FormatFeatureCache {
@@ -18,7 +18,8 @@ impl Default for FormatFeatureCache {
 }
 
 impl FormatFeatureCache {
-    /// Features of images of `format` in optimal tiling; none where a feature that the format needs is off.
+    /// Returns the features of images of `format` in optimal tiling. Empty if a feature that the format needs
+    /// is disabled.
     pub(crate) fn image_features(
         &self,
         instance: &ash::Instance,
@@ -33,17 +34,17 @@ impl FormatFeatureCache {
     }
 }
 
-/// Properties of a format (`vkGetPhysicalDeviceFormatProperties`).
+/// Returns the properties of a format (`vkGetPhysicalDeviceFormatProperties`).
 pub(crate) fn format_properties(
     instance: &ash::Instance,
     device: vk::PhysicalDevice,
     format: vk::Format,
 ) -> vk::FormatProperties {
-    // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
+    // SAFETY: the physical device belongs to the instance, and the extension of the format is enabled.
     unsafe { instance.get_physical_device_format_properties(device, format) }
 }
 
-/// The feature by which there is the format, beyond what Vulkan has anyway.
+/// Returns the optional feature that the format needs. `None` for formats of core Vulkan.
 fn required_feature(format: Format) -> Option<OptionalFeature> {
     let name = format.raw().as_raw();
     let between = |first: vk::Format, last: vk::Format| (first.as_raw()..=last.as_raw()).contains(&name);

@@ -1,21 +1,21 @@
-//! Images written by the host itself (`VK_EXT_host_image_copy`), past staging memory and queue.
+//! Image copies by the host (`VK_EXT_host_image_copy`), without staging memory and queue.
 
 use ash::vk;
 
 use super::capabilities::Capabilities;
 use crate::error::{Error, Result};
 
-/// The layout that images are written in and stay in: what shaders sample.
+/// The layout in which images are written and remain: the layout for sampling.
 const LAYOUT: vk::ImageLayout = vk::ImageLayout::READ_ONLY_OPTIMAL;
 
-/// The functions of the extension, where first contents go by them.
+/// The functions of the extension, for writing the first contents of images.
 pub(crate) struct HostImageCopy {
     device: ash::ext::host_image_copy::Device,
 }
 
 impl HostImageCopy {
-    /// `None` where the device has none, where staging is the faster way, or where it does not write images in the layout that
-    /// shaders sample.
+    /// `None` if the device lacks the extension, if staging is faster, or if the device cannot write images
+    /// in the layout for sampling.
     pub(crate) fn new(
         instance: &ash::Instance,
         device: &ash::Device,
@@ -26,11 +26,12 @@ impl HostImageCopy {
         is_wanted.then(|| Self { device: ash::ext::host_image_copy::Device::new(instance, device) })
     }
 
-    /// Writes the first contents of an image, after which all of `range` is ready to be sampled.
+    /// Writes the first contents of an image. Afterwards `range` is ready to be sampled.
     ///
     /// # Safety
-    /// The image is new, was made with [`vk::ImageUsageFlags::HOST_TRANSFER_EXT`], and `range` is all of it. The regions lie
-    /// inside of it, do not overlap, and each points to as many bytes as it has.
+    /// The image is new and was created with [`vk::ImageUsageFlags::HOST_TRANSFER_EXT`], and `range` covers
+    /// all of it. The regions lie inside the image and do not overlap. Each region points to as many bytes as
+    /// it copies.
     pub(crate) unsafe fn write_image(
         &self,
         image: vk::Image,
@@ -49,12 +50,12 @@ impl HostImageCopy {
             .dst_image(image)
             .dst_image_layout(LAYOUT)
             .regions(regions);
-        // SAFETY: by the caller; the layout is one that the device writes in.
+        // SAFETY: guaranteed by the caller; the device supports writes in this layout.
         unsafe { self.device.copy_memory_to_image(&copy) }.map_err(Error::vulkan("vkCopyMemoryToImageEXT"))
     }
 }
 
-/// True if the host can write images of this description, and the device samples them as fast as others.
+/// True if the host can write images of this description without making sampling on the device slower.
 pub(crate) fn host_copies_stay_optimal(
     instance: &ash::Instance,
     device: vk::PhysicalDevice,
@@ -66,7 +67,7 @@ pub(crate) fn host_copies_stay_optimal(
 fn has_host_transfer(instance: &ash::Instance, device: vk::PhysicalDevice, format: vk::Format) -> bool {
     let mut more = vk::FormatProperties3::default();
     let mut all = vk::FormatProperties2::default().push_next(&mut more);
-    // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
+    // SAFETY: the physical device belongs to the instance, and the extension of the format is enabled.
     unsafe { instance.get_physical_device_format_properties2(device, format, &mut all) };
     more.optimal_tiling_features.contains(vk::FormatFeatureFlags2::HOST_IMAGE_TRANSFER_EXT)
 }
@@ -80,16 +81,17 @@ fn is_optimal(instance: &ash::Instance, device: vk::PhysicalDevice, info: &vk::I
         .flags(info.flags);
     let mut access = vk::HostImageCopyDevicePerformanceQueryEXT::default();
     let mut all = vk::ImageFormatProperties2::default().push_next(&mut access);
-    // SAFETY: as above; where it refuses, nothing was written.
+    // SAFETY: as above; if the query fails, nothing was written.
     let answer = unsafe { instance.get_physical_device_image_format_properties2(device, &asked, &mut all) };
     answer.is_ok() && access.optimal_device_access == vk::TRUE
 }
 
-/// Layouts in which the host writes images.
+/// Returns the layouts in which the host can write images.
 fn host_copy_layouts(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Vec<vk::ImageLayout> {
     let mut count = vk::PhysicalDeviceHostImageCopyPropertiesEXT::default();
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut count);
-    // SAFETY: the physical device belongs to the instance and has the extension; without arrays the counts are written.
+    // SAFETY: the physical device belongs to the instance and has the extension. Without arrays only the
+    // counts are written.
     unsafe { instance.get_physical_device_properties2(physical, &mut all) };
     let (read, written) = (count.copy_src_layout_count, count.copy_dst_layout_count);
     let mut source = vec![vk::ImageLayout::UNDEFINED; read as usize];
@@ -98,7 +100,7 @@ fn host_copy_layouts(instance: &ash::Instance, physical: vk::PhysicalDevice) -> 
         .copy_src_layouts(&mut source)
         .copy_dst_layouts(&mut target);
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut lists);
-    // SAFETY: as above, with arrays of the sizes that were answered.
+    // SAFETY: as above, with arrays of the returned lengths.
     unsafe { instance.get_physical_device_properties2(physical, &mut all) };
     target
 }

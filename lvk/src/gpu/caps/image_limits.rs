@@ -1,5 +1,5 @@
-//! What the device allows for images, by what they are. Each kind of image is asked for once: a device never changes its
-//! answer, and an answer costs as much as making the image.
+//! Limits of images by kind. Each kind is queried once, because the result never changes and a query costs as
+//! much as creating the image.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use ash::vk;
 
 use crate::lock_order::{Rank, RwLock};
 
-/// What the limits of an image depend on.
+/// Properties of an image that its limits depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct ImageKind {
     format: vk::Format,
@@ -17,10 +17,10 @@ struct ImageKind {
     flags: vk::ImageCreateFlags,
 }
 
-/// The limits of a kind, or why there are no such images.
+/// Limits of a kind of image, or the driver's error.
 pub(crate) type ImageLimitsResult = Result<vk::ImageFormatProperties, vk::Result>;
 
-/// The answers so far.
+/// Cached results.
 pub(crate) struct ImageLimitCache(RwLock<HashMap<ImageKind, ImageLimitsResult>>);
 
 impl ImageLimitCache {
@@ -28,7 +28,7 @@ impl ImageLimitCache {
         Self(RwLock::new(Rank::ImageLimitCache, HashMap::new()))
     }
 
-    /// Limits of an image of this description, or the driver's refusal.
+    /// Returns the limits of an image of this description, or the driver's error.
     pub(crate) fn image_limits(
         &self,
         instance: &ash::Instance,
@@ -69,7 +69,8 @@ impl ImageLimitCache {
     }
 }
 
-/// Whether the device will answer the same again: it may also have been short of memory.
+/// True if a repeated query returns the same result. Errors other than an unsupported format may be
+/// temporary, such as lack of memory.
 fn is_permanent(answer: &ImageLimitsResult) -> bool {
     matches!(answer, Ok(_) | Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED))
 }
@@ -86,7 +87,8 @@ mod tests {
         flags: vk::ImageCreateFlags::empty(),
     };
 
-    /// What is known of each kind after each was asked for twice, and how often the device was.
+    /// Queries each kind twice. Returns whether each result was right, and the number of queries to the
+    /// device.
     fn ask_twice(kinds: &[ImageKind], answer: impl Fn(&ImageKind) -> ImageLimitsResult) -> (Vec<bool>, u32) {
         let (limits, mut asked) = (ImageLimitCache::new(), 0);
         let mut get = |kind: &ImageKind| {

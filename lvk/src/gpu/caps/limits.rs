@@ -1,4 +1,4 @@
-//! What the device allows, in numbers.
+//! Numeric limits of the device.
 
 use ash::vk;
 
@@ -7,119 +7,123 @@ use super::mesh_limits::MeshLimits;
 use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::shading_rate::ShadingRateLimits;
 
-/// Top-level structures the library asks for where the device allows more.
+/// Number of TLAS descriptors that the library requests. Fewer if the device allows fewer.
 const WANTED_TLAS: u32 = 256;
 
-/// Limits of the device, in the unit of each name.
+/// Limits of the device. The name of each field gives its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
-    /// Most that the level of detail of a sampler can be biased, in either direction (`maxSamplerLodBias`).
+    /// Maximum absolute level-of-detail bias of a sampler (`maxSamplerLodBias`).
     pub max_lod_bias: f32,
-    /// Most samplers with a border colour of their own (`maxCustomBorderColorSamplers`).
+    /// Maximum number of samplers with a custom border colour (`maxCustomBorderColorSamplers`).
     pub max_custom_borders: u32,
-    /// Longest row, in texels (`maxImageDimension1D`).
+    /// Maximum length of a 1D texture, in texels (`maxImageDimension1D`).
     pub max_texture_1d: u32,
-    /// Widest 2D texture, in texels a side (`maxImageDimension2D`).
+    /// Maximum width and height of a 2D texture, in texels (`maxImageDimension2D`).
     pub max_texture_2d: u32,
-    /// Widest and deepest volume, in texels a side (`maxImageDimension3D`).
+    /// Maximum width, height and depth of a 3D texture, in texels (`maxImageDimension3D`).
     pub max_texture_3d: u32,
-    /// Widest cube texture, in texels a side (`maxImageDimensionCube`).
+    /// Maximum width and height of a cube texture, in texels (`maxImageDimensionCube`).
     pub max_texture_cube: u32,
-    /// Most layers of a texture (`maxImageArrayLayers`).
+    /// Maximum number of array layers of a texture (`maxImageArrayLayers`).
     pub max_texture_layers: u32,
-    /// Numbers of samples a pixel that colour targets may have, added up: 5 is 1 and 4 (`framebufferColorSampleCounts`).
+    /// Supported sample counts of colour targets, as a sum: 5 means 1 and 4 (`framebufferColorSampleCounts`).
     pub color_samples: u32,
-    /// Those that depth targets may have (`framebufferDepthSampleCounts`).
+    /// Supported sample counts of depth targets, as a sum (`framebufferDepthSampleCounts`).
     pub depth_samples: u32,
-    /// Largest buffer in bytes (`maxBufferSize`).
+    /// Maximum size of a buffer in bytes (`maxBufferSize`).
     pub max_buffer_bytes: u64,
-    /// Most memory of one buffer or texture, in bytes (`maxMemoryAllocationSize`).
+    /// Maximum memory of one buffer or texture, in bytes (`maxMemoryAllocationSize`).
     pub max_allocation_bytes: u64,
-    /// Most bytes a shader reaches through one storage buffer descriptor (`maxStorageBufferRange`).
+    /// Maximum range of one storage buffer descriptor in bytes (`maxStorageBufferRange`).
     pub max_storage_buffer_range: u64,
-    /// Push constants in bytes (`maxPushConstantsSize`).
+    /// Maximum size of push constants in bytes (`maxPushConstantsSize`).
     pub max_push_constant_bytes: u32,
-    /// Most colour targets of a render pass (`maxColorAttachments`).
+    /// Maximum number of colour targets of a render pass (`maxColorAttachments`).
     pub max_color_targets: u32,
-    /// Targets of a pass that its own fragment shaders can read: of these, depth is the first, and colour targets follow in
-    /// their order; stencil is the tenth (`maxPerStageDescriptorInputAttachments`). 0 without
+    /// Maximum number of input attachments: targets of a pass that its own fragment shaders read
+    /// (`maxPerStageDescriptorInputAttachments`). Depth is the first, the colour targets follow in their
+    /// order, and stencil is the tenth. 0 without
     /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
     pub max_input_attachments: u32,
-    /// Largest width and height of a texture that render passes draw to, in pixels (`maxFramebufferWidth`,
+    /// Maximum width and height of a render target, in pixels (`maxFramebufferWidth`,
     /// `maxFramebufferHeight`).
     pub max_target_size: [u32; 2],
-    /// Most layers of a render pass (`maxFramebufferLayers`).
+    /// Maximum number of layers of a render pass (`maxFramebufferLayers`).
     pub max_target_layers: u32,
-    /// Most views of a render pass that draws several at once (`maxMultiviewViewCount`).
+    /// Maximum number of views of a multiview render pass (`maxMultiviewViewCount`).
     pub max_views: u32,
-    /// How multisampled depth and stencil can be resolved.
+    /// Support for resolving multisampled depth and stencil.
     pub depth_resolve: DepthResolveLimits,
-    /// Of fragments of several pixels.
+    /// Limits of fragment shading rates.
     pub shading_rate: ShadingRateLimits,
-    /// Most vertices of a patch, before and behind the tessellation control stage (`maxTessellationPatchSize`).
+    /// Maximum number of vertices of a patch, before and after the tessellation control stage
+    /// (`maxTessellationPatchSize`).
     pub max_patch_points: u32,
-    /// Least and greatest width of lines in pixels (`lineWidthRange`).
+    /// Minimum and maximum width of lines in pixels (`lineWidthRange`).
     pub line_width: [f32; 2],
-    /// Most workgroups of a dispatch for each axis (`maxComputeWorkGroupCount`).
+    /// Maximum workgroups of a dispatch along each axis (`maxComputeWorkGroupCount`).
     pub max_dispatch_groups: [u32; 3],
-    /// Most invocations of a workgroup for each axis (`maxComputeWorkGroupSize`).
+    /// Maximum size of a compute workgroup along each axis, in invocations (`maxComputeWorkGroupSize`).
     pub max_group_size: [u32; 3],
-    /// Most invocations of a workgroup altogether (`maxComputeWorkGroupInvocations`).
+    /// Maximum invocations of a compute workgroup (`maxComputeWorkGroupInvocations`).
     pub max_group_invocations: u32,
-    /// Most bytes that the invocations of a compute workgroup share (`maxComputeSharedMemorySize`), counted by the rules of
-    /// std430.
+    /// Maximum shared memory of a compute workgroup in bytes (`maxComputeSharedMemorySize`), counted by
+    /// std430 rules.
     pub max_shared_bytes: u32,
-    /// Most draws of one indirect call (`maxDrawIndirectCount`).
+    /// Maximum number of draws of one indirect command (`maxDrawIndirectCount`).
     pub max_indirect_draws: u32,
-    /// Largest width and height of a viewport in pixels (`maxViewportDimensions`).
+    /// Maximum width and height of a viewport in pixels (`maxViewportDimensions`).
     pub max_viewport: [u32; 2],
-    /// Where viewports may begin and end in pixels, along both axes (`viewportBoundsRange`).
+    /// Minimum and maximum viewport coordinates in pixels, along both axes (`viewportBoundsRange`).
     pub viewport_bounds: [f32; 2],
-    /// Nanoseconds of one tick of a timestamp (`timestampPeriod`); 0 where the queue has none.
+    /// Duration of one timestamp tick in nanoseconds (`timestampPeriod`); 0 if the queue has no timestamps.
     pub timestamp_period_ns: f32,
-    /// Bits of a timestamp that count (`timestampValidBits`).
+    /// Valid bits of a timestamp (`timestampValidBits`).
     pub timestamp_bits: u32,
-    /// Most elements of `kTextures2D[]` and the storage images: what the device's limits of descriptors leave, and no
-    /// more than 1,048,576. Textures in Y'CbCr ([`ContextDesc::yuv`](crate::ContextDesc::yuv)) take some of it.
+    /// Maximum number of elements of `kTextures2D[]` and of the storage images. It follows from the
+    /// descriptor limits of the device and is at most 1,048,576. Y'CbCr textures
+    /// ([`ContextDesc::yuv`](crate::ContextDesc::yuv)) reduce it.
     pub max_bindless_textures: u32,
-    /// Most elements of `kSamplers[]`. Textures in Y'CbCr take of it where samplers are few.
+    /// Maximum number of elements of `kSamplers[]`. Y'CbCr textures reduce it if the device allows few
+    /// samplers.
     pub max_bindless_samplers: u32,
-    /// Most elements of `kTLAS[]`.
+    /// Maximum number of elements of `kTLAS[]`.
     pub max_bindless_tlas: u32,
     /// Alignment of scratch addresses in bytes (`minAccelerationStructureScratchOffsetAlignment`).
     pub scratch_alignment: u32,
-    /// Most geometries in a BLAS (`maxGeometryCount`).
+    /// Maximum number of geometries in a BLAS (`maxGeometryCount`).
     pub max_blas_geometries: u64,
-    /// Most primitives in a BLAS (`maxPrimitiveCount`).
+    /// Maximum number of primitives in a BLAS (`maxPrimitiveCount`).
     pub max_blas_primitives: u64,
-    /// Most bytes of one acceleration structure: `maxBufferSize`, or `maxStorageBufferRange` on drivers that are known
-    /// to fail beyond it.
+    /// Maximum size of one acceleration structure in bytes: `maxBufferSize`, or `maxStorageBufferRange` on
+    /// drivers that are known to fail beyond it.
     pub max_accel_structure_bytes: u64,
-    /// Most bytes of scratch for the build of one acceleration structure; bounded as
-    /// [`max_accel_structure_bytes`](Self::max_accel_structure_bytes) is.
+    /// Maximum scratch memory in bytes for the build of one acceleration structure, bounded like
+    /// [`max_accel_structure_bytes`](Self::max_accel_structure_bytes).
     pub max_accel_scratch_bytes: u64,
-    /// Most instances in a TLAS (`maxInstanceCount`).
+    /// Maximum number of instances in a TLAS (`maxInstanceCount`).
     pub max_tlas_instances: u64,
-    /// Deepest recursion of `traceRayEXT` (`maxRayRecursionDepth`).
+    /// Maximum recursion depth of `traceRayEXT` (`maxRayRecursionDepth`).
     pub max_ray_recursion: u32,
-    /// Most invocations of one trace (`maxRayDispatchInvocationCount`).
+    /// Maximum number of invocations of one trace command (`maxRayDispatchInvocationCount`).
     pub max_trace_invocations: u32,
-    /// Largest hit attributes in bytes (`maxRayHitAttributeSize`).
+    /// Maximum size of hit attributes in bytes (`maxRayHitAttributeSize`).
     pub max_hit_attribute_bytes: u32,
-    /// Bytes of a shader group handle (`shaderGroupHandleSize`).
+    /// Size of a shader group handle in bytes (`shaderGroupHandleSize`).
     pub sbt_handle_bytes: u32,
-    /// Alignment of handles in bytes (`shaderGroupHandleAlignment`).
+    /// Alignment of shader group handles in bytes (`shaderGroupHandleAlignment`).
     pub sbt_handle_alignment: u32,
     /// Alignment of shader binding table regions in bytes (`shaderGroupBaseAlignment`).
     pub sbt_base_alignment: u32,
-    /// Largest stride of a shader binding table in bytes (`maxShaderGroupStride`).
+    /// Maximum stride of a shader binding table in bytes (`maxShaderGroupStride`).
     pub sbt_max_stride: u32,
-    /// Of task and mesh shaders.
+    /// Limits of task and mesh shaders.
     pub mesh: MeshLimits,
 }
 
 impl Limits {
-    /// As the device says them.
+    /// Converts the limits reported by the device.
     pub(crate) fn from_properties(
         plain: &vk::PhysicalDeviceLimits,
         v12: &vk::PhysicalDeviceVulkan12Properties<'_>,
@@ -190,7 +194,8 @@ impl Limits {
         limits
     }
 
-    /// Of structures the library builds itself; without any of the device's own they are the only ones.
+    /// Adds the limits of acceleration structures that the library builds itself. They apply only if the
+    /// device builds none.
     pub(crate) fn enable_software_structures(&mut self, beside_hardware: bool) {
         if beside_hardware {
             return;
@@ -204,14 +209,14 @@ impl Limits {
     }
 }
 
-/// Bounds of what references to nodes and leaves can name; see `accel::software::layout`.
+/// Maximum values that node and leaf references can encode; see `accel::software::layout`.
 mod software {
     pub(crate) const MAX_GEOMETRIES: u64 = 1 << 24;
     pub(crate) const MAX_PRIMITIVES: u64 = 1 << 27;
 }
 
-/// Most bytes of an acceleration structure or of its scratch. Builds on Arm's own driver fail where either is beyond
-/// the range of a storage buffer, though Vulkan knows no such limit.
+/// Returns the maximum size of an acceleration structure or its scratch, in bytes. Builds with Arm's own
+/// driver fail if either exceeds the range of a storage buffer, although Vulkan has no such limit.
 fn max_accel_bytes(driver: vk::DriverId, storage_range: u32, buffer_bytes: u64) -> u64 {
     if driver == vk::DriverId::ARM_PROPRIETARY {
         buffer_bytes.min(storage_range.into())
@@ -220,7 +225,7 @@ fn max_accel_bytes(driver: vk::DriverId, storage_range: u32, buffer_bytes: u64) 
     }
 }
 
-/// Sizes the arrays of the one descriptor set, as they are without conversions of Y'CbCr.
+/// Computes the array sizes of the bindless set, without Y'CbCr conversions.
 fn size_bindless(
     limits: &mut Limits,
     v12: &vk::PhysicalDeviceVulkan12Properties<'_>,

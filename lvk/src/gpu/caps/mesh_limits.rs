@@ -1,44 +1,47 @@
-//! What task and mesh shaders may ask for.
+//! Limits of task and mesh shaders.
 
 use ash::vk;
 
 /// Limits of `VK_EXT_mesh_shader`; all 0 where the device has no mesh shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MeshLimits {
-    /// Most task workgroups of a draw for each axis (`maxTaskWorkGroupCount`).
+    /// Maximum task workgroups of a draw along each axis (`maxTaskWorkGroupCount`).
     pub max_task_groups: [u32; 3],
-    /// Most task workgroups of a draw altogether (`maxTaskWorkGroupTotalCount`).
+    /// Maximum task workgroups of a draw in total (`maxTaskWorkGroupTotalCount`).
     pub max_task_groups_total: u32,
-    /// Most mesh workgroups of a draw, or of one task workgroup, for each axis (`maxMeshWorkGroupCount`).
+    /// Maximum mesh workgroups of a draw, or of one task workgroup, along each axis
+    /// (`maxMeshWorkGroupCount`).
     pub max_mesh_groups: [u32; 3],
-    /// Most mesh workgroups of a draw, or of one task workgroup, altogether (`maxMeshWorkGroupTotalCount`).
+    /// Maximum mesh workgroups of a draw, or of one task workgroup, in total (`maxMeshWorkGroupTotalCount`).
     pub max_mesh_groups_total: u32,
-    /// Most invocations of a task workgroup for each axis (`maxTaskWorkGroupSize`).
+    /// Maximum size of a task workgroup along each axis (`maxTaskWorkGroupSize`).
     pub max_task_group_size: [u32; 3],
-    /// Most invocations of a task workgroup altogether (`maxTaskWorkGroupInvocations`).
+    /// Maximum invocations of a task workgroup (`maxTaskWorkGroupInvocations`).
     pub max_task_invocations: u32,
-    /// Bytes a task workgroup may hand to its mesh workgroups (`maxTaskPayloadSize`).
+    /// Maximum payload of a task workgroup in bytes (`maxTaskPayloadSize`).
     pub max_task_payload_bytes: u32,
-    /// Bytes that the invocations of a task workgroup may share (`maxTaskSharedMemorySize`).
+    /// Maximum shared memory of a task workgroup in bytes (`maxTaskSharedMemorySize`).
     pub max_task_shared_bytes: u32,
-    /// Bytes of both together (`maxTaskPayloadAndSharedMemorySize`).
+    /// Maximum sum of payload and shared memory of a task workgroup in bytes
+    /// (`maxTaskPayloadAndSharedMemorySize`).
     pub max_task_payload_and_shared_bytes: u32,
-    /// Most invocations of a mesh workgroup for each axis (`maxMeshWorkGroupSize`).
+    /// Maximum size of a mesh workgroup along each axis (`maxMeshWorkGroupSize`).
     pub max_mesh_group_size: [u32; 3],
-    /// Most invocations of a mesh workgroup altogether (`maxMeshWorkGroupInvocations`).
+    /// Maximum invocations of a mesh workgroup (`maxMeshWorkGroupInvocations`).
     pub max_mesh_invocations: u32,
-    /// Bytes that the invocations of a mesh workgroup may share (`maxMeshSharedMemorySize`).
+    /// Maximum shared memory of a mesh workgroup in bytes (`maxMeshSharedMemorySize`).
     pub max_mesh_shared_bytes: u32,
-    /// Bytes of those and of the payload it takes (`maxMeshPayloadAndSharedMemorySize`).
+    /// Maximum sum of shared memory and received payload of a mesh workgroup in bytes
+    /// (`maxMeshPayloadAndSharedMemorySize`).
     pub max_mesh_payload_and_shared_bytes: u32,
-    /// Most vertices a mesh workgroup puts out (`maxMeshOutputVertices`).
+    /// Maximum output vertices of a mesh workgroup (`maxMeshOutputVertices`).
     pub max_output_vertices: u32,
-    /// Most primitives a mesh workgroup puts out (`maxMeshOutputPrimitives`).
+    /// Maximum output primitives of a mesh workgroup (`maxMeshOutputPrimitives`).
     pub max_output_primitives: u32,
 }
 
 impl MeshLimits {
-    /// Those of `found`, which is all 0 unless the device was asked.
+    /// Returns the limits in `found`, which are all 0 unless they were queried.
     pub(crate) fn from_properties(found: &vk::PhysicalDeviceMeshShaderPropertiesEXT<'_>) -> Self {
         Self {
             max_task_groups: found.max_task_work_group_count,

@@ -1,4 +1,4 @@
-//! The optional features of devices: each once, with its name in Vulkan, its extension and its place.
+//! The optional features of devices. Each entry lists the Vulkan name, the extension and the structure field.
 
 use std::ffi::CStr;
 use std::fmt;
@@ -7,67 +7,66 @@ use ash::vk;
 
 use super::features::Features;
 
-/// A feature that some devices have and the library does not need. It is turned on wherever it is found, unless a
-/// [`DeviceProfile`](crate::DeviceProfile) hides it; [`Capabilities::has`](crate::Capabilities::has) says whether it is
-/// there. Ray tracing and mesh shaders have flags of their own.
+/// A feature that some devices have and the library does not need. It is enabled wherever the device has it,
+/// unless a [`DeviceProfile`](crate::DeviceProfile) hides it. [`Capabilities::has`](crate::Capabilities::has)
+/// returns true if it is enabled. Ray tracing and mesh shaders have separate flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum OptionalFeature {
     /// Indices above 2^24 - 1 (`fullDrawIndexUint32`).
     FullDrawIndex,
-    /// Arrays of cubes can be made and sampled (`imageCubeArray`).
+    /// Arrays of cube textures can be created and sampled (`imageCubeArray`).
     CubeArrays,
     /// The geometry stage, and `gl_PrimitiveID` in fragment shaders (`geometryShader`).
     GeometryShader,
     /// The two tessellation stages (`tessellationShader`).
     TessellationShader,
-    /// Fragment shaders that run once a sample (`sampleRateShading`).
+    /// Fragment shaders that run once per sample (`sampleRateShading`).
     SampleRateShading,
     /// Blend factors from a second output of the fragment shader (`dualSrcBlend`).
     DualSourceBlend,
-    /// Several draws from one indirect call of the driver (`multiDrawIndirect`).
+    /// Several draws from one indirect Vulkan command (`multiDrawIndirect`).
     MultiDrawIndirect,
     /// Indirect draws whose first instance is not 0 (`drawIndirectFirstInstance`).
     DrawIndirectFirstInstance,
-    /// Indirect draws that take their number from a buffer (`drawIndirectCount`).
+    /// Indirect draws with a draw count from a buffer (`drawIndirectCount`).
     DrawIndirectCount,
-    /// Depths beyond the range are clamped in place of clipped (`depthClamp`).
+    /// Depths outside the range are clamped instead of clipped (`depthClamp`).
     DepthClamp,
-    /// Depth biases with a bound (`depthBiasClamp`).
+    /// Depth biases with a clamp value (`depthBiasClamp`).
     DepthBiasClamp,
-    /// Polygons as lines or points (`fillModeNonSolid`).
+    /// Polygons drawn as lines or points (`fillModeNonSolid`).
     FillModeNonSolid,
-    /// Lines of other widths than 1 (`wideLines`).
+    /// Line widths other than 1 (`wideLines`).
     WideLines,
-    /// Points of other sizes than 1 (`largePoints`).
+    /// Point sizes other than 1 (`largePoints`).
     LargePoints,
-    /// Anisotropic filters (`samplerAnisotropy`).
+    /// Anisotropic filtering (`samplerAnisotropy`).
     SamplerAnisotropy,
     /// Formats BC1 to BC7 (`textureCompressionBC`).
     TextureCompressionBc,
-    /// Formats ETC2 and EAC (`textureCompressionETC2`).
+    /// ETC2 and EAC formats (`textureCompressionETC2`).
     TextureCompressionEtc2,
-    /// Formats ASTC of low dynamic range (`textureCompressionASTC_LDR`).
+    /// ASTC formats of low dynamic range (`textureCompressionASTC_LDR`).
     TextureCompressionAstcLdr,
-    /// Formats ASTC of high dynamic range (`textureCompressionASTC_HDR`).
+    /// ASTC formats of high dynamic range (`textureCompressionASTC_HDR`).
     TextureCompressionAstcHdr,
     /// Occlusion queries that count samples exactly (`occlusionQueryPrecise`).
     OcclusionQueryPrecise,
-    /// Queries of what the stages of pipelines do (`pipelineStatisticsQuery`).
+    /// Queries that count the work of pipeline stages (`pipelineStatisticsQuery`).
     PipelineStatisticsQuery,
-    /// Vertex, tessellation and geometry shaders that write (`vertexPipelineStoresAndAtomics`).
+    /// Stores and atomics in vertex, tessellation and geometry shaders (`vertexPipelineStoresAndAtomics`).
     VertexStoresAndAtomics,
     /// `gl_PointSize` in the tessellation and geometry stages
     /// (`shaderTessellationAndGeometryPointSize`).
     TessellationAndGeometryPointSize,
     /// Gathers with offsets that are not constant (`shaderImageGatherExtended`).
     ImageGatherExtended,
-    /// More formats in the declarations of storage images (`shaderStorageImageExtendedFormats`).
+    /// Additional formats in the declarations of storage images (`shaderStorageImageExtendedFormats`).
     StorageImageExtendedFormats,
-    /// Storage images of several samples (`shaderStorageImageMultisample`).
+    /// Multisampled storage images (`shaderStorageImageMultisample`).
     StorageImageMultisample,
-    /// Storage images read without a format in the shader
-    /// (`shaderStorageImageReadWithoutFormat`).
+    /// Reads of storage images without a format in the shader (`shaderStorageImageReadWithoutFormat`).
     StorageImageReadWithoutFormat,
     /// `gl_ClipDistance` (`shaderClipDistance`).
     ClipDistance,
@@ -83,7 +82,7 @@ pub enum OptionalFeature {
     Float16,
     /// 8-bit integers in shaders (`shaderInt8`).
     Int8,
-    /// Samples with a least level of detail (`shaderResourceMinLod`).
+    /// Texture samples with a minimum level of detail (`shaderResourceMinLod`).
     MinLod,
     /// 16-bit values in buffers (`storageBuffer16BitAccess`).
     StorageBuffer16Bit,
@@ -105,21 +104,21 @@ pub enum OptionalFeature {
     VariablePointers,
     /// `gl_DrawID`, `gl_BaseVertex` and `gl_BaseInstance` (`shaderDrawParameters`).
     DrawParameters,
-    /// Passes that draw several views at once (`multiview`).
+    /// Render passes that draw several views at once (`multiview`).
     Multiview,
-    /// Geometry shaders in such passes (`multiviewGeometryShader`).
+    /// Geometry shaders in multiview passes (`multiviewGeometryShader`).
     MultiviewGeometry,
-    /// Tessellation in such passes (`multiviewTessellationShader`).
+    /// Tessellation in multiview passes (`multiviewTessellationShader`).
     MultiviewTessellation,
-    /// Mesh shaders in such passes (`multiviewMeshShader`).
+    /// Mesh shaders in multiview passes (`multiviewMeshShader`).
     MultiviewMesh,
     /// Pipeline statistics of task and mesh shaders (`meshShaderQueries`).
     MeshShaderQueries,
-    /// Textures in YCbCr (`samplerYcbcrConversion`).
+    /// Textures in Y'CbCr formats (`samplerYcbcrConversion`).
     YcbcrConversion,
-    /// Addresses mirrored once (`samplerMirrorClampToEdge`).
+    /// Texture addresses mirrored once (`samplerMirrorClampToEdge`).
     MirrorClampToEdge,
-    /// Filters that take the least or greatest texel (`samplerFilterMinmax`).
+    /// Filters that return the minimum or maximum texel (`samplerFilterMinmax`).
     FilterMinMax,
     /// Atomic operations on 64-bit integers in buffers (`shaderBufferInt64Atomics`).
     BufferInt64Atomics,
@@ -127,65 +126,65 @@ pub enum OptionalFeature {
     SharedInt64Atomics,
     /// `gl_Layer` written by vertex and tessellation shaders (`shaderOutputLayer`).
     ShaderOutputLayer,
-    /// Loads, stores and exchanges of floats in buffers, atomically (`shaderBufferFloat32Atomics`).
+    /// Atomic loads, stores and exchanges of floats in buffers (`shaderBufferFloat32Atomics`).
     BufferFloatAtomics,
-    /// Sums of floats in buffers, atomically (`shaderBufferFloat32AtomicAdd`).
+    /// Atomic additions of floats in buffers (`shaderBufferFloat32AtomicAdd`).
     BufferFloatAtomicAdd,
-    /// Loads, stores and exchanges of floats in shared memory (`shaderSharedFloat32Atomics`).
+    /// Atomic loads, stores and exchanges of floats in shared memory (`shaderSharedFloat32Atomics`).
     SharedFloatAtomics,
-    /// Sums of floats in shared memory (`shaderSharedFloat32AtomicAdd`).
+    /// Atomic additions of floats in shared memory (`shaderSharedFloat32AtomicAdd`).
     SharedFloatAtomicAdd,
-    /// Loads, stores and exchanges of floats in storage images (`shaderImageFloat32Atomics`).
+    /// Atomic loads, stores and exchanges of floats in storage images (`shaderImageFloat32Atomics`).
     ImageFloatAtomics,
-    /// Sums of floats in storage images (`shaderImageFloat32AtomicAdd`).
+    /// Atomic additions of floats in storage images (`shaderImageFloat32AtomicAdd`).
     ImageFloatAtomicAdd,
-    /// Fragment shaders that read what their pass has drawn (`dynamicRenderingLocalRead`).
+    /// Fragment shaders that read the attachments of their own pass (`dynamicRenderingLocalRead`).
     LocalRead,
-    /// Fragment shaders that run once for several pixels, by pipeline or draw
-    /// (`pipelineFragmentShadingRate`).
+    /// Fragments of several pixels, by pipeline or draw (`pipelineFragmentShadingRate`).
     PipelineShadingRate,
-    /// The same, by primitive (`primitiveFragmentShadingRate`).
+    /// Fragments of several pixels, by primitive (`primitiveFragmentShadingRate`).
     PrimitiveShadingRate,
-    /// The same, by an image (`attachmentFragmentShadingRate`).
+    /// Fragments of several pixels, by an attachment (`attachmentFragmentShadingRate`).
     AttachmentShadingRate,
-    /// The same, by primitives of mesh shaders (`primitiveFragmentShadingRateMeshShader`).
+    /// Fragments of several pixels, by primitives of mesh shaders (`primitiveFragmentShadingRateMeshShader`).
     MeshPrimitiveShadingRate,
     /// `gl_BaryCoordEXT` in fragment shaders (`fragmentShaderBarycentric`).
     Barycentrics,
     /// 8-bit indices (`indexTypeUint8`).
     IndexTypeUint8,
-    /// Any colour beyond the edge of a texture (`customBorderColors`).
+    /// Arbitrary border colours of samplers (`customBorderColors`).
     CustomBorderColors,
-    /// The same for samplers that know no format (`customBorderColorWithoutFormat`).
+    /// Arbitrary border colours for samplers without a format (`customBorderColorWithoutFormat`).
     CustomBorderColorWithoutFormat,
-    /// Texels written by the CPU without a copy on the GPU (`hostImageCopy`).
+    /// Texels copied by the host, without a copy on the GPU (`hostImageCopy`).
     HostImageCopy,
-    /// Formats A8 and A1B5G5R5, and what else is in `maintenance5`.
+    /// Formats A8 and A1B5G5R5, and the other features of `maintenance5`.
     Maintenance5,
-    /// The clocks of device and host can be read together (`VK_KHR_calibrated_timestamps` or
+    /// Clocks of device and host that can be read together (`VK_KHR_calibrated_timestamps` or
     /// `VK_EXT_calibrated_timestamps`).
     CalibratedTimestamps,
-    /// How much memory of each heap is left (`VK_EXT_memory_budget`).
+    /// Budget and use of each memory heap (`VK_EXT_memory_budget`).
     MemoryBudget,
-    /// What a lost device says of its fault (`deviceFault`).
+    /// Fault report of a lost device (`deviceFault`).
     DeviceFault,
-    /// Images of windows (`VK_KHR_swapchain`).
+    /// Presenting to windows (`VK_KHR_swapchain`).
     Swapchain,
-    /// Fences and modes for each present (`swapchainMaintenance1`).
+    /// Fences and present modes for each present (`swapchainMaintenance1`).
     SwapchainMaintenance1,
-    /// What a window's display is told of its pictures (`VK_EXT_hdr_metadata`).
+    /// HDR metadata for the display of a window (`VK_EXT_hdr_metadata`).
     HdrMetadata,
 }
 
 use OptionalFeature as F;
 
 impl OptionalFeature {
-    /// All of them.
+    /// Returns all optional features.
     pub fn all() -> impl ExactSizeIterator<Item = Self> {
         ROWS.iter().map(|row| row.feature)
     }
 
-    /// Its name in Vulkan: that of the member of a feature structure, or of the extension where that has no features.
+    /// Returns the Vulkan name: the member of a feature structure, or the extension if it has no feature
+    /// structure.
     pub fn vulkan_name(self) -> &'static str {
         self.table_row().name
     }
@@ -199,53 +198,53 @@ impl OptionalFeature {
     }
 }
 
-/// Some of the [`OptionalFeature`]s.
+/// A set of [`OptionalFeature`]s.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 pub struct FeatureSet(u128);
 
 impl FeatureSet {
-    /// None of them.
+    /// The empty set.
     pub const NONE: Self = Self(0);
-    /// All of them, those of later versions included.
+    /// The set of all features, including those of later versions.
     pub const ALL: Self = Self(u128::MAX);
 
-    /// Whether `feature` is one of them.
+    /// True if the set contains `feature`.
     pub fn contains(self, feature: OptionalFeature) -> bool {
         self.0 & feature.bit() != 0
     }
 
-    /// These and `feature`.
+    /// Returns the set with `feature` added.
     #[must_use]
     pub fn with(self, feature: OptionalFeature) -> Self {
         Self(self.0 | feature.bit())
     }
 
-    /// These without those of `other`.
+    /// Returns the set without the features of `other`.
     #[must_use]
     pub fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// Them, in the order of [`OptionalFeature::all`].
+    /// Returns the features of the set, in the order of [`OptionalFeature::all`].
     pub fn iter(self) -> impl Iterator<Item = OptionalFeature> {
         OptionalFeature::all().filter(move |feature| self.contains(*feature))
     }
 
-    /// Those of `features` that are on and can be used without the others.
+    /// Returns the features enabled in `features` whose requirements are enabled too.
     pub(crate) fn from_features(features: &Features) -> Self {
         let mut features = *features;
         let on = ROWS.iter().filter(|row| *(row.field)(&mut features) == vk::TRUE);
         on.map(|row| row.feature).collect::<Self>().without_unmet_requirements()
     }
 
-    /// Without those whose own requirement is not among them, which Vulkan forbids to turn on.
+    /// Returns the set without features whose requirement is missing; Vulkan forbids enabling those.
     #[must_use]
     pub(crate) fn without_unmet_requirements(self) -> Self {
         let orphans = REQUIREMENTS.into_iter().filter(|(_, needs)| !self.contains(*needs));
         self.without(orphans.map(|(feature, _)| feature).collect())
     }
 
-    /// Copies those of the set that `found` has to `wanted`.
+    /// Copies the features of the set from `found` to `wanted`.
     pub(crate) fn enable(self, wanted: &mut Features, found: &Features) {
         let mut found = *found;
         for row in self.iter().map(OptionalFeature::table_row) {
@@ -253,7 +252,7 @@ impl FeatureSet {
         }
     }
 
-    /// The extensions of them, some several times.
+    /// Returns the extensions of the features. The result may contain duplicates.
     pub(crate) fn extensions(self) -> impl Iterator<Item = &'static CStr> {
         self.iter().filter_map(|feature| feature.table_row().extension)
     }
@@ -271,14 +270,14 @@ impl fmt::Debug for FeatureSet {
     }
 }
 
-/// Of mesh shaders, which have a switch of their own.
+/// Features of mesh shaders, which have a separate flag.
 pub(crate) const OF_MESH_SHADERS: [OptionalFeature; 3] =
     [F::MultiviewMesh, F::MeshShaderQueries, F::MeshPrimitiveShadingRate];
 
-/// Of a window's images: only where the instance knows windows.
+/// Features of presentation, available only if the instance has surface extensions.
 pub(crate) const OF_WINDOWS: [OptionalFeature; 3] = [F::Swapchain, F::SwapchainMaintenance1, F::HdrMetadata];
 
-/// Features that Vulkan takes only together with another.
+/// Pairs of a feature and the feature that it requires in Vulkan.
 const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 9] = [
     (F::MultiviewGeometry, F::Multiview),
     (F::MultiviewTessellation, F::Multiview),

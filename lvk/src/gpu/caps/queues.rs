@@ -1,44 +1,47 @@
-//! The queues of a device behind the three of the library.
+//! The Vulkan queues behind the three queues of the library.
 
 use ash::vk;
 
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
 
-/// Whether queues are kept apart.
+/// Mapping of the library's queues to Vulkan queues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum QueueRequest {
-    /// Where the device has queues for them.
+    /// Separate Vulkan queues where the device has them.
     #[default]
     OwnHardware,
-    /// Never: all run one after the other on one queue of the device.
+    /// One Vulkan queue, on which all commands run one after the other.
     Shared,
-    /// Always: those that share a queue of the device wait for each other, and move what they own, as if each had its own.
-    /// It shows on any device, and to its validation layer, what several queues do; it makes nothing faster.
+    /// Separate queues on every device. Queues that share a Vulkan queue synchronise and transfer ownership
+    /// as if each had its own. This exercises multi-queue code on any device and under its validation layer.
+    /// It makes nothing faster.
     Emulated,
 }
 
-/// What counts of timestamps of several queues, which have so many bits each: the bits that all have that have any.
+/// Returns the mask of the timestamp bits that are valid on all queues that have timestamps. `bits` holds the
+/// valid bits of each queue, 0 for none.
 pub(crate) fn shared_timestamp_bits(bits: [u32; 3]) -> u64 {
     let least = bits.into_iter().filter(|bits| *bits > 0).min().unwrap_or(1);
     u64::MAX >> (64 - least.min(64))
 }
 
-/// What stands behind a [`Queue`].
+/// Properties of the Vulkan queue behind a [`Queue`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct QueueInfo {
-    /// Whether the device has a queue for it alone; that of the graphics queue is its own, whoever else uses it.
+    /// True if the device has a separate Vulkan queue for it. Always true for the graphics queue, even if
+    /// other queues share it.
     pub own_hardware: bool,
-    /// The family of the device's queue.
+    /// Queue family of the Vulkan queue.
     pub family: u32,
-    /// Bits of a timestamp that count (`timestampValidBits`); 0 where the queue has none.
+    /// Valid bits of a timestamp (`timestampValidBits`); 0 if the queue has no timestamps.
     pub timestamp_bits: u32,
-    /// Offsets and extents of copies from and to textures are multiples of this, in texels or blocks, or reach the edge;
-    /// zeros where only whole mips can be copied (`minImageTransferGranularity`).
+    /// Granularity of texture copies, in texels or blocks (`minImageTransferGranularity`). Offsets and
+    /// extents of copies must be multiples of it or reach the edge. Zeros if only whole mips can be copied.
     pub copy_granularity: [u32; 3],
 }
 
-/// A family of queues, as the device tells of it.
+/// A queue family, as reported by the device.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct QueueFamily {
     pub(crate) flags: vk::QueueFlags,
@@ -47,14 +50,14 @@ pub(crate) struct QueueFamily {
     pub(crate) copy_granularity: [u32; 3],
 }
 
-/// A queue of the device.
+/// A Vulkan queue, by family and index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct QueueLocation {
     pub(crate) family: u32,
     pub(crate) index: u32,
 }
 
-/// The families of a device, in their order.
+/// Returns the queue families of a device, in Vulkan's order.
 pub(crate) fn queue_families(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Vec<QueueFamily> {
     // SAFETY: `raw` was enumerated from `instance`.
     let families = unsafe { instance.get_physical_device_queue_family_properties(raw) };
@@ -70,8 +73,9 @@ pub(crate) fn queue_families(instance: &ash::Instance, raw: vk::PhysicalDevice) 
     families.iter().map(family).collect()
 }
 
-/// A queue of the device for each of the library's, where `graphics` is the family for everything. Families that can do
-/// least else come first; then further queues of the families in use; then the graphics queue itself.
+/// Selects a Vulkan queue for each queue of the library. `graphics` is the family with graphics and compute.
+/// The most specialised families come first, then further queues of the families in use, then the graphics
+/// queue itself.
 pub(crate) fn locate_queues(families: &[QueueFamily], graphics: u32) -> [QueueLocation; 3] {
     use vk::QueueFlags as Flags;
     let first = QueueLocation { family: graphics, index: 0 };
@@ -91,7 +95,7 @@ pub(crate) fn locate_queues(families: &[QueueFamily], graphics: u32) -> [QueueLo
     [first, compute, transfer.or_else(next).unwrap_or(first)]
 }
 
-/// What is told of queues at these places.
+/// Returns the properties of the queues at these locations.
 pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueueLocation; 3]) -> [QueueInfo; 3] {
     let info = |queue: Queue| {
         let place = places[queue.index()];
@@ -107,24 +111,24 @@ pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueueLocation;
     Queue::ALL.map(info)
 }
 
-/// The queues of a device that are in use.
+/// The Vulkan queues that a context uses.
 ///
-/// Command buffers that are kept in one order run in a *queue*: queue 0 is that of the graphics queue, and a queue that is kept
-/// apart has the queue of its own number.
+/// Command buffers of one queue index run in submission order. The graphics queue has queue index 0. A
+/// separate queue has the index of its position in [`Queue::ALL`]; every other queue shares index 0.
 pub(crate) struct Queues {
     raw: Vec<Mutex<vk::Queue>>,
-    /// Which of `raw` each queue submits to.
+    /// Index into `raw` for each queue.
     places: [usize; 3],
     families: [u32; 3],
-    /// Whether a queue has a queue of its own.
+    /// True for each queue with a queue index of its own.
     apart: [bool; 3],
     rehearsed: bool,
-    /// Each once.
+    /// The queue families in use, without duplicates.
     distinct: Vec<u32>,
 }
 
 impl Queues {
-    /// By the device's queue of each, and its family. Those of one handle share it.
+    /// Creates the queues from the Vulkan queue and family of each. Queues with the same handle share it.
     pub(crate) fn new(raw: [(vk::Queue, u32); 3], request: QueueRequest) -> Self {
         let raw = if request == QueueRequest::Shared { [raw[0]; 3] } else { raw };
         let mut queues: Vec<vk::Queue> = Vec::new();
@@ -145,37 +149,37 @@ impl Queues {
         Self { raw, places, families, apart, rehearsed, distinct }
     }
 
-    /// The queue of a queue.
+    /// Returns the queue index of a queue.
     pub(crate) fn queue_index(&self, queue: Queue) -> usize {
         if self.apart[queue.index()] { queue.index() } else { 0 }
     }
 
-    /// Whether there is more than one queue.
+    /// True if there is more than one queue index.
     pub(crate) fn has_several(&self) -> bool {
         self.apart.contains(&true)
     }
 
-    /// The device's queue of a queue; Vulkan wants one thread at a time on it.
+    /// Locks the Vulkan queue of a queue index, which only one thread may use at a time.
     pub(crate) fn raw(&self, queue_index: usize) -> Guard<'_, vk::Queue> {
         self.raw[self.places[queue_index]].lock()
     }
 
-    /// The family of a queue.
+    /// Returns the family of a queue index.
     pub(crate) fn family(&self, queue_index: usize) -> u32 {
         self.families[queue_index]
     }
 
-    /// All families in use, each once.
+    /// Returns all families in use, without duplicates.
     pub(crate) fn families(&self) -> &[u32] {
         &self.distinct
     }
 
-    /// Queues of one domain own images together.
+    /// Returns the ownership domain of a queue index. Queues of one domain share ownership of images.
     pub(crate) fn domain(&self, queue_index: usize) -> u32 {
         if self.rehearsed { queue_index as u32 } else { self.families[queue_index] }
     }
 
-    /// Whether images can belong to one queue and not to another.
+    /// True if images can be owned by one queue and not by another.
     pub(crate) fn has_several_domains(&self) -> bool {
         (1..3).any(|queue_index| self.apart[queue_index] && self.domain(queue_index) != self.domain(0))
     }

@@ -1,56 +1,56 @@
-//! Who walks the tree of a ray query: the device, or the library.
+//! Selection of the ray query implementation: the device, or the library in software.
 
 use crate::error::{Error, Result};
 
-/// Who is to walk the trees of ray queries.
+/// Requested implementation of ray queries.
 ///
-/// Software needs Vulkan 1.3 and nothing else, so it works on every device that a context can be made on. Either way
-/// handles, shaders (`#include <lvk/ray_query.glsl>`) and answers are the same.
+/// Software traversal only needs Vulkan 1.3, so it works on every device that can have a context. Handles,
+/// shaders (`#include <lvk/ray_query.glsl>`) and results are the same with both implementations.
 ///
-/// Software needs the feature `software-ray-query` of the crate, which is on by default.
+/// Software traversal needs the crate feature `software-ray-query`, which is enabled by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayQueryRequest {
-    /// Hardware where it is real; software where there is none, or where the device is a CPU, whose own queries are no
-    /// hardware and slower. Without the feature `software-ray-query`, the same as
+    /// Hardware queries on GPUs that have them. Software on GPUs without them, and on CPU devices, whose own
+    /// queries are slower. Without the feature `software-ray-query`, the same as
     /// [`HardwareIfPresent`](Self::HardwareIfPresent).
     #[default]
     Auto,
     /// Only devices with `VK_KHR_ray_query` are considered.
     Hardware,
-    /// `VK_KHR_ray_query` where present; without it queries do not work. Spares devices that trace by pipelines alone the
-    /// structures of software queries.
+    /// `VK_KHR_ray_query` if the device has it; otherwise ray queries do not work. Devices with ray tracing
+    /// pipelines only then build no acceleration structures for software queries.
     HardwareIfPresent,
-    /// The library itself, even where there is hardware. [`Context::new`](crate::Context::new) fails with
-    /// [`Unsupported`](crate::Error::Unsupported) without the feature `software-ray-query`.
+    /// Software, even if the device has hardware queries. Without the feature `software-ray-query`,
+    /// [`Context::new`](crate::Context::new) fails with [`Unsupported`](crate::Error::Unsupported).
     Software,
-    /// None, even where present.
+    /// No ray queries, even if the device has them.
     Off,
 }
 
-/// Who walks the trees of ray queries.
+/// Implementation of ray queries in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayQueryPath {
-    /// Nobody: there are no ray queries.
+    /// No ray queries.
     #[default]
     None,
-    /// The device (`VK_KHR_ray_query`).
+    /// Traversal by the device (`VK_KHR_ray_query`).
     Hardware,
-    /// The library, in the shader, over trees of its own.
+    /// Traversal by the library, in the shader, over the library's own BVHs.
     Software,
 }
 
-/// A path with the reason it was taken.
+/// A ray query path, with the reason for its selection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RayQueryChoice {
     pub(crate) path: RayQueryPath,
     pub(crate) reason: &'static str,
 }
 
-/// Whether the library has its own traversal.
+/// True if the library is built with its own traversal.
 const HAS_SOFTWARE: bool = cfg!(feature = "software-ray-query");
 
 impl RayQueryRequest {
-    /// Fails for the software path in a build without it.
+    /// Returns an error for the software path in a build without it.
     pub(crate) fn check(self) -> Result<()> {
         if self == Self::Software && !HAS_SOFTWARE {
             let why =
@@ -60,17 +60,17 @@ impl RayQueryRequest {
         Ok(())
     }
 
-    /// Whether only devices that have it will do.
+    /// True if only devices with hardware queries are considered.
     pub(crate) fn requires_hardware(self) -> bool {
         self == Self::Hardware
     }
 
-    /// Whether a device that has it is better than one that has not.
+    /// True if devices with hardware queries are preferred.
     pub(crate) fn prefers_hardware(self) -> bool {
         matches!(self, Self::Auto | Self::Hardware | Self::HardwareIfPresent)
     }
 
-    /// Who walks on a device that `has` hardware queries or not, and is a CPU or not.
+    /// Selects the implementation for a device. `has`: it has hardware queries; `is_cpu`: it is a CPU.
     pub(crate) fn choose(self, has: bool, is_cpu: bool) -> RayQueryChoice {
         use RayQueryPath::{Hardware, None, Software};
         let (path, reason) = match self {

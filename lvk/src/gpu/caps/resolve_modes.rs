@@ -1,23 +1,23 @@
-//! How the samples of a pixel become one.
+//! Modes for resolving multisampled depth and stencil.
 
 use bitflags::bitflags;
 
-/// How depth or stencil samples of a pixel become one (`VkResolveModeFlagBits`). Colours are averaged, integers take the
-/// first.
+/// Mode for resolving the depth or stencil samples of a pixel (`VkResolveModeFlagBits`). Colours are
+/// averaged; integers take the first sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ResolveMode {
-    /// The first; every device has it.
+    /// The first sample. Every device supports it.
     SampleZero,
-    /// The mean; never of stencil.
+    /// The mean of the samples. Not available for stencil.
     Average,
-    /// The least.
+    /// The minimum of the samples.
     Min,
-    /// The greatest.
+    /// The maximum of the samples.
     Max,
 }
 
 bitflags! {
-    /// Some of the [`ResolveMode`]s. The bits are Vulkan's.
+    /// A set of [`ResolveMode`]s. The bits are Vulkan's.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
     pub struct ResolveModes: u32 {
         /// [`ResolveMode::SampleZero`].
@@ -42,22 +42,22 @@ impl ResolveMode {
     }
 }
 
-/// What a device can do with multisampled depth and stencil at the end of a pass
+/// Support for resolving multisampled depth and stencil at the end of a pass
 /// (`VkPhysicalDeviceDepthStencilResolveProperties`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DepthResolveLimits {
-    /// Modes of depth.
+    /// Supported modes for depth.
     pub depth: ResolveModes,
-    /// Modes of stencil.
+    /// Supported modes for stencil.
     pub stencil: ResolveModes,
-    /// One of both may be resolved without the other.
+    /// True if depth or stencil may be resolved without the other.
     pub one_alone: bool,
-    /// Both may be resolved by different modes.
+    /// True if depth and stencil may be resolved with different modes.
     pub different: bool,
 }
 
 impl DepthResolveLimits {
-    /// Whether the device resolves a target with both parts this way.
+    /// True if the device can resolve a depth-stencil target with these modes.
     pub(crate) fn supports(&self, depth: Option<ResolveMode>, stencil: Option<ResolveMode>) -> bool {
         let known = |mode: Option<ResolveMode>, modes: ResolveModes| {
             mode.is_none_or(|mode| modes.contains(mode.bit()))

@@ -1,21 +1,21 @@
-//! Fragments of several pixels: how their sizes are told, put together, and what devices have of them.
+//! Fragment shading rates: sizes, combiners and device limits.
 
 use ash::vk;
 
-/// How two rates become one (`VkFragmentShadingRateCombinerOpKHR`), width and height each for itself. All but
-/// [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].
+/// Combination of two rates into one (`VkFragmentShadingRateCombinerOpKHR`), separately for width and height.
+/// All but [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ShadingRateCombiner {
-    /// The first.
+    /// The first rate.
     #[default]
     Keep,
-    /// The second.
+    /// The second rate.
     Replace,
-    /// The finer of both.
+    /// The finer of both rates.
     Min,
-    /// The coarser of both.
+    /// The coarser of both rates.
     Max,
-    /// The product; the sum of exponents where [`ShadingRateLimits::multiplies`] is not set.
+    /// The product of both rates. The sum of the exponents if [`ShadingRateLimits::multiplies`] is not set.
     Multiply,
 }
 
@@ -32,18 +32,20 @@ impl ShadingRateCombiner {
     }
 }
 
-/// How many pixels a fragment covers, which its shader runs once for: coverage and depth stay those of pixels.
+/// Number of pixels that a fragment covers. The fragment shader runs once for all of them; coverage and depth
+/// stay per pixel.
 ///
-/// Three rates come together: that of the pipeline or draw, that of the primitive (`gl_PrimitiveShadingRateEXT`), and that of
-/// the pass's attachment. The device takes the coarsest size it has that is no coarser than the outcome. Where shaders run
-/// once a sample, or write depth and [`ShadingRateLimits::with_depth_writes`] is not set, fragments are single pixels.
+/// Three rates are combined: the rate of the pipeline or draw, of the primitive
+/// (`gl_PrimitiveShadingRateEXT`), and of the pass's attachment. The device uses its coarsest size that is no
+/// coarser than the result. Fragments are single pixels if shaders run once per sample. The same holds for
+/// shaders that write depth, unless [`ShadingRateLimits::with_depth_writes`] is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ShadingRate {
     /// Width and height in pixels, each 1, 2 or 4: one of [`Context::shading_rates`](crate::Context::shading_rates).
     pub size: [u32; 2],
-    /// How the primitive's rate comes in.
+    /// Combiner of the pipeline's rate with the primitive's rate.
     pub primitive: ShadingRateCombiner,
-    /// How the attachment's rate comes in then.
+    /// Combiner of that result with the attachment's rate.
     pub attachment: ShadingRateCombiner,
 }
 
@@ -54,23 +56,23 @@ impl Default for ShadingRate {
 }
 
 impl ShadingRate {
-    /// Fragments of this size, whatever primitives and attachments say.
+    /// Fragments of this size, independent of primitives and attachments.
     pub const fn new(size: [u32; 2]) -> Self {
         Self { size, primitive: ShadingRateCombiner::Keep, attachment: ShadingRateCombiner::Keep }
     }
 
-    /// Fragments of the sizes that the pass's attachment says.
+    /// Fragments of the sizes given by the pass's attachment.
     pub const fn by_attachment() -> Self {
         Self { attachment: ShadingRateCombiner::Replace, ..Self::new([1, 1]) }
     }
 
-    /// Fragments of the sizes that primitives say.
+    /// Fragments of the sizes given by primitives.
     pub const fn by_primitive() -> Self {
         Self { primitive: ShadingRateCombiner::Replace, ..Self::new([1, 1]) }
     }
 
-    /// A texel of an attachment, and a `gl_PrimitiveShadingRateEXT`, that stands for this size; `None` for sides other than 1,
-    /// 2 and 4.
+    /// Returns the attachment texel, or `gl_PrimitiveShadingRateEXT`, that encodes this size. `None` for
+    /// sides other than 1, 2 and 4.
     pub fn texel(size: [u32; 2]) -> Option<u8> {
         let [width, height] = [exponent(size[0])?, exponent(size[1])?];
         Some(width << 2 | height)
@@ -94,32 +96,33 @@ fn exponent(side: u32) -> Option<u8> {
     }
 }
 
-/// A size of fragments that a device has.
+/// A fragment size that a device supports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct FragmentSize {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Numbers of samples a pixel that targets may have with it, added up: 5 is 1 and 4.
+    /// Sample counts of targets allowed with this size, as a sum: 5 means 1 and 4.
     pub samples: u32,
 }
 
-/// What a device can do with rates (`VkPhysicalDeviceFragmentShadingRatePropertiesKHR`); zeros where it has none.
+/// Shading rate limits of a device (`VkPhysicalDeviceFragmentShadingRatePropertiesKHR`). All zero if the
+/// device has no shading rates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ShadingRateLimits {
-    /// Largest fragments, in pixels.
+    /// Maximum size of fragments, in pixels.
     pub max_size: [u32; 2],
-    /// Fewest pixels that a texel of an attachment stands for.
+    /// Minimum number of pixels per texel of an attachment, along each axis.
     pub min_texel: [u32; 2],
-    /// Most pixels that it stands for.
+    /// Maximum number of pixels per texel of an attachment, along each axis.
     pub max_texel: [u32; 2],
-    /// How much longer than the other one side of such a texel may be.
+    /// Maximum aspect ratio of the pixels per texel.
     pub max_texel_aspect: u32,
-    /// Rates can be put together by [`ShadingRateCombiner::Min`], [`Max`](ShadingRateCombiner::Max) and
+    /// True if the device supports [`ShadingRateCombiner::Min`], [`Max`](ShadingRateCombiner::Max) and
     /// [`Multiply`](ShadingRateCombiner::Multiply).
     pub combines: bool,
-    /// Products are products.
+    /// True if [`ShadingRateCombiner::Multiply`] multiplies. Otherwise it adds exponents.
     pub multiplies: bool,
-    /// Shaders that write depth run for fragments of several pixels too.
+    /// True if fragments may cover several pixels with shaders that write depth.
     pub with_depth_writes: bool,
 }
 
@@ -137,7 +140,7 @@ impl ShadingRateLimits {
         }
     }
 
-    /// Fails unless a texel of an attachment may stand for so many pixels.
+    /// Returns an error unless a texel of an attachment may cover this number of pixels.
     pub(crate) fn check_texel(&self, texel: [u32; 2]) -> Result<(), String> {
         let fits = (0..2).all(|axis| {
             let range = self.min_texel[axis]..=self.max_texel[axis];
@@ -155,16 +158,17 @@ impl ShadingRateLimits {
     }
 }
 
-/// Why a rate cannot be.
+/// Reason why a rate cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ShadingRateError {
-    /// Nowhere.
+    /// Invalid on every device.
     Wrong(String),
-    /// Not here.
+    /// Unsupported by this device.
     Lacks(String),
 }
 
-/// Fails unless the device has the rate's size for so many samples, and puts rates together this way.
+/// Returns an error unless the device supports the rate's size with this sample count, and the rate's
+/// combiners.
 pub(crate) fn check_rate(
     rate: &ShadingRate,
     samples: u32,
@@ -190,14 +194,15 @@ pub(crate) fn check_rate(
     ))
 }
 
-/// The functions of `VK_KHR_fragment_shading_rate`, and the sizes of the device.
+/// The functions of `VK_KHR_fragment_shading_rate`, and the fragment sizes of the device.
 pub(crate) struct ShadingRates {
     pub(crate) functions: ash::khr::fragment_shading_rate::Device,
     pub(crate) sizes: Vec<FragmentSize>,
 }
 
 impl ShadingRates {
-    /// For a device with [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
+    /// Creates the functions, for a device with
+    /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
     pub(crate) fn new(
         entry: &ash::Entry,
         instance: &ash::Instance,
@@ -209,7 +214,7 @@ impl ShadingRates {
     }
 }
 
-/// None where the driver does not answer.
+/// Returns the fragment sizes of the device. Empty if the query fails.
 fn query_sizes(
     entry: &ash::Entry,
     instance: &ash::Instance,
@@ -218,19 +223,20 @@ fn query_sizes(
     let functions = ash::khr::fragment_shading_rate::Instance::new(entry, instance);
     let ask = functions.fp().get_physical_device_fragment_shading_rates_khr;
     let mut count = 0;
-    // SAFETY: the physical device belongs to the instance and has the extension; without a list the count is answered.
+    // SAFETY: the physical device belongs to the instance and has the extension. Without a list only the
+    // count is written.
     if unsafe { ask(physical, &mut count, std::ptr::null_mut()) } != vk::Result::SUCCESS {
         return Vec::new();
     }
     let mut found = vec![vk::PhysicalDeviceFragmentShadingRateKHR::default(); count as usize];
-    // SAFETY: as above, and the list has room for so many.
+    // SAFETY: as above, and the list has that length.
     if unsafe { ask(physical, &mut count, found.as_mut_ptr()) } != vk::Result::SUCCESS {
         return Vec::new();
     }
     found.truncate(count as usize);
     let size = |raw: &vk::PhysicalDeviceFragmentShadingRateKHR<'_>| FragmentSize {
         size: [raw.fragment_size.width, raw.fragment_size.height],
-        // Of single pixels, which any number of samples can have, drivers set all bits.
+        // Drivers set all bits for single pixels, which support every sample count.
         samples: raw.sample_counts.as_raw() & 0x7f,
     };
     found.iter().map(size).collect()
@@ -242,7 +248,7 @@ mod tests {
 
     use super::*;
 
-    /// As a desktop GPU answers, coarse to fine.
+    /// Fragment sizes of a typical desktop GPU, coarse to fine.
     const SIZES: [FragmentSize; 4] = [
         FragmentSize { size: [4, 4], samples: 1 },
         FragmentSize { size: [2, 2], samples: 7 },

@@ -1,4 +1,4 @@
-//! Debuggers and profilers that read the names of objects.
+//! Detects debuggers and profilers that read the names of objects.
 
 use ash::vk;
 
@@ -7,7 +7,7 @@ pub(crate) fn has_debugger(instance: &ash::Instance, device: vk::PhysicalDevice)
     // SAFETY: the physical device belongs to the instance, whose version is 1.3.
     let count = unsafe { instance.get_physical_device_tool_properties_len(device) }.unwrap_or(0);
     let mut tools = vec![vk::PhysicalDeviceToolProperties::default(); count];
-    // SAFETY: as above; tools come and go with the process, so the count still holds.
+    // SAFETY: as above. Tools register once per process, so the count still holds.
     let found = unsafe { instance.get_physical_device_tool_properties(device, &mut tools) };
     found.is_ok() && tools.iter().any(|tool| reads_names(tool.purposes))
 }

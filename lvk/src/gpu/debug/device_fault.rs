@@ -6,20 +6,22 @@ use ash::vk;
 
 use crate::error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 
-/// Lists longer than this are taken for nonsense of a driver that has just failed.
+/// Maximum length of a list. A driver that has just failed may report nonsense, and longer lists are cut.
 const MAX_ENTRIES: u32 = 1 << 16;
 
-/// Asks a lost device; `None` where it cannot say.
+/// Queries the fault of a lost device. `None` if the query fails.
 pub(crate) fn query_fault(
     functions: &ash::ext::device_fault::Device,
     device: vk::Device,
 ) -> Option<DeviceFault> {
     let functions = functions.fp();
-    // SAFETY: the device is lost, as its last answer was, and the lists have the lengths that the counts say.
+    // SAFETY: the device is lost, as its last result reported, and the lists have the lengths given by the
+    // counts.
     read_fault(|counts, info| unsafe { (functions.get_device_fault_info_ext)(device, counts, info) })
 }
 
-/// Reads by a function that works like `vkGetDeviceFaultInfoEXT`: counts first, then lists of that length.
+/// Reads a fault through `ask`, which works like `vkGetDeviceFaultInfoEXT`: first the counts, then lists of
+/// that length.
 fn read_fault(
     ask: impl Fn(*mut vk::DeviceFaultCountsEXT<'_>, *mut vk::DeviceFaultInfoEXT<'_>) -> vk::Result,
 ) -> Option<DeviceFault> {
@@ -27,7 +29,7 @@ fn read_fault(
     if ask(&mut counts, std::ptr::null_mut()) != vk::Result::SUCCESS {
         return None;
     }
-    counts.vendor_binary_size = 0; // only drivers' own tools read it, and it has a feature of its own
+    counts.vendor_binary_size = 0; // read only by the driver's own tools, and behind a separate feature
     counts.address_info_count = counts.address_info_count.min(MAX_ENTRIES);
     counts.vendor_info_count = counts.vendor_info_count.min(MAX_ENTRIES);
     let mut addresses = vec![vk::DeviceFaultAddressInfoEXT::default(); counts.address_info_count as usize];
@@ -37,7 +39,7 @@ fn read_fault(
         p_vendor_infos: vendor.as_mut_ptr(),
         ..Default::default()
     };
-    // Incomplete only says that there is more.
+    // `INCOMPLETE` only means that more entries exist.
     let answer = ask(&mut counts, &mut info);
     if answer != vk::Result::SUCCESS && answer != vk::Result::INCOMPLETE {
         return None;
@@ -64,7 +66,8 @@ fn decode(
     }
 }
 
-/// The precision is a power of two: the true address has the same multiple of it below.
+/// Decodes an address. The precision is a power of two, and the true address has the same multiple of it
+/// below.
 fn decode_address(info: &vk::DeviceFaultAddressInfoEXT) -> FaultAddress {
     let precision = info.address_precision.max(1);
     let start = info.reported_address / precision * precision;
@@ -88,7 +91,7 @@ fn decode_kind(raw: vk::DeviceFaultAddressTypeEXT) -> FaultKind {
     }
 }
 
-/// The text of an array of characters, whether it ends in a zero or not.
+/// Returns the text of a character array, with or without a terminating zero.
 fn decode_text(chars: &[c_char]) -> String {
     let mut bytes: Vec<u8> = chars.iter().map(|c| c.cast_unsigned()).collect();
     bytes.push(0);
@@ -117,12 +120,12 @@ mod tests {
         }
     }
 
-    /// A driver that has two addresses and one code.
+    /// A driver that reports two addresses and one code.
     fn driver(
         counts: *mut vk::DeviceFaultCountsEXT<'_>,
         info: *mut vk::DeviceFaultInfoEXT<'_>,
     ) -> vk::Result {
-        // SAFETY: as of `vkGetDeviceFaultInfoEXT`; the test is its only caller.
+        // SAFETY: the contract of `vkGetDeviceFaultInfoEXT`; only this test calls the function.
         unsafe {
             if info.is_null() {
                 *counts = vk::DeviceFaultCountsEXT {
@@ -174,7 +177,7 @@ mod tests {
         };
         assert_eq!(read_fault(second_fails), None);
         assert_eq!(read_fault(|_, _| vk::Result::SUCCESS), Some(DeviceFault::default()));
-        // Counts that no list has, and fewer entries than were announced.
+        // Announces more entries than any list holds, and then writes fewer entries than announced.
         let boasts = |counts: *mut vk::DeviceFaultCountsEXT<'_>, info: *mut vk::DeviceFaultInfoEXT<'_>| {
             // SAFETY: as in `driver`.
             unsafe { (*counts).address_info_count = if info.is_null() { u32::MAX } else { 1 } };

@@ -1,4 +1,4 @@
-//! Validation messages, object names.
+//! Messages of the validation layer, and object names.
 
 use std::ffi::{CStr, CString, c_void};
 use std::fmt;
@@ -8,7 +8,7 @@ use ash::vk;
 
 use crate::lock_order::{Guard, Mutex, Rank};
 
-/// How much the validation layer checks. The layer must be installed; see [`ValidationMode::Standard`].
+/// Checks of the validation layer. The layer must be installed; see [`ValidationMode::Standard`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ValidationMode {
     /// No layer is loaded.
@@ -16,8 +16,8 @@ pub enum ValidationMode {
     Off,
     /// Core checks, and synchronization validation with the shader-access heuristic.
     Standard,
-    /// As [`Standard`](ValidationMode::Standard), and shaders are instrumented to check their accesses on the GPU.
-    /// About half as slow again; meant as a run of its own.
+    /// As [`Standard`](ValidationMode::Standard), with shaders instrumented to check their accesses on the
+    /// GPU. About half as slow again; meant for a separate test run.
     GpuAssisted,
 }
 
@@ -26,9 +26,9 @@ pub enum ValidationMode {
 pub struct ValidationMessage {
     /// `true` for errors, `false` for warnings.
     pub error: bool,
-    /// The layer's name of the rule, for instance `VUID-vkCmdDraw-None-02699`.
+    /// Name of the violated rule, for instance `VUID-vkCmdDraw-None-02699`.
     pub id: String,
-    /// The layer's text.
+    /// Text of the message.
     pub text: String,
 }
 
@@ -39,8 +39,9 @@ impl fmt::Display for ValidationMessage {
     }
 }
 
-/// Collects the messages of the validation layer. A cheap clone shares the same messages, so a test can keep one
-/// and read it after the context is gone, and a logger may read it while it is given a message.
+/// Collects the messages of the validation layer. Clones are cheap and share the same messages. A test can
+/// therefore keep a clone and read it after the context is destroyed. A logger may read the sink while it
+/// handles a message.
 #[derive(Debug, Clone)]
 pub struct ValidationSink {
     messages: Arc<Mutex<Vec<ValidationMessage>>>,
@@ -53,20 +54,20 @@ impl Default for ValidationSink {
 }
 
 impl ValidationSink {
-    /// Messages kept; later ones are logged only.
+    /// Maximum number of messages kept. Later messages are only logged.
     const CAPACITY: usize = 1024;
 
-    /// The messages so far, oldest first.
+    /// Returns the messages so far, oldest first.
     pub fn messages(&self) -> Vec<ValidationMessage> {
         self.lock().clone()
     }
 
-    /// Takes the messages out.
+    /// Removes and returns the messages so far.
     pub fn take(&self) -> Vec<ValidationMessage> {
         std::mem::take(&mut *self.lock())
     }
 
-    /// Whether the layer has been silent.
+    /// True if the layer has reported no messages.
     pub fn is_empty(&self) -> bool {
         self.lock().is_empty()
     }
@@ -83,7 +84,7 @@ impl ValidationSink {
     }
 }
 
-/// The messenger of an instance; `sink` is shared so that its address stays put while Vulkan holds it.
+/// The messenger of an instance. `sink` is shared so that its address stays valid while Vulkan holds it.
 pub(crate) struct Messenger {
     sink: Arc<ValidationSink>,
     installed: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
@@ -98,7 +99,7 @@ impl Messenger {
         &self.sink
     }
 
-    /// What both instance creation and [`install`](Self::install) are given.
+    /// Returns the create info for both instance creation and [`install`](Self::install).
     pub(crate) fn create_info(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
         let sink: *const ValidationSink = Arc::as_ptr(&self.sink);
         vk::DebugUtilsMessengerCreateInfoEXT::default()
@@ -118,7 +119,7 @@ impl Messenger {
         Ok(())
     }
 
-    /// Must be called before the instance is destroyed.
+    /// Destroys the messenger. Must be called before the instance is destroyed.
     pub(crate) fn remove(&mut self) {
         if let Some((ext, raw)) = self.installed.take() {
             // SAFETY: created by `install` and removed once.
@@ -127,8 +128,8 @@ impl Messenger {
     }
 }
 
-/// Warnings that say nothing about the program: about the layer's own settings, and about names the
-/// loader itself asks for while it creates a device.
+/// Warnings that do not concern the program. They are about the layer's own settings, and about names that
+/// the loader itself requests while it creates a device.
 const REMARKS: [&str; 3] =
     ["VALIDATION-SETTINGS", "WARNING-Setting-Limit-Adjusted", "WARNING-vkGetDeviceProcAddr-device"];
 
@@ -164,11 +165,11 @@ unsafe fn text(ptr: *const std::ffi::c_char) -> String {
     if ptr.is_null() {
         return String::new();
     }
-    // SAFETY: by the caller.
+    // SAFETY: the caller guarantees it.
     unsafe { CStr::from_ptr(ptr) }.to_string_lossy().into_owned()
 }
 
-/// A C string of a debug name; interior NUL bytes are dropped.
+/// Returns a C string for a debug name. Interior NUL bytes are dropped.
 pub(crate) fn c_name(name: &str) -> CString {
     CString::new(name.replace('\0', "")).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Memory of buffers and images, by `gpu-allocator`. Small objects take slots of blocks that they share.
+//! Memory of buffers and images, by `gpu-allocator`. Small objects take slots of shared blocks.
 
 use std::ptr::NonNull;
 
@@ -11,20 +11,20 @@ use gpu_allocator::{AllocationError, AllocationSizes, AllocatorDebugSettings, Me
 use super::slab::{Slab, Slot};
 use crate::error::{Error, Result};
 
-/// Where a buffer lives.
+/// Memory location of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum MemoryKind {
-    /// Fast for the GPU; written by uploads and commands.
+    /// Device-local memory, written by uploads and commands.
     #[default]
     Device,
-    /// Mapped for the host to write, read by the GPU across the bus.
+    /// Mapped memory that the host writes and the GPU reads across the bus.
     HostVisible,
-    /// Mapped and cached for the host to read what the GPU wrote.
+    /// Mapped and cached memory, from which the host reads data that the GPU wrote.
     Readback,
 }
 
 impl MemoryKind {
-    /// Whether the host sees the memory.
+    /// True if the memory is mapped for the host.
     pub(crate) fn mapped(self) -> bool {
         self != Self::Device
     }
@@ -41,27 +41,27 @@ impl MemoryKind {
 /// Memory of a buffer or an image.
 pub(crate) struct ObjectMemory {
     pub(crate) raw: vk::DeviceMemory,
-    /// Where the object's part of it begins, in bytes.
+    /// Offset of the object in the memory, in bytes.
     pub(crate) offset: u64,
-    /// Of the object's part, in bytes.
+    /// Size of the object's part, in bytes.
     pub(crate) size: u64,
     pub(crate) properties: vk::MemoryPropertyFlags,
     mapped: Option<Mapping>,
     source: Source,
 }
 
-/// Where memory came from and goes back to.
+/// Origin of the memory, to which it is returned.
 enum Source {
     Own(Box<Allocation>),
-    /// A slot of a [`SlabPool`], by its number.
+    /// A slot of the [`SlabPool`] with this index.
     Shared(usize, Slot),
 }
 
-/// Where the host sees memory.
+/// Host address of mapped memory.
 #[derive(Clone, Copy)]
 pub(crate) struct Mapping(pub(crate) NonNull<u8>);
 
-// SAFETY: the address is the same in every thread, and what is done with it is the business of those who ask for it.
+// SAFETY: the address is valid in every thread. Code that uses the address synchronises its own accesses.
 unsafe impl Send for Mapping {}
 // SAFETY: as above.
 unsafe impl Sync for Mapping {}
@@ -77,18 +77,18 @@ impl ObjectMemory {
         Self { raw, offset, size, properties, mapped, source }
     }
 
-    /// Where the host sees the object's part, if it does.
+    /// Returns the host address of the object's part, if the memory is mapped.
     pub(crate) fn mapped(&self) -> Option<NonNull<u8>> {
         self.mapping().map(|mapping| mapping.0)
     }
 
-    /// The same, to be kept with what the memory belongs to.
+    /// As [`mapped`](Self::mapped), in a form that can be stored beside the owner of the memory.
     pub(crate) fn mapping(&self) -> Option<Mapping> {
         self.mapped
     }
 }
 
-/// Where a piece of memory lies.
+/// Position of an object in device memory.
 struct MemoryPlacement {
     raw: vk::DeviceMemory,
     offset: u64,
@@ -99,7 +99,7 @@ struct MemoryPlacement {
 impl MemoryPlacement {
     fn from_allocation(allocation: &Allocation) -> Self {
         Self {
-            // SAFETY: the memory is only named here; it lives until the allocation is freed.
+            // SAFETY: the handle is only stored here; the memory lives until the allocation is freed.
             raw: unsafe { allocation.memory() },
             offset: allocation.offset(),
             properties: allocation.memory_properties(),
@@ -107,7 +107,7 @@ impl MemoryPlacement {
         }
     }
 
-    /// A slot of a block.
+    /// Returns the position of a slot in a block.
     fn from_slot(block: &Allocation, slot: Slot, slot_bytes: u64) -> Self {
         let whole = Self::from_allocation(block);
         let offset = u64::from(slot.number) * slot_bytes;
@@ -117,35 +117,35 @@ impl MemoryPlacement {
     }
 }
 
-/// The memory of a device: large objects have pieces of their own from the allocator, small ones share blocks.
+/// The memory of a device. Large objects have dedicated allocations; small ones share blocks.
 pub(crate) struct DeviceMemory {
     allocator: Allocator,
     slab_pools: Vec<SlabPool>,
 }
 
-/// Slots for objects that are alike.
+/// Slots for objects of the same class.
 struct SlabPool {
     kind: SlabClass,
     slab: Slab<Allocation>,
 }
 
-/// What objects that share blocks have in common.
+/// Common requirements of the objects that share a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct SlabClass {
     slot_bytes: u64,
-    /// Kinds of memory that will do.
+    /// Allowed memory types.
     type_bits: u32,
     memory: MemoryKind,
     linear: bool,
 }
 
 impl SlabClass {
-    /// The least and the most bytes of a slot; with these a block has 16 KiB to 1 MiB.
+    /// Minimum slot size in bytes. With `LEAST` and `MOST` a block has 16 KiB to 1 MiB.
     const LEAST: u64 = 256;
     const MOST: u64 = 16 << 10;
 
-    /// For an object with these requirements; `None` if it is large enough for memory of its own. Slots are powers of two, so
-    /// that each lies as it has to in a block that does.
+    /// Returns the class for an object with these requirements. `None` if the object is large enough for a
+    /// dedicated allocation. Slot sizes are powers of two, so each slot is aligned if its block is.
     fn from_requirements(
         requirements: &vk::MemoryRequirements,
         memory: MemoryKind,
@@ -160,7 +160,7 @@ impl SlabClass {
         })
     }
 
-    /// What a block of slots requires.
+    /// Returns the memory requirements of a block of slots.
     fn block_requirements(&self) -> vk::MemoryRequirements {
         vk::MemoryRequirements {
             size: self.slot_bytes * Slab::<Allocation>::SLOTS,
@@ -170,7 +170,7 @@ impl SlabClass {
     }
 }
 
-/// What the allocator answers.
+/// Result of an allocation.
 pub(crate) type Allocated<T> = Result<T, AllocationError>;
 
 impl DeviceMemory {
@@ -180,7 +180,7 @@ impl DeviceMemory {
         physical_device: vk::PhysicalDevice,
     ) -> Result<Self> {
         let mut debug_settings = AllocatorDebugSettings::default();
-        // The context reports by name what is left over.
+        // The context reports leaks by name.
         debug_settings.log_leaks_on_shutdown = false;
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
@@ -194,7 +194,8 @@ impl DeviceMemory {
         Ok(Self { allocator, slab_pools: Vec::new() })
     }
 
-    /// Memory for one object; where a block for small ones cannot be had, a piece of its own.
+    /// Allocates memory for one object. If a block for small objects cannot be allocated, the object gets a
+    /// dedicated allocation.
     pub(crate) fn allocate(
         &mut self,
         name: &str,
@@ -216,7 +217,7 @@ impl DeviceMemory {
         )?))
     }
 
-    /// A slot of a block.
+    /// Allocates a slot of a block.
     fn allocate_slot(&mut self, name: &str, kind: SlabClass, size: u64) -> Allocated<ObjectMemory> {
         let number =
             self.slab_pools.iter().position(|slab_pool| slab_pool.kind == kind).unwrap_or_else(|| {
@@ -240,7 +241,7 @@ impl DeviceMemory {
     }
 }
 
-/// A piece of memory from the allocator, which keeps a copy of the name that only its own reports show.
+/// Allocates dedicated memory. The allocator copies the name, which only its own reports contain.
 fn allocate_dedicated(
     allocator: &mut Allocator,
     name: &str,
@@ -264,7 +265,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Wherever a block lies as it has to, so do its slots, and each has room for its object.
+        /// Slots of an aligned block are aligned, and each is large enough for its object.
         #[test]
         fn slots_suit_their_objects(
             size in 1..40_000_u64, alignment in 0..17_u32, start in 0..8_u64, number in 0..64_u64
@@ -283,7 +284,7 @@ mod tests {
             }
         }
 
-        /// Objects share blocks only where they may have the same memory.
+        /// Objects share blocks only if they may use the same memory.
         #[test]
         fn objects_of_different_kinds_share_nothing(bits in 1..4_u32, other_bits in 1..4_u32, linear: bool) {
             let of = |memory_type_bits, memory, linear| {

@@ -1,4 +1,4 @@
-//! How much of each heap of memory there is, may be used and is used.
+//! Size, budget and use of each memory heap.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -9,26 +9,28 @@ use super::allocator::ObjectMemory;
 /// The memory of a device, from [`Context::memory_budget`](crate::Context::memory_budget).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MemoryBudget {
-    /// In the order of Vulkan.
+    /// The memory heaps, in the order of Vulkan.
     pub heaps: Vec<MemoryHeap>,
-    /// Whether the driver has told budgets and uses ([`OptionalFeature::MemoryBudget`](crate::OptionalFeature::MemoryBudget)); without it the budgets are the
-    /// sizes, and only the objects of this context count as used.
+    /// True if the driver reports budgets and uses
+    /// ([`OptionalFeature::MemoryBudget`](crate::OptionalFeature::MemoryBudget)). Otherwise the budgets equal
+    /// the sizes, and only the objects of this context count as used.
     pub is_measured: bool,
 }
 
-/// One heap of memory.
+/// One memory heap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryHeap {
-    /// All of it, in bytes.
+    /// Size of the heap, in bytes.
     pub size_bytes: u64,
-    /// What the process may use before allocations fail or slow everything down, in bytes. Other programs change it.
+    /// Bytes that the process may use before allocations fail or slow everything down. Other programs change
+    /// this value.
     pub budget_bytes: u64,
-    /// What the process uses, in bytes: all that the driver has taken for it.
+    /// Bytes that the process uses, including all memory that the driver allocated for it.
     pub used_bytes: u64,
-    /// What the buffers and images of this context take of that, in bytes, those included that wait for the GPU to be done
-    /// with them. Where two heaps have memory of the same properties, both count in the first.
+    /// Bytes of that used by the buffers and images of this context. Objects that are destroyed but still in use by
+    /// the GPU are included. If two heaps have memory types with the same properties, both count in the first.
     pub object_bytes: u64,
-    /// Whether it is the GPU's own memory (`VK_MEMORY_HEAP_DEVICE_LOCAL_BIT`).
+    /// True if the heap is device-local (`VK_MEMORY_HEAP_DEVICE_LOCAL_BIT`).
     pub device_local: bool,
 }
 
@@ -39,7 +41,7 @@ pub(crate) struct HeapUse {
 }
 
 impl HeapUse {
-    /// Nothing yet.
+    /// Creates the counters, all zero.
     pub(crate) fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         // SAFETY: the physical device belongs to the instance.
         let memory = unsafe { instance.get_physical_device_memory_properties(device) };
@@ -47,21 +49,22 @@ impl HeapUse {
         Self { types, bytes: Default::default() }
     }
 
-    /// An object was allocated.
+    /// Adds an allocated object.
     pub(crate) fn add(&self, allocated: &ObjectMemory) {
         if let Some(heap) = heap_index(&self.types, allocated.properties) {
             self.bytes[heap].fetch_add(allocated.size, Ordering::Relaxed);
         }
     }
 
-    /// An object goes.
+    /// Removes an object that is freed.
     pub(crate) fn remove(&self, allocated: &ObjectMemory) {
         if let Some(heap) = heap_index(&self.types, allocated.properties) {
             self.bytes[heap].fetch_sub(allocated.size, Ordering::Relaxed);
         }
     }
 
-    /// Queries the heaps of a device (`vkGetPhysicalDeviceMemoryProperties2`); `is_measured` where it has `VK_EXT_memory_budget`.
+    /// Queries the heaps of a device (`vkGetPhysicalDeviceMemoryProperties2`). `is_measured` is true if the
+    /// device has `VK_EXT_memory_budget`.
     pub(crate) fn query_budget(
         &self,
         instance: &ash::Instance,
@@ -73,7 +76,7 @@ impl HeapUse {
         if is_measured {
             properties = properties.push_next(&mut told);
         }
-        // SAFETY: the physical device belongs to the instance, and has what is chained.
+        // SAFETY: the physical device belongs to the instance, and supports the chained structures.
         unsafe { instance.get_physical_device_memory_properties2(device, &mut properties) };
         let memory = properties.memory_properties;
         let heaps = memory.memory_heaps_as_slice().iter().enumerate().map(|(place, heap)| {
@@ -89,7 +92,7 @@ impl HeapUse {
     }
 }
 
-/// The heap of memory with these properties: the first, where several have the same.
+/// Returns the heap of the first memory type with these properties.
 fn heap_index(types: &[vk::MemoryType], properties: vk::MemoryPropertyFlags) -> Option<usize> {
     types.iter().find(|of| of.property_flags == properties).map(|of| of.heap_index as usize)
 }

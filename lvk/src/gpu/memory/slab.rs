@@ -1,16 +1,16 @@
-//! Small pieces of memory out of blocks of 64 slots: which slots are taken, as plain values.
+//! Suballocation from blocks of 64 slots, as plain data without Vulkan.
 //!
-//! A slot is found without a search, however many there are. An allocator for pieces of any size looks through all that is free
-//! for what fits best, which takes longer than the driver does to make a small buffer.
+//! A slot is found without a search, independent of the number of slots. A general allocator searches all
+//! free ranges for the best fit, which takes longer than the driver's creation of a small buffer.
 
 use slotmap::{DefaultKey, SlotMap};
 
 /// Slots of one size. `B` is the memory of a block of them.
 pub(crate) struct Slab<B> {
     blocks: SlotMap<DefaultKey, SlabBlock<B>>,
-    /// The blocks that have both taken and free slots.
+    /// The blocks that have both used and free slots.
     open: Vec<DefaultKey>,
-    /// A block that has no taken slot, kept for the next one.
+    /// An empty block, kept for the next allocation.
     spare: Option<DefaultKey>,
 }
 
@@ -18,15 +18,15 @@ struct SlabBlock<B> {
     memory: B,
     /// A bit for each free slot.
     free: u64,
-    /// Where it stands in `open`, while it does.
+    /// Index in `open`, valid while the block is in `open`.
     place: usize,
 }
 
-/// A slot that is taken.
+/// An allocated slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
     block: DefaultKey,
-    /// Its place in the block, below [`Slab::SLOTS`].
+    /// Index in the block, below [`Slab::SLOTS`].
     pub(crate) number: u32,
 }
 
@@ -37,10 +37,11 @@ impl<B> Default for Slab<B> {
 }
 
 impl<B> Slab<B> {
-    /// Slots of a block.
+    /// Number of slots in a block.
     pub(crate) const SLOTS: u64 = u64::BITS as u64;
 
-    /// Takes a slot, with the memory of its block; `new` makes that of another block where all slots are taken.
+    /// Allocates a slot and returns it with the memory of its block. If all slots are used, `new` creates the
+    /// memory of another block.
     pub(crate) fn allocate<E>(&mut self, new: impl FnOnce() -> Result<B, E>) -> Result<(Slot, &B), E> {
         let key = match self.open.last() {
             Some(key) => *key,
@@ -62,7 +63,8 @@ impl<B> Slab<B> {
         Ok((Slot { block: key, number }, &self.blocks[key].memory))
     }
 
-    /// Gives a slot back, once; answers the memory of a block that is not needed any more.
+    /// Frees a slot, which must happen once. Returns the memory of the slot's block if the block is not
+    /// needed any more.
     pub(crate) fn free(&mut self, slot: Slot) -> Option<B> {
         let block = self.blocks.get_mut(slot.block)?;
         let was_full = block.free == 0;
@@ -121,7 +123,7 @@ mod tests {
         ]
     }
 
-    /// A slab whose blocks are numbers, with all that it should have.
+    /// A slab whose block memory is a number, with the expected contents.
     #[derive(Default)]
     struct SlabModel {
         slab: Slab<u32>,

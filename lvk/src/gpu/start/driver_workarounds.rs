@@ -1,7 +1,8 @@
-//! What must not happen at once, on whatever devices of the process.
+//! Serialises driver calls that deadlock when they run concurrently, across all devices of the process.
 //!
-//! NVIDIA's driver (580.159.04) locks up where one thread makes or destroys a device and another one makes or destroys a ray
-//! tracing pipeline: each waits for a lock of the driver that the other one has. So there devices come and go alone.
+//! NVIDIA's driver (580.159.04) deadlocks if one thread creates or destroys a device while another thread
+//! creates or destroys a ray tracing pipeline. Each thread then waits for a driver lock that the other one
+//! holds. On that driver, creation and destruction of a device therefore exclude both.
 
 use ash::vk;
 
@@ -9,19 +10,20 @@ use crate::lock_order::{Rank, RwLock};
 
 static DEVICE_LIFETIME: RwLock<()> = RwLock::new(Rank::DeviceLifetime, ());
 
-/// Makes or destroys a device of this driver.
+/// Runs `change`, which creates or destroys a device of this driver, under the exclusive lock.
 pub(crate) fn with_exclusive_device_lock<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
     let _alone = needs_device_lock(driver).then(|| DEVICE_LIFETIME.write());
     change()
 }
 
-/// Makes or destroys a ray tracing pipeline of this driver.
+/// Runs `change`, which creates or destroys a ray tracing pipeline of this driver, under the shared lock.
 pub(crate) fn with_shared_device_lock<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
     let _beside_others = needs_device_lock(driver).then(|| DEVICE_LIFETIME.read());
     change()
 }
 
-/// Where debug assertions are on, any driver: so tests see on each that the lock is taken in its order.
+/// True if the driver needs the lock. With debug assertions every driver takes it, so that tests check the
+/// lock order everywhere.
 fn needs_device_lock(driver: vk::DriverId) -> bool {
     cfg!(debug_assertions) || driver == vk::DriverId::NVIDIA_PROPRIETARY
 }

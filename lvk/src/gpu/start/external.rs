@@ -1,4 +1,4 @@
-//! A device that somebody else has made.
+//! A device that the application or another engine has created.
 
 use std::ffi::CStr;
 
@@ -9,42 +9,47 @@ use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 use crate::gpu::caps::queues::{QueueFamily, QueueLocation};
 
-/// An instance, a device and a queue of the caller's own, and what was turned on when they were made.
+/// An instance, a device and queues that the caller has created, with the extensions and features enabled at
+/// their creation.
 #[derive(Clone)]
 pub struct RawContext<'a> {
     /// The loader's entry points.
     pub entry: ash::Entry,
-    /// The instance, of version 1.3 or later.
+    /// The instance. Its version must be 1.3 or later.
     pub instance: ash::Instance,
-    /// Extensions that the instance was made with.
+    /// Extensions enabled at creation of the instance.
     pub instance_extensions: &'a [&'a CStr],
     /// The physical device.
     pub physical_device: vk::PhysicalDevice,
     /// The device.
     pub device: ash::Device,
-    /// Extensions that the device was made with.
+    /// Extensions enabled at creation of the device.
     pub device_extensions: &'a [&'a CStr],
-    /// Features that are on, beside those that every context needs.
+    /// Features that are enabled, beside those that every context requires.
     pub features: FeatureSet,
-    /// `accelerationStructure`, its `descriptorBindingAccelerationStructureUpdateAfterBind`, and `rayTracingPipeline` are on.
+    /// True if `accelerationStructure`, its `descriptorBindingAccelerationStructureUpdateAfterBind`, and
+    /// `rayTracingPipeline` are enabled.
     pub ray_tracing_pipeline: bool,
-    /// `accelerationStructure`, its `descriptorBindingAccelerationStructureUpdateAfterBind`, and `rayQuery` are on.
+    /// True if `accelerationStructure`, its `descriptorBindingAccelerationStructureUpdateAfterBind`, and
+    /// `rayQuery` are enabled.
     pub ray_query: bool,
-    /// `taskShader` and `meshShader` are on.
+    /// True if `taskShader` and `meshShader` are enabled.
     pub mesh_shader: bool,
     /// A queue for graphics and compute.
     pub queue: vk::Queue,
-    /// Its family.
+    /// Queue family of `queue`.
     pub queue_family: u32,
-    /// Another queue, for compute, and its family, that [`Queue::Compute`](crate::Queue::Compute) is to be. Without it, and
-    /// where it is the same queue, that shares `queue`.
+    /// A separate queue for [`Queue::Compute`](crate::Queue::Compute), and its queue family. If it is `None`
+    /// or equal to `queue`, [`Queue::Compute`](crate::Queue::Compute) shares `queue`.
     pub compute_queue: Option<(vk::Queue, u32)>,
-    /// As `compute_queue`, for [`Queue::Transfer`](crate::Queue::Transfer). It may be the one for compute.
+    /// As `compute_queue`, for [`Queue::Transfer`](crate::Queue::Transfer). It may equal the queue of
+    /// `compute_queue`.
     pub transfer_queue: Option<(vk::Queue, u32)>,
 }
 
 impl RawContext<'_> {
-    /// What the device can do as far as was told; fails where that cannot be true.
+    /// Returns the device, limited to the features that the caller declares enabled. Fails if the declaration cannot
+    /// be true.
     pub(crate) fn physical(&self) -> Result<PhysicalDevice> {
         let mut found = PhysicalDevice::query(&self.instance, self.physical_device)?;
         if !found.missing.is_empty() {
@@ -68,13 +73,14 @@ impl RawContext<'_> {
         self.device_extensions.contains(&extension)
     }
 
-    /// The queue of each, and its family.
+    /// Returns the Vulkan queue of each library queue, and its family.
     pub(crate) fn queues(&self) -> [(vk::Queue, u32); 3] {
         let first = (self.queue, self.queue_family);
         [first, self.compute_queue.unwrap_or(first), self.transfer_queue.unwrap_or(first)]
     }
 
-    /// Where they are; their numbers in their families are not known, and only tell whether they are the same.
+    /// Returns the location of each queue. The indices within the families are unknown, so these are
+    /// arbitrary; only their equality has a meaning.
     fn queue_locations(&self) -> [QueueLocation; 3] {
         let queues = self.queues();
         let number = |raw| queues.iter().position(|(queue, _)| *queue == raw).unwrap_or_default();
@@ -91,7 +97,7 @@ impl RawContext<'_> {
         check_family(families, transfer, |flags| flags.intersects(copies), "transfer")
     }
 
-    /// Features need the device, their extensions, and what they build on.
+    /// Checks that the device has the features, their extensions, and the features that they depend on.
     fn check_features(&self, found: &PhysicalDevice) -> Result<()> {
         let known: FeatureSet =
             OptionalFeature::all().filter(|feature| self.features.contains(*feature)).collect();

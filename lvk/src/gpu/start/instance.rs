@@ -1,4 +1,4 @@
-//! Opens the Vulkan loader and makes an instance, with the validation layer if asked for.
+//! Opens the Vulkan loader and creates an instance, with the validation layer if requested.
 
 use std::ffi::{CStr, CString};
 use std::path::Path;
@@ -16,26 +16,26 @@ pub(crate) struct Instance {
     pub(crate) entry: ash::Entry,
     pub(crate) raw: ash::Instance,
     pub(crate) debug_utils: bool,
-    /// The validation layer is on.
+    /// True if the validation layer is enabled.
     pub(crate) validated: bool,
-    /// Shaders are instrumented by the validation layer.
+    /// True if the validation layer instruments shaders.
     pub(crate) gpu_assisted: bool,
-    /// Present where the context is for windows.
+    /// `None` if the context does not present to windows.
     pub(crate) windows: Option<WindowExtensions>,
     messenger: Messenger,
-    /// Somebody else made the instance, and destroys it.
+    /// True if the caller created the instance and destroys it.
     is_foreign: bool,
 }
 
-/// What an instance is made with.
+/// Description of an instance.
 pub(crate) struct InstanceDesc<'a> {
     pub(crate) application_name: &'a str,
     /// The loader to open.
     pub(crate) library: Option<&'a Path>,
     pub(crate) validation: ValidationMode,
-    /// Extensions of the caller's own.
+    /// Additional extensions of the caller.
     pub(crate) extra: &'a [&'a CStr],
-    /// A window that the instance has to know.
+    /// A window that the context presents to.
     pub(crate) window: Option<WindowRef<'a>>,
     pub(crate) sink: ValidationSink,
 }
@@ -62,7 +62,7 @@ impl Instance {
         Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, windows, messenger, is_foreign: false })
     }
 
-    /// Of somebody else's.
+    /// Wraps an instance that the caller created.
     pub(crate) fn external(entry: ash::Entry, raw: ash::Instance, extensions: &[&CStr]) -> Self {
         Self {
             entry,
@@ -76,7 +76,7 @@ impl Instance {
         }
     }
 
-    /// The messages of the validation layer.
+    /// Returns the messages of the validation layer.
     pub(crate) fn sink(&self) -> &ValidationSink {
         self.messenger.sink()
     }
@@ -84,7 +84,7 @@ impl Instance {
     pub(crate) fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>> {
         // SAFETY: the instance is alive.
         unsafe { self.raw.enumerate_physical_devices() }.map_err(|result| Error::NoVulkan {
-            reason: format!("vkEnumeratePhysicalDevices answered {result}"),
+            reason: format!("vkEnumeratePhysicalDevices returned {result}"),
         })
     }
 }
@@ -95,7 +95,7 @@ impl Drop for Instance {
         if self.is_foreign {
             return;
         }
-        // SAFETY: the device is destroyed before, as `Gpu` declares it first.
+        // SAFETY: the device is destroyed first, as `Gpu` declares it first.
         unsafe { self.raw.destroy_instance(None) };
     }
 }
@@ -171,7 +171,8 @@ impl<'a> Extensions<'a> {
         Ok(found)
     }
 
-    /// The layer reads its settings without its extension being on, and loaders older than the extension refuse it.
+    /// Returns the names of the extensions to enable. The settings extension is left out: the layer reads its
+    /// settings without it, and loaders older than the extension refuse it.
     fn names(&self) -> Vec<*const std::ffi::c_char> {
         let own = self.debug_utils.then_some(ash::ext::debug_utils::NAME);
         let windows = self.windows.iter().flat_map(WindowExtensions::names).map(|name| -> &'a CStr { name });
@@ -219,10 +220,10 @@ fn create_instance(
     let made = made
         .map(crate::test_support::null_commands::wrap_null_commands)
         .map(crate::test_support::fault_injection::wrap_fault_injection);
-    made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
+    made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance returned {result}") })
 }
 
-/// The switches of the layer, by its own setting names.
+/// Returns the switches of the validation layer, by its own setting names.
 fn layer_switches(validation: ValidationMode) -> Vec<(CString, bool)> {
     let gpu = validation == ValidationMode::GpuAssisted;
     [
@@ -244,6 +245,6 @@ fn layer_setting<'a>(key: &'a CStr, value: &'a [vk::Bool32; 1]) -> vk::LayerSett
         .setting_name(key)
         .ty(vk::LayerSettingTypeEXT::BOOL32)
         .values(bytes);
-    // ash counts bytes here, Vulkan counts values.
+    // ash counts bytes here; Vulkan counts values.
     vk::LayerSettingEXT { value_count: 1, ..setting }
 }

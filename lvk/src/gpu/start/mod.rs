@@ -1,4 +1,4 @@
-//! The steps that create a logical device: instance, choice of a device, extensions, features.
+//! The steps that create a logical device: instance, selection of a device, extensions, features.
 
 pub(crate) mod driver_workarounds;
 pub(crate) mod external;

@@ -1,4 +1,4 @@
-//! One physical device: its features, properties and queues, as Vulkan answers.
+//! One physical device: its features, properties and queues, as Vulkan reports them.
 
 use std::ffi::{CStr, CString};
 
@@ -15,20 +15,20 @@ use crate::gpu::caps::queues::{QueueFamily, QueueLocation, describe_queues, loca
 use crate::gpu::caps::ray_query_path::RayQueryPath;
 use crate::gpu::caps::shading_rate::ShadingRateLimits;
 
-/// One physical device as found, before any is chosen.
+/// One physical device as reported, before a device is selected.
 pub(crate) struct PhysicalDevice {
     pub(crate) raw: vk::PhysicalDevice,
     pub(crate) capabilities: Capabilities,
     pub(crate) kind: DeviceKind,
     pub(crate) local_memory_bytes: u64,
-    /// The family for everything.
+    /// The queue family with graphics and compute.
     pub(crate) queue_family: Option<u32>,
     pub(crate) families: Vec<QueueFamily>,
-    /// The queue of the device for each of the library's.
+    /// The device's queue for each queue of the library.
     pub(crate) places: [QueueLocation; 3],
-    /// Core features the library cannot do without and the device lacks.
+    /// Required core features that the device lacks.
     pub(crate) missing: Vec<String>,
-    /// As found.
+    /// Features as reported.
     pub(crate) features: Features,
     pub(crate) extensions: Vec<CString>,
 }
@@ -75,25 +75,26 @@ impl PhysicalDevice {
         Ok(found)
     }
 
-    /// Has this family for everything, and others beside it.
+    /// Uses `family` for graphics and compute, and selects the other queues again.
     pub(crate) fn use_single_family(&mut self, family: u32) {
         self.queue_family = Some(family);
         self.set_queues(locate_queues(&self.families, family));
     }
 
-    /// Has these queues.
+    /// Sets the location of each queue, and the queue information derived from it.
     pub(crate) fn set_queues(&mut self, places: [QueueLocation; 3]) {
         self.places = places;
         self.capabilities.queues = describe_queues(&self.families, &places);
         self.capabilities.limits.timestamp_bits = self.capabilities.queues[0].timestamp_bits;
     }
 
-    /// Whether the device has an extension.
+    /// True if the device has the extension.
     pub(crate) fn has_extension(&self, name: &CStr) -> bool {
         self.extensions.iter().any(|extension| extension.as_c_str() == name)
     }
 
-    /// Fills the features and what is missing; answers whether acceleration structures may be asked about.
+    /// Fills in the features and the missing ones. Returns true if acceleration structure properties may be
+    /// queried.
     fn read_features(&mut self, instance: &ash::Instance) -> bool {
         let mut found = query_features(instance, self.raw, &|name| self.has_extension(name));
         let accel = &found.ext.structures;
@@ -152,7 +153,7 @@ impl PhysicalDevice {
         if self.capabilities.has(OptionalFeature::CustomBorderColors) {
             all = all.push_next(&mut borders);
         }
-        // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
+        // SAFETY: the chain holds only structures that the device supports, and lives until the call returns.
         unsafe { instance.get_physical_device_properties2(self.raw, &mut all) };
         self.features.subgroups = Subgroups {
             operations: v11.subgroup_supported_operations,
@@ -175,7 +176,7 @@ impl PhysicalDevice {
     }
 }
 
-/// What the device offers.
+/// Returns the features that the device reports.
 fn query_features(
     instance: &ash::Instance,
     raw: vk::PhysicalDevice,
@@ -187,7 +188,7 @@ fn query_features(
         .push_next(&mut found.v12)
         .push_next(&mut found.v13);
     let mut all = found.ext.append_to_chain(all, has);
-    // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
+    // SAFETY: the chain holds only structures that the device supports, and lives until the call returns.
     unsafe { instance.get_physical_device_features2(raw, &mut all) };
     found.core = all.features;
     found.ext.set_featureless_extensions(has);
@@ -206,7 +207,7 @@ fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
 }
 
 impl PhysicalDevice {
-    /// Takes a family whose queues present to the window, or says that there is none.
+    /// Selects the family whose queues present to the window, or records that the device has no such family.
     pub(crate) fn select_present_queue(&mut self, family: Option<u32>) {
         match family {
             Some(family) => self.use_single_family(family),

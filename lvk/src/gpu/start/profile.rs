@@ -1,4 +1,4 @@
-//! Phones and lesser devices rehearsed on a better one: what a device reports, made no looser and often tighter.
+//! Clamps the reported capabilities and limits of a device to emulate a phone or another weaker device.
 
 use std::borrow::Cow;
 
@@ -7,12 +7,13 @@ use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::gpu::caps::optional_features::FeatureSet;
 
-/// Clamps what the real device reports, so that the path of another one runs on it.
+/// Clamps the reported capabilities and limits of a device, so that code paths for weaker devices run on it.
 ///
-/// A profile hides and tightens, it never adds: on a device that is worse than the profile the device's own answers
-/// stay. The logical device is created without the extensions that are hidden. Limits of structures and builds are those of
-/// the device's own: where there is only what software traces, they bind nothing. The default clamps nothing; a profile of
-/// one's own is made from it, or from a built-in one:
+/// A profile hides features and tightens limits. It never adds anything: where the device is weaker than the
+/// profile, the device's own values stay. The logical device is created without the hidden extensions. Limits
+/// of acceleration structures and of builds apply to the device's own structures. They have no effect if only
+/// software traces rays. The default profile clamps nothing. Custom profiles start from the default or from a
+/// built-in profile:
 ///
 /// ```
 /// use lvk::DeviceProfile;
@@ -26,39 +27,41 @@ use crate::gpu::caps::optional_features::FeatureSet;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceProfile {
-    /// For messages and [`Capabilities::profile`].
+    /// Name of the profile, for messages and [`Capabilities::profile`].
     pub name: Cow<'static, str>,
-    /// Whether ray tracing pipelines may be used.
+    /// True if ray tracing pipelines may be used.
     pub ray_tracing_pipeline: bool,
-    /// Whether ray queries may be used.
+    /// True if ray queries may be used.
     pub ray_query: bool,
-    /// Whether positions of hit triangles may be fetched.
+    /// True if vertex positions of hit triangles may be fetched.
     pub position_fetch: bool,
-    /// Whether task and mesh shaders may be used.
+    /// True if task and mesh shaders may be used.
     pub mesh_shader: bool,
-    /// Optional features that may not be used.
+    /// Optional features that are hidden.
     pub hidden: FeatureSet,
-    /// Least alignment of scratch addresses in bytes; rounded up to a power of two.
+    /// Minimum alignment of scratch addresses in bytes, rounded up to a power of two.
     pub min_scratch_alignment: u32,
-    /// Most bytes of a storage buffer descriptor.
+    /// Maximum size of a storage buffer descriptor in bytes.
     ///
-    /// Shaders reach the caller's buffers by address, where no device bounds them by this. Devices whose builds go
-    /// through such descriptors are bound by it in their acceleration structures and in the scratch of a build, so it
-    /// tightens both limits below.
+    /// Shaders access the caller's buffers by address, where no device applies this limit. Some devices build
+    /// acceleration structures through such descriptors. Their acceleration structures and build scratch are
+    /// bound by it, so it tightens the next two limits too.
     pub max_storage_buffer_range: u64,
-    /// Most bytes of one acceleration structure. Meshes beyond it are split, larger top-level structures refused.
+    /// Maximum size of one acceleration structure in bytes. Meshes that need more are split into several BLAS; a
+    /// larger TLAS is refused.
     pub max_accel_structure_bytes: u64,
-    /// Most bytes of scratch for one build, with the same consequences.
+    /// Maximum scratch size of one build in bytes. Meshes beyond it are split, and a TLAS beyond it is
+    /// refused.
     pub max_accel_scratch_bytes: u64,
-    /// Most bytes that the invocations of a compute, task or mesh workgroup share.
+    /// Maximum shared memory of a compute, task or mesh workgroup in bytes.
     pub max_shared_bytes: u32,
-    /// Most primitives of one bottom-level structure.
+    /// Maximum number of primitives in one BLAS.
     pub max_blas_primitives: u64,
-    /// Bytes of a bottom-level structure for each primitive where the driver asks for fewer; 0 leaves the driver's
-    /// answer.
+    /// Minimum BLAS size in bytes per primitive. It replaces a smaller driver value; 0 keeps the driver's
+    /// value.
     pub structure_bytes_per_primitive: u64,
-    /// Bytes of scratch for each primitive of a bottom-level build where the driver asks for fewer; 0 leaves the
-    /// driver's answer.
+    /// Minimum BLAS build scratch in bytes per primitive. It replaces a smaller driver value; 0 keeps the
+    /// driver's value.
     pub scratch_bytes_per_primitive: u64,
 }
 
@@ -83,7 +86,7 @@ impl Default for DeviceProfile {
     }
 }
 
-/// What the invocations of a workgroup share on phones.
+/// Shared memory of a workgroup on phones, in bytes.
 const PHONE_SHARED_BYTES: u32 = 32 << 10;
 
 type BuiltIn = (&'static str, fn() -> DeviceProfile);
@@ -99,9 +102,11 @@ const BUILT_IN: [BuiltIn; 6] = [
 ];
 
 impl DeviceProfile {
-    /// `mali-g715`: Arm Mali-G715-Immortalis MC11 with driver r38p1. Ray queries only; neither a structure nor the
-    /// scratch of a build may exceed the 256 MiB range of a storage buffer; the driver asks for 7,852,992,128 bytes of
-    /// scratch and 612,837,208 of structure for a mesh of 2.8 million triangles, which makes 2,805 and 219 for each. A
+    /// `mali-g715`: Arm Mali-G715-Immortalis MC11 with driver r38p1.
+    ///
+    /// It has ray queries only. Neither an acceleration structure nor the scratch of a build may exceed the
+    /// 256 MiB range of a storage buffer. For a mesh of 2.8 million triangles the driver requires
+    /// 7,852,992,128 bytes of scratch and a BLAS of 612,837,208 bytes: 2,805 and 219 bytes per triangle. A
     /// workgroup shares at most 32 KiB.
     pub fn mali_g715() -> Self {
         const RANGE: u64 = 256 << 20;
@@ -121,9 +126,11 @@ impl DeviceProfile {
         }
     }
 
-    /// `xclipse-940`: Samsung Xclipse 940. Pipelines and queries, no limit of the storage range; the driver asks for
-    /// 601,488,316 bytes of scratch and 461,519,536 of structure for the same mesh, which makes 215 and 165 for each. A workgroup
-    /// is held to the 32 KiB that phones commonly share.
+    /// `xclipse-940`: Samsung Xclipse 940.
+    ///
+    /// It has ray tracing pipelines and ray queries, and no limit on the storage buffer range. For the same
+    /// mesh the driver requires 601,488,316 bytes of scratch and a BLAS of 461,519,536 bytes: 215 and 165
+    /// bytes per triangle. Shared memory of a workgroup is clamped to the 32 KiB that is common on phones.
     pub fn xclipse_940() -> Self {
         Self {
             name: Cow::Borrowed("xclipse-940"),
@@ -134,22 +141,22 @@ impl DeviceProfile {
         }
     }
 
-    /// `no-rt-pipeline`: the device at hand with ray queries only.
+    /// `no-rt-pipeline`: the current device with ray queries only.
     pub fn no_rt_pipeline() -> Self {
         Self { name: Cow::Borrowed("no-rt-pipeline"), ray_tracing_pipeline: false, ..Self::default() }
     }
 
-    /// `no-ray-query`: the device at hand with ray tracing pipelines only.
+    /// `no-ray-query`: the current device with ray tracing pipelines only.
     pub fn no_ray_query() -> Self {
         Self { name: Cow::Borrowed("no-ray-query"), ray_query: false, ..Self::default() }
     }
 
-    /// `no-ray-tracing`: the device at hand with no hardware ray tracing at all.
+    /// `no-ray-tracing`: the current device without hardware ray tracing.
     pub fn no_ray_tracing() -> Self {
         Self { name: Cow::Borrowed("no-ray-tracing"), ray_tracing_pipeline: false, ..Self::no_ray_query() }
     }
 
-    /// `core-only`: the device at hand with nothing optional at all, neither ray tracing nor mesh shaders nor any
+    /// `core-only`: the current device without any optional feature: no ray tracing, no mesh shaders and no
     /// [`OptionalFeature`](crate::OptionalFeature).
     pub fn core_only() -> Self {
         Self {
@@ -161,15 +168,15 @@ impl DeviceProfile {
         }
     }
 
-    /// The names of the built-in profiles.
+    /// Returns the names of the built-in profiles.
     pub fn names() -> impl ExactSizeIterator<Item = &'static str> {
         BUILT_IN.iter().map(|(name, _)| *name)
     }
 
-    /// The built-in profile of this name.
+    /// Returns the built-in profile with this name.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] with the list of names.
+    /// [`Error::InvalidUsage`] with the list of names, if no profile has this name.
     pub fn named(name: &str) -> Result<Self> {
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((_, profile)) => Ok(profile()),
@@ -181,12 +188,12 @@ impl DeviceProfile {
         }
     }
 
-    /// Whether anything may not be used.
+    /// True if the profile hides any feature.
     pub(crate) fn has_restrictions(&self) -> bool {
         !(self.ray_tracing_pipeline && self.ray_query && self.position_fetch && self.mesh_shader)
     }
 
-    /// Takes from `capabilities` what the profile hides and tightens their limits.
+    /// Removes the hidden features from `capabilities` and tightens its limits.
     pub fn apply(&self, capabilities: &mut Capabilities) {
         capabilities.profile = Some(self.name.clone().into_owned());
         capabilities.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
@@ -216,7 +223,7 @@ impl DeviceProfile {
     }
 }
 
-/// A power of two that is enough for both.
+/// Returns the smallest power of two that satisfies both alignments.
 fn stricter_alignment(device: u32, profile: u32) -> u32 {
     const LARGEST: u32 = 1 << 31;
     device.max(profile).max(1).checked_next_power_of_two().unwrap_or(LARGEST)

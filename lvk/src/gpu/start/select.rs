@@ -1,18 +1,18 @@
-//! Which of the machine's devices to use.
+//! Selects the physical device to use.
 
 use std::cmp::Reverse;
 use std::fmt;
 
 use crate::error::{Error, Result};
 
-/// What kind of device it is, the preferred ones first.
+/// Kind of a device, in order of preference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum DeviceKind {
     /// Graphics card.
     Discrete,
-    /// Shares memory with the CPU.
+    /// Integrated GPU, which shares memory with the CPU.
     Integrated,
-    /// Part of a device, inside a virtual machine.
+    /// Virtual GPU: part of a device, inside a virtual machine.
     Virtual,
     /// Software driver.
     Cpu,
@@ -32,18 +32,18 @@ impl fmt::Display for DeviceKind {
     }
 }
 
-/// One device, as far as the choice depends on it.
+/// One device, reduced to the properties that the selection depends on.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
-    /// Name the driver gives.
+    /// Name reported by the driver.
     pub(crate) name: String,
-    /// What kind of device.
+    /// Kind of the device.
     pub(crate) kind: DeviceKind,
     /// Bytes of device-local memory.
     pub(crate) local_memory_bytes: u64,
-    /// What it lacks of what is required; empty if it can be used.
+    /// Required features that the device lacks. Empty if the device is usable.
     pub(crate) missing: Vec<String>,
-    /// How many optional features it has.
+    /// Number of optional features that the device has.
     pub(crate) optional_score: u32,
 }
 
@@ -62,14 +62,14 @@ impl Candidate {
     }
 }
 
-/// Position of the device to use.
+/// Returns the index of the device to use.
 ///
-/// `requested` is an index or a part of a name in any case. Without one, the best usable device: by kind, then by optional
-/// features, then by memory, then the first.
+/// `requested` is an index or a part of a name in any letter case. Without it, the best usable device is
+/// chosen: by kind, then by optional features, then by memory, then by index.
 ///
 /// # Errors
-/// [`Error::NoDevice`], which names every device, if none is usable, or if the wish names no device, several
-/// devices, or one that lacks something.
+/// [`Error::NoDevice`], which lists every device, if no device is usable, or if `requested` matches no
+/// device, several devices, or a device that lacks a required feature.
 pub(crate) fn choose(candidates: &[Candidate], requested: Option<&str>) -> Result<usize> {
     match requested.map(str::trim).filter(|requested| !requested.is_empty()) {
         Some(requested) => choose_named(candidates, requested),
@@ -79,7 +79,7 @@ pub(crate) fn choose(candidates: &[Candidate], requested: Option<&str>) -> Resul
 
 fn choose_best(candidates: &[Candidate]) -> Result<usize> {
     let usable = candidates.iter().enumerate().filter(|(_, candidate)| candidate.missing.is_empty());
-    // The last of equals wins, so the list is walked from its end.
+    // `max_by_key` returns the last of equal elements, so the list is reversed.
     let best = usable.rev().max_by_key(|(_, candidate)| candidate.rank());
     best.map(|(index, _)| index).ok_or_else(|| no_device(candidates, None))
 }
@@ -96,7 +96,8 @@ fn choose_named(candidates: &[Candidate], requested: &str) -> Result<usize> {
     }
 }
 
-/// A number in range is an index; a name may contain numbers too, so any other number is part of a name.
+/// Returns the indices of the matching devices. A number in range is an index. Names may contain numbers too,
+/// so any other number is matched as part of a name.
 fn matches(candidates: &[Candidate], requested: &str) -> Vec<usize> {
     if let Some(index) = requested.parse().ok().filter(|index| *index < candidates.len()) {
         return vec![index];

@@ -7,17 +7,17 @@ use super::window::{WindowHandles, WindowRef, display, raw_window, required_exte
 use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::OptionalFeature;
 
-/// The functions of windows.
+/// Vulkan functions for surfaces and swapchains.
 pub(crate) struct WindowFunctions {
     pub(crate) surface: ash::khr::surface::Instance,
     pub(crate) swapchain: ash::khr::swapchain::Device,
-    /// Fences and modes of single presents: `VK_EXT_swapchain_maintenance1`.
+    /// Fences and modes for each present: `VK_EXT_swapchain_maintenance1`.
     pub(crate) maintenance: Option<ash::khr::get_surface_capabilities2::Instance>,
     pub(crate) hdr: Option<ash::ext::hdr_metadata::Device>,
 }
 
 impl WindowFunctions {
-    /// `None` where the device has no swapchains, or the instance no windows.
+    /// `None` if the device has no swapchains or the instance no surface extensions.
     pub(crate) fn new(
         instance: &Instance,
         device: &ash::Device,
@@ -37,7 +37,7 @@ impl WindowFunctions {
     }
 }
 
-/// A window while a device is chosen, destroyed on drop.
+/// Surface of a window while a device is selected. Destroyed on drop.
 pub(crate) struct SurfaceProbe<'a> {
     functions: ash::khr::surface::Instance,
     raw: vk::SurfaceKHR,
@@ -53,13 +53,14 @@ impl<'a> SurfaceProbe<'a> {
         })
     }
 
-    /// The first queue family of the device for graphics, compute and this window.
+    /// Returns the first queue family of the device that supports graphics, compute and presenting to this
+    /// window.
     pub(crate) fn queue_family(&self, device: vk::PhysicalDevice) -> Option<u32> {
         let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         // SAFETY: the device belongs to the instance.
         let families = unsafe { self.instance.get_physical_device_queue_family_properties(device) };
         let presents = |family| {
-            // SAFETY: as above, and the surface too.
+            // SAFETY: as above, and the surface belongs to the same instance.
             unsafe { self.functions.get_physical_device_surface_support(device, family, self.raw) }
                 .unwrap_or(false)
         };
@@ -72,12 +73,12 @@ impl<'a> SurfaceProbe<'a> {
 
 impl Drop for SurfaceProbe<'_> {
     fn drop(&mut self) {
-        // SAFETY: nothing was made from the surface.
+        // SAFETY: nothing was created from the surface.
         unsafe { self.functions.destroy_surface(self.raw, None) };
     }
 }
 
-/// Makes a surface (`vkCreateXcbSurfaceKHR` and its kin). The window has to outlive it.
+/// Creates a surface (`vkCreateXcbSurfaceKHR` and the like). The window must outlive it.
 pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) -> Result<vk::SurfaceKHR> {
     let (display, window) = (display(window)?, raw_window(window)?);
     let enabled = instance.windows.as_ref().map_or(&[][..], |windows| windows.system());
@@ -86,7 +87,8 @@ pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) ->
             "the context was made for windows of another window system, or for none; set ContextDesc::window";
         return Err(Error::unsupported("this kind of window", why));
     }
-    // SAFETY: the extensions of the window system are on, the handles belong together, and the caller keeps the window.
+    // SAFETY: the extensions of the window system are enabled, the handles belong together, and the caller
+    // keeps the window alive.
     unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, window, None) }
         .map_err(Error::vulkan("vkCreateSurfaceKHR"))
 }

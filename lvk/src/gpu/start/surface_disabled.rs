@@ -1,4 +1,4 @@
-//! The names of `surface.rs` in a build without the feature `window`: the type of a surface has no values.
+//! Stand-in for `surface.rs` in a build without the feature `window`. The surface type has no values.
 
 use ash::vk;
 
@@ -6,7 +6,7 @@ use super::instance::Instance;
 use super::window::WindowRef;
 use crate::error::Result;
 
-/// A window while a device is chosen: there is none.
+/// Stand-in for the surface of a window; never constructed.
 pub(crate) enum SurfaceProbe {}
 
 impl SurfaceProbe {

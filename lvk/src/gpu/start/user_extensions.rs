@@ -1,4 +1,4 @@
-//! Extensions and features of the caller's own, beside those that the library turns on.
+//! Extensions and features that the caller enables in addition to those of the library.
 
 use std::ffi::{CStr, c_void};
 use std::fmt;
@@ -6,9 +6,9 @@ use std::ptr;
 
 use ash::vk;
 
-/// Extensions and features for Vulkan calls of the caller's own, and what its shaders may then ask for.
+/// Extensions and features for the caller's own Vulkan calls, and the SPIR-V capabilities they allow.
 ///
-/// Empty by default. What the library turns on itself may be named again among the extensions, not among the features.
+/// Empty by default. Extensions that the library enables itself may be listed again; its features may not.
 #[derive(Clone, Copy, Default)]
 pub struct UserExtensions<'a> {
     instance: &'a [&'a CStr],
@@ -18,14 +18,18 @@ pub struct UserExtensions<'a> {
 }
 
 impl<'a> UserExtensions<'a> {
-    /// Extensions of the instance, extensions of the device, a chain of feature structures to put behind
-    /// `VkDeviceCreateInfo` with `pNext` set between them and null at its end, and the numbers of SPIR-V capabilities
-    /// that they allow.
+    /// Creates the set from:
+    /// * extensions of the instance,
+    /// * extensions of the device,
+    /// * a chain of feature structures to append to `VkDeviceCreateInfo`, linked by `pNext` and null at its
+    ///   end,
+    /// * and the numbers of the SPIR-V capabilities that they allow.
     ///
     /// # Safety
-    /// Each structure of the chain must be valid, alive for `'a`, belong to one of the extensions or to the device's core
-    /// version, ask for features that the chosen device has, and be none of those that the library chains:
-    /// `VkPhysicalDeviceFeatures2`, `VkPhysicalDeviceVulkan11Features`, `..12Features`, `..13Features`, what is behind
+    /// Each structure of the chain must be valid and alive for `'a`. It must belong to one of the extensions
+    /// or to the device's core version, and may only enable features that the chosen device has. The chain
+    /// must not contain structures that the library chains itself: `VkPhysicalDeviceFeatures2`,
+    /// `VkPhysicalDeviceVulkan11Features`, `..12Features`, `..13Features`, and those of
     /// [`OptionalFeature`](crate::OptionalFeature), ray tracing and mesh shaders. Shaders that use one of the
     /// capabilities must be valid on the device.
     pub unsafe fn new(
@@ -49,7 +53,7 @@ impl<'a> UserExtensions<'a> {
         self.capabilities
     }
 
-    /// The head of the chain, or null. Vulkan only reads it.
+    /// Returns the head of the chain, or null. Vulkan only reads the chain.
     pub(crate) fn feature_chain(&self) -> *mut c_void {
         self.features.map_or(ptr::null_mut(), |head| ptr::from_ref(head).cast::<c_void>().cast_mut())
     }

@@ -1,4 +1,4 @@
-//! The window that a context is made for, and the instance extensions it needs.
+//! The window that a context is created for, and the instance extensions it needs.
 
 use std::ffi::CStr;
 use std::fmt;
@@ -8,10 +8,10 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle, Raw
 use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
 
-/// A window, of whatever library made it: everything with the handles of the crate `raw-window-handle` is one.
+/// A window of any windowing library: every type that implements the traits of the crate `raw-window-handle`.
 ///
-/// Locks of the library may be held while its handles are asked for, and while the last reference to it goes: neither may use a
-/// context.
+/// The library may hold its locks while it queries the handles and while it drops the last reference to the
+/// window. Neither operation may use a context.
 pub trait WindowHandles: HasDisplayHandle + HasWindowHandle + Send + Sync {}
 
 impl<T: HasDisplayHandle + HasWindowHandle + Send + Sync> WindowHandles for T {}
@@ -22,22 +22,22 @@ impl fmt::Debug for dyn WindowHandles + '_ {
     }
 }
 
-/// A window while an instance and a device are made.
+/// A window during the creation of an instance and a device.
 pub(crate) type WindowRef<'a> = &'a dyn WindowHandles;
 
-/// The extensions of an instance that knows windows.
+/// The instance extensions for presenting to windows.
 #[derive(Debug, Clone)]
 pub(crate) struct WindowExtensions {
-    /// Of the window system, with `VK_KHR_surface`.
+    /// Extensions of the window system, with `VK_KHR_surface`.
     system: Vec<&'static CStr>,
-    /// `VK_EXT_surface_maintenance1`, with what it needs.
+    /// `VK_EXT_surface_maintenance1`, with the extension it depends on.
     maintenance: bool,
     /// `VK_EXT_swapchain_colorspace`.
     color_spaces: bool,
 }
 
 impl WindowExtensions {
-    /// Those for windows like `window`, of which `has` says what there is.
+    /// Returns the extensions for windows like `window`. `has` returns true for available extensions.
     pub(crate) fn query(window: WindowRef<'_>, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
         let system = required_extensions(display(window)?)?;
         if let Some(name) = system.iter().find(|name| !has(name)) {
@@ -51,12 +51,12 @@ impl WindowExtensions {
         })
     }
 
-    /// Those of the window system.
+    /// Returns the extensions of the window system.
     pub(super) fn system(&self) -> &[&'static CStr] {
         &self.system
     }
 
-    /// The features of a device for windows that cannot be enabled with these extensions.
+    /// Returns the presentation features of a device that cannot be enabled with these extensions.
     pub(crate) fn unavailable_features(extensions: Option<&Self>) -> FeatureSet {
         match extensions {
             None => OF_WINDOWS.into_iter().collect(),
@@ -65,7 +65,7 @@ impl WindowExtensions {
         }
     }
 
-    /// All of them.
+    /// Returns the names of all the extensions.
     pub(crate) fn names(&self) -> impl Iterator<Item = &'static CStr> {
         let maintenance = if self.maintenance { &MAINTENANCE[..] } else { &[] };
         let color_spaces = self.color_spaces.then_some(ash::ext::swapchain_colorspace::NAME);
@@ -85,7 +85,7 @@ pub(super) fn raw_window(window: &dyn WindowHandles) -> Result<RawWindowHandle> 
 }
 
 fn no_handle(error: raw_window_handle::HandleError) -> Error {
-    Error::usage("window", format!("it gives no handle: {error}"))
+    Error::usage("window", format!("the window has no handle: {error}"))
 }
 
 pub(super) fn required_extensions(display: RawDisplayHandle) -> Result<Vec<&'static CStr>> {

@@ -1,4 +1,4 @@
-//! The names of `window.rs` in a build without the feature `window`: the types of a window have no values.
+//! Stand-in for `window.rs` in a build without the feature `window`. The types have no values.
 
 use std::convert::Infallible;
 use std::ffi::CStr;
@@ -7,10 +7,10 @@ use std::iter::Empty;
 use crate::error::Result;
 use crate::gpu::caps::optional_features::{FeatureSet, OF_WINDOWS};
 
-/// A window while an instance and a device are made: there is none.
+/// Stand-in for a window; never constructed.
 pub(crate) type WindowRef<'a> = &'a Infallible;
 
-/// The extensions of an instance that knows windows: no instance does.
+/// Stand-in for the instance extensions of windows; never constructed.
 pub(crate) enum WindowExtensions {}
 
 impl WindowExtensions {
@@ -22,7 +22,7 @@ impl WindowExtensions {
         match *self {}
     }
 
-    /// The features of a device for windows that cannot be enabled: all of them.
+    /// Returns the presentation features of a device that cannot be enabled: all of them.
     pub(crate) fn unavailable_features(extensions: Option<&Self>) -> FeatureSet {
         match extensions {
             None => OF_WINDOWS.into_iter().collect(),

@@ -7,17 +7,17 @@ layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform itexture2D k
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture2DMS kTextures2DMS[];
 #define kTextures2DShadow kTextures2D
 
-// Textures of a further shape, declared by the shaders that want them, as it may need a feature of the device; `type` is
+// Textures of another shape. The shader declares them itself, because they may need a feature of the device. `type` is
 // textureCubeArray, utexture3D and so on.
 #define LVK_TEXTURES(type, name) layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform type name[]
 
-// Textures in Y'CbCr with their conversions, declared by the shaders that want them; the index is a constant, also one of
-// specialisation.
+// Y'CbCr textures with their conversions, declared by the shader itself. The index must be a constant; a specialisation
+// constant is allowed.
 #define LVK_YUV_TEXTURES(name) layout(set = LVK_SET, binding = LVK_BINDING_YCBCR) uniform sampler2D name[]
 #define textureBindlessYUV(name, index, uv) textureLod(name[index], uv, 0.0)
 
-// Targets of the pass as its own fragment shaders read them, at the fragment's pixel, by subpassLoad: a colour target by its
-// place among them, depth and stencil. `type` is subpassInput, usubpassInput, isubpassInput, or one of these with MS.
+// Input attachments: the pass's attachments for its own fragment shaders, read at the fragment's pixel by subpassLoad.
+// Colour attachments go by index. `type` is subpassInput, usubpassInput, isubpassInput, or one of these with MS.
 #define LVK_INPUT_AT(place, type, name) \
     layout(input_attachment_index = place, set = LVK_INPUT_SET, binding = place) uniform type name
 #define LVK_INPUT(target, type, name) LVK_INPUT_AT(LVK_PLACE_OF_COLOR + target, type, name)
@@ -45,8 +45,8 @@ layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_AC
 #define LVK_STORAGE_IMAGES_U2D(format, name) LVK_STORAGE_IMAGES(uimage2D, format, name)
 #define LVK_STORAGE_IMAGES_I2D(format, name) LVK_STORAGE_IMAGES(iimage2D, format, name)
 
-// Both the indices and the combination are marked: the first for drivers that look at the access, the second because
-// the rules of Vulkan look at the combined operand.
+// Both the indices and the combined sampler are marked: the indices for drivers that examine the access, the combined
+// sampler because the rules of Vulkan examine the combined operand.
 #define LVK_SAMPLED(type, images, samplers, tex, smp) \
     nonuniformEXT(type(images[nonuniformEXT(tex)], samplers[nonuniformEXT(smp)]))
 #define LVK_2D(tex, smp) LVK_SAMPLED(sampler2D, kTextures2D, kSamplers, tex, smp)
@@ -57,7 +57,7 @@ layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_AC
 #define LVK_2D_ARRAY_SHADOW(tex, smp) LVK_SAMPLED(sampler2DArrayShadow, kTextures2DArray, kSamplersShadow, tex, smp)
 #define LVK_CUBE_SHADOW(tex, smp) LVK_SAMPLED(samplerCubeShadow, kTexturesCube, kSamplersShadow, tex, smp)
 
-// Only fragment shaders have derivatives; elsewhere the same helper reads mip level 0.
+// Only fragment shaders have derivatives; in other stages the same helper reads mip level 0.
 #ifdef LVK_STAGE_FRAGMENT
 #define LVK_SAMPLE(sampled, uv) texture(sampled, uv)
 #else
@@ -71,7 +71,7 @@ vec4 textureBindless2DGather(uint tex, uint smp, vec2 uv) { return textureGather
 float textureBindless2DShadow(uint tex, uint smp, vec3 uvw) { return LVK_SAMPLE(LVK_2D_SHADOW(tex, smp), uvw); }
 
 vec4 textureBindless2DGatherShadow(uint tex, uint smp, vec2 uv, float ref) { return textureGather(LVK_2D_SHADOW(tex, smp), uv, ref); }
-// The channel, 0 to 3, is a constant.
+// The channel (0 to 3) must be a constant.
 #define textureBindless2DGatherChannel(tex, smp, uv, channel) textureGather(LVK_2D(tex, smp), uv, channel)
 #define textureBindless2DArrayGatherChannel(tex, smp, uvLayer, channel) textureGather(LVK_2D_ARRAY(tex, smp), uvLayer, channel)
 #define textureBindlessCubeGatherChannel(tex, smp, dir, channel) textureGather(LVK_CUBE(tex, smp), dir, channel)
@@ -93,7 +93,7 @@ vec4 textureBindlessFetch2D(uint tex, ivec2 texel, int lod) { return texelFetch(
 uvec4 textureBindlessFetchU2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTexturesU2D[nonuniformEXT(tex)], texel, lod); }
 ivec4 textureBindlessFetchI2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTexturesI2D[nonuniformEXT(tex)], texel, lod); }
 
-// These need LVK_TEXTURES(textureCubeArray, kTexturesCubeArray); the fourth coordinate is the number of the cube.
+// These need LVK_TEXTURES(textureCubeArray, kTexturesCubeArray). The fourth coordinate is the index of the cube.
 #define LVK_CUBE_ARRAY(tex, smp) LVK_SAMPLED(samplerCubeArray, kTexturesCubeArray, kSamplers, tex, smp)
 #define textureBindlessCubeArray(tex, smp, dirCube) LVK_SAMPLE(LVK_CUBE_ARRAY(tex, smp), dirCube)
 #define textureBindlessCubeArrayLod(tex, smp, dirCube, lod) textureLod(LVK_CUBE_ARRAY(tex, smp), dirCube, lod)

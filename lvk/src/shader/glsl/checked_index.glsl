@@ -1,4 +1,4 @@
-// Looks indices of bindless arrays up before they are used. `lvk/src/bindless/checks.rs` has the layout of the words.
+// Checks indices of bindless arrays before they are used. `lvk/src/bindless/checks.rs` has the layout of the words.
 layout(local_size_x = 1) in;
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer LvkCheckWords { uint at[]; };
@@ -10,7 +10,7 @@ const uint ENTRY_COUNT = 4096u;
 const uint ENTRY_WORDS = 8u;
 const uint PROBES = 16u;
 
-// The index, or 0 where nobody has it, after writing that down.
+// Returns the index. If no live object has the index, records the access and returns 0.
 uint lvkCheckedIndex(const uvec2 address, const uint shader, const uint array, const uint first, const uint count,
                      const uint index) {
     LvkCheckWords words = LvkCheckWords(address);
@@ -39,7 +39,7 @@ uint lvkCheckedIndex(const uvec2 address, const uint shader, const uint array, c
     return 0u;
 }
 
-// Only what is called is compiled.
+// The compiler emits only functions that are called.
 shared uint result;
 
 void main() { result = lvkCheckedIndex(uvec2(0u), 0u, 0u, 0u, 0u, 0u); }

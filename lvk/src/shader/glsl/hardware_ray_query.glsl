@@ -15,25 +15,25 @@
 // Starts a query: void (LvkRayQuery, uint tlasIndex, uint flags, uint cullMask, vec3 origin, float tMin, vec3 direction, float tMax).
 #define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
     rayQueryInitializeEXT(rq, kTLAS[nonuniformEXT(tlasIndex)], (flags) | LVK_RAY_FLAGS_ALWAYS, mask, origin, tMin, direction, tMax)
-// Steps to the next candidate that the shader must judge; false when the walk is over.
+// Steps to the next candidate that the shader must judge; false when the traversal is over.
 #define lvkRayQueryProceed(rq) rayQueryProceedEXT(rq)
-// Ends the walk; what was committed stays.
+// Ends the traversal; the committed hit stays.
 #define lvkRayQueryTerminate(rq) rayQueryTerminateEXT(rq)
-// Commits the candidate box at distance `t`, within the range that is left.
+// Commits the candidate AABB at distance `t`, within the remaining range.
 #define lvkRayQueryGenerateIntersection(rq, t) rayQueryGenerateIntersectionEXT(rq, t)
 // Commits the candidate triangle.
 #define lvkRayQueryConfirmIntersection(rq) rayQueryConfirmIntersectionEXT(rq)
 
-// Of the ray.
+// Values of the ray.
 #define lvkRayQueryTMin(rq) rayQueryGetRayTMinEXT(rq)
 #define lvkRayQueryFlags(rq) uint(rayQueryGetRayFlagsEXT(rq))
 #define lvkRayQueryWorldRayOrigin(rq) rayQueryGetWorldRayOriginEXT(rq)
 #define lvkRayQueryWorldRayDirection(rq) rayQueryGetWorldRayDirectionEXT(rq)
 
-// Of an intersection.
+// Values of an intersection.
 #define lvkRayQueryType(rq, which) rayQueryGetIntersectionTypeEXT(rq, which)
 #define lvkRayQueryT(rq, which) rayQueryGetIntersectionTEXT(rq, which)
-// The application's own numbers of instance and primitive; `tlas` is the index the query was started with.
+// The application's own instance and primitive ids; `tlas` is the index that the query was started with.
 #define lvkRayQueryInstanceId(rq, which, tlas) lvkMapInstance(tlas, rayQueryGetIntersectionInstanceIdEXT(rq, which))
 #define lvkRayQueryPrimitiveIndex(rq, which, tlas) \
     lvkMapPrimitive(tlas, rayQueryGetIntersectionInstanceIdEXT(rq, which), \
@@ -44,7 +44,7 @@
 #define lvkRayQueryBarycentrics(rq, which) rayQueryGetIntersectionBarycentricsEXT(rq, which)
 #define lvkRayQueryFrontFace(rq, which) rayQueryGetIntersectionFrontFaceEXT(rq, which)
 #ifdef LVK_POSITION_FETCH
-// The corners of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
+// Vertices of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
 #define lvkRayQueryTrianglePositions(rq, which, positions) rayQueryGetIntersectionTriangleVertexPositionsEXT(rq, which, positions)
 #endif
 #define lvkRayQueryCandidateAabbOpaque(rq) rayQueryGetIntersectionCandidateAABBOpaqueEXT(rq)

@@ -1,9 +1,9 @@
 #ifndef LVK_HIT_NUMBERS_GLSL
 #define LVK_HIT_NUMBERS_GLSL
 
-// From what a ray hit to the numbers the application gave. Where a mesh was split, or its primitives were put into
-// another order, the instances and primitives that Vulkan counts are the library's own: a row for each of Vulkan's
-// instances leads back. A structure without such meshes has no rows, and the numbers are the same.
+// Maps the ids of a hit to those of the application. If a mesh was split or its primitives were reordered, Vulkan
+// counts the library's own instances and primitives. A hit remap table with an entry for each of these instances maps
+// them back. A TLAS without such meshes has no table, and the ids are the same.
 #include <lvk/tlas_table.glsl>
 struct LvkTlasRow { uvec2 map; uint instance; uint unused; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer LvkTlasRows { LvkTlasRow row[]; };

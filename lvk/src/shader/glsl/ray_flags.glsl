@@ -10,7 +10,7 @@
 #define LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES 0x20u
 #define LVK_RAY_FLAG_CULL_OPAQUE 0x40u
 #define LVK_RAY_FLAG_CULL_NO_OPAQUE 0x80u
-// Shaders that skip by kind require GL_EXT_ray_flags_primitive_culling and say layout(primitive_culling);
+// Shaders with these flags require GL_EXT_ray_flags_primitive_culling and declare layout(primitive_culling).
 #define LVK_RAY_FLAG_SKIP_TRIANGLES 0x100u
 #define LVK_RAY_FLAG_SKIP_AABBS 0x200u
 

@@ -1,4 +1,4 @@
-//! Which atomic operations a module has, by what they change and where it lies.
+//! Finds the atomic operations of a module, by type and storage of their target.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -6,17 +6,17 @@ use ::spirv::{Op, StorageClass};
 
 use super::words::{Instruction, instructions};
 
-/// Atomic operations that a device feature of their own allows.
+/// A kind of atomic operations that needs a device feature of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Atomic {
     pub(crate) is_float: bool,
     pub(crate) bits: u32,
-    /// An addition, not merely an exchange, a load or a store. Integers have only one feature for both.
+    /// True for additions, false for exchanges, loads and stores. Integers have only one feature for both.
     pub(crate) is_add: bool,
     pub(crate) place: AtomicStorage,
 }
 
-/// Where the changed value lies.
+/// The storage of the target of an atomic operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum AtomicStorage {
     Buffer,
@@ -24,7 +24,7 @@ pub(crate) enum AtomicStorage {
     Image,
 }
 
-/// The atomic operations on floats and on integers of other than 32 bits, each kind once.
+/// Returns the atomic operations on floats and on integers of a size other than 32 bits, each kind once.
 pub(crate) fn find_atomics(words: &[u32]) -> Result<Vec<Atomic>, String> {
     let mut ids = AtomicIds::default();
     let mut found = BTreeSet::new();
@@ -36,10 +36,10 @@ pub(crate) fn find_atomics(words: &[u32]) -> Result<Vec<Atomic>, String> {
     Ok(found.into_iter().collect())
 }
 
-/// What is known of ids so far; definitions come before uses wherever it matters here.
+/// The types of the ids so far. All definitions that matter here precede their uses.
 #[derive(Default)]
 struct AtomicIds {
-    /// Scalar types: whether they are floats, and their bits.
+    /// Scalar types: true for floats, and their bits.
     scalars: HashMap<u32, (bool, u32)>,
     /// Pointer types: storage class and target type.
     pointer_types: HashMap<u32, (u32, u32)>,
@@ -84,7 +84,7 @@ fn atomic_storage(storage: u32) -> Option<AtomicStorage> {
     places.into_iter().find(|(class, _)| *class as u32 == storage).map(|(_, place)| place)
 }
 
-/// Result type first, then the result.
+/// True if the result can be a pointer. The result type is the first operand, the result the second.
 fn makes_pointers(op: Op) -> bool {
     use Op::{
         AccessChain, Bitcast, ConvertUToPtr, CopyObject, FunctionCall, FunctionParameter, ImageTexelPointer,

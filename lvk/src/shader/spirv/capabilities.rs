@@ -1,4 +1,4 @@
-//! Whether a module's SPIR-V capabilities are among those that the device's features allow.
+//! Checks that the device's features allow a module's SPIR-V capabilities.
 
 use ::spirv::Capability as C;
 use ash::vk;
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::gpu::caps::features::Features;
 use crate::shader::{Reflection, ShaderStage};
 
-/// Allowed on every device the library takes: without a feature, or by one the library cannot do without.
+/// Capabilities that every supported device allows: they need no feature, or a feature that the library requires.
 const FREE: [C; 18] = [
     C::Matrix,
     C::Shader,
@@ -30,7 +30,7 @@ const FREE: [C; 18] = [
     C::PhysicalStorageBufferAddresses,
 ];
 
-/// A capability, whether it is allowed, and the feature that allows it.
+/// A capability, a function that returns true if it is allowed, and the name of the feature that allows it.
 type CapabilityRow = (C, fn(&Features) -> vk::Bool32, &'static str);
 
 const BY_FEATURE: [CapabilityRow; 51] = [
@@ -150,7 +150,7 @@ pub(crate) fn check_stage(name: &str, stage: ShaderStage, features: &Features) -
     Ok(())
 }
 
-/// Fails unless `features`, those that are on, allow everything the module asks for beside the capabilities in `extra`.
+/// Fails unless the enabled `features` allow everything that the module needs beside the capabilities in `extra`.
 pub(crate) fn check_capabilities(
     name: &str,
     stage: ShaderStage,
@@ -173,7 +173,7 @@ pub(crate) fn check_capabilities(
     Ok(())
 }
 
-/// Why the capability is not allowed.
+/// Returns the reason if the capability is not allowed.
 fn missing_capability(capability: u32, features: &Features) -> Option<String> {
     let is = |known: C| known as u32 == capability;
     if FREE.into_iter().any(is) || BY_SUBGROUP.iter().any(|row| is(row.0)) {
@@ -271,7 +271,8 @@ fn multisampled_storage(features: &Features) -> vk::Bool32 {
     features.core.shader_storage_image_multisample
 }
 
-/// Reading the rate needs any of the features, and none is there without this one.
+/// True if shading rates can be read. Any of the three features is enough, and every device with one of them has this
+/// one.
 fn shading_rate(features: &Features) -> vk::Bool32 {
     features.ext.shading_rate.pipeline_fragment_shading_rate
 }
@@ -280,12 +281,12 @@ fn dot_product(features: &Features) -> vk::Bool32 {
     features.v13.shader_integer_dot_product
 }
 
-/// The operations are looked at one by one; here, one place is enough.
+/// True if one storage allows the capability. The operations are checked individually.
 fn int64_atomics(features: &Features) -> vk::Bool32 {
     features.v12.shader_buffer_int64_atomics | features.v12.shader_shared_int64_atomics
 }
 
-/// As [`int64_atomics`].
+/// See [`int64_atomics`].
 fn float_add(features: &Features) -> vk::Bool32 {
     let on = &features.ext.float_atomics;
     on.shader_buffer_float32_atomic_add
@@ -304,7 +305,7 @@ mod tests {
         Reflection { capabilities, ..Reflection::default() }
     }
 
-    /// The text of the refusal, if there is one.
+    /// Returns the text of the error, if there is one.
     fn refusal(stage: ShaderStage, module: &Reflection, features: &Features) -> Option<String> {
         match check_capabilities("test", stage, module, features, &[]) {
             Ok(()) => None,

@@ -1,8 +1,9 @@
-//! What operations on specialization constants come to (`OpSpecConstantOp`), as far as lengths of arrays need them.
+//! Evaluates operations on specialization constants (`OpSpecConstantOp`), as far as array lengths need them.
 
 use ::spirv::Op;
 
-/// The value of an operation on 32-bit integers and booleans, `None` for other operations and where it has none.
+/// Returns the value of an operation on 32-bit integers and booleans. Returns `None` for other operations, and if the
+/// operation has no value.
 pub(crate) fn evaluate_spec_constant_op(op: Op, operands: &[u32]) -> Option<u32> {
     let operand = |index: usize| operands.get(index).copied();
     let (a, b) = (operand(0)?, operand(1).unwrap_or(0));

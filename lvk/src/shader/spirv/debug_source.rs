@@ -1,15 +1,16 @@
-//! Puts the texts a module was compiled from into it, for debuggers.
+//! Embeds the source texts of a module in its SPIR-V, for debuggers.
 
 use ::spirv::Op;
 
 use super::words::{HEADER_WORDS, instructions};
 
-/// Words of an instruction at most.
+/// Maximum words of an instruction.
 const MAX_WORDS: usize = 0xFFFF;
-/// Word of the header that is above every id.
+/// The header word that holds the id bound.
 const BOUND: usize = 3;
 
-/// `words` with `OpSource` naming each text and holding it; the first is the module's own. The texts are ASCII.
+/// Returns `words` with an `OpSource` that names and contains each text. The first text is the module's own. The texts
+/// are ASCII.
 pub(crate) fn embed_source(words: &[u32], texts: &[(String, String)]) -> Vec<u32> {
     let mut out = words.get(..HEADER_WORDS).unwrap_or(words).to_vec();
     for instruction in instructions(words).flatten() {
@@ -24,7 +25,7 @@ pub(crate) fn embed_source(words: &[u32], texts: &[(String, String)]) -> Vec<u32
     out
 }
 
-/// Every `OpString` stands before every `OpSource`.
+/// Appends the texts. Every `OpString` precedes every `OpSource`.
 fn push_texts(out: &mut Vec<u32>, language: [u32; 2], texts: &[(String, String)]) {
     let first = out[BOUND];
     out[BOUND] += texts.len() as u32;
@@ -43,7 +44,7 @@ fn push_texts(out: &mut Vec<u32>, language: [u32; 2], texts: &[(String, String)]
     }
 }
 
-/// An instruction that ends in a string.
+/// Appends an instruction that ends in a string.
 fn push_text(out: &mut Vec<u32>, op: Op, operands: &[u32], text: &str) {
     let mut bytes = text.as_bytes().to_vec();
     bytes.resize((bytes.len() / 4 + 1) * 4, 0);

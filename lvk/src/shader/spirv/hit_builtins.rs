@@ -1,13 +1,13 @@
-//! Whether a hit shader reads Vulkan's own numbers of what was hit, which are not the caller's where meshes were split or
-//! reordered.
+//! Finds uses of Vulkan's own ids of a hit in hit shaders. After a split or a reordering, they differ from the
+//! caller's ids.
 
 use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 
-/// The built-ins, each with the helper to use instead.
+/// The built-ins, each with the helper that replaces it.
 const NUMBERS: [(&str, &str); 2] =
     [("gl_InstanceID", "lvkInstanceId(tlas)"), ("gl_PrimitiveID", "lvkPrimitiveIndex(tlas)")];
 
-/// The first such built-in in the caller's text, with the helper to use instead.
+/// Returns the first such built-in in the caller's text, with the helper that replaces it.
 pub(crate) fn find_raw_hit_builtin(desc: &ShaderModuleDesc<'_>) -> Option<(&'static str, &'static str)> {
     use ShaderStage::{AnyHit, ClosestHit, Intersection};
     let ShaderSource::Glsl(text) = desc.source else { return None };

@@ -1,4 +1,4 @@
-//! What a fragment stage reads of its pass's targets, and where it puts colours out.
+//! Input attachments that a fragment stage reads, and the locations of its outputs.
 
 use ::spirv::{Decoration, StorageClass};
 
@@ -7,7 +7,7 @@ use crate::bindless::input_attachments::InputAttachment;
 use crate::bindless::layout;
 use crate::format::NumericFormat;
 
-/// A target of the pass that a module reads.
+/// An input attachment that a module reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct InputRead {
     pub(crate) input: InputAttachment,
@@ -15,7 +15,7 @@ pub(crate) struct InputRead {
     pub(crate) multisampled: bool,
 }
 
-/// What a variable reads of the targets; `None` where it is something else.
+/// Returns the input attachment that a variable reads; `None` if the variable is something else.
 pub(crate) fn read_input_attachment(
     module: &ParsedModule,
     variable: &Variable,
@@ -45,7 +45,7 @@ pub(crate) fn read_input_attachment(
 const MISPLACED: &str = "reads a target of the pass, but not at its place; declare it with LVK_INPUT, LVK_DEPTH_INPUT or \
                          LVK_STENCIL_INPUT";
 
-/// The target that set, binding and index agree on.
+/// Returns the input attachment if set, binding and index agree on it.
 fn attachment_of(module: &ParsedModule, variable: &Variable) -> Option<InputAttachment> {
     let get = |decoration| module.decoration(variable.id, decoration);
     let input = InputAttachment::from_index(get(Decoration::Binding)?)?;
@@ -54,7 +54,7 @@ fn attachment_of(module: &ParsedModule, variable: &Variable) -> Option<InputAtta
     agrees.then_some(input)
 }
 
-/// The locations of an output, a bit for each; arrays take several.
+/// Returns the locations of an output, a bit for each. An array takes several.
 pub(crate) fn output_locations(module: &ParsedModule, variable: &Variable) -> u32 {
     let Some(first) = module.decoration(variable.id, Decoration::Location) else { return 0 };
     let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { return 0 };

@@ -1,4 +1,4 @@
-//! Puts a function of one module into another.
+//! Links a function of one module into another.
 
 use std::collections::{HashMap, HashSet};
 
@@ -6,15 +6,15 @@ use ::spirv::Op;
 
 use super::words::{HEADER_WORDS, Instruction, instructions};
 
-/// Word of the header that is above every id.
+/// The header word that holds the id bound.
 const BOUND: usize = 3;
 
-/// A module in its sections, to which something is added.
+/// The sections of a module that another function is linked into.
 pub(crate) struct ModuleSections {
     /// The header.
     pub(crate) header: Vec<u32>,
     pub(crate) capabilities: Vec<u32>,
-    /// Everything up to the decorations, those included.
+    /// Everything up to and including the decorations.
     pub(crate) annotations: Vec<u32>,
     /// Types, constants and variables.
     pub(crate) globals: Vec<u32>,
@@ -22,7 +22,7 @@ pub(crate) struct ModuleSections {
 }
 
 impl ModuleSections {
-    /// Fails where an instruction is cut off.
+    /// Splits `words` into sections. Fails if an instruction is truncated.
     pub(crate) fn parse(words: &[u32]) -> Result<Self, String> {
         let header = words.get(..HEADER_WORDS).ok_or("the header is cut off")?.to_vec();
         let mut all = Self {
@@ -56,16 +56,16 @@ impl ModuleSections {
         id
     }
 
-    /// The id of a new constant of one word.
+    /// Adds a constant of one word and returns its id.
     pub(crate) fn add_constant(&mut self, ty: u32, value: u32) -> u32 {
         let id = self.new_id();
         push_instruction(&mut self.globals, Op::Constant, &[ty, id, value]);
         id
     }
 
-    /// Adds the function of this name with the types, constants and decorations that it needs; answers its id.
+    /// Adds the function `name` of `donor` with its types, constants and decorations. Returns the ids for calls.
     ///
-    /// Types that may be declared only once are shared with what is there.
+    /// Types that SPIR-V allows only once are shared with those of this module.
     pub(crate) fn link_function(&mut self, donor: &[u32], name: &str) -> Result<LinkedFunction, String> {
         let code: Vec<_> = instructions(donor).collect::<Result<_, _>>()?;
         let wanted = |i: &&Instruction<'_>| i.op == Some(Op::Name) && i.string(1).0.starts_with(name);
@@ -133,7 +133,7 @@ impl ModuleSections {
         words
     }
 
-    /// The types that may be declared once only, by their words without the result.
+    /// Returns the types that SPIR-V allows only once, by their words without the result.
     fn unique_types(&self) -> Result<DefinedIds, String> {
         let mut known = HashMap::new();
         for instruction in instructions(&[self.header.clone(), self.globals.clone()].concat()) {
@@ -148,20 +148,20 @@ impl ModuleSections {
     }
 }
 
-/// What was imported.
+/// Ids of a linked function.
 pub(crate) struct LinkedFunction {
     pub(crate) function: u32,
-    /// Type of what it answers.
+    /// Return type.
     pub(crate) result: u32,
-    /// Type of its first parameter.
+    /// Type of the first parameter.
     pub(crate) address: u32,
-    /// Type of its second.
+    /// Type of the second parameter.
     pub(crate) word: u32,
 }
 
 struct IdRemap {
     known: DefinedIds,
-    /// Ids of the donor and what they became.
+    /// Ids in this module by the ids of the donor.
     mapped: HashMap<u32, u32>,
 }
 
@@ -173,13 +173,13 @@ impl DefinedIds {
     }
 }
 
-/// Adds an instruction.
+/// Appends an instruction.
 pub(crate) fn push_instruction(section: &mut Vec<u32>, op: Op, operands: &[u32]) {
     section.push((operands.len() as u32 + 1) << 16 | op as u32);
     section.extend(operands);
 }
 
-/// The types and constants that `body` needs, in their order.
+/// Returns the types and constants that `body` needs, in their order.
 fn required_globals<'a, 'b>(
     code: &'a [Instruction<'b>],
     body: &[Instruction<'b>],
@@ -200,7 +200,7 @@ fn required_globals<'a, 'b>(
     found
 }
 
-/// Which operand of a type or constant is its own id.
+/// Returns the index of the operand that is the id of a type or constant.
 fn result_operand(instruction: &Instruction<'_>) -> usize {
     if instruction.op.is_some_and(is_type) { 0 } else { 1 }
 }
@@ -212,7 +212,7 @@ fn function_body<'a, 'b>(code: &'a [Instruction<'b>], function: u32) -> &'a [Ins
     end.map_or(&[], |end| &rest[..=end])
 }
 
-/// What stands in front of types, constants and variables.
+/// True for instructions that precede types, constants and variables.
 fn is_annotation(op: Op) -> bool {
     use Op::{
         Decorate, DecorateId, DecorateString, DecorationGroup, EntryPoint, ExecutionMode, ExecutionModeId,
@@ -258,7 +258,7 @@ fn is_type_or_constant(op: Op) -> bool {
     is_type(op) || matches!(op, Op::Constant | Op::ConstantComposite | Op::ConstantTrue | Op::ConstantFalse)
 }
 
-/// Whether operand `index`, counted from 0, is an id, in the instructions that donors have.
+/// True if operand `index`, counted from 0, is an id. Covers only the instructions of the donors.
 fn is_id(instruction: &Instruction<'_>, index: usize) -> bool {
     use Op::{
         BranchConditional, Constant, Function, LoopMerge, SelectionMerge, Store, TypeFloat, TypeInt,

@@ -1,4 +1,4 @@
-//! Reads SPIR-V modules: words, reflection, capabilities, constants, and the passes that rewrite modules.
+//! SPIR-V modules: words, reflection, capabilities, constants, and passes that rewrite modules.
 
 pub(crate) mod atomics;
 pub(crate) mod capabilities;

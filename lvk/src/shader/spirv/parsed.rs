@@ -1,4 +1,4 @@
-//! The declarations of a SPIR-V module, collected once.
+//! The declarations of a SPIR-V module, parsed once.
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,12 +8,12 @@ use super::const_eval::evaluate_spec_constant_op;
 use super::words::{self, Instruction};
 use crate::format::NumericFormat;
 
-/// A buffer address in a push-constant block.
+/// Bytes of a buffer address in a push-constant block.
 const ADDRESS_BYTES: u64 = 8;
-/// Types nested deeper than this are taken for damage.
+/// Maximum nesting of types. A module with deeper nesting is invalid.
 pub(crate) const MAX_NESTING: u32 = 64;
 
-/// Declarations by id; ids may point anywhere, so every look-up can fail.
+/// Declarations by id. An id may refer to anything, so every look-up can fail.
 #[derive(Debug, Default)]
 pub(crate) struct ParsedModule {
     version: u32,
@@ -23,7 +23,7 @@ pub(crate) struct ParsedModule {
     pub(crate) names: HashMap<u32, String>,
     pub(crate) types: HashMap<u32, Type>,
     pub(crate) constants: HashMap<u32, Constant>,
-    /// What operations on constants come to.
+    /// Values of operations on constants.
     folded: HashMap<u32, u32>,
     composites: HashMap<u32, [u32; 3]>,
     pub(crate) variables: Vec<Variable>,
@@ -48,7 +48,7 @@ pub(crate) struct Mode {
     pub(crate) operands: [u32; 3],
 }
 
-/// A type, as far as sizes and descriptor kinds need it.
+/// A type, with the data that sizes and descriptor kinds need.
 #[derive(Debug)]
 pub(crate) enum Type {
     Bool,
@@ -80,7 +80,7 @@ pub(crate) enum Type {
     Image {
         storage: bool,
     },
-    /// What a pass draws, as its own fragment shaders read it: of numbers of this type.
+    /// An input attachment with texels of this type.
     SubpassInput {
         texel: u32,
         multisampled: bool,
@@ -88,7 +88,7 @@ pub(crate) enum Type {
     Opaque(Op),
 }
 
-/// A scalar constant; its low word.
+/// A scalar constant: its low word.
 #[derive(Debug)]
 pub(crate) struct Constant {
     pub(crate) ty: u32,
@@ -109,7 +109,7 @@ impl ParsedModule {
         Self::specialized(words, &HashMap::new())
     }
 
-    /// As [`parse`](Self::parse), with these values of specialization constants, by their ids.
+    /// Like [`parse`](Self::parse), with values of specialization constants by their ids.
     pub(crate) fn specialized(words: &[u32], values: &HashMap<u32, u32>) -> Result<Self, String> {
         let mut module = Self { version: words::version(words), ..Self::default() };
         for instruction in words::instructions(words) {
@@ -127,7 +127,7 @@ impl ParsedModule {
         self.capabilities.contains(&(capability as u32))
     }
 
-    /// The numbers of all capabilities, sorted.
+    /// Returns the numbers of all capabilities, sorted.
     pub(crate) fn capabilities(&self) -> Vec<u32> {
         let mut all: Vec<u32> = self.capabilities.iter().copied().collect();
         all.sort_unstable();
@@ -142,13 +142,13 @@ impl ParsedModule {
         self.member_decorations.get(&(ty, member, decoration as u32)).copied()
     }
 
-    /// Whether `variable` belongs to the entry point; before SPIR-V 1.4 interfaces do not list resources.
+    /// True if the entry point uses `variable`. Before SPIR-V 1.4, interfaces do not list resources.
     pub(crate) fn in_interface(&self, entry: usize, variable: &Variable) -> bool {
         self.version < words::VERSION_1_4
             || self.entries.get(entry).is_some_and(|entry| entry.interface.contains(&variable.id))
     }
 
-    /// Whether an output of the entry point, or a member of one, is the built-in `Layer`.
+    /// True if an output of the entry point, or a member of one, is the built-in `Layer`.
     pub(crate) fn writes_layer(&self, entry: usize) -> bool {
         let (builtin, layer) = (Decoration::BuiltIn as u32, BuiltIn::Layer as u32);
         let members: HashSet<u32> = self
@@ -166,7 +166,7 @@ impl ParsedModule {
         })
     }
 
-    /// The struct that a pointer leads to, or an array behind it.
+    /// Returns the struct that a pointer refers to, directly or as the element of an array.
     fn block_of(&self, pointer: u32) -> Option<u32> {
         let Type::Pointer { target } = self.types.get(&pointer)? else { return None };
         match self.types.get(target)? {
@@ -175,20 +175,21 @@ impl ParsedModule {
         }
     }
 
-    /// The three constants of the `WorkgroupSize` built-in.
+    /// Returns the three constants of the `WorkgroupSize` built-in.
     pub(crate) fn workgroup_size(&self) -> Option<[u32; 3]> {
         let is_size =
             |id: &u32| self.decoration(*id, Decoration::BuiltIn) == Some(BuiltIn::WorkgroupSize as u32);
         self.composites.iter().find(|(id, _)| is_size(id)).map(|(_, parts)| *parts)
     }
 
-    /// Bytes of a type laid out by its offset and stride decorations.
+    /// Returns the bytes of a type that its offset and stride decorations lay out.
     pub(crate) fn size_of(&self, ty: u32) -> Result<u64, String> {
         let mut known = HashMap::new();
         self.size(ty, None, MAX_NESTING, &mut known)
     }
 
-    /// `matrix_stride` is that of the member at hand, and whether its rows are contiguous.
+    /// Returns the bytes of a type. `matrix` is the matrix stride of the current member, and true if the member is
+    /// row-major.
     fn size(
         &self,
         ty: u32,
@@ -244,7 +245,7 @@ impl ParsedModule {
         Ok(u64::from(stride) * u64::from(if row_major { rows } else { columns }))
     }
 
-    /// The end of the member that ends last.
+    /// Returns the highest end of all members.
     fn struct_size(
         &self,
         ty: u32,
@@ -308,7 +309,7 @@ impl ParsedModule {
         self.constants.insert(i.operand(1), Constant { ty: i.operand(0), value, is_spec });
     }
 
-    /// What it is made of stands before it.
+    /// Evaluates an `OpSpecConstantOp`. Its operands precede it.
     fn evaluate_spec_op(&mut self, i: &Instruction<'_>) {
         let operands = i.operands().get(3..).unwrap_or(&[]);
         let value = match Op::from_u32(i.operand(2)) {
@@ -324,13 +325,13 @@ impl ParsedModule {
         }
     }
 
-    /// One of the first three parts of a composite constant.
+    /// Returns one of the first three constituents of a composite constant.
     fn constituent(&self, composite: u32, index: u32) -> Option<u32> {
         let part = self.composites.get(&composite)?.get(index as usize)?;
         self.constant_value(*part)
     }
 
-    /// The low word of a constant, or what an operation on constants comes to.
+    /// Returns the low word of a constant, or the value of an operation on constants.
     pub(crate) fn constant_value(&self, id: u32) -> Option<u32> {
         let plain = self.constants.get(&id).map(|constant| constant.value);
         plain.or_else(|| self.folded.get(&id).copied())
@@ -364,7 +365,7 @@ fn parse_entry_point(i: &Instruction<'_>) -> EntryPoint {
     EntryPoint { model: i.operand(0), function: i.operand(1), name, interface }
 }
 
-/// Texel buffers have no binding in the library.
+/// Parses an image type. Texel buffers become opaque: the library has no binding for them.
 fn parse_image_type(i: &Instruction<'_>) -> Type {
     const SAMPLED: u32 = 1;
     const STORAGE: u32 = 2;

@@ -1,4 +1,4 @@
-//! How large the payloads and hit attributes of ray tracing shaders are.
+//! Sizes of the payloads and hit attributes of ray tracing shaders.
 
 use std::collections::HashMap;
 
@@ -6,17 +6,17 @@ use ::spirv::StorageClass;
 
 use super::parsed::{MAX_NESTING, ParsedModule, Type};
 
-/// Sizes in bytes, 0 where a module has none.
+/// Sizes in bytes; 0 if a module declares none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct RayInterface {
-    /// The largest ray payload, of either direction.
+    /// Bytes of the largest ray payload, incoming or outgoing.
     pub(crate) payload_bytes: u32,
-    /// The hit attributes.
+    /// Bytes of the hit attributes.
     pub(crate) hit_attribute_bytes: u32,
 }
 
 impl RayInterface {
-    /// What the module declares. A size that cannot be known counts as the largest.
+    /// Returns the sizes that the module declares. An unknown size counts as the largest.
     pub(crate) fn from_module(module: &ParsedModule) -> Self {
         let largest = |classes: &[StorageClass]| {
             let variables = module.variables.iter();
@@ -38,7 +38,7 @@ impl RayInterface {
 /// Size and largest scalar of a type, in bytes.
 type Extent = (u64, u64);
 
-/// The size as Vulkan counts it, where no offset is given: every member is aligned to the type's largest scalar
+/// Returns the size of a type without offsets by Vulkan's rule: every member is aligned to the type's largest scalar
 /// (`VkRayTracingPipelineInterfaceCreateInfoKHR`).
 fn type_bytes(module: &ParsedModule, ty: u32) -> u32 {
     let Some((_, scalar)) = type_extent(module, ty, 1, MAX_NESTING, &mut HashMap::new()) else {
@@ -48,7 +48,7 @@ fn type_bytes(module: &ParsedModule, ty: u32) -> u32 {
     whole.and_then(|(bytes, _)| u32::try_from(bytes).ok()).unwrap_or(u32::MAX)
 }
 
-/// The extent with members aligned to `alignment`; `None` for what has none.
+/// Returns the extent with members aligned to `alignment`; `None` for a type without a size.
 fn type_extent(
     module: &ParsedModule,
     ty: u32,

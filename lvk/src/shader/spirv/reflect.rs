@@ -1,4 +1,4 @@
-//! What a SPIR-V module tells about itself, and whether it fits the library's descriptor sets.
+//! Reflection of a SPIR-V module, and checks against the library's descriptor sets.
 
 use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
@@ -12,42 +12,42 @@ use crate::bindless::layout;
 use crate::error::{Error, Result};
 use crate::shader::ShaderStage;
 
-/// What a primitive is, as geometry shaders take it and tessellation makes it.
+/// Kind of primitives that a geometry stage takes or a tessellation stage emits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Primitive {
     Points,
     Lines,
     Triangles,
-    /// With adjacent vertices, which no topology of the library has.
+    /// Primitives with adjacent vertices, for which the library has no topology.
     Adjacent,
 }
 
 /// Facts of one entry point that pipelines need.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Reflection {
-    /// Bytes that must be pushed: the end of the block's last member, rounded up to 4; 0 without a block.
+    /// Bytes of push constants: the end of the block's last member, rounded up to 4; 0 without a block.
     pub(crate) push_constant_bytes: u32,
-    /// The module uses ray queries, the device's or the library's own.
+    /// The module uses ray queries, by the device or by the library.
     pub(crate) ray_query: bool,
-    /// The module uses those of the device.
+    /// The module uses ray queries by the device.
     pub(crate) hardware_ray_query: bool,
     /// The module is for a ray tracing pipeline.
     pub(crate) ray_tracing: bool,
-    /// Payloads and hit attributes.
+    /// Sizes of payloads and hit attributes.
     pub(crate) ray_interface: RayInterface,
-    /// Invocations of a work group (compute, task, mesh), with the defaults of specialization constants; else zeros.
+    /// Workgroup size (compute, task, mesh), with the defaults of specialization constants; zeros in other stages.
     pub(crate) local_size: [u32; 3],
     /// For each axis, the specialization constant that overrides [`local_size`](Self::local_size).
     pub(crate) local_size_ids: [Option<u32>; 3],
-    /// What a geometry stage takes, or what a tessellation evaluation stage makes.
+    /// The primitives that a geometry stage takes, or that a tessellation evaluation stage emits.
     pub(crate) primitive: Option<Primitive>,
-    /// A stage before rasterisation chooses the layer it draws to.
+    /// A stage before rasterisation writes `gl_Layer`.
     pub(crate) writes_layer: bool,
     /// A fragment stage has an output of index 1, the second source of blending.
     pub(crate) second_output: bool,
-    /// Most vertices and primitives that a workgroup of a mesh stage puts out; else zeros.
+    /// Maximum vertices and primitives that a workgroup of a mesh stage emits; zeros in other stages.
     pub(crate) mesh_outputs: [u32; 2],
-    /// What the invocations of a workgroup share (compute, task, mesh).
+    /// Memory that the invocations of a workgroup share (compute, task, mesh).
     pub(crate) shared_memory: SharedMemory,
     /// Specialization constants: id and bytes (1 to 8; booleans take 4), sorted by id.
     pub(crate) specialization: Vec<(u32, u32)>,
@@ -57,15 +57,15 @@ pub(crate) struct Reflection {
     pub(crate) capabilities: Vec<u32>,
     /// Atomic operations that need a device feature.
     pub(crate) atomics: Vec<Atomic>,
-    /// Targets of the pass that a fragment stage reads, sorted by place.
+    /// Input attachments that a fragment stage reads, sorted by index.
     pub(crate) input_reads: Vec<InputRead>,
-    /// Locations that a fragment stage puts colours out at, a bit for each.
+    /// Locations of the outputs of a fragment stage, a bit for each.
     pub(crate) outputs: u32,
-    /// First locations of the inputs; those of a vertex stage are its attributes.
+    /// First locations of the inputs; in a vertex stage, its attributes.
     pub(crate) inputs: Vec<u32>,
 }
 
-/// Reads `words`, made for `stage` with the entry point `main`; never trusts them.
+/// Reads `words` for `stage` with the entry point `main`. The words may be invalid.
 pub(crate) fn reflect(name: &str, stage: ShaderStage, words: &[u32]) -> Result<Reflection> {
     reflect_words(stage, words).map_err(|log| Error::Shader { name: name.to_owned(), log })
 }
@@ -98,7 +98,7 @@ fn reflect_words(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String
     bindings.dedup();
     let hardware_ray_query = module.has_capability(Capability::RayQueryKHR);
     let ray_tracing = stage.is_ray_tracing() || module.has_capability(Capability::RayTracingKHR);
-    // Only what traces rays itself has any business with the table.
+    // Only modules that trace rays in software read the table.
     let software_ray_query = !hardware_ray_query && !ray_tracing && bindings.contains(&layout::TLAS_TABLE);
     Ok(Reflection {
         push_constant_bytes,
@@ -134,7 +134,7 @@ fn entry_point(module: &ParsedModule, stage: ShaderStage) -> Result<usize, Strin
     })
 }
 
-/// Fails unless the entry point's function is there: drivers take it for granted.
+/// Fails unless the entry point's function exists: drivers rely on it.
 fn check_function(words: &[u32], function: u32) -> Result<(), String> {
     for instruction in words::instructions(words) {
         let instruction = instruction?;
@@ -169,7 +169,7 @@ fn model_name(model: u32) -> String {
     stage.map_or_else(|| format!("execution model {model}"), |stage| stage.name().to_owned())
 }
 
-/// The `WorkgroupSize` built-in outranks both execution modes.
+/// Returns the workgroup size. The `WorkgroupSize` built-in takes precedence over both execution modes.
 fn local_size(module: &ParsedModule, function: u32) -> ([u32; 3], [Option<u32>; 3]) {
     if let Some(parts) = module.workgroup_size() {
         return parts_of(module, parts);
@@ -193,7 +193,7 @@ fn mesh_outputs(module: &ParsedModule, function: u32) -> [u32; 2] {
     })
 }
 
-/// Stages before rasterisation name their primitives by execution modes.
+/// Returns the primitives of a stage before rasterisation, which execution modes declare.
 fn primitive(module: &ParsedModule, stage: ShaderStage, function: u32) -> Option<Primitive> {
     use ExecutionMode as Mode;
     let has = |wanted: ExecutionMode| {
@@ -255,7 +255,7 @@ fn is_descriptor(variable: &Variable) -> bool {
     [UniformConstant, Uniform, StorageBuffer].iter().any(|class| *class as u32 == variable.storage)
 }
 
-/// The binding of a descriptor variable, if it is one of the library's and of its kind.
+/// Returns the binding of a descriptor variable, if it is a binding of the library and of its kind.
 fn binding(module: &ParsedModule, variable: &Variable) -> Result<u32, String> {
     let what = module.names.get(&variable.id).map_or("a resource".to_owned(), |name| format!("'{name}'"));
     let (Some(set), Some(binding)) = (
@@ -286,10 +286,10 @@ fn binding(module: &ParsedModule, variable: &Variable) -> Result<u32, String> {
     }
 }
 
-/// The one buffer descriptor, which `<lvk/hit_numbers.glsl>` declares.
+/// Set and binding of the one buffer descriptor, which `<lvk/hit_numbers.glsl>` declares.
 const TLAS_TABLE: (u32, u32) = (layout::SET, layout::TLAS_TABLE);
 
-/// The binding that takes resources of this type.
+/// Returns the binding for resources of this type.
 fn descriptor_kind(module: &ParsedModule, pointer: u32) -> Option<u32> {
     let Type::Pointer { target } = module.types.get(&pointer)? else { return None };
     let element = match module.types.get(target)? {

@@ -1,23 +1,24 @@
-//! Reads SPIR-V words. Knows lengths, not meanings, so that instructions newer than this library pass.
+//! Reads SPIR-V words. Only the lengths of instructions are checked, so that instructions newer than this library are
+//! accepted.
 
 use ::spirv::{MAGIC_NUMBER, Op};
 
 pub(crate) const HEADER_WORDS: usize = 5;
-/// SPIR-V 1.6, what Vulkan 1.3 takes.
+/// SPIR-V 1.6, the highest version that Vulkan 1.3 accepts.
 const MAX_VERSION: u32 = 0x0001_0600;
 pub(crate) const VERSION_1_4: u32 = 0x0001_0400;
 
 /// One instruction of a module.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Instruction<'a> {
-    /// None for an instruction that this library does not know.
+    /// `None` for an instruction unknown to this library.
     pub(crate) op: Option<Op>,
-    /// All words, the first included.
+    /// All words, including the first.
     pub(crate) words: &'a [u32],
 }
 
 impl<'a> Instruction<'a> {
-    /// Operand `index`, counted from the word after the opcode; zero, which is no id, where there is none.
+    /// Returns operand `index`, counted from the word after the opcode. A missing operand is zero, an invalid id.
     pub(crate) fn operand(&self, index: usize) -> u32 {
         self.operands().get(index).copied().unwrap_or(0)
     }
@@ -26,7 +27,7 @@ impl<'a> Instruction<'a> {
         self.words.get(1..).unwrap_or(&[])
     }
 
-    /// The string that starts at operand `index`, and how many words it takes.
+    /// Returns the string that starts at operand `index`, and its length in words.
     pub(crate) fn string(&self, index: usize) -> (String, usize) {
         let words = self.operands().get(index..).unwrap_or(&[]);
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
@@ -35,7 +36,7 @@ impl<'a> Instruction<'a> {
     }
 }
 
-/// Checks the header and that whole instructions and functions fill `words`.
+/// Checks the header, and that complete instructions and functions fill `words`.
 pub(crate) fn validate(words: &[u32]) -> Result<(), String> {
     match words.first() {
         Some(&MAGIC_NUMBER) => {}
@@ -61,12 +62,12 @@ pub(crate) fn validate(words: &[u32]) -> Result<(), String> {
     if in_function { Err("the SPIR-V ends inside a function".to_owned()) } else { Ok(()) }
 }
 
-/// The version word: `0x0001_0600` for 1.6.
+/// Returns the version word: `0x0001_0600` for 1.6.
 pub(crate) fn version(words: &[u32]) -> u32 {
     words.get(1).copied().unwrap_or(0)
 }
 
-/// The instructions behind the header; ends after the first error.
+/// Returns the instructions after the header. Ends after the first error.
 pub(crate) fn instructions(words: &[u32]) -> impl Iterator<Item = Result<Instruction<'_>, String>> {
     let mut rest = words.get(HEADER_WORDS..).unwrap_or(&[]);
     std::iter::from_fn(move || {

@@ -1,7 +1,7 @@
-//! Bytes that the invocations of a workgroup share, and those that a task workgroup hands to its mesh workgroups.
+//! Bytes of the shared memory of a workgroup, and of the payload from a task workgroup to its mesh workgroups.
 //!
-//! They are counted as Vulkan bounds them: variables one after the other by the rules of std430, booleans as 32 bits
-//! (`maxComputeSharedMemorySize`).
+//! They are counted by Vulkan's rules for `maxComputeSharedMemorySize`: variables one after the other in the layout of
+//! std430, booleans as 32 bits.
 
 use std::collections::HashMap;
 
@@ -10,21 +10,21 @@ use ::spirv::{Decoration, Op, StorageClass};
 use super::parsed::{MAX_NESTING, ParsedModule, Type, Variable};
 use super::words;
 
-/// Declarations of a module with such memory, whose arrays every pipeline may size by its own constants.
+/// Declarations of a module with shared memory. Specialization constants of each pipeline may size its arrays.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct SharedMemory {
-    /// The module up to its first function; empty where nothing is shared.
+    /// The module up to its first function; empty without shared memory.
     declarations: Vec<u32>,
-    /// Which of its entry points.
+    /// Index of the entry point.
     entry: usize,
 }
 
 /// Bytes of one workgroup.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct SharedBytes {
-    /// What its invocations share (`shared`).
+    /// Bytes that its invocations share (`shared`).
     pub(crate) shared: u64,
-    /// What goes from a task to its mesh workgroups (`taskPayloadSharedEXT`).
+    /// Bytes of the payload from a task to its mesh workgroups (`taskPayloadSharedEXT`).
     pub(crate) payload: u64,
 }
 
@@ -40,8 +40,8 @@ impl SharedMemory {
         Self { declarations, entry }
     }
 
-    /// With these values of specialization constants, by their ids; others have their defaults. Variables whose size cannot
-    /// be known count nothing.
+    /// Returns the bytes with these values of specialization constants, by their ids. Other constants have their
+    /// defaults. Variables of unknown size count as 0.
     pub(crate) fn bytes(&self, constants: &HashMap<u32, u32>) -> SharedBytes {
         if self.declarations.is_empty() {
             return SharedBytes::default();
@@ -61,7 +61,7 @@ fn has_storage_class(variable: &Variable, storage: StorageClass) -> bool {
     variable.storage == storage as u32
 }
 
-/// All before the first function.
+/// Returns all words before the first function.
 fn declarations(words: &[u32]) -> &[u32] {
     let before = words::instructions(words)
         .map_while(Result::ok)
@@ -70,14 +70,14 @@ fn declarations(words: &[u32]) -> &[u32] {
     words.get(..words::HEADER_WORDS + length).unwrap_or(words)
 }
 
-/// Sizes of the types of a module; each is worked out once.
+/// Sizes of the types of a module, each computed once.
 struct TypeSizes<'a> {
     module: &'a ParsedModule,
     known: HashMap<u32, Option<SizeAlign>>,
 }
 
 impl TypeSizes<'_> {
-    /// Blocks lie in one another, everything else one after the other.
+    /// Returns the bytes of all variables. Blocks overlap, other variables lie one after the other.
     fn of_all(&mut self, entry: usize, storage: StorageClass) -> u64 {
         let (mut end, mut blocks) = (0, 0);
         let module = self.module;
@@ -148,12 +148,12 @@ impl TypeSizes<'_> {
     }
 }
 
-/// The end of what lies as soon behind `end` as its alignment allows.
+/// Returns the end of an object that is placed after `end` at its alignment.
 fn place_after(end: u64, room: SizeAlign) -> u64 {
     align_size((end, room.1)).saturating_add(room.0)
 }
 
-/// The size as a multiple of the alignment.
+/// Returns the size as a multiple of the alignment.
 fn align_size((bytes, align): SizeAlign) -> u64 {
     bytes.checked_next_multiple_of(align).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,4 @@
-//! Damaged texts and words are refused.
+//! Tests that damaged texts and words are refused.
 
 use ::spirv::Op;
 use proptest::prelude::*;
@@ -27,7 +27,7 @@ fn damaged_text_is_an_error() {
     }
 }
 
-/// A module with blocks, arrays, matrices, images and a query, to be damaged.
+/// Returns a module with blocks, arrays, matrices, images and a query, as input for damage.
 fn rich() -> &'static [u32] {
     static WORDS: std::sync::LazyLock<Vec<u32>> = std::sync::LazyLock::new(|| {
         let globals = "#include <lvk/ray_query.glsl>\nstruct S { vec3 a; mat3 m[2]; };\n\
@@ -57,7 +57,7 @@ proptest! {
     #[test]
     fn random_instructions_never_panic(code in prop::collection::vec((0u32..400, prop::collection::vec(0u32..24, 0..6)), 0..80)) {
         let mut words = rich()[..5].to_vec();
-        // Entry point 'main' of a compute shader, so that reading goes on.
+        // Entry point 'main' of a compute shader, so that parsing continues.
         words.extend([6 << 16 | Op::EntryPoint as u32, 5, 1, u32::from_le_bytes(*b"main"), 0, 2]);
         for (op, operands) in code {
             words.push((operands.len() as u32 + 1) << 16 | op);

@@ -1,4 +1,4 @@
-//! Compiles real shaders and reads them back.
+//! Tests that compile shaders and reflect them.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
 mod damage;
@@ -35,7 +35,7 @@ fn facts(stage: ShaderStage, text: &str) -> Reflection {
     reflect("test", stage, &words(stage, text)).unwrap()
 }
 
-/// The log of the error; the error must be about the shader.
+/// Returns the log of the error, which must be a shader error.
 fn log<T: std::fmt::Debug>(result: Result<T>) -> String {
     match result {
         Err(Error::Shader { name, log }) => {
@@ -59,7 +59,7 @@ fn declares(words: &[u32], name: &str) -> bool {
     words::instructions(words).map(|i| i.unwrap()).any(|i| i.op == Some(Op::Name) && i.string(1).0 == name)
 }
 
-/// A whole shader of `stage` around a body; `globals` stand in front of `main`.
+/// Returns a complete shader of `stage` around a body; `globals` precede `main`.
 fn shader(stage: ShaderStage, globals: &str, body: &str) -> String {
     let layout = match stage {
         ShaderStage::Compute | ShaderStage::Task => "layout(local_size_x = 32) in;",

@@ -1,4 +1,4 @@
-//! What is read from modules, and what is done to them.
+//! Tests of reflection and of the passes over modules.
 
 use ::spirv::{Capability, Decoration, Op};
 
@@ -48,7 +48,7 @@ fn sampled_operands_are_marked_non_uniform() {
     for op in [Op::ImageSampleExplicitLod, Op::ImageFetch] {
         let image = all.iter().find(|i| i.op == Some(op)).unwrap().operand(2);
         assert!(non_uniform(image), "{op:?}");
-        // Not by a copy of what was loaded or combined: SwiftShader misses the mark there.
+        // The decoration must not be on a copy of a loaded or combined value: SwiftShader ignores it there.
         let is_maker = |i: &&words::Instruction<'_>| matches!(i.op, Some(Op::SampledImage | Op::Load));
         assert!(all.iter().filter(is_maker).any(|i| i.operand(1) == image), "{op:?}");
     }

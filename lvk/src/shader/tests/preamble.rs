@@ -1,4 +1,4 @@
-//! What the preamble gives to shaders of every stage.
+//! Tests of the preamble in every stage.
 
 use ::spirv::{Capability, Op};
 

@@ -1,9 +1,9 @@
-//! What workgroups share, in bytes.
+//! Tests of the sizes of shared memory of workgroups.
 
 use super::super::SharedBytes;
 use super::*;
 
-/// Bytes of the shared variables, of which `v` is used in some way, with these constants.
+/// Returns the bytes of the shared variables with these constants; the shader uses `v`.
 fn bytes(globals: &str, constants: &[(u32, u32)]) -> u64 {
     let text = format!(
         "layout(local_size_x = 8) in;\nlayout(constant_id = 1) const uint kN = 4;\nlayout(constant_id = 2) const bool kMany = true;\n\
@@ -94,7 +94,7 @@ fn payloads_count_on_both_sides() {
     assert_eq!(of(ShaderStage::Fragment, "void main() {}"), SharedBytes::default());
 }
 
-/// Only with an extension of the caller's own do blocks share memory.
+/// Blocks share memory only with an extension that the caller enables.
 #[test]
 fn blocks_lie_in_one_another() {
     let words = words(

@@ -1,4 +1,4 @@
-//! Texts: includes, the lines in errors, and what debuggers see.
+//! Tests of texts: includes, the lines in errors, and debug information.
 
 use ::spirv::Op;
 

@@ -1,4 +1,4 @@
-//! Binary trees by binned surface area, never deeper than the walk's stack.
+//! Builds a BVH2 by the binned surface area heuristic, with a depth below the limit of the traversal stack.
 
 use super::nodes::{Bvh, BvhNodes};
 use crate::accel::primitive_bounds::Bounds;
@@ -7,7 +7,7 @@ use crate::software_ray_query::layout::{
 };
 
 const BINS: usize = 16;
-/// From here on halves have the same number of primitives, so that at most 27 levels follow.
+/// From this depth on, halves have equal primitive counts, so that at most 27 levels follow.
 const MEDIAN_SPLIT_DEPTH: usize = MAX_BVH2_DEPTH - 28;
 
 /// A range of the order that becomes a node or a leaf.
@@ -25,7 +25,7 @@ struct Builder<'a> {
     leaf_size: usize,
 }
 
-/// A tree whose leaves hold at most `leaf_size` primitives.
+/// Builds a BVH2 whose leaves have at most `leaf_size` primitives.
 pub(crate) fn build_bvh2(bounds: &[Bounds], leaf_size: usize) -> Bvh {
     let leaf_size = leaf_size.clamp(1, MAX_LEAF_PRIMITIVES);
     let mut builder =
@@ -45,7 +45,7 @@ impl Builder<'_> {
         root
     }
 
-    /// The reference to a range: a leaf, or a node that is filled later.
+    /// Returns the reference to a range: a leaf, or a node that is filled later.
     fn push_range(&mut self, work: PendingRange, open: &mut Vec<(usize, PendingRange)>) -> u32 {
         match work.end - work.first {
             0 => NONE,
@@ -81,7 +81,7 @@ impl Builder<'_> {
         self.order[first..end].iter().map(of).fold(Bounds::EMPTY, Bounds::union)
     }
 
-    /// Orders a range so that it falls into two at the place that is answered.
+    /// Partitions a range in two and returns the index of the second part.
     fn split_range(&mut self, work: PendingRange) -> usize {
         let PendingRange { first, end, depth } = work;
         let centers = self.order[first..end].iter().map(|number| center(&self.bounds[*number as usize]));
@@ -106,7 +106,7 @@ impl Builder<'_> {
         middle
     }
 
-    /// The axis and the first bin of the second half that make the cheapest children.
+    /// Returns the axis and the first bin of the second half for the cheapest children.
     fn best_bin(&self, work: PendingRange, spread: &Bounds) -> Option<(usize, usize)> {
         let mut best = None;
         let mut least = f32::INFINITY;
@@ -130,7 +130,7 @@ impl Builder<'_> {
     }
 }
 
-/// The cost of a split in front of each bin but the first.
+/// Returns the cost of a split before each bin except the first.
 fn costs(bins: &[(Bounds, usize); BINS]) -> [(usize, f32); BINS - 1] {
     let mut after = [0.0; BINS];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
@@ -154,7 +154,7 @@ fn bin_of(bounds: &Bounds, spread: &Bounds, axis: usize) -> usize {
     ((share * BINS as f32) as usize).min(BINS - 1)
 }
 
-/// Moves those that are `first` to the front; answers how many.
+/// Moves the primitives that satisfy `first` to the front. Returns their number.
 fn partition_primitives(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
     let mut count = 0;
     for index in 0..numbers.len() {
@@ -166,8 +166,8 @@ fn partition_primitives(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> us
     count
 }
 
-/// Whether every path from the first node ends in primitives that exist, none is too long, no two meet, and all nodes are
-/// on one. Nodes stand in any order.
+/// True if the nodes are a tree: every path from the first node ends in primitives that exist, no path is too long, no
+/// two paths meet, and all nodes are on a path. Nodes may have any order.
 pub(crate) fn is_valid_bvh2(nodes: &[Bvh2NodeRecord], primitives: usize) -> bool {
     let mut seen = vec![false; nodes.len()];
     let mut open = vec![(0_u32, 1_usize)];
@@ -187,7 +187,7 @@ pub(crate) fn is_valid_bvh2(nodes: &[Bvh2NodeRecord], primitives: usize) -> bool
     seen.into_iter().all(|seen| seen)
 }
 
-/// Whether a reference to a leaf names primitives that exist.
+/// True if a leaf reference refers to primitives that exist.
 pub(crate) fn is_valid_leaf(reference: u32, primitives: usize) -> bool {
     let (first, count) = (reference & 0x07ff_ffff, (reference >> 27 & 15) + 1);
     reference & LEAF != 0 && first as usize + count as usize <= primitives

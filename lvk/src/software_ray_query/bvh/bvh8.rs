@@ -1,4 +1,5 @@
-//! Wide trees: [`ploc`] with reinsertion, collapsed to eight compressed children, the latter two by the crate `obvhs`.
+//! Builds a BVH8: [`ploc`] with reinsertion, collapsed to eight compressed children. The crate `obvhs` implements the
+//! latter two steps.
 
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
@@ -11,33 +12,34 @@ use super::ploc;
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::{Bvh2NodeRecord, MAX_BVH8_DEPTH};
 
-/// Most primitives of a leaf: they are counted in three bits, one by one.
+/// Maximum primitives of a leaf. The node stores the count as unary in three bits.
 const LARGEST_LEAF: u32 = 3;
-/// The share of nodes that is moved to better places: on an NVIDIA H200 rays are up to 7 % faster than by half of it, for
-/// a quarter more time.
+/// Share of nodes that reinsertion moves. On an NVIDIA H200, it makes rays up to 7 % faster than half of it, for a
+/// quarter more build time.
 const REINSERTION_SHARE: f32 = 0.1;
-/// Levels of a binary tree that a node of eight children takes the place of, at most.
+/// Maximum levels of a binary tree that one node of eight children replaces.
 const LEVELS: usize = 7;
-/// Most looks at nodes, for each node of the tree, to find better places.
+/// Maximum node visits of the reinsertion search, for each node of the tree.
 const REINSERTION_SEARCH_COST: f32 = 100.0;
 
-/// A wide tree of primitives, at least two; `None` where it would be too deep, or larger than one of two children.
+/// Builds a BVH8 of at least two primitives. Returns `None` if it would be too deep, or larger than a BVH2.
 pub(crate) fn build_bvh8(bounds: &[Bounds]) -> Option<Bvh> {
     let mut binary = ploc::build_ploc(bounds);
     let moved = reinsertion_share(&binary);
     ReinsertionOptimizer::default().run(&mut binary, moved, None);
-    // What collapses it calls itself for each level, and boxes within each other may have thousands.
+    // The collapse recurses for each level, and nested bounds may have thousands of levels.
     binary.nodes = in_traversal_order(&binary, MAX_BVH8_DEPTH * LEVELS)?;
     let mut wide = bvh2_to_cwbvh(&binary, LARGEST_LEAF, true, false);
     wide.nodes.iter_mut().for_each(widen_thin_node);
-    // Boxes without area cost nothing, so that nothing is gained by nodes of more than two children.
+    // Bounds without area cost nothing, so that nodes of more than two children gain nothing.
     let is_small = size_of_val(&wide.nodes[..]) <= (bounds.len() - 1) * size_of::<Bvh2NodeRecord>();
     let is_fit = is_small && max_depth(&wide.nodes) <= MAX_BVH8_DEPTH;
     is_fit.then_some(Bvh { nodes: BvhNodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
 }
 
-/// Makes steps larger where a node is much thinner than it is wide, so that rays which run along it and touch it take longer to
-/// leave the outermost step than to get there. Kernels have it in `build/encode.glsl`.
+/// Enlarges the steps along an axis on which a node is much thinner than on others. Rays that run along the node and
+/// touch it then take longer to leave the outermost step than to reach it. Kernels do the same in
+/// `kernels/encode.glsl`.
 fn widen_thin_node(node: &mut CwBvhNode) {
     const THIN: u8 = 20;
     const OF_POINT: u8 = 87;
@@ -57,8 +59,10 @@ fn widen_thin_node(node: &mut CwBvhNode) {
     }
 }
 
-/// The nodes of a binary tree, children behind their parent and what is below the first before what is below the second: what
-/// collapses the tree goes that way, and reads memory in order. `None` where a path has more than `most`.
+/// Sorts the nodes of a binary tree in depth-first order, children after their parent. Returns `None` if a path has
+/// more than `most` nodes.
+///
+/// The collapse traverses the tree in this order, and then reads memory sequentially.
 fn in_traversal_order(binary: &Bvh2, most: usize) -> Option<Vec<Bvh2Node>> {
     let mut nodes: Vec<Bvh2Node> = Vec::with_capacity(binary.nodes.len());
     nodes.push(binary.nodes[0]);
@@ -78,8 +82,9 @@ fn in_traversal_order(binary: &Bvh2, most: usize) -> Option<Vec<Bvh2Node>> {
     Some(nodes)
 }
 
-/// The share of nodes to move. A place is searched for among the nodes that one overlaps: about as many as a ray meets, which
-/// their areas tell. Where boxes lie in one another, that is most of the tree, and fewer nodes are moved.
+/// Returns the share of nodes to move. The search for a position visits the nodes that a node overlaps. Their number is
+/// about that of a ray, which follows from the areas. Nested bounds overlap most of the tree, and fewer nodes are
+/// moved.
 fn reinsertion_share(binary: &Bvh2) -> f32 {
     let area = |node: &Bvh2Node| f64::from(node.aabb().half_area());
     let whole = binary.nodes.first().map_or(0.0, area);
@@ -87,7 +92,7 @@ fn reinsertion_share(binary: &Bvh2) -> f32 {
     REINSERTION_SHARE.min(REINSERTION_SEARCH_COST / met as f32)
 }
 
-/// Nodes on the longest path. Children stand behind their parents.
+/// Returns the number of nodes on the longest path. Children must follow their parents.
 fn max_depth(nodes: &[CwBvhNode]) -> usize {
     let mut depths = vec![1_u32; nodes.len()];
     for index in 0..nodes.len() {
@@ -101,12 +106,12 @@ fn max_depth(nodes: &[CwBvhNode]) -> usize {
     depths.into_iter().max().unwrap_or(0) as usize
 }
 
-/// The numbers of a node's inner children.
+/// Returns the indices of a node's inner children.
 pub(crate) fn children(node: &CwBvhNode) -> std::ops::Range<u32> {
     node.child_base_idx..node.child_base_idx.saturating_add(node.imask.count_ones())
 }
 
-/// Whether all children and primitives exist, children behind their parents and each below but one, and no path is too
+/// True if all children and primitives exist, children follow their parents, each has one parent, and no path is too
 /// long.
 pub(crate) fn is_valid_bvh8(nodes: &[CwBvhNode], primitives: usize) -> bool {
     let is_node_valid = |(index, node): (usize, &CwBvhNode)| {
@@ -122,7 +127,7 @@ pub(crate) fn is_valid_bvh8(nodes: &[CwBvhNode], primitives: usize) -> bool {
         && max_depth(nodes) <= MAX_BVH8_DEPTH
 }
 
-/// Whether each node but the first is the child of exactly one: paths that meet would be walked over and over.
+/// True if each node except the first has exactly one parent. Otherwise paths meet, and are traversed repeatedly.
 fn each_has_one_parent(nodes: &[CwBvhNode]) -> bool {
     let mut parents = vec![0_u32; nodes.len()];
     for child in nodes.iter().flat_map(children) {
@@ -141,7 +146,7 @@ fn is_valid_leaf(node: &CwBvhNode, child: usize, primitives: usize) -> bool {
     }
     let count = (meta >> 5).count_ones();
     let end = u64::from(node.primitive_base_idx) + u64::from(meta & 0x1f) + u64::from(count);
-    // One with a place but no primitives would stand for others.
+    // An entry with an offset but without primitives would alias another one.
     let unary = matches!(meta >> 5, 1 | 3 | 7);
     meta == 0 || (unary && u32::from(meta & 0x1f) + count <= 24 && end <= primitives as u64)
 }
@@ -172,7 +177,7 @@ mod tests {
         assert_eq!(share(sizes().map(|_| [7.0, 7.0])), REINSERTION_SHARE, "points");
     }
 
-    /// Each box is a little larger than the one before, from hair to continent.
+    /// Each AABB is slightly larger than the one before, from a hair to a continent.
     #[test]
     fn boxes_within_each_other_need_no_deep_stack() {
         let grown = |number: i32| Vec3::splat(1e-12 * 1.003_f32.powi(number));

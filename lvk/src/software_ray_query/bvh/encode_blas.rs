@@ -1,4 +1,4 @@
-//! The bytes of a bottom-level structure.
+//! Encodes a BLAS to bytes.
 
 use glam::Vec3;
 
@@ -14,23 +14,23 @@ use crate::software_ray_query::layout::{
     LeafTriangle,
 };
 
-/// A structure, ready to be copied to the GPU.
+/// The bytes of a BLAS, ready for upload.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct BlasBlob {
     pub(crate) bytes: Vec<u8>,
-    /// Of all primitives.
+    /// Bounds of all primitives.
     pub(crate) bounds: Bounds,
 }
 
 impl BlasBlob {
-    /// Its header.
+    /// Returns the header.
     pub(crate) fn header(&self) -> BlobHeader {
         let bytes = self.bytes.get(..size_of::<BlobHeader>());
         bytes.map_or_else(bytemuck::Zeroable::zeroed, bytemuck::pod_read_unaligned)
     }
 }
 
-/// The leaves of a structure: primitives in the order of the mesh, or, in the order of the tree, what names vertices.
+/// The leaves of a BLAS: complete primitives in the order of the mesh, or vertex indices in the order of the tree.
 enum EncodedLeaves<'a> {
     Boxes(&'a [LeafBox]),
     Triangles(&'a [LeafTriangle]),
@@ -57,7 +57,9 @@ impl EncodedLeaves<'_> {
         }
     }
 
-    /// Appends them in the order of the tree, which those that name vertices have already; answers their place in blocks.
+    /// Appends the leaves in the order of the tree. Returns their offset in blocks.
+    ///
+    /// Leaves with vertex indices already have this order.
     fn append(&self, bytes: &mut Vec<u8>, order: &[u32]) -> u32 {
         match self {
             Self::Boxes(leaves) => append_in_order(bytes, leaves, order),
@@ -68,20 +70,20 @@ impl EncodedLeaves<'_> {
     }
 }
 
-/// Leaves, and the vertices that they name.
+/// Leaves, and the vertices that their indices refer to.
 struct LeavesAndVertices<'a> {
     leaves: EncodedLeaves<'a>,
     vertices: Vec<Vec3>,
 }
 
 impl LeavesAndVertices<'_> {
-    /// Bytes of all parts.
+    /// Returns the bytes of all parts.
     fn size(&self) -> usize {
         self.leaves.size() + size_of_val(&self.vertices[..])
     }
 }
 
-/// Builds a tree over the mesh and packs it.
+/// Builds a tree over the mesh and encodes it.
 pub(crate) fn encode_blas(mesh: &Mesh, quality: BvhSettings) -> BlasBlob {
     let bounds = mesh.bounds();
     let tree = Bvh::build(&bounds);
@@ -120,7 +122,7 @@ pub(crate) fn encode_bvh(mesh: &Mesh, tree: &Bvh, quality: BvhSettings, bounds: 
     bytes
 }
 
-/// Appends a part; answers its place in blocks.
+/// Appends a part. Returns its offset in blocks.
 fn append(bytes: &mut Vec<u8>, part: &[u8]) -> u32 {
     let place = bytes.len() / BLOCK_BYTES;
     bytes.extend_from_slice(part);
@@ -128,7 +130,7 @@ fn append(bytes: &mut Vec<u8>, part: &[u8]) -> u32 {
     place as u32
 }
 
-/// Appends primitives, which are whole blocks, in the order of a tree; answers their place in blocks.
+/// Appends primitives in the order of a tree. Returns their offset in blocks. A primitive must be whole blocks.
 fn append_in_order<T: bytemuck::NoUninit>(bytes: &mut Vec<u8>, primitives: &[T], order: &[u32]) -> u32 {
     const { assert!(size_of::<T>().is_multiple_of(BLOCK_BYTES)) };
     let place = bytes.len() / BLOCK_BYTES;
@@ -154,7 +156,7 @@ fn encode_leaves<'a>(mesh: &'a Mesh, order: &[u32], quality: BvhSettings) -> Lea
     }
 }
 
-/// Leaves that name vertices, as small as their numbers allow.
+/// Encodes leaves with vertex indices, in the smallest format that fits.
 fn encode_indexed_leaves(IndexedMesh { triangles, vertices }: IndexedMesh) -> LeavesAndVertices<'static> {
     let list = if LeafKind::with_vertex_indices(vertices.len()) == LeafKind::PackedTriangles {
         EncodedLeaves::Packed(triangles.iter().map(LeafPacked::encode).collect())
@@ -180,7 +182,7 @@ mod tests {
     const SMALL: BvhSettings = BvhSettings { low_memory: true, refit: false };
     const SMALL_MOVING: BvhSettings = BvhSettings { low_memory: true, refit: true };
 
-    /// Cells of two triangles each that share their vertices, which have so many numbers for each position.
+    /// A grid of cells of two triangles with shared vertices. Each position has `numbers` vertices.
     fn grid(side: u32, numbers: u32) -> Mesh {
         let corner = |x: u32, y: u32, cell: u32| (y * (side + 1) + x) * numbers + cell % numbers;
         let cell = |cell: u32| {
@@ -206,7 +208,7 @@ mod tests {
         (blob.header().leaf_kind, blob.bytes.len() as f64 / f64::from(blob.header().primitive_count))
     }
 
-    /// Nodes take about 8 bytes of that, the leaf 12, and vertices, of which there are half as many, 6.
+    /// Of these, nodes take about 8 bytes, the leaf 12, and the vertices, half as many as triangles, 6.
     #[test]
     fn a_triangle_takes_less_than_28_bytes_with_low_memory() {
         let shared = grid(80, 1);
@@ -215,7 +217,7 @@ mod tests {
         assert_eq!(bytes_each(&Mesh { vertices: Vec::new(), ..shared }, SMALL), (kind, bytes), "without");
     }
 
-    /// Where a position has a number for each of its cells, only what never moves shares it.
+    /// If a position has a vertex for each of its cells, only leaves that never move share it.
     #[test]
     fn leaves_name_vertices_where_copies_take_more() {
         let apart = grid(30, 900);
@@ -229,7 +231,7 @@ mod tests {
         assert!(kind == LeafKind::PackedTriangles as u32 && shared < with_updates, "one for both");
     }
 
-    /// The leaves of one triangle that names the last of so many vertices.
+    /// The leaf of one triangle that refers to the last of `count` vertices.
     fn last_of(count: usize) -> (LeafIndexed, LeavesAndVertices<'static>) {
         let vertices = [0, 1, count as u32 - 1];
         let triangle = LeafIndexed { vertices, primitive: 7 };

@@ -1,4 +1,4 @@
-//! Instances as the walk reads them.
+//! Encodes instances for traversal.
 
 use std::sync::Arc;
 
@@ -9,23 +9,23 @@ use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::InstanceRecord;
 use crate::software_ray_query::rebraid_parts::RebraidParts;
 
-/// What an instance shows.
+/// The BLAS of an instance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct InstancedBlas {
     pub(crate) address: u64,
     pub(crate) parts: Arc<RebraidParts>,
 }
 
-/// An instance or a part of one, and its box in the world.
+/// An instance or a part of one, and its bounds in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlacedInstance {
     pub(crate) instance: InstanceRecord,
     pub(crate) bounds: Bounds,
-    /// Of what the instance shows.
+    /// Parts of the instance's BLAS.
     pub(crate) parts: Arc<RebraidParts>,
 }
 
-/// The instance with this number in the caller's list; `None` where no ray can meet it.
+/// Returns the instance with index `number` in the caller's list; `None` if no ray can hit it.
 pub(crate) fn place_instance(
     number: u32,
     instance: &TlasInstance,
@@ -53,8 +53,8 @@ pub(crate) fn place_instance(
     Some(PlacedInstance { instance: record, bounds, parts: Arc::clone(&shown.parts) })
 }
 
-/// Whether the determinant is nothing but what rounding of the matrix, and of the products that the kernel in
-/// `build/instance.glsl` makes of it, may leave.
+/// True if the determinant is no more than the rounding error of the matrix and of the products in the kernel
+/// `kernels/instance.glsl`.
 fn is_singular(matrix: &DMat3) -> bool {
     const SINGULAR_EPSILON: f64 = 4.0 * f32::EPSILON as f64;
     let DMat3 { x_axis: x, y_axis: y, z_axis: z } = *matrix;
@@ -62,7 +62,7 @@ fn is_singular(matrix: &DMat3) -> bool {
     matrix.determinant().abs() <= products * SINGULAR_EPSILON
 }
 
-/// Around a box of the object as rows of a matrix move it, as [`place_instance`] does it for the whole.
+/// Returns the bounds of transformed bounds, with a matrix in rows. [`place_instance`] does the same for a whole BLAS.
 pub(crate) fn transform_bounds_rows(object_to_world: &[f32; 12], bounds: Bounds) -> Bounds {
     transform_bounds(&matrix_from_rows(object_to_world), bounds)
 }
@@ -80,7 +80,7 @@ fn rows_from_matrix(matrix: &DAffine3) -> [f32; 12] {
     [x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], z[0], z[1], z[2], z[3]]
 }
 
-/// Around the box as the matrix moves it, with room for what rounding does to the rays.
+/// Returns the bounds of transformed bounds, with a margin for the rounding of rays.
 fn transform_bounds(matrix: &DAffine3, bounds: Bounds) -> Bounds {
     const ROUNDING: f64 = 1.0 / (1 << 20) as f64;
     let (low, high) = (bounds.low.as_dvec3(), bounds.high.as_dvec3());

@@ -1,4 +1,4 @@
-//! The bytes of a top-level structure that the CPU builds. They fit wherever a build on the GPU of as many records would.
+//! Encodes a TLAS that the CPU builds. Its size is at most that of a build on the GPU with as many records.
 
 use super::bvh2;
 use super::encode_instances::PlacedInstance;
@@ -10,7 +10,7 @@ use crate::software_ray_query::layout::{
     BLOCK_BYTES, BlobHeader, Bvh2NodeRecord, FORMAT_BVH2, InstanceRecord, NONE,
 };
 
-/// Builds a tree over the instances, or parts of them where there is room for so many records, and packs it.
+/// Builds a tree over the instances and encodes it. Overlapping instances are split into parts, up to `room` records.
 pub(crate) fn encode_tlas(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
     if instances.is_empty() {
         let nothing = BlobHeader {

@@ -1,4 +1,4 @@
-//! Triangles that name vertices instead of holding them, for structures that take little memory.
+//! Triangles with vertex indices instead of positions, for BLASes that use little memory.
 
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
@@ -9,19 +9,20 @@ use super::primitives::Mesh;
 use crate::barrier::IdHasher;
 use crate::software_ray_query::layout::{LeafIndexed, LeafTriangle};
 
-/// Triangles and the vertices they name.
+/// Triangles and the vertices that their indices refer to.
 pub(crate) struct IndexedMesh {
     pub(crate) triangles: Vec<LeafIndexed>,
     pub(crate) vertices: Vec<Vec3>,
 }
 
-/// Most geometries whose numbers fit beside those of primitives.
+/// Maximum geometries whose index fits beside that of a primitive.
 const MAX_GEOMETRIES: usize = 1 << 8;
-/// Most primitives of a geometry beside its number.
+/// Maximum primitives of a geometry whose index fits beside that of the geometry.
 const MAX_PRIMITIVES: u32 = 1 << 24;
 
-/// The triangles in this order; `None` where their numbers do not fit. Each position is there once, or each vertex if the mesh
-/// says which are named, and none that is not.
+/// Returns the triangles in this order; `None` if their indices do not fit.
+///
+/// Each used position is stored once. If the mesh has vertex indices, each used vertex is stored once.
 pub(crate) fn index_mesh(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32]) -> Option<IndexedMesh> {
     let several = mesh.flags.len() > 1;
     if several
@@ -60,7 +61,7 @@ mod tests {
     use crate::accel::geometry::GeometryFlags;
     use crate::software_ray_query::bvh::primitives::MeshPrimitives;
 
-    /// Triangles of two geometries in turn, each with vertices of its own, some of them in one place.
+    /// Triangles of two geometries in turn, each with vertices of its own, some of them at the same position.
     fn mesh(named: &[[u8; 3]]) -> Mesh {
         let position = |vertex: u8| Vec3::new(f32::from(vertex / 2), f32::from(vertex % 3), 0.5);
         let triangle = |(number, named): (u32, &[u8; 3])| {

@@ -1,4 +1,4 @@
-//! A tree over the primitives of a mesh, in the form that suits it.
+//! Chooses the node format of a tree over the primitives of a mesh.
 
 use super::bvh2;
 use super::bvh8;
@@ -7,7 +7,7 @@ use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::{NONE, leaf};
 
 impl Bvh {
-    /// The tree of a bottom-level structure: wide, but for meshes that wide nodes do not suit.
+    /// Builds the tree of a BLAS: wide, except for meshes that wide nodes do not suit.
     pub(crate) fn build(bounds: &[Bounds]) -> Self {
         const ONE_LEAF: usize = 3;
         match bounds.len() {

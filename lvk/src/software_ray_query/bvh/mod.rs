@@ -1,7 +1,7 @@
-//! Trees for devices without ray tracing: how the CPU builds them and keeps them on disk, which kernels build them on
-//! the GPU, and whether a tree from a file is sound. What they are made for is in [`crate::software_ray_query`].
+//! BVHs for devices without ray tracing: builders on the CPU, and the encoding of BLASes and TLASes. See
+//! [`crate::software_ray_query`] for their use.
 //!
-//! Shaders walk them with `software_ray_query/glsl/software_*.glsl`.
+//! Shaders traverse them with `software_ray_query/glsl/software_*.glsl`.
 
 pub(crate) mod bvh2;
 pub(crate) mod bvh8;

@@ -1,8 +1,9 @@
-//! Binary trees by parallel locally ordered clustering (Meister and Bittner, 2018), in O(n log n) for all boxes.
+//! Binary trees by parallel locally ordered clustering (Meister and Bittner, 2018), in O(n log n) for any bounds.
 //!
-//! Boxes stand along a Morton curve. In each round every one looks for the neighbour with which its union has the least
-//! area, and those that find each other become one. Where each looks at the next, as among boxes that lie in one another,
-//! a round would make one pair; such a round pairs by place instead, so that every round leaves a share of boxes less.
+//! Nodes are sorted along a Morton curve. In each round, every node searches the neighbour whose union with it has the
+//! least area, and two nodes that choose each other become one. If each node chooses its successor, as nested bounds
+//! do, a round would merge one pair only. Such a round also pairs by position, so that every round removes a share of
+//! the nodes.
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -14,21 +15,21 @@ use super::thread_budget::ThreadBudget;
 use crate::accel::primitive_bounds::Bounds;
 use crate::parallel::parallel_for;
 
-/// Rounds that look at the next neighbours only: most of what is small is paired by them.
+/// Rounds that search the direct neighbours only; they pair most small nodes.
 const SHORT_SEARCH_ROUNDS: usize = 2;
-/// How far later rounds look to either side.
+/// Search radius of later rounds to either side.
 const LONG_SEARCH_RADIUS: usize = 14;
-/// A round that pairs less than one in so many pairs those that stand beside each other too.
+/// If a round pairs less than one in this many nodes, it also pairs direct neighbours.
 const MIN_PAIRED_FRACTION: usize = 32;
-/// The last so many are left to the rule.
+/// With at most this many nodes, rounds pair mutual choices only.
 const FINAL_NODE_COUNT: usize = 32;
 
-/// A tree of boxes, at least one, with one in each leaf.
+/// Builds a tree of at least one AABB, with one AABB in each leaf.
 pub(crate) fn build_ploc(boxes: &[Bounds]) -> Bvh2 {
     cluster_counting_searches(boxes).0
 }
 
-/// The tree, and how many boxes looked for a neighbour over all rounds: at most [`MIN_PAIRED_FRACTION`] for each.
+/// Returns the tree, and the number of searches over all rounds: at most [`MIN_PAIRED_FRACTION`] for each AABB.
 fn cluster_counting_searches(boxes: &[Bounds]) -> (Bvh2, usize) {
     let mut tree = Bvh2::zeroed(boxes.len());
     tree.primitive_indices = (0..boxes.len() as u32).collect();
@@ -62,7 +63,7 @@ fn aabb(bounds: &Bounds) -> Aabb {
     Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) }
 }
 
-/// The leaves along a Morton curve through their centers.
+/// Returns the leaves along a Morton curve through their centers.
 fn morton_sorted_leaves(build: &ThreadBudget, boxes: &[Bounds]) -> Vec<Bvh2Node> {
     let whole = aabb(&boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union));
     let scale = 1.0 / whole.diagonal().as_dvec3().max(DVec3::splat(f64::MIN_POSITIVE));
@@ -77,16 +78,17 @@ fn morton_sorted_leaves(build: &ThreadBudget, boxes: &[Bounds]) -> Vec<Bvh2Node>
         }
         codes.sort_unstable();
     });
-    // Finds the sorted chunks and merges them.
+    // The stable sort detects the sorted chunks and merges them.
     codes.sort();
     codes.iter().map(|(_, number)| Bvh2Node::new(aabb(&boxes[*number as usize]), 1, *number)).collect()
 }
 
-/// For each node which other, at most `reach` places away, makes the smallest box with it. Of equals the one beside it with
-/// which it makes an even and an odd place, so that boxes that are alike find each other.
+/// Finds for each node the node within `reach` positions whose union with it has the least area.
+///
+/// Of equals, a node prefers the one at the position with the last bit flipped, so that equal nodes choose each other.
 fn find_partners(build: &ThreadBudget, nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
     let threads = build.thread_count(nodes.len());
-    // More pieces than threads, as some take longer.
+    // More chunks than threads, because some take longer.
     let pieces = if threads == 1 { 1 } else { threads * 4 };
     let length = nodes.len().div_ceil(pieces);
     parallel_for(threads, partners.chunks_mut(length).enumerate(), |(chunk, partners)| {
@@ -94,7 +96,7 @@ fn find_partners(build: &ThreadBudget, nodes: &[Bvh2Node], reach: usize, partner
     });
 }
 
-/// Of the nodes from `first` on.
+/// Finds the partners of the nodes from `first` on.
 fn find_partners_from(nodes: &[Bvh2Node], reach: usize, first: usize, partners: &mut [u32]) {
     let end = first + partners.len();
     let mut least = vec![f32::INFINITY; partners.len()];
@@ -132,7 +134,7 @@ fn merged_half_area(one: &Bvh2Node, other: &Bvh2Node) -> f32 {
     one.aabb().union(other.aabb()).half_area()
 }
 
-/// Pairs those side by side that nobody took, where too few found each other: each looks at one that looks at the next.
+/// Pairs unpaired direct neighbours if too few nodes chose each other. This happens if each node chooses its successor.
 fn pair_neighbours(partners: &mut [u32]) {
     let found = |partners: &[u32], place: usize| partners[partners[place] as usize] as usize == place;
     let count = partners.len();
@@ -148,7 +150,7 @@ fn pair_neighbours(partners: &mut [u32]) {
     }
 }
 
-/// Makes one node of each pair; its children go to the end of `free`.
+/// Merges each pair to one node. The two children are written to the end of `free`.
 fn merge_pairs(nodes: &[Bvh2Node], partners: &[u32], free: &mut [Bvh2Node], next: &mut Vec<Bvh2Node>) {
     next.clear();
     let mut end = free.len();
@@ -178,7 +180,7 @@ mod tests {
         Bounds { low: low.into(), high: (low + size).into() }
     }
 
-    /// A number below 1 for each other number.
+    /// Returns a pseudo-random number below 1 for each `number`.
     fn paired_share(number: usize) -> f32 {
         (number as u32).wrapping_mul(0x9e37_79b9) as f32 / u32::MAX as f32
     }
@@ -188,7 +190,7 @@ mod tests {
             * 100.0
     }
 
-    /// Boxes in which each may look at the next, `kinds` times side by side.
+    /// Bounds for which each node may choose its successor, `kinds` times side by side.
     fn worst(kinds: usize) -> [(&'static str, Vec<Bounds>); 6] {
         let each = COUNT / kinds;
         let make = |of: &dyn Fn(usize, f32) -> Bounds| {
@@ -222,7 +224,7 @@ mod tests {
         ]
     }
 
-    /// Fails unless each box is in one leaf and in every box above it.
+    /// Fails unless each AABB is in one leaf and inside all bounds above it.
     fn check(boxes: &[Bounds], tree: &Bvh2) {
         let (mut open, mut found) = (vec![(0, 1)], vec![false; boxes.len()]);
         while let Some((number, depth)) = open.pop() {

@@ -1,4 +1,4 @@
-//! The primitives of a mesh, as leaves hold them: without those that no ray can hit.
+//! The primitives of a mesh as leaves store them, without those that no ray can hit.
 
 use glam::Vec3;
 
@@ -7,7 +7,8 @@ use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::{Bounds, GeometryBytes};
 use crate::software_ray_query::layout::{LeafBox, LeafTriangle};
 
-/// Bounds end here: the sums of areas that a build compares still are numbers. Kernels have it in `build/box.glsl`.
+/// Maximum coordinate of bounds. Sums of areas that a build compares stay finite with it. Kernels have it in
+/// `kernels/box.glsl`.
 pub(crate) const MAX_COORDINATE: f32 = 1e15;
 
 /// The primitives of all geometries.
@@ -17,18 +18,18 @@ pub(crate) enum MeshPrimitives {
     Boxes(Vec<LeafBox>),
 }
 
-/// The mesh of a bottom-level structure.
+/// The mesh of a BLAS.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Mesh {
     pub(crate) primitives: MeshPrimitives,
-    /// Of each triangle the vertices of its geometry, where leaves share them as they are given; else none.
+    /// Vertex indices of each triangle in its geometry, if leaves share vertices as given; else empty.
     pub(crate) vertices: Vec<[u32; 3]>,
-    /// Of each geometry.
+    /// Flags of each geometry.
     pub(crate) flags: Vec<GeometryFlags>,
 }
 
 impl Mesh {
-    /// Takes the primitives out of the geometries, which are all of one kind, for a tree of this quality.
+    /// Reads the primitives of the geometries, which are all of one kind, for a tree with these settings.
     pub(crate) fn new(geometries: &[(GeometryBytes<'_>, GeometryFlags)], quality: BvhSettings) -> Self {
         let flags = geometries.iter().map(|(_, flags)| *flags).collect();
         let boxes = matches!(geometries.first(), Some((GeometryBytes::Boxes(_), _)));
@@ -47,7 +48,7 @@ impl Mesh {
         mesh
     }
 
-    /// The boxes of the primitives.
+    /// Returns the bounds of the primitives.
     pub(crate) fn bounds(&self) -> Vec<Bounds> {
         match &self.primitives {
             MeshPrimitives::Triangles(all) => all
@@ -75,7 +76,7 @@ impl Mesh {
                 let leaf = |number| leaf_aabb(boxes.bounds(number)?, number, geometry, opaque);
                 all.extend((0..boxes.count).filter_map(leaf));
             }
-            // The kinds were checked to be the same.
+            // The caller has checked that all kinds are equal.
             _ => {}
         }
     }
@@ -96,7 +97,7 @@ fn leaf_aabb(bounds: Bounds, primitive: u32, geometry: u32, opaque: bool) -> Opt
     Some(LeafBox { low, primitive, high, geometry })
 }
 
-/// Boxes may reach to infinity; the walk wants numbers.
+/// Clamps AABBs, which may be infinite: traversal needs finite numbers.
 fn clamp_to_max(corner: Vec3) -> Vec3 {
     corner.clamp(Vec3::splat(-MAX_COORDINATE), Vec3::splat(MAX_COORDINATE))
 }
@@ -107,10 +108,10 @@ mod tests {
     use crate::accel::primitive_bounds::{IndexBytes, TriangleBytes, VertexBytes};
     use crate::format::VertexFormat;
 
-    /// Vertices of which the fourth is none.
+    /// Vertices. The fourth has no valid position.
     const POSITIONS: [[f32; 3]; 5] =
         [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f32::NAN; 3], [1.0, 1.0, 0.0]];
-    /// Triangles of which one names that, and one a vertex that is not there.
+    /// Triangles. One refers to that vertex, and one to a vertex that does not exist.
     const TRIANGLES: [[u16; 3]; 4] = [[0, 1, 2], [1, 3, 2], [1, 5, 2], [1, 4, 2]];
 
     fn numbers(mesh: &Mesh) -> Vec<(u32, u32)> {

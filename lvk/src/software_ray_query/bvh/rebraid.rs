@@ -1,5 +1,5 @@
-//! Instances that overlap, shown in parts (Benthin, Woop, Wald and Afra, "Improved Two-Level BVHs Using Partial
-//! Re-Braiding", 2017): a ray enters a part that it meets in place of every instance whose box it meets.
+//! Re-braiding: splits overlapping instances into parts (Benthin, Woop, Wald and Afra, "Improved Two-Level BVHs Using
+//! Partial Re-Braiding", 2017). A ray then enters only the parts that it hits, not every instance whose bounds it hits.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,18 +8,18 @@ use super::encode_instances::{PlacedInstance, transform_bounds_rows};
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::rebraid_parts::RebraidPart;
 
-/// More instances are shown whole: to look at them in pairs would take too long.
+/// Maximum instances for re-braiding: the pairwise overlap test would take too long for more.
 const MAX_INSTANCES: u32 = 512;
-/// Records that may always come to those of the instances, so that a few can be taken apart.
+/// Minimum extra records, so that a few instances can be split.
 const MIN_EXTRA_RECORDS: u32 = 16;
 
-/// Records that so many instances may make, and a structure with room for them has room for.
+/// Returns the maximum records of `instances` instances after re-braiding, and the capacity of their TLAS.
 pub(crate) fn record_capacity(instances: u32) -> u32 {
     let may_be_apart = (2..=MAX_INSTANCES).contains(&instances);
     instances + if may_be_apart { instances.max(MIN_EXTRA_RECORDS) } else { 0 }
 }
 
-/// A record that may be taken apart.
+/// A record that may be split.
 struct RebraidCandidate<'a> {
     instance: &'a PlacedInstance,
     part: &'a RebraidPart,
@@ -27,8 +27,8 @@ struct RebraidCandidate<'a> {
     is_open: bool,
 }
 
-/// Takes the largest of what overlaps others apart, where its parts leave room empty, until there are as many records as
-/// these instances may make, or the next would make more than `record_capacity`.
+/// Splits the largest overlapping instances if their parts leave empty space. Stops before there are more records than
+/// [`record_capacity`] for these instances, or more than `room`.
 pub(crate) fn rebraid<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<PlacedInstance> {
     let most =
         room.min(crate::software_ray_query::bvh::rebraid::record_capacity(instances.len() as u32) as usize);
@@ -66,7 +66,7 @@ pub(crate) fn rebraid<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<P
     shown.into_iter().filter(|shown| !shown.is_open).map(|shown| shown.record).collect()
 }
 
-/// Which of the instances overlap others, found along the axis on which they lie furthest apart.
+/// Returns for each instance true if it overlaps another. Sweeps along the axis of the largest extent.
 fn overlapping(instances: &[PlacedInstance]) -> Vec<bool> {
     let whole = instances.iter().fold(Bounds::EMPTY, |all, of| all.union(of.bounds));
     let axis = (whole.high - whole.low).max_position();
@@ -90,7 +90,7 @@ fn bounds_overlap(one: &Bounds, other: &Bounds) -> bool {
     one.low.cmplt(other.high).all() && other.low.cmplt(one.high).all()
 }
 
-/// A record for each part of what is shown.
+/// Returns a record for each part of a candidate.
 fn split_candidate<'a>(shown: &RebraidCandidate<'a>) -> Vec<RebraidCandidate<'a>> {
     let part = |part: &'a RebraidPart| {
         let mut record = shown.instance.clone();
@@ -115,7 +115,7 @@ mod tests {
     use crate::software_ray_query::bvh::encode_instances::{InstancedBlas, place_instance};
     use crate::software_ray_query::bvh::subtrees::tests::{primitives, row, structure};
 
-    /// Instances of one structure of 300 boxes.
+    /// Instances of one BLAS of 300 AABBs.
     fn placed(transforms: &[Affine3A]) -> (Vec<u8>, Vec<PlacedInstance>) {
         let boxes = row(300, Vec3::ZERO);
         let (bytes, parts) = structure(&boxes);
@@ -179,7 +179,7 @@ mod tests {
     fn what_overlaps_is_found_whatever_the_axis() {
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
             let at = |place: f32| Affine3A::from_translation(axis * place);
-            // The structure is 300 long, 900 high and 3 deep.
+            // The BLAS is 300 long, 900 high and 3 deep.
             let instances =
                 placed(&[at(5_000.0), at(0.0), at(9_000.0), at(2.0), at(-4_000.0), at(8_999.0)]).1;
             assert_eq!(overlapping(&instances), [false, true, true, true, false, true]);

@@ -1,13 +1,13 @@
-//! What the flags of a build ask of the CPU.
+//! Settings of a build on the CPU.
 
 use crate::accel::flags::BuildFlags;
 
-/// What the flags of a build ask of the CPU. Fast builds are the GPU's.
+/// Settings of a build on the CPU, from the build flags. The GPU makes fast builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BvhSettings {
-    /// Leaves name shared vertices, where that takes less than copies.
+    /// Leaves have indices of shared vertices, if that is smaller than copies.
     pub(crate) low_memory: bool,
-    /// The structure may be refitted.
+    /// The BLAS may be refitted.
     pub(crate) refit: bool,
 }
 
@@ -19,7 +19,7 @@ impl BvhSettings {
         }
     }
 
-    /// Whether leaves may only share what the caller does: a refit may move each of its vertices elsewhere.
+    /// True if leaves may share a vertex only if the caller does: a refit may move each vertex independently.
     pub(crate) fn keeps_given_vertices(self) -> bool {
         self.low_memory && self.refit
     }

@@ -1,4 +1,4 @@
-//! Takes structures apart.
+//! Splits a BLAS into subtrees.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,11 +12,11 @@ use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::{BLOCK_BYTES, FORMAT_BVH8, leaf};
 use crate::software_ray_query::rebraid_parts::{RebraidPart, RebraidParts};
 
-/// Parts that are kept of a structure, 36 bytes each.
+/// Maximum parts that are kept for a BLAS, 36 bytes each.
 const MAX_PARTS: usize = 64;
 const NODE_BYTES: usize = size_of::<CwBvhNode>();
 
-/// The parts of a sound structure. One of nodes of two children, or of a single leaf, is only taken whole.
+/// Returns the parts of a valid BLAS. A BVH2 and a single leaf are not split.
 pub(crate) fn subtree_parts(blob: &BlasBlob) -> RebraidParts {
     let mut all = RebraidParts::single(blob.bounds);
     let header = blob.header();
@@ -28,7 +28,7 @@ pub(crate) fn subtree_parts(blob: &BlasBlob) -> RebraidParts {
         let first = start + number as usize * NODE_BYTES;
         blob.bytes.get(first..first + NODE_BYTES).map(bytemuck::pod_read_unaligned)
     };
-    // The largest first: areas are never negative, so that their bits are in order. No number is the whole.
+    // The largest first: areas are never negative, so their bits have the same order. `None` is the whole.
     let area = |bounds: &Bounds| bounds.half_area().to_bits();
     let mut open = BinaryHeap::from([(area(&blob.bounds), Reverse(None))]);
     while let Some((_, Reverse(number))) = open.pop() {
@@ -47,7 +47,7 @@ pub(crate) fn subtree_parts(blob: &BlasBlob) -> RebraidParts {
     all
 }
 
-/// The children of a node, and whether each is a node; `None` for one whose boxes are none.
+/// Returns the children of a node, with true for inner nodes; `None` if a child has invalid bounds.
 fn child_parts(node: &CwBvhNode) -> Option<Vec<(RebraidPart, bool)>> {
     let mut inner = children(node);
     let used = (0..8).filter(|child| node.child_meta[*child] != 0);
@@ -66,7 +66,7 @@ fn child_parts(node: &CwBvhNode) -> Option<Vec<(RebraidPart, bool)>> {
     used.map(part).collect()
 }
 
-/// The box of a child, with the room that the walk gives it for rounding.
+/// Returns the bounds of a child, with the rounding margin of the traversal.
 fn child_bounds(node: &CwBvhNode, child: usize) -> Bounds {
     const ROUNDING: f32 = 1e-6;
     let scale = Vec3::from_array(node.e.map(|exponent| f32::from_bits(u32::from(exponent) << 23)));
@@ -88,7 +88,7 @@ pub(crate) mod tests {
 
     const QUALITY: BvhSettings = BvhSettings { low_memory: false, refit: false };
 
-    /// The structure of these boxes.
+    /// Builds a BLAS of these AABBs.
     pub(crate) fn structure(boxes: &[Bounds]) -> (Vec<u8>, RebraidParts) {
         let place =
             |(primitive, of): (u32, &Bounds)| LeafBox { low: of.low, primitive, high: of.high, geometry: 0 };
@@ -99,7 +99,7 @@ pub(crate) mod tests {
         (blob.bytes, parts)
     }
 
-    /// Boxes in a row that bends.
+    /// Returns AABBs along a curve.
     pub(crate) fn row(count: u32, away: Vec3) -> Vec<Bounds> {
         let place = |number: u32| {
             away + Vec3::new(number as f32, (number * number) as f32 * 0.01, (number % 3) as f32)
@@ -107,7 +107,7 @@ pub(crate) mod tests {
         (0..count).map(|number| Bounds { low: place(number), high: place(number) + 0.7 }).collect()
     }
 
-    /// The primitives below a reference.
+    /// Returns the primitives below a reference.
     pub(crate) fn primitives(bytes: &[u8], reference: u32) -> Vec<LeafBox> {
         let header: BlobHeader = bytemuck::pod_read_unaligned(&bytes[..size_of::<BlobHeader>()]);
         let at = |block: u32, index: u32, size: u32| (block * BLOCK_BYTES as u32 + index * size) as usize;

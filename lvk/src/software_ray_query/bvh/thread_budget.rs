@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::parallel::core_count;
 
-/// Builds under way in the process.
+/// Running builds of the process.
 static RUNNING_BUILDS: AtomicUsize = AtomicUsize::new(0);
 
-/// A build under way: all of them share the cores.
+/// A running build. All builds share the cores.
 pub(crate) struct ThreadBudget(());
 
 impl ThreadBudget {
@@ -16,9 +16,9 @@ impl ThreadBudget {
         Self(())
     }
 
-    /// Threads that so much work is for, the one that has it included.
+    /// Returns the number of threads for this many AABBs, including the calling thread.
     pub(crate) fn thread_count(&self, boxes: usize) -> usize {
-        /// So many boxes are worth a thread.
+        /// Minimum AABBs for each thread.
         const BOXES_PER_THREAD: usize = 16_384;
         let worth = boxes / BOXES_PER_THREAD;
         if worth < 2 {

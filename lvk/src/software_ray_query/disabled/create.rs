@@ -1,4 +1,4 @@
-//! The names of this folder in a build without the feature `software-ray-query`: no structure has a software half.
+//! The creation functions for a build without the feature `software-ray-query`: no BLAS or TLAS has a software BVH.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ impl Context {
     }
 }
 
-/// The software half of a TLAS: none.
+/// Returns no software TLAS.
 pub(crate) fn software_tlas(_: &DeviceState, _: &str, _: u32) -> Result<Option<SoftwareTlas>> {
     Ok(None)
 }

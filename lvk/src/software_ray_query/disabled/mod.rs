@@ -1,10 +1,11 @@
-//! The names of this folder in a build without the feature `software-ray-query`. No context takes the software path then:
-//! the types of a BLAS and a TLAS have no values, so that every `Option` of them is `None`.
+//! The names of this folder for a build without the feature `software-ray-query`. No context uses software ray queries
+//! then: [`SoftwareBlas`](blas::SoftwareBlas) and [`SoftwareTlas`](tlas::SoftwareTlas) have no values, so that every
+//! `Option` of them is `None`.
 
 pub(crate) mod create;
 pub(crate) mod record;
 
-/// The files behind `#include <lvk/software_*.glsl>`: none.
+/// The files for `#include <lvk/software_*.glsl>`: none.
 #[cfg(feature = "glsl")]
 pub(crate) const GLSL: &[(&str, &str)] = &[];
 
@@ -15,7 +16,7 @@ pub(crate) mod blas {
     use crate::accel::geometry::BlasGeometry;
     use crate::error::{Error, Result};
 
-    /// The software half of a BLAS: no BLAS has one.
+    /// The software BVH of a BLAS; no BLAS has one.
     pub(crate) enum SoftwareBlas {}
 
     impl SoftwareBlas {
@@ -44,12 +45,12 @@ pub(crate) mod blas {
         }
     }
 
-    /// Fails: without acceleration structures of the device there are none.
+    /// Fails, since without acceleration structures of the device there are no BLAS.
     pub(crate) fn max_sizes(name: &str, _: &[BlasGeometry], _: BuildFlags) -> Result<AccelStructSizes> {
         Err(missing(name))
     }
 
-    /// The error for a BLAS that only software could trace.
+    /// Returns the error for a BLAS that only software could trace.
     pub(crate) fn missing(name: &str) -> Error {
         let why = "the device has no acceleration structures; enable lvk's feature `software-ray-query`";
         Error::unsupported(format!("the BLAS '{name}'"), why)
@@ -59,7 +60,7 @@ pub(crate) mod blas {
 pub(crate) mod tlas {
     use crate::accel::flags::AccelStructSizes;
 
-    /// The software half of a TLAS: no TLAS has one.
+    /// The software BVH of a TLAS; no TLAS has one.
     pub(crate) enum SoftwareTlas {}
 
     impl SoftwareTlas {

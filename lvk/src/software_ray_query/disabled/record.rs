@@ -1,4 +1,4 @@
-//! The names of this folder in a build without the feature `software-ray-query`: nothing is recorded.
+//! The recording functions for a build without the feature `software-ray-query`: nothing is recorded.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -59,7 +59,7 @@ impl CommandBuffer {
     }
 }
 
-/// Succeeds: no build moves a tree.
+/// Succeeds, since no build moves a BVH.
 pub(crate) fn check_unmoved(_: &AccelStruct) -> Result<()> {
     Ok(())
 }

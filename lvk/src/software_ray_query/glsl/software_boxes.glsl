@@ -3,23 +3,24 @@
 
 #include <lvk/software_layout.glsl>
 
-// A ray against the boxes of a node. Every test errs on the side of a hit, by more than rounding can be wrong, so that
-// the triangles alone decide.
+// Intersection of a ray with the bounds of a node. Every test is conservative by more than the rounding error, so that
+// only the triangles decide.
 
-// What of a ray the boxes of a level share.
+// Values of a ray that all bounds of a level share.
 struct LvkSoftSlabs {
     vec3 origin;
     vec3 inverse; // of the direction, never infinite
-    uint octant;  // a bit for each axis the ray follows: x 4, y 2, z 1
+    uint octant;  // a bit for each axis with a positive direction: x 4, y 2, z 1
 };
 
-// What a component of a direction in the world counts as at least: times to the ends of boxes, at 1e15, are finite numbers.
+// Minimum magnitude of a direction component in the world. With it, distances to bounds at 1e15 are finite.
 #define LVK_SOFT_LEAST 1e-22
 
-// The same, as a share of the longest component.
+// Minimum magnitude as a share of the longest component.
 #define LVK_SOFT_LEAST_SHARE 1e-18
 
-// The same, as a share of how far away the corners of a structure are. On CPUs nodes count with times that are up to 520 times as long.
+// Minimum magnitude as a share of the farthest vertex of a BLAS. Nodes on CPUs compute with distances up to 520 times
+// as long.
 #ifdef LVK_DEVICE_IS_CPU
 #define LVK_SOFT_LEAST_OF_FAR 1e-35
 #else
@@ -31,8 +32,8 @@ float lvkSoftLongest(vec3 v) {
     return max(max(size.x, size.y), size.z);
 }
 
-// The least for a ray in the space of a structure. What suits corners at 1e15 would be too much of short directions, as they are in
-// large instances; there it follows from how far away the structure's own corners are.
+// Returns the minimum magnitude for a ray in the space of a BLAS. The value for vertices at 1e15 would be too large for
+// short directions, as in large instances. There, the farthest vertex of the BLAS determines it.
 float lvkSoftLeast(uvec2 structure, vec3 origin, vec3 direction) {
     const float kMost = 1e15 * LVK_SOFT_LEAST_OF_FAR;
     if (lvkSoftLongest(direction) * LVK_SOFT_LEAST_SHARE >= kMost) {
@@ -53,38 +54,39 @@ LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction, float least) {
     return LvkSoftSlabs(origin, 1.0 / mix(direction, replaced, isFlat), octant);
 }
 
-// How much wider boxes must be, as the time a ray takes for it along each axis, for a share of the furthest coordinate.
+// Returns the distance along the ray, for each axis, that widens bounds by a share of the farthest coordinate.
 vec3 lvkSoftSlack(LvkSoftSlabs ray, vec3 far, float share) {
     return abs(ray.inverse) * (lvkSoftLongest(far) * share);
 }
 
-// Of boxes in the world: in the space of an instance the ray begins elsewhere by some roundings of its origin's coordinates.
+// Slack of bounds in the world: in the space of an instance, the ray's origin differs by some rounding errors of its
+// coordinates.
 vec3 lvkSoftWorldSlack(LvkSoftSlabs ray) {
     return lvkSoftSlack(ray, abs(ray.origin), 2e-6);
 }
 
-// Of a box that the ray may touch without entering it: it runs along a face, or the box is flat and the ray in its plane. Such a
-// box is left when it is entered, however long the ray takes to get there.
+// Slack of bounds that the ray may touch without entering: the ray runs along a face, or the bounds are flat and the
+// ray is in their plane. The ray leaves such bounds at the entry distance, however large it is.
 vec3 lvkSoftTouchSlack(LvkSoftSlabs ray, vec3 low, vec3 high) {
-    const float kFarthest = 1e16; // behind all corners but those of boxes that hold nothing
+    const float kFarthest = 1e16; // beyond all vertices except those of empty bounds
     vec3 far = max(abs(low - ray.origin), abs(high - ray.origin));
     return lvkSoftSlack(ray, min(far, vec3(kFarthest)), 1e-7);
 }
 
-// The last of the distances at which a ray enters, or any negative one if all are. As integers, positive floats are in order and
-// before them all negative ones, and devices may have instructions for the most of three integers.
+// Returns the largest entry distance, or any negative one if all are negative. As integers, positive floats keep their
+// order and all negative ones precede them. Devices may have instructions for the maximum of three integers.
 float lvkSoftLastEntry(vec3 enter) {
     ivec3 all = floatBitsToInt(enter);
     return intBitsToFloat(max(max(all.x, all.y), all.z));
 }
 
-// The first of the distances at which it leaves; any negative one if there are such.
+// Returns the smallest exit distance; any negative one if there is one.
 float lvkSoftFirstExit(vec3 leave) {
     ivec3 all = floatBitsToInt(leave);
     return intBitsToFloat(min(min(all.x, all.y), all.z));
 }
 
-// The same within the range of a ray, whose tMin is not negative.
+// Like the two functions above, within the range of a ray, whose tMin is not negative.
 float lvkSoftLast(vec3 enter, float tMin) {
     return intBitsToFloat(max(floatBitsToInt(lvkSoftLastEntry(enter)), floatBitsToInt(tMin)));
 }
@@ -93,9 +95,9 @@ float lvkSoftFirst(vec3 leave, float tMax) {
     return intBitsToFloat(min(floatBitsToInt(lvkSoftFirstExit(leave)), floatBitsToInt(tMax)));
 }
 
-// Where the ray enters and leaves a box, of the range it has left. Which corner is near follows from the direction: a box that
-// holds nothing, whose low corner lies above the high one, is left before it is entered. Along each axis the box is wider by
-// what a ray takes `slack` for.
+// Returns the entry and exit distance of bounds, within the remaining range of the ray. The direction selects the near
+// side, so a ray leaves empty bounds (low above high) before it enters them. `slack` widens the bounds along each axis,
+// as a distance along the ray.
 vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range, vec3 slack) {
     const float kLess = 1.0 - 5e-7, kMore = 1.0 + 5e-7;
     vec3 a = (low - ray.origin) * ray.inverse;
@@ -106,8 +108,9 @@ vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range, vec3 slack)
     return vec2(lvkSoftLast(near, range.x) * kLess, lvkSoftFirst(far, range.y) * kMore);
 }
 
-// The children of a binary node that the ray meets, the nearer one first; LVK_SOFT_NONE for each it misses. `nodes` is the
-// block where nodes begin. Boxes in the world are wider by `slack`; others, which are exact, by what a touch needs.
+// Returns the children of a binary node that the ray hits, the nearer first; LVK_SOFT_NONE for each miss. `nodes` is
+// the first block of nodes. `slack` widens bounds in the world. Other bounds are exact, and are widened by the slack
+// for a touch.
 uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range, bool inWorld, vec3 slack) {
     uint first = nodes + node * LVK_SOFT_BINARY_NODE_BLOCKS;
     uvec4 a = lvkSoftBlock(blocks, first);

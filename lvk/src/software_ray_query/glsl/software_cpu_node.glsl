@@ -3,11 +3,12 @@
 
 #include <lvk/software_boxes.glsl>
 
-// A ray against the boxes of a wide node, as <lvk/software_wide_node.glsl> does it on GPUs. What counts on a CPU is how many
-// instructions there are, above all those that only the unit that adds and multiplies has: conversions, minima and maxima.
+// Intersection of a ray with the bounds of a wide node on CPUs, like <lvk/software_wide_node.glsl> on GPUs. The cost on
+// a CPU is the number of instructions, mainly of those that only the multiply-add unit executes: conversions, minima
+// and maxima.
 
-// Where along each axis the planes lie that a ray enters by: bytes from a node's start, or with blocks of 16 bytes whether they are
-// the first half of a block. The planes it leaves by are the other half.
+// The position of the near planes along each axis: bytes from a node's start. With 16-byte blocks: true if they are the
+// first half of a block. The far planes are the other half.
 #ifdef LVK_GATHERS_PAIRS
 #define LvkSoftOrder u64vec3
 LvkSoftOrder lvkSoftOrderOf(LvkSoftSlabs ray) {
@@ -15,10 +16,10 @@ LvkSoftOrder lvkSoftOrderOf(LvkSoftSlabs ray) {
                    (ray.octant & 1u) != 0u ? 64ul : 72ul);
 }
 
-// Of eight children, in two words, the planes of the axis whose block is named.
+// Returns the planes of eight children, in two words, along the axis of a block.
 void lvkSoftPlanes(LvkSoftBlocks node, uint block, uint64_t order, out uvec2 near, out uvec2 far) {
     uint64_t start = packUint2x32(uvec2(node));
-    uint64_t halves = uint64_t(block) * 32ul + 8ul; // where one half of the block begins and where the other does, added up
+    uint64_t halves = uint64_t(block) * 32ul + 8ul; // sum of the offsets of both halves of the block
     near = unpackUint2x32(LvkSoftPair(start + order).at);
     far = unpackUint2x32(LvkSoftPair(start + (halves - order)).at);
 }
@@ -35,21 +36,21 @@ void lvkSoftPlanes(LvkSoftBlocks node, uint block, bool order, out uvec2 near, o
 }
 #endif
 
-// Planes of a child, bytes in each word, as numbers without a conversion: as bits of numbers from 1 to 2, of which they are
-// steps of 1 / 32768.
+// Converts the planes of a child, bytes in each word, to floats without conversion instructions: as mantissa bits of
+// floats from 1 to 2, in steps of 1 / 32768.
 vec3 lvkSoftSteps(uvec3 words, uint child) {
     uvec3 moved = child == 0u ? words << 8 : words >> (child - 8u);
     return uintBitsToFloat(moved & 0xFF00u | 0x3F800000u);
 }
 
-// Bits moved to the left, those that leave there coming in again at the right. Of `by` the lowest five bits count, so nothing has to
-// clear what is above them.
+// Rotates bits to the left. Only the lowest five bits of `by` count, so that the caller need not clear the bits above
+// them.
 uint lvkSoftRotate(uint bits, uint by) {
     return bits << (by & 31u) | bits >> (-by & 31u);
 }
 
-// Of four children of a wide node, those the ray meets, as bits at their places. The number of a plane times `scale` is how much later
-// than `start` the ray enters by it, or than `end` leaves.
+// Returns the children, of four of a wide node, that the ray hits, as bits at their positions. The ray enters a plane
+// at its index times `scale` after `start`, and leaves it at that distance after `end`.
 uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
     uint met = 0u;
     [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
@@ -61,7 +62,7 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
     return met;
 }
 
-// What of a wide node the ray meets, as lvkSoftMeet8 tells it.
+// Returns the hits of a wide node, in the format of lvkSoftMeet8.
 uvec4 lvkSoftMeetNode(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec2 range) {
     uvec4 head = lvkSoftBlock(node, 0u);
     uvec4 children = lvkSoftBlock(node, 1u);
@@ -69,13 +70,13 @@ uvec4 lvkSoftMeetNode(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, 
     lvkSoftPlanes(node, 2u, order.x, nearX, farX);
     lvkSoftPlanes(node, 3u, order.y, nearY, farY);
     lvkSoftPlanes(node, 4u, order.z, nearZ, farZ);
-    // Exponents are larger by the 15 bits of lvkSoftSteps. None is near the end of its byte, as boxes end at 1e15, and no time is
-    // infinite by LVK_SOFT_LEAST_OF_FAR. What is rounded is `start`, and at the size of `scale` all that follows.
+    // Exponents are larger by the 15 bits of lvkSoftSteps. None overflows its byte, because bounds end at 1e15, and
+    // LVK_SOFT_LEAST_OF_FAR keeps distances finite. Rounding affects `start`, and the rest at the size of `scale`.
     vec3 scale = uintBitsToFloat((head.www + 0x0F0F0Fu >> uvec3(0u, 8u, 16u) & 255u) << 23) * ray.inverse;
     vec3 start = (uintBitsToFloat(head.xyz) - ray.origin) * ray.inverse;
     vec3 error = (abs(start) + abs(scale)) * 1e-6;
     vec3 enter = start - scale - error, leave = start - scale + error;
-    // Inner children have 24 and more for their place, which then follows the order of the ray.
+    // The position of inner children is 24 and more; it is permuted by the order of the ray.
     uvec2 inner = children.zw & (children.zw << 1) & 0x10101010u;
     uvec2 places = children.zw ^ ((inner >> 1) - (inner >> 4) & ray.octant * 0x01010101u);
     uvec2 counts = children.zw >> 5;
@@ -86,7 +87,7 @@ uvec4 lvkSoftMeetNode(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, 
     return uvec4(children.x, met & 0xFF000000u | head.w >> 24, children.y, met & 0x00FFFFFFu);
 }
 
-// The same as in <lvk/software_wide_node.glsl>.
+// See <lvk/software_wide_node.glsl>.
 uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
     LvkSoftItems items = lvkSoftItems(structure, nodes);
     return lvkSoftMeetNode(ray, lvkSoftOrderOf(ray), lvkSoftItem(items, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);

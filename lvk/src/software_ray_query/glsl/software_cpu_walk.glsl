@@ -1,16 +1,16 @@
 #ifndef LVK_SOFTWARE_CPU_WALK_GLSL
 #define LVK_SOFTWARE_CPU_WALK_GLSL
 
-// Part of <lvk/software_walk.glsl>: how CPUs walk what most scenes are made of, a wide tree of triangles, all of them taken for
-// opaque. A CPU runs eight invocations as one. What it guesses wrong costs it most, so there are few branches, and what
-// follows a test does not wait for its outcome; and each turn does what most of the eight have to do.
+// Part of <lvk/software_walk.glsl>: traversal on CPUs for the most common case, a BVH8 of opaque triangles. A CPU runs
+// eight invocations as one, and mispredicted branches cost most. So there are few branches, and the code after a test
+// does not depend on its result. Each iteration does the work that most of the eight need.
 
-// What the walk keeps of a level besides.
+// Additional values of a level.
 struct LvkSoftTriangleLevel {
     LvkSoftItems nodes;
     LvkSoftItems triangles;
     LvkSoftOrder order;
-    vec2 wholes; // what the areas of a triangle come to, if the side the ray sees counts, lies between these
+    vec2 wholes; // a triangle counts if the sum of its areas is between these (face culling)
 };
 
 LvkSoftTriangleLevel lvkSoftTriangleLevelOf(LvkSoftLevel level) {
@@ -23,14 +23,14 @@ LvkSoftTriangleLevel lvkSoftTriangleLevelOf(LvkSoftLevel level) {
                                 vec2(least, most));
 }
 
-// The triangle that is nearest so far: its place, or LVK_SOFT_NONE, and what its areas come to.
+// The nearest triangle so far: its index, or LVK_SOFT_NONE, and the sum of its areas.
 struct LvkSoftNearest {
     uint primitive;
     float whole;
 };
 
-// Tests the next triangle of the group, and commits where it is hit if that counts. Whether the ray ends there. What the
-// triangle says of itself is read once the nearest is known.
+// Tests the next triangle of the group, and commits a hit if `counts`. Returns true if the ray ends there. The data of
+// the triangle's leaf is read once the nearest one is known.
 bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level,
                          LvkSoftTriangleLevel triangles, bool counts, inout LvkSoftNearest nearest) {
     uint primitive = place.leaves.x + uint(findLSB(place.leaves.y));
@@ -52,7 +52,7 @@ bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftPlace place, Lvk
     return hits && (state.flags & LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT) != 0u;
 }
 
-// Visits the next node of the group. The rest of the group goes on the stack only if it has inner children that the ray meets.
+// Visits the next node of the group. The rest of the group is pushed only if the ray hits inner children of the node.
 void lvkSoftVisitWide(inout LvkSoftPlace place, LvkSoftLevel level, LvkSoftTriangleLevel triangles, vec2 range) {
     uint node = lvkSoftTakeNode(place, level);
     uvec4 met = lvkSoftMeetNode(level.slabs, triangles.order,
@@ -65,7 +65,7 @@ void lvkSoftVisitWide(inout LvkSoftPlace place, LvkSoftLevel level, LvkSoftTrian
     place.leaves = met.zw;
 }
 
-// Fills in what was hit.
+// Fills in the data of the hit.
 void lvkSoftTell(inout LvkSoftHit hit, LvkSoftLevel level, LvkSoftItems triangles, uint instance, LvkSoftNearest nearest) {
     vec3 corners[3];
     uvec3 words;
@@ -78,8 +78,8 @@ void lvkSoftTell(inout LvkSoftHit hit, LvkSoftLevel level, LvkSoftItems triangle
     hit.opaque = (words.z & 1u) != 0u;
 }
 
-// Walks through the structure of a level. A turn tests up to two triangles and visits a node if none is left then. A ray that
-// ends does so after that, as the others need the visit anyway.
+// Traverses the BLAS of a level. An iteration tests up to two triangles, and visits a node if none is left. A ray that
+// ends does so after the visit, because other invocations need the visit anyway.
 void lvkSoftWalkTriangles(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
     LvkSoftTriangleLevel triangles = lvkSoftTriangleLevelOf(level);
     LvkSoftNearest nearest = LvkSoftNearest(LVK_SOFT_NONE, 0.0);
@@ -98,7 +98,7 @@ void lvkSoftWalkTriangles(inout LvkSoftState state, inout LvkSoftPlace place, Lv
                 }
                 place.group = lvkSoftPopGroup(place.top);
             }
-            // Asked again, so that CPUs pass it by once all rays have left.
+            // Tested again, so that CPUs skip the visit once all rays have ended.
             if (place.group.y >= LVK_SOFT_ANY_NODE) {
                 lvkSoftVisitWide(place, level, triangles, vec2(state.tMin, state.committed.t));
             }

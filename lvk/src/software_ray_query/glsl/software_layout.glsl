@@ -1,8 +1,8 @@
 #ifndef LVK_SOFTWARE_LAYOUT_GLSL
 #define LVK_SOFTWARE_LAYOUT_GLSL
 
-// How structures lie in memory; the same numbers as in lvk/src/accel/software/layout.rs. Everything is read in blocks of
-// 16 bytes by address, and a structure says by numbers of blocks from its own start where its parts lie.
+// Memory layout of BLASes and TLASes; the same numbers as in lvk/src/software_ray_query/layout.rs. Everything is read
+// in blocks of 16 bytes by address. The header has the offsets of the parts in blocks from its own start.
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftBlocks { uvec4 at[]; };
 #ifdef LVK_GATHERS_PAIRS
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftPairs { u64vec2 at[]; };
@@ -11,8 +11,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Lvk
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftVertices { vec3 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftTriples { uvec3 at[]; };
 
-// Format of a structure: block 0 is (format, kind of leaves, root, number of primitives); of a moved one the last two
-// are the address of the structure that is meant.
+// Format of a BLAS or TLAS: block 0 is (format, kind of leaves, root, number of primitives). In a moved BLAS, the last
+// two are the address of the target BLAS.
 #define LVK_SOFT_WIDE 0u
 #define LVK_SOFT_BINARY 1u
 #define LVK_SOFT_MOVED 2u
@@ -24,18 +24,19 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_INSTANCES 3u
 #define LVK_SOFT_PACKED 4u
 
-// References to nodes: a node's number, or with the highest bit a leaf: first primitive, 4 bits number of them less 1.
+// Node references: the index of a node. With the highest bit, a leaf: first primitive, and 4 bits for the count minus
+// 1.
 #define LVK_SOFT_LEAF 0x80000000u
 #define LVK_SOFT_LEAF_COUNT 0x78000000u
 #define LVK_SOFT_LEAF_ONE 0x08000000u
 #define LVK_SOFT_LEAF_FIRST 0x07FFFFFFu
 #define LVK_SOFT_NONE 0xFFFFFFFFu
 
-// Marks of a bottom-level structure, the last number of block 2.
+// Marks of a BLAS, in the last word of block 2.
 #define LVK_SOFT_ALL_OPAQUE 1u
 #define LVK_SOFT_NONE_OPAQUE 2u
 
-// Flags of an instance, the highest byte of the last number of its block 6.
+// Flags of an instance, in the highest byte of the last word of its block 6.
 #define LVK_SOFT_NO_CULL 1u
 #define LVK_SOFT_FLIP_FACING 2u
 #define LVK_SOFT_FORCE_OPAQUE 4u
@@ -47,27 +48,27 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_BINARY_NODE_BLOCKS 4u
 #define LVK_SOFT_WIDE_NODE_BLOCKS 5u
 
-// Of packed leaves: bits of a vertex in a word of its own, which has those of the third above them.
+// Packed leaves: bits of a vertex index in its own word, and of the third index above it.
 #define LVK_SOFT_NAME_BITS 21
 #define LVK_SOFT_REST_BITS 11
 #define LVK_SOFT_NAME 0x001FFFFFu
 
-// Loops and branches cost CPUs more than lanes that wait for one another.
+// On CPUs, loops and branches cost more than idle invocations.
 #ifdef LVK_DEVICE_IS_CPU
 const bool kLvkSoftIsCpu = true;
 #else
 const bool kLvkSoftIsCpu = false;
 #endif
 
-// Paths have at most 64 binary nodes in either level, or 32 wide ones, each of which leaves one entry, and an instance may
-// leave others of its leaf. On CPUs binary nodes leave half an entry.
+// A path has at most 64 binary nodes in either level, or 32 wide ones, and each pushes one entry. An instance can push
+// another entry for its leaf. On CPUs, a binary node pushes half an entry.
 #ifdef LVK_DEVICE_IS_CPU
 #define LVK_SOFT_STACK_ENTRIES 66u
 #else
 #define LVK_SOFT_STACK_ENTRIES 130u
 #endif
 
-// A block of a node or leaf.
+// Returns a block of a node or leaf.
 uvec4 lvkSoftBlock(LvkSoftBlocks blocks, uint at) {
 #ifdef LVK_GATHERS_PAIRS
     u64vec2 pairs = LvkSoftPairs(uvec2(blocks)).at[at];
@@ -77,8 +78,8 @@ uvec4 lvkSoftBlock(LvkSoftBlocks blocks, uint at) {
 #endif
 }
 
-// The number of a block from which on some are read. Where addresses are counted by 64 bits, `blocks` begin with it afterwards,
-// so that one address serves all of them.
+// Returns the index of the first block of several to read. With 64-bit address arithmetic, `blocks` starts at it
+// afterwards, so that one address serves all of them.
 uint lvkSoftBegin(inout LvkSoftBlocks blocks, uint first) {
 #ifdef LVK_GATHERS_PAIRS
     blocks = LvkSoftBlocks(unpackUint2x32(packUint2x32(uvec2(blocks)) + uint64_t(first) * 16ul));
@@ -88,14 +89,14 @@ uint lvkSoftBegin(inout LvkSoftBlocks blocks, uint first) {
 #endif
 }
 
-// The address `blocks` blocks behind another one.
+// Returns the address `blocks` blocks after another one.
 uvec2 lvkSoftBehind(uvec2 base, uint blocks) {
     uint carry;
     uint low = uaddCarry(base.x, blocks << 4, carry);
     return uvec2(low, base.y + (blocks >> 28) + carry);
 }
 
-// Where nodes or primitives begin, as an address that one of them is soon found from.
+// The address of the first node or primitive, from which that of another one is computed.
 #ifdef LVK_GATHERS_PAIRS
 #define LvkSoftItems uint64_t
 LvkSoftItems lvkSoftItems(uvec2 structure, uint first) {

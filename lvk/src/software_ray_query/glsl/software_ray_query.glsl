@@ -1,11 +1,11 @@
 #ifndef LVK_SOFTWARE_RAY_QUERY_GLSL
 #define LVK_SOFTWARE_RAY_QUERY_GLSL
 
-// Part of <lvk/ray_query.glsl>: queries that the library walks itself, on devices that have none or only slow ones.
+// Part of <lvk/ray_query.glsl>: queries with software traversal, for devices without ray queries or with slow ones.
 #include <lvk/software_walk.glsl>
 #include <lvk/tlas_table.glsl>
 
-// A query: its state, and the entries of its stack while it waits with a candidate, if there are such.
+// A query: its state, and its stack entries while it waits with a candidate, if the module has candidates.
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
 struct LvkRayQuery {
     LvkSoftState state;
@@ -24,7 +24,7 @@ void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask,
     lvkSoftFinish(start);
     lvkSoftQueries += 1u;
     flags |= LVK_RAY_FLAGS_ALWAYS;
-    // What is no number stays so, whatever its sign: nothing is behind it.
+    // A NaN stays NaN, whatever its sign: no distance is beyond it.
     bool isNumber = (floatBitsToUint(tMin) & 0x7FFFFFFFu) <= 0x7F800000u;
     float from = intBitsToFloat(isNumber ? max(floatBitsToInt(tMin), 0) : 0x7FC00000);
     state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, from, direction, flags, mask & 0xFFu,
@@ -34,7 +34,7 @@ void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask,
     }
 }
 
-// Keeps the stack while the shader judges a candidate.
+// Saves the stack while the shader judges a candidate.
 bool lvkSoftSave(LvkSoftState state, inout uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
     for (uint entry = 0u; entry < lvkSoftEntries(state.place.top); ++entry) {
         stack[entry] = lvkSoftStack[entry];
@@ -42,7 +42,7 @@ bool lvkSoftSave(LvkSoftState state, inout uvec2 stack[LVK_SOFT_STACK_ENTRIES]) 
     return true;
 }
 
-// Takes the stack back that another query has used meanwhile.
+// Restores the stack, which another query has used meanwhile.
 bool lvkSoftRestore(LvkSoftState state, uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
     for (uint entry = 0u; entry < lvkSoftEntries(state.place.top); ++entry) {
         lvkSoftStack[entry] = stack[entry];
@@ -67,7 +67,7 @@ void lvkSoftGenerate(inout LvkSoftState state, float t) {
     }
 }
 
-// Zeros where nothing was hit: no instance has that number, and no memory lies there.
+// Returns zeros without a hit: LVK_SOFT_NONE is no index of an instance, and no valid memory.
 uvec4 lvkSoftInstanceBlock(LvkSoftState state, uint instance, uint block) {
     if (instance == LVK_SOFT_NONE) {
         return uvec4(0u);
@@ -75,7 +75,7 @@ uvec4 lvkSoftInstanceBlock(LvkSoftState state, uint instance, uint block) {
     return LvkSoftBlocks(lvkSoftInstances(state)).at[instance * LVK_SOFT_INSTANCE_BLOCKS + block];
 }
 
-// The rows of the instance's matrix in its blocks from `first` on; zeros where nothing was hit.
+// Returns the rows of the instance's matrix in its blocks from `first` on; zeros without a hit.
 mat3x4 lvkSoftInstanceRows(LvkSoftState state, LvkSoftHit hit, uint first) {
     if (hit.instance == LVK_SOFT_NONE) {
         return mat3x4(0.0);
@@ -87,12 +87,12 @@ vec3 lvkSoftObject(LvkSoftState state, LvkSoftHit hit, vec4 v) {
     return lvkSoftTransform(lvkSoftInstanceRows(state, hit, 0u), v);
 }
 
-// The matrix in the instance's blocks from `first` on.
+// Returns the matrix in the instance's blocks from `first` on.
 mat4x3 lvkSoftMatrix(LvkSoftState state, LvkSoftHit hit, uint first) {
     return transpose(lvkSoftInstanceRows(state, hit, first));
 }
 
-// Zeros where no triangle was hit.
+// Returns the vertices of the hit triangle; zeros without a triangle.
 void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3]) {
     positions = vec3[3](vec3(0.0), vec3(0.0), vec3(0.0));
     if (hit.instance == LVK_SOFT_NONE) {
@@ -108,13 +108,13 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
     lvkSoftCorners(structure, primitives, head.y, hit.primitive, positions, words);
 }
 
-// The hit that `which` means.
+// The hit that `which` selects.
 #define LVK_SOFT_HIT(rq, which) ((which) ? (rq).state.committed : (rq).state.candidate)
 
 // Starts a query: void (LvkRayQuery, uint tlasIndex, uint flags, uint cullMask, vec3 origin, float tMin, vec3 direction, float tMax).
 #define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
     lvkSoftInitialize((rq).state, tlasIndex, flags, mask, origin, tMin, direction, tMax)
-// Steps to the next candidate that the shader must judge; false when the walk is over.
+// Steps to the next candidate that the shader must judge; false when the traversal is over.
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
 #define lvkRayQueryProceed(rq) lvkSoftProceed((rq).state)
 #else
@@ -122,23 +122,23 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
     ((!(rq).state.interrupted || lvkSoftOwner == (rq).state.id || lvkSoftRestore((rq).state, (rq).stack)) \
         && lvkSoftProceed((rq).state) && lvkSoftSave((rq).state, (rq).stack))
 #endif
-// Ends the walk; what was committed stays.
+// Ends the traversal; the committed hit stays.
 #define lvkRayQueryTerminate(rq) lvkSoftFinish((rq).state.place)
-// Commits the candidate box at distance `t`, within the range that is left.
+// Commits the candidate AABB at distance `t`, within the remaining range.
 #define lvkRayQueryGenerateIntersection(rq, t) lvkSoftGenerate((rq).state, t)
 // Commits the candidate triangle.
 #define lvkRayQueryConfirmIntersection(rq) lvkSoftConfirm((rq).state)
 
-// Of the ray.
+// Values of the ray.
 #define lvkRayQueryTMin(rq) ((rq).state.tMin)
 #define lvkRayQueryFlags(rq) ((rq).state.flags)
 #define lvkRayQueryWorldRayOrigin(rq) ((rq).state.origin)
 #define lvkRayQueryWorldRayDirection(rq) ((rq).state.direction)
 
-// Of an intersection.
+// Values of an intersection.
 #define lvkRayQueryType(rq, which) (LVK_SOFT_HIT(rq, which).kind)
 #define lvkRayQueryT(rq, which) (LVK_SOFT_HIT(rq, which).t)
-// The application's own numbers of instance and primitive; `tlas` is the index the query was started with.
+// The application's own ids of instance and primitive; `tlas` is the index that the query was started with.
 #define lvkRayQueryInstanceId(rq, which, tlas) \
     int(lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 7u).x)
 #define lvkRayQueryPrimitiveIndex(rq, which, tlas) int(LVK_SOFT_HIT(rq, which).numbers.y)
@@ -150,7 +150,7 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 #define lvkRayQueryBarycentrics(rq, which) (LVK_SOFT_HIT(rq, which).barycentrics)
 #define lvkRayQueryFrontFace(rq, which) (LVK_SOFT_HIT(rq, which).front)
 #ifdef LVK_POSITION_FETCH
-// The corners of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
+// Vertices of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
 #define lvkRayQueryTrianglePositions(rq, which, positions) \
     lvkSoftPositions((rq).state, LVK_SOFT_HIT(rq, which), positions)
 #endif

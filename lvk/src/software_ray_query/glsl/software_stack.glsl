@@ -3,17 +3,17 @@
 
 #include <lvk/software_layout.glsl>
 
-// The stack of the query that is walking. Queries take turns: one that waits with a candidate keeps its entries itself.
-// It holds groups of nodes, written as one, and references with nothing beside them; groups only above `floor`, and then
-// nothing else. `top` and `floor` count what a reference takes.
+// The stack of the running query. Queries take turns: a query that waits with a candidate stores its entries itself.
+// The stack contains node groups and single references. Groups are only above `floor`, and then nothing else is above
+// it. `top` and `floor` are in units of references.
 uvec2 lvkSoftStack[LVK_SOFT_STACK_ENTRIES];
 
 #ifdef LVK_DEVICE_IS_CPU
 
-// lavapipe clears the stack for every eight invocations, so here it is half as large: two references share an entry.
+// lavapipe clears the stack for every eight invocations, so it has half the size here: two references share an entry.
 #define LVK_SOFT_GROUP_TAKES 2u
 
-// Entries in use.
+// Returns the number of used entries.
 uint lvkSoftEntries(uint top) {
     return (top + 1u) >> 1;
 }
@@ -43,7 +43,7 @@ uint lvkSoftPopReference(inout uint top) {
     return (top & 1u) == 0u ? both.x : both.y;
 }
 
-// A group, or a reference with anything beside it.
+// Returns a group, or a reference with an unspecified second word.
 uvec2 lvkSoftPop(inout uint top, bool isGroup) {
     return isGroup ? lvkSoftPopGroup(top) : uvec2(lvkSoftPopReference(top), 0u);
 }

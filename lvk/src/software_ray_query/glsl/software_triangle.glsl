@@ -3,16 +3,16 @@
 
 #include <lvk/software_layout.glsl>
 
-// A ray against a triangle without leaks at shared edges and corners (Woop, Benthin and Wald, "Watertight Ray/Triangle
-// Intersection", 2013). Triangles that share an edge compute its area from the same numbers by the same operations, so
-// that none of a ray's areas can be wrong on both sides; an area of 0 counts as inside on either.
+// Ray-triangle intersection, watertight at shared edges and vertices (Woop, Benthin and Wald, "Watertight Ray/Triangle
+// Intersection", 2013). Triangles with a shared edge compute its area from the same numbers by the same operations, so
+// that the ray cannot miss both of them. An area of 0 counts as inside on both sides.
 
-// What of a ray all triangles share: how they are sheared so that it runs along the longest of its axes.
+// Values of a ray that all triangles share: the shear that aligns the ray with its longest axis.
 struct LvkSoftShear {
     vec2 lean;   // of the other two axes, for each unit of the longest
     float scale; // one over the longest
-    bool alongX; // the longest is x
-    bool alongZ; // it is z; else y
+    bool alongX; // the longest axis is x
+    bool alongZ; // the longest axis is z; else y
 };
 
 struct LvkSoftPassage {
@@ -21,7 +21,7 @@ struct LvkSoftPassage {
     bool front;
 };
 
-// The other two axes, and the longest. For y they are in the wrong order, which mirrors triangles.
+// Returns the other two axes, and the longest. For y they are swapped, which mirrors triangles.
 vec3 lvkSoftTurn(LvkSoftShear shear, vec3 v) {
     return vec3(shear.alongX ? v.y : v.x, shear.alongZ ? v.y : v.z, shear.alongX ? v.x : shear.alongZ ? v.z : v.y);
 }
@@ -32,14 +32,15 @@ LvkSoftShear lvkSoftShearOf(vec3 direction) {
     shear.alongX = size.x >= size.y && size.x >= size.z;
     shear.alongZ = !shear.alongX && size.z > size.y;
     vec3 turned = lvkSoftTurn(shear, direction);
-    precise float scale = 1.0 / turned.z; // as the ray's place in lvkSoftTransform
+    precise float scale = 1.0 / turned.z; // same rounding everywhere, as in lvkSoftTransform
     precise vec2 lean = turned.xy * scale;
     shear.scale = scale;
     shear.lean = lean;
     return shear;
 }
 
-// Twice the areas between the ray's line and the edges, as seen along it; `lengths` of the corners along the ray's longest axis.
+// Returns twice the areas between the ray's line and the edges, seen along it; `lengths` of the vertices along the
+// longest axis.
 vec3 lvkSoftAreas(LvkSoftShear ray, vec3 origin, vec3 corners[3], out vec3 lengths) {
     precise vec3 p = lvkSoftTurn(ray, corners[0] - origin);
     precise vec3 q = lvkSoftTurn(ray, corners[1] - origin);
@@ -53,7 +54,8 @@ vec3 lvkSoftAreas(LvkSoftShear ray, vec3 origin, vec3 corners[3], out vec3 lengt
     return areas;
 }
 
-// What of the whole each area is; first of all, as areas by lengths would leave the range of floats.
+// Returns each area as a share of the whole. This must come first: areas times lengths would exceed the range of
+// floats.
 vec3 lvkSoftShares(vec3 areas, float whole) {
     return areas * (1.0 / whole);
 }
@@ -62,13 +64,13 @@ float lvkSoftDistance(LvkSoftShear ray, vec3 shares, vec3 lengths) {
     return (shares.x * lengths.x + shares.y * lengths.y + shares.z * lengths.z) * ray.scale;
 }
 
-// Whether the ray sees the front of a triangle whose areas come to `whole`.
+// Returns true if the ray hits the front of a triangle with areas of sum `whole`.
 bool lvkSoftIsFront(LvkSoftShear ray, float whole) {
     bool mirrors = !ray.alongX && !ray.alongZ;
     return ((whole < 0.0) == (ray.scale > 0.0)) != mirrors;
 }
 
-// Whether the ray's line passes the triangle, and where.
+// Returns true if the ray's line passes through the triangle, and the position.
 bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPassage passage) {
     vec3 lengths;
     vec3 areas = lvkSoftAreas(ray, origin, corners, lengths);
@@ -76,7 +78,7 @@ bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPa
     float least = min(min(areas.x, areas.y), areas.z);
     float most = max(max(areas.x, areas.y), areas.z);
     bool passes = (least >= 0.0 || most <= 0.0) && whole != 0.0;
-    if (!kLvkSoftIsCpu && !passes) { // a CPU loses more by a branch that it guesses wrong than by the rest
+    if (!kLvkSoftIsCpu && !passes) { // on a CPU, a mispredicted branch costs more than the rest
         return false;
     }
     vec3 shares = lvkSoftShares(areas, whole);

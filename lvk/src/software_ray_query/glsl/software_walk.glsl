@@ -1,7 +1,7 @@
 #ifndef LVK_SOFTWARE_WALK_GLSL
 #define LVK_SOFTWARE_WALK_GLSL
 
-// The state of a query that the library walks itself, and its walk through both levels.
+// The state of a query with software traversal, and its traversal of both levels.
 #include <lvk/ray_flags.glsl>
 #include <lvk/software_boxes.glsl>
 #include <lvk/software_layout.glsl>
@@ -13,32 +13,32 @@
 #include <lvk/software_wide_node.glsl>
 #endif
 
-// LvkSoftHit.kind of candidates. Committed ones have LVK_COMMITTED_*.
+// Values of LvkSoftHit.kind for candidates. Committed hits have LVK_COMMITTED_*.
 #define LVK_SOFT_CANDIDATE_TRIANGLE 0u
 #define LVK_SOFT_CANDIDATE_BOX 1u
 
 struct LvkSoftHit {
     float t;
     uint kind;
-    uint instance;  // place in the structure
-    uint primitive; // place among the leaves of the instance's structure
-    uvec2 numbers;  // the application's own of geometry and primitive
+    uint instance;  // index in the TLAS
+    uint primitive; // index among the leaves of the instance's BLAS
+    uvec2 numbers;  // the application's geometry and primitive
     vec2 barycentrics;
     bool front;
     bool opaque;
 };
 
-// What is left to visit. Entries behind `top` are of others; those below `floor` are references of the top level.
+// The pending work. Stack entries from `top` on belong to others; those below `floor` are references of the TLAS.
 struct LvkSoftPlace {
-    uint next;     // reference of the top level to go to before those on the stack, or LVK_SOFT_NONE
-    uint instance; // the one whose structure is walked, or LVK_SOFT_NONE
-    uvec2 group;   // nodes: of a wide node as lvkSoftMeet8 tells them, or a binary node's number and LVK_SOFT_ONE_NODE
-    uvec2 leaves;  // primitives: the first, and which of it and those behind it
+    uint next;     // reference of the TLAS to visit before those on the stack, or LVK_SOFT_NONE
+    uint instance; // instance whose BLAS is traversed, or LVK_SOFT_NONE
+    uvec2 group;   // nodes: a group as lvkSoftMeet8 returns it, or the index of a binary node and LVK_SOFT_ONE_NODE
+    uvec2 leaves;  // primitives: the first, and a bit mask from it on
     uint top;
     uint floor;
 };
 
-// A query without its stack, small enough to be handed in and out of functions.
+// A query without its stack, small enough to be passed in and out of functions.
 struct LvkSoftState {
     uvec2 tlas;
     vec3 origin;
@@ -47,23 +47,23 @@ struct LvkSoftState {
     uint flags;
     uint mask;
     uint id;
-    bool interrupted; // a candidate waits, and the stack is kept in the query
+    bool interrupted; // a candidate waits, and the query stores the stack
     LvkSoftPlace place;
     LvkSoftHit candidate;
     LvkSoftHit committed;
 };
 
-// The structure of an instance, and the ray in its space.
+// The BLAS of an instance, and the ray in its space.
 struct LvkSoftLevel {
     LvkSoftSlabs slabs;
     LvkSoftShear shear;
     uvec2 structure;
-    uint nodes;      // blocks where nodes and primitives begin
+    uint nodes;      // first blocks of nodes and primitives
     uint primitives;
     bool wide;
-    bool several; // it has more than one geometry
-    uint kind;    // of its leaves
-    uint opacity; // of all primitives: LVK_SOFT_CLEAR, LVK_SOFT_OPAQUE, or LVK_SOFT_EACH where each has its own
+    bool several; // more than one geometry
+    uint kind;    // kind of the leaves
+    uint opacity; // of all primitives: LVK_SOFT_CLEAR, LVK_SOFT_OPAQUE, or LVK_SOFT_EACH if primitives differ
     uint cull;    // LVK_RAY_FLAG_CULL_* of faces
     bool flip;
 };
@@ -71,14 +71,14 @@ struct LvkSoftLevel {
 #define LVK_SOFT_ONE_NODE 0x80000000u
 #define LVK_SOFT_ANY_NODE 0x01000000u
 
-// Said as constants, so that compilers drop what a module without candidates does not need.
+// Constants, so that compilers remove the code that a module without candidates does not need.
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
 const bool kLvkSoftHasCandidates = false;
 #else
 const bool kLvkSoftHasCandidates = true;
 #endif
 
-// lavapipe drops what helper invocations write to arrays of their own (mesa 25.0), so these have no stack.
+// lavapipe drops writes of helper invocations to their own arrays (mesa 25.0), so helper invocations have no stack.
 #if defined(LVK_STAGE_FRAGMENT) && defined(LVK_HELPERS_LOSE_ARRAYS)
 #define LVK_SOFT_IS_STACKLESS gl_HelperInvocation
 #else
@@ -91,11 +91,11 @@ const bool kLvkSoftHasCandidates = true;
 
 #define LVK_SOFT_CULL_FACES (LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES | LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES)
 
-// Whose the stack is, and how many queries there were.
+// The query that owns the stack, and the number of queries so far.
 uint lvkSoftOwner = 0u;
 uint lvkSoftQueries = 0u;
 
-// Goes to a node or leaf that a reference names.
+// Moves to the node or leaf of a reference.
 void lvkSoftGo(inout LvkSoftPlace place, uint reference) {
     bool isLeaf = (reference & LVK_SOFT_LEAF) != 0u;
     uint count = (reference & LVK_SOFT_LEAF_COUNT) / LVK_SOFT_LEAF_ONE + 1u;
@@ -116,15 +116,15 @@ uint lvkSoftOpacity(uint marks, uint instanceFlags, uint rayFlags) {
     return (rayFlags & LVK_RAY_FLAG_NO_OPAQUE) != 0u ? LVK_SOFT_CLEAR : opacity;
 }
 
-// The three rows of a matrix, each in a block.
+// Returns the three rows of a matrix, each in a block.
 mat3x4 lvkSoftRows(uvec2 base, uint first) {
     LvkSoftBlocks blocks = LvkSoftBlocks(base);
     return mat3x4(uintBitsToFloat(lvkSoftBlock(blocks, first)), uintBitsToFloat(lvkSoftBlock(blocks, first + 1u)),
                   uintBitsToFloat(lvkSoftBlock(blocks, first + 2u)));
 }
 
-// Three rows of a matrix by a vector. A ray that goes on in an instance it has left must be the same to the bit, so compilers may
-// not do it in other ways in other places.
+// Multiplies three rows of a matrix with a vector. A ray that resumes in an instance must be bitwise the same, so
+// compilers must not compute it differently at different places.
 vec3 lvkSoftTransform(mat3x4 rows, vec4 v) {
     mat4x3 columns = transpose(rows);
     precise vec3 last = columns[3] * v.w;
@@ -132,12 +132,12 @@ vec3 lvkSoftTransform(mat3x4 rows, vec4 v) {
     return moved;
 }
 
-// Where the instances of the structure that is traced lie.
+// Returns the address of the instances of the traced TLAS.
 uvec2 lvkSoftInstances(LvkSoftState state) {
     return lvkSoftBehind(state.tlas, LvkSoftBlocks(state.tlas).at[1].y);
 }
 
-// The structure that an instance means where it names this one, and its first block.
+// Returns the BLAS that an instance with this address refers to, and its first block. Follows a moved BLAS.
 uvec2 lvkSoftStructureOf(uvec2 named, out uvec4 head) {
     head = lvkSoftBlock(LvkSoftBlocks(named), 0u);
     if (head.x != LVK_SOFT_MOVED) {
@@ -148,8 +148,8 @@ uvec2 lvkSoftStructureOf(uvec2 named, out uvec4 head) {
     return moved;
 }
 
-// The structure of an instance with the ray in its space; answers where in it to start, or LVK_SOFT_NONE if the ray passes
-// it by.
+// Returns the BLAS of an instance and the ray in its space. The result is the reference to start at, or LVK_SOFT_NONE
+// if the ray skips the instance.
 uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSoftLevel level) {
     uint first = instance * LVK_SOFT_INSTANCE_BLOCKS;
     uvec4 numbers = lvkSoftBlock(LvkSoftBlocks(instances), first + 6u);
@@ -179,12 +179,12 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     uint skip = isBox ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
     bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftHasCandidates);
     bool culled = level.opacity != LVK_SOFT_EACH && lvkSoftIsCulled(state.flags, level.opacity == LVK_SOFT_OPAQUE);
-    // A part of it, unless the structure has moved, which has others.
+    // The entry point is a part of the BLAS. A moved BLAS has other parts, and is entered at its root.
     uint start = entry != 0u && level.structure == numbers.xy ? entry : head.z;
     return culled || skipped ? LVK_SOFT_NONE : start;
 }
 
-// Takes the next node, of a wide tree, out of the group.
+// Removes the next node of a wide tree from the group.
 uint lvkSoftTakeNode(inout LvkSoftPlace place, LvkSoftLevel level) {
     uint bit = uint(findMSB(place.group.y));
     uint slot = bit - 24u ^ level.slabs.octant;
@@ -216,7 +216,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
     }
 }
 
-// Takes from the stack what was put aside last in this level.
+// Pops the last entry that this level has pushed.
 void lvkSoftResume(inout LvkSoftPlace place, LvkSoftLevel level) {
     uvec2 entry = lvkSoftPop(place.top, level.wide);
     if (level.wide) {
@@ -230,12 +230,12 @@ LvkSoftHit lvkSoftNoHit(float t) {
     return LvkSoftHit(t, 0u, LVK_SOFT_NONE, 0u, uvec2(0u), vec2(0.0), false, false);
 }
 
-// Ends the walk.
+// Ends the traversal.
 void lvkSoftFinish(inout LvkSoftPlace place) {
     place = LvkSoftPlace(LVK_SOFT_NONE, LVK_SOFT_NONE, uvec2(0u), uvec2(0u), 0u, 0u);
 }
 
-// Commits a hit; ends the walk if that is enough.
+// Commits a hit; ends the traversal if that is enough.
 void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHit hit, uint kind) {
     state.committed = hit;
     state.committed.kind = kind;
@@ -244,7 +244,7 @@ void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHi
     }
 }
 
-// The vertices that a triangle names, and the word with its numbers.
+// Returns the vertex indices of a triangle, and the word with its ids.
 uvec4 lvkSoftNames(uvec2 structure, uint primitives, uint kind, uint primitive) {
     if (kind == LVK_SOFT_INDEXED) {
         return LvkSoftBlocks(structure).at[primitives + primitive];
@@ -254,7 +254,7 @@ uvec4 lvkSoftNames(uvec2 structure, uint primitives, uint kind, uint primitive) 
     return uvec4(leaf.xy & LVK_SOFT_NAME, rest.x | rest.y << LVK_SOFT_REST_BITS, leaf.z);
 }
 
-// The corners of a triangle whose leaf begins with block `first`, and in its last three words what the leaf says besides.
+// Returns the vertices of a triangle whose leaf starts at block `first`. `words` are the other words of the leaf.
 void lvkSoftReadTriangle(LvkSoftBlocks blocks, uint first, out vec3 corners[3], out uvec3 words) {
     uvec4 a = lvkSoftBlock(blocks, first);
     uvec4 b = lvkSoftBlock(blocks, first + 1u);
@@ -265,7 +265,7 @@ void lvkSoftReadTriangle(LvkSoftBlocks blocks, uint first, out vec3 corners[3], 
     words = uvec3(a.w, b.w, c.w);
 }
 
-// The same of any kind of leaf.
+// Like lvkSoftReadTriangle, for any kind of leaf.
 void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive, out vec3 corners[3],
                     out uvec3 words) {
     LvkSoftBlocks blocks = LvkSoftBlocks(structure);
@@ -282,14 +282,15 @@ void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive,
     }
 }
 
-// The application's numbers of a triangle, geometry and primitive, from the words of its leaf.
+// Returns the application's ids of a triangle, geometry and primitive, from the words of its leaf.
 uvec2 lvkSoftNumbers(uvec3 words, uint kind, bool several) {
     bool inOneWord = kind != LVK_SOFT_TRIANGLES && several;
     uint geometry = inOneWord ? words.x >> 24 : words.y & 0x7FFFFFFFu;
     return uvec2(geometry, inOneWord ? words.x & 0x00FFFFFFu : words.x);
 }
 
-// Whether a primitive is opaque where each says so itself; leaves that name vertices leave it to their geometry.
+// Returns true if a primitive is opaque, in a BLAS where primitives differ. For leaves with vertex indices, the
+// geometry decides.
 bool lvkSoftSaysOpaque(LvkSoftLevel level, LvkSoftHit hit) {
     if (level.kind == LVK_SOFT_TRIANGLES || level.kind == LVK_SOFT_BOXES) {
         return hit.opaque;
@@ -298,7 +299,7 @@ bool lvkSoftSaysOpaque(LvkSoftLevel level, LvkSoftHit hit) {
     return (LvkSoftBlocks(geometries).at[hit.numbers.x].x & 1u) != 0u;
 }
 
-// Whether the ray meets or touches the box of a primitive, which holds nothing if its corners are in the wrong order.
+// Returns true if the ray hits or touches an AABB primitive. An AABB with swapped minimum and maximum is empty.
 bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     uint first = level.primitives + hit.primitive * LVK_SOFT_BOX_BLOCKS;
     uvec4 a = lvkSoftBlock(LvkSoftBlocks(level.structure), first);
@@ -311,12 +312,12 @@ bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hi
     return all(lessThanEqual(low, high)) && range.x <= range.y;
 }
 
-// The flag that leaves out triangles seen from this side.
+// Returns the flag that culls triangles facing this way.
 uint lvkSoftCulling(bool front) {
     return front ? LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES : LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES;
 }
 
-// Whether the ray hits a triangle between its ends, which do not count themselves, and from a side that counts.
+// Returns true if the ray hits a triangle strictly between tMin and tMax, and the triangle's side is not culled.
 bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     vec3 corners[3];
     uvec3 words;
@@ -336,7 +337,7 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHi
     return (level.cull & lvkSoftCulling(hit.front)) == 0u;
 }
 
-// Tests the next primitive. Answers whether it is a candidate that the shader must judge.
+// Tests the next primitive. Returns true if it is a candidate that the shader must judge.
 bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
     uint primitive = place.leaves.x + uint(findLSB(place.leaves.y));
     place.leaves.y &= place.leaves.y - 1u;
@@ -365,14 +366,14 @@ bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
     return true;
 }
 
-// The reference of the top level to go on with; LVK_SOFT_NONE where none is left.
+// Returns the next reference of the TLAS; LVK_SOFT_NONE if none is left.
 uint lvkSoftNextReference(inout LvkSoftPlace place) {
     uint next = place.next;
     place.next = LVK_SOFT_NONE;
     return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPopReference(place.top);
 }
 
-// The next leaf of the top level that the ray meets, from a node on; LVK_SOFT_NONE where none is left.
+// Returns the next leaf of the TLAS that the ray hits, from a node on; LVK_SOFT_NONE if none is left.
 uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference) {
     LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
     LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction, LVK_SOFT_LEAST);
@@ -388,10 +389,10 @@ uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference
     return reference;
 }
 
-// The next instance whose box the ray meets, or LVK_SOFT_NONE.
+// Returns the next instance whose bounds the ray hits, or LVK_SOFT_NONE.
 uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftPlace place) {
     uint reference = lvkSoftNextReference(place);
-    if ((reference & LVK_SOFT_LEAF) == 0u) { // else a ray would be prepared for nothing
+    if ((reference & LVK_SOFT_LEAF) == 0u) { // otherwise the setup of the ray would be wasted
         reference = lvkSoftDescend(state, place, reference);
     }
     if (reference == LVK_SOFT_NONE) {
@@ -403,7 +404,7 @@ uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftPlace place) {
     return reference & LVK_SOFT_LEAF_FIRST;
 }
 
-// Goes on to the root or part of the next instance that the ray may hit; false where there is none.
+// Moves to the root or part of the next instance that the ray may hit; false if there is none.
 bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSoftLevel level) {
     if (place.next == LVK_SOFT_NONE && place.top == 0u) {
         return false;
@@ -422,14 +423,14 @@ bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSo
     return true;
 }
 
-// Walks through the structure of a level. Answers whether a candidate waits that the shader must judge.
+// Traverses the BLAS of a level. Returns true if a candidate waits that the shader must judge.
 bool lvkSoftWalkLevel(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
     while (true) {
         while (place.leaves.y != 0u) {
             if (lvkSoftTest(state, place, level)) {
                 return true;
             }
-            if (kLvkSoftIsCpu) { // each turn tests a primitive or visits a node
+            if (kLvkSoftIsCpu) { // each iteration tests a primitive or visits a node
                 break;
             }
         }
@@ -450,13 +451,13 @@ bool lvkSoftWalkLevel(inout LvkSoftState state, inout LvkSoftPlace place, LvkSof
     return false;
 }
 
-// Where there are candidates, a walk of its own would take longer to compile than it saves.
+// With candidates, a separate traversal would take longer to compile than it saves.
 #if defined(LVK_DEVICE_IS_CPU) && defined(LVK_OPAQUE_TRIANGLES_ONLY)
 #define LVK_SOFT_HAS_CPU_WALK
 #include <lvk/software_cpu_walk.glsl>
 #endif
 
-// Walks through the structure of the instance. Answers whether a candidate waits that the shader must judge.
+// Traverses the BLAS of the instance. Returns true if a candidate waits that the shader must judge.
 bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
 #ifdef LVK_SOFT_HAS_CPU_WALK
     if (level.wide && level.kind == LVK_SOFT_TRIANGLES) {
@@ -467,7 +468,7 @@ bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
     return lvkSoftWalkLevel(state, place, level);
 }
 
-// Walks on to the next candidate; false when there is none.
+// Traverses to the next candidate; false if there is none.
 bool lvkSoftProceed(inout LvkSoftState state) {
     state.interrupted = false;
     if (state.tlas == uvec2(0u) || LVK_SOFT_IS_STACKLESS) {

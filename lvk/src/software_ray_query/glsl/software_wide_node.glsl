@@ -3,9 +3,9 @@
 
 #include <lvk/software_boxes.glsl>
 
-// A ray against the boxes of a wide node; on CPUs see <lvk/software_cpu_node.glsl>.
+// Intersection of a ray with the bounds of a wide node; on CPUs see <lvk/software_cpu_node.glsl>.
 
-// Of four children of a wide node, those the ray meets, as bits at their places.
+// Returns the children, of four of a wide node, that the ray hits, as bits at their positions.
 uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
     uint met = 0u;
     [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
@@ -17,10 +17,10 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
     return met;
 }
 
-// What of a wide node the ray meets (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
-// Compressed Wide BVHs", 2017): its inner children as a group of nodes, first node and, in the order of the ray, a bit for
-// each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each. `nodes` is the block where
-// nodes begin.
+// Returns the hits of a wide node (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
+// Compressed Wide BVHs", 2017). The hit inner children are a node group: the first node, and from bit 24 on a bit for
+// each, in the order of the ray. The hit leaves are a primitive group: the first primitive and a bit for each. `nodes`
+// is the first block of nodes.
 uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
     LvkSoftBlocks blocks = LvkSoftBlocks(structure);
     uint first = nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
@@ -36,7 +36,7 @@ uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec
     uvec4 nearX = along.x ? x : x.zwxy;
     uvec4 nearY = along.y ? y : y.zwxy;
     uvec4 nearZ = along.z ? z : z.zwxy;
-    // Inner children have 24 and more for their place, which then follows the order of the ray.
+    // The position of inner children is 24 and more; it is permuted by the order of the ray.
     uvec2 inner = (children.zw & (children.zw << 1) & 0x10101010u) >> 4;
     uvec2 counts = children.zw >> 5 & 0x07070707u;
     uvec2 places = (children.zw ^ inner * ray.octant) & 0x1F1F1F1Fu;

@@ -1,4 +1,4 @@
-//! Geometries as the kernels read them.
+//! Geometries in the layout of the kernels.
 
 use std::sync::Arc;
 
@@ -31,11 +31,13 @@ pub(crate) struct GpuGeometry {
     pub(crate) reserved: [u32; 3],
 }
 
-/// The geometries of a structure, which have been checked, as kernels read them. `matrices` is the address of the
-/// matrices that are given by value, a multiple of 16, with 48 bytes for each geometry; `None` where there are none.
+/// Returns validated geometries in the layout of the kernels.
+///
+/// `matrices` is the address of the matrices that are given by value: a multiple of 16, with 48 bytes for each
+/// geometry. It is `None` without such matrices.
 ///
 /// # Errors
-/// A buffer that is gone; more primitives than 32 bits count.
+/// A destroyed buffer; more primitives than 32 bits can count.
 pub(crate) fn gpu_geometries(
     name: &str,
     geometries: &[BlasGeometry],
@@ -61,13 +63,13 @@ pub(crate) fn gpu_geometries(
         list.push(GpuGeometry { first_primitive: primitives, first_vertex: vertices, flags, ..read });
         let too_many = || Error::usage(name, "the geometries have more primitives than 32 bits count");
         primitives = primitives.checked_add(geometry.primitive_count()).ok_or_else(too_many)?;
-        // Of more vertices than this counts leaves hold copies.
+        // With more vertices than 32 bits can count, leaves have copies of positions.
         vertices = vertices.saturating_add(read.vertex_count);
     }
     Ok(list)
 }
 
-/// Vertices that a geometry may name.
+/// Returns the number of vertices that a geometry may refer to.
 pub(crate) fn vertex_count(geometry: &BlasGeometry) -> u32 {
     match geometry {
         BlasGeometry::Triangles(triangles) => triangles.vertex_count,
@@ -108,7 +110,8 @@ fn geometry_triangles(
     })
 }
 
-/// The number of a format that structures are built from, in `positionAt` of `software_ray_query/kernels/input.glsl`.
+/// Returns the id of a vertex format that acceleration structures support, for `positionAt` of
+/// `software_ray_query/kernels/input.glsl`.
 fn format_id(format: VertexFormat) -> Option<u32> {
     Some(match format {
         VertexFormat::F32 => 0,

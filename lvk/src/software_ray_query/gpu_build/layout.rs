@@ -1,4 +1,4 @@
-//! How much memory a build on the GPU takes, and where in it everything lies.
+//! Memory sizes of a build on the GPU, and the offsets of its parts.
 
 use super::geometry::GpuGeometry;
 use super::params::GpuBuildParams;
@@ -6,52 +6,53 @@ use crate::accel::geometry::GeometryFlags;
 use crate::error::{Result, check_limit};
 use crate::software_ray_query::layout::{BLOCK_BYTES, LeafKind};
 
-/// Bytes of the header of a structure.
+/// Bytes of the header of an acceleration structure.
 pub(crate) const HEADER_BYTES: u64 = 128;
 /// Bytes of a binary node.
 const BINARY_NODE_BYTES: u64 = 64;
 /// Bytes of a wide node.
 const WIDE_NODE_BYTES: u64 = 80;
-/// Up to so many primitives are one leaf, without nodes.
+/// Maximum primitives of a BLAS that is a single leaf, without nodes.
 const MAX_SINGLE_LEAF: u32 = 3;
-/// Wide nodes that a thousand primitives have room for, besides the first: what a triangle takes is then 56 bytes with the header.
+/// Capacity in wide nodes for a thousand primitives, in addition to the first nodes. With it, a triangle takes 56 bytes
+/// including the header.
 const BVH8_NODES_PER_THOUSAND: u64 = 99;
 const GEOMETRY_BYTES: u64 = 16;
-/// Bytes of a vertex that leaves name.
+/// Bytes of a vertex that leaves refer to.
 pub(crate) const VERTEX_BYTES: u64 = 12;
 const BLOB_ALIGNMENT: u64 = 256;
-/// A leaf's first primitive has 27 bits.
+/// Maximum primitives: the first primitive of a leaf has 27 bits.
 const MAX_PRIMITIVES: u64 = 1 << 27;
-/// Up to so many primitives one workgroup makes the whole build.
+/// Maximum primitives of a build by one workgroup.
 const MAX_SMALL_BUILD: u32 = 2048;
 /// Keys that a workgroup sorts, `kBlock` of `software_ray_query/kernels/job.glsl`.
 pub(crate) const SORT_BLOCK: u32 = 1024;
 const DIGITS: u32 = 16;
-/// Nodes on a path that traversal has room for.
+/// Maximum nodes on a path that traversal supports.
 pub(crate) const MAX_HEIGHT: u32 = 64;
-/// Of the first word of a code.
+/// Bits of the first word of a code.
 const CODE_BITS: u32 = 30;
 const MAX_IMPROVEMENTS: u32 = 8;
-/// Of top-level structures.
+/// Improvement passes of a TLAS.
 const TLAS_IMPROVEMENTS: u32 = 1;
-/// Words that say how far a build is, `kStateWords` of `software_ray_query/kernels/job.glsl`.
+/// Words of the build state, `kStateWords` of `software_ray_query/kernels/job.glsl`.
 pub(crate) const STATE_WORDS: u64 = 48;
 const BOX_WORDS: u64 = 6;
 
-/// What a bottom-level structure is to hold.
+/// Content of a BLAS to build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BlasShape {
     pub(crate) leaf_kind: LeafKind,
-    /// Of all geometries, inactive ones included.
+    /// Primitives of all geometries, inactive ones included.
     pub(crate) primitive_count: u32,
-    /// Of all geometries; they count only where leaves name them.
+    /// Vertices of all geometries; used only if leaves have vertex indices.
     pub(crate) vertex_count: u32,
     pub(crate) geometry_count: u32,
-    /// How often nodes are given better places, 0 to 8. Each makes builds a little slower and rays faster.
+    /// Number of improvement passes over the tree, 0 to 8. Each makes builds slightly slower and rays faster.
     pub(crate) improvements: u32,
 }
 
-/// Where the parts of a structure lie, in units of 16 bytes from its start; 0 where there is no such part.
+/// Offsets of the parts of an acceleration structure, in units of 16 bytes from its start; 0 for a missing part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct BlobOffsets {
     pub(crate) nodes: u32,
@@ -60,7 +61,7 @@ pub(crate) struct BlobOffsets {
     pub(crate) geometries: u32,
 }
 
-/// Where the parts of the scratch memory of a build lie, in words from its start.
+/// Offsets of the parts of the scratch memory of a build, in words from its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct ScratchOffsets {
     pub(crate) boxes: u32,
@@ -69,63 +70,63 @@ pub(crate) struct ScratchOffsets {
     pub(crate) digits: u32,
     pub(crate) arrivals: u32,
     pub(crate) parents: u32,
-    /// Binary nodes, where the structure has wide ones.
+    /// Binary nodes, if the acceleration structure has wide ones.
     pub(crate) binary: u32,
 }
 
-/// A build on the GPU, as far as counts decide it.
+/// Sizes and offsets of a build on the GPU, as far as counts determine them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct GpuBuildPlan {
     pub(crate) leaf_kind: LeafKind,
-    /// Most primitives or instances.
+    /// Maximum primitives or instances.
     pub(crate) capacity: u32,
     pub(crate) vertex_count: u32,
     pub(crate) geometry_count: u32,
-    /// Most nodes of a bottom-level structure; 0 for a top-level one, whose nodes stay binary.
+    /// Maximum nodes of a BLAS; 0 for a TLAS, whose nodes stay binary.
     pub(crate) wide_capacity: u32,
-    /// Where the parts of the structure lie.
+    /// Offsets of the parts of the acceleration structure.
     pub(crate) offsets: BlobOffsets,
-    /// Bytes of the structure, a multiple of 256.
+    /// Bytes of the acceleration structure, a multiple of 256.
     pub(crate) blob_bytes: u64,
     /// Bytes of scratch memory of a build, at an address that is a multiple of 16.
     pub(crate) scratch_bytes: u64,
     pub(crate) scratch: ScratchOffsets,
-    /// Of the second word of a code; 0 where codes have but one.
+    /// Bits of the second word of a code; 0 for codes of one word.
     pub(crate) low_bits: u32,
-    /// How often nodes are given better places.
+    /// Number of improvement passes over the tree.
     pub(crate) improvements: u32,
 }
 
-/// What a build reads.
+/// The inputs of a build.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum BuildSource {
-    /// As many as the plan has.
+    /// Geometries, as many as the plan has.
     Geometries(Vec<GpuGeometry>),
     /// Records of 64 bytes each (`VkAccelerationStructureInstanceKHR`).
     Instances {
-        /// Where the first lies; a multiple of 16.
+        /// Address of the first record, a multiple of 16.
         records: u64,
-        /// How many, at most the plan's capacity.
+        /// Number of records, at most the plan's capacity.
         count: u32,
-        /// Where records name structures by place: the addresses of the structures, and how many. Without it they
-        /// hold addresses. Address 0, and a place that does not exist, are an instance that no ray meets.
+        /// Address and length of a table of BLAS addresses, if records name their BLAS by index; `None` if they contain
+        /// addresses. Address 0 and an index outside the table are an instance that no ray hits.
         table: Option<(u64, u32)>,
     },
 }
 
 impl GpuBuildPlan {
-    /// Of a bottom-level structure.
+    /// Returns the plan of a BLAS.
     ///
     /// # Errors
-    /// [`LimitExceeded`](Error::LimitExceeded) for more primitives than the format has numbers for.
+    /// [`LimitExceeded`](Error::LimitExceeded) for more primitives than the format can index.
     pub(crate) fn blas(name: &str, shape: &BlasShape) -> Result<Self> {
         Self::new(name, shape)
     }
 
-    /// Of a top-level structure with room for `capacity` instances.
+    /// Returns the plan of a TLAS with a capacity of `capacity` instances.
     ///
     /// # Errors
-    /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the format has numbers for.
+    /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the format can index.
     pub(crate) fn tlas(name: &str, capacity: u32) -> Result<Self> {
         let shape = BlasShape {
             leaf_kind: LeafKind::Instances,
@@ -159,31 +160,32 @@ impl GpuBuildPlan {
         })
     }
 
-    /// Most binary nodes of the build.
+    /// Returns the maximum binary nodes of the build.
     pub(crate) fn node_capacity(&self) -> u32 {
         self.capacity.saturating_sub(1)
     }
 
-    /// What a structure has to have room for beyond [`blob_bytes`](Self::blob_bytes), if all its nodes may be binary, as those
-    /// of some trees of the CPU are.
+    /// Returns the bytes that a BLAS needs in addition to [`blob_bytes`](Self::blob_bytes) if all its nodes are binary.
+    /// Some trees of the CPU are.
     pub(crate) fn bvh2_excess_bytes(&self) -> u64 {
         let wide = u64::from(self.wide_capacity) * WIDE_NODE_BYTES;
         (u64::from(self.node_capacity()) * BINARY_NODE_BYTES).saturating_sub(wide)
     }
 
-    /// Most binary nodes on a path from the root to a leaf, at most [`MAX_HEIGHT`]: every node splits at a bit of the code, or,
-    /// where codes are equal, of the leaf's number. What a path of a top-level structure really has stands in its header.
+    /// Returns the maximum binary nodes on a path from the root to a leaf, at most [`MAX_HEIGHT`]. Every node splits at
+    /// a bit of the code or, for equal codes, of the leaf's index. The header of a TLAS has the actual height.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn max_height(&self) -> u32 {
         (CODE_BITS + self.low_bits + number_bits(self.capacity)).min(self.node_capacity())
     }
 
-    /// Whether one workgroup makes the whole build of `element_count` primitives or instances.
+    /// True if one workgroup makes the whole build of `count` primitives or instances.
     pub(crate) fn is_small(&self, count: u32) -> bool {
         count.max(self.geometry_count) <= MAX_SMALL_BUILD && self.vertex_count <= 3 * MAX_SMALL_BUILD
     }
 
-    /// What the kernels of one build are told. `inputs` is the address of the geometries; instances have their own.
+    /// Returns the parameters of the kernels for one build. `inputs` is the address of the geometries; instances have
+    /// their own address.
     pub(crate) fn build_params(
         &self,
         source: &BuildSource,
@@ -232,7 +234,7 @@ impl GpuBuildPlan {
 }
 
 impl BuildSource {
-    /// Primitives or instances that a build of `plan` looks at.
+    /// Returns the number of primitives or instances that a build of `plan` reads.
     pub(crate) fn element_count(&self, plan: &GpuBuildPlan) -> u32 {
         match self {
             Self::Geometries(_) => plan.capacity,
@@ -241,13 +243,14 @@ impl BuildSource {
     }
 }
 
-/// Lays parts out one behind the other.
+/// Places parts one after the other.
 struct OffsetAllocator {
     end: u64,
 }
 
 impl OffsetAllocator {
-    /// The place of a part of `bytes`, in units of `unit` bytes, which the part's alignment is a multiple of.
+    /// Returns the offset of a part of `bytes`, in units of `unit` bytes. The part's alignment must be a multiple of
+    /// `unit`.
     fn push(&mut self, bytes: u64, alignment: u64, unit: u64) -> u64 {
         let start = self.end.next_multiple_of(alignment);
         self.end = start + bytes;
@@ -255,8 +258,10 @@ impl OffsetAllocator {
     }
 }
 
-/// Bits of the second word of a code. Codes of one word have 1024 cells along an axis: fine enough for few primitives,
-/// and sorted in fewer passes. No code has so many bits that the tree could get too high.
+/// Returns the bits of the second word of a code.
+///
+/// Codes of one word have 1024 cells along an axis: fine enough for few primitives, and sorted in fewer passes. The
+/// number of bits is limited so that the tree cannot exceed [`MAX_HEIGHT`].
 fn low_bit_mask(shape: &BlasShape) -> u32 {
     let few = if shape.leaf_kind == LeafKind::Instances { 1 << 15 } else { 1 << 12 };
     if shape.primitive_count <= few {
@@ -265,12 +270,12 @@ fn low_bit_mask(shape: &BlasShape) -> u32 {
     MAX_HEIGHT - CODE_BITS - number_bits(shape.primitive_count)
 }
 
-/// Bits that the number of a leaf has.
+/// Returns the bits of a leaf's index.
 fn number_bits(count: u32) -> u32 {
     u32::BITS - count.saturating_sub(1).leading_zeros()
 }
 
-/// Bit 0: every geometry is opaque; bit 1: none is.
+/// Returns the header flags. Bit 0: every geometry is opaque; bit 1: no geometry is.
 fn header_flags(source: &BuildSource) -> u32 {
     match source {
         BuildSource::Geometries(list) => {
@@ -281,7 +286,8 @@ fn header_flags(source: &BuildSource) -> u32 {
     }
 }
 
-/// Room for wide nodes: more than most meshes need, and than the full nodes need that any mesh may have in their place.
+/// Returns the capacity in wide nodes. It is more than most meshes need, and more than packed nodes need, which can
+/// replace the nodes of any mesh.
 fn bvh8_node_capacity(shape: &BlasShape) -> u32 {
     const FIRST: u32 = 2;
     match (shape.leaf_kind, shape.primitive_count) {
@@ -308,12 +314,12 @@ fn blob_offsets(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blo
         part(u64::from(shape.geometry_count) * GEOMETRY_BYTES, 16),
     ];
     let bytes = layout.end.next_multiple_of(BLOB_ALIGNMENT);
-    check_limit(name, "structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
+    check_limit(name, "acceleration structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
     let [nodes, primitives, vertices, geometries] = places.map(|place| place as u32);
     Ok((BlobOffsets { nodes, primitives, vertices, geometries }, bytes))
 }
 
-/// All of it is below 2^32 words, as kernels number them: a primitive takes at most 30 and a sixty-fourth.
+/// Returns the offsets. All are below 2^32 words, as kernels need: a primitive takes at most 30 1/64 words.
 fn scratch_offsets(shape: &BlasShape, long_codes: bool) -> (ScratchOffsets, u64) {
     let count = u64::from(shape.primitive_count);
     let nodes = u64::from(shape.primitive_count.saturating_sub(1));
@@ -366,7 +372,7 @@ mod tests {
         )
     }
 
-    /// Fails where parts overlap, are not aligned, or leave the memory.
+    /// Fails if parts overlap, are not aligned, or exceed the memory.
     fn check_parts(mut parts: Vec<(u64, u64)>, start: u64, end: u64) {
         parts.retain(|(_, bytes)| *bytes > 0);
         parts.sort_unstable();
@@ -423,7 +429,7 @@ mod tests {
         assert!(GpuBuildPlan::tlas("s", 0).is_ok());
     }
 
-    /// Wherever wide nodes may be made anew because they had no room, there is room for as many as that takes.
+    /// If wide nodes are built again because they did not fit, the capacity suffices for any count.
     #[test]
     fn there_is_room_for_full_nodes_of_any_count() {
         let full = |count: u32| {
@@ -441,7 +447,7 @@ mod tests {
         }
     }
 
-    /// Of the shapes that flags lead to, with half as many vertices as triangles.
+    /// Shapes that flags lead to, with half as many vertices as triangles.
     #[test]
     fn a_triangle_takes_56_bytes_or_26_with_low_memory() {
         let count = 1_000_000;

@@ -1,8 +1,8 @@
-//! Builds and refits of software structures on the GPU: which kernels run, in which order.
+//! Builds and refits of software acceleration structures on the GPU: the kernels and their order.
 //!
-//! A build sorts primitives along a space-filling curve, finds the hierarchy of their codes, and fits boxes from the
-//! leaves up. Of bottom-level structures eight children at a time then become one node; see [`steps`] for the order of the
-//! kernels. Many builds are recorded side by side.
+//! A build sorts primitives along a space-filling curve, finds the hierarchy of their codes, and fits bounds from the
+//! leaves up. In a BLAS, nodes are then collapsed to eight children each. See [`steps`] for the order of the kernels.
+//! Many builds are recorded side by side.
 
 pub(crate) mod geometry;
 pub(crate) mod layout;

@@ -1,4 +1,4 @@
-//! What the kernels of a build are told.
+//! Parameters of the build kernels.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -30,7 +30,7 @@ pub(crate) struct GpuBuildParams {
     pub(crate) improvements: u32,
     pub(crate) wide_capacity: u32,
     pub(crate) header_flags: u32,
-    /// Fills the record to a multiple of 16 bytes.
+    /// Pads the record to a multiple of 16 bytes.
     pub(crate) unused: [u32; 2],
 }
 

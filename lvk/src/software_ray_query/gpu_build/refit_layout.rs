@@ -1,4 +1,4 @@
-//! Refits of structures, whoever built them.
+//! Refits of BLASes, built by the CPU or the GPU.
 
 use bytemuck::Zeroable;
 
@@ -10,30 +10,30 @@ const ARRIVAL_BYTES: u64 = 4;
 const PARENT_BYTES: u64 = 4;
 const BOX_BYTES: u64 = 24;
 
-/// How nodes are kept, by the numbers of the structure's header.
+/// Format of nodes, by the number in the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub(crate) enum NodeFormat {
-    /// Eight children with boxes of 8 bits, 80 bytes.
+    /// Eight children with bounds of 8 bits, 80 bytes.
     Wide = 0,
     /// Two children, 64 bytes.
     Binary = 1,
 }
 
-/// A bottom-level structure that is to be refitted.
+/// Layout of a BLAS to refit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct GpuRefitPlan {
     pub(crate) format: NodeFormat,
     pub(crate) leaf_kind: LeafKind,
     pub(crate) offsets: BlobOffsets,
-    /// Nodes there are, or at most.
+    /// Number of nodes, or an upper bound.
     pub(crate) node_count: u32,
-    /// Primitives in leaves, or at most.
+    /// Number of primitives in leaves, or an upper bound.
     pub(crate) primitive_count: u32,
 }
 
 impl GpuRefitPlan {
-    /// Of a bottom-level structure that was built on the GPU.
+    /// Returns the plan of a BLAS that was built on the GPU.
     pub(crate) fn from_build(plan: &GpuBuildPlan) -> Self {
         Self {
             format: NodeFormat::Wide,
@@ -44,13 +44,13 @@ impl GpuRefitPlan {
         }
     }
 
-    /// Bytes of scratch memory, at an address that is a multiple of 16.
+    /// Returns the bytes of scratch memory, at an address that is a multiple of 16.
     pub(crate) fn scratch_bytes(&self) -> u64 {
         let boxes = if self.format == NodeFormat::Wide { BOX_BYTES } else { 0 };
         (u64::from(self.node_count) * (ARRIVAL_BYTES + PARENT_BYTES + boxes)).next_multiple_of(16)
     }
 
-    /// What the kernels of one refit are told. `inputs` is the address of `input_count` geometries.
+    /// Returns the parameters of the kernels for one refit. `inputs` is the address of `input_count` geometries.
     pub(crate) fn refit_params(
         &self,
         inputs: u64,

@@ -1,4 +1,4 @@
-//! Which kernels run in which order, and which of them side by side.
+//! The order of the build kernels, and their parallel phases.
 
 use crate::kernels::Kernel;
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SORT_BLOCK};
@@ -7,25 +7,25 @@ use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 
 /// Invocations of a workgroup, `kGroup` of `software_ray_query/kernels/job.glsl`.
 const WORKGROUP_SIZE: u32 = 128;
-/// Passes over the first word of codes, four bits each, and at most over both words.
+/// Passes over the first word of codes with four bits each, and the maximum passes over both words.
 const FIRST_WORD_PASSES: u32 = 8;
 const MAX_PASSES: u32 = 16;
 
 /// One dispatch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BuildStep {
-    /// Steps of a phase run side by side; a phase waits for the one before.
+    /// Steps of a phase run side by side. A phase waits for the previous one.
     pub(crate) phase: u32,
     pub(crate) kernel: Kernel,
-    /// Which job, or the first of several that a workgroup each works on.
+    /// Index of the job, or of the first of several jobs with a workgroup each.
     pub(crate) job: u32,
-    /// Which pass of the sort, or how many jobs there are with a workgroup each.
+    /// Index of the sort pass or of the level, or the number of jobs with a workgroup each.
     pub(crate) pass_or_jobs: u32,
     pub(crate) groups: u32,
 }
 
-/// The steps of builds, by phases. Job `i` is build `order[i]`: those that one workgroup makes come first, by kind, so that
-/// one dispatch has them all.
+/// Returns the steps of builds, sorted by phase. Job `i` is build `order[i]`. Builds by one workgroup come first, by
+/// kind, so that one dispatch contains all of a kind.
 pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usize>, Vec<BuildStep>) {
     let mut order: Vec<usize> = (0..builds.len()).collect();
     let small = |build: &usize| {
@@ -83,7 +83,8 @@ fn large_build_steps(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<
     }
 }
 
-/// The steps from a binary tree to the structure, from a phase on. Whether wide nodes had room only the last two know.
+/// Returns the steps from a binary tree to the BLAS, starting at a phase. Only the last two steps know whether the wide
+/// nodes fit.
 pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<BuildStep> {
     let groups = |invocations: u32| invocations.div_ceil(WORKGROUP_SIZE).max(1);
     let step = |nth, kernel, level, invocations| BuildStep {
@@ -93,7 +94,7 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
         pass_or_jobs: level,
         groups: groups(invocations),
     };
-    // Eight times as many nodes as in the level above, as long as there can be so many.
+    // Eight times as many nodes as in the level above, up to the capacity.
     let nodes = |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity);
     let levels = if plan.wide_capacity > 0 { MAX_BVH8_DEPTH as u32 } else { 0 };
     let written = plan.capacity.max(plan.geometry_count).max(plan.vertex_count);
@@ -104,7 +105,7 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
     steps
 }
 
-/// The steps that sort the keys of a build, the low words first.
+/// Returns the steps that sort the keys of a build, the low words first.
 pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<BuildStep> {
     let blocks = count.div_ceil(SORT_BLOCK).max(1);
     let passes = low_bits.div_ceil(4) + FIRST_WORD_PASSES;
@@ -125,7 +126,7 @@ pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<BuildStep> 
     (0..passes).flat_map(pass).collect()
 }
 
-/// The steps of refits, by phases; job `i` is refit `i`.
+/// Returns the steps of refits, sorted by phase; job `i` is refit `i`.
 pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<BuildStep> {
     let mut steps = Vec::new();
     for (job, plan) in (0..).zip(refits) {

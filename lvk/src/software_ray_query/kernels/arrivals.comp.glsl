@@ -1,4 +1,4 @@
-// Nobody has arrived anywhere.
+// Resets the arrival counters of all nodes.
 void main() {
     readJob(firstJob);
     uint i = invocation();

@@ -1,8 +1,8 @@
-// The parent of each node, and which child of it the node is.
+// Writes the parent of a node, and its child index there.
 void writeParent(uint child, uint parent, uint which) { Words(job.parents).word[child] = parent | which << 29; }
 
-// Counts of the children that arrived at each node. Fitting starts where both children are leaves, which has to be known
-// beforehand: others may change a node before its own invocation looks at it.
+// Counters of the children that arrived at each node. Fitting starts at nodes whose children are both leaves. These are
+// marked in advance: other invocations may change a node before its own invocation reads it.
 const uint kStart = 0x80000000u;
 
 void writeArrivals(uint node, bool start) { Words(work(job.arrivals)).word[node] = start ? kStart : 0u; }

@@ -1,4 +1,4 @@
-// Bounds of the centres of all primitives, first of a workgroup, then of all.
+// Reduces the bounds of the centres of all primitives, first of a workgroup, then of all.
 shared vec3 groupLo[128];
 shared vec3 groupHi[128];
 shared uint groupActive[128];
@@ -28,7 +28,7 @@ void extendBounds(Box centres, uint actives) {
     }
 }
 
-// Keeps the box of a primitive and answers its centre as a box; empty where the primitive is inactive.
+// Stores the bounds of a primitive and returns its centre as bounds; empty if the primitive is inactive.
 Box keepBox(uint i, Box box, inout uint actives) {
     writeBox(Corners(work(job.boxes)), i, box);
     if (isEmpty(box)) return box;

@@ -1,4 +1,4 @@
-// Axis-aligned boxes, and bounds that many invocations extend.
+// AABBs, and bounds that many invocations extend.
 struct Box { vec3 lo; vec3 hi; };
 
 const float kFar = 3.402823466e38;
@@ -7,7 +7,7 @@ Box emptyBox() { return Box(vec3(kFar), vec3(-kFar)); }
 
 bool isEmpty(Box box) { return box.lo.x > box.hi.x; }
 
-// As builds on the CPU end them (FARTHEST in lvk/src/software/mesh.rs): sides and areas of all still are numbers.
+// Clamps like builds on the CPU (MAX_COORDINATE in software_ray_query/bvh/primitives.rs): sides and areas stay finite.
 vec3 ended(vec3 v) {
     const float kFarthest = 1e15;
     return clamp(v, vec3(-kFarthest), vec3(kFarthest));
@@ -17,7 +17,7 @@ Box around(vec3 a, vec3 b, vec3 c) { return Box(ended(min(a, min(b, c))), ended(
 
 Box join(Box a, Box b) { return Box(min(a.lo, b.lo), max(a.hi, b.hi)); }
 
-// By bits: compilers may take it that no number is infinite or none at all.
+// Tests bits: compilers may assume that no float is infinite or NaN.
 bool isFinite(vec3 v) {
     return all(notEqual(floatBitsToUint(v) & uvec3(0x7f800000u), uvec3(0x7f800000u)));
 }
@@ -33,7 +33,7 @@ float areaOf(Box box) {
 
 vec3 centre(Box box) { return box.lo * 0.5 + box.hi * 0.5; }
 
-// Floats as integers of the same order.
+// Maps floats to integers of the same order.
 uvec3 ordered(vec3 v) {
     uvec3 bits = floatBitsToUint(v);
     return mix(bits | 0x80000000u, ~bits, notEqual(bits & 0x80000000u, uvec3(0)));

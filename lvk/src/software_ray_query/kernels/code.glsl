@@ -1,4 +1,4 @@
-// Codes of places along a space-filling curve (Morton order), of 30 to 60 bits.
+// Codes of positions along a space-filling curve (Morton order), of 30 to 60 bits.
 uint spread(uint v) {
     v = (v | v << 16) & 0x030000ffu;
     v = (v | v << 8) & 0x0300f00fu;
@@ -8,7 +8,7 @@ uint spread(uint v) {
 
 uint interleave(uvec3 v) { return spread(v.x) << 2 | spread(v.y) << 1 | spread(v.z); }
 
-// Where primitive `i` lies in the bounds of all centres, by cells that are cubes. High word, low word.
+// Returns the code of the box's centre in the bounds of all centres, with cubic cells. High word, low word.
 uvec2 codeOf(Box box) {
     Quads all_ = Quads(job.scratch);
     uvec4 first = all_.quad[0], second = all_.quad[1];
@@ -23,7 +23,7 @@ uvec2 codeOf(Box box) {
     return uvec2(interleave(cell >> 10), interleave(cell & 1023u) >> 30u - job.lowBits);
 }
 
-// Writes the key of primitive `i`; those that are inactive sort behind all others.
+// Writes the key of primitive `i`; inactive primitives sort after all others.
 void writeKey(uint i) {
     Box box = readBox(Corners(work(job.boxes)), i);
     uvec2 code = isEmpty(box) ? uvec2(kNone) : codeOf(box);

@@ -1,4 +1,4 @@
-// The key of every primitive.
+// Writes the key of every primitive.
 void main() {
     readJob(firstJob);
     uint i = invocation();

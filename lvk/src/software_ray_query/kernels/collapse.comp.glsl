@@ -1,4 +1,4 @@
-// The wide nodes of a level.
+// Builds the wide nodes of a level.
 void main() {
     readJob(firstJob);
     uvec2 nodes = nodesOfLevel(passOrJobs);

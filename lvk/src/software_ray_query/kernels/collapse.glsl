@@ -1,17 +1,17 @@
-// Makes nodes of eight children out of binary ones, from the root down, a level at a time: every wide node takes the place of
-// a binary node and of as many below it as it has room for, the largest first. Nobody waits for anybody.
+// Collapses binary nodes to nodes of eight children, from the root down, a level at a time. Every wide node replaces a
+// binary node and as many nodes below it as fit, the largest first. No invocation waits for another.
 
-// Nodes on a path that walks have room for.
+// Maximum nodes on a path that traversal supports.
 const uint kLevels = 32u;
 
-// What falls into so few groups is no node of its own: its groups become leaves of the node above. So no node has few
-// children, and there is room for all.
+// A subtree of at most this many groups becomes no node of its own: its groups become leaves of the node above. So no
+// node has few children, and all nodes fit.
 const uint kFewGroups = 4u;
 
-// What rays save where a group becomes two, beside what they save where a node does.
+// Gain of splitting a group, relative to that of splitting a node.
 const float kGroupWorth = 0.5;
 
-// The binary nodes and leaves that a wide node has below it.
+// The parts of a wide node: binary nodes and leaves.
 uint cutCount;
 uint cutReference[kChildren];
 uint cutShape[kChildren];
@@ -25,13 +25,13 @@ void setCut(uint at, uint reference, Fitted what) {
 
 bool isGroup(uint shape) { return countOf(shape) <= kMostOfGroup; }
 
-// Children that something of this shape takes at least.
+// Returns the minimum children that a subtree of this shape needs.
 uint childrenOf(uint shape, bool isTall) {
     uint groups = groupsOf(shape);
     return isTall || groups > kFewGroups ? 1u : groups;
 }
 
-// Which of the cut to take apart next: the largest, or of what is too tall the tallest; kNone where nothing is left.
+// Returns the part to split next: the largest, or the tallest if the subtree is too tall; kNone if none is left.
 uint nextToOpen(uint closed, bool isTall) {
     uint next = kNone;
     float most = -1.0;
@@ -47,15 +47,15 @@ uint nextToOpen(uint closed, bool isTall) {
     return next;
 }
 
-// Cuts the tree below a binary node into what becomes children of the wide node in its place. Where paths would get longer
-// than walks have room for, the tallest part is opened first, so that three levels end here.
+// Splits the subtree of a binary node into the children of the wide node that replaces it. If paths would exceed the
+// depth of traversal, the tallest part is split first, so that three levels end here.
 void cutBelow(uint number, uint level) {
     Node top = readNode(number);
     [[dont_unroll]] for (uint which = 0; which < 2; ++which) setCut(which, referenceOf(top, which), childOf(top, which));
     cutCount = 2u;
     bool isTall = (heightOf(above(cutShape[0], cutShape[1])) + 1u) / 3u > kLevels - 1u - level;
     uint taken = childrenOf(cutShape[0], isTall) + childrenOf(cutShape[1], isTall);
-    uint closed = 0u;  // what has no room if opened
+    uint closed = 0u;  // parts that do not fit if split
     [[dont_unroll]] while (cutCount < kChildren) {
         uint next = nextToOpen(closed, isTall);
         if (next == kNone) return;
@@ -73,10 +73,10 @@ void cutBelow(uint number, uint level) {
     }
 }
 
-// Which of the cut each child is; kNone where it is missing.
+// The index of the part of each child; kNone for a missing child.
 uint cutOf[kChildren];
 
-// For each of the cut the best child that is free, and how far along the direction of that child it lies.
+// For each part the best free child, and the part's distance along the direction of that child.
 uint cutChild[kChildren];
 float cutAlong[kChildren];
 
@@ -93,8 +93,8 @@ void findChild(uint k, vec3 middle) {
     }
 }
 
-// Which child each of the cut becomes: rays visit last what lies along their direction, seen from the middle. What lies
-// farthest out chooses first.
+// Assigns a child to each part. Rays visit the parts along their direction, seen from the middle, last. The outermost
+// part chooses first.
 void order() {
     Box whole = cutBox[0];
     [[dont_unroll]] for (uint k = 1; k < cutCount; ++k) whole = join(whole, cutBox[k]);
@@ -118,7 +118,7 @@ void order() {
 
 void placePrimitive(uint slot, uint reference) { Words(work(job.spareKeys)).word[slot] = reference & 0x07ffffffu; }
 
-// Puts up to three primitives into slots one behind the other.
+// Writes up to three primitives to consecutive slots.
 void placeGroup(uint slot, uint reference) {
     if (isLeaf(reference)) {
         placePrimitive(slot, reference);
@@ -137,7 +137,7 @@ void placeGroup(uint slot, uint reference) {
     }
 }
 
-// Room for nodes that follow each other; kNone where there is none.
+// Allocates consecutive nodes; returns kNone if they do not fit.
 uint roomForNodes(uint count, uint level) {
     if (count == 0u) return 0u;
     uint first = atomicAdd(state().word[kWideNodes], count);
@@ -146,8 +146,8 @@ uint roomForNodes(uint count, uint level) {
     return first;
 }
 
-// Writes a wide node but for its boxes, and says to those below which binary nodes they are made of. False where there is no
-// room for them.
+// Writes a wide node except its bounds, and the binary node of each wide child into that child. Returns false if the
+// children do not fit.
 bool link(Words node, uint level) {
     uint inner = 0u, count = 0u;
     uvec2 metas = uvec2(0);
@@ -185,7 +185,7 @@ bool link(Words node, uint level) {
     return true;
 }
 
-// Makes wide node `i`.
+// Builds wide node `i`.
 void collapse(uint i, uint level) {
     Words node = wideAt(i);
     cutBelow(node.word[0], level);
@@ -196,7 +196,7 @@ void collapse(uint i, uint level) {
     encode(node, child);
 }
 
-// The numbers of the wide nodes of a level: the first, and the one behind the last.
+// Returns the range of the wide nodes of a level: the first, and the one after the last.
 uvec2 nodesOfLevel(uint level) {
     Words all_ = state();
     return uvec2(level == 0u ? 0u : all_.word[kEnds + level - 1u], all_.word[kEnds + level]);

@@ -1,15 +1,16 @@
-// Boxes of the children of wide nodes, encoded so that no box loses anything: Ylitie, Karras, Laine, "Efficient Incoherent
-// Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017.
+// Encodes the bounds of the children of wide nodes conservatively: Ylitie, Karras, Laine, "Efficient Incoherent Ray
+// Traversal on GPUs Through Compressed Wide BVHs", HPG 2017.
 
-// The smallest power of two by whose 255 steps the extent is covered, as an exponent with its bias.
+// Returns the smallest power of two whose 255 steps cover the extent, as a biased exponent.
 uint exponentOf(float extent) {
     const float kSlack = 1e-4;
     uint exponent = clamp(floatBitsToUint(extent / 255.0) >> 23, 1u, 253u);
     return ceil(extent / uintBitsToFloat(exponent << 23) + kSlack) > 255.0 ? exponent + 1 : exponent;
 }
 
-// The same for each axis. Where a node is much thinner than it is wide, its thickness counts as more, so that rays which run along
-// it and touch it take longer to leave the outermost step than to get there. The CPU's nodes are alike (`widen` in wide_tree.rs).
+// Returns the exponents of all axes. If a node is much thinner than it is wide, its thickness is increased. Rays that
+// run along the node and touch it then take longer to leave the outermost step than to reach it. See `widen_thin_node`
+// in bvh/bvh8.rs.
 uvec3 exponentsOf(vec3 extent) {
     const uint kThin = 20u, kOfPoint = 87u;
     uvec3 each = uvec3(exponentOf(extent.x), exponentOf(extent.y), exponentOf(extent.z));
@@ -18,12 +19,12 @@ uvec3 exponentsOf(vec3 extent) {
     return max(each, uvec3(isPoint ? kOfPoint : max(most, kThin + 1u) - kThin));
 }
 
-// Steps from the corner of the node, with what rounding may take away.
+// Returns the steps from the node's minimum, with a margin for rounding.
 uint stepsDown(float distance_, float unit) { return uint(clamp(floor(distance_ / unit - 1e-4), 0.0, 255.0)); }
 
 uint stepsUp(float distance_, float unit) { return uint(clamp(ceil(distance_ / unit + 1e-4), 0.0, 255.0)); }
 
-// Writes the boxes of all children, and answers what they have in common.
+// Writes the bounds of all children, and returns their union.
 Box encode(Words node, Box child[kChildren]) {
     Box all_ = emptyBox();
     [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) all_ = join(all_, child[i]);

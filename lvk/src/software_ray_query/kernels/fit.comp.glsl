@@ -1,4 +1,4 @@
-// The boxes of binary nodes.
+// Fits the bounds of binary nodes.
 void main() {
     readJob(firstJob);
     fitFrom(invocation());

@@ -1,5 +1,5 @@
-// Fits the boxes of binary nodes, bottom up. A node's own invocation starts where both children are leaves; above, the
-// child that arrives last goes on, so that nobody ever waits.
+// Fits the bounds of binary nodes, bottom up. A node's own invocation starts if both children are leaves. Above, the
+// invocation of the child that arrives last continues, so that none waits.
 void finish(Fitted root) {
     Corners to = Corners(plus(job.blob, 48u, 0u));
     to.corner[0] = root.box.lo;
@@ -7,7 +7,7 @@ void finish(Fitted root) {
     header().word[18] = heightOf(root.shape);
 }
 
-// Fits what can be fitted from node `i` up to the root.
+// Fits nodes from node `i` up to the root, as far as possible.
 void fitFrom(uint i) {
     uint nodes = min(header().word[8], job.nodeCapacity);
     if (nodes == 0u && i == 0u) finish(Fitted(leafBox(header().word[2]), 0u));
@@ -16,7 +16,7 @@ void fitFrom(uint i) {
     uint number = i;
     uint which = 0u;
     fitLeaf(number, which, Words(nodeAt(number)).word[3]);
-    // Each step goes one node up; a damaged structure with a circle ends too.
+    // Each step goes one node up. A damaged BLAS with a cycle terminates too.
     [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
         uint sibling = Words(nodeAt(number)).word[which == 0u ? 7 : 3];
         if (isLeaf(sibling)) {

@@ -1,4 +1,4 @@
-// The boxes of wide nodes that were made anew.
+// Fits the bounds of packed wide nodes.
 void main() {
     readJob(firstJob);
     if (isPacked()) fitWideFrom(invocation());

@@ -1,4 +1,4 @@
-// The boxes of wide nodes.
+// Fits the bounds of wide nodes.
 void main() {
     readJob(firstJob);
     fitWideFrom(invocation());

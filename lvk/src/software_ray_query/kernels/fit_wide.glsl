@@ -1,4 +1,4 @@
-// Fits the boxes of wide nodes, bottom up, and encodes them anew. What is below each child stays.
+// Fits the bounds of wide nodes, bottom up, and encodes them again. The references to children stay.
 uint byteOf(Words node, uint word, uint child) { return node.word[word + child / 4] >> (child & 3u) * 8u & 0xffu; }
 
 Box wideChild(Words node, uint child) {
@@ -11,7 +11,7 @@ Box wideChild(Words node, uint child) {
     return readBox(Corners(work(job.boxes)), number);
 }
 
-// Encodes a node anew around its children; answers the box of them all.
+// Encodes a node again around its children; returns the union of their bounds.
 Box encodeAnew(Words node) {
     Box child[kChildren];
     [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) child[i] = wideChild(node, i);
@@ -24,7 +24,7 @@ void finishWide(Box box) {
     to.corner[1] = box.hi;
 }
 
-// Fits what can be fitted from node `i` up to the root: it starts where no child is a node.
+// Fits nodes from node `i` up to the root, as far as possible. Starts at nodes without inner children.
 void fitWideFrom(uint i) {
     uint nodes = min(header().word[8], job.nodeCapacity);
     if (nodes == 0u && i == 0u) finishWide(leafBox(header().word[2]));

@@ -1,4 +1,4 @@
-// The boxes of binary nodes, and better places for some of them.
+// Fits the bounds of binary nodes, and improves the tree by rotations.
 void main() {
     readJob(firstJob);
     fitFrom(invocation());

@@ -1,8 +1,8 @@
-// Triangles and boxes as the caller's buffers hold them.
+// Triangles and AABBs in the caller's buffers.
 struct Geometry {
-    uvec2 data;          // positions or boxes
+    uvec2 data;          // positions or AABBs
     uvec2 indices;
-    uvec2 matrix;        // 0 if there is none
+    uvec2 matrix;        // 0 without a matrix
     uint stride;
     uint format;
     uint indexBytes;     // 0, 2 or 4
@@ -16,7 +16,7 @@ struct Geometry {
 };
 
 const uint kGeometryBytes = 64u;
-// Their words.
+// Word indices of these fields.
 const uint kFirstPrimitive = 10u;
 const uint kFirstVertex = 11u;
 
@@ -26,7 +26,7 @@ Geometry readGeometry(uint number) {
     return Geometry(a.xy, a.zw, b.xy, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w);
 }
 
-// Four bytes from any address; reads no word that has none of them.
+// Returns four bytes from any address; reads only words that contain one of them.
 uint wordAt(uvec2 address) {
     Inputs at = Inputs(uvec2(address.x & ~3u, address.y));
     uint shift = (address.x & 3u) * 8u;
@@ -39,7 +39,7 @@ uint halfAt(uvec2 address) {
     return (address.x & 2u) == 0u ? word & 0xffffu : word >> 16;
 }
 
-// Positions of 32-bit numbers lie at multiples of four bytes.
+// Positions of 32-bit numbers are aligned to four bytes.
 vec3 widePosition(uvec2 at, uint format) {
     if (format == 2u || format == 3u) return uintBitsToFloat(InputTriples(at).triple[0]);
     Inputs words = Inputs(at);
@@ -72,7 +72,7 @@ uvec3 cornersOf(Geometry g, uint primitive) {
     return InputTriples(at).triple[0];
 }
 
-// A triangle, or the two corners of a box. Inactive where a number is none, or an index beyond the vertices.
+// A triangle, or minimum and maximum of an AABB. Inactive if a coordinate is NaN, or an index exceeds the vertex count.
 struct Primitive {
     bool isActive;
     uvec3 corner;
@@ -122,7 +122,7 @@ Box boxOf(Primitive found) {
     return around(found.a, found.b, found.c);
 }
 
-// The last geometry that starts at or before number `i`, counted in primitives or vertices.
+// Returns the last geometry that starts at or before index `i`, counted in primitives or vertices.
 uint geometryOf(uint i, bool vertices) {
     uint word = vertices ? kFirstVertex : kFirstPrimitive;
     uint low = 0, high = job.inputCount;

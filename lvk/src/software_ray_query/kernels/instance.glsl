@@ -1,18 +1,18 @@
-// Instances: records as the caller's buffers hold them, and as the structure keeps them.
+// Instances: records in the caller's buffers, and in the TLAS.
 const uint kInstanceBytes = 128u;
 
-// A header that only says where the structure lies now.
+// Format of a header that only contains the new address of a moved BLAS.
 const uint kMoved = 2u;
 
 struct Affine { vec3 x; vec3 y; vec3 z; vec3 t; };
 
 vec3 apply(Affine m, vec3 p) { return m.x * p.x + m.y * p.y + m.z * p.z + m.t; }
 
-// The largest power of two that is no larger, of a positive number.
+// Returns the largest power of two that is not above a positive number.
 float powerBelow(float v) { return uintBitsToFloat(floatBitsToUint(v) & 0x7f800000u); }
 
-// The inverse, by cofactors of the matrix over about its largest number; false where there is none, but for what rounding may
-// make of it. `NOTHING` in lvk/src/software/instances.rs is the same share.
+// Inverts a matrix by its cofactors, scaled by its largest number. Returns false if it is singular within rounding
+// errors. `SINGULAR_EPSILON` in software_ray_query/bvh/encode_instances.rs is the same share.
 bool invert(Affine m, out Affine inverse) {
     const float kNothing = 4.76837158e-7;
     vec3 most = max(abs(m.x), max(abs(m.y), abs(m.z)));
@@ -32,13 +32,13 @@ bool invert(Affine m, out Affine inverse) {
     return isFinite(inverse.x) && isFinite(inverse.y) && isFinite(inverse.z) && isFinite(inverse.t);
 }
 
-// Finite numbers, and something else in place of those that are none: infinite ones that met.
+// Clamps to finite numbers, and replaces NaN (of infinities that met) by `other`.
 vec3 numberOr(vec3 v, float other) {
     bvec3 isNone = greaterThan(floatBitsToUint(v) & uvec3(0x7fffffffu), uvec3(0x7f800000u));
     return mix(clamp(v, vec3(-kFar), vec3(kFar)), vec3(other), isNone);
 }
 
-// Around the box as a matrix moves it, with what rounding may take away, here and where rays are moved.
+// Returns the bounds of a transformed box, with a margin for rounding here and where rays are transformed.
 Box moved(Affine m, Box box) {
     const float kRounding = 6e-7;
     const float kRays = 1.0 / 1048576.0;
@@ -58,7 +58,7 @@ uvec2 structureOf(uvec2 named) {
     return uvec2(entry.word[0], entry.word[1]);
 }
 
-// Keeps an instance and answers its box in the world; empty where no ray can meet it.
+// Stores an instance and returns its bounds in the world; empty if no ray can hit it.
 Box keepInstance(uint i) {
     InputQuads record = InputQuads(element(job.inputs, i, 64u));
     uvec4 a = record.quad[0], b = record.quad[1], c = record.quad[2], numbers = record.quad[3];
@@ -73,7 +73,7 @@ Box keepInstance(uint i) {
     bool isActive = finite && numbers.x >> 24 != 0u && structure != uvec2(0) && invert(m, inverse);
     if (!isActive) return emptyBox();
     uvec4 start = InputQuads(structure).quad[0];
-    // An address, as references that depend on a condition are too much for some drivers.
+    // An address, because some drivers do not support buffer references that depend on a condition.
     uvec2 shown = start.x == kMoved ? start.zw : structure;
     if (start.x == kMoved) start = InputQuads(shown).quad[0];
     if (start.z == kNone) return emptyBox();

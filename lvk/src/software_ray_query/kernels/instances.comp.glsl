@@ -1,4 +1,4 @@
-// Keeps every instance, its box in the world, and the bounds of all.
+// Stores every instance and its bounds in the world, and reduces the bounds of all.
 void main() {
     readJob(firstJob);
     uint i = invocation();

@@ -1,4 +1,4 @@
-// What every kernel of a build on the GPU works on.
+// Parameters and memory of every kernel of a build on the GPU.
 layout(local_size_x = 128) in;
 
 const uint kGroup = 128u;
@@ -7,12 +7,12 @@ const uint kBlock = kGroup * kItems;  // keys that a workgroup sorts
 const uint kNone = 0xffffffffu;
 const uint kLeaf = 0x80000000u;
 
-// Kernels whose invocations read what others of the same dispatch wrote say `coherent` here.
+// Kernels whose invocations read writes of others in the same dispatch define this as `coherent`.
 #ifndef LVK_SHARED
 #define LVK_SHARED
 #endif
 
-// Memory by words, by three, and by four at a time: fewer accesses are faster to run and to compile.
+// Memory by one, three, and four words: fewer accesses are faster to run and to compile.
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Inputs { uint word[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer InputTriples { uvec3 triple[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer InputQuads { uvec4 quad[]; };
@@ -21,7 +21,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) LVK_SHARED buffer C
 layout(buffer_reference, scalar, buffer_reference_align = 4) LVK_SHARED buffer Triples { uvec3 triple[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) LVK_SHARED buffer Quads { uvec4 quad[]; };
 
-// Formats and leaf kinds as the header has them.
+// Formats and leaf kinds, as in the header.
 const uint kWide = 0u;
 const uint kBinary = 1u;
 const uint kTriangles = 0u;
@@ -32,35 +32,35 @@ const uint kPackedTriangles = 4u;
 
 struct Job {
     uvec2 inputs;        // geometries, or the records of instances
-    uvec2 table;         // addresses of structures that records name by place; 0 where they hold addresses
-    uvec2 blob;          // the structure
+    uvec2 table;         // BLAS addresses that records refer to by index; 0 if records contain addresses
+    uvec2 blob;          // the BLAS or TLAS
     uvec2 scratch;
     uvec2 parents;       // of each node, a word in the scratch memory
-    uvec2 binary;        // nodes of two children: of what ends with wide nodes in the scratch memory
+    uvec2 binary;        // nodes of two children; in the scratch memory if the build ends with wide nodes
     uint count;          // primitives of the inputs, inactive ones included
     uint inputCount;     // geometries, or addresses in `table`
     uint leafKind;
-    uint lowBits;        // of the second word of a code; 0 where codes have but one
-    uint nodes;          // places in the structure, in units of 16 bytes; these are of the nodes it ends with
+    uint lowBits;        // of the second word of a code; 0 for codes of one word
+    uint nodes;          // offsets in the BLAS or TLAS, in units of 16 bytes; this one is of its final nodes
     uint primitives;
     uint vertices;
     uint geometries;
-    uint vertexCount;    // vertices of the copy that leaves name
-    uint boxes;          // places in the scratch memory, in words: six floats for each primitive or wide node
-    uint keys;           // codes and numbers of primitives
-    uint spareKeys;      // afterwards the number of the primitive in each slot of the leaves
-    uint digits;         // how often each digit occurs in each block
+    uint vertexCount;    // vertices of the copy that leaves refer to
+    uint boxes;          // offsets in the scratch memory, in words: six floats for each primitive or wide node
+    uint keys;           // codes and indices of primitives
+    uint spareKeys;      // later the index of the primitive in each slot of the leaves
+    uint digits;         // count of each digit in each block
     uint arrivals;       // a counter for each node
-    uint nodeCapacity;   // most binary nodes of a build, most nodes of a refit
-    uint improvements;   // how often places are made better
-    uint wideCapacity;   // most wide nodes of a build; 0 where nodes stay binary
-    uint headerFlags;    // bit 0: every geometry is opaque, bit 1: none is
+    uint nodeCapacity;   // maximum binary nodes of a build, maximum nodes of a refit
+    uint improvements;   // number of improvement passes
+    uint wideCapacity;   // maximum wide nodes of a build; 0 if nodes stay binary
+    uint headerFlags;    // bit 0: every geometry is opaque, bit 1: no geometry is opaque
 };
 
 layout(push_constant, scalar) uniform Push {
     uvec2 jobs;
     uint firstJob;
-    uint passOrJobs;     // which pass of the sort, or how many jobs there are with a workgroup each
+    uint passOrJobs;     // index of the sort pass, or number of jobs with a workgroup each
 };
 
 const uint kJobBytes = 128u;
@@ -77,7 +77,7 @@ uvec2 plus(uvec2 address, uint low, uint high) {
     return uvec2(sum, address.y + high + carry);
 }
 
-// Element `index` of an array of elements `stride` bytes apart.
+// Returns the address of element `index` in an array of elements `stride` bytes apart.
 uvec2 element(uvec2 base, uint index, uint stride) {
     uint high, low;
     umulExtended(index, stride, high, low);
@@ -95,15 +95,15 @@ uint lowPasses() { return (job.lowBits + 3) / 4; }
 
 uint passes() { return lowPasses() + 8; }
 
-// Where keys lie before a pass; after the last they are in `keys`.
+// Returns the keys before a pass; after the last they are in `keys`.
 Words keysBefore(uint pass) { return Words(work((passes() - pass & 1u) != 0u ? job.spareKeys : job.keys)); }
 
-// The scratch memory starts with these words. Bounds are kept as numbers that only grow from 0.
+// The scratch memory starts with these words. Bounds are stored as numbers that only grow from 0.
 const uint kStateWords = 48u;
 const uint kActive = 6u;
-const uint kPlaced = 7u;     // slots of leaves that have a primitive
-const uint kWideNodes = 8u;  // more than there is room for where they did not fit
-const uint kEnds = 9u;       // of each level the number behind its last wide node
+const uint kPlaced = 7u;     // slots of leaves with a primitive
+const uint kWideNodes = 8u;  // exceeds the capacity if the nodes did not fit
+const uint kEnds = 9u;       // for each level, the index after its last wide node
 
 Words state() { return Words(job.scratch); }
 

@@ -1,4 +1,4 @@
-// Boxes of what leaves hold.
+// Bounds of the content of leaves.
 Box cornersBox(vec3 a, vec3 b, vec3 c) {
     if (!(isFinite(a) && isFinite(b) && isFinite(c))) return emptyBox();
     return around(a, b, c);

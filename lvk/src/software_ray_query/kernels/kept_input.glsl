@@ -1,2 +1,2 @@
-// While a structure is built, references to leaves are numbers of primitives, whose boxes stay where they were found.
+// During a build, references to leaves are indices of primitives. Their bounds stay in the scratch memory.
 Box keptBox(uint slot) { return readBox(Corners(work(job.boxes)), slot); }

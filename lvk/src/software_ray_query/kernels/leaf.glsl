@@ -1,16 +1,16 @@
-// Primitives of leaves as the structure keeps them.
+// Primitives of leaves, as stored in a BLAS.
 Quads slotAt(uint slot, uint bytes) { return Quads(element(place(job.primitives), slot, bytes)); }
 
 bool namesVertices() { return job.leafKind == kIndexedTriangles || job.leafKind == kPackedTriangles; }
 
-// Three words, where leaves are packed.
+// Returns the three words of a packed leaf.
 Triples packedAt(uint slot) { return Triples(element(place(job.primitives), slot, 12u)); }
 
-// Packed leaves have 21 bits for each vertex: two words begin with one each, and share the third above them.
+// Packed leaves have 21 bits for each vertex: two words start with one each, and share the third above them.
 const uint kNameBits = 21u;
 const uint kRestBits = 32u - kNameBits;
 
-// The vertices that a slot names.
+// Returns the vertex indices of a slot.
 uvec3 namedVertices(uint slot) {
     if (job.leafKind == kIndexedTriangles) return slotAt(slot, 16u).quad[0].xyz;
     uvec2 names = packedAt(slot).triple[0].xy;
@@ -18,7 +18,7 @@ uvec3 namedVertices(uint slot) {
     return uvec3(names & ((1u << kNameBits) - 1u), rest.x | rest.y << kRestBits);
 }
 
-// The box of what lies in a slot.
+// Returns the bounds of the content of a slot.
 Box keptBox(uint slot);
 
 Box slotsBox(uint first, uint count) {

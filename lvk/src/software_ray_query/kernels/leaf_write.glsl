@@ -23,7 +23,7 @@ void writePrimitive(uint slot, uint geometry, uint index, Geometry g, Primitive 
     }
 }
 
-// The copy of vertices that leaves name.
+// Writes the copy of a vertex that leaves refer to.
 void copyVertex(uint i) {
     Geometry g = readGeometry(geometryOf(i, true));
     Corners(place(job.vertices)).corner[i] = positionOf(g, i - g.firstVertex);

@@ -1,4 +1,4 @@
-// All invocations of the workgroup see what each of them wrote.
+// Barrier: makes writes of all invocations visible to the workgroup.
 void meet() {
     memoryBarrierBuffer();
     barrier();

@@ -1,11 +1,11 @@
-// Binary nodes: corners of both children in turn, and beside them what the children are and their shapes.
+// Binary nodes: minimum and maximum of both children in turn, beside them their references and shapes.
 struct Node { uvec4 part[4]; };
 
-// A child's box and shape.
+// Bounds and shape of a child.
 struct Fitted { Box box; uint shape; };
 
-// The shape of a subtree, in one word: nodes on its longest path (8 bits), groups that its primitives fall into where it is
-// taken apart until none has more than a leaf of a wide node holds (8), and primitives (16). No number grows beyond its bits.
+// The shape of a subtree, in one word: nodes on its longest path (8 bits), groups (8 bits), and primitives (16 bits).
+// Groups are the parts after splits until none exceeds a leaf of a wide node. Each number saturates.
 const uint kMostOfGroup = 3u;
 const uint kLeafShape = 0x00010100u;
 
@@ -15,7 +15,7 @@ uint groupsOf(uint shape) { return shape >> 8 & 0xffu; }
 
 uint countOf(uint shape) { return shape >> 16; }
 
-// The shape of a node of two children.
+// Returns the shape of a node of two children.
 uint above(uint one, uint two) {
     uint count = min(countOf(one) + countOf(two), 0xffffu);
     uint groups = count <= kMostOfGroup ? 1u : min(groupsOf(one) + groupsOf(two), 0xffu);
@@ -38,7 +38,7 @@ Fitted childOf(Node node, uint which) {
     return Fitted(Box(uintBitsToFloat(lo), uintBitsToFloat(hi)), shape);
 }
 
-// Touches nothing of the other child: that may be written at the same time.
+// Writes nothing of the other child, which another invocation may write at the same time.
 void writeChild(uint node, uint which, Fitted child) {
     uvec2 at = nodeAt(node);
     Corners(plus(at, which * 32u, 0u)).corner[0] = child.box.lo;

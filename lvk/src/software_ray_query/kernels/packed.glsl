@@ -1,10 +1,10 @@
-// Trees for primitives whose wide nodes had no room, which takes trees that are far from even: nodes that are full, of
-// primitives in the order of their codes. There is room for those of any count.
+// Packed trees replace wide nodes that did not fit, which happens for very unbalanced trees. Their nodes are full, with
+// primitives in the order of their codes. They fit for any count.
 const uint kFullLeaves = kChildren * kMostOfGroup;
 
 bool isPacked() { return state().word[kWideNodes] > job.wideCapacity; }
 
-// Nodes in the lowest level, and in all.
+// Returns the number of nodes in the lowest level, and in all levels.
 uvec2 packedNodes() {
     uint level = (state().word[kActive] + kFullLeaves - 1u) / kFullLeaves;
     uvec2 found = uvec2(level);
@@ -38,7 +38,7 @@ void writePackedChildren(Words node, uint number, uint first, uint count) {
     [[dont_unroll]] for (uint child = 0; child < count; ++child) writeParent(first + child, number, 0u);
 }
 
-// Writes node `i` but for its boxes. Levels follow each other, the root first.
+// Writes node `i` except its bounds. Levels follow each other, the root first.
 void writePacked(uint i) {
     uvec2 nodes = packedNodes();
     if (i >= nodes.y) return;

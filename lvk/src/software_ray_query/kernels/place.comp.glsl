@@ -1,4 +1,4 @@
-// The leaves of a structure, its vertices, geometries and header; and its nodes where they had no room as they were.
+// Writes the leaves of a BLAS, its vertices, geometries and header; and packed nodes if the collapsed ones did not fit.
 void main() {
     readJob(firstJob);
     placePart(invocation());

@@ -1,9 +1,9 @@
-// Everything of a bottom-level structure but its nodes, which are known by now.
+// Writes all parts of a BLAS except its nodes, which are complete now.
 void writeGeometry(uint i) {
     Quads(element(place(job.geometries), i, 16u)).quad[0] = uvec4(readGeometry(i).flags, uvec3(0));
 }
 
-// The number of the primitive that belongs into a slot.
+// Returns the index of the primitive for a slot.
 uint numberOf(uint slot) {
     bool isSorted = isPacked() || state().word[kWideNodes] == 0u;
     return isSorted ? Words(work(job.keys)).word[job.count + slot] : Words(work(job.spareKeys)).word[slot];
@@ -17,7 +17,7 @@ void placeSlot(uint slot) {
     writePrimitive(slot, geometry, index, g, readPrimitive(g, index));
 }
 
-// The header of wide nodes, in place of that of binary ones; bounds stay.
+// Replaces the header of binary nodes by that of wide ones; bounds stay.
 void writeWideHeader() {
     uint actives = state().word[kActive];
     uint nodes = isPacked() ? packedNodes().y : state().word[kWideNodes];
@@ -28,7 +28,7 @@ void writeWideHeader() {
     header().word[18] = 0u;
 }
 
-// Whatever has number `i`.
+// Writes the parts with index `i`.
 void placePart(uint i) {
     if (i < job.inputCount) writeGeometry(i);
     if (i < state().word[kActive]) placeSlot(i);

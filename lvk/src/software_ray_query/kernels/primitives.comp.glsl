@@ -1,4 +1,4 @@
-// The box of every triangle or box of the inputs, and the bounds of all.
+// Computes the bounds of every triangle or AABB of the inputs, and reduces the bounds of all.
 void main() {
     readJob(firstJob);
     uint i = invocation();

@@ -1,5 +1,5 @@
-// Ranks keys by four bits, stably: a counter for each digit and invocation, summed in the order digit, invocation. Every
-// invocation has a run of neighbouring keys. Nothing depends on the size of subgroups.
+// Ranks keys by four bits, stably: a counter for each digit and invocation, summed in the order digit, invocation.
+// Every invocation has a run of consecutive keys. Nothing depends on the size of subgroups.
 const uint kDigits = 16u;
 
 shared uint counts[kDigits * 128];
@@ -7,7 +7,7 @@ shared uint sums[128];
 
 struct Source { Words keys; uint digitWord; uint shift; };
 
-// The word of the keys and the bits that a pass sorts by; the low words come first.
+// Returns the key word and the bits that a pass sorts by; the low words come first.
 Source sourceOf(uint pass) {
     bool low = pass < lowPasses();
     return Source(keysBefore(pass), low ? 2 * job.count : 0u, (low ? pass : pass - lowPasses()) * 4u);
@@ -23,7 +23,7 @@ void moveKey(Source from, Words to, uint i, uint rank) {
     if (job.lowBits != 0u) to.word[2 * job.count + rank] = from.keys.word[2 * job.count + i];
 }
 
-// Sums of what all invocations before this one gave.
+// Returns the sum of `own` of all previous invocations.
 uint before(uint own) {
     uint t = gl_LocalInvocationIndex;
     sums[t] = own;

@@ -1,4 +1,4 @@
-// The primitives of leaves, as the caller's buffers hold them now.
+// Rewrites the primitives of leaves from the caller's current buffers.
 void main() {
     readJob(firstJob);
     refitFrom(invocation());

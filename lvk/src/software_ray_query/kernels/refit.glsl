@@ -1,6 +1,6 @@
-// Rewrites what leaves hold from the caller's current buffers; their order and their ids stay.
+// Rewrites the content of leaves from the caller's current buffers; their order and their ids stay.
 
-// Numbers of the geometry and of the primitive that lies in a slot.
+// Returns the geometry and the primitive in a slot.
 uvec2 numbersAt(uint slot) {
     if (namesVertices()) {
         uint both = job.leafKind == kIndexedTriangles ? slotAt(slot, 16u).quad[0].w : packedAt(slot).triple[0].z;
@@ -10,7 +10,7 @@ uvec2 numbersAt(uint slot) {
     return uvec2(kept.quad[1].w & 0x7fffffffu, kept.quad[0].w);
 }
 
-// Moves the vertices that a slot names. Whoever names them too writes the same numbers.
+// Moves the vertices of a slot. Invocations that share a vertex write the same numbers.
 void moveVertices(uint slot, Geometry g, Primitive from) {
     if (any(greaterThanEqual(from.corner, uvec3(g.vertexCount)))) return;
     uvec3 named = namedVertices(slot);
@@ -33,7 +33,7 @@ void refitPrimitive(uint slot) {
     writePrimitive(slot, numbers.x, numbers.y, g, found);
 }
 
-// What a node knows of those below it, which then know it as their parent. Nobody has arrived there.
+// Writes the parent of a node's children, and resets its arrival counter.
 void prepareBinary(uint node) {
     resetArrivals(node);
     Words from = Words(element(job.binary, node, 64u));
@@ -50,7 +50,7 @@ void prepareWide(uint node) {
     [[dont_unroll]] for (uint child = first; child < end; ++child) writeParent(child, node, 0u);
 }
 
-// Everything that must be ready before boxes are fitted and has number `i`.
+// Prepares everything with index `i` that fitting of bounds needs.
 void refitFrom(uint i) {
     if (i < min(header().word[8], job.nodeCapacity)) {
         if (header().word[0] == kBinary) prepareBinary(i);

@@ -1,4 +1,4 @@
-// Nothing is known yet of any primitive.
+// Resets the build state.
 void main() {
     readJob(firstJob);
     uint i = invocation();

@@ -1,17 +1,17 @@
-// Makes a node better while both its children are at hand: Kopta et al., "Fast, Effective BVH Updates for Animated Scenes",
-// I3D 2012. A child changes places with a child of the other where that makes boxes smaller and no path longer.
+// Rotates a node once both its children are fitted: Kopta et al., "Fast, Effective BVH Updates for Animated Scenes",
+// I3D 2012. A child and a child of its sibling are swapped if that shrinks bounds and makes no path longer.
 void writeReference(uint node, uint which, uint reference) {
     Words(nodeAt(node)).word[3 + which * 4] = reference;
     if (!isLeaf(reference)) Words(job.parents).word[reference] = node | which << 29;
 }
 
-// Answers the shape of the node then.
+// Returns the shape of the node after the rotation.
 uint rotate(uint number, Node node) {
     uint shape = above(node.part[2].w, node.part[3].w);
     if (job.improvements == 0u) return shape;
     uint height = heightOf(shape);
     float gain = 0.0;
-    uint side = 0u, given = kNone;  // grandchild `given` below `side` changes places with the other side
+    uint side = 0u, given = kNone;  // grandchild `given` below `side` is swapped with the other side
     Node lower;
     [[dont_unroll]] for (uint inner = 0; inner < 2; ++inner) {
         uint reference = referenceOf(node, inner);

@@ -1,2 +1,2 @@
-// Invocations of this kernel read what others wrote.
+// Invocations of this kernel read writes of others.
 #define LVK_SHARED coherent

@@ -1,4 +1,4 @@
-// A build up to its binary tree by one workgroup, one for each job: dispatches cost more than the work of few primitives.
+// A build up to its binary tree, with one workgroup for each job: dispatches cost more than the work of few primitives.
 void boundAll() {
     uint actives = 0;
     Box centres = emptyBox();

@@ -1,2 +1,2 @@
-// The binary tree of a whole bottom-level structure by one workgroup.
+// Builds the binary tree of a whole BLAS by one workgroup.
 Box smallBox(uint i) { return inputBox(i); }

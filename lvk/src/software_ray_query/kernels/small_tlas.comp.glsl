@@ -1,2 +1,2 @@
-// A whole top-level structure by one workgroup.
+// Builds a whole TLAS by one workgroup.
 Box smallBox(uint i) { return keepInstance(i); }

@@ -1,4 +1,4 @@
-// What follows a small binary tree, by one workgroup, one for each job: its wide nodes and everything else of the structure.
+// Completes a small build with one workgroup for each job: the wide nodes and all other parts of the BLAS.
 uint parts() { return max(max(job.count, job.inputCount), max(job.vertexCount, 1u)); }
 
 void main() {

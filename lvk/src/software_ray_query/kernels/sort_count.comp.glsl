@@ -1,4 +1,4 @@
-// How often each digit occurs in each block of keys.
+// Counts each digit in each block of keys.
 shared uint found[kDigits];
 
 void main() {

@@ -1,4 +1,4 @@
-// From how often digits occur to where their keys go: sums of all counters before each. One workgroup.
+// Converts counts of digits to positions of their keys: prefix sums of all counters. One workgroup.
 void main() {
     readJob(firstJob);
     uint total = kDigits * ((job.count + kBlock - 1) / kBlock);

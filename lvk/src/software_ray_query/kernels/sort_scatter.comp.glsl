@@ -1,4 +1,4 @@
-// Puts the keys of a block where they belong.
+// Moves the keys of a block to their sorted positions.
 shared uint start[kDigits];
 
 void main() {

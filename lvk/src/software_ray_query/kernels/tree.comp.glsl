@@ -1,4 +1,4 @@
-// The hierarchy.
+// Builds the hierarchy.
 void main() {
     readJob(firstJob);
     writeHierarchy(invocation());

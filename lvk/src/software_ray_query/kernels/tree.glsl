@@ -1,8 +1,8 @@
 // The hierarchy of sorted codes: Karras, "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees",
-// HPG 2012. Every node finds its range by itself; leaves with equal codes differ by their numbers.
+// HPG 2012. Every node finds its range independently; leaves with equal codes differ by their indices.
 uint leafReference(uint leaf) { return kLeaf | Words(work(job.keys)).word[job.count + leaf]; }
 
-// Leading bits that leaf `i`, whose key is `own`, has in common with leaf `j`; -1 where there is no such leaf.
+// Returns the leading bits that leaf `i`, whose key is `own`, shares with leaf `j`; -1 if leaf `j` does not exist.
 int sameBits(uint i, uvec2 own, int j, uint leaves) {
     if (j < 0 || j >= int(leaves)) return -1;
     Words keys = Words(work(job.keys));
@@ -57,7 +57,7 @@ void writeHeader(uint leaves) {
     for (uint k = 3; k < 8; ++k) to.quad[k] = uvec4(0);
 }
 
-// Wide nodes begin with the root; each says by its first word which binary node it is made of.
+// Starts the wide nodes with the root. The first word of each is the binary node that it is built from.
 void writeWideRoot(uint leaves) {
     const uint kOneLeaf = 3u;
     if (job.wideCapacity == 0u || leaves <= kOneLeaf) return;
@@ -66,7 +66,7 @@ void writeWideRoot(uint leaves) {
     state().word[kEnds] = 1u;
 }
 
-// The hierarchy, and a header for it. Leaves are single primitives, by their numbers.
+// Writes the hierarchy, and a header for it. Leaves are single primitives, by their indices.
 void writeHierarchy(uint i) {
     uint leaves = state().word[kActive];
     if (i + 1 < leaves) writeNode(i, leaves);

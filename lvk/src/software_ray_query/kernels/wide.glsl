@@ -1,4 +1,4 @@
-// Nodes of eight children, of which those that are nodes follow each other.
+// Nodes of eight children. The inner children of a node are consecutive.
 const uint kChildren = 8u;
 const uint kWideWords = 20u;
 

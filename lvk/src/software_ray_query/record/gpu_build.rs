@@ -1,4 +1,4 @@
-//! Builds and refits of software structures by the library's kernels.
+//! Builds and refits of software BVHs by the library's kernels.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::software_ray_query::gpu_build::params::{BuildPushConstants, GpuBuildP
 use crate::software_ray_query::gpu_build::refit_layout::GpuRefitPlan;
 use crate::software_ray_query::gpu_build::steps::{BuildStep, build_steps, refit_steps};
 
-/// Parts of the scratch memory are aligned to their widest accesses.
+/// Alignment of scratch memory ranges, in bytes: that of their widest accesses.
 const SCRATCH_ALIGNMENT: u64 = 256;
 const TABLE_ALIGNMENT: u64 = 16;
 
@@ -24,11 +24,11 @@ const TABLE_ALIGNMENT: u64 = 16;
 pub(crate) struct GpuBuild {
     pub(crate) plan: GpuBuildPlan,
     pub(crate) source: BuildSource,
-    /// Address of the structure, a multiple of 256, with room for the plan's `blob_bytes`.
+    /// Address of the BVH, a multiple of 256, with at least the plan's `blob_bytes` of memory.
     pub(crate) blob: u64,
-    /// The buffer the structure lies in.
+    /// The buffer that the BVH lies in.
     pub(crate) target: Arc<Buffer>,
-    /// Buffers the build reads: inputs, and buffers of the structures that instances show.
+    /// Buffers the build reads: inputs, and buffers of the BLAS that instances reference.
     pub(crate) read_buffers: Vec<Arc<Buffer>>,
 }
 
@@ -37,17 +37,17 @@ pub(crate) struct GpuRefit {
     pub(crate) plan: GpuRefitPlan,
     /// The geometries of the build, over buffers whose contents may have changed.
     pub(crate) geometries: Vec<GpuGeometry>,
-    /// Address of the structure.
+    /// Address of the BVH.
     pub(crate) blob: u64,
-    /// The buffer the structure lies in.
+    /// The buffer that the BVH lies in.
     pub(crate) target: Arc<Buffer>,
     /// Buffers the refit reads.
     pub(crate) read_buffers: Vec<Arc<Buffer>>,
 }
 
 impl CommandBuffer {
-    /// Records builds, side by side as far as the scratch memory has room. A top-level structure goes into a later call
-    /// than what it shows. On an error nothing of the batch that failed is recorded, nor of those behind it.
+    /// Records builds, as many concurrently as fit in the scratch memory. Record a TLAS in a later call than the BLAS
+    /// it references. On an error, neither the batch that failed nor later ones are recorded.
     pub(crate) fn record_gpu_builds(&mut self, builds: &[GpuBuild]) -> Result<()> {
         let sizes: Vec<_> = builds.iter().map(|build| build.plan.scratch_bytes).collect();
         self.for_each_scratch_batch(&sizes, |cmd, range, scratch| {
@@ -68,7 +68,7 @@ impl CommandBuffer {
         })
     }
 
-    /// Records refits, side by side as far as the scratch memory has room; errors as of
+    /// Records refits, as many concurrently as fit in the scratch memory. The errors are those of
     /// [`record_gpu_builds`](Self::record_gpu_builds).
     pub(crate) fn record_gpu_refits(&mut self, refits: &[GpuRefit]) -> Result<()> {
         let sizes: Vec<_> = refits.iter().map(|refit| refit.plan.scratch_bytes()).collect();
@@ -90,7 +90,7 @@ impl CommandBuffer {
         })
     }
 
-    /// Calls `record` for each batch that shares the scratch buffer, with the addresses of its scratch memory.
+    /// Calls `record` for each batch that shares the scratch buffer, with the addresses of its scratch memory ranges.
     fn for_each_scratch_batch(
         &mut self,
         sizes: &[u64],
@@ -113,7 +113,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Runs the steps of some jobs, with barriers between phases; the scratch buffer is among the uses.
+    /// Records the steps of some jobs, with barriers between phases. Expects the scratch buffer among the declared
+    /// accesses.
     pub(crate) fn record_build_steps<'a>(
         &mut self,
         jobs: &[GpuBuildParams],
@@ -145,7 +146,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Has later dispatches of a build see what earlier ones wrote. The tracker knows the first and the last of them.
+    /// Makes writes of earlier dispatches of a build visible to later ones. The tracker covers only the barriers before
+    /// the first dispatch and after the last one.
     fn compute_barrier(&self) {
         let written = vk::AccessFlags2::SHADER_STORAGE_WRITE;
         let barrier = [vk::MemoryBarrier2::default()
@@ -158,7 +160,8 @@ impl CommandBuffer {
         unsafe { self.shared.gpu.device.cmd_pipeline_barrier2(self.raw(), &info) };
     }
 
-    /// The address of records that the GPU may read until the command buffer is done.
+    /// Writes records to staging memory, where the GPU may read them until the command buffer is done. Returns their
+    /// address.
     fn stage_records<T: bytemuck::NoUninit>(&mut self, records: &[T]) -> Result<u64> {
         let bytes = bytemuck::cast_slice(records);
         let region = self.shared.staging.write(bytes, TABLE_ALIGNMENT, self.recording.staging_key())?;

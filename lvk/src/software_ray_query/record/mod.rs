@@ -1,6 +1,6 @@
-//! Builds of the library's own structures.
+//! Records builds of software BVHs.
 //!
-//! `disabled.rs` has the names that other files use, for builds without the feature `software-ray-query`.
+//! `disabled/record.rs` has the names that other files use, for builds without the feature `software-ray-query`.
 
 pub(crate) mod gpu_build;
 
@@ -32,13 +32,13 @@ use crate::software_ray_query::bvh::encode_tlas;
 
 use gpu_build::{GpuBuild, GpuRefit};
 
-/// So many instances the CPU builds a tree over that is worth more than its time. A driver that runs on the CPU has no
-/// faster builds.
+/// Up to this many instances, the CPU builds the BVH of a TLAS, whose quality is worth its time. A driver that runs on
+/// the CPU has no faster builds.
 const MAX_CPU_TLAS_INSTANCES: usize = 512;
-/// Addresses of tables and records.
+/// Alignment of tables and records, in bytes.
 const ALIGNMENT: u64 = 16;
 
-/// Builds and refits to record side by side.
+/// Builds and refits to record together.
 #[derive(Default)]
 pub(crate) struct SoftwareBuilds {
     targets: Vec<ResourceId>,
@@ -47,15 +47,15 @@ pub(crate) struct SoftwareBuilds {
     moves: Vec<BlobMove>,
 }
 
-/// A structure that the CPU built and that has a tree of the GPU from now on.
+/// A BLAS whose CPU-built BVH is replaced by one of the GPU.
 struct BlobMove {
     target: ResourceId,
-    /// What it leaves if that lies elsewhere, and what has to be said there.
+    /// The old storage and the header to write there, if the new BVH lies elsewhere.
     left: Option<(Arc<SoftwareAccelStorage>, MovedHeader)>,
 }
 
 impl CommandBuffer {
-    /// Copies what the CPU built into a bottom-level structure.
+    /// Copies a BVH that the CPU built into the storage of a BLAS.
     pub(crate) fn fill_software_blas(
         &mut self,
         target: &AccelStruct,
@@ -65,7 +65,7 @@ impl CommandBuffer {
         self.fill_software_storage(target, self.shared.new_blas[self.recording.queue_index], body, bytes)
     }
 
-    /// The next command copies what software traces.
+    /// Declares that the next command copies the software BVH.
     pub(crate) fn read_software_blas(&mut self, body: &SoftwareAccelStorage) {
         self.use_all_blas(Use::transfer_read());
         self.use_buffer(body.buffer(), Use::transfer_read());
@@ -85,14 +85,14 @@ impl CommandBuffer {
         self.flush_barriers();
         let copy =
             vk::BufferCopy { src_offset: region.offset, dst_offset: body.offset(), size: bytes.len() as u64 };
-        // SAFETY: the structure has room for the bytes, which lie in the staging memory.
+        // SAFETY: the storage has at least as many bytes, and the bytes lie in the staging memory.
         unsafe {
             self.shared.gpu.device.cmd_copy_buffer(self.raw(), region.buffer, body.buffer().raw, &[copy]);
         }
         Ok(())
     }
 
-    /// What has to be built on the GPU of structures that have nothing yet; what the CPU built is ready.
+    /// Plans the builds of the GPU for BLAS that have no BVH yet. BVHs that the CPU built need no build.
     pub(crate) fn plan_first_software_builds(
         &self,
         structures: &[Arc<AccelStruct>],
@@ -106,13 +106,13 @@ impl CommandBuffer {
         self.plan_software_builds(&structures, &rebuilds)
     }
 
-    /// Builds what software traces of a structure for the first time.
+    /// Builds the software BVH of a BLAS for the first time.
     pub(crate) fn build_software_blas(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
         let work = self.plan_first_software_builds(std::slice::from_ref(target))?;
         self.record_software_builds(work, false)
     }
 
-    /// Makes room for builds or refits of what software traces of these structures; records nothing.
+    /// Plans builds or refits of the software BVHs of these BLAS, and allocates their memory. Records nothing.
     pub(crate) fn plan_software_builds(
         &self,
         structures: &[Arc<AccelStruct>],
@@ -129,7 +129,7 @@ impl CommandBuffer {
         Ok(work)
     }
 
-    /// Records what was planned.
+    /// Records the planned builds and refits.
     pub(crate) fn record_software_builds(&mut self, work: SoftwareBuilds, is_first: bool) -> Result<()> {
         let SoftwareBuilds { targets, builds, refits, moves } = work;
         if builds.is_empty() && refits.is_empty() {
@@ -199,7 +199,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Where a structure that the CPU built lies at the next command, if it was rebuilt.
+    /// Returns the storage of a CPU-built BVH as of the next command, if it was rebuilt.
     pub(crate) fn moved_storage<'a>(
         &self,
         target: &AccelStruct,
@@ -209,7 +209,7 @@ impl CommandBuffer {
         here.or(software.moved_storage())
     }
 
-    /// Room for builds on the GPU of what the CPU built first.
+    /// Allocates storage for GPU builds of a BVH that the CPU built first.
     fn storage_for_rebuild(&self, target: &AccelStruct, plan: &GpuBuildPlan) -> Result<SoftwareAccelStorage> {
         let shared = &self.shared;
         SoftwareAccelStorage::new(&shared.gpu, &shared.accel_storage, &target.name, plan.blob_bytes)
@@ -221,7 +221,7 @@ impl CommandBuffer {
         gpu_geometries(&target.name, &blas.geometries, &find, matrices)
     }
 
-    /// Has the body that a structure leaves refer to the other one.
+    /// Writes the address of the new BVH to the storage that it leaves.
     fn record_blob_move(&mut self, moved: &BlobMove) {
         self.state.moved_blas.insert(moved.target.0);
         let Some((body, header)) = &moved.left else { return };
@@ -229,14 +229,14 @@ impl CommandBuffer {
         self.state.accesses.add_accumulating(self.shared.all_blas, Use::transfer_write());
         self.flush_barriers();
         let bytes = bytemuck::bytes_of(header);
-        // SAFETY: the body begins with a header, at a multiple of 4.
+        // SAFETY: the storage begins with a header, at a multiple of 4.
         unsafe {
             let device = &self.shared.gpu.device;
             device.cmd_update_buffer(self.raw(), body.buffer().raw, body.offset(), bytes);
         }
     }
 
-    /// Builds a top-level structure of the library's own from instances of the host.
+    /// Builds a software TLAS from instances of the host.
     pub(crate) fn build_software_tlas(
         &mut self,
         target: &AccelStruct,
@@ -262,7 +262,7 @@ impl CommandBuffer {
         self.record_software_tlas(target, software, source, Vec::new())
     }
 
-    /// As [`build_software_tlas`](Self::build_software_tlas), from records in a buffer that name structures by place.
+    /// As [`build_software_tlas`](Self::build_software_tlas), from records in a buffer that name BLAS by index.
     pub(crate) fn build_software_tlas_from_buffer(
         &mut self,
         target: &AccelStruct,
@@ -285,7 +285,7 @@ impl CommandBuffer {
         self.record_software_tlas(target, software, source, vec![buffer])
     }
 
-    /// The instances for a build on the CPU; nothing where it does not know all of their bounds.
+    /// Returns the instances for a build on the CPU; `None` if the CPU does not know all of their bounds.
     fn place_instances(
         &self,
         target: &AccelStruct,
@@ -308,7 +308,7 @@ impl CommandBuffer {
         Ok(Some(placed))
     }
 
-    /// What the instances show must not be rebuilt before this is submitted.
+    /// Declares that the BLAS of the instances must not be rebuilt before the command buffer is submitted.
     fn expect_unmoved_blas(&mut self, instances: &[TlasInstance]) -> Result<()> {
         let mut last = None;
         for handle in instances.iter().map(|instance| instance.blas) {
@@ -371,18 +371,18 @@ impl CommandBuffer {
     }
 }
 
-/// Fails if a submission has moved the tree of a structure that the host placed when it recorded an update.
+/// Fails if a submission has moved the BVH of a BLAS since the host wrote its address to an update.
 pub(crate) fn check_unmoved(blas: &AccelStruct) -> Result<()> {
     let software = blas.blas()?.software.as_ref();
     if software.is_none_or(|software| software.moved_storage().is_none()) {
         return Ok(());
     }
-    let message = "a top-level structure was updated to show it, but a submission since then has rebuilt it; record \
+    let message = "a TLAS was updated to reference it, but a submission since then has rebuilt it; record \
                    the update anew";
     Err(Error::usage(&blas.name, message))
 }
 
-/// What software traces of a bottom-level structure.
+/// Returns the storage of the software BVH of a BLAS.
 fn software_storage<'a>(name: &str, blas: &'a Blas) -> Result<&'a Arc<SoftwareAccelStorage>> {
     let none = || Error::usage(name, "the acceleration structure has no BVH for software traversal");
     Ok(&blas.software.as_ref().ok_or_else(none)?.storage)

@@ -1,4 +1,4 @@
-//! Runs the kernels that make wide nodes of binary ones without the rest of a build, for tests.
+//! Runs the kernels that collapse binary nodes to wide ones without the rest of a build, for tests.
 
 use std::sync::Arc;
 
@@ -12,14 +12,14 @@ use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, GpuBu
 use crate::software_ray_query::gpu_build::steps::wide_steps;
 use crate::software_ray_query::layout::LeafKind;
 
-/// Words of the state, as `software_ray_query/kernels/job.glsl` numbers them.
+/// Indices of state words, as numbered in `software_ray_query/kernels/job.glsl`.
 const ACTIVE: usize = 6;
 const WIDE_NODES: usize = 8;
 const END_BYTES: usize = 9;
 const BINARY_WORDS: usize = 16;
 const WIDE_WORDS: usize = 20;
 
-/// A binary tree on its way through the kernels: the structure, and behind it what a build has as its scratch memory.
+/// A binary tree as input of the kernels: the memory of the BLAS, followed by the scratch memory of a build.
 pub(crate) struct Collapser<'a> {
     tree: &'a Bvh2Reference,
     plan: GpuBuildPlan,
@@ -41,12 +41,12 @@ impl<'a> Collapser<'a> {
         self.plan.blob_bytes + self.plan.scratch_bytes
     }
 
-    /// Wide nodes that have room.
+    /// Returns the capacity for wide nodes.
     pub(crate) fn buffer_bytes(&self) -> usize {
         self.plan.wide_capacity as usize
     }
 
-    /// The memory before.
+    /// Returns the memory before the kernels.
     pub(crate) fn words(&self) -> Vec<u32> {
         let mut words = vec![0; (self.bytes() / 4) as usize];
         let scratch = &mut words[(self.plan.blob_bytes / 4) as usize..];
@@ -77,7 +77,7 @@ impl<'a> Collapser<'a> {
         cmd.record_build_steps(&[job], &steps, std::iter::empty())
     }
 
-    /// The tree of the memory after; `None` where it had no room.
+    /// Returns the tree in the memory after the kernels; `None` if it did not fit.
     pub(crate) fn collapsed(&self, words: &[u32]) -> Option<Bvh8Reference> {
         let scratch = &words[(self.plan.blob_bytes / 4) as usize..];
         let order = &scratch[self.plan.scratch.spare_keys as usize..];

@@ -1,4 +1,5 @@
-//! How a binary tree becomes a wide one, as `software_ray_query/kernels/collapse.glsl` does it: what tests hold the kernel against.
+//! Reference for the collapse of a binary tree to a wide one in `software_ray_query/kernels/collapse.glsl`. Tests
+//! compare the kernel with it.
 
 use super::gpu_build_check::CheckBounds;
 use crate::software_ray_query::layout::MAX_BVH8_DEPTH;
@@ -11,47 +12,47 @@ const GROUP_WORTH: f32 = 0.5;
 /// Nodes of two children each, the root first.
 #[derive(Debug, Clone, Default)]
 pub struct Bvh2Reference {
-    /// Both children of each.
+    /// The two children of each node.
     pub nodes: Vec<[Bvh2Child; 2]>,
 }
 
 /// A child of a binary node.
 #[derive(Debug, Clone, Copy)]
 pub struct Bvh2Child {
-    /// Around all below it.
+    /// Bounds of the subtree.
     pub bounds: CheckBounds,
-    /// What it is.
+    /// The node or leaf.
     pub below: BelowNode,
 }
 
-/// What a child is.
+/// The target of a child reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BelowNode {
-    /// Another node.
+    /// A node, by its index.
     Node(usize),
-    /// A primitive, by its number.
+    /// A primitive, by its index.
     Leaf(u32),
 }
 
-/// A wide node with all that is below it.
+/// A wide node with its subtree.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bvh8Reference {
-    /// In the order of the node.
+    /// The children, in the order of the node.
     pub children: [Bvh8Child; 8],
 }
 
 /// A child of a wide node.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Bvh8Child {
-    /// There is none.
+    /// No child.
     None,
-    /// Another node.
+    /// A node.
     Node(Box<Bvh8Reference>),
-    /// Numbers of primitives, in the order of their slots.
+    /// Indices of primitives, in the order of their slots.
     Leaf(Vec<u32>),
 }
 
-/// What `Fitted::shape` of the kernels says of a subtree.
+/// `Fitted::shape` of a subtree in the kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct GroupShape {
     pub(crate) height: u32,
@@ -74,7 +75,7 @@ impl GroupShape {
         Self { height: self.height.max(other.height) + 1, groups, count }
     }
 
-    /// As the kernels have it in a word.
+    /// Returns the shape as one word in the kernels' format.
     pub(crate) fn packed(self) -> u32 {
         self.height | self.groups << 8 | self.count << 16
     }
@@ -89,7 +90,7 @@ impl GroupShape {
 }
 
 impl Bvh2Reference {
-    /// The shape of what is below a child.
+    /// Returns the shape of the subtree of a child.
     pub(crate) fn shape(&self, below: BelowNode) -> GroupShape {
         match below {
             BelowNode::Leaf(_) => GroupShape::LEAF,
@@ -100,7 +101,7 @@ impl Bvh2Reference {
         }
     }
 
-    /// The shape of each node, which its children stand behind.
+    /// Returns the shape of each node. Children must follow their parent.
     fn shapes(&self) -> Vec<GroupShape> {
         let mut shapes = vec![GroupShape::LEAF; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate().rev() {
@@ -110,7 +111,7 @@ impl Bvh2Reference {
         shapes
     }
 
-    /// The wide tree of a tree of more than three primitives.
+    /// Returns the wide tree. This tree must have more than three primitives.
     pub fn collapse(&self) -> Bvh8Reference {
         self.is_wide(&self.shapes(), 0, 0)
     }
@@ -130,7 +131,7 @@ impl Bvh2Reference {
         Bvh8Reference { children: order.map(child) }
     }
 
-    /// What becomes children of the wide node that stands for a binary one.
+    /// Returns the children of the wide node that replaces a binary one.
     fn cut_to_groups(&self, shapes: &[GroupShape], node: usize, level: usize) -> Vec<CollapsePart> {
         let part = |child: Bvh2Child| CollapsePart { child, shape: node_below(shapes, child.below) };
         let mut cut: Vec<CollapsePart> = self.nodes[node].map(part).to_vec();
@@ -164,20 +165,20 @@ impl Bvh2Reference {
 }
 
 impl Bvh8Reference {
-    /// Nodes on the longest path.
+    /// Returns the number of nodes on the longest path.
     pub fn depth(&self) -> usize {
         let depth = |child: &Bvh8Child| if let Bvh8Child::Node(below) = child { below.depth() } else { 0 };
         1 + self.children.iter().map(depth).max().unwrap_or(0)
     }
 
-    /// Nodes of all levels.
+    /// Returns the number of nodes of all levels.
     pub fn node_count(&self) -> usize {
         let count =
             |child: &Bvh8Child| if let Bvh8Child::Node(below) = child { below.node_count() } else { 0 };
         1 + self.children.iter().map(count).sum::<usize>()
     }
 
-    /// Numbers of all primitives.
+    /// Returns the indices of all primitives.
     pub fn primitives(&self) -> Vec<u32> {
         let below = |child: &Bvh8Child| match child {
             Bvh8Child::None => Vec::new(),
@@ -208,7 +209,7 @@ fn next_to_split(cut: &[CollapsePart], closed: &[bool], is_tall: bool) -> Option
     next
 }
 
-/// Which part each child is.
+/// Returns for each child slot the index of its part.
 fn slot_order(cut: &[CollapsePart]) -> [Option<usize>; 8] {
     let centre = |bounds: &CheckBounds| -> [f32; 3] {
         std::array::from_fn(|axis| bounds[0][axis] * 0.5 + bounds[1][axis] * 0.5)
@@ -248,9 +249,11 @@ fn half_area(bounds: &CheckBounds) -> f32 {
     x * y + y * z + z * x
 }
 
-/// A tree of `count` primitives, at least two, with corners at small integers. `choose` answers a number below its argument;
-/// `even` is how many times of eight halves have about the same number of primitives, else one of them has only one. No path
-/// has more than `height` nodes, of which there must be enough.
+/// Generates a tree of `count` primitives, at least two, with vertices at small integers.
+///
+/// `choose` returns a number below its argument. In `even` of eight nodes, the halves have about the same number of
+/// primitives; in the others, one half has only one. No path has more than `height` nodes, which must suffice for
+/// `count`.
 pub fn any_tree(
     count: usize,
     even: usize,
@@ -312,7 +315,7 @@ mod tests {
         })
     }
 
-    /// Fewest children of any node but the root.
+    /// Returns the fewest children of any node except the root.
     fn min_groups(tree: &Bvh8Reference) -> usize {
         let own =
             |tree: &Bvh8Reference| tree.children.iter().filter(|child| **child != Bvh8Child::None).count();
@@ -341,7 +344,7 @@ mod tests {
         }
     }
 
-    /// A path as long as codes make them, of which every node has something large beside it.
+    /// Paths as long as codes allow, with a large sibling beside every node.
     #[test]
     fn the_longest_paths_are_short_enough() {
         for seed in 0..200 {

@@ -1,30 +1,31 @@
-//! Checks the memory of a structure, whoever built it, against everything a traversal relies on.
+//! Checks the memory of an acceleration structure of any builder against the assumptions of traversal.
 
 use std::fmt::Debug;
 
 use crate::software_ray_query::bvh::primitives::MAX_COORDINATE;
 
-/// Smallest corner, largest corner.
+/// Minimum, maximum.
 pub type CheckBounds = [[f32; 3]; 2];
 
-/// What a structure turned out to hold.
+/// The content of a checked acceleration structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureFacts {
     /// Nodes on the longest path from the root to a leaf.
     pub height: u32,
-    /// Nodes that are reached.
+    /// Number of reached nodes.
     pub node_count: u32,
-    /// Geometry and primitive of each slot of the leaves; of instances 0 and their number.
+    /// Geometry and primitive of each slot of the leaves; for instances, 0 and the instance index.
     pub primitives: Vec<(u32, u32)>,
-    /// Corners of each triangle, or of each box; empty for instances.
+    /// Vertices of each triangle, or minimum and maximum of each AABB; empty for instances.
     pub vertices: Vec<Vec<[f32; 3]>>,
-    /// Of everything in the leaves; the first corner is the larger one where there is nothing.
+    /// Bounds of everything in the leaves; the minimum is larger than the maximum if there is nothing.
     pub bounds: CheckBounds,
-    /// Sum of the areas of all children's boxes over that of the root: what a random ray that meets the root visits.
+    /// Sum of the surface areas of all children over that of the root: the expected visits of a random ray that hits
+    /// the root.
     pub cost: f64,
 }
 
-/// No bounds at all.
+/// Bounds of nothing.
 pub const EMPTY: CheckBounds = [[f32::MAX; 3], [-f32::MAX; 3]];
 
 const NONE: u32 = u32::MAX;
@@ -38,13 +39,15 @@ const KIND_PACKED: u32 = 4;
 
 type Checked<T> = Result<T, String>;
 
-/// Checks a structure, given as words from its header on. `instance` answers the box in the world that an instance needs
-/// at least; it is asked for top-level structures only.
+/// Checks an acceleration structure, given as words that start with its header.
 ///
-/// Every node and every slot must be reached once, and boxes must hold what is below them: exactly in binary nodes, to two and a half steps in wide ones.
+/// `instance` returns the minimum bounds of an instance in the world; it is called for a TLAS only.
+///
+/// Every node and every slot must be reached once, and bounds must contain their subtree: exactly in binary nodes, to
+/// two and a half steps in wide ones.
 ///
 /// # Errors
-/// What is wrong, in words.
+/// A text that names the failed check.
 pub fn check_structure(words: &[u32], instance: &dyn Fn(u32) -> CheckBounds) -> Checked<StructureFacts> {
     let mut walk = BlobChecker::new(words, instance)?;
     let root = walk.header(2);
@@ -58,7 +61,7 @@ pub fn check_structure(words: &[u32], instance: &dyn Fn(u32) -> CheckBounds) -> 
     if bounds[0][0] > bounds[1][0] {
         expect_equal("bounds of nothing", kept[0][0] > kept[1][0], true)?;
     }
-    // A single instance has no node whose box could say how wide it was made.
+    // A single instance has no node whose bounds include the widening.
     let slack = if walk.header(1) == KIND_INSTANCES { [1e-5; 3] } else { [0.0; 3] };
     check_box("header", kept, bounds, slack.map(|part| part * mark_reached(kept)))?;
     if walk.header(0) != FORMAT_WIDE {
@@ -80,7 +83,7 @@ struct BlobChecker<'a> {
     area: f64,
 }
 
-/// A child of a node: what it is, its box as the node has it, and how far that may be from the true one.
+/// A child of a node: its reference, its bounds as the node stores them, and the allowed difference to the true ones.
 struct CheckedChild {
     reference: u32,
     slots: Option<(u32, u32)>,
@@ -89,7 +92,7 @@ struct CheckedChild {
     slack: [f32; 3],
 }
 
-/// What lies in a slot: geometry and primitive, corners, and the box around.
+/// The content of a slot: geometry and primitive, vertices, and bounds.
 struct CheckedPrimitive {
     ids: (u32, u32),
     vertices: Vec<[f32; 3]>,
@@ -106,7 +109,7 @@ impl<'a> BlobChecker<'a> {
         if nodes > most || primitives > most {
             return Err(format!("{nodes} nodes and {primitives} primitives in {most} words"));
         }
-        // Instances stay where the caller put them: those that are left out leave their slots empty.
+        // Instances keep the caller's order: those that are left out leave their slots empty.
         let slots = if words[1] == KIND_INSTANCES { most / 32 } else { primitives };
         Ok(Self {
             words,
@@ -124,7 +127,7 @@ impl<'a> BlobChecker<'a> {
     }
 
     fn word_at(&self, at: usize) -> Checked<u32> {
-        self.words.get(at).copied().ok_or_else(|| format!("word {at} lies behind the structure"))
+        self.words.get(at).copied().ok_or_else(|| format!("word {at} is beyond the end of the BLAS or TLAS"))
     }
 
     fn vec3(&self, at: usize) -> Checked<[f32; 3]> {
@@ -136,7 +139,7 @@ impl<'a> BlobChecker<'a> {
         self.header(header_word) as usize * 4
     }
 
-    /// What is below a reference, and how high it is.
+    /// Returns the bounds and the height of the subtree of a reference.
     fn check_subtree(&mut self, reference: u32, slots: Option<(u32, u32)>) -> Checked<(CheckBounds, u32)> {
         if slots.is_some() || reference & LEAF != 0 {
             let (first, count) = slots.unwrap_or((reference & 0x07ff_ffff, (reference >> 27 & 15) + 1));
@@ -278,7 +281,7 @@ impl<'a> BlobChecker<'a> {
 }
 
 impl BlobChecker<'_> {
-    /// The triangle of these vertices; `id` has the numbers of geometry and primitive.
+    /// Returns the triangle with these vertex indices; `id` contains the indices of geometry and primitive.
     fn named_triangle(&self, names: [u32; 3], id: u32) -> Checked<CheckedPrimitive> {
         let mut corners = Vec::new();
         for name in names {
@@ -290,7 +293,7 @@ impl BlobChecker<'_> {
     }
 }
 
-/// Fails unless a box holds another and is nowhere wider than that by more than the slack.
+/// Fails unless `kept` contains `below` and is nowhere wider than `below` by more than the slack.
 fn check_box(what: &str, kept: CheckBounds, below: CheckBounds, slack: [f32; 3]) -> Checked<()> {
     if below[0][0] > below[1][0] {
         return Ok(());
@@ -307,7 +310,7 @@ fn check_box(what: &str, kept: CheckBounds, below: CheckBounds, slack: [f32; 3])
     Ok(())
 }
 
-/// The largest coordinate or side.
+/// Returns the largest coordinate or side.
 fn mark_reached(bounds: CheckBounds) -> f32 {
     let side = |axis: usize| bounds[1][axis] - bounds[0][axis];
     (0..3).fold(0.0, |most, axis| bounds[0][axis].abs().max(bounds[1][axis].abs()).max(side(axis)).max(most))

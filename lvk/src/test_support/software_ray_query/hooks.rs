@@ -1,4 +1,4 @@
-//! What tests of the builds on the GPU reach: the bare memory of structures.
+//! Test hooks for builds on the GPU: the raw memory of acceleration structures.
 
 #![allow(missing_docs, reason = "only tests see it")]
 
@@ -21,25 +21,25 @@ use crate::software_ray_query::record::gpu_build::{GpuBuild, GpuRefit};
 
 const ALIGNMENT: u64 = 256;
 
-/// What leaves of triangles hold.
+/// Content of the leaves of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LeafEncoding {
-    /// Corners.
+    /// Vertex positions.
     Corners,
-    /// Numbers of vertices, a word each.
+    /// Vertex indices, a word each.
     Indexed,
-    /// Numbers of vertices, 21 bits each.
+    /// Vertex indices, 21 bits each.
     Packed,
 }
 
-/// A bottom-level structure to build.
+/// A BLAS to build.
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
     pub improvements: u32,
     pub leaves: LeafEncoding,
 }
 
-/// A structure and the buffer it lies in.
+/// An acceleration structure and its buffer.
 pub struct GpuStructure {
     pub buffer: Holder<BufferHandle>,
     pub address: u64,
@@ -48,7 +48,7 @@ pub struct GpuStructure {
     plan: GpuRefitPlan,
 }
 
-/// Builds structures side by side.
+/// Builds BLASes side by side.
 pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStructure>> {
     let (mut builds, mut built) = (Vec::new(), Vec::new());
     for desc in descs {
@@ -83,7 +83,7 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
     Ok(built)
 }
 
-/// Refits structures side by side.
+/// Refits BLASes side by side.
 pub fn refit(ctx: &Context, structures: &[(&GpuStructure, &[BlasGeometry])]) -> Result<()> {
     let mut refits = Vec::new();
     for (structure, geometries) in structures {
@@ -98,7 +98,7 @@ pub fn refit(ctx: &Context, structures: &[(&GpuStructure, &[BlasGeometry])]) -> 
     record(ctx, |cmd| cmd.record_gpu_refits(&refits))
 }
 
-/// Builds a top-level structure from records in a buffer; `table` holds addresses of structures.
+/// Builds a TLAS from instance records in a buffer; `table` contains addresses of BLASes.
 pub fn build_tlas(
     ctx: &Context,
     records: BufferHandle,
@@ -123,7 +123,7 @@ pub fn build_tlas(
     Ok(structure)
 }
 
-/// The words of a structure.
+/// Returns the words of an acceleration structure.
 pub fn read(ctx: &Context, structure: &GpuStructure) -> Result<Vec<u32>> {
     let mut words = vec![0_u32; (structure.bytes / 4) as usize];
     let offset = structure.address - ctx.buffer_address(*structure.buffer)?;
@@ -131,7 +131,7 @@ pub fn read(ctx: &Context, structure: &GpuStructure) -> Result<Vec<u32>> {
     Ok(words)
 }
 
-/// Places a structure that was built elsewhere; its header says what it is.
+/// Uploads an acceleration structure that was built elsewhere. Its header defines its format.
 pub fn place(ctx: &Context, words: &[u32]) -> Result<GpuStructure> {
     let bytes = words.len() as u64 * 4;
     let (buffer, address) = memory(ctx, bytes)?;
@@ -156,16 +156,18 @@ pub fn place(ctx: &Context, words: &[u32]) -> Result<GpuStructure> {
     Ok(GpuStructure { buffer, address, most_height: u32::MAX, bytes, plan })
 }
 
-/// Sorts keys by the kernels of large builds: the sorted keys, each with its number among those given. Keys have 32 bits,
-/// with `low_bits` in a second word below them.
+/// Sorts keys with the kernels of large builds. Returns the sorted keys, each with its index in `keys`.
+///
+/// Keys have 32 bits, and `low_bits` more in a second, lower word.
 pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)>> {
     let sorter = super::sort_kernels::Sorter::new(keys, low_bits);
     let words = run_on(ctx, &sorter.words(), |cmd, target, address| sorter.record(cmd, target, address))?;
     Ok(sorter.sorted(&words))
 }
 
-/// The wide tree that the kernels make of a binary one of more than three primitives, `None` where it had no room; and how many
-/// nodes have.
+/// Collapses a binary tree of more than three primitives with the kernels.
+///
+/// Returns the wide tree, or `None` if it did not fit, and the capacity in nodes.
 pub fn collapse(ctx: &Context, tree: &Bvh2Reference) -> Result<(Option<Bvh8Reference>, usize)> {
     let collapser = super::collapse_kernels::Collapser::new(tree)?;
     let words =
@@ -180,7 +182,7 @@ fn record(ctx: &Context, record: impl FnOnce(&mut crate::CommandBuffer) -> Resul
     Ok(())
 }
 
-/// The words that commands leave of these, which they find in a buffer at an address.
+/// Uploads words to a buffer, executes commands on them, and returns the words after that.
 fn run_on(
     ctx: &Context,
     words: &[u32],

@@ -1,4 +1,4 @@
-//! Test doubles and hooks for the builds of software structures.
+//! Test doubles and hooks for builds of software acceleration structures.
 
 pub(crate) mod collapse_kernels;
 pub(crate) mod collapse_model;

@@ -1,4 +1,4 @@
-//! Runs the kernels that sort without the rest of a build, for tests.
+//! Runs the sorting kernels without the rest of a build, for tests.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::resource::Buffer;
 use crate::software_ray_query::gpu_build::params::GpuBuildParams;
 use crate::software_ray_query::gpu_build::steps::sort_steps;
 
-/// Keys on their way through the kernels, in memory that starts where a build has its scratch memory.
+/// Keys as input of the kernels, in memory that starts with the scratch memory of a build.
 pub(crate) struct Sorter<'a> {
     keys: &'a [u64],
     job: GpuBuildParams,
@@ -35,7 +35,7 @@ impl<'a> Sorter<'a> {
         4 * (u64::from(self.job.digits) + 16 * u64::from(self.job.count.div_ceil(1024)) + 1)
     }
 
-    /// The memory before, with keys where the first pass looks for them.
+    /// Returns the memory before the sort, with keys at the source of the first pass.
     pub(crate) fn words(&self) -> Vec<u32> {
         let high = self.keys.iter().map(|key| if self.is_long() { (key >> 32) as u32 } else { *key as u32 });
         let low = self.keys.iter().filter(|_| self.is_long()).map(|key| *key as u32);
@@ -54,7 +54,7 @@ impl<'a> Sorter<'a> {
         cmd.record_build_steps(&[job], &steps, std::iter::empty())
     }
 
-    /// Keys and numbers from the memory after.
+    /// Returns keys and indices from the memory after the sort.
     pub(crate) fn sorted(&self, words: &[u32]) -> Vec<(u64, u32)> {
         let count = self.keys.len();
         let key = |i: usize| match self.is_long() {

@@ -1,4 +1,4 @@
-//! Has a module look its indices of bindless arrays up before it uses them.
+//! Adds a check of every index of a bindless array before its use.
 
 use std::collections::{HashMap, HashSet};
 
@@ -10,14 +10,15 @@ use crate::shader::spirv::link::{LinkedFunction, ModuleSections, push_instructio
 use crate::shader::spirv::parsed::{ParsedModule, Type};
 use crate::shader::spirv::words::{self, Instruction, instructions};
 
-/// `glsl/checked_index.glsl` as words.
+/// The words of `glsl/checked_index.glsl`.
 const DONOR: &[u8] = include_bytes!("../../glsl/checked_index.spv");
 const FUNCTION: &str = "lvkCheckedIndex(";
-/// Casts of addresses to pointers are part of it.
+/// The first version that includes casts of addresses to pointers.
 const VERSION_1_5: u32 = 0x0001_0500;
 
-/// The module with every index of a bindless array checked; why not where it cannot be. Arrays of Y'CbCr samplers take
-/// constants alone, and are left as they are.
+/// Returns the module with a check of every index of a bindless array, or the reason why that is impossible.
+///
+/// Arrays of Y'CbCr samplers accept only constant indices and are left unchanged.
 pub(crate) fn with_checked_indices(words: &[u32], plan: &CheckPlan) -> Result<Vec<u32>, String> {
     let module = ParsedModule::parse(words)?;
     let arrays = find_bindless_arrays(&module);
@@ -41,7 +42,8 @@ pub(crate) fn with_checked_indices(words: &[u32], plan: &CheckPlan) -> Result<Ve
     Ok(sections.words())
 }
 
-/// A variable that is an array of the set, or the table beside `kTLAS`: which, and where the index stands in an access.
+/// Returns the variables that are a bindless array or the table beside `kTLAS`. The value is the array and the position
+/// of the index in an access.
 fn find_bindless_arrays(module: &ParsedModule) -> HashMap<u32, (BindlessArray, usize)> {
     let found = |variable: &crate::shader::spirv::parsed::Variable| {
         let set = module.decoration(variable.id, Decoration::DescriptorSet)?;
@@ -64,7 +66,7 @@ fn find_bindless_arrays(module: &ParsedModule) -> HashMap<u32, (BindlessArray, u
     module.variables.iter().filter_map(found).collect()
 }
 
-/// Declares that the module has addresses.
+/// Declares the capability and the extension for buffer addresses.
 fn enable_buffer_addresses(sections: &mut ModuleSections, module: &ParsedModule) {
     if !module.has_capability(Capability::PhysicalStorageBufferAddresses) {
         let capability = Capability::PhysicalStorageBufferAddresses as u32;
@@ -82,17 +84,17 @@ fn enable_buffer_addresses(sections: &mut ModuleSections, module: &ParsedModule)
     }
 }
 
-/// Rewrites the bodies of functions.
+/// Rewrites function bodies.
 struct Checker<'a> {
     sections: &'a mut ModuleSections,
     imported: &'a LinkedFunction,
     address: u32,
     shader: u32,
-    /// For each array its number, the place of its first word and its length.
+    /// For each array: its number, the position of its first word, and its length.
     arrays: Vec<[u32; 3]>,
-    /// Integer types: bits.
+    /// Bits of integer types.
     integers: HashMap<u32, u32>,
-    /// Types of constants and of values so far.
+    /// Types of constants and of the values so far.
     types: HashMap<u32, u32>,
     type_ids: HashSet<u32>,
     non_uniform: HashSet<u32>,
@@ -153,7 +155,7 @@ impl<'a> Checker<'a> {
         if is_type(i) {
             self.type_ids.insert(i.operand(0));
         } else if self.type_ids.contains(&i.operand(0)) {
-            // Only result types stand first.
+            // Only a result type can be the first operand and a type.
             self.types.insert(i.operand(1), i.operand(0));
         }
     }
@@ -170,7 +172,7 @@ impl<'a> Checker<'a> {
             self.collect(&instruction);
             let is_access = matches!(instruction.op, Some(Op::AccessChain | Op::InBoundsAccessChain));
             let array = arrays.get(&instruction.operand(2)).filter(|_| is_access);
-            // Behind type, result and base.
+            // The indices follow type, result and base.
             let index = array.map(|(_, position)| 3 + position);
             match (array, index.filter(|index| *index < instruction.operands().len())) {
                 (Some((array, _)), Some(index)) => {
@@ -185,7 +187,7 @@ impl<'a> Checker<'a> {
         Ok(out)
     }
 
-    /// Calls the function for one index; answers what it answers.
+    /// Emits a call of the check for one index. Returns the id of the result.
     fn emit_check_call(
         &mut self,
         out: &mut Vec<u32>,
@@ -223,7 +225,7 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Types have their own id first.
+/// True for types. Their first operand is their own id.
 fn is_type(i: &Instruction<'_>) -> bool {
     let number = i.words.first().map_or(0, |word| word & 0xFFFF);
     (Op::TypeVoid as u32..=Op::TypePipe as u32).contains(&number)
@@ -248,7 +250,7 @@ mod tests {
         CheckPlan { address: 0x1234_5678_9abc_def0, shader: 3, arrays }
     }
 
-    /// Array and index operands of the calls, by the values of constants and the names of ids.
+    /// Returns the array and index operands of the calls, by the values of constants and the names of ids.
     fn calls(words: &[u32]) -> Vec<u32> {
         let code: Vec<_> = instructions(words).map(Result::unwrap).collect();
         let value = |id: u32| {
@@ -264,7 +266,7 @@ mod tests {
             .collect()
     }
 
-    /// `LVK_UPDATE_KERNELS=1 cargo test -p lvk kernel` writes the words anew.
+    /// `LVK_UPDATE_KERNELS=1 cargo test -p lvk kernel` rewrites the words.
     #[test]
     fn the_kernel_of_checks_is_that_of_its_source() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/shader/glsl");

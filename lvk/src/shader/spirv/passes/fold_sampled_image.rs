@@ -1,4 +1,4 @@
-//! Lets combinations of image and sampler carry their decorations themselves.
+//! Moves the decorations of a copied `OpSampledImage` to the `OpSampledImage` itself.
 
 use std::collections::HashSet;
 
@@ -6,10 +6,11 @@ use ::spirv::Op;
 
 use crate::shader::spirv::words::{HEADER_WORDS, Instruction, instructions};
 
-/// `words` without copies of `OpSampledImage`, which GLSL's compiler makes of `nonuniformEXT(sampler2D(...))`.
+/// Returns `words` without copies of `OpSampledImage`, which the GLSL compiler emits for
+/// `nonuniformEXT(sampler2D(...))`.
 ///
-/// The combination takes the name and so the decorations of its copy. SPIR-V has combinations used by sampling instructions
-/// alone, and SwiftShader looks at nothing but the combination to know that lanes may differ.
+/// The `OpSampledImage` takes the id of its copy, and thereby the decorations. SPIR-V allows only sampling instructions
+/// to use an `OpSampledImage`. SwiftShader reads `NonUniform` only from the `OpSampledImage` itself.
 pub(crate) fn fold_sampled_images(words: Vec<u32>) -> Vec<u32> {
     let Ok(code) = instructions(&words).collect::<Result<Vec<_>, _>>() else {
         return words;
@@ -39,7 +40,7 @@ pub(crate) fn fold_sampled_images(words: Vec<u32>) -> Vec<u32> {
     out
 }
 
-/// Whether `next` copies what `combination` made.
+/// True if `next` copies the result of `combination`.
 fn is_copy_of(next: &Instruction<'_>, combination: &Instruction<'_>) -> bool {
     combination.op == Some(Op::SampledImage)
         && next.op == Some(Op::CopyObject)

@@ -1,11 +1,13 @@
-//! Takes a declaration out of modules that walk ray queries themselves.
+//! Strips an unused capability from modules with software ray queries.
 
 use ::spirv::{Capability, Op};
 
 use crate::shader::spirv::words::{HEADER_WORDS, instructions};
 
-/// The module without the capability that `layout(primitive_culling)` asks for, where nothing in it traces by the device:
-/// software skips kinds of primitives without a word of permission, and Vulkan refuses the capability alone.
+/// Returns the module without the capability that `layout(primitive_culling)` declares, if nothing in the module traces
+/// rays by the device.
+///
+/// Software traversal skips kinds of primitives without a capability, and Vulkan forbids this capability alone.
 pub(crate) fn strip_primitive_culling(words: &[u32]) -> Vec<u32> {
     let declares = |capability: Capability| {
         let is = |words: &[u32]| words.len() == 2 && words[1] == capability as u32;

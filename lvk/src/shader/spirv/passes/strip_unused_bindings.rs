@@ -1,4 +1,4 @@
-//! Drops the resource arrays of the preamble that a shader does not touch.
+//! Strips the resource arrays of the preamble that a shader does not use.
 
 use std::collections::HashSet;
 
@@ -6,10 +6,10 @@ use ::spirv::{Op, StorageClass};
 
 use crate::shader::spirv::words::{Instruction, instructions};
 
-/// `words` without the resource variables that no function mentions.
+/// Returns `words` without the resource variables that no function uses.
 ///
-/// A device feature may be asked for by the mere presence of a variable (a writable image in a vertex shader), so an
-/// unused one must go. A number that happens to equal an id keeps the variable, which does no harm.
+/// The mere presence of a variable can need a device feature (a writable image in a vertex shader), so unused ones are
+/// removed. A literal that equals the id of a variable keeps the variable, which does no harm.
 pub(crate) fn strip_unused_bindings(words: Vec<u32>) -> Vec<u32> {
     let Ok(code) = instructions(&words).collect::<Result<Vec<_>, _>>() else {
         return words;
@@ -37,7 +37,7 @@ fn push_without(out: &mut Vec<u32>, instruction: &Instruction<'_>, unused: &Hash
     let drop = match instruction.op {
         Some(Op::Name | Op::Decorate | Op::DecorateId) => unused.contains(&instruction.operand(0)),
         Some(Op::Variable) => unused.contains(&instruction.operand(1)),
-        // The preamble's extensions say nothing about the shader.
+        // The extensions of the preamble are the same for every shader.
         Some(Op::SourceExtension) => true,
         Some(Op::EntryPoint) => return push_entry_point(out, instruction, unused),
         _ => false,
@@ -48,7 +48,7 @@ fn push_without(out: &mut Vec<u32>, instruction: &Instruction<'_>, unused: &Hash
 }
 
 fn push_entry_point(out: &mut Vec<u32>, instruction: &Instruction<'_>, unused: &HashSet<u32>) {
-    // Opcode, model, function, then the name.
+    // Operands: execution model, function, then the name.
     let interface = 3 + instruction.string(2).1;
     let (head, ids) = instruction.words.split_at(interface.min(instruction.words.len()));
     let at = out.len();
