@@ -1,5 +1,6 @@
-//! The library without its feature `glsl`, which needs no C++ compiler: shaders from SPIR-V words, and with the feature
-//! `software-ray-query` the library's own kernels. `LVK_TEST_LIBRARY` names a Vulkan loader in place of the system's.
+//! Tests of the library without its feature `glsl`, which needs no C++ compiler. Shaders are SPIR-V words. With the
+//! feature `software-ray-query` the library's own kernels run too. `LVK_TEST_LIBRARY` names a Vulkan loader in place
+//! of the system's.
 #![cfg(not(feature = "glsl"))]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
@@ -8,7 +9,7 @@ use lvk::{
     ShaderModuleDesc, ShaderSource, ShaderStage,
 };
 
-/// `None`, loudly, where there is no device and none is demanded.
+/// Returns a context. Without a device it prints a line and returns `None`, unless `LVK_REQUIRE_GPU` is set.
 fn context() -> Option<Context> {
     let library = std::env::var_os("LVK_TEST_LIBRARY").map(std::path::PathBuf::from);
     let made = Context::new(&ContextDesc {
@@ -63,7 +64,7 @@ fn words_run_and_texts_are_refused() {
     }
 }
 
-/// Builds by kernels, which come as words.
+/// Builds acceleration structures with kernels that are compiled to SPIR-V words.
 #[cfg(feature = "software-ray-query")]
 #[test]
 fn accel_structs_are_built_by_kernels() {

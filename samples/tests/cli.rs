@@ -20,7 +20,7 @@ struct Desk {
     output: TempDir,
 }
 
-/// What a run of the program came to.
+/// The result of a run of the program.
 struct Outcome {
     status: Option<i32>,
     out: String,
@@ -133,7 +133,7 @@ fn hybrid(args: &[&str]) -> Command {
     command
 }
 
-/// Whether the test can go on; `false`, with a line, only where the user allowed to go on without a device.
+/// True if a device was found. Returns false and prints a line without a device, if `LVK_SKIP_GPU_TESTS` allows that.
 fn has_device() -> bool {
     let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
     if !is_set("LVK_SKIP_GPU_TESTS") || is_set("LVK_REQUIRE_GPU") {

@@ -13,9 +13,9 @@ use lvk_dev_driver::{DriverRequest, prepare};
 struct Program {
     path: &'static str,
     quick: &'static [&'static str],
-    /// What its help tells beside what all samples have.
+    /// Options in the program's help besides those of all samples.
     own: &'static [&'static str],
-    /// What it says of the picture.
+    /// Text that the program prints about the image.
     said: &'static [&'static str],
     /// Arguments for each way to draw it.
     ways: &'static [&'static [&'static str]],
@@ -211,7 +211,7 @@ fn assert_names(text: &str, parts: &[&str]) {
     }
 }
 
-/// Whether the test can go on; `false`, with a line, only where the user allowed to go on without a device.
+/// True if a device was found. Returns false and prints a line without a device, if `LVK_SKIP_GPU_TESTS` allows that.
 fn has_device() -> bool {
     let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
     let found = prepare(&DriverRequest { validation: true });
@@ -290,7 +290,7 @@ fn every_method_writes_an_image_under_validation() {
     }
 }
 
-/// What the other tests leave a program out for.
+/// The condition for which the other tests skip a program.
 #[test]
 fn a_device_without_mesh_shaders_is_distinguished_from_other_errors() {
     if !has_device() {

@@ -21,7 +21,7 @@ use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
 
 const SIZE: [u32; 2] = [416, 224];
-/// Where the panel is not, at the right.
+/// An x coordinate to the right of the panel.
 const BESIDE_PANEL: u32 = 352;
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -287,7 +287,7 @@ impl Session {
         self.keys.configure_window(self.window, &size).unwrap().check().unwrap();
     }
 
-    /// What the server shows of the window, without alpha.
+    /// The window's pixels on the server, without alpha.
     fn seen(&self, [width, height]: [u32; 2]) -> Vec<[u8; 3]> {
         let [width, height] = [width as u16, height as u16];
         let asked = self.keys.get_image(ImageFormat::Z_PIXMAP, self.window, 0, 0, width, height, !0);
@@ -362,7 +362,7 @@ fn an_animation_by_frames_stands_too() {
     session.close();
 }
 
-/// How many frames were shown while a sample was loaded, once it is there.
+/// Waits until a sample is loaded and returns the number of frames shown meanwhile.
 fn frames_while_loading(session: &mut Session) -> u32 {
     let mut frames = None;
     let deadline = Instant::now() + PATIENCE;

@@ -1,4 +1,4 @@
-//! An acceleration structure as its handle names it: its name, its flags, and what stands behind it.
+//! An acceleration structure of either level, with its name, flags, sizes and build state.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,23 +13,23 @@ use crate::handle::AccelStructHandle;
 
 /// An acceleration structure of either level.
 pub(crate) struct AccelStruct {
-    /// One resource to the tracker, however many parts there are.
+    /// The resource that barriers track: one, even if a BLAS has several parts.
     pub(crate) id: ResourceId,
     pub(crate) name: String,
     pub(crate) flags: BuildFlags,
-    /// As the first build asked for them.
+    /// Sizes that the first build needs.
     pub(crate) sizes: AccelStructSizes,
     pub(crate) kind: AccelKind,
     /// Timeline value of the submission with the first build; 0 before it is submitted.
     built_by: AtomicU64,
 }
 
-/// What differs between the two levels.
+/// Data of a BLAS or of a TLAS.
 #[expect(clippy::large_enum_variant, reason = "an update of a TLAS reads it without one more pointer")]
 pub(crate) enum AccelKind {
-    /// A bottom-level structure.
+    /// A bottom-level acceleration structure.
     Blas(Arc<Blas>),
-    /// A top-level structure.
+    /// A top-level acceleration structure.
     Tlas(Tlas),
 }
 
@@ -39,7 +39,7 @@ impl AccelStruct {
         Self { id: ResourceId::next(), name: name.to_owned(), flags, sizes, kind, built_by }
     }
 
-    /// The bottom level, or an error that says what the handle names instead.
+    /// Returns the BLAS. Fails if the handle names a TLAS.
     pub(crate) fn blas(&self) -> Result<&Arc<Blas>> {
         match &self.kind {
             AccelKind::Blas(blas) => Ok(blas),
@@ -49,12 +49,12 @@ impl AccelStruct {
         }
     }
 
-    /// References the bottom level that `handle` names.
+    /// Returns a reference to the BLAS that `handle` names. Fails if it names a TLAS.
     pub(crate) fn blas_ref(&self, handle: AccelStructHandle) -> Result<BlasRef> {
         Ok(BlasRef::new(handle, self.id, self.flags, Arc::clone(self.blas()?)))
     }
 
-    /// The top level, or an error that says what the handle names instead.
+    /// Returns the TLAS. Fails if the handle names a BLAS.
     #[inline]
     pub(crate) fn tlas(&self) -> Result<&Tlas> {
         match &self.kind {
@@ -65,13 +65,13 @@ impl AccelStruct {
         }
     }
 
-    /// Whether the structure may be refitted.
+    /// True if the acceleration structure may be refitted.
     #[inline]
     pub(crate) fn allows_refit(&self) -> bool {
         self.flags.contains(BuildFlags::ALLOW_UPDATE)
     }
 
-    /// Fails unless the structure may be refitted.
+    /// Fails unless the acceleration structure may be refitted.
     #[inline]
     pub(crate) fn check_refit(&self) -> Result<()> {
         if self.allows_refit() {
@@ -81,7 +81,7 @@ impl AccelStruct {
         Err(Error::usage(&self.name, message))
     }
 
-    /// A build of it went to the GPU with this timeline value.
+    /// Records the timeline value of the first submission with a build. Later calls change nothing.
     #[inline]
     pub(crate) fn mark_used_by_submission(&self, value: u64) {
         if self.built_by.load(Ordering::Relaxed) == 0 {
@@ -89,7 +89,7 @@ impl AccelStruct {
         }
     }
 
-    /// Timeline value at which it is built, once that is submitted.
+    /// Timeline value of the first submission with a build; `None` before that submission.
     pub(crate) fn last_build_value(&self) -> Option<u64> {
         Some(self.built_by.load(Ordering::Relaxed)).filter(|value| *value > 0)
     }

@@ -1,4 +1,4 @@
-//! A bottom-level structure: one for the caller, one or more for Vulkan.
+//! A bottom-level acceleration structure (BLAS): one object for the caller, one or more parts for Vulkan.
 
 use std::sync::Arc;
 
@@ -11,59 +11,59 @@ use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::software_ray_query::blas::SoftwareBlas;
 
-/// What a bottom-level structure is built from, and what was built.
+/// The inputs of a BLAS and its acceleration structures.
 pub(crate) struct Blas {
     pub(crate) geometries: Vec<BlasGeometry>,
-    /// The matrices of geometries that have one by value, 48 bytes for each geometry.
+    /// Transform matrices that were given by value, 48 bytes for each geometry; `None` if no geometry has one.
     pub(crate) transforms: Option<Buffer>,
-    /// The parts a mesh was cut into; a single one where it was not.
+    /// Parts of the mesh; a mesh that is not split has one part.
     pub(crate) parts: Vec<BlasPart>,
-    /// What software traces, where it does.
+    /// The BVH that software ray queries traverse; `None` if no ray queries run in software.
     pub(crate) software: Option<SoftwareBlas>,
     state: Mutex<BlasState>,
 }
 
-/// What changes with builds and compaction.
+/// State that changes with builds and compaction.
 struct BlasState {
     structures: Arc<BlasStructures>,
     /// Builds in command buffers that are not submitted yet.
     open_builds: u32,
-    /// Builds submitted so far, refits not counted; tells whether a compacted size still holds.
+    /// Builds submitted so far, without refits. A compacted size is valid only while this number stays the same.
     builds: u64,
     /// Refits submitted since the last rebuild.
     refits: u32,
     compaction: CompactionState,
 }
 
-/// What has become of the wish to compact a structure that is not compacted.
+/// State of the compaction of a BLAS that is not compacted yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CompactionState {
-    /// Nobody has it.
+    /// No compaction is requested.
     None,
-    /// It is under way.
+    /// A compaction is pending.
     Open,
-    /// It could not be met.
+    /// The compaction failed.
     Failed,
-    /// There is nothing to gain.
+    /// Compaction would save nothing.
     Idle,
 }
 
 /// Input of the builds of one part.
 pub(crate) struct BlasPart {
-    /// The geometries as Vulkan takes them: for the size query, for builds and for refits. A part may have no primitives of
-    /// some geometries.
+    /// The geometries in Vulkan's form, for the size query, for builds and for refits. Some geometries may have no
+    /// primitives in a part.
     pub(crate) input: BuildInput,
-    /// Which primitives these are, where they are not all of the mesh in its own order.
+    /// Maps the part's primitives to those of the mesh; `None` if the part holds the whole mesh in its own order.
     pub(crate) map: Option<PrimitiveMap>,
     pub(crate) sizes: AccelStructSizes,
 }
 
-/// The Vulkan structures of all parts. Compaction replaces the body; who still uses the old one keeps it alive.
+/// The Vulkan acceleration structures of all parts. Compaction replaces them. Users of the old ones keep those alive.
 pub(crate) struct BlasStructures {
     pub(crate) structures: Vec<RawAccelStruct>,
-    /// Bytes of its structures before compaction, for a body that is compacted.
+    /// Bytes of the acceleration structures before compaction; `None` if they are not compacted.
     pub(crate) compacted_from: Option<u64>,
-    /// Whether another build from scratch fits.
+    /// True if the acceleration structures have enough memory for a rebuild.
     pub(crate) rebuildable: bool,
 }
 
@@ -92,13 +92,13 @@ impl Blas {
         Self { geometries, transforms, parts, software, state: Mutex::new(Rank::BlasState, state) }
     }
 
-    /// What stands for it now.
+    /// The present acceleration structures.
     pub(crate) fn structures(&self) -> Arc<BlasStructures> {
         Arc::clone(&self.lock_state().structures)
     }
 
-    /// Puts a compacted body in place of the present one, which is returned, if exactly `build_count` builds were
-    /// submitted and none waits for its submission.
+    /// Replaces the acceleration structures by compacted ones and returns the old ones. Replaces nothing and returns
+    /// `None` unless exactly `builds` builds were submitted and no recorded build waits for its submission.
     pub(crate) fn replace_structures(
         &self,
         body: BlasStructures,
@@ -109,33 +109,34 @@ impl Blas {
         settled.then(|| std::mem::replace(&mut state.structures, Arc::new(body)))
     }
 
-    /// Bytes of memory of what software traces, which compaction leaves alone.
+    /// Bytes of memory of the BVH for software ray queries. Compaction does not change it.
     pub(crate) fn software_bytes(&self) -> u64 {
         self.software.as_ref().map_or(0, SoftwareBlas::memory_bytes)
     }
 
-    /// Scratch bytes of the first builds of all parts and of what software traces.
+    /// Scratch bytes of the first builds of all parts and of the BVH for software ray queries.
     pub(crate) fn initial_scratch_bytes(&self) -> u64 {
         let parts: u64 = self.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();
         let software = self.software.as_ref().map_or(0, SoftwareBlas::initial_scratch_bytes);
         parts.saturating_add(software)
     }
 
-    /// Buffers the library keeps for it, in bytes: maps of primitives and matrices.
+    /// Bytes of the buffers that the library keeps for the BLAS: primitive maps and transform matrices.
     pub(crate) fn table_bytes(&self) -> u64 {
         let maps = self.parts.iter().filter_map(|part| part.map.as_ref());
         let matrices = self.transforms.as_ref().map_or(0, |buffer| buffer.size_bytes);
         maps.map(PrimitiveMap::table_bytes).sum::<u64>() + matrices
     }
 
-    /// A build of the body is about to be recorded; it stays in place until [`close_build`](Self::close_build).
+    /// Begins the recording of a build and returns the acceleration structures to build. They are not replaced until
+    /// [`close_build`](Self::close_build).
     pub(crate) fn open_build(&self) -> Arc<BlasStructures> {
         let mut state = self.lock_state();
         state.open_builds += 1;
         Arc::clone(&state.structures)
     }
 
-    /// The command buffer with a recorded build, a refit or not, was submitted, or given up.
+    /// Ends a recorded build or refit: its command buffer was submitted or discarded.
     pub(crate) fn close_build(&self, submitted: bool, refit: bool) {
         let mut state = self.lock_state();
         state.open_builds = state.open_builds.saturating_sub(1);
@@ -149,27 +150,27 @@ impl Blas {
         }
     }
 
-    /// How many builds were submitted so far, refits not counted.
+    /// Number of builds submitted so far, without refits.
     pub(crate) fn build_count(&self) -> u64 {
         self.lock_state().builds
     }
 
-    /// Whether builds wait for their submission.
+    /// True if recorded builds wait for their submission.
     pub(crate) fn has_open_builds(&self) -> bool {
         self.lock_state().open_builds > 0
     }
 
-    /// Refits submitted since the last rebuild.
+    /// Number of refits submitted since the last rebuild.
     pub(crate) fn refit_count(&self) -> u32 {
         self.lock_state().refits
     }
 
-    /// What has become of the wish to compact it.
+    /// State of the compaction.
     pub(crate) fn compaction_state(&self) -> CompactionState {
         self.lock_state().compaction
     }
 
-    /// Changes that; answers what it was before.
+    /// Sets the state of the compaction and returns the previous one.
     pub(crate) fn set_compaction_state(&self, wish: CompactionState) -> CompactionState {
         std::mem::replace(&mut self.lock_state().compaction, wish)
     }

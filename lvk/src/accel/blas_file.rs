@@ -1,19 +1,18 @@
-//! A bottom-level structure as bytes, to be kept in a file: what the driver wrote of each part, and what the library
-//! must know to put the parts together again.
+//! Serialisation of a BLAS: the driver's data of each part, and the data from which the library joins the parts.
 //!
-//! All numbers are little-endian: magic (8 bytes), version (`read_u32`), length of the whole (`read_u64`), checksum of all that
-//! follows (`read_u64`); flags, then the number of geometries and each of them (seven `read_u32`), then the number of parts and
-//! each of them: bytes of the driver's data (`read_u64`), words in the map plus one, or 0 without a map (`read_u64`), the data,
-//! the map.
+//! All numbers are little-endian. The header is: magic (8 bytes), version (`u32`), length of the whole file (`u64`),
+//! checksum of all that follows (`u64`). The body is: flags (`u32`), number of geometries (`u32`), the geometries
+//! (seven `u32` each), number of parts (`u32`), the parts. A part is: bytes of the driver's data (`u64`), 0 without a
+//! map or the words of the map plus one (`u64`), the driver's data, the map.
 
-/// A serialised bottom-level structure.
+/// A serialised BLAS.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BlasFile {
-    /// What it was built with, as the caller defines it.
+    /// Build flags, encoded by the caller.
     pub(crate) flags: u32,
-    /// The geometries it was built from.
+    /// The geometries of the BLAS.
     pub(crate) geometries: Vec<BlasFileGeometry>,
-    /// The structures it consists of.
+    /// The parts of the BLAS, one Vulkan acceleration structure each.
     pub(crate) parts: Vec<BlasFilePart>,
 }
 
@@ -22,15 +21,15 @@ pub(crate) struct BlasFile {
 pub(crate) struct BlasFileGeometry {
     pub(crate) kind: BlasFileGeometryKind,
     pub(crate) primitive_count: u32,
-    /// Flags of the geometry, as the caller defines them.
+    /// Geometry flags, encoded by the caller.
     pub(crate) flags: u32,
 }
 
-/// What a geometry consists of, as far as a refit must not change it.
+/// Properties of a geometry that a refit must not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BlasFileGeometryKind {
     Triangles {
-        /// Number of a `VkFormat`.
+        /// Value of a `VkFormat`.
         vertex_format: u32,
         vertex_count: u32,
         indices: BlasFileIndices,
@@ -39,7 +38,7 @@ pub(crate) enum BlasFileGeometryKind {
     Boxes,
 }
 
-/// How triangles are indexed.
+/// Index format of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BlasFileIndices {
     None,
@@ -47,32 +46,33 @@ pub(crate) enum BlasFileIndices {
     U32,
 }
 
-/// One structure.
+/// The acceleration structure of one part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BlasFilePart {
-    /// What the driver wrote; at least [`VERSION_DATA_BYTES`].
+    /// Data that the driver serialised, at least [`VERSION_DATA_BYTES`].
     pub(crate) driver: Vec<u8>,
-    /// The words of the part's table of primitives; `None` where they are in the user's own order.
+    /// The words of the part's primitive map; `None` if the primitives are in the caller's order.
     pub(crate) map: Option<Vec<u32>>,
 }
 
-/// Bytes at the start of a driver's data that say which drivers can read it: its UUID and that of the format.
+/// Bytes at the start of the driver's data that identify compatible drivers: the driver's UUID and the UUID of the
+/// format.
 pub(crate) const VERSION_DATA_BYTES: usize = 32;
 
 impl BlasFilePart {
-    /// What `vkGetDeviceAccelerationStructureCompatibilityKHR` is asked about.
+    /// The input of `vkGetDeviceAccelerationStructureCompatibilityKHR`.
     pub(crate) fn version_data(&self) -> Option<&[u8; VERSION_DATA_BYTES]> {
         self.driver.first_chunk()
     }
 }
 
-/// Why bytes are not a structure that can be read.
+/// Reason that bytes cannot be decoded as a BLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum BlasFileError {
     /// The magic is missing.
     #[error("these bytes are not a serialised acceleration structure")]
     NotABlob,
-    /// Another version of the library wrote it.
+    /// The file has another format version.
     #[error(
         "the acceleration structure was serialised in version {found} of the format, this is version {VERSION}"
     )]
@@ -80,15 +80,15 @@ pub(crate) enum BlasFileError {
         /// The version found.
         found: u32,
     },
-    /// The end is missing.
+    /// Bytes at the end are missing.
     #[error("the serialised acceleration structure is cut off: {found} of {expected} bytes are there")]
     Truncated {
         /// Bytes found.
         found: u64,
-        /// Bytes that were written, or that the header alone takes.
+        /// Bytes of the whole file, or of the header if that is incomplete.
         expected: u64,
     },
-    /// The bytes were changed.
+    /// The bytes do not match the checksum.
     #[error("the serialised acceleration structure is damaged: its checksum is wrong")]
     Checksum,
     /// The contents contradict each other.
@@ -101,7 +101,7 @@ const VERSION: u32 = 2;
 const HEADER_BYTES: usize = 28;
 const GEOMETRY_WORDS: usize = 7;
 
-/// Writes a structure as bytes.
+/// Encodes a BLAS as bytes.
 pub(crate) fn encode_blas_file(blob: &BlasFile) -> Vec<u8> {
     let mut body = Vec::with_capacity(encoded_bytes(blob));
     body.extend(MAGIC);
@@ -126,7 +126,7 @@ pub(crate) fn encode_blas_file(blob: &BlasFile) -> Vec<u8> {
     body
 }
 
-/// Reads what [`encode_blas_file`] wrote. Any bytes are allowed; none but those are accepted.
+/// Decodes the output of [`encode_blas_file`]. Any other bytes are an error.
 pub(crate) fn decode_blas_file(bytes: &[u8]) -> Result<BlasFile, BlasFileError> {
     let short = |expected| BlasFileError::Truncated { found: bytes.len() as u64, expected };
     if !MAGIC.starts_with(&bytes[..bytes.len().min(MAGIC.len())]) {
@@ -150,7 +150,8 @@ pub(crate) fn decode_blas_file(bytes: &[u8]) -> Result<BlasFile, BlasFileError> 
     reader.read_blob()
 }
 
-/// Kind, primitives, flags; then of triangles vertex format, vertices, bits of an index, whether there is a matrix.
+/// Encodes a geometry: kind, primitives, flags. Triangles add the vertex format, the number of vertices, the bits of
+/// an index (0, 16 or 32), and 1 for a transform matrix.
 fn geometry_words(geometry: &BlasFileGeometry) -> [u32; GEOMETRY_WORDS] {
     let (count, flags) = (geometry.primitive_count, geometry.flags);
     match geometry.kind {
@@ -166,12 +167,12 @@ fn geometry_words(geometry: &BlasFileGeometry) -> [u32; GEOMETRY_WORDS] {
     }
 }
 
-/// Takes numbers from the front of bytes.
+/// Reads numbers from the front of a byte slice.
 struct BlobReader<'a> {
     rest: &'a [u8],
 }
 
-const TOO_SHORT: BlasFileError = BlasFileError::Malformed("it promises more than it holds");
+const TOO_SHORT: BlasFileError = BlasFileError::Malformed("a count exceeds the data that follows");
 
 impl<'a> BlobReader<'a> {
     fn read_blob(mut self) -> Result<BlasFile, BlasFileError> {
@@ -256,7 +257,7 @@ fn encoded_bytes(blob: &BlasFile) -> usize {
         + blob.parts.iter().map(part).sum::<usize>()
 }
 
-/// FNV-1a, 64 bits: every step can be undone, so that a single changed byte always changes the sum.
+/// FNV-1a, 64 bits. Every step is invertible, so a single changed byte always changes the checksum.
 fn checksum(bytes: &[u8]) -> u64 {
     bytes
         .iter()
@@ -290,7 +291,7 @@ mod tests {
             .prop_map(|(flags, geometries, parts)| BlasFile { flags, geometries, parts })
     }
 
-    /// Bytes with a header that is right, around any body.
+    /// Prepends a valid header to any body.
     fn sealed(body: &[u8]) -> Vec<u8> {
         let length = (HEADER_BYTES + body.len()) as u64;
         let header =

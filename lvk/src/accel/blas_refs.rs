@@ -1,4 +1,4 @@
-//! The BLAS that a TLAS references, without duplicates. The set is kept as long as the same BLAS are referenced.
+//! The BLAS that a TLAS references, without duplicates. The set is reused while the TLAS references the same BLAS.
 
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
@@ -10,22 +10,22 @@ use crate::barrier::{IdHasher, ResourceId};
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
 
-/// Finds the BLAS of a handle.
+/// Returns the BLAS of a handle.
 pub(crate) type ResolveBlas<'a> = &'a (dyn Fn(AccelStructHandle) -> Result<BlasRef> + Sync);
 
-/// Rises with every structure that is destroyed, and with every one that moves: while it stays the same, so does what was
-/// found.
+/// Counters of destroyed and of moved acceleration structures. While both stay the same, resolved references stay
+/// valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct AccelGeneration {
     pub(crate) removals: u64,
     pub(crate) moves: u64,
 }
 
-/// A bottom-level structure that instances refer to, with the body they refer to.
+/// A BLAS that instances reference, with its acceleration structures at that time.
 #[derive(Clone)]
 pub(crate) struct BlasRef {
     pub(crate) handle: AccelStructHandle,
-    /// The resource that barriers and queues know it by.
+    /// The resource that barriers and queue synchronisation track.
     pub(crate) id: ResourceId,
     allows_compaction: bool,
     pub(crate) blas: Arc<Blas>,
@@ -44,50 +44,51 @@ impl BlasRef {
         !Arc::ptr_eq(&self.blas.structures(), &self.structures)
     }
 
-    /// Whether it may yet be compacted, which gives it another address.
+    /// True if the BLAS may still be compacted, which changes its address.
     fn may_move(&self) -> bool {
         self.allows_compaction && self.structures.compacted_from.is_none()
     }
 
-    /// Whether its address does not do in an instance.
+    /// True if an instance of the BLAS cannot be written with its address alone.
     pub(crate) fn needs_kernel(&self) -> bool {
         self.may_move() || self.needs_hit_remap()
     }
 
-    /// Whether its hits need rows to become the caller's numbers.
+    /// True if hits of the BLAS need a hit remap table to map them to the caller's ids.
     fn needs_hit_remap(&self) -> bool {
         self.blas.parts.iter().any(|part| part.map.is_some()) || self.structures.structures.len() > 1
     }
 
-    /// What instances refer to, where they refer to an address.
+    /// Address of the first part, for instances that are written with addresses.
     fn address(&self) -> u64 {
         self.structures.structures.first().map_or(0, |structure| structure.address)
     }
 }
 
-/// What a list of instances refers to, with all that follows from it. Never changes.
+/// The BLAS that a list of instances references, with derived data. Immutable.
 #[derive(Default)]
 pub(crate) struct BlasRefSet {
     refs: Vec<BlasRef>,
     handles: Vec<AccelStructHandle>,
-    /// The place of each in `refs`, where they are more than a few.
+    /// Index of each handle in `refs`; empty for at most [`LINEAR_SEARCH_MAX`](Self::LINEAR_SEARCH_MAX) of them.
     index_map: HashMap<AccelStructHandle, u32, BuildHasherDefault<IdHasher>>,
-    /// What instances refer to, where they refer to an address.
+    /// Address of the first part of each BLAS.
     addresses: Vec<u64>,
-    /// First part and number of parts of each.
+    /// First part and number of parts of each BLAS.
     part_spans: Vec<[u32; 2]>,
-    /// Address of the structure and of its map, for each part.
+    /// Address of the acceleration structure and of the primitive map of each part.
     part_addresses: Vec<[u64; 2]>,
-    /// Whether an address does not do for some: it has parts, maps, or may move.
+    /// True if any BLAS cannot be written with its address alone: it has several parts or a primitive map, or may
+    /// move.
     pub(crate) needs_kernel: bool,
-    /// Whether some may yet be compacted.
+    /// True if any BLAS may still be compacted.
     pub(crate) may_move: bool,
-    /// Whether hits of some need rows.
+    /// True if hits of any BLAS need a hit remap table.
     pub(crate) needs_hit_remap: bool,
 }
 
 impl BlasRefSet {
-    /// So many are searched one by one, which is faster than a map.
+    /// Up to this many handles are searched one by one, which is faster than a map.
     const LINEAR_SEARCH_MAX: usize = 8;
 
     pub(crate) fn new(list: Vec<BlasRef>) -> Self {
@@ -116,44 +117,44 @@ impl BlasRefSet {
         }
     }
 
-    /// Everything shown, each at its place.
+    /// The BLAS references, by index.
     pub(crate) fn refs(&self) -> &[BlasRef] {
         &self.refs
     }
 
-    /// First part and number of parts of everything shown.
+    /// First part and number of parts of each BLAS.
     pub(crate) fn part_spans(&self) -> &[[u32; 2]] {
         &self.part_spans
     }
 
-    /// Address of the structure and of its map, for every part of everything shown.
+    /// Address of the acceleration structure and of the primitive map of each part of each BLAS.
     pub(crate) fn part_addresses(&self) -> &[[u64; 2]] {
         &self.part_addresses
     }
 
-    /// Whether anything shown has moved since.
+    /// True if any BLAS has moved since the set was created.
     pub(crate) fn is_outdated(&self) -> bool {
         self.refs.iter().any(BlasRef::is_outdated)
     }
 
-    /// Whether everything is still there, where it was.
+    /// True if every BLAS still exists and none has moved.
     pub(crate) fn is_current(&self, resolve: ResolveBlas<'_>) -> bool {
         let is_same = |known: &BlasRef, now: BlasRef| Arc::ptr_eq(&known.structures, &now.structures);
         self.refs.iter().all(|known| resolve(known.handle).is_ok_and(|now| is_same(known, now)))
     }
 
-    /// The same structures as they stand now.
+    /// Returns a set of the same BLAS with their present acceleration structures.
     pub(crate) fn refreshed(&self) -> Self {
         let refresh = |known: &BlasRef| BlasRef { structures: known.blas.structures(), ..known.clone() };
         Self::new(self.refs.iter().map(refresh).collect())
     }
 
-    /// Whether it lists exactly these, in this order.
+    /// True if the set has exactly these handles, in this order.
     pub(crate) fn has_handles(&self, handles: &[AccelStructHandle]) -> bool {
         self.handles == handles
     }
 
-    /// The place of a structure, and what an instance of it refers to.
+    /// Index and address of a BLAS; `None` if the set does not have it.
     #[inline]
     pub(crate) fn index_and_address(&self, handle: AccelStructHandle) -> Option<(u32, u64)> {
         let ref_index = self.index_of(handle)?;
@@ -174,11 +175,11 @@ impl BlasRefSet {
     }
 }
 
-/// Which of those known were met. Kept and emptied, so that it seldom allocates.
+/// A set of indices. Its memory is reused, so it rarely allocates.
 #[derive(Debug, Default)]
 pub(crate) struct BitSet {
     first: u64,
-    /// Of those behind the first 64.
+    /// Bits of the indices from 64 on.
     more: Vec<u64>,
     count: usize,
 }
@@ -214,18 +215,18 @@ impl BitSet {
     }
 }
 
-/// Finds what instances refer to, starting from what was shown before.
+/// Collects the BLAS that instances reference, beginning with those of the previous set.
 pub(crate) struct BlasRefCollector<'a> {
     previous: &'a BlasRefSet,
     seen: &'a mut BitSet,
     resolve: ResolveBlas<'a>,
-    /// What was not known; mostly nothing.
+    /// BLAS that the previous set does not have; `None` if there are none, as is usual.
     new: Option<Box<NewRefs>>,
-    /// Whether an address does not do for some.
+    /// True if any BLAS cannot be written with its address alone.
     pub(crate) needs_kernel: bool,
 }
 
-/// Structures that were not known, each once.
+/// BLAS that the previous set does not have, without duplicates.
 #[derive(Default)]
 struct NewRefs {
     refs: Vec<BlasRef>,
@@ -239,7 +240,7 @@ impl<'a> BlasRefCollector<'a> {
         Self { previous: known, seen: marks, resolve, new: None, needs_kernel: known.needs_kernel }
     }
 
-    /// The place of a structure: among those known, or behind them.
+    /// Adds a BLAS and returns its index. Indices of new BLAS follow those of the previous set.
     #[inline]
     pub(crate) fn add(&mut self, handle: AccelStructHandle) -> Result<usize> {
         let Some(ref_index) = self.previous.index_of(handle) else { return self.add_new(handle) };
@@ -247,7 +248,7 @@ impl<'a> BlasRefCollector<'a> {
         Ok(ref_index)
     }
 
-    /// What an instance of it refers to.
+    /// Adds a BLAS and returns the address for its instances.
     #[inline]
     pub(crate) fn add_for_address(&mut self, handle: AccelStructHandle) -> Result<u64> {
         let Some(ref_index) = self.previous.index_of(handle) else { return self.add_new_for_address(handle) };
@@ -275,18 +276,18 @@ impl<'a> BlasRefCollector<'a> {
         Ok(before + list.len() - 1)
     }
 
-    /// What was not known.
+    /// Returns the BLAS that the previous set does not have.
     pub(crate) fn into_new_refs(self) -> Vec<BlasRef> {
         self.new.map(|new| new.refs).unwrap_or_default()
     }
 
-    /// Whether everything known was met, and nothing else.
+    /// True if all BLAS of the previous set were added, and no others.
     #[inline]
     pub(crate) fn is_unchanged(&self) -> bool {
         self.new.is_none() && self.seen.count == self.previous.refs.len()
     }
 
-    /// What was met, with the place that each of the [places](Self::place) has become.
+    /// Returns the set of all added BLAS, and the index in it for each index that [`add`](Self::add) returned.
     pub(crate) fn finish(self) -> (BlasRefSet, Vec<u32>) {
         let Self { previous: known, seen: marks, new, .. } = self;
         let new = new.map(|new| new.refs).unwrap_or_default();
@@ -329,7 +330,7 @@ mod tests {
     }
 
     proptest! {
-        /// Lists one after the other, each found from what the one before has shown.
+        /// Collects several lists in turn, each with the set of the one before as the previous set.
         #[test]
         fn a_set_is_what_the_list_refers_to_and_stays_while_that_is_the_same(
             count in 1..100_usize,

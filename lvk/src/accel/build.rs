@@ -1,4 +1,5 @@
-//! The input of a build in Vulkan's terms. The same value serves the size query and every build.
+//! The input of an acceleration structure build in Vulkan's form. The same value serves the size query and every
+//! build.
 
 use std::sync::Arc;
 
@@ -23,8 +24,8 @@ pub(crate) struct BuildInput {
 }
 
 impl BuildInput {
-    /// Checks and converts the geometries of a bottom-level structure. `transform_matrices` is the address of the matrices
-    /// that are given by value, 48 bytes for each geometry, or `None` where there are none.
+    /// Checks and converts the geometries of a BLAS. `transforms` is the address of the transform matrices given by
+    /// value, 48 bytes for each geometry, or `None` if there are none.
     pub(crate) fn from_geometries(
         gpu: &Gpu,
         name: &str,
@@ -56,7 +57,7 @@ impl BuildInput {
         part
     }
 
-    /// As [`for_part`](Self::for_part) for a part that is only planned: good for size queries.
+    /// As [`for_part`](Self::for_part), for a part that is only planned. The result is valid for size queries alone.
     pub(crate) fn with_gathered_inputs(mut self) -> Self {
         const NO_ADDRESS: u64 = 0;
         self.geometries.iter_mut().for_each(|geometry| use_gathered_inputs(geometry, NO_ADDRESS));
@@ -70,7 +71,7 @@ impl BuildInput {
         }
     }
 
-    /// The input of a top-level structure: `count` instances at `instances`, an address that is a multiple of 16.
+    /// Returns the input of a TLAS: `count` instances at `instances`, an address that is a multiple of 16.
     pub(crate) fn from_instances(flags: BuildFlags, instances: u64, count: u32) -> Self {
         let converted = [VulkanGeometry { raw: instances_geometry(instances), primitive_count: count }];
         Self::new(vk::AccelerationStructureTypeKHR::TOP_LEVEL, flags, &converted)
@@ -89,7 +90,8 @@ impl BuildInput {
         }
     }
 
-    /// Asks how large the structure and its scratch memory are (`vkGetAccelerationStructureBuildSizesKHR`).
+    /// Queries the sizes of the acceleration structure and its scratch memory
+    /// (`vkGetAccelerationStructureBuildSizesKHR`).
     pub(crate) fn query_sizes(&self, gpu: &Gpu) -> Result<AccelStructSizes> {
         let counts: Vec<_> = self.ranges.iter().map(|range| range.primitive_count).collect();
         let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
@@ -113,7 +115,7 @@ impl BuildInput {
         Ok(if bottom { gpu.profile.query_build_sizes(sizes, primitives) } else { sizes })
     }
 
-    /// The build of `target` with scratch memory at this address.
+    /// Returns the build of `target` with scratch memory at the address `scratch`.
     pub(crate) fn build(
         &self,
         target: vk::AccelerationStructureKHR,
@@ -128,24 +130,24 @@ impl BuildInput {
     }
 }
 
-/// The build of a top-level structure, as [`BuildInput`] would have it, without lists.
+/// The build of a TLAS, as [`BuildInput`] describes it, without heap allocations.
 pub(crate) struct TlasBuild {
     pub(crate) flags: BuildFlags,
-    /// Where the instances lie, a multiple of 16.
+    /// Address of the instances, a multiple of 16.
     pub(crate) instances: u64,
     pub(crate) count: u32,
     pub(crate) refit: bool,
     pub(crate) target: vk::AccelerationStructureKHR,
-    /// The address of its scratch memory.
+    /// Address of the scratch memory.
     pub(crate) scratch: u64,
 }
 
 impl TlasBuild {
-    /// Records it (`vkCmdBuildAccelerationStructuresKHR`).
+    /// Records the build (`vkCmdBuildAccelerationStructuresKHR`).
     ///
     /// # Safety
-    /// The command buffer is being recorded; instances, structure and scratch memory are alive, checked, aligned and large
-    /// enough, and barriers keep them apart from other commands.
+    /// The command buffer is in the recording state. Instances, acceleration structure and scratch memory are alive,
+    /// checked, aligned and large enough. Barriers separate them from other commands.
     #[inline(always)]
     pub(crate) unsafe fn record(&self, ext: &ExtDevice, commands: vk::CommandBuffer) {
         let geometry = [instances_geometry(self.instances)];
@@ -154,7 +156,7 @@ impl TlasBuild {
         let range =
             vk::AccelerationStructureBuildRangeInfoKHR { primitive_count: self.count, ..Default::default() };
         let build = ext.fp().cmd_build_acceleration_structures_khr;
-        // SAFETY: the caller's promise; one structure with one geometry and its one range.
+        // SAFETY: the caller ensures the conditions; one acceleration structure with one geometry and its range.
         unsafe { build(commands, 1, &info, &std::ptr::from_ref(&range)) };
     }
 }
@@ -190,7 +192,7 @@ fn build_command(
     if refit { info.src_acceleration_structure(target) } else { info }
 }
 
-/// Instances at an address that is a multiple of 16.
+/// The geometry of instances at an address that is a multiple of 16.
 #[inline]
 fn instances_geometry(instances: u64) -> vk::AccelerationStructureGeometryKHR<'static> {
     debug_assert!(instances.is_multiple_of(16));
@@ -201,7 +203,7 @@ fn instances_geometry(instances: u64) -> vk::AccelerationStructureGeometryKHR<'s
         .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data })
 }
 
-/// Makes a geometry read its indices, or its boxes, from where they were gathered.
+/// Makes a geometry read its indices or AABBs from the gathered inputs.
 fn use_gathered_inputs(geometry: &mut vk::AccelerationStructureGeometryKHR<'_>, inputs: u64) {
     const BOX_BYTES: u64 = 24;
     match geometry.geometry_type {
@@ -212,7 +214,7 @@ fn use_gathered_inputs(geometry: &mut vk::AccelerationStructureGeometryKHR<'_>, 
             triangles.index_data = host_or_device_address(inputs);
         }
         _ => {
-            // SAFETY: as above; bottom levels hold triangles or boxes.
+            // SAFETY: as above; a BLAS holds triangles or AABBs.
             let boxes = unsafe { &mut geometry.geometry.aabbs };
             boxes.data = host_or_device_address(inputs);
             boxes.stride = BOX_BYTES;
@@ -223,7 +225,7 @@ fn use_gathered_inputs(geometry: &mut vk::AccelerationStructureGeometryKHR<'_>, 
 /// Bytes of a 3 x 4 matrix.
 pub(crate) const TRANSFORM_BYTES: u64 = 48;
 
-/// The matrices given by value, identity for other geometries; `None` if no geometry has one.
+/// The transform matrices given by value, identity for other geometries; `None` if no geometry has one.
 pub(crate) fn transform_matrices(geometries: &[BlasGeometry]) -> Option<Vec<f32>> {
     const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let any = geometries.iter().any(|geometry| geometry.transform_rows().is_some());

@@ -1,21 +1,23 @@
-//! Builds of top-level structures one after the other: which of them need not wait for those before. Decisions only.
+//! Consecutive TLAS builds: decides which of them need no barrier between them. Records nothing.
 
 use std::ops::Range;
 
 use crate::barrier::ResourceId;
 
-/// Builds that may run at once: each of another structure, in scratch memory of its own. Alignments are powers of two.
+/// TLAS builds that may run concurrently: each has its own target and its own scratch memory. Alignments are powers of
+/// two.
 #[derive(Debug, Default)]
 pub(crate) struct ConcurrentBuilds {
-    /// Where the next build may work.
+    /// Scratch address of the next build.
     next: u64,
-    /// Where the memory ends; at `next` or before where no run is under way.
+    /// End of the scratch memory; at most `next` if no concurrent builds are open.
     end: u64,
     targets: BuildTargets,
 }
 
 impl ConcurrentBuilds {
-    /// Begins with a build of `target` at the start of `memory`, an aligned address; it waits for everything before.
+    /// Starts with a build of `target` at the start of `memory`, an aligned address. This build waits for all earlier
+    /// commands.
     pub(crate) fn start(&mut self, target: ResourceId, memory: Range<u64>, bytes: u64, alignment: u64) {
         let after = aligned_end(memory.start, bytes, alignment);
         (self.next, self.end) = (after.unwrap_or(u64::MAX), memory.end);
@@ -23,12 +25,12 @@ impl ConcurrentBuilds {
         self.targets.insert(target);
     }
 
-    /// The address at which the next build works, of `target`, unless it has to wait for those before.
+    /// Returns the scratch address of the next build, of `target`; `None` if it must wait for the builds before.
     #[inline]
     pub(crate) fn try_add(&mut self, target: ResourceId, bytes: u64, alignment: u64) -> Option<u64> {
         let address = self.next;
         let after = aligned_end(address, bytes, alignment).filter(|after| *after <= self.end)?;
-        // A build that needs no memory tells nobody whether a run is under way.
+        // A build without scratch memory would fit even if no concurrent builds are open.
         if after == address || !self.targets.insert(target) {
             return None;
         }
@@ -36,23 +38,23 @@ impl ConcurrentBuilds {
         Some(address)
     }
 
-    /// Whatever comes next waits.
+    /// Makes the next build wait for those before.
     #[inline]
     pub(crate) fn stop(&mut self) {
         self.end = 0;
     }
 }
 
-/// What a run builds, each once.
+/// The targets of concurrent builds, each once.
 #[derive(Debug, Default)]
 struct BuildTargets {
-    /// A bit for each, which several may share.
+    /// One bit for each target. Several targets may share a bit.
     bits: u64,
     ids: Vec<ResourceId>,
 }
 
 impl BuildTargets {
-    /// So many builds keep a device busy; one more waits, so that each is looked for among few.
+    /// This many concurrent builds occupy a device. The limit keeps searches in `ids` short.
     const MAX_TARGETS: usize = 64;
 
     fn clear(&mut self) {
@@ -60,7 +62,7 @@ impl BuildTargets {
         self.ids.clear();
     }
 
-    /// Whether it is new, and there is room for it.
+    /// Adds a target. Returns false if the list has it already or is full.
     #[inline]
     fn insert(&mut self, id: ResourceId) -> bool {
         let bit = id.bit();
@@ -73,7 +75,7 @@ impl BuildTargets {
     }
 }
 
-/// The first aligned address behind so many bytes.
+/// The first aligned address after `bytes` bytes at `address`.
 #[inline]
 fn aligned_end(address: u64, bytes: u64, alignment: u64) -> Option<u64> {
     let mask = alignment.saturating_sub(1);
@@ -88,15 +90,15 @@ mod tests {
 
     #[derive(Debug, Clone)]
     enum BuildRunCommand {
-        /// A build of one of a few structures.
+        /// A build of one of a few TLAS.
         Build { target: u64, bytes: u64 },
-        /// Something else, in front of which there may be a barrier.
+        /// Another command, which may have a barrier before it.
         Other,
     }
 
     fn command() -> impl Strategy<Value = BuildRunCommand> {
         let bytes = prop_oneof![9 => 0..900_u64, 1 => Just(u64::MAX)];
-        // Some share a bit.
+        // Some targets share a bit.
         let target = prop_oneof![0..6_u64, 64..70_u64];
         prop_oneof![
             9 => (target, bytes).prop_map(|(target, bytes)| BuildRunCommand::Build { target, bytes }),
@@ -104,7 +106,7 @@ mod tests {
         ]
     }
 
-    /// What nothing keeps apart: structures, each with its scratch memory.
+    /// Builds without a barrier between them: targets, each with its scratch memory.
     type Unordered = Vec<(u64, Range<u64>)>;
 
     fn need_barrier(unordered: &Unordered, target: u64, memory: &Range<u64>) -> bool {
@@ -114,7 +116,7 @@ mod tests {
     }
 
     proptest! {
-        /// Two builds of one structure wait for each other, and so do two in the same memory; nothing else does.
+        /// A build waits for an earlier one of the same TLAS or in the same scratch memory, and for no other.
         #[test]
         fn builds_wait_for_the_same_structure_and_for_memory_and_for_nothing_else(
             commands in prop::collection::vec(command(), 1..60),

@@ -1,4 +1,4 @@
-//! Compactions under way: sizes are asked of the GPU, and the copies made once it has answered.
+//! Pending compactions: size queries on the GPU, and the copies that follow their results.
 
 use std::sync::{Arc, Weak};
 
@@ -8,35 +8,35 @@ use crate::error::{Error, Result};
 use crate::lock_order::{Mutex, Rank};
 use crate::resource::QueryPool;
 
-/// All compactions of a context.
+/// All pending compactions of a context.
 #[derive(Default)]
 pub(crate) struct Compactions {
-    /// Those whose sizes the GPU is to answer.
+    /// Size queries without results yet.
     pub(crate) queries: Vec<Arc<CompactedSizeQuery>>,
-    /// Copies to be made.
+    /// Copies that are not recorded yet.
     pub(crate) copies: Vec<PlannedCopy>,
-    /// What copies took the place of: memory that comes back.
+    /// Acceleration structures that copies replaced. Their memory is freed later.
     pub(crate) replaced: Vec<Weak<BlasStructures>>,
 }
 
-/// A copy whose sizes are known.
+/// A copy with known sizes.
 pub(crate) struct PlannedCopy {
-    /// Nothing is kept for the sake of its copy.
+    /// Weak, so that a planned copy does not keep a destroyed BLAS alive.
     pub(crate) target: Weak<AccelStruct>,
-    /// Bytes of each part.
+    /// Compacted bytes of each part.
     pub(crate) sizes: Vec<u64>,
-    /// How many builds the structure had seen when it was asked.
+    /// Number of builds of the BLAS at the time of the size query.
     pub(crate) builds: u64,
-    /// Why there was no room for it when that was last tried.
+    /// Failure of the last attempt for lack of memory; `None` if none has failed.
     pub(crate) refused: Option<CompactionRefusal>,
 }
 
-/// There was no room for a copy.
+/// A failure to allocate the memory of a copy.
 pub(crate) struct CompactionRefusal {
     pub(crate) error: Error,
-    /// Bytes that structures had in use.
+    /// Bytes that acceleration structures used at that time.
     pub(crate) used_bytes: u64,
-    /// The last submission by then: what was destroyed before is freed when the GPU is done with it.
+    /// The last submission at that time. Objects destroyed earlier are freed once the GPU has completed it.
     pub(crate) submitted: u64,
 }
 
@@ -45,12 +45,13 @@ impl Compactions {
         self.queries.is_empty() && self.copies.is_empty()
     }
 
-    /// Forgets what is freed by now.
+    /// Drops the entries of `replaced` whose memory is freed.
     pub(crate) fn drop_freed(&mut self) {
         self.replaced.retain(|body| body.strong_count() > 0);
     }
 
-    /// The copies without room, where nothing under way will free any, with the GPU as far as submission `completed`.
+    /// Takes the copies that lack memory, if no pending work can free any. The GPU has completed the submissions up to
+    /// `completed`.
     pub(crate) fn drain_stuck(&mut self, completed: u64) -> Vec<PlannedCopy> {
         let waits =
             |copy: &PlannedCopy| copy.refused.as_ref().is_none_or(|refusal| refusal.submitted > completed);
@@ -60,18 +61,19 @@ impl Compactions {
 }
 
 impl PlannedCopy {
-    /// Whether to try it, with so many bytes of structures in use.
+    /// True if the copy was never refused, or if less memory is in use than at the refusal. `used_bytes` is the memory
+    /// of acceleration structures in use.
     pub(crate) fn should_retry(&self, used_bytes: u64) -> bool {
         self.refused.as_ref().is_none_or(|refusal| used_bytes < refusal.used_bytes)
     }
 }
 
-/// Compacted sizes asked for together.
+/// A query of the compacted sizes of several BLAS.
 pub(crate) struct CompactedSizeQuery {
     pub(crate) pool: QueryPool,
-    /// Each with the query of its first part; its other parts follow.
+    /// Each BLAS with the query index of its first part. The queries of its other parts follow.
     pub(crate) targets: Vec<(Arc<AccelStruct>, u32)>,
-    /// For each target how many builds the GPU will have seen when it answers; empty before the submission.
+    /// For each target, the number of builds before the query; empty before the submission.
     builds: Mutex<Vec<u64>>,
 }
 
@@ -80,14 +82,14 @@ impl CompactedSizeQuery {
         Self { pool, targets, builds: Mutex::new(Rank::SizeQuery, Vec::new()) }
     }
 
-    /// The query went to the GPU, behind all builds submitted so far.
+    /// Records that the query was submitted after all builds submitted so far.
     pub(crate) fn mark_submitted(&self) {
         let builds =
             |(target, _): &(Arc<AccelStruct>, u32)| target.blas().map_or(0, |blas| blas.build_count());
         *self.builds.lock() = self.targets.iter().map(builds).collect();
     }
 
-    /// The copies to be made, once the GPU has answered.
+    /// Returns the copies to record; `None` until the GPU has written the results.
     pub(crate) fn results(&self) -> Result<Option<Vec<PlannedCopy>>> {
         let Some(builds) = self.build_counts() else { return Ok(None) };
         let sizes: Option<Vec<_>> = self.pool.values(0, self.pool.count)?.into_iter().collect();
@@ -100,7 +102,7 @@ impl CompactedSizeQuery {
         self.targets.iter().zip(builds).map(copy).collect::<Result<_>>().map(Some)
     }
 
-    /// The builds each target's size is of; `None` before the submission.
+    /// For each target, the number of builds before the query; `None` before the submission.
     fn build_counts(&self) -> Option<Vec<u64>> {
         let builds = self.builds.lock();
         (builds.len() == self.targets.len()).then(|| builds.clone())

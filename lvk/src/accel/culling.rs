@@ -1,11 +1,11 @@
-//! Which instances are worth a place in a top-level structure.
+//! Selection of the instances of a TLAS.
 
 use glam::{Mat4, Vec3, Vec4};
 
-/// Chooses the instances that rays may meet: those near an extended view frustum that are not too small to be seen.
+/// Selects the instances that rays may hit: those near an extended view frustum that are not too small to be seen.
 ///
-/// Rays leave the frustum in reflections and shadows, so give it a margin. The size test compares the angle under
-/// which the eye sees the sphere around an instance's box with a threshold, as Wolfenstein: Youngblood did.
+/// Reflected rays and shadow rays leave the frustum, so give it a margin. The size test compares the angle under which
+/// the sphere around an instance's AABB appears from the eye with a threshold, as in Wolfenstein: Youngblood.
 ///
 /// ```
 /// use lvk::InstanceCulling;
@@ -25,14 +25,14 @@ use glam::{Mat4, Vec3, Vec4};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InstanceCulling {
-    /// Where the viewer stands.
+    /// Position of the viewer.
     pub eye: Vec3,
-    /// Planes of the frustum: a point `p` is inside where `dot(xyz, p) + w >= 0`. The lengths of the normals do not
-    /// matter; a plane with the normal 0 culls nothing.
+    /// Planes of the frustum: a point `p` is inside if `dot(xyz, p) + w >= 0`. The lengths of the normals do not
+    /// matter. A plane with the normal 0 culls nothing.
     pub planes: [Vec4; 6],
-    /// How far the planes are moved outwards, in units of the world; negative moves them inwards.
+    /// Distance by which the planes are moved outwards, in world units; a negative one moves them inwards.
     pub frustum_margin: f32,
-    /// Smallest angle an instance must be seen under, in radians, 0 to π. 0 culls nothing.
+    /// Smallest angle under which an instance must appear, in radians, 0 to π; 0 culls nothing.
     pub min_angle: f32,
 }
 
@@ -44,30 +44,30 @@ impl Default for InstanceCulling {
 }
 
 impl InstanceCulling {
-    /// Culls what is outside the frustum of a matrix from the world to Vulkan's clip space: depth from 0 to 1, in
-    /// either direction; the far plane may be infinitely far.
+    /// Creates a selection that culls everything outside the frustum of a matrix from world space to Vulkan's clip
+    /// space. Depth is from 0 to 1 in either direction. The far plane may be infinitely far.
     pub fn from_view_projection(eye: Vec3, view_projection: Mat4) -> Self {
         let [x, y, z, w] = [0, 1, 2, 3].map(|row| view_projection.row(row));
         Self { eye, planes: [w + x, w - x, w + y, w - y, z, w - z], ..Self::default() }
     }
 
-    /// Whether the box from `low` to `high`, in the world, is kept. One that holds the eye always is, and so is one
-    /// that is not a box: with a coordinate that is not a number, or inverted.
+    /// True if the AABB from `low` to `high`, in world space, is kept. An AABB that contains the eye is always kept.
+    /// So is an invalid one: inverted, or with a NaN coordinate.
     pub fn keeps(&self, low: Vec3, high: Vec3) -> bool {
         let is_box = low.cmple(high).all();
         let holds_eye = low.cmple(self.eye).all() && self.eye.cmple(high).all();
         !is_box || holds_eye || (self.touches_frustum(low, high) && self.is_large(low, high))
     }
 
-    /// As [`keeps`](Self::keeps), of a box in the space of an object that `transform` (3 rows of 4 columns, as in
-    /// [`TlasInstance`](crate::TlasInstance)) moves into the world.
+    /// As [`keeps`](Self::keeps), for an AABB in object space. `transform` (3 rows of 4 columns, as in
+    /// [`TlasInstance`](crate::TlasInstance)) maps object space to world space.
     pub fn keeps_instance(&self, low: Vec3, high: Vec3, transform: &[f32; 12]) -> bool {
         let is_box = low.cmple(high).all();
         let (low, high) = transformed_box(low, high, transform);
         !is_box || self.keeps(low, high)
     }
 
-    /// Places, in the list given, of the boxes `(low, high)` in the world that are kept.
+    /// Returns the indices of the AABBs `(low, high)`, in world space, that are kept.
     pub fn kept(&self, boxes: impl IntoIterator<Item = (Vec3, Vec3)>) -> Vec<u32> {
         (0..).zip(boxes).filter(|(_, (low, high))| self.keeps(*low, *high)).map(|(index, _)| index).collect()
     }
@@ -81,7 +81,7 @@ impl InstanceCulling {
         })
     }
 
-    /// The sphere of radius r at the distance d is seen under the angle 2 asin(r / d).
+    /// A sphere of radius r at the distance d appears under the angle 2 asin(r / d).
     fn is_large(&self, low: Vec3, high: Vec3) -> bool {
         let radius_squared = low.distance_squared(high) / 4.0;
         let distance_squared = self.eye.distance_squared((low + high) / 2.0);
@@ -91,7 +91,7 @@ impl InstanceCulling {
     }
 }
 
-/// Box around a transformed box (Arvo, Graphics Gems 1990).
+/// AABB of a transformed AABB (Arvo, Graphics Gems 1990).
 fn transformed_box(low: Vec3, high: Vec3, transform: &[f32; 12]) -> (Vec3, Vec3) {
     let column = |index: usize| Vec3::new(transform[index], transform[4 + index], transform[8 + index]);
     let (mut world_low, mut world_high) = (column(3), column(3));
@@ -131,7 +131,7 @@ mod tests {
         })
     }
 
-    /// Whether a point is inside by the clip rules of Vulkan, clearly.
+    /// True if a point is clearly inside Vulkan's clip volume.
     fn is_inside(matrix: Mat4, point: Vec3) -> bool {
         let clip = matrix * point.extend(1.0);
         let available = clip.w * 0.999;
@@ -146,7 +146,8 @@ mod tests {
         let view = view::look_to_mat4(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y);
         let projection = vulkan::perspective(std::f32::consts::FRAC_PI_2, 1.0, 1.0, 100.0);
         let culling = InstanceCulling::from_view_projection(Vec3::ZERO, projection * view);
-        // At the depth of 50 the frustum is 50 high and wide to each side; all planes but two are slanted by 45 degrees.
+        // At the depth of 50 the frustum is 50 high and wide to each side; all planes but two are slanted by 45
+        // degrees.
         let slant = 0.5_f32.sqrt();
         let cases = [
             (Vec3::new(60.0, 0.0, -50.0), 10.0 * slant),
@@ -284,7 +285,7 @@ mod tests {
         }
     }
 
-    /// Kept unless all eight corners are outside the same plane.
+    /// True unless all eight corners are outside the same plane.
     fn brute_force(culling: &InstanceCulling, low: Vec3, high: Vec3) -> bool {
         let outside = |plane: &Vec4, corner: &Vec3| {
             plane.dot(corner.extend(1.0)) < -culling.frustum_margin * plane.xyz().length()

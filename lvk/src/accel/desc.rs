@@ -1,32 +1,33 @@
-//! The description of a BLAS.
+//! Description of a BLAS.
 
 use super::flags::BuildFlags;
 use super::geometry::BlasGeometry;
 
-/// In which order the driver's builder gets the primitives of a mesh.
+/// Order in which the driver's builder gets the primitives of a mesh.
 ///
-/// Shaders see the numbers of the caller's own order, through `lvkPrimitiveIndex` and `lvkRayQueryPrimitiveIndex`.
+/// Shaders get primitive indices in the caller's order from `lvkPrimitiveIndex` and `lvkRayQueryPrimitiveIndex`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum PrimitiveOrder {
-    /// As given, but [`Spatial`](Self::Spatial) for builds with [`BuildFlags::FAST_TRACE`] on drivers that keep the
-    /// order and trace unordered meshes slowly ([`Capabilities::prefers_spatial_order`](crate::Capabilities)).
+    /// The caller's order, except [`Spatial`](Self::Spatial) for builds with [`BuildFlags::FAST_TRACE`] on drivers
+    /// that keep the order and trace unordered meshes slowly
+    /// ([`Capabilities::prefers_spatial_order`](crate::Capabilities)).
     #[default]
     Auto,
-    /// As given.
+    /// The caller's order.
     Given,
-    /// Neighbours in the list are neighbours in space, by the leaves of a tree of small surface; where the given order
-    /// is already about as good it stays. Reads the inputs back, so creation waits for the GPU.
+    /// Neighbours in the list are neighbours in space: the leaf order of a BVH of small surface area. A given order
+    /// that is about as good is kept. The inputs are read back, so creation waits for the GPU.
     Spatial,
 }
 
-/// Describes a bottom-level structure.
+/// Describes a bottom-level acceleration structure (BLAS).
 #[derive(Debug, Clone, Copy)]
 pub struct BlasDesc<'a> {
-    /// Its geometries, all triangles or all boxes. Shaders read a hit's place in the list as `gl_GeometryIndexEXT`.
+    /// The geometries, all triangles or all AABBs. Shaders read a hit's index in the list as `gl_GeometryIndexEXT`.
     pub geometries: &'a [BlasGeometry],
-    /// What the build is optimised for.
+    /// Build preferences, and the operations allowed later.
     pub flags: BuildFlags,
-    /// In which order the primitives are built, by the contents of the buffers at creation.
+    /// Order in which the primitives are built. It is derived from the contents of the buffers at creation.
     pub order: PrimitiveOrder,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,

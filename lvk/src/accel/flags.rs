@@ -1,4 +1,4 @@
-//! What a build is asked for: flags, mode, and the sizes that follow.
+//! Parameters of a build: flags and mode, and the sizes it needs.
 
 use ash::vk;
 use bitflags::bitflags;
@@ -7,22 +7,21 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
 bitflags! {
-    /// What a build is optimised for, and what may be done with the structure later.
+    /// Build preferences, and the operations that an acceleration structure allows later.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     pub struct BuildFlags: u32 {
-        /// Rays are traced as fast as possible; the build may take longer.
+        /// Prefers fast ray traversal over a fast build.
         const FAST_TRACE = 1;
-        /// The build is as fast as possible; for structures built every frame.
+        /// Prefers a fast build; for acceleration structures that are built every frame.
         const FAST_BUILD = 1 << 1;
-        /// The structure may be refitted after its inputs moved.
+        /// Allows refits after the inputs changed.
         const ALLOW_UPDATE = 1 << 2;
-        /// The structure takes little memory.
+        /// Prefers little memory.
         const LOW_MEMORY = 1 << 3;
-        /// The structure may be compacted by [`Context::compact`](crate::Context::compact) once it is built. Bottom
-        /// level only.
+        /// Allows compaction by [`Context::compact`](crate::Context::compact) once the BLAS is built. Not for a TLAS.
         const ALLOW_COMPACTION = 1 << 4;
-        /// Hit shaders and queries may fetch the corners of the triangle that was hit
-        /// (`VK_KHR_ray_tracing_position_fetch`). Bottom level only.
+        /// Allows hit shaders and ray queries to fetch the vertices of the triangle hit
+        /// (`VK_KHR_ray_tracing_position_fetch`). Not for a TLAS.
         const POSITION_FETCH = 1 << 5;
     }
 }
@@ -34,7 +33,7 @@ impl Default for BuildFlags {
 }
 
 impl BuildFlags {
-    /// Those that only a bottom-level structure can have.
+    /// Flags that only a BLAS can have.
     const BLAS_ONLY: Self = Self::ALLOW_COMPACTION.union(Self::POSITION_FETCH);
 
     pub(crate) fn raw(self) -> vk::BuildAccelerationStructureFlagsKHR {
@@ -50,7 +49,7 @@ impl BuildFlags {
         pairs.iter().filter(|(bit, _)| self.contains(*bit)).fold(Raw::empty(), |all, (_, raw)| all | *raw)
     }
 
-    /// Fails where two flags contradict each other, or the device lacks one.
+    /// Fails if two flags contradict each other or the device lacks a required feature.
     pub(crate) fn check_blas(self, gpu: &Gpu, name: &str) -> Result<()> {
         self.check(name)?;
         if self.contains(Self::POSITION_FETCH) && !gpu.caps.position_fetch {
@@ -59,7 +58,7 @@ impl BuildFlags {
         Ok(())
     }
 
-    /// As [`check_blas`](Self::check_blas), for a top-level structure.
+    /// As [`check_blas`](Self::check_blas), for a TLAS.
     pub(crate) fn check_tlas(self, name: &str) -> Result<()> {
         if self.intersects(Self::BLAS_ONLY) {
             let message = "ALLOW_COMPACTION and POSITION_FETCH are for bottom-level structures";
@@ -76,10 +75,10 @@ impl BuildFlags {
     }
 }
 
-/// Bytes an acceleration structure takes.
+/// Bytes that an acceleration structure and its builds need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AccelStructSizes {
-    /// Bytes of the structure itself.
+    /// Bytes of the acceleration structure itself.
     pub structure_bytes: u64,
     /// Bytes of scratch memory of a build.
     pub build_scratch_bytes: u64,
@@ -88,12 +87,12 @@ pub struct AccelStructSizes {
 }
 
 impl AccelStructSizes {
-    /// Scratch bytes of the build that needs more.
+    /// Scratch bytes of a build or a refit, whichever needs more.
     pub(crate) fn scratch_bytes(&self) -> u64 {
         self.build_scratch_bytes.max(self.update_scratch_bytes)
     }
 
-    /// Of several structures that stand for one: their bytes together, and the scratch of the largest.
+    /// Combines the sizes of two acceleration structures: the sum of their bytes and the larger scratch sizes.
     pub(crate) fn max_with(self, other: Self) -> Self {
         Self {
             structure_bytes: self.structure_bytes.saturating_add(other.structure_bytes),
@@ -103,25 +102,25 @@ impl AccelStructSizes {
     }
 }
 
-/// Whether a build starts anew or moves what is there.
+/// Rebuild or refit of an acceleration structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum BuildMode {
-    /// A whole new build: best quality, and the number of instances may change.
+    /// A new build: best quality; the number of instances may change.
     #[default]
     Rebuild,
-    /// Moves the boxes of the present tree. Needs [`BuildFlags::ALLOW_UPDATE`] and unchanged counts.
+    /// Updates the bounds of the present BVH. Needs [`BuildFlags::ALLOW_UPDATE`] and unchanged counts.
     Refit,
-    /// Refits where that is allowed, and rebuilds where it is not (no [`BuildFlags::ALLOW_UPDATE`], another number of
-    /// instances) or when this many submitted refits in a row have worn the tree out. 16 to 64 suit most animations. A
-    /// bottom-level structure without room for a rebuild, since it was compacted, is refitted on.
+    /// Refits if allowed. Rebuilds without [`BuildFlags::ALLOW_UPDATE`], after a change of the number of instances,
+    /// and after `max_refits` submitted refits in a row, which degrade the BVH. 16 to 64 suit most animations. A BLAS
+    /// that was compacted and has no memory for a rebuild is always refitted.
     Auto {
-        /// Most refits between two rebuilds.
+        /// Maximum number of refits between two rebuilds.
         max_refits: u32,
     },
 }
 
 impl BuildMode {
-    /// Whether to refit, where a refit is `possible` and so many were made since the last rebuild.
+    /// True if the build is a refit. `possible`: a refit is allowed. `refits`: the number since the last rebuild.
     pub(crate) fn refits(self, possible: bool, refits: u32) -> bool {
         match self {
             Self::Rebuild => false,

@@ -1,4 +1,4 @@
-//! Geometry of a bottom-level structure: checked and converted once, for the size query and for the build.
+//! Geometries of a BLAS: checked and converted once, for the size query and for the build.
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use crate::resource::Buffer;
 use crate::resource::buffer::BufferUsage;
 
 bitflags! {
-    /// How rays treat a geometry.
+    /// Ray behaviour of a geometry.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
     pub struct GeometryFlags: u32 {
-        /// Never runs an any-hit shader: every hit counts.
+        /// Runs no any-hit shader: every hit counts.
         const OPAQUE = 1;
         /// Runs the any-hit shader at most once for each primitive.
         const NO_DUPLICATE_ANY_HIT = 1 << 1;
@@ -29,20 +29,20 @@ bitflags! {
 pub struct Indices {
     /// A buffer with [`BufferUsage::ACCEL_INPUT`].
     pub buffer: BufferHandle,
-    /// Where the first index lies, in bytes; a multiple of the index size.
+    /// Offset of the first index in bytes, a multiple of the index size.
     pub offset: u64,
     /// Format of an index.
     pub format: IndexFormat,
 }
 
-/// Triangles of a bottom-level structure.
+/// Triangles of a BLAS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangles {
     /// A buffer with [`BufferUsage::ACCEL_INPUT`] that holds the positions.
     pub vertex_buffer: BufferHandle,
-    /// Where the first vertex lies, in bytes.
+    /// Offset of the first vertex in bytes.
     pub vertex_offset: u64,
-    /// From one vertex to the next, in bytes; 0 is tightly packed positions.
+    /// Bytes from one vertex to the next; 0 means tightly packed positions.
     pub vertex_stride: u64,
     /// Format of a position.
     pub vertex_format: VertexFormat,
@@ -52,9 +52,9 @@ pub struct Triangles {
     pub indices: Option<Indices>,
     /// Number of triangles.
     pub triangle_count: u32,
-    /// Moves the vertices before the build.
+    /// Transform of the vertices before the build.
     pub transform: Option<GeometryTransform>,
-    /// How rays treat the triangles.
+    /// Ray behaviour of the triangles.
     pub flags: GeometryFlags,
 }
 
@@ -95,7 +95,7 @@ pub enum GeometryTransform {
     Buffer {
         /// A buffer with [`BufferUsage::ACCEL_INPUT`].
         buffer: BufferHandle,
-        /// Where the matrix lies, in bytes; a multiple of 16.
+        /// Offset of the matrix in bytes, a multiple of 16.
         offset: u64,
     },
 }
@@ -106,31 +106,31 @@ impl From<[f32; 12]> for GeometryTransform {
     }
 }
 
-/// Axis-aligned boxes, each `[f32; 6]`: smallest corner, largest corner. An intersection shader decides what is in them.
+/// Axis-aligned bounding boxes, each `[f32; 6]`: minimum, maximum. An intersection shader computes the hits inside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Aabbs {
     /// A buffer with [`BufferUsage::ACCEL_INPUT`].
     pub buffer: BufferHandle,
-    /// Where the first box lies, in bytes; a multiple of 8.
+    /// Offset of the first AABB in bytes, a multiple of 8.
     pub offset: u64,
-    /// From one box to the next, in bytes; a multiple of 8, 0 is tightly packed (24).
+    /// Bytes from one AABB to the next, a multiple of 8; 0 means tightly packed (24).
     pub stride: u64,
-    /// Number of boxes.
+    /// Number of AABBs.
     pub count: u32,
-    /// How rays treat the boxes.
+    /// Ray behaviour of the AABBs.
     pub flags: GeometryFlags,
 }
 
-/// One geometry of a bottom-level structure. All geometries of a structure are of the same kind.
+/// One geometry of a BLAS. All geometries of a BLAS are of the same kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BlasGeometry {
     /// Triangles.
     Triangles(Triangles),
-    /// Boxes.
+    /// Axis-aligned bounding boxes.
     Aabbs(Aabbs),
 }
 
-/// A geometry as Vulkan takes it, with its number of primitives.
+/// A geometry in Vulkan's form, with its number of primitives.
 #[derive(Clone, Copy)]
 pub(crate) struct VulkanGeometry {
     pub(crate) raw: vk::AccelerationStructureGeometryKHR<'static>,
@@ -138,7 +138,7 @@ pub(crate) struct VulkanGeometry {
 }
 
 impl BlasGeometry {
-    /// Buffers the build reads.
+    /// The buffers that a build reads.
     pub(crate) fn buffers(&self) -> impl Iterator<Item = BufferHandle> {
         let all = match self {
             Self::Triangles(t) => {
@@ -149,7 +149,7 @@ impl BlasGeometry {
         all.into_iter().flatten()
     }
 
-    /// The matrix, where it is given by value.
+    /// The transform matrix, if it is given by value.
     pub(crate) fn transform_rows(&self) -> Option<[f32; 12]> {
         match self {
             Self::Triangles(Triangles { transform: Some(GeometryTransform::Rows(rows)), .. }) => Some(*rows),
@@ -173,7 +173,7 @@ impl BlasGeometry {
         }
     }
 
-    /// Whether it holds boxes.
+    /// True if the geometry holds AABBs.
     pub(crate) fn is_aabbs(&self) -> bool {
         matches!(self, Self::Aabbs(_))
     }
@@ -185,7 +185,7 @@ impl BlasGeometry {
         }
     }
 
-    /// Checks the geometry and converts it. `matrix` is the address of its matrix if that is given by value, else 0.
+    /// Checks and converts the geometry. `matrix` is the address of a transform matrix given by value, else 0.
     pub(crate) fn convert(
         &self,
         gpu: &Gpu,
@@ -200,7 +200,7 @@ impl BlasGeometry {
     }
 }
 
-/// Checks what concerns the list as a whole.
+/// Checks the list of geometries and the formats of each.
 pub(crate) fn check_geometries(name: &str, geometries: &[BlasGeometry], limits: &Limits) -> Result<()> {
     geometries.iter().try_for_each(|geometry| match geometry {
         BlasGeometry::Triangles(triangles) => check_formats(name, triangles),
@@ -215,12 +215,12 @@ pub(crate) fn check_geometries(name: &str, geometries: &[BlasGeometry], limits: 
     check_limit(name, "geometry count", geometries.len() as u64, limits.max_blas_geometries)
 }
 
-/// Fails for formats that draws alone can take.
+/// Fails for formats that only draws support.
 fn check_formats(name: &str, triangles: &Triangles) -> Result<()> {
     let format = triangles.vertex_format;
     if !format.is_position() {
         let what = format!("vertex format {format:?} in acceleration structure '{name}'");
-        return Err(Error::unsupported(what, "structures are built from other formats; F32x3 always works"));
+        return Err(Error::unsupported(what, "no BLAS can be built from it; F32x3 always works"));
     }
     if triangles.indices.is_some_and(|indices| indices.format == IndexFormat::U8) {
         let what = format!("8-bit indices in acceleration structure '{name}'");

@@ -11,46 +11,46 @@ use crate::handle::{AccelStructHandle, BufferHandle};
 use crate::parallel::{core_count, parallel_for};
 use crate::resource::Buffer;
 
-/// A thread gets at least so many instances: one converts 200 of them in a microsecond, and takes tens of microseconds to
-/// start.
+/// Minimum number of instances for each thread. A thread converts 200 of them in a microsecond, and takes tens of
+/// microseconds to start.
 const INSTANCES_PER_THREAD: usize = 1 << 17;
-/// More threads than this do not write faster.
+/// Maximum number of threads. More do not write faster.
 const MAX_THREADS: usize = 8;
 
 bitflags! {
-    /// How rays treat an instance.
+    /// Ray behaviour of an instance.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
     pub struct InstanceFlags: u8 {
-        /// Rays that cull back or front faces do not cull this instance's triangles.
+        /// Disables back and front face culling for the triangles of the instance.
         const NO_CULL = 1;
-        /// The other winding is the front.
+        /// Swaps front and back faces.
         const FLIP_FACING = 2;
-        /// Every geometry counts as opaque.
+        /// Treats every geometry as opaque.
         const FORCE_OPAQUE = 4;
-        /// No geometry counts as opaque: any-hit shaders run.
+        /// Treats no geometry as opaque: any-hit shaders run.
         const FORCE_NO_OPAQUE = 8;
     }
 }
 
-/// One instance of a bottom-level structure.
+/// One instance of a BLAS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TlasInstance {
-    /// Object to world: 3 rows of 4 columns, row by row. See [`transform_rows`].
+    /// Object-to-world transform: 3 rows of 4 columns, row by row. See [`transform_rows`].
     pub transform: [f32; 12],
-    /// The bottom-level structure.
+    /// The BLAS.
     pub blas: AccelStructHandle,
-    /// What shaders read as `gl_InstanceCustomIndexEXT`; 24 bits.
+    /// Value that shaders read as `gl_InstanceCustomIndexEXT`; 24 bits.
     pub custom_index: u32,
-    /// Rays see the instance if this and their cull mask have a bit in common.
+    /// Rays hit the instance only if this mask and their cull mask have a bit in common.
     pub mask: u8,
-    /// Added to the hit-group index of a ray tracing pipeline; 24 bits.
+    /// Added to the hit group index of a ray tracing pipeline; 24 bits.
     pub hit_group_offset: u32,
-    /// How rays treat the instance.
+    /// Ray behaviour of the instance.
     pub flags: InstanceFlags,
 }
 
 impl TlasInstance {
-    /// An untransformed instance that every ray sees.
+    /// Creates an instance with the identity transform that is visible to every ray.
     pub fn new(blas: AccelStructHandle) -> Self {
         Self {
             transform: transform_rows(&glam::Affine3A::IDENTITY),
@@ -63,14 +63,14 @@ impl TlasInstance {
     }
 }
 
-/// The rows of an affine transform as Vulkan takes them (`VkTransformMatrixKHR`).
+/// Returns the rows of an affine transform in Vulkan's order (`VkTransformMatrixKHR`).
 pub fn transform_rows(transform: &glam::Affine3A) -> [f32; 12] {
     let columns = transform.matrix3;
     let (x, y, z, t) = (columns.x_axis, columns.y_axis, columns.z_axis, transform.translation);
     [x.x, y.x, z.x, t.x, x.y, y.y, z.y, t.y, x.z, y.z, z.z, t.z]
 }
 
-/// The bytes Vulkan reads (`VkAccelerationStructureInstanceKHR`).
+/// The record that Vulkan reads (`VkAccelerationStructureInstanceKHR`).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(crate) struct RawInstance {
@@ -89,29 +89,30 @@ pub(crate) fn instance_bytes(count: u32) -> u64 {
     u64::from(count) * INSTANCE_BYTES as u64
 }
 
-/// Instances that the GPU wrote, or that lie in a buffer for another reason.
+/// Instances in a buffer, for example written by the GPU.
 #[derive(Debug, Clone, Copy)]
 pub struct DeviceInstances<'a> {
     /// A buffer with [`BufferUsage::STORAGE`](crate::BufferUsage::STORAGE) that holds
     /// `VkAccelerationStructureInstanceKHR` records of 64 bytes each: 3 rows of 4 floats; 24 bits custom index and 8
-    /// bits mask; 24 bits hit-group offset and 8 bits flags; and, in place of an address, the place of the structure in
-    /// `blas` as 64 bits. A place that does not exist makes an instance that no ray meets.
+    /// bits mask; 24 bits hit group offset and 8 bits flags; 64 bits BLAS index. The BLAS index is an index into
+    /// `blas` in place of an address. Rays never hit an instance whose index is out of range.
     pub buffer: BufferHandle,
-    /// Where the first record lies, in bytes; a multiple of 16.
+    /// Offset of the first record in bytes, a multiple of 16.
     pub offset: u64,
     /// Number of records.
     pub count: u32,
-    /// The bottom-level structures that records may refer to.
+    /// The BLAS that records may reference.
     pub blas: &'a [AccelStructHandle],
 }
 
-/// Fails unless every number of the instance fits. Quick where it does: there may be millions.
+/// Fails unless every field of the instance is in range. The valid case is fast, as there may be millions of
+/// instances.
 #[inline]
 pub(crate) fn check_instance(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
     if is_valid(instance) { Ok(()) } else { Err(invalid_reason(name, index, instance)) }
 }
 
-/// Whether [`check_instance`] finds nothing wrong.
+/// True if [`check_instance`] finds no error.
 #[inline]
 pub(crate) fn is_valid(instance: &TlasInstance) -> bool {
     const BOTH: InstanceFlags = InstanceFlags::FORCE_OPAQUE.union(InstanceFlags::FORCE_NO_OPAQUE);
@@ -119,7 +120,7 @@ pub(crate) fn is_valid(instance: &TlasInstance) -> bool {
     fits && is_finite(&instance.transform) && !instance.flags.contains(BOTH)
 }
 
-/// Whether no exponent is all ones, without a branch for each number.
+/// True if all numbers are finite: no exponent is all ones. Needs no branch for each number.
 #[inline]
 fn is_finite(transform: &[f32; 12]) -> bool {
     let all = transform.iter().fold(0, |all, number| all | ((number.to_bits() & 0x7fff_ffff) + 0x0080_0000));
@@ -151,24 +152,24 @@ pub(crate) fn to_raw(instance: &TlasInstance, blas_address: u64) -> RawInstance 
     }
 }
 
-/// Whether the first structure referred to needs no more than an address, as then mostly all do.
+/// True if the BLAS of the first instance can be written with its address alone. Then usually all of them can.
 pub(crate) fn first_needs_only_address(instances: &[TlasInstance], resolve: ResolveBlas<'_>) -> Result<bool> {
     let Some(first) = instances.first() else { return Ok(true) };
     Ok(!resolve(first.blas)?.needs_kernel())
 }
 
-/// What instances refer to that were written with addresses.
+/// Result of writing instances with BLAS addresses.
 pub(crate) enum WrittenRefs {
-    /// What was known, all of it.
+    /// The instances reference exactly the BLAS of the previous set.
     Unchanged,
-    /// Something else.
+    /// The instances reference another set of BLAS.
     Changed(Arc<BlasRefSet>),
-    /// Some need more than an address; what was written means nothing.
+    /// Some BLAS need more than an address; the written data is invalid.
     NeedsKernel,
 }
 
-/// Checks `instances` and writes them with addresses, on several threads where there are many. `previous` is what was shown
-/// before, if that still stands.
+/// Checks `instances` and writes them with BLAS addresses. Long lists are written by several threads. `previous` is
+/// the BLAS set of the TLAS so far, or empty if that is no longer current.
 #[inline]
 pub(crate) fn write_addresses(
     name: &str,
@@ -194,11 +195,12 @@ pub(crate) fn write_addresses(
     Ok(WrittenRefs::Changed(Arc::new(collector.finish().0)))
 }
 
-/// As [`write_addresses`], of a few instances. Answers `false` unless they are as they should, and refer to all that is known,
-/// which needs no more than addresses, and to nothing else; then what was written means nothing.
+/// As [`write_addresses`], for a few instances. Returns `false` unless all instances are valid and reference exactly
+/// the BLAS of `previous`. The caller makes sure that these need no more than addresses. After `false` the written
+/// data is invalid.
 #[inline(never)]
 pub(crate) fn write_unchanged(instances: &[TlasInstance], previous: &BlasRefSet, out: &mut [u8]) -> bool {
-    // A bit for each structure that is known. More than there are bits are never all met by a few.
+    // One bit for each BLAS of the set. A few instances cannot reference more BLAS than there are bits.
     let mut unmet = match previous.refs().len() {
         count @ 1..=64 => u64::MAX >> (64 - count),
         _ => return false,
@@ -237,7 +239,7 @@ fn write_on_threads(
     merge_refs(all.into_iter().flatten())
 }
 
-/// Counting cores reads files on Linux, some 10 us: only where there is work for several.
+/// Counting cores reads files on Linux, some 10 us. So it happens only if there is work for several threads.
 #[inline]
 fn thread_count(instances: usize) -> usize {
     let wanted = (instances / INSTANCES_PER_THREAD).min(MAX_THREADS);
@@ -247,7 +249,7 @@ fn thread_count(instances: usize) -> usize {
     core_count().min(wanted)
 }
 
-/// Answers `false` where some need more than an address.
+/// Returns `false` if any BLAS needs more than an address.
 #[inline]
 fn write_chunk(
     name: &str,
@@ -276,7 +278,7 @@ fn write_chunk(
     Ok(true)
 }
 
-/// What all chunks show, each structure once; the first error where there is one.
+/// Merges the BLAS references of all chunks without duplicates. Returns the first error if there is one.
 fn merge_refs(chunks: impl Iterator<Item = Result<Option<Vec<BlasRef>>>>) -> Result<Option<Vec<BlasRef>>> {
     let mut all: Vec<BlasRef> = Vec::new();
     let mut seen = std::collections::HashSet::new();
@@ -292,26 +294,26 @@ fn merge_refs(chunks: impl Iterator<Item = Result<Option<Vec<BlasRef>>>>) -> Res
     Ok((!needs_kernel).then_some(all))
 }
 
-/// Memory for plans, used again.
+/// Reused memory of instance plans.
 #[derive(Default)]
 pub(crate) struct PlanMemory {
     pub(crate) seen: BitSet,
-    /// The place of what each instance refers to.
+    /// Index of the BLAS that each instance references.
     pub(crate) ref_indices: Vec<u32>,
 }
 
-/// What a list of instances refers to, and how many Vulkan is given.
+/// The BLAS that a list of instances references, and the number of instances for Vulkan.
 pub(crate) struct InstancePlan {
     pub(crate) blas_refs: Arc<BlasRefSet>,
-    /// For each instance its place in `blas_refs`.
+    /// For each instance, the index of its BLAS in `blas_refs`.
     ref_indices: Vec<u32>,
-    /// Instances with those for further parts of split meshes.
+    /// Number of instances for Vulkan, including those for the extra parts of split meshes.
     pub(crate) built_count: u32,
 }
 
 impl InstancePlan {
-    /// Finds the structures of `instances`, which are to be shown by the structure `name`. `previous` is what was shown
-    /// before, if that still stands.
+    /// Plans `instances` for the TLAS `name`. `previous` is the BLAS set of the TLAS so far, or empty if that is no
+    /// longer current.
     pub(crate) fn new(
         name: &str,
         instances: &[TlasInstance],
@@ -349,12 +351,12 @@ impl InstancePlan {
         Ok(Self { blas_refs, ref_indices: refers, built_count: built as u32 })
     }
 
-    /// The memory of the plan, to be used again.
+    /// Returns the memory of the plan for reuse.
     pub(crate) fn into_ref_indices(self) -> Vec<u32> {
         self.ref_indices
     }
 
-    /// Of the instances behind the caller's: whose further parts they are, and which.
+    /// The extra instances that follow the caller's: for each the caller's instance that owns it, and its part.
     fn extra_parts(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         let owners = (0..).zip(&self.ref_indices);
         owners.flat_map(|(owner, place)| {
@@ -363,20 +365,20 @@ impl InstancePlan {
         })
     }
 
-    /// How many instances stand behind the caller's.
+    /// Number of extra instances that follow the caller's.
     pub(crate) fn extra_part_count(&self) -> u32 {
         self.built_count.saturating_sub(self.ref_indices.len() as u32)
     }
 
-    /// Writes whose further parts the instances behind the caller's are.
+    /// Writes the index of the owner of each extra instance.
     pub(crate) fn write_extra_part_owners(&self, out: &mut [u8]) {
         for ((owner, _), out) in self.extra_parts().zip(out.chunks_exact_mut(size_of::<u32>())) {
             out.copy_from_slice(bytemuck::bytes_of(&owner));
         }
     }
 
-    /// Checks the instances and writes them with numbers of [parts](BlasRefSet::part_addresses), those of further parts behind the
-    /// caller's.
+    /// Checks the instances and writes them with indices of [parts](BlasRefSet::part_addresses). Instances of extra
+    /// parts follow the caller's.
     pub(crate) fn write_part_indices(
         &self,
         name: &str,
@@ -402,41 +404,41 @@ impl InstancePlan {
     }
 }
 
-/// Instances that name structures by number, for the kernel that puts addresses in.
+/// Instances with BLAS indices, for the kernel that writes the addresses.
 #[derive(Clone)]
 pub(crate) struct InstanceSource {
-    /// `VkAccelerationStructureInstanceKHR` with a number in place of the address.
+    /// `VkAccelerationStructureInstanceKHR` records with an index in place of the address.
     pub(crate) instances: InstanceBytes,
-    /// How many there are.
+    /// Number of instances.
     pub(crate) count: u32,
-    /// Of further parts: the caller's instance each belongs to.
+    /// For each instance of an extra part, the index of the caller's instance that owns it.
     pub(crate) owners: Option<InstanceBytes>,
-    /// Instances of the caller.
+    /// Number of instances of the caller.
     pub(crate) user_count: u32,
-    /// How often the whole list is written: once for each part that a structure may have.
+    /// Number of times that the whole list is written: once for each part that a BLAS may have.
     pub(crate) copies: u32,
     pub(crate) indexing: BlasIndexing,
 }
 
-/// What the numbers of an [`InstanceSource`] count.
+/// Meaning of the BLAS indices of an [`InstanceSource`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BlasIndexing {
-    /// Parts of everything shown.
+    /// Indices of the parts of all referenced BLAS.
     ByPart,
-    /// Structures shown, with all their parts.
+    /// Indices of referenced BLAS, each with all its parts.
     ByBlas,
 }
 
-/// Bytes the kernel reads.
+/// Bytes that the kernel reads.
 #[derive(Clone)]
 pub(crate) struct InstanceBytes {
     pub(crate) address: u64,
-    /// What holds them; `None` for staging memory, which keeps them until the command buffer is done.
+    /// The buffer of the bytes; `None` for staging memory, which stays alive until the command buffer is complete.
     pub(crate) buffer: Option<Arc<Buffer>>,
 }
 
 impl InstanceSource {
-    /// Instances Vulkan is given for it.
+    /// Number of instances for Vulkan.
     pub(crate) fn built_count(&self, name: &str) -> Result<u32> {
         let count = u64::from(self.count) * u64::from(self.copies);
         check_limit(name, "number of instances, parts of split meshes included", count, u32::MAX.into())?;
@@ -445,7 +447,7 @@ impl InstanceSource {
 }
 
 impl BlasIndexing {
-    /// How many numbers mean something.
+    /// Number of valid indices.
     pub(crate) fn entry_count(self, blas_refs: &BlasRefSet) -> usize {
         match self {
             Self::ByPart => blas_refs.part_addresses().len(),
@@ -453,7 +455,7 @@ impl BlasIndexing {
         }
     }
 
-    /// Writes what they mean: first part and number of parts for each.
+    /// Writes the first part and the number of parts for each index.
     pub(crate) fn write_entries(self, blas_refs: &BlasRefSet, out: &mut [u8]) {
         match self {
             Self::ByBlas => out.copy_from_slice(bytemuck::cast_slice(blas_refs.part_spans())),
@@ -534,7 +536,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against the general way, from what any list before has shown.
+        /// Compares the fast path with the general one, with the BLAS set of any earlier list.
         #[test]
         fn a_few_instances_are_written_alike_only_if_they_show_what_is_known(
             count in 1..20_usize,

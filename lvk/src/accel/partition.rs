@@ -1,36 +1,37 @@
-//! How a list of primitives is cut in two compact pieces.
+//! Partition of a list of primitives into two spatially compact sides.
 
 use std::cmp::Ordering;
 
 use super::primitive_bounds::Bounds;
 
-/// A primitive on its way through the cuts.
+/// A primitive in a list that is partitioned.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PrimitiveBounds {
     pub(crate) bounds: Bounds,
     pub(crate) index: u32,
 }
 
-/// Numbers boxes from 0.
+/// Numbers the bounds from 0.
 pub(crate) fn primitive_bounds<'a>(bounds: impl IntoIterator<Item = &'a Bounds>) -> Vec<PrimitiveBounds> {
     bounds.into_iter().zip(0..).map(|(&bounds, index)| PrimitiveBounds { bounds, index }).collect()
 }
 
-/// The union of the boxes.
+/// The union of the bounds.
 pub(crate) fn union_bounds(items: &[PrimitiveBounds]) -> Bounds {
     items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds))
 }
 
-/// Ways to rank primitives: by the low or the high end along x, y or z. Of those that reach across a cut, one end or
-/// the other decides, which gathers the few large ones of a place in one piece and leaves the other one small.
+/// Sort keys of primitives: the low or the high end along x, y or z. For primitives that straddle the partition plane,
+/// one of the ends decides. This collects the few large primitives of a region on one side and keeps the other side
+/// small.
 const AXIS_KEY_COUNT: usize = 6;
 
-/// The cheapest way to cut a long list is found on about this many of its primitives, evenly picked. Fewer miss the
-/// few large ones, whose place matters most.
+/// A long list is partitioned by the cheapest key of about this many evenly picked primitives. Fewer samples miss the
+/// few large primitives, whose position matters most.
 const SAMPLE_COUNT: usize = 1 << 14;
 
-/// Moves `left` of the primitives to the front, so that both pieces together cost little by the surface-area measure.
-/// The result depends on the items and their order alone.
+/// Moves `left` of the primitives to the front, so that both sides together have a small surface area cost. The result
+/// depends only on the items and their order.
 pub(crate) fn partition_at(items: &mut [PrimitiveBounds], left: usize) {
     if left == 0 || left >= items.len() {
         return;
@@ -46,10 +47,11 @@ pub(crate) fn partition_at(items: &mut [PrimitiveBounds], left: usize) {
     select_lowest(items, left, key);
 }
 
-/// Moves some of the primitives to the front, wherever both pieces together cost least when a ray that enters a piece
-/// costs the root of its count; answers how many. At least one goes to either side of a list of two or more.
+/// Moves some of the primitives to the front and returns their number. Minimises the cost of both sides, where a ray
+/// that enters a side costs the square root of its primitive count. Each side of a list of two or more gets at least
+/// one primitive.
 ///
-/// Unlike [`partition_at`] it follows the gaps of the mesh and not a count, so pieces may be of any size.
+/// Unlike [`partition_at`] the position follows the gaps of the mesh and not a count, so the sides may have any size.
 pub(crate) fn partition_sah(items: &mut [PrimitiveBounds]) -> usize {
     let step = (items.len() / SAMPLE_COUNT).max(1);
     let sample: Vec<_> = items.iter().copied().step_by(step).collect();
@@ -66,7 +68,7 @@ pub(crate) fn partition_sah(items: &mut [PrimitiveBounds]) -> usize {
     middle
 }
 
-/// By the low end, by the high end and by the centre along x, y or z.
+/// The low end, the high end or the centre along x, y or z.
 const SAH_KEY_COUNT: usize = 9;
 
 fn sah_sort_key(item: &PrimitiveBounds, key: usize) -> f32 {
@@ -76,15 +78,15 @@ fn sah_sort_key(item: &PrimitiveBounds, key: usize) -> f32 {
     }
 }
 
-/// Where a list may be cut in two.
+/// A candidate partition of a list.
 struct SahSplit {
     cost: f32,
     key: usize,
-    /// What ranks below goes left.
+    /// Primitives with a key below this go left.
     threshold: f32,
 }
 
-/// The cheapest of evenly spaced places along one way; none where all rank alike.
+/// The cheapest of evenly spaced thresholds of one key; `None` if all primitives have the same key.
 fn cheapest_split(items: &[PrimitiveBounds], key: usize) -> Option<SahSplit> {
     const BIN_COUNT: usize = 64;
     let ranks = || items.iter().map(|item| sah_sort_key(item, key));
@@ -119,7 +121,7 @@ fn sah_cost((bounds, count): (Bounds, usize)) -> f32 {
     if count == 0 { 0.0 } else { bounds.half_area() * (count as f32).sqrt() }
 }
 
-/// Moves what goes left to the front, and answers how many that are.
+/// Moves the primitives that go left to the front and returns their number.
 fn partition_by(items: &mut [PrimitiveBounds], goes_left: impl Fn(&PrimitiveBounds) -> bool) -> usize {
     let mut left = 0;
     for index in 0..items.len() {
@@ -148,11 +150,11 @@ fn cost(items: &[PrimitiveBounds]) -> f32 {
     union_bounds(items).half_area() * items.len() as f32
 }
 
-/// Moves the `left` lowest ranked items to the front.
+/// Moves the `left` items with the lowest keys to the front.
 fn select_lowest(items: &mut [PrimitiveBounds], left: usize, key: usize) {
     let compare =
         |a: &PrimitiveBounds, b: &PrimitiveBounds| match sort_key(a, key).total_cmp(&sort_key(b, key)) {
-            // Equal ranks are told apart, so that the result does not depend on how selection works.
+            // Equal keys are ordered by index, so that the result does not depend on the selection algorithm.
             Ordering::Equal => a.index.cmp(&b.index),
             order => order,
         };

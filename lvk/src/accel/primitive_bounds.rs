@@ -1,10 +1,10 @@
-//! Where primitives lie: their boxes, read from vertices, indices and boxes as a build reads them.
+//! Bounds of primitives, computed from vertices, indices and AABBs in the way a build reads them.
 
 use glam::{Vec3, Vec4};
 
 use crate::format::VertexFormat;
 
-/// An axis-aligned box.
+/// An axis-aligned bounding box (AABB).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bounds {
     pub(crate) low: Vec3,
@@ -12,10 +12,10 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Holds nothing: the start of a union.
+    /// Empty bounds, the neutral element of a union.
     pub(crate) const EMPTY: Self = Self { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
-    /// The box of a primitive that no ray can hit.
+    /// Bounds of a primitive that no ray can hit.
     pub(crate) const ORIGIN: Self = Self { low: Vec3::ZERO, high: Vec3::ZERO };
 
     pub(crate) fn from_points(points: [Vec3; 3]) -> Self {
@@ -27,8 +27,8 @@ impl Bounds {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Half of the surface: a ray's chance to meet the box. 0 for one that holds nothing; sides count as at most
-    /// [`MAX_SIDE`], so that sums over many boxes stay finite.
+    /// Half of the surface area, proportional to the probability that a ray hits the AABB. 0 for empty bounds. Side
+    /// lengths are clamped to [`MAX_SIDE`], so that sums over many AABBs stay finite.
     pub(crate) fn half_area(self) -> f32 {
         let d = (self.high - self.low).max(Vec3::ZERO).min(Vec3::splat(MAX_SIDE));
         d.x * d.y + d.y * d.z + d.z * d.x
@@ -37,11 +37,11 @@ impl Bounds {
 
 const MAX_SIDE: f32 = 1e12;
 
-/// Vertices as they lie in memory.
+/// Vertices in their memory layout.
 pub(crate) struct VertexBytes<'a> {
-    /// Starts at the first vertex.
+    /// The bytes from the first vertex on.
     pub(crate) bytes: &'a [u8],
-    /// From one vertex to the next, in bytes; 0 is tightly packed positions.
+    /// Bytes from one vertex to the next; 0 means tightly packed positions.
     pub(crate) stride: usize,
     /// Format of a position.
     pub(crate) format: VertexFormat,
@@ -50,7 +50,7 @@ pub(crate) struct VertexBytes<'a> {
 }
 
 impl VertexBytes<'_> {
-    /// Position of a vertex; `None` beyond the last one and beyond the bytes.
+    /// Position of a vertex; `None` if the vertex is out of range or beyond the bytes.
     fn position(&self, vertex: u32) -> Option<Vec3> {
         if vertex >= self.count {
             return None;
@@ -60,7 +60,7 @@ impl VertexBytes<'_> {
     }
 }
 
-/// Indices as they lie in memory, three for each triangle; the bytes start at the first one and need no alignment.
+/// Indices in their memory layout, three for each triangle. The bytes start at the first index and need no alignment.
 pub(crate) enum IndexBytes<'a> {
     /// Every three vertices are a triangle.
     None,
@@ -71,7 +71,7 @@ pub(crate) enum IndexBytes<'a> {
 }
 
 impl IndexBytes<'_> {
-    /// The vertices of a triangle; `None` beyond the last one.
+    /// The vertex indices of a triangle; `None` if the triangle is out of range.
     pub(crate) fn vertex_indices(&self, triangle: u32) -> Option<[u32; 3]> {
         match self {
             Self::None => {
@@ -86,25 +86,25 @@ impl IndexBytes<'_> {
     }
 }
 
-/// Triangles as they lie in memory.
+/// Triangles in their memory layout.
 pub(crate) struct TriangleBytes<'a> {
     pub(crate) vertices: VertexBytes<'a>,
     pub(crate) indices: IndexBytes<'a>,
     /// Number of triangles.
     pub(crate) count: u32,
-    /// 3 rows of 4 columns that move the vertices.
+    /// Transform of the vertices: 3 rows of 4 columns.
     pub(crate) transform: Option<[f32; 12]>,
 }
 
 impl TriangleBytes<'_> {
-    /// The corners of a triangle; `None` where a coordinate is not a number, or a vertex not there.
+    /// The vertices of a triangle; `None` if a coordinate is NaN or a vertex does not exist.
     pub(crate) fn vertices(&self, triangle: u32) -> Option<[Vec3; 3]> {
         let [a, b, c] = self.indices.vertex_indices(triangle)?;
         let corners = [self.vertex(a)?, self.vertex(b)?, self.vertex(c)?];
         (!corners.iter().any(|corner| corner.is_nan())).then_some(corners)
     }
 
-    /// The boxes of all triangles. One without corners lies at the origin.
+    /// The bounds of all triangles. A triangle without valid vertices lies at the origin.
     pub(crate) fn bounds(&self) -> Vec<Bounds> {
         let bounds = |triangle| self.vertices(triangle).map_or(Bounds::ORIGIN, Bounds::from_points);
         (0..self.count).map(bounds).collect()
@@ -118,18 +118,18 @@ impl TriangleBytes<'_> {
     }
 }
 
-/// Boxes as they lie in memory, each six floats: smallest corner, largest corner.
+/// AABBs in their memory layout, six floats each: minimum, maximum.
 pub(crate) struct AabbListBytes<'a> {
-    /// Starts at the first box.
+    /// The bytes from the first AABB on.
     pub(crate) bytes: &'a [u8],
-    /// From one box to the next, in bytes; 0 is tightly packed.
+    /// Bytes from one AABB to the next; 0 means tightly packed.
     pub(crate) stride: usize,
-    /// Number of boxes.
+    /// Number of AABBs.
     pub(crate) count: u32,
 }
 
 impl AabbListBytes<'_> {
-    /// A box; `None` for one that is inverted, not a number or beyond the bytes.
+    /// Bounds of an AABB; `None` if it is inverted, has a NaN coordinate or lies beyond the bytes.
     pub(crate) fn bounds(&self, index: u32) -> Option<Bounds> {
         let bytes = element_bytes(self.bytes, self.stride, 24, index)?;
         let [ax, ay, az, bx, by, bz] = decode_numbers(bytes, f32::from_le_bytes)?;
@@ -137,27 +137,27 @@ impl AabbListBytes<'_> {
         low.cmple(high).all().then_some(Bounds { low, high })
     }
 
-    /// All boxes; those that are none lie at the origin.
+    /// Bounds of all AABBs. Invalid ones lie at the origin.
     pub(crate) fn all_bounds(&self) -> Vec<Bounds> {
         (0..self.count).map(|index| self.bounds(index).unwrap_or(Bounds::ORIGIN)).collect()
     }
 }
 
-/// A geometry as it was read.
+/// The contents of a geometry's buffers.
 pub(crate) enum GeometryBytes<'a> {
     Triangles(TriangleBytes<'a>),
     Boxes(AabbListBytes<'a>),
 }
 
-/// The bytes of one element; `None` if they are not all there.
+/// The bytes of one element; `None` if the element lies beyond the slice.
 fn element_bytes(bytes: &[u8], stride: usize, packed: usize, index: u32) -> Option<&[u8]> {
     let stride = if stride == 0 { packed } else { stride };
     let start = stride.checked_mul(index as usize)?;
     bytes.get(start..start.checked_add(packed)?)
 }
 
-/// Position in the bytes of one vertex; components a format lacks are 0. `None` if there are too few bytes, and for formats
-/// that structures are not built from.
+/// Decodes a position from the bytes of one vertex. Components that the format lacks are 0. Returns `None` if there
+/// are too few bytes, and for formats from which no BLAS can be built.
 fn decode_position(format: VertexFormat, bytes: &[u8]) -> Option<Vec3> {
     let snorm = |value: u16| (f32::from(value as i16) / 32767.0).max(-1.0);
     Some(match format {
@@ -184,7 +184,7 @@ fn with_zero_z([x, y]: [f32; 2]) -> Vec3 {
     Vec3::new(x, y, 0.0)
 }
 
-/// The first `COUNT` numbers of `SIZE` bytes each; `None` if there are too few bytes.
+/// Decodes the first `COUNT` numbers of `SIZE` bytes each; `None` if there are too few bytes.
 fn decode_numbers<const COUNT: usize, const SIZE: usize, T: Copy + Default>(
     bytes: &[u8],
     read: fn([u8; SIZE]) -> T,
@@ -197,7 +197,7 @@ fn decode_numbers<const COUNT: usize, const SIZE: usize, T: Copy + Default>(
     Some(all)
 }
 
-/// Value of a half float (IEEE 754 binary16); every one has an exact `f32`.
+/// Value of a half float (IEEE 754 binary16); each has an exact `f32`.
 fn half_to_f32(half: u16) -> f32 {
     const SMALLEST: f32 = 1.0 / 16_777_216.0;
     let sign = u32::from(half & 0x8000) << 16;

@@ -1,4 +1,4 @@
-//! Which of the caller's primitives a part holds, and the inputs gathered for it.
+//! Map from the primitives of a part to those of the mesh, and the gathered inputs of the part.
 
 use std::sync::Arc;
 
@@ -10,25 +10,25 @@ use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
 /// Bytes of three 32-bit indices.
 const TRIANGLE_BYTES: u64 = 12;
-/// Bytes of a box.
+/// Bytes of an AABB.
 const BOX_BYTES: u64 = 24;
 
-/// From the primitives of a part to those of the mesh, with indices or boxes of the part's own.
+/// Maps the primitives of a part to those of the mesh, and holds the part's own indices or AABBs.
 ///
-/// The table has a word for each geometry, the place of its first primitive in the table, and then the numbers of
-/// the mesh's primitives. Shaders read it to answer the caller's number, and the kernel that gathers inputs does too.
+/// The table has one word for each geometry, the position of its first primitive in the table. The primitive numbers
+/// of the mesh follow. Shaders read the table to return the caller's primitive number. The gather kernel reads it too.
 pub(crate) struct PrimitiveMap {
     pub(crate) table: Arc<Buffer>,
-    /// The gathered inputs; none once no build can come any more.
+    /// The gathered inputs; `None` once no further build is possible.
     inputs: Mutex<Option<Arc<Buffer>>>,
     inputs_address: u64,
-    /// First primitive of each geometry in `gathered_inputs`.
+    /// First primitive of each geometry in the gathered inputs.
     first_primitives: Vec<u32>,
     primitive_bytes: u64,
 }
 
 impl PrimitiveMap {
-    /// Makes the buffers; the caller uploads [`encode_table`] and gathers the inputs.
+    /// Creates the buffers. The caller uploads [`encode_table`] and gathers the inputs.
     pub(crate) fn new(gpu: &Arc<Gpu>, name: &str, geometries: &[Vec<u32>], boxes: bool) -> Result<Self> {
         let primitive_bytes = if boxes { BOX_BYTES } else { TRIANGLE_BYTES };
         let total: u64 = geometries.iter().map(|list| list.len() as u64).sum();
@@ -44,12 +44,12 @@ impl PrimitiveMap {
         })
     }
 
-    /// The gathered inputs, unless they were taken.
+    /// The gathered inputs; `None` once they were taken.
     pub(crate) fn gathered_inputs(&self) -> Option<Arc<Buffer>> {
         self.inputs.lock().clone()
     }
 
-    /// Takes the gathered inputs away from a part that is never built again, to be retired.
+    /// Takes the gathered inputs of a part that is never built again. The caller frees them later.
     pub(crate) fn take_gathered_inputs(&self) -> Option<Arc<Buffer>> {
         self.inputs.lock().take()
     }
@@ -60,13 +60,13 @@ impl PrimitiveMap {
         self.inputs_address + u64::from(first) * self.primitive_bytes
     }
 
-    /// Address of the numbers of a geometry's primitives.
+    /// Address of the primitive numbers of a geometry.
     pub(crate) fn primitive_ids_address(&self, geometry: usize) -> u64 {
         let first = self.first_primitives.get(geometry).copied().unwrap_or(0);
         self.table.address + (self.first_primitives.len() as u64 + u64::from(first)) * 4
     }
 
-    /// Bytes of both buffers, of those that are left.
+    /// Bytes of the table and of the gathered inputs, if these still exist.
     pub(crate) fn table_bytes(&self) -> u64 {
         self.table.size_bytes + self.gathered_inputs().map_or(0, |inputs| inputs.size_bytes)
     }
@@ -79,8 +79,8 @@ pub(crate) fn encode_table(geometries: &[Vec<u32>]) -> Vec<u32> {
     places.chain(geometries.iter().flatten().copied()).collect()
 }
 
-/// The lists that [`encode_table`] put into `words`, for a mesh with so many primitives in each geometry; `None` if it
-/// was not that.
+/// Decodes the lists that [`encode_table`] put into `words`, for a mesh with `primitive_counts` primitives in each
+/// geometry. Returns `None` for any other words.
 pub(crate) fn decode_table(words: &[u32], primitive_counts: &[u32]) -> Option<Vec<Vec<u32>>> {
     let head = words.get(..primitive_counts.len())?;
     let ends = head.iter().skip(1).map(|end| *end as usize).chain([words.len()]);
@@ -92,7 +92,7 @@ pub(crate) fn decode_table(words: &[u32], primitive_counts: &[u32]) -> Option<Ve
     (encode_table(&lists) == words).then_some(lists)
 }
 
-/// Whether parts of so many primitives of each geometry have every one of the mesh, and none twice.
+/// True if the parts together hold every primitive of the mesh exactly once.
 pub(crate) fn covers_mesh(parts: &[Vec<Vec<u32>>], primitive_counts: &[u32]) -> bool {
     primitive_counts.iter().enumerate().all(|(geometry, count)| {
         let lists = parts.iter().filter_map(|part| part.get(geometry));

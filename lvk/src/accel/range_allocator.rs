@@ -1,12 +1,12 @@
-//! Which ranges of a shared buffer are free.
+//! Allocator of ranges of a shared buffer.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Offsets of ranges are multiples of this: what Vulkan asks of an acceleration structure in a buffer.
+/// Alignment of range offsets: Vulkan's requirement for an acceleration structure in a buffer.
 pub(crate) const RANGE_ALIGNMENT: u64 = 256;
 
-/// Free ranges of one buffer. Allocation takes the smallest one that is large enough; neighbours are joined when they
-/// are freed. Both take O(log n) time.
+/// The free ranges of one buffer. Allocation takes the smallest range that is large enough. Freed ranges merge with
+/// their neighbours. Both take O(log n) time.
 #[derive(Debug)]
 pub(crate) struct RangeAllocator {
     size: u64,
@@ -18,7 +18,7 @@ pub(crate) struct RangeAllocator {
 }
 
 impl RangeAllocator {
-    /// A buffer of so many bytes, all free.
+    /// Creates the allocator of a buffer of `size` bytes, all free.
     pub(crate) fn new(size: u64) -> Self {
         let mut ranges = Self { size, used: 0, free: BTreeMap::new(), by_length: BTreeSet::new() };
         if size > 0 {
@@ -27,7 +27,8 @@ impl RangeAllocator {
         ranges
     }
 
-    /// Offset of a new range of at least one byte, a multiple of [`RANGE_ALIGNMENT`]; `None` if there is no room.
+    /// Offset of a new range of at least one byte, a multiple of [`RANGE_ALIGNMENT`]; `None` if no free range is large
+    /// enough.
     pub(crate) fn alloc(&mut self, bytes: u64) -> Option<u64> {
         let bytes = bytes.max(1);
         let &(_, start) = self.by_length.range((bytes, 0)..).next()?;
@@ -40,8 +41,8 @@ impl RangeAllocator {
         Some(start)
     }
 
-    /// Gives a range back: what [`alloc`](Self::alloc) answered and was asked. A range that is not in use as a whole
-    /// stays as it is.
+    /// Frees a range: the offset that [`alloc`](Self::alloc) returned and the bytes it was called with. Does nothing
+    /// unless the whole range is in use.
     pub(crate) fn free(&mut self, offset: u64, bytes: u64) {
         let (mut start, mut end) = (offset, self.free_range_end(offset, bytes.max(1)));
         let before = self.free.range(..=start).next_back().map(|(&start, &end)| (start, end));
@@ -63,7 +64,7 @@ impl RangeAllocator {
         self.insert(start, end);
     }
 
-    /// Whether nothing is in use.
+    /// True if no range is in use.
     pub(crate) fn is_empty(&self) -> bool {
         self.used == 0
     }
@@ -73,7 +74,7 @@ impl RangeAllocator {
         self.used
     }
 
-    /// Where a range ends: at a multiple of the alignment, or with the buffer.
+    /// End of a range: a multiple of the alignment, or the end of the buffer.
     fn free_range_end(&self, start: u64, bytes: u64) -> u64 {
         let end = start.saturating_add(bytes).checked_next_multiple_of(RANGE_ALIGNMENT);
         end.unwrap_or(u64::MAX).min(self.size)
@@ -171,7 +172,7 @@ mod tests {
         (place + bytes.max(1)).next_multiple_of(RANGE_ALIGNMENT).min(size)
     }
 
-    /// The longest run of bytes between sorted ranges.
+    /// The longest gap in bytes between ranges.
     fn largest_gap(size: u64, live: &[(u64, u64)]) -> u64 {
         let mut sorted = live.to_vec();
         sorted.sort_unstable();

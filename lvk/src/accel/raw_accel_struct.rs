@@ -11,14 +11,14 @@ use crate::gpu::Gpu;
 /// One Vulkan acceleration structure, destroyed on drop.
 pub(crate) struct RawAccelStruct {
     pub(crate) raw: vk::AccelerationStructureKHR,
-    /// What instances refer to.
+    /// Device address, for instances.
     pub(crate) address: u64,
     storage: StorageRange,
     ext: ash::khr::acceleration_structure::Device,
 }
 
 impl RawAccelStruct {
-    /// Makes the object with its memory; nothing is built yet.
+    /// Creates the object with its memory. Builds nothing.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         storage: &AccelStorage,
@@ -38,12 +38,12 @@ impl RawAccelStruct {
             .map_err(Error::vulkan("vkCreateAccelerationStructureKHR"))?;
         gpu.name(raw, name);
         let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw);
-        // SAFETY: the structure is alive.
+        // SAFETY: the acceleration structure is alive.
         let address = unsafe { ext.get_acceleration_structure_device_address(&info) };
         Ok(Self { raw, address, storage, ext })
     }
 
-    /// Bytes of memory it takes.
+    /// Bytes of its memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
         self.storage.bytes
     }
@@ -51,7 +51,7 @@ impl RawAccelStruct {
 
 impl Drop for RawAccelStruct {
     fn drop(&mut self) {
-        // SAFETY: the owner has waited until the GPU is done with the structure.
+        // SAFETY: the owner has waited until the GPU no longer uses the acceleration structure.
         unsafe { self.ext.destroy_acceleration_structure(self.raw, None) };
     }
 }

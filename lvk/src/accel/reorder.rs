@@ -1,21 +1,23 @@
-//! An order of primitives that makes a good tree of a builder which does not sort.
+//! A primitive order that gives a good BVH with a builder that does not sort.
 //!
-//! Some drivers (lavapipe up to 25.0) cut the list of primitives in the middle, each half in the middle again, and so
-//! on: the tree is as good as the order. So the order is made by that very tree, top down, each node by its cheapest
-//! cut. Builders that sort gain nothing.
+//! Some drivers (lavapipe up to 25.0) split the list of primitives in the middle, then each half in the middle, and so
+//! on. Their BVH is only as good as the order. So the order is computed from the same BVH, top down, with the cheapest
+//! partition at each node. Builders that sort gain nothing.
 
 use super::partition::{PrimitiveBounds, partition_at, primitive_bounds};
 use super::primitive_bounds::Bounds;
 use crate::parallel::{core_count, parallel_for};
 
-/// Another order is worth its number map and its time if its tree costs this many times less than the given one.
+/// Minimum ratio of the BVH cost of the given order to that of another order. Below it, the other order is not worth
+/// its primitive map and its time.
 pub(crate) const MIN_AREA_RATIO: f64 = 1.1;
 
-/// Nodes larger than this are worth a thread of their own.
+/// Nodes with more primitives than this get their own thread.
 const MIN_PARALLEL_COUNT: usize = 1 << 16;
 
-/// Numbers of the boxes in an order whose tree of halves (the first `ceil(n / 2)` to the left, at every node) has a
-/// small surface. Deterministic; any values are allowed, but those that are not finite get a poor place.
+/// Returns the indices of the bounds in an order whose median-split BVH has a small surface area. A median split puts
+/// the first `ceil(n / 2)` primitives of every node to the left. Deterministic. Any values are allowed, but bounds
+/// that are not finite get a poor position.
 ///
 /// Takes O(n log n) time.
 pub(crate) fn spatial_order(bounds: &[Bounds]) -> Vec<u32> {
@@ -24,20 +26,20 @@ pub(crate) fn spatial_order(bounds: &[Bounds]) -> Vec<u32> {
     items.into_iter().map(|item| item.index).collect()
 }
 
-/// Whether building in this order instead of the given one lowers the cost of the tree of halves by more than
-/// [`MIN_AREA_RATIO`].
+/// True if the order lowers the cost of the median-split BVH by a factor of more than [`MIN_AREA_RATIO`], compared
+/// with the given order.
 pub(crate) fn is_reorder_worthwhile(bounds: &[Bounds], order: &[u32]) -> bool {
     let given: Vec<u32> = (0..bounds.len() as u32).collect();
     median_tree_area(bounds, &given) > MIN_AREA_RATIO * median_tree_area(bounds, order)
 }
 
-/// Cost of the tree of halves of an order: the half areas of all its inner nodes together. Numbers without a box
+/// Cost of the median-split BVH of an order: the sum of the half areas of all its inner nodes. Indices without bounds
 /// count as empty.
 pub(crate) fn median_tree_area(bounds: &[Bounds], order: &[u32]) -> f64 {
     node_area(bounds, order).1
 }
 
-/// Box of a node, and the half areas of it and of all inner nodes below.
+/// Bounds of a node, and the sum of the half areas of the node and of all inner nodes below it.
 fn node_area(bounds: &[Bounds], order: &[u32]) -> (Bounds, f64) {
     match order {
         [] => (Bounds::EMPTY, 0.0),
@@ -52,7 +54,7 @@ fn node_area(bounds: &[Bounds], order: &[u32]) -> (Bounds, f64) {
     }
 }
 
-/// Arranges `primitive_bounds`, splitting the work over up to `threads` threads.
+/// Sorts `items` in median-split order on up to `threads` threads.
 fn sort_median(mut items: &mut [PrimitiveBounds], threads: usize) {
     while items.len() > 2 {
         let middle = items.len().div_ceil(2);

@@ -1,20 +1,20 @@
-//! Which builds share a scratch buffer, and where in it each one works.
+//! Assignment of builds to batches that share a scratch buffer, and of each build's offset in it.
 
 use std::ops::Range;
 
-/// Builds that run side by side in one scratch buffer.
+/// Builds that run concurrently in one scratch buffer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ScratchBatch {
-    /// Which builds, by position in the list planned.
+    /// The builds, by index in the planned list.
     pub(crate) builds: Range<usize>,
     /// Offset of each build's scratch from the aligned start of the buffer, in bytes; a multiple of the alignment.
     pub(crate) offsets: Vec<u64>,
-    /// Bytes of all together.
+    /// Total bytes of the batch.
     pub(crate) bytes: u64,
 }
 
-/// Cuts builds, in order, into batches whose aligned scratch sizes together stay within `budget` bytes. A build that
-/// is over the budget by itself gets a batch of its own.
+/// Divides builds, in order, into batches whose aligned scratch sizes together stay within `budget` bytes. A build
+/// that exceeds the budget gets its own batch.
 pub(crate) fn plan_scratch(sizes: &[u64], alignment: u64, budget: u64) -> Vec<ScratchBatch> {
     let mut batches: Vec<ScratchBatch> = Vec::new();
     for (build, &size) in sizes.iter().enumerate() {
@@ -34,8 +34,8 @@ pub(crate) fn plan_scratch(sizes: &[u64], alignment: u64, budget: u64) -> Vec<Sc
 
 /// Sizes of scratch buffers within a budget.
 ///
-/// A buffer that has become too small is freed only when the GPU is done with it, and until then both count. So there
-/// are two sizes that together make the budget, and larger ones only for single builds that need them.
+/// A buffer that has become too small is freed only when the GPU no longer uses it. Until then both buffers count. So
+/// there are two sizes that together make the budget. A larger buffer is used only for a single build that needs it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ScratchSizes {
     small: u64,
@@ -43,7 +43,8 @@ pub(crate) struct ScratchSizes {
 }
 
 impl ScratchSizes {
-    /// For buffers that together take at most `budget` bytes, the alignment of their addresses included.
+    /// Creates the sizes of buffers that together take at most `budget` bytes, including the alignment of their
+    /// addresses.
     pub(crate) fn new(budget: u64, alignment: u64) -> Self {
         let small = budget / 8;
         let large = budget - small;
@@ -51,29 +52,29 @@ impl ScratchSizes {
         Self { small: usable(small), large: usable(large) }
     }
 
-    /// Most scratch memory of builds side by side, in bytes.
+    /// Maximum scratch memory of concurrent builds, in bytes.
     pub(crate) fn batch_bytes(&self) -> u64 {
         self.large
     }
 
-    /// Scratch bytes of the buffer to make for a batch that needs `bytes`.
+    /// Scratch bytes of the buffer for a batch that needs `bytes`.
     pub(crate) fn buffer_bytes(&self, bytes: u64) -> u64 {
         if bytes <= self.small { self.small } else { self.large.max(bytes) }
     }
 }
 
-/// Bytes to allocate for `bytes` of scratch, so that they still fit once the address is rounded up: Vulkan aligns the
-/// address a build is given, and a buffer's address need not be aligned that far.
+/// Bytes to allocate for `bytes` of scratch, so that they still fit after the address is rounded up. Vulkan requires
+/// an aligned scratch address, and a buffer's address may have a smaller alignment.
 pub(crate) fn scratch_buffer_bytes(bytes: u64, alignment: u64) -> u64 {
     bytes.saturating_add(alignment.saturating_sub(1))
 }
 
-/// First address at or behind `buffer_address` at which scratch may start.
+/// First address at or after `buffer_address` at which scratch may start.
 pub(crate) fn aligned_scratch_address(buffer_address: u64, alignment: u64) -> u64 {
     align_up(buffer_address, alignment)
 }
 
-/// Values that cannot be rounded up stay at the last aligned one, far beyond what a device can address.
+/// Rounds up. Values that cannot be rounded up give the last aligned one, far beyond the address range of a device.
 fn align_up(value: u64, alignment: u64) -> u64 {
     let alignment = alignment.max(1);
     value.checked_next_multiple_of(alignment).unwrap_or(u64::MAX - u64::MAX % alignment)

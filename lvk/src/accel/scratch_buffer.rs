@@ -1,4 +1,4 @@
-//! The scratch memory of builds: one buffer for all of them, as large as the largest batch so far.
+//! The scratch memory of builds: one buffer for all of them, which grows with the largest batch.
 
 use std::sync::Arc;
 
@@ -10,17 +10,17 @@ use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
-/// The pooled scratch buffer. Builds that share it are kept apart by the tracker like any other writes.
+/// The shared scratch buffer. Barriers separate the builds that use it, as for any other writes.
 pub(crate) struct ScratchBuffer {
-    /// Stands for the memory, whichever buffer it is at present: all builds of a lane use it, so that they come in order
-    /// unless they are recorded side by side.
+    /// The resource that barriers track in place of the present buffer. All builds of a queue use it, so they run in
+    /// order unless they are recorded as concurrent.
     pub(crate) id: ResourceId,
     pub(crate) tiers: ScratchSizes,
     current: Mutex<Option<Arc<Buffer>>>,
 }
 
 impl ScratchBuffer {
-    /// Takes at most `budget` bytes, unless a single build needs more.
+    /// Creates a scratch buffer of at most `budget` bytes, or more if a single build needs more.
     pub(crate) fn new(budget: u64, alignment: u64) -> Self {
         Self {
             id: ResourceId::next(),
@@ -29,7 +29,8 @@ impl ScratchBuffer {
         }
     }
 
-    /// A buffer with room for `bytes` at an aligned address, and the smaller one it replaces, to be retired.
+    /// Returns a buffer with `bytes` at an aligned address, and the smaller buffer that it replaces. The caller frees
+    /// that one later.
     pub(crate) fn get_or_grow(
         &self,
         gpu: &Arc<Gpu>,
@@ -49,7 +50,7 @@ impl ScratchBuffer {
         }
     }
 
-    /// Bytes of the buffer at present.
+    /// Bytes of the present buffer.
     pub(crate) fn bytes(&self) -> u64 {
         let current = self.current.lock();
         current.as_ref().map_or(0, |buffer| buffer.size_bytes)

@@ -1,11 +1,11 @@
-//! What a bottom-level build takes under a device profile, which may ask for more than the driver at hand does.
+//! Size model of BLAS builds under a device profile, which may require more memory than the present driver.
 
 use super::flags::AccelStructSizes;
 use crate::gpu::start::profile::DeviceProfile;
 
 impl DeviceProfile {
-    /// The larger of what the `driver` answered for a bottom-level build and what the profile says of that many
-    /// `primitives`. The scratch of updates is the driver's own.
+    /// Returns the larger of the `driver`'s sizes for a BLAS build and the profile's sizes for `primitives`
+    /// primitives. The scratch size of refits is the driver's.
     pub fn query_build_sizes(&self, driver: AccelStructSizes, primitives: u64) -> AccelStructSizes {
         let model = |bytes_each: u64| primitives.saturating_mul(bytes_each);
         AccelStructSizes {

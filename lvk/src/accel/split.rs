@@ -1,13 +1,13 @@
-//! How a mesh too large for the device is cut into parts that each fit.
+//! Split of a mesh that exceeds the device's limits into parts that each fit.
 
 use super::partition::{PrimitiveBounds, partition_sah, primitive_bounds, union_bounds};
 use super::primitive_bounds::Bounds;
 use crate::error::{Error, Result, check_limit};
 
-/// Most that one structure may take.
+/// Limits of one acceleration structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct PartLimits {
-    /// Bytes of the structure.
+    /// Bytes of the acceleration structure.
     pub(crate) structure_bytes: u64,
     /// Bytes of scratch memory of its builds.
     pub(crate) scratch_bytes: u64,
@@ -15,12 +15,12 @@ pub(crate) struct PartLimits {
     pub(crate) primitives: u64,
 }
 
-/// What a structure takes.
+/// Sizes of one acceleration structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct PartSizes {
-    /// Bytes of the structure.
+    /// Bytes of the acceleration structure.
     pub(crate) structure_bytes: u64,
-    /// Bytes of scratch memory, of a build or a refit, whichever is more.
+    /// Bytes of scratch memory of a build or a refit, whichever needs more.
     pub(crate) scratch_bytes: u64,
 }
 
@@ -31,10 +31,11 @@ pub(crate) struct PartPlan {
     pub(crate) geometries: Vec<Vec<u32>>,
 }
 
-/// Cuts a mesh into spatially compact parts that fit and overlap little: about the least number of parts, or up to twice
-/// as many where the mesh has large primitives and small ones side by side. Parts that still do not fit, because their
-/// mixture of geometries takes more, are cut further. `bounds` holds the boxes of each geometry's primitives,
-/// `sizes` answers what a structure with so many primitives of each geometry takes. Deterministic.
+/// Splits a mesh into spatially compact parts that fit and overlap little. The number of parts is about the minimum,
+/// or up to twice that for a mesh that mixes large and small primitives. Parts that still do not fit, because their
+/// mix of geometries needs more memory, are split further. `bounds` holds the bounds of each geometry's primitives.
+/// `sizes` returns the sizes of an acceleration structure with the given number of primitives of each geometry.
+/// Deterministic.
 ///
 /// Fails with [`Error::LimitExceeded`] if a single primitive does not fit.
 pub(crate) fn plan_split(
@@ -57,7 +58,7 @@ pub(crate) fn plan_split(
 
 struct SplitPlanner<'a> {
     name: &'a str,
-    /// Number of each geometry's first primitive when all are counted through.
+    /// Number of each geometry's first primitive, counted over all geometries.
     starts: Vec<u64>,
     limits: &'a PartLimits,
     sizes: &'a mut dyn FnMut(&[u32]) -> Result<PartSizes>,
@@ -86,7 +87,7 @@ impl SplitPlanner<'_> {
         self.split_part(items, parts)
     }
 
-    /// Cuts into parts of at most an equal share each, and plans each of them.
+    /// Splits the primitives into parts of at most an equal share each, and plans each part.
     fn split_part(&mut self, items: &mut [PrimitiveBounds], parts: u64) -> Result<()> {
         let share = (items.len() as u64).div_ceil(parts).max(1) as usize;
         let leaf = (share / median_leaves_of_part(parts)).max(1);
@@ -97,8 +98,8 @@ impl SplitPlanner<'_> {
         Ok(())
     }
 
-    /// Least number of parts, at least `lowest` and at most `highest`, of which an equal share of every geometry fits:
-    /// sizes have a fixed base, so the ratio of the whole's size to the limit may be too few.
+    /// Smallest number of parts, between `lowest` and `highest`, for which an equal share of every geometry fits.
+    /// Sizes have a fixed base, so the ratio of the whole size to the limit may be too small a number.
     fn min_part_count(&mut self, counts: &[u32], lowest: u64, highest: u64) -> Result<u64> {
         let mut too_few = lowest.min(highest) - 1;
         let mut enough = too_few + 1;
@@ -120,7 +121,7 @@ impl SplitPlanner<'_> {
         Ok(self.size_demand(&equal_share(counts, parts))?.parts <= 1)
     }
 
-    /// The limit that so many primitives of each geometry exceed most, and how many times.
+    /// The limit that an acceleration structure with these counts exceeds by the largest factor, with that factor.
     fn size_demand(&mut self, counts: &[u32]) -> Result<SizeDemand> {
         let sizes = (self.sizes)(counts)?;
         let primitives = counts.iter().copied().map(u64::from).sum();
@@ -154,13 +155,13 @@ impl SplitPlanner<'_> {
     }
 }
 
-/// Into how many leaves a share is cut before they are merged: more give parts that overlap less, but merging looks at
-/// all pairs.
+/// Number of leaves of a share before leaves are merged. More leaves give parts that overlap less, but merging
+/// compares all pairs.
 fn median_leaves_of_part(parts: u64) -> usize {
     (1024 / parts.max(1)).clamp(1, 8) as usize
 }
 
-/// Cuts freely until no piece has more than `most` primitives.
+/// Partitions by SAH until no leaf has more than `most` primitives.
 fn sah_leaves(items: &mut [PrimitiveBounds], most: usize) -> Vec<&mut [PrimitiveBounds]> {
     let (mut open, mut done) = (vec![items], Vec::new());
     while let Some(piece) = open.pop() {
@@ -175,18 +176,19 @@ fn sah_leaves(items: &mut [PrimitiveBounds], most: usize) -> Vec<&mut [Primitive
     done
 }
 
-/// A part while it is put together of leaves.
+/// A part that is merged from leaves.
 struct MergeCandidate {
     items: Vec<PrimitiveBounds>,
     bounds: Bounds,
-    /// The part it gains most to be merged with, and the gain.
+    /// The other part that gives the largest merge gain, and the gain.
     partner: Option<(usize, f32)>,
 }
 
 impl MergeCandidate {
-    /// How much surface a ray is spared when both are one part; none where there is no room.
+    /// Surface area saved if both parts become one; `None` if the merged part would be too large.
     fn merge_gain(&self, other: &Self, most: usize) -> Option<f32> {
-        /// One part is better than two that are a little smaller together: each costs a ray that enters it.
+        /// One part is preferred to two with a slightly smaller total, because each part costs every ray that enters
+        /// it.
         const REORDER_PREFERENCE: f32 = 0.25;
         if self.items.len() + other.items.len() > most {
             return None;
@@ -196,8 +198,8 @@ impl MergeCandidate {
     }
 }
 
-/// Merges pieces, those first that overlap most, as long as they gain or are more than `enough`, and no part has more than
-/// `most` primitives.
+/// Merges leaves, those with the largest overlap first. Merges until no merge gains and at most `enough` parts remain,
+/// or until each merged part would have more than `most` primitives.
 fn merge_parts(pieces: Vec<&mut [PrimitiveBounds]>, most: usize, enough: usize) -> Vec<Vec<PrimitiveBounds>> {
     let merged = |piece: &mut [PrimitiveBounds]| MergeCandidate {
         items: piece.to_vec(),
@@ -232,7 +234,7 @@ fn find_merge_partner(parts: &mut [MergeCandidate], part: usize, most: usize) {
     (0..parts.len()).for_each(|other| offer_merge(parts, part, other, most));
 }
 
-/// Makes `other` the partner of `part_plan` if it gains more than the present one.
+/// Makes `other` the merge partner of `part` if it gains more than the present partner.
 fn offer_merge(parts: &mut [MergeCandidate], part: usize, other: usize, most: usize) {
     if part == other {
         return;
@@ -244,7 +246,7 @@ fn offer_merge(parts: &mut [MergeCandidate], part: usize, other: usize, most: us
     }
 }
 
-/// The two parts that gain most together, or lose least where that is better than nothing.
+/// The two parts with the largest merge gain. With `at_a_loss`, the gain may be negative.
 fn best_merge(parts: &[MergeCandidate], at_a_loss: bool) -> Option<(usize, usize)> {
     let pairs = parts.iter().enumerate().filter_map(|(part, merged)| {
         let (partner, gain) = merged.partner?;
@@ -254,8 +256,8 @@ fn best_merge(parts: &[MergeCandidate], at_a_loss: bool) -> Option<(usize, usize
     best.filter(|(_, _, gain)| at_a_loss || *gain >= 0.0).map(|(part, partner, _)| (part, partner))
 }
 
-/// How many primitives of each geometry an average one of so many parts holds: `ceil(total / parts)` together, as
-/// the geometries may be more than the primitives of a part.
+/// Primitives of each geometry in an average part: `ceil(total / parts)` in sum over all geometries. Rounding each
+/// geometry up would give more, as there may be more geometries than primitives in a part.
 fn equal_share(counts: &[u32], parts: u64) -> Vec<u32> {
     let (mut behind, mut given) = (0_u64, 0);
     let share = |&count: &u32| {
@@ -267,7 +269,7 @@ fn equal_share(counts: &[u32], parts: u64) -> Vec<u32> {
     counts.iter().map(share).collect()
 }
 
-/// One limit, and into how many parts it asks to cut.
+/// One limit, and the number of parts that it requires.
 #[derive(Clone, Copy)]
 struct SizeDemand {
     what: &'static str,
@@ -303,7 +305,7 @@ mod tests {
             .collect()
     }
 
-    /// Sizes that grow by so many bytes of structure and scratch for each primitive, above a base.
+    /// Sizes with a fixed base and `structure` and `scratch` bytes for each primitive.
     fn linear(base: u64, structure: u64, scratch: u64) -> impl FnMut(&[u32]) -> Result<PartSizes> {
         move |counts| {
             let primitives: u64 = counts.iter().copied().map(u64::from).sum();
@@ -351,7 +353,7 @@ mod tests {
     #[test]
     fn a_fixed_base_takes_little_more_parts_than_it_must() {
         let bounds = [scattered(1000)];
-        // 1000 + 10 n <= 1500 holds for n <= 50, so 20 parts, though the whole is only 8 times too large.
+        // 1000 + 10 n <= 1500 holds for n <= 50. So 20 parts are needed, though the whole is only 8 times too large.
         let parts = plan_split("mesh", &bounds, &limits(1500, 1500, 1000), &mut linear(1000, 10, 1)).unwrap();
         assert!((20..=40).contains(&parts.len()), "{}", parts.len());
     }
@@ -384,7 +386,7 @@ mod tests {
 
     #[test]
     fn a_costly_geometry_is_cut_further_than_a_cheap_one() {
-        // The first geometry, all on the left, costs 50 times what the second one does.
+        // The first geometry, all on the left, costs 50 times as much as the second one.
         let shifted = scattered(500).into_iter();
         let right = shifted
             .map(|one| Bounds { low: one.low + Vec3::X * 9.0, high: one.high + Vec3::X * 9.0 })
@@ -428,7 +430,7 @@ mod tests {
         let parts =
             plan_split("mesh", &bounds, &limits(MIB, MIB, 50_000 / 31), &mut linear(0, 1, 1)).unwrap();
         let area: f64 = parts.iter().map(|part| part_area(&bounds, part)).sum();
-        // Parts of a random choice would all be as large as the whole, 3.
+        // Parts of random primitives would all be as large as the whole, 3.
         assert!(area < 0.15 * 3.0 * parts.len() as f64, "{area} in {} parts", parts.len());
     }
 
@@ -465,7 +467,7 @@ mod tests {
         }
     }
 
-    /// A small box; a wild one has any corners, the same ones for all that are not numbers.
+    /// A small AABB, or with `wild` one with any coordinates. Coordinates that are NaN make all such AABBs equal.
     fn boxed(place: [f32; 3], wild: bool) -> Bounds {
         let place = Vec3::from(place);
         if wild {

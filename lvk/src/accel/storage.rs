@@ -1,4 +1,4 @@
-//! The memory of acceleration structures: small ones share buffers, large ones have their own.
+//! Memory of acceleration structures: small ones share buffers, large ones have their own.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -10,14 +10,14 @@ use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
-/// Size of a shared buffer.
+/// Bytes of a shared buffer.
 const SHARED_BLOCK_BYTES: u64 = 4 << 20;
-/// Structures larger than this get a buffer of their own, which goes back to the allocator with them.
+/// Acceleration structures larger than this get their own buffer, which is freed together with them.
 const MAX_SHARED_BYTES: u64 = SHARED_BLOCK_BYTES / 8;
-/// Vulkan wants structures at multiples of this inside their buffer.
+/// Vulkan's alignment of acceleration structures inside their buffer.
 const ALIGNMENT: u64 = 256;
 
-/// Hands out memory for structures and takes it back.
+/// Allocates memory for acceleration structures.
 pub(crate) struct AccelStorage {
     pool: Arc<SharedBlocks>,
     budget_bytes: u64,
@@ -28,13 +28,13 @@ struct SharedBlocks {
     used_bytes: AtomicU64,
 }
 
-/// A buffer that several structures share.
+/// A buffer that several acceleration structures share.
 struct SharedBlock {
     buffer: Arc<Buffer>,
     ranges: RangeAllocator,
 }
 
-/// The bytes of one structure, given back on drop.
+/// The bytes of one acceleration structure, freed on drop.
 pub(crate) struct StorageRange {
     pub(crate) buffer: Arc<Buffer>,
     /// A multiple of 256.
@@ -45,17 +45,17 @@ pub(crate) struct StorageRange {
 }
 
 impl AccelStorage {
-    /// Never holds more than `budget_bytes` at once.
+    /// Creates a storage that never holds more than `budget_bytes`.
     pub(crate) fn new(budget_bytes: u64) -> Self {
         let blocks = Mutex::new(Rank::AccelBlocks, Vec::new());
         Self { pool: Arc::new(SharedBlocks { blocks, used_bytes: AtomicU64::new(0) }), budget_bytes }
     }
 
-    /// Memory for the structure `name`.
+    /// Allocates memory for the acceleration structure `name`.
     pub(crate) fn alloc(&self, gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<StorageRange> {
         let bytes = bytes.max(1).checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX);
         self.reserve(name, bytes)?;
-        // ValidationMode in shaders knows where buffers end, but not where structures do.
+        // Validation in shaders knows the end of a buffer, but not the end of an acceleration structure inside it.
         let alone = bytes > MAX_SHARED_BYTES || gpu.instance.gpu_assisted;
         let made = if alone {
             new_buffer(gpu, name, bytes).map(|buffer| (Arc::new(buffer), 0, false))
@@ -66,12 +66,12 @@ impl AccelStorage {
         Ok(StorageRange { buffer, offset, bytes, shared, pool: Arc::clone(&self.pool) })
     }
 
-    /// Bytes of all structures alive.
+    /// Bytes of all live acceleration structures.
     pub(crate) fn used_bytes(&self) -> u64 {
         self.pool.used_bytes.load(Ordering::Relaxed)
     }
 
-    /// Bytes of shared buffers that no structure uses.
+    /// Bytes of shared buffers that no acceleration structure uses.
     pub(crate) fn free_bytes(&self) -> u64 {
         let blocks = self.pool.blocks.lock();
         blocks.iter().map(|block| SHARED_BLOCK_BYTES - block.ranges.used_bytes()).sum()
@@ -106,7 +106,7 @@ impl SharedBlocks {
         self.used_bytes.fetch_sub(bytes, Ordering::Relaxed);
     }
 
-    /// Takes a range of a shared buffer back; the buffer goes with its last structure.
+    /// Frees a range of a shared buffer. The buffer is freed with its last acceleration structure.
     fn free_shared(&self, range: &StorageRange) {
         let mut blocks = self.blocks.lock();
         let Some(index) = blocks.iter().position(|block| block.buffer.id == range.buffer.id) else { return };
@@ -129,7 +129,7 @@ impl Drop for StorageRange {
 fn new_buffer(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
     let desc =
         BufferDesc { size_bytes: bytes, usage: BufferUsage::STORAGE, debug_name: name, ..Default::default() };
-    // Those of the library's own are read as any buffer is.
+    // Software acceleration structures are read as ordinary buffers.
     let usage =
         if gpu.accel.is_some() { InternalUsage::ACCEL_STORAGE } else { InternalUsage::SOFTWARE_STRUCTURES };
     Buffer::new(gpu, &desc, usage)

@@ -1,4 +1,4 @@
-//! A top-level structure and what it shows.
+//! A top-level acceleration structure (TLAS) and its contents.
 
 use std::sync::{Arc, OnceLock};
 
@@ -15,42 +15,42 @@ use crate::software_ray_query::tlas::SoftwareTlas;
 /// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
 const REMAP_ENTRY_BYTES: u64 = 16;
 
-/// A top-level structure.
+/// A top-level acceleration structure.
 pub(crate) struct Tlas {
-    /// Its element of `kTLAS[]`.
+    /// Index in `kTLAS[]`.
     pub(crate) slot: u32,
-    /// Instances the caller may show.
+    /// Maximum number of instances of the caller.
     pub(crate) capacity: u32,
-    /// Instances Vulkan may be given, those for further parts of split meshes included.
+    /// Maximum number of instances for Vulkan, including those for extra parts of split meshes.
     pub(crate) built_capacity: u32,
-    /// What the device traces, where it does.
+    /// The hardware acceleration structure; `None` if the device has none.
     pub(crate) structure: Option<RawAccelStruct>,
-    /// What software traces, where it does.
+    /// The BVH that software ray queries traverse; `None` if no ray queries run in software.
     pub(crate) software: Option<SoftwareTlas>,
-    /// From hits to the caller's numbers: a row for each instance Vulkan is given. Made when first needed.
+    /// The hit remap table: maps each of Vulkan's instances to the caller's ids. Created on first use.
     pub(crate) hit_table: OnceLock<Arc<Buffer>>,
-    /// The instances Vulkan is given, where a kernel writes them. Made when first needed.
+    /// The instance records for Vulkan that a kernel writes. Created on first use.
     pub(crate) records: OnceLock<Arc<Buffer>>,
-    /// Of the last build submitted.
+    /// Contents of the last submitted build.
     contents: Mutex<TlasContents>,
 }
 
 /// The instances of a build.
 #[derive(Default, Clone)]
 pub(crate) struct TlasContents {
-    /// Instances of the caller, `None` before the first build is submitted.
+    /// Number of instances of the caller; `None` before the first build is submitted.
     pub(crate) instance_count: Option<u32>,
-    /// Instances Vulkan was given.
+    /// Number of instances for Vulkan.
     pub(crate) built_count: u32,
     /// Refits since the last rebuild.
     pub(crate) refits: u32,
-    /// What the instances refer to, kept alive as long as they do.
+    /// The BLAS that the instances reference, kept alive as long as the instances use them.
     pub(crate) blas_refs: Arc<BlasRefSet>,
-    /// When that was last known to stand as it is.
+    /// The generation at which `blas_refs` was last known to be current.
     pub(crate) generation: AccelGeneration,
-    /// The address of the rows that the table of structures names for it; 0 for none.
+    /// Address of the hit remap table in the TLAS's entry of the table of all TLAS; 0 for none.
     pub(crate) hit_table_address: u64,
-    /// From what the instances can be written again once a structure they refer to has moved.
+    /// Data from which the instances are written again after a referenced BLAS has moved.
     pub(crate) source: Option<Arc<InstanceSource>>,
 }
 
@@ -79,23 +79,23 @@ impl Tlas {
         self.contents.lock()
     }
 
-    /// Returns the buffer for instances that a kernel writes; makes it the first time.
+    /// Returns the buffer for instance records that a kernel writes; creates it the first time.
     pub(crate) fn records_buffer(&self, gpu: &Arc<Gpu>, name: &str) -> Result<Arc<Buffer>> {
         get_or_create(&self.records, gpu, name, u64::from(self.built_capacity) * instance_bytes(1))
     }
 
-    /// Returns the buffer of the hit remap table; makes it the first time.
+    /// Returns the buffer of the hit remap table; creates it the first time.
     pub(crate) fn hit_table_buffer(&self, gpu: &Arc<Gpu>, name: &str) -> Result<Arc<Buffer>> {
         get_or_create(&self.hit_table, gpu, name, u64::from(self.built_capacity) * REMAP_ENTRY_BYTES)
     }
 
-    /// Bytes of the structure.
+    /// Bytes of the acceleration structures.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let hardware = self.structure.as_ref().map_or(0, RawAccelStruct::memory_bytes);
         hardware + self.software.as_ref().map_or(0, SoftwareTlas::memory_bytes)
     }
 
-    /// Bytes of buffers the library keeps for it.
+    /// Bytes of the buffers that the library keeps for the TLAS.
     pub(crate) fn table_bytes(&self) -> u64 {
         let kept = [self.hit_table.get(), self.records.get()];
         kept.into_iter().flatten().map(|buffer| buffer.size_bytes).sum()
@@ -103,13 +103,13 @@ impl Tlas {
 }
 
 impl TlasContents {
-    /// The same, but for what the instances can be written from.
+    /// Returns a clone without `source`.
     #[inline]
     pub(crate) fn clone_without_source(&self) -> Self {
         Self { blas_refs: Arc::clone(&self.blas_refs), source: None, ..*self }
     }
 
-    /// Instances of the caller and of Vulkan, `None` before the first build.
+    /// Number of instances of the caller and of Vulkan; `None` before the first build.
     #[inline]
     pub(crate) fn counts(&self) -> Option<(u32, u32)> {
         self.instance_count.map(|count| (count, self.built_count))

@@ -1,20 +1,20 @@
-//! The description of a TLAS.
+//! Description of a TLAS.
 
 use super::flags::BuildFlags;
 use super::instance::TlasInstance;
 
-/// Describes a top-level structure.
+/// Describes a top-level acceleration structure (TLAS).
 #[derive(Debug, Clone, Copy)]
 pub struct TlasDesc<'a> {
-    /// Its first instances; may be empty.
+    /// The first instances; may be empty.
     pub instances: &'a [TlasInstance],
-    /// Room for instances in later updates; at least the number of the first ones.
+    /// Maximum number of instances in later updates; at least the number of the first ones.
     pub capacity: u32,
-    /// Most parts that a mesh shown may have been split into ([`AccelStructInfo::parts`](crate::AccelStructInfo)), on
-    /// the average of all instances. 1 unless phones' limits or [`DeviceProfile`](crate::DeviceProfile)s split meshes; the
-    /// average of the first instances where that is more.
+    /// Maximum average number of parts of the referenced meshes ([`AccelStructInfo::parts`](crate::AccelStructInfo))
+    /// over all instances. 1 is enough unless the limits of phones or of [`DeviceProfile`](crate::DeviceProfile)s
+    /// split meshes. The average of the first instances is used if it is larger.
     pub parts_per_instance: u32,
-    /// What the build is optimised for.
+    /// Build preferences, and the operations allowed later.
     pub flags: BuildFlags,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,

@@ -1,4 +1,4 @@
-//! What top-level structures show once a command buffer is submitted.
+//! Contents that TLAS have once a command buffer is submitted.
 
 use std::sync::Arc;
 
@@ -11,46 +11,48 @@ use crate::handle::AccelStructHandle;
 use crate::handle_cache::HandleCache;
 use crate::pool::HandlePool;
 
-/// What a command buffer makes of one top-level structure.
+/// Changes of a command buffer to one TLAS.
 #[derive(Default)]
 pub(crate) struct TlasTracker {
-    /// What it shows after the last command; where there was none yet, by the last submission that was looked at.
+    /// Contents after the last recorded command, or without one those of the last submission when they were loaded.
     contents: Option<TlasContents>,
-    /// Whether a command has updated it.
+    /// True if a command of this command buffer updates the TLAS.
     is_recorded: bool,
-    /// The rows that the last command to do so has the table name; `None` where none did, and all rely on the table naming none.
+    /// Address that the last such command writes to the TLAS's hit remap table entry. `None` if no command writes it,
+    /// and all commands rely on an empty entry.
     hit_table_address: Option<u64>,
-    /// Whether a command was recorded before any had the table name rows: it relies on the table naming none.
+    /// True if a command was recorded before any wrote the hit remap table entry. Such a command relies on an empty
+    /// entry.
     expects_no_hit_table: bool,
-    /// The counts that a first command relies on which moves what is shown when the command buffer is submitted.
+    /// Instance counts that the first command requires at submission, if that command is a refit.
     expected_counts: Option<(u32, u32)>,
 }
 
-/// A command as it was recorded.
+/// A recorded build or refit.
 pub(crate) struct RecordedTlasBuild {
-    /// Instances of the caller, and those Vulkan is given.
+    /// Number of instances of the caller, and for Vulkan.
     pub(crate) counts: (u32, u32),
     pub(crate) refit: bool,
-    /// The rows that it has the table of structures name, where it writes that.
+    /// Address that the command writes to the hit remap table entry; `None` if it does not write the entry.
     pub(crate) hit_table_address: Option<u64>,
-    /// When what is shown was looked at.
+    /// The generation at which the referenced BLAS were checked.
     pub(crate) generation: AccelGeneration,
 }
 
-/// What a command has a structure show.
+/// New contents of a TLAS, set by a command.
 pub(crate) struct TlasChange {
-    /// Instances of the caller.
+    /// Number of instances of the caller.
     pub(crate) count: u32,
-    /// Instances Vulkan is given.
+    /// Number of instances for Vulkan.
     pub(crate) built_count: u32,
-    /// What the instances refer to; `None` for the same as before.
+    /// The BLAS that the instances reference; `None` if they are the same as before.
     pub(crate) blas_refs: Option<Arc<BlasRefSet>>,
     pub(crate) source: Option<Arc<InstanceSource>>,
     pub(crate) refit: bool,
 }
 
 impl TlasTracker {
-    /// What the structure shows before the next command.
+    /// Contents of the TLAS before the next command.
     #[inline(always)]
     pub(crate) fn current(&mut self, tlas: &Tlas) -> &TlasContents {
         if !self.is_recorded {
@@ -59,19 +61,20 @@ impl TlasTracker {
         self.contents.get_or_insert_default()
     }
 
-    /// Looks at what the last submission has it show.
+    /// Loads the contents of the last submission.
     #[inline(never)]
     fn load_submitted(&mut self, tlas: &Tlas) {
         self.contents = Some(tlas.contents().clone_without_source());
     }
 
-    /// Whether a command has updated it.
+    /// True if a command of this command buffer updates the TLAS.
     #[inline]
     pub(crate) fn is_recorded(&self) -> bool {
         self.is_recorded
     }
 
-    /// A command was recorded. Answers whether one was before.
+    /// Updates the counts for a recorded command. Returns true if an earlier command of this command buffer was
+    /// recorded.
     #[inline(always)]
     fn record(&mut self, recorded: &RecordedTlasBuild) -> bool {
         let RecordedTlasBuild { counts, refit, hit_table_address, generation } = *recorded;
@@ -88,8 +91,8 @@ impl TlasTracker {
         was_recorded
     }
 
-    /// A command has it show this from now on, and where it is `None` what was shown before, written from this source. Answers
-    /// what is shown no longer, though commands of this command buffer are to read it.
+    /// Replaces the BLAS references, or keeps them for `None`, and replaces the source. Returns replaced contents that
+    /// commands of this command buffer still read.
     fn replace_contents(
         &mut self,
         blas_refs: Option<Arc<BlasRefSet>>,
@@ -100,14 +103,14 @@ impl TlasTracker {
         let blas_refs = blas_refs.filter(|blas_refs| !Arc::ptr_eq(blas_refs, &contents.blas_refs));
         let source = std::mem::replace(&mut contents.source, source);
         let blas_refs = blas_refs.map(|blas_refs| std::mem::replace(&mut contents.blas_refs, blas_refs));
-        // What was submitted stays with the structure until this is submitted, too.
+        // The submitted contents stay with the TLAS until this command buffer is submitted, too.
         if !was_recorded || (source.is_none() && blas_refs.is_none()) {
             return None;
         }
         Some(TlasContents { blas_refs: blas_refs.unwrap_or_default(), source, ..TlasContents::default() })
     }
 
-    /// Whether what it shows can be written again from a source of its own.
+    /// True if the contents have a source from which they can be written again.
     #[inline(always)]
     fn has_source(&self) -> bool {
         self.contents.as_ref().is_some_and(|contents| contents.source.is_some())
@@ -124,7 +127,8 @@ impl TlasTracker {
         Err(Error::usage(&target.name, message))
     }
 
-    /// Makes it so. Answers what was shown before, unless that is still shown.
+    /// Sets the contents of the TLAS. Returns the previous contents if the BLAS references changed or if they had a
+    /// source.
     fn apply(&mut self, tlas: &Tlas) -> Option<TlasContents> {
         let Self { contents, hit_table_address, .. } = std::mem::take(self);
         let contents = TlasContents { hit_table_address: hit_table_address.unwrap_or(0), ..contents? };
@@ -136,21 +140,21 @@ impl TlasTracker {
     }
 }
 
-/// The updates of one command buffer, with memory that is used again.
+/// The TLAS updates of one command buffer. Its memory is reused.
 #[derive(Default)]
 pub(crate) struct TlasTrackers {
-    /// Structures that were named.
+    /// The TLAS of the command buffer, by handle.
     cache: HandleCache<AccelStructHandle, AccelStruct, 32>,
-    /// One for each of them.
+    /// One tracker for each TLAS in `cache`.
     trackers: Vec<TlasTracker>,
-    /// What commands were to read and later ones have replaced.
+    /// Contents that recorded commands read and later commands replaced.
     replaced: Vec<TlasContents>,
-    /// What structures show of which nothing is known.
+    /// An empty set, for TLAS without known contents.
     no_refs: Arc<BlasRefSet>,
     plan_memory: PlanMemory,
 }
 
-/// One structure and what becomes of it.
+/// One TLAS and its tracker.
 pub(crate) struct TlasEntry<'a> {
     pub(crate) target: &'a Arc<AccelStruct>,
     pub(crate) tracker: &'a mut TlasTracker,
@@ -159,10 +163,10 @@ pub(crate) struct TlasEntry<'a> {
 }
 
 impl TlasTrackers {
-    /// Memory for more instances is let go.
+    /// Memory for more instances is not kept.
     const MAX_KEPT_INSTANCES: usize = 1 << 16;
 
-    /// The row of a structure.
+    /// Index of the TLAS with this handle.
     #[inline]
     pub(crate) fn index_of_handle(
         &mut self,
@@ -174,7 +178,7 @@ impl TlasTrackers {
         Ok(index)
     }
 
-    /// The row of a structure.
+    /// Index of this TLAS.
     pub(crate) fn index_of(&mut self, target: &Arc<AccelStruct>) -> usize {
         let index = self.cache.index_of(target);
         self.grow();
@@ -188,14 +192,14 @@ impl TlasTrackers {
         }
     }
 
-    /// What is in a row.
+    /// The entry at an index.
     #[inline]
     pub(crate) fn entry(&mut self, index: usize) -> TlasEntry<'_> {
         let Self { cache: found, trackers: list, no_refs, plan_memory: memory, .. } = self;
         TlasEntry { target: found.object(index), tracker: &mut list[index], no_refs, plan_memory: memory }
     }
 
-    /// A command was recorded that has the structure of a row show something.
+    /// Records that a command changes the contents of the TLAS at an index.
     pub(crate) fn record_build(
         &mut self,
         index: usize,
@@ -208,7 +212,8 @@ impl TlasTrackers {
         self.replaced.extend(update.replace_contents(blas_refs, source, was_recorded));
     }
 
-    /// As [`record_build`](Self::record_build), where the same is shown as before, and instances were written with addresses.
+    /// As [`record_build`](Self::record_build), for the same BLAS references as before and instances written with
+    /// addresses.
     #[inline(always)]
     pub(crate) fn record_unchanged(&mut self, index: usize, recorded: &RecordedTlasBuild) {
         let update = &mut self.trackers[index];
@@ -218,7 +223,7 @@ impl TlasTrackers {
         }
     }
 
-    /// Fails if what was recorded no longer fits what was submitted since.
+    /// Fails if a recorded refit no longer matches the submitted contents.
     pub(crate) fn check(&self) -> Result<()> {
         self.cache
             .objects_from(0)
@@ -227,7 +232,7 @@ impl TlasTrackers {
             .try_for_each(|(target, update)| update.check(target))
     }
 
-    /// Structures for which the table names rows by now, though a command relies on there being none.
+    /// TLAS with a hit remap table in their entry, though a recorded command relies on an empty entry.
     pub(crate) fn with_unexpected_hit_table(&self) -> impl Iterator<Item = &Tlas> {
         let relying = self
             .cache
@@ -240,7 +245,7 @@ impl TlasTrackers {
             .filter(|tlas| tlas.contents().hit_table_address != 0)
     }
 
-    /// Makes it all so; `before` is told of each structure with what it is to show.
+    /// Sets the contents of all updated TLAS. Calls `before` with each TLAS and its new contents.
     pub(crate) fn apply(&mut self, mut before: impl FnMut(&Arc<AccelStruct>, &TlasContents)) {
         for (target, update) in self.cache.objects_from(0).iter().zip(&mut self.trackers) {
             if let (Ok(tlas), true, Some(contents)) = (target.tlas(), update.is_recorded, &update.contents) {
@@ -250,17 +255,17 @@ impl TlasTrackers {
         }
     }
 
-    /// What has to stay until the GPU is done with what was applied.
+    /// Takes replaced contents, which must stay alive until the GPU has completed the applied commands.
     pub(crate) fn drain_replaced(&mut self) -> impl Iterator<Item = TlasContents> + '_ {
         self.replaced.drain(..)
     }
 
-    /// Whether the memory is not too much to keep for what is recorded next.
+    /// True if the memory is small enough to keep for the next command buffer.
     pub(crate) fn is_worth_keeping(&self) -> bool {
         self.plan_memory.ref_indices.capacity() <= Self::MAX_KEPT_INSTANCES
     }
 
-    /// Forgets everything, and keeps the memory.
+    /// Removes all entries and keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.cache.clear();
         self.trackers.clear();
@@ -301,7 +306,7 @@ mod tests {
         updates.apply(|_, _| {});
     }
 
-    /// Over several command buffers, as each begins with what was submitted.
+    /// Several command buffers, each of which begins with the submitted contents.
     #[test]
     fn auto_counts_the_refits_since_the_last_rebuild() {
         let (target, auto) = (structure(), BuildMode::Auto { max_refits: 2 });
@@ -321,7 +326,8 @@ mod tests {
         assert_eq!(refits, [false, true, true, false, true, true, false, true]);
     }
 
-    /// What a command shows, and the next of the same command buffer no longer, is still read by the first.
+    /// Contents that one command sets and the next command of the same command buffer replaces are still read by the
+    /// first.
     #[test]
     fn what_is_shown_is_kept_until_the_gpu_is_done_with_it() {
         let target = structure();
@@ -348,7 +354,7 @@ mod tests {
         assert_eq!(is_alive(), [false, false, true]);
     }
 
-    /// Those that are not submitted change nothing, and leave nothing behind.
+    /// Command buffers that are not submitted change no contents and keep nothing alive.
     #[test]
     fn a_command_buffer_that_is_given_up_keeps_nothing() {
         let target = structure();

@@ -18,7 +18,7 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Listens from now on. Where the system does not let it, Ctrl-C ends the process as ever.
+    /// Listens from now on. If the system does not allow it, Ctrl-C ends the process as usual.
     #[must_use]
     pub fn listen() -> Self {
         let interrupt = Self::default();

@@ -13,7 +13,7 @@ pub struct Difference {
     pub max_difference: u8,
 }
 
-/// Why two pictures cannot be compared.
+/// Reason that two images cannot be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{what} holds {bytes} bytes; {width} x {height} pixels need 3 or 4 bytes each")]
 pub struct SizeError {

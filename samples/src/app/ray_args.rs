@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 /// The choice of the ray tracing path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct RayArgs {
-    /// How to trace rays
+    /// The ray tracing path
     #[arg(long, value_enum, default_value_t = RayTracing::Auto, help_heading = "Rendering")]
     pub rt: RayTracing,
 }

@@ -111,7 +111,7 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
-    /// Where to write pictures of the sample called `name`.
+    /// Returns the output file of images of the sample called `name`.
     #[must_use]
     pub fn out_or(&self, name: &str) -> PathBuf {
         let is_sequence = matches!(self.frames, Some(Frames::Sequence(_)));

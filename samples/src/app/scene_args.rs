@@ -12,7 +12,7 @@ use super::scene_list;
 use super::value_parsers::positive;
 use crate::scene::{ObjOptions, Scene, SceneError};
 
-/// Which scene, and from where it is seen.
+/// Arguments that select the scene and its camera.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct SceneArgs {
     /// Wavefront OBJ to render, with its MTL and textures beside it, or a name in --list-scenes
@@ -29,19 +29,19 @@ pub struct SceneArgs {
     #[arg(long, value_name = "FILE", requires = "scene", help_heading = "Scene")]
     pub cameras: Option<PathBuf>,
 
-    /// From where it is seen
+    /// The camera
     #[command(flatten)]
     pub camera: CameraArgs,
 
-    /// What is known by name
+    /// List of the scenes that have a name
     #[command(flatten)]
     pub list: ListArgs,
 }
 
-/// Through which camera a scene is seen.
+/// Arguments that select the camera of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct CameraArgs {
-    /// Which of the scene's five cameras to look through; a sequence starts there and passes through all five
+    /// Camera, one of the scene's five; a sequence starts there and passes through all five
     #[arg(
         long = "camera",
         value_name = "1-5",
@@ -147,7 +147,7 @@ pub struct BuiltInSceneRayArgs {
     #[command(flatten)]
     pub scene: BuiltInSceneArgs,
 
-    /// By what rays are traced
+    /// The ray tracing path
     #[command(flatten)]
     pub tracing: RayArgs,
 }

@@ -39,11 +39,11 @@ pub enum View {
     Picture,
     /// Their colours
     Albedo,
-    /// Where they face
+    /// Their normals
     Normals,
-    /// How rough they are
+    /// Their roughness
     Roughness,
-    /// How near they are
+    /// Their depth
     Depth,
 }
 

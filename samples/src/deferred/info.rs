@@ -10,7 +10,7 @@ use crate::app::value_parsers::whole;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Picture")]
 pub struct DeferredArgs {
-    /// How surfaces come to those who light them [default: one, where the device can]
+    /// Transfer of surfaces to the lighting [default: one, where the device can]
     #[arg(long, value_enum, value_name = "PASSES")]
     pub passes: Option<Passes>,
 
@@ -23,7 +23,7 @@ pub struct DeferredArgs {
     )]
     pub lights: u32,
 
-    /// What the picture shows
+    /// Quantity that the image shows
     #[arg(long, value_enum, value_name = "VIEW", default_value_t = View::Picture)]
     pub view: View,
 }

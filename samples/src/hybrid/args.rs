@@ -15,19 +15,19 @@ pub const MAX_SAMPLES: u32 = 256;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct HybridArgs {
-    /// Which scene, and from where it is seen
+    /// The scene and its camera
     #[command(flatten)]
     pub scene: SceneArgs,
 
-    /// How to find what a pixel sees [default: hybrid, or standalone on a device that cannot]
+    /// Method that finds the visible surfaces [default: hybrid, or standalone on a device that cannot]
     #[arg(long, value_enum)]
     pub method: Option<Method>,
 
-    /// What the hybrid method's geometry pass leaves for the rays
+    /// Data that the hybrid method's geometry pass leaves for the rays
     #[arg(long, value_enum, default_value_t = GBuffer::Visibility)]
     pub gbuffer: GBuffer,
 
-    /// How to rasterise visible triangles
+    /// Rasteriser of visible triangles
     #[arg(long, value_enum, default_value_t = Raster::Auto)]
     pub raster: Raster,
 
@@ -39,7 +39,7 @@ pub struct HybridArgs {
     #[arg(long, value_name = "PIXELS", hide = true)]
     pub medium_triangle: Option<u32>,
 
-    /// How often a ray may be reflected or refracted before it gives up, 0 to 16; 0 gives shadows only
+    /// Maximum number of reflections and refractions of a ray, 0 to 16; 0 gives shadows only
     #[arg(
         long,
         value_name = "N",
@@ -48,7 +48,7 @@ pub struct HybridArgs {
     )]
     pub depth: u32,
 
-    /// When to follow the rays of mirrors and glass; the picture is the same
+    /// Time at which the rays of mirrors and glass are traced; the image is the same
     #[arg(long, value_enum, default_value_t = Bounces::Auto)]
     pub bounces: Bounces,
 
@@ -61,16 +61,16 @@ pub struct HybridArgs {
     )]
     pub samples: u32,
 
-    /// What the lamp does in a sequence
+    /// Motion of the lamp in a sequence
     #[arg(long, value_enum, default_value_t = Lamp::Still, help_heading = "Frames")]
     pub lamp: Lamp,
 
-    /// By what rays are traced
+    /// The ray tracing path
     #[command(flatten)]
     pub tracing: RayArgs,
 }
 
-/// How to find what a pixel sees.
+/// The method that finds the visible surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Method {
     /// Everything by rays, from the camera on.
@@ -79,7 +79,7 @@ pub enum Method {
     Hybrid,
 }
 
-/// What the geometry pass leaves for the rays.
+/// The data that the geometry pass leaves for the rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum GBuffer {
     /// Position, normals, albedo and triangle, as in the paper.
@@ -88,7 +88,7 @@ pub enum GBuffer {
     Visibility,
 }
 
-/// How to rasterise visible triangles.
+/// The rasteriser of visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Raster {
     /// By compute where the device can, as its picture is exactly that of rays; says how long each took in a few frames.
@@ -103,7 +103,7 @@ pub enum Raster {
 /// The time at which rays of mirrors and glass are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Bounces {
-    /// What suits the device and the method.
+    /// The best for the device and the method.
     Auto,
     /// At once, by the thread of the pixel.
     Inline,
@@ -113,7 +113,7 @@ pub enum Bounces {
     First,
 }
 
-/// What the lamp does in a sequence.
+/// The motion of the lamp in a sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Lamp {
     /// It stays where it is.

@@ -32,7 +32,7 @@ impl Default for Geometry {
     }
 }
 
-/// By which rasteriser visible triangles are found.
+/// The rasteriser that finds visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Raster {
     /// Compute shaders with 64-bit atomics (`shaderBufferInt64Atomics`).
@@ -80,7 +80,7 @@ pub enum Bounces {
     First,
 }
 
-/// By which part of Vulkan rays are traced.
+/// The part of Vulkan that traces rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RayPath {
     /// A ray tracing pipeline.
@@ -94,7 +94,7 @@ pub enum RayPath {
 pub struct HybridConfig {
     /// The method that finds primary visibility.
     pub method: Method,
-    /// By which part of Vulkan rays are traced.
+    /// The part of Vulkan that traces rays.
     pub path: RayPath,
     /// Pixels in a row.
     pub width: u32,

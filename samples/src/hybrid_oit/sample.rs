@@ -17,7 +17,7 @@ use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::scene::Camera;
 
-/// Renders a scene of blocks, balls and glass. What it shows depends on the time alone, not on frames before.
+/// Renders a scene of blocks, balls and glass. The image depends on the time alone, not on earlier frames.
 pub struct HybridOit {
     ctx: Context,
     config: HybridOitConfig,

@@ -52,23 +52,23 @@ pub struct LargeSceneArgs {
     )]
     pub triangles: u32,
 
-    /// What becomes of what is shown more than once
+    /// Layout of objects that occur more than once
     #[arg(long, value_enum, default_value_t = Layout::Instanced, help_heading = "Scene")]
     pub layout: Layout,
 
-    /// From where it is seen
+    /// The camera
     #[command(flatten)]
     pub camera: CameraArgs,
 
-    /// What is known by name
+    /// List of the scenes that have a name
     #[command(flatten)]
     pub list: ListArgs,
 
-    /// What pixels show
+    /// Quantity that the image shows
     #[arg(long, value_enum, default_value_t = Show::Picture, help_heading = "Rendering")]
     pub show: Show,
 
-    /// How often a ray may be mirrored or bent, 0 to 16
+    /// Maximum number of reflections and refractions of a ray, 0 to 16
     #[arg(
         long,
         value_name = "N",
@@ -92,7 +92,7 @@ pub struct LargeSceneArgs {
     #[arg(long, help_heading = "Rendering")]
     pub no_compaction: bool,
 
-    /// By what rays are traced
+    /// The ray tracing path
     #[command(flatten)]
     pub tracing: RayArgs,
 }

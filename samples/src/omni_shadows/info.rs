@@ -11,11 +11,11 @@ use crate::app::value_parsers::{up_to, whole};
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct OmniShadowsArgs {
-    /// How the six faces of the shadow's cube map are drawn
+    /// Method of drawing the six faces of the shadow's cube map
     #[arg(long, value_enum, default_value_t = Faces::Auto)]
     pub faces: Faces,
 
-    /// How the shadow is filtered
+    /// Filter of the shadow
     #[arg(long, value_enum, default_value_t = ShadowFilter::Soft)]
     pub filter: ShadowFilter,
 
@@ -32,7 +32,7 @@ pub struct OmniShadowsArgs {
     #[arg(long, value_name = "METRES", default_value_t = 0.012, value_parser = up_to(0.1))]
     pub lamp_radius: f32,
 
-    /// How thick the air is, from 0 for clear to 1
+    /// Density of the air, from 0 for clear to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.005, value_parser = up_to(1.0))]
     pub haze: f32,
 

@@ -18,7 +18,7 @@ pub enum SkinUpdate {
 /// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReflectionsConfig {
-    /// By which part of Vulkan rays are traced.
+    /// The part of Vulkan that traces rays.
     pub path: RayPath,
     /// Pixels in a row.
     pub width: u32,

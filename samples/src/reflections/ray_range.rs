@@ -12,10 +12,10 @@ const BLURRED_EXTENT: f32 = 2.5;
 /// Length of the ray that finds what a surface of `roughness` (0 to 1) reflects, in scene units; 0 where none is
 /// traced.
 ///
-/// The lobe of the microfacet model is about `roughness * roughness` wide for each unit of length. Where it has become
-/// wider than the things in the scene, what a single ray meets tells nothing about the average, and ambient light
-/// stands in for it: the ray may end there, which saves the traversal of all that is farther away.
-/// `shaders/reflections/ray_range.glsl` has the same rule.
+/// The lobe of the microfacet model is about `roughness * roughness` wide for each unit of length. Beyond the length
+/// at which it is wider than the objects of the scene, the hit of a single ray tells nothing about the average.
+/// Ambient light replaces it there. So the ray may end at that length, which saves the traversal of everything farther
+/// away. `shaders/reflections/ray_range.glsl` has the same rule.
 #[must_use]
 pub fn reflection_range(roughness: f32) -> f32 {
     match roughness {

@@ -111,8 +111,8 @@ impl Reflections {
         })
     }
 
-    /// Moves the camera and everything that moves to where they are at `phase` of the animation's round: 0 to 1, beyond
-    /// which it goes round again. What is not finite counts as 0. Nothing depends on earlier phases.
+    /// Moves the camera and all moving objects to their positions at `phase` of the animation's round: 0 to 1, beyond
+    /// which it goes round again. A phase that is not finite counts as 0. Nothing depends on earlier phases.
     pub fn show(&mut self, phase: f32) {
         self.phase = if phase.is_finite() { phase.rem_euclid(1.0) % 1.0 } else { 0.0 };
         self.camera = scene::camera(self.phase);

@@ -11,7 +11,7 @@ use crate::app::value_parsers::{up_to, whole};
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct RenderToCubeMapArgs {
-    /// How to draw the faces of the cube map; the picture is the same
+    /// Method of drawing the faces of the cube map; the image is the same
     #[arg(long, value_enum, default_value_t = FacesArg::Auto)]
     pub faces: FacesArg,
 
@@ -24,12 +24,12 @@ pub struct RenderToCubeMapArgs {
     )]
     pub face_size: u32,
 
-    /// How blurred the drop mirrors, 0 to 1
+    /// Blur of the drop's reflection, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = up_to(1.0))]
     pub roughness: f32,
 }
 
-/// How to draw the faces of the cube map.
+/// The method of drawing the faces of the cube map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FacesArg {
     /// In one pass where the device has six views at once.

@@ -15,7 +15,7 @@ const BLOCK_FRAGMENT: SampleStage = shader!("render_to_cube_map", "block.frag");
 const SKY_VERTEX: SampleStage = shader!("render_to_cube_map", "sky.vert");
 const SKY_FRAGMENT: SampleStage = shader!("render_to_cube_map", "sky.frag");
 
-/// Of what is infinitely far away, drawn last.
+/// Depth test of everything infinitely far away, which is drawn last.
 const FARTHEST: DepthTest =
     DepthTest { compare: CompareOp::GreaterOrEqual, write: false, ..RenderTarget::NEAREST };
 

@@ -10,7 +10,7 @@ use crate::hybrid::RayPath;
 /// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RtxConfig {
-    /// By which part of Vulkan rays are traced.
+    /// The part of Vulkan that traces rays.
     pub path: RayPath,
     /// Pixels in a row.
     pub width: u32,

@@ -25,15 +25,15 @@ pub struct RtxAoArgs {
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = whole(1..=RtxAoConfig::MAX_RAYS))]
     pub rays: u32,
 
-    /// How far surroundings darken a surface, in scene units [default: a share of the scene's size]
+    /// Distance within which surroundings darken a surface, in scene units [default: a share of the scene's size]
     #[arg(long, value_name = "UNITS", value_parser = positive)]
     pub radius: Option<f32>,
 
-    /// Which scene, and from where it is seen
+    /// The scene and its camera
     #[command(flatten)]
     pub scene: SceneArgs,
 
-    /// By what rays are traced
+    /// The ray tracing path
     #[command(flatten)]
     pub tracing: RayArgs,
 }

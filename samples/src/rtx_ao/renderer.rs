@@ -105,7 +105,7 @@ impl RtxAo {
         self
     }
 
-    /// Looks at the scene so. Where that is another view than before, the cache begins anew.
+    /// Sets the view of the scene. A view other than the last one clears the cache.
     pub fn show(&mut self, view: &View) {
         if self.view != *view {
             self.view = *view;

@@ -12,7 +12,7 @@ use crate::rtx::RtxConfig;
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct RtxPipelineArgs {
-    /// How often a ray may be mirrored or bent, 0 to 16; pipelines of some devices cannot trace so deep
+    /// Maximum number of reflections and refractions of a ray, 0 to 16; pipelines of some devices cannot trace so deep
     #[arg(
         long,
         value_name = "N",
@@ -22,11 +22,11 @@ pub struct RtxPipelineArgs {
     )]
     pub depth: u32,
 
-    /// Which scene, and from where it is seen
+    /// The scene and its camera
     #[command(flatten)]
     pub scene: SceneArgs,
 
-    /// By what rays are traced
+    /// The ray tracing path
     #[command(flatten)]
     pub tracing: RayArgs,
 }

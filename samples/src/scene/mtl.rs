@@ -314,7 +314,7 @@ fn make_mirror(material: &mut Material) {
     let polish = material.shininess / (material.shininess + 20.0);
     material.reflectivity = 0.95 * strength * polish;
     material.tint = material.specular.map(|c| c / strength);
-    // What a rough metal scatters is its colour too, though Phong's diffuse part is black in the file.
+    // The diffuse light of a rough metal has the metal's colour, though Phong's diffuse part is black in the file.
     let scattered = material.specular.map(|c| 0.4 * c);
     material.albedo = std::array::from_fn(|i| material.albedo[i].max(scattered[i]));
 }

@@ -26,7 +26,7 @@ pub struct SponzaArgs {
     #[arg(long)]
     pub no_culling: bool,
 
-    /// How draws are taken from what culling leaves [default: counted where the device can]
+    /// Method of drawing the objects left after culling [default: counted where the device can]
     #[arg(long, value_enum)]
     pub draws: Option<DrawPath>,
 
@@ -51,7 +51,7 @@ pub struct SponzaArgs {
     #[arg(long)]
     pub no_normal_maps: bool,
 
-    /// Which scene, and from where it is seen
+    /// The scene and its camera
     #[command(flatten)]
     pub scene: SceneArgs,
 }

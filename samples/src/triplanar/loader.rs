@@ -64,7 +64,7 @@ impl Loader {
 impl Drop for Loader {
     fn drop(&mut self) {
         self.wishes = None;
-        // What it was painting is dropped with the answers.
+        // A texture that the thread is still painting is dropped with the answers.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }

@@ -11,7 +11,7 @@ use crate::app::sample_info::prelude::*;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct YuvArgs {
-    /// How the planes of the moving picture lie [default: the first that the device has]
+    /// Plane layout of the moving image [default: the first that the device has]
     #[arg(long, value_enum)]
     pub format: Option<YuvFormat>,
 
@@ -19,7 +19,7 @@ pub struct YuvArgs {
     #[arg(long, value_enum, default_value_t = YuvModel::Bt709)]
     pub model: YuvModel,
 
-    /// Which numbers are black and white
+    /// Values of black and white
     #[arg(long, value_enum, default_value_t = YuvRange::Narrow)]
     pub range: YuvRange,
 

@@ -1,9 +1,9 @@
-//! What the device lacks of what a sample is about, as the sample itself says it.
+//! The feature that a sample needs and the device lacks, as the sample's error names it.
 
 use std::process::Command;
 
-/// Why the sample cannot show anything, where that is because the device has no mesh shaders: `picture` writes one. Whatever
-/// else is wrong is left to the tests.
+/// Runs `picture`, a command that writes an image. Returns the sample's error if the device has no mesh shaders. Other
+/// errors are left to the tests.
 pub fn mesh_shaders(mut picture: Command) -> Option<String> {
     let said = picture.output().map(|output| String::from_utf8_lossy(&output.stderr).into_owned());
     let said = said.unwrap_or_default();

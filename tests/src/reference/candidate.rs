@@ -38,8 +38,8 @@ pub struct Hit {
     pub is_front: bool,
     /// True if no any-hit shader decides about it.
     pub is_opaque: bool,
-    /// Absolute cosine between the direction and the surface's normal. Where a ray grazes a surface, rounding of its
-    /// origin moves the hit by one over this.
+    /// Absolute cosine between the direction and the surface's normal. At a grazing hit, rounding of the ray's origin
+    /// moves the hit by one over this.
     pub cosine: f64,
 }
 

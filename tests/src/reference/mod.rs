@@ -1,8 +1,8 @@
 //! Hits of rays, computed on the CPU in f64 and without the library under test.
 //!
-//! A GPU computes in f32. Where f32 may give another result (a ray through an edge, along a surface, past a
-//! silhouette, two surfaces at one position, a hit at the very end of the ray) the reference says so, and the caller
-//! leaves the ray out and counts it.
+//! A GPU computes in f32. The reference reports rays for which f32 may give another result: a ray through an edge,
+//! along a surface, past a silhouette, two surfaces at one position, a hit at the very end of the ray. The caller
+//! leaves such a ray out and counts it.
 
 mod candidate;
 mod rules;

@@ -13,7 +13,7 @@ fn rows() -> Vec<[&'static str; 4]> {
     rows.filter(|[feature, ..]| !feature.starts_with("**")).collect()
 }
 
-/// What is wrong with a row.
+/// The error of a row; `None` if the row is valid.
 fn complaint([feature, here, held_by, left_out]: &[&str; 4]) -> Option<String> {
     if feature.is_empty() || here.is_empty() {
         return Some("a cell is empty".to_owned());
@@ -21,7 +21,8 @@ fn complaint([feature, here, held_by, left_out]: &[&str; 4]) -> Option<String> {
     held_by::complaint(held_by).or_else(|| page_complaint(left_out))
 }
 
-/// What is left out ends with the name of the page that says why.
+/// The error of a cell about missing features, which is `-` or ends with the name of the manual page that gives the
+/// reason.
 fn page_complaint(left_out: &str) -> Option<String> {
     if left_out == "-" {
         return None;

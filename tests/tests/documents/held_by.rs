@@ -12,7 +12,7 @@ pub fn cells(line: &str) -> Option<Vec<&str>> {
     Some(inside.strip_suffix('|').unwrap_or(inside).split('|').map(str::trim).collect())
 }
 
-/// What is wrong with a cell that names files: one begins as none does, or has no test.
+/// The error of a cell that names test files: a prefix is unknown, or a file has no test. `None` if the cell is valid.
 pub fn complaint(held_by: &str) -> Option<String> {
     let files = match files(held_by) {
         Ok(files) => files,

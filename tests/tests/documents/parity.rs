@@ -242,7 +242,7 @@ fn rows(page: &str) -> Result<Vec<Row<'_>>, String> {
     Ok(found)
 }
 
-/// What is wrong with a row.
+/// The error of a row; `None` if the row is valid.
 fn complaint(row: &Row<'_>) -> Option<String> {
     let Row { feature, here, held_by, .. } = row;
     let left_out = here.strip_prefix("Left out").map(|rest| rest.rsplit(": ").next().unwrap_or(rest));

@@ -19,7 +19,7 @@ pub struct WrittenPath {
     name: Option<String>,
 }
 
-/// What one file declares and names.
+/// The declarations and paths of one file.
 #[derive(Debug, Default)]
 pub struct Module {
     /// The file's path below the crate's `src`.

@@ -1,5 +1,5 @@
-//! Rebuilds that move the software tree of a BLAS that the CPU built: later refits use the new memory. Where the
-//! device traces, the same commands give the same hits.
+//! Rebuilds that move the software BVH of a BLAS that the CPU built: later refits use the new memory. On a device that
+//! traces in hardware, the same commands give the same hits.
 
 use lvk::{
     BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryPath, RayQueryRequest, Result, TlasDesc,

@@ -284,7 +284,7 @@ fn a_mesh_is_compacted_while_it_moves() -> Result<()> {
     Ok(())
 }
 
-/// The copy has no room for a build. What software traces alone was not copied: then the rebuild is as any other.
+/// The copy has no memory for a rebuild. A BLAS for software ray queries alone is not copied and is rebuilt as usual.
 #[test]
 fn a_compacted_accel_struct_cannot_be_rebuilt() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

@@ -180,7 +180,7 @@ fn the_lamp_lights_what_no_opaque_thing_hides() {
     assert_mask("lamp", &scene, |ray| is_lit(&scene, &reference, ray));
 }
 
-/// From where the line `sun` of the camera file says.
+/// The sun's direction is that of the line `sun` in the camera file.
 #[test]
 fn the_sun_lights_what_no_opaque_thing_hides() {
     let sun = obj_scene().sun.map(|sun| DirectionalLight { color: [500.0; 3], ..sun });

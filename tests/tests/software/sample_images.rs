@@ -23,7 +23,7 @@ const MOMENT: f64 = 1.9;
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// The same rays, but filters spread what a ray at an edge finds elsewhere.
 const SAME_FILTERED: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 0.01, flip: 0.004 };
-/// Of what rays alone find, on SwiftShader: its textures are filtered with fewer bits.
+/// Limits of images from rays alone, on SwiftShader: its textures are filtered with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 46.0, ssim: 0.999, differing_share: 0.2, flip: 0.012 };
 /// Tolerance where it rasterises too: vertices are snapped to 4 bits of a pixel in place of 8, so edges differ.
 const OTHER_EDGES: Tolerance = Tolerance { psnr: 38.0, ssim: 0.99, differing_share: 0.1, flip: 0.012 };

@@ -113,7 +113,7 @@ impl<S> Drop for UnderWay<S> {
     fn drop(&mut self) {
         self.status.stop();
         if let Some(thread) = self.thread.take() {
-            // What it has made, or why it has not, concerns nobody any more.
+            // The result is no longer needed, and neither is its error.
             let _ = thread.join();
         }
     }

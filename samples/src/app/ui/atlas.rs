@@ -45,8 +45,8 @@ impl Atlas {
         self.owned.remove(&id);
     }
 
-    /// By which numbers shaders reach a texture and its sampler; 0, which is white, for one that is not there. The number of
-    /// a texture that is not egui's own is its name.
+    /// Indices of a texture and its sampler for shaders; 0, which is white, for a texture that does not exist. The
+    /// index of a texture that is not egui's own is its id.
     pub(super) fn numbers(&mut self, id: TextureId) -> lvk::Result<[u32; 2]> {
         match id {
             TextureId::Managed(_) => {

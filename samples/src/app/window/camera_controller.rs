@@ -50,7 +50,7 @@ mod tests {
     const FORWARD: Steering = Steering { direction: [0.0, 0.0, 1.0], ..STANDING };
     const TEN_NOTCHES: Steering = Steering { faster: 10.0, ..STANDING };
 
-    /// How far a tenth of a second leads forward.
+    /// Distance that a tenth of a second moves the camera forward.
     fn step(camera_controller: &mut CameraController) -> f32 {
         let before = camera_controller.camera().unwrap_or(SEEN_FROM).eye[2];
         assert!(camera_controller.steer(Some(&SEEN_FROM), &FORWARD, 0.1));

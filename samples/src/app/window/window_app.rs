@@ -135,7 +135,7 @@ where
         if self.ended.is_ok() {
             self.ended = ended;
         }
-        // What is still being loaded may take a time to end.
+        // Loading that is still in progress may take some time to end.
         self.running.iter().for_each(|running| running.window.set_visible(false));
         event_loop.exit();
     }
@@ -247,7 +247,7 @@ impl<S: Sample> Running<S> {
         Next::Frame
     }
 
-    /// Compiles all shaders again. Where one is wrong, all old pipelines stay.
+    /// Compiles all shaders again. If one is wrong, all old pipelines stay.
     fn reload(&mut self) {
         let done = reload(&mut self.sample, self.present_pass.painter());
         self.panel.shader_error = done.err().map(|error| error.to_string());
