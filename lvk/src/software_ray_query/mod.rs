@@ -1,8 +1,11 @@
 //! Software ray queries: memory layout of BLASes and TLASes, plans of builds and refits on the GPU, and the software
 //! half of BLAS and TLAS objects. [`crate::software_ray_query::bvh`] builds trees on the CPU.
 //!
-//! `disabled.rs` has the items that the rest of the crate uses, for builds without the feature `software-ray-query`.
-//! The folder `command/software_ray_query` records builds, and `context/software_ray_query` creates objects.
+//! `create` and `record` hold the methods of `Context` and `CommandBuffer` that create and build them. The shaders of
+//! applications traverse them with the GLSL in `glsl/`; the compute shaders in `kernels/` build and refit them.
+//!
+//! In builds without the feature `software-ray-query`, the folder `disabled` takes the place of this module. It has the
+//! items that the rest of the crate uses.
 
 pub(crate) mod blas;
 pub(crate) mod bvh;

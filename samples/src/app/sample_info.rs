@@ -59,7 +59,11 @@ pub trait SampleInfo {
     /// Further paragraphs of `--help`.
     const DETAILS: &'static str = "";
     /// Commands that `--help` shows, one a line: arguments, a vertical bar, and what the command does.
-    const EXAMPLES: &'static str;
+    const EXAMPLES: &'static str = "
+        | a picture, by the best device
+        --window --hot-reload | in a window, whose shaders can be changed meanwhile
+        --validate | with validation
+    ";
     /// A round of the animation, for the example of a sequence; empty where the examples have their own, or none.
     const ROUND: &'static str = "one round of the animation";
     /// Paragraphs of `--help` after the examples.

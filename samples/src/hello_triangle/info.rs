@@ -8,11 +8,6 @@ impl SampleInfo for HelloTriangle {
     const NAME: &'static str = "hello_triangle";
     const ABOUT: &'static str =
         "Rasterises a turning triangle, the first thing to draw, and writes pictures as PNG";
-    const EXAMPLES: &'static str = "
-        | a picture, by the best device
-        --window --hot-reload | in a window, whose shaders can be changed meanwhile
-        --validate | with validation
-    ";
     type Args = NoArgs;
     type Sample = Self;
 

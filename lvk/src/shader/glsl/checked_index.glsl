@@ -1,4 +1,4 @@
-// Checks indices of bindless arrays before they are used. `lvk/src/bindless/checks.rs` has the layout of the words.
+// Checks indices of bindless arrays before they are used. `lvk/src/bindless/index_checks.rs` has the layout of the words.
 layout(local_size_x = 1) in;
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer LvkCheckWords { uint at[]; };
