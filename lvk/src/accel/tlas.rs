@@ -12,7 +12,7 @@ use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::tlas::SoftwareTlas;
 
-/// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
+/// Bytes of `LvkTlasRow` in `shader/glsl/hit_remap.glsl`.
 const REMAP_ENTRY_BYTES: u64 = 16;
 
 /// A top-level acceleration structure.

@@ -60,73 +60,76 @@ kernels! {
     }
     #[cfg(feature = "software-ray-query")] {
         /// Resets the scratch memory after an earlier build.
-        BuildReset = "software_ray_query/kernels/reset", ["job.glsl", "reset.comp.glsl"];
+        BuildReset = "software_ray_query/kernels/reset", ["build_params.glsl", "reset.comp.glsl"];
         /// Computes the bounds of triangles and AABBs.
         BuildPrimitives = "software_ray_query/kernels/primitives",
-            ["job.glsl", "box.glsl", "bounds.glsl", "input.glsl", "primitives.comp.glsl"];
+            ["build_params.glsl", "box.glsl", "bounds.glsl", "input.glsl", "primitives.comp.glsl"];
         /// Computes the bounds of instances, and writes the instance records of the TLAS.
         BuildInstances = "software_ray_query/kernels/instances",
-            ["job.glsl", "box.glsl", "bounds.glsl", "instance.glsl", "instances.comp.glsl"];
+            ["build_params.glsl", "box.glsl", "bounds.glsl", "instance.glsl", "instances.comp.glsl"];
         /// Computes the Morton codes of primitives.
-        BuildCodes = "software_ray_query/kernels/codes", ["job.glsl", "box.glsl", "code.glsl", "codes.comp.glsl"];
+        BuildCodes = "software_ray_query/kernels/codes",
+            ["build_params.glsl", "box.glsl", "code.glsl", "codes.comp.glsl"];
         /// Counts the digits of codes.
-        SortCount = "software_ray_query/kernels/sort_count", ["job.glsl", "rank.glsl", "sort_count.comp.glsl"];
+        SortCount = "software_ray_query/kernels/sort_count", ["build_params.glsl", "rank.glsl", "sort_count.comp.glsl"];
         /// Sums the counts.
-        SortScan = "software_ray_query/kernels/sort_scan", ["job.glsl", "rank.glsl", "sort_scan.comp.glsl"];
+        SortScan = "software_ray_query/kernels/sort_scan", ["build_params.glsl", "rank.glsl", "sort_scan.comp.glsl"];
         /// Moves codes to their sorted positions.
-        SortScatter = "software_ray_query/kernels/sort_scatter", ["job.glsl", "rank.glsl", "sort_scatter.comp.glsl"];
+        SortScatter = "software_ray_query/kernels/sort_scatter",
+            ["build_params.glsl", "rank.glsl", "sort_scatter.comp.glsl"];
         /// Builds the hierarchy.
         BuildTree = "software_ray_query/kernels/tree",
-            ["job.glsl", "arrivals.glsl", "tree.glsl", "tree.comp.glsl"];
+            ["build_params.glsl", "arrival_counters.glsl", "tree.glsl", "tree.comp.glsl"];
         /// Resets the arrival counters of nodes.
-        ResetArrivals = "software_ray_query/kernels/arrivals", ["job.glsl", "arrivals.glsl", "arrivals.comp.glsl"];
+        ResetArrivals = "software_ray_query/kernels/reset_arrivals",
+            ["build_params.glsl", "arrival_counters.glsl", "reset_arrivals.comp.glsl"];
         /// Fits the bounds of binary nodes, and improves the tree by rotations.
         BuildImprove = "software_ray_query/kernels/improve",
-            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl",
-             "arrivals.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "improve.comp.glsl"];
+            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl",
+             "arrival_counters.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "improve.comp.glsl"];
         /// Collapses binary nodes to one level of wide nodes.
         Collapse = "software_ray_query/kernels/collapse",
-            ["job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl", "node.glsl",
+            ["build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl", "node.glsl",
              "wide.glsl", "encode.glsl", "collapse.glsl", "collapse.comp.glsl"];
         /// Writes all parts of a BLAS except its nodes.
-        Place = "software_ray_query/kernels/place",
-            ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
-             "arrivals.glsl", "node.glsl", "wide.glsl", "packed.glsl", "place.glsl",
-             "place.comp.glsl"];
+        WriteBlas = "software_ray_query/kernels/blas_write",
+            ["build_params.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
+             "arrival_counters.glsl", "node.glsl", "wide.glsl", "packed.glsl", "blas_write.glsl",
+             "blas_write.comp.glsl"];
         /// Fits the bounds of packed wide nodes, which replace collapsed nodes that did not fit.
         FitPacked = "software_ray_query/kernels/fit_packed",
-            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
-             "arrivals.glsl", "node.glsl", "wide.glsl", "encode.glsl", "packed.glsl",
+            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds.glsl",
+             "arrival_counters.glsl", "node.glsl", "wide.glsl", "encode.glsl", "packed.glsl",
              "fit_wide.glsl", "fit_packed.comp.glsl"];
         /// Fits the bounds of binary nodes.
         FitBinary = "software_ray_query/kernels/fit",
-            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
-             "arrivals.glsl", "node.glsl", "no_rotation.glsl", "fit.glsl", "fit.comp.glsl"];
+            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds.glsl",
+             "arrival_counters.glsl", "node.glsl", "no_rotation.glsl", "fit.glsl", "fit.comp.glsl"];
         /// Fits the bounds of wide nodes.
         FitWide = "software_ray_query/kernels/fit_wide",
-            ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
+            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds.glsl",
              "wide.glsl", "encode.glsl", "fit_wide.glsl", "fit_wide.comp.glsl"];
         /// Rewrites the primitives of leaves from moved inputs.
         RefitLeaves = "software_ray_query/kernels/refit",
-            ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
-             "arrivals.glsl", "wide.glsl", "refit.glsl", "refit.comp.glsl"];
+            ["build_params.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
+             "arrival_counters.glsl", "wide.glsl", "refit.glsl", "refit.comp.glsl"];
         /// Builds the binary tree of a whole BLAS by one workgroup.
         BuildSmallBlas = "software_ray_query/kernels/small_blas",
-            ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "input.glsl",
-             "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
-             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
+            ["shared.glsl", "build_params.glsl", "box.glsl", "bounds.glsl", "input.glsl",
+             "code.glsl", "rank.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl", "arrival_counters.glsl",
+             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "workgroup_barrier.glsl",
              "small_blas.comp.glsl", "small.glsl"];
         /// Builds the rest of such a BLAS by one workgroup.
         BuildSmallWide = "software_ray_query/kernels/small_wide",
-            ["shared.glsl", "job.glsl", "box.glsl", "input.glsl", "leaf.glsl",
-             "kept_any.glsl", "leaf_write.glsl", "arrivals.glsl", "node.glsl", "wide.glsl",
-             "encode.glsl", "collapse.glsl", "packed.glsl", "place.glsl", "fit_wide.glsl",
-             "meet.glsl", "small_wide.comp.glsl"];
+            ["shared.glsl", "build_params.glsl", "box.glsl", "input.glsl", "leaf.glsl",
+             "leaf_bounds.glsl", "leaf_write.glsl", "arrival_counters.glsl", "node.glsl", "wide.glsl",
+             "encode.glsl", "collapse.glsl", "packed.glsl", "blas_write.glsl", "fit_wide.glsl",
+             "workgroup_barrier.glsl", "small_wide.comp.glsl"];
         /// Builds a whole TLAS by one workgroup.
         BuildSmallTlas = "software_ray_query/kernels/small_tlas",
-            ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "instance.glsl",
-             "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
-             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
+            ["shared.glsl", "build_params.glsl", "box.glsl", "bounds.glsl", "instance.glsl",
+             "code.glsl", "rank.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl", "arrival_counters.glsl",
+             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "workgroup_barrier.glsl",
              "small_tlas.comp.glsl", "small.glsl"];
     }
 }

@@ -18,7 +18,7 @@ pub(super) fn library() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 const CORE_LIBRARY: &[(&str, &str)] = &[
     ("lvk/hardware_ray_query.glsl", include_str!("glsl/hardware_ray_query.glsl")),
-    ("lvk/hit_numbers.glsl", include_str!("glsl/hit_numbers.glsl")),
+    ("lvk/hit_remap.glsl", include_str!("glsl/hit_remap.glsl")),
     ("lvk/ray_flags.glsl", include_str!("glsl/ray_flags.glsl")),
     ("lvk/ray_query.glsl", include_str!("glsl/ray_query.glsl")),
     ("lvk/ray_tracing.glsl", include_str!("glsl/ray_tracing.glsl")),

@@ -24,11 +24,11 @@ pub(crate) mod validate_blob;
 pub(crate) const GLSL: &[(&str, &str)] = &[
     ("lvk/software_boxes.glsl", include_str!("glsl/software_boxes.glsl")),
     ("lvk/software_cpu_node.glsl", include_str!("glsl/software_cpu_node.glsl")),
-    ("lvk/software_cpu_walk.glsl", include_str!("glsl/software_cpu_walk.glsl")),
+    ("lvk/software_cpu_traversal.glsl", include_str!("glsl/software_cpu_traversal.glsl")),
     ("lvk/software_layout.glsl", include_str!("glsl/software_layout.glsl")),
     ("lvk/software_ray_query.glsl", include_str!("glsl/software_ray_query.glsl")),
     ("lvk/software_stack.glsl", include_str!("glsl/software_stack.glsl")),
+    ("lvk/software_traversal.glsl", include_str!("glsl/software_traversal.glsl")),
     ("lvk/software_triangle.glsl", include_str!("glsl/software_triangle.glsl")),
-    ("lvk/software_walk.glsl", include_str!("glsl/software_walk.glsl")),
     ("lvk/software_wide_node.glsl", include_str!("glsl/software_wide_node.glsl")),
 ];

@@ -7,7 +7,7 @@
 #ifdef LVK_POSITION_FETCH
 #extension GL_EXT_ray_tracing_position_fetch : require
 #endif
-#include <lvk/hit_numbers.glsl>
+#include <lvk/hit_remap.glsl>
 #include <lvk/tlas.glsl>
 
 #define LvkRayQuery rayQueryEXT

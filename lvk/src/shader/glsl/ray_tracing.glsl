@@ -9,7 +9,7 @@
 #include <lvk/tlas.glsl>
 
 #if defined(LVK_STAGE_CLOSEST_HIT) || defined(LVK_STAGE_ANY_HIT) || defined(LVK_STAGE_INTERSECTION)
-#include <lvk/hit_numbers.glsl>
+#include <lvk/hit_remap.glsl>
 // The application's own ids of the hit in kTLAS[tlas]: the index of the instance, of the geometry and of the primitive.
 // Use them instead of gl_InstanceID and gl_PrimitiveID, which count the parts of split and reordered meshes.
 int lvkInstanceId(uint tlas) { return lvkMapInstance(tlas, gl_InstanceID); }

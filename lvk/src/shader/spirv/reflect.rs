@@ -286,7 +286,7 @@ fn binding(module: &ParsedModule, variable: &Variable) -> Result<u32, String> {
     }
 }
 
-/// Set and binding of the one buffer descriptor, which `<lvk/hit_numbers.glsl>` declares.
+/// Set and binding of the one buffer descriptor, which `<lvk/hit_remap.glsl>` declares.
 const TLAS_TABLE: (u32, u32) = (layout::SET, layout::TLAS_TABLE);
 
 /// Returns the binding for resources of this type.

@@ -111,7 +111,8 @@ vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range, vec3 slack)
 // Returns the children of a binary node that the ray hits, the nearer first; LVK_SOFT_NONE for each miss. `nodes` is
 // the first block of nodes. `slack` widens bounds in the world. Other bounds are exact, and are widened by the slack
 // for a touch.
-uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range, bool inWorld, vec3 slack) {
+uvec2 lvkSoftIntersect2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range, bool inWorld,
+                        vec3 slack) {
     uint first = nodes + node * LVK_SOFT_BINARY_NODE_BLOCKS;
     uvec4 a = lvkSoftBlock(blocks, first);
     uvec4 b = lvkSoftBlock(blocks, first + 1u);

@@ -51,19 +51,19 @@ uint lvkSoftRotate(uint bits, uint by) {
 
 // Returns the children, of four of a wide node, that the ray hits, as bits at their positions. The ray enters a plane
 // at its index times `scale` after `start`, and leaves it at that distance after `end`.
-uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
-    uint met = 0u;
+uint lvkSoftIntersect4(uvec3 near, uvec3 far, uint counts, uint shifts, vec3 scale, vec3 start, vec3 end, vec2 range) {
+    uint hits = 0u;
     [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
         float enter = lvkSoftLastEntry(lvkSoftSteps(near, child) * scale + start);
         float leave = lvkSoftFirstExit(lvkSoftSteps(far, child) * scale + end);
-        bool meets = enter <= leave && enter <= range.y && leave >= range.x;
-        met |= meets ? lvkSoftRotate(counts >> child & 7u, places >> child) : 0u;
+        bool isHit = enter <= leave && enter <= range.y && leave >= range.x;
+        hits |= isHit ? lvkSoftRotate(counts >> child & 7u, shifts >> child) : 0u;
     }
-    return met;
+    return hits;
 }
 
-// Returns the hits of a wide node, in the format of lvkSoftMeet8.
-uvec4 lvkSoftMeetNode(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec2 range) {
+// Returns the hits of a wide node, in the format of lvkSoftIntersect8.
+uvec4 lvkSoftIntersectNode(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec2 range) {
     uvec4 head = lvkSoftBlock(node, 0u);
     uvec4 children = lvkSoftBlock(node, 1u);
     uvec2 nearX, nearY, nearZ, farX, farY, farZ;
@@ -78,19 +78,19 @@ uvec4 lvkSoftMeetNode(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, 
     vec3 enter = start - scale - error, leave = start - scale + error;
     // The position of inner children is 24 and more; it is permuted by the order of the ray.
     uvec2 inner = children.zw & (children.zw << 1) & 0x10101010u;
-    uvec2 places = children.zw ^ ((inner >> 1) - (inner >> 4) & ray.octant * 0x01010101u);
+    uvec2 shifts = children.zw ^ ((inner >> 1) - (inner >> 4) & ray.octant * 0x01010101u);
     uvec2 counts = children.zw >> 5;
-    uint met = lvkSoftMeet4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(farX.x, farY.x, farZ.x), counts.x, places.x,
-                            scale, enter, leave, range);
-    met |= lvkSoftMeet4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(farX.y, farY.y, farZ.y), counts.y, places.y,
-                        scale, enter, leave, range);
-    return uvec4(children.x, met & 0xFF000000u | head.w >> 24, children.y, met & 0x00FFFFFFu);
+    uint hits = lvkSoftIntersect4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(farX.x, farY.x, farZ.x), counts.x, shifts.x,
+                                  scale, enter, leave, range);
+    hits |= lvkSoftIntersect4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(farX.y, farY.y, farZ.y), counts.y, shifts.y,
+                              scale, enter, leave, range);
+    return uvec4(children.x, hits & 0xFF000000u | head.w >> 24, children.y, hits & 0x00FFFFFFu);
 }
 
 // See <lvk/software_wide_node.glsl>.
-uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
+uvec4 lvkSoftIntersect8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
     LvkSoftItems items = lvkSoftItems(structure, nodes);
-    return lvkSoftMeetNode(ray, lvkSoftOrderOf(ray), lvkSoftItem(items, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
+    return lvkSoftIntersectNode(ray, lvkSoftOrderOf(ray), lvkSoftItem(items, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
 }
 
 #endif

@@ -49,9 +49,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_WIDE_NODE_BLOCKS 5u
 
 // Packed leaves: bits of a vertex index in its own word, and of the third index above it.
-#define LVK_SOFT_NAME_BITS 21
+#define LVK_SOFT_INDEX_BITS 21
 #define LVK_SOFT_REST_BITS 11
-#define LVK_SOFT_NAME 0x001FFFFFu
+#define LVK_SOFT_INDEX_MASK 0x001FFFFFu
 
 // On CPUs, loops and branches cost more than idle invocations.
 #ifdef LVK_DEVICE_IS_CPU
@@ -90,7 +90,7 @@ uint lvkSoftBegin(inout LvkSoftBlocks blocks, uint first) {
 }
 
 // Returns the address `blocks` blocks after another one.
-uvec2 lvkSoftBehind(uvec2 base, uint blocks) {
+uvec2 lvkSoftOffsetAddress(uvec2 base, uint blocks) {
     uint carry;
     uint low = uaddCarry(base.x, blocks << 4, carry);
     return uvec2(low, base.y + (blocks >> 28) + carry);
@@ -109,11 +109,11 @@ LvkSoftBlocks lvkSoftItem(LvkSoftItems items, uint item, uint blocks) {
 #else
 #define LvkSoftItems uvec2
 LvkSoftItems lvkSoftItems(uvec2 structure, uint first) {
-    return lvkSoftBehind(structure, first);
+    return lvkSoftOffsetAddress(structure, first);
 }
 
 LvkSoftBlocks lvkSoftItem(LvkSoftItems items, uint item, uint blocks) {
-    return LvkSoftBlocks(lvkSoftBehind(items, item * blocks));
+    return LvkSoftBlocks(lvkSoftOffsetAddress(items, item * blocks));
 }
 #endif
 

@@ -2,7 +2,7 @@
 #define LVK_SOFTWARE_RAY_QUERY_GLSL
 
 // Part of <lvk/ray_query.glsl>: queries with software traversal, for devices without ray queries or with slow ones.
-#include <lvk/software_walk.glsl>
+#include <lvk/software_traversal.glsl>
 #include <lvk/tlas_table.glsl>
 
 // A query: its state, and its stack entries while it waits with a candidate, if the module has candidates.
@@ -20,7 +20,7 @@ struct LvkRayQuery {
 void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask, vec3 origin, float tMin,
                        vec3 direction, float tMax) {
     LvkSoftHit none = lvkSoftNoHit(tMax);
-    LvkSoftPlace start;
+    LvkSoftCursor start;
     lvkSoftFinish(start);
     lvkSoftQueries += 1u;
     flags |= LVK_RAY_FLAGS_ALWAYS;
@@ -30,13 +30,13 @@ void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask,
     state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, from, direction, flags, mask & 0xFFu,
                          lvkSoftQueries, false, start, none, none);
     if (state.tlas != uvec2(0u)) {
-        state.place.next = LvkSoftBlocks(state.tlas).at[0].z;
+        state.cursor.next = LvkSoftBlocks(state.tlas).at[0].z;
     }
 }
 
 // Saves the stack while the shader judges a candidate.
 bool lvkSoftSave(LvkSoftState state, inout uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
-    for (uint entry = 0u; entry < lvkSoftEntries(state.place.top); ++entry) {
+    for (uint entry = 0u; entry < lvkSoftEntries(state.cursor.top); ++entry) {
         stack[entry] = lvkSoftStack[entry];
     }
     return true;
@@ -44,16 +44,16 @@ bool lvkSoftSave(LvkSoftState state, inout uvec2 stack[LVK_SOFT_STACK_ENTRIES]) 
 
 // Restores the stack, which another query has used meanwhile.
 bool lvkSoftRestore(LvkSoftState state, uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
-    for (uint entry = 0u; entry < lvkSoftEntries(state.place.top); ++entry) {
+    for (uint entry = 0u; entry < lvkSoftEntries(state.cursor.top); ++entry) {
         lvkSoftStack[entry] = stack[entry];
     }
     return true;
 }
 
 void lvkSoftJudge(inout LvkSoftState state, uint kind) {
-    LvkSoftPlace place = state.place;
-    lvkSoftCommit(state, place, state.candidate, kind);
-    state.place = place;
+    LvkSoftCursor cursor = state.cursor;
+    lvkSoftCommit(state, cursor, state.candidate, kind);
+    state.cursor = cursor;
 }
 
 void lvkSoftConfirm(inout LvkSoftState state) {
@@ -105,7 +105,7 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
     }
     uint primitives = LvkSoftBlocks(structure).at[1].y;
     uvec3 words;
-    lvkSoftCorners(structure, primitives, head.y, hit.primitive, positions, words);
+    lvkSoftReadVertices(structure, primitives, head.y, hit.primitive, positions, words);
 }
 
 // The hit that `which` selects.
@@ -123,7 +123,7 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
         && lvkSoftProceed((rq).state) && lvkSoftSave((rq).state, (rq).stack))
 #endif
 // Ends the traversal; the committed hit stays.
-#define lvkRayQueryTerminate(rq) lvkSoftFinish((rq).state.place)
+#define lvkRayQueryTerminate(rq) lvkSoftFinish((rq).state.cursor)
 // Commits the candidate AABB at distance `t`, within the remaining range.
 #define lvkRayQueryGenerateIntersection(rq, t) lvkSoftGenerate((rq).state, t)
 // Commits the candidate triangle.

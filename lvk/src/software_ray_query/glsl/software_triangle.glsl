@@ -41,10 +41,10 @@ LvkSoftShear lvkSoftShearOf(vec3 direction) {
 
 // Returns twice the areas between the ray's line and the edges, seen along it; `lengths` of the vertices along the
 // longest axis.
-vec3 lvkSoftAreas(LvkSoftShear ray, vec3 origin, vec3 corners[3], out vec3 lengths) {
-    precise vec3 p = lvkSoftTurn(ray, corners[0] - origin);
-    precise vec3 q = lvkSoftTurn(ray, corners[1] - origin);
-    precise vec3 r = lvkSoftTurn(ray, corners[2] - origin);
+vec3 lvkSoftAreas(LvkSoftShear ray, vec3 origin, vec3 vertices[3], out vec3 lengths) {
+    precise vec3 p = lvkSoftTurn(ray, vertices[0] - origin);
+    precise vec3 q = lvkSoftTurn(ray, vertices[1] - origin);
+    precise vec3 r = lvkSoftTurn(ray, vertices[2] - origin);
     precise vec2 pf = fma(-ray.lean, p.zz, p.xy);
     precise vec2 qf = fma(-ray.lean, q.zz, q.xy);
     precise vec2 rf = fma(-ray.lean, r.zz, r.xy);
@@ -71,9 +71,9 @@ bool lvkSoftIsFront(LvkSoftShear ray, float whole) {
 }
 
 // Returns true if the ray's line passes through the triangle, and the position.
-bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPassage passage) {
+bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 vertices[3], out LvkSoftPassage passage) {
     vec3 lengths;
-    vec3 areas = lvkSoftAreas(ray, origin, corners, lengths);
+    vec3 areas = lvkSoftAreas(ray, origin, vertices, lengths);
     float whole = areas.x + areas.y + areas.z;
     float least = min(min(areas.x, areas.y), areas.z);
     float most = max(max(areas.x, areas.y), areas.z);

@@ -6,22 +6,22 @@
 // Intersection of a ray with the bounds of a wide node; on CPUs see <lvk/software_cpu_node.glsl>.
 
 // Returns the children, of four of a wide node, that the ray hits, as bits at their positions.
-uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
-    uint met = 0u;
+uint lvkSoftIntersect4(uvec3 near, uvec3 far, uint counts, uint shifts, vec3 scale, vec3 start, vec3 end, vec2 range) {
+    uint hits = 0u;
     [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
         vec3 enter = vec3(near >> child & 255u) * scale + start;
         vec3 leave = vec3(far >> child & 255u) * scale + end;
-        bool meets = lvkSoftLast(enter, range.x) <= lvkSoftFirst(leave, range.y);
-        met |= meets ? (counts >> child & 7u) << (places >> child & 31u) : 0u;
+        bool isHit = lvkSoftLast(enter, range.x) <= lvkSoftFirst(leave, range.y);
+        hits |= isHit ? (counts >> child & 7u) << (shifts >> child & 31u) : 0u;
     }
-    return met;
+    return hits;
 }
 
 // Returns the hits of a wide node (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
 // Compressed Wide BVHs", 2017). The hit inner children are a node group: the first node, and from bit 24 on a bit for
 // each, in the order of the ray. The hit leaves are a primitive group: the first primitive and a bit for each. `nodes`
 // is the first block of nodes.
-uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
+uvec4 lvkSoftIntersect8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
     LvkSoftBlocks blocks = LvkSoftBlocks(structure);
     uint first = nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
     uvec4 head = lvkSoftBlock(blocks, first);
@@ -39,12 +39,12 @@ uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec
     // The position of inner children is 24 and more; it is permuted by the order of the ray.
     uvec2 inner = (children.zw & (children.zw << 1) & 0x10101010u) >> 4;
     uvec2 counts = children.zw >> 5 & 0x07070707u;
-    uvec2 places = (children.zw ^ inner * ray.octant) & 0x1F1F1F1Fu;
-    uint met = lvkSoftMeet4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(nearX.z, nearY.z, nearZ.z), counts.x, places.x,
-                            scale, start - error, start + error, range);
-    met |= lvkSoftMeet4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(nearX.w, nearY.w, nearZ.w), counts.y, places.y,
-                        scale, start - error, start + error, range);
-    return uvec4(children.x, met & 0xFF000000u | head.w >> 24, children.y, met & 0x00FFFFFFu);
+    uvec2 shifts = (children.zw ^ inner * ray.octant) & 0x1F1F1F1Fu;
+    uint hits = lvkSoftIntersect4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(nearX.z, nearY.z, nearZ.z), counts.x,
+                                  shifts.x, scale, start - error, start + error, range);
+    hits |= lvkSoftIntersect4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(nearX.w, nearY.w, nearZ.w), counts.y,
+                              shifts.y, scale, start - error, start + error, range);
+    return uvec4(children.x, hits & 0xFF000000u | head.w >> 24, children.y, hits & 0x00FFFFFFu);
 }
 
 #endif

@@ -25,7 +25,7 @@ const BLOB_ALIGNMENT: u64 = 256;
 const MAX_PRIMITIVES: u64 = 1 << 27;
 /// Maximum primitives of a build by one workgroup.
 const MAX_SMALL_BUILD: u32 = 2048;
-/// Keys that a workgroup sorts, `kBlock` of `software_ray_query/kernels/job.glsl`.
+/// Keys that a workgroup sorts, `kBlock` of `software_ray_query/kernels/build_params.glsl`.
 pub(crate) const SORT_BLOCK: u32 = 1024;
 const DIGITS: u32 = 16;
 /// Maximum nodes on a path that traversal supports.
@@ -35,7 +35,7 @@ const CODE_BITS: u32 = 30;
 const MAX_IMPROVEMENTS: u32 = 8;
 /// Improvement passes of a TLAS.
 const TLAS_IMPROVEMENTS: u32 = 1;
-/// Words of the build state, `kStateWords` of `software_ray_query/kernels/job.glsl`.
+/// Words of the build state, `kStateWords` of `software_ray_query/kernels/build_params.glsl`.
 pub(crate) const STATE_WORDS: u64 = 48;
 const BOX_WORDS: u64 = 6;
 

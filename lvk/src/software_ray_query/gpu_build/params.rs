@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// `GpuBuildParams` of `software_ray_query/kernels/job.glsl`.
+/// `GpuBuildParams` of `software_ray_query/kernels/build_params.glsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct GpuBuildParams {

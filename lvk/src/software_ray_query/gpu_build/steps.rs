@@ -5,7 +5,7 @@ use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SO
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 
-/// Invocations of a workgroup, `kGroup` of `software_ray_query/kernels/job.glsl`.
+/// Invocations of a workgroup, `kGroup` of `software_ray_query/kernels/build_params.glsl`.
 const WORKGROUP_SIZE: u32 = 128;
 /// Passes over the first word of codes with four bits each, and the maximum passes over both words.
 const FIRST_WORD_PASSES: u32 = 8;
@@ -100,7 +100,7 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
     let written = plan.capacity.max(plan.geometry_count).max(plan.vertex_count);
     let mut steps: Vec<_> =
         (0..levels).map(|level| step(level, Kernel::Collapse, level, nodes(level))).collect();
-    steps.push(step(levels, Kernel::Place, 0, written));
+    steps.push(step(levels, Kernel::WriteBlas, 0, written));
     steps.push(step(levels + 1, Kernel::FitPacked, 0, plan.wide_capacity));
     steps
 }

@@ -12,7 +12,7 @@ use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, GpuBu
 use crate::software_ray_query::gpu_build::steps::wide_steps;
 use crate::software_ray_query::layout::LeafKind;
 
-/// Indices of state words, as numbered in `software_ray_query/kernels/job.glsl`.
+/// Indices of state words, as numbered in `software_ray_query/kernels/build_params.glsl`.
 const ACTIVE: usize = 6;
 const WIDE_NODES: usize = 8;
 const END_BYTES: usize = 9;

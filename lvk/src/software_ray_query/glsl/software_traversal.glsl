@@ -1,5 +1,5 @@
-#ifndef LVK_SOFTWARE_WALK_GLSL
-#define LVK_SOFTWARE_WALK_GLSL
+#ifndef LVK_SOFTWARE_TRAVERSAL_GLSL
+#define LVK_SOFTWARE_TRAVERSAL_GLSL
 
 // The state of a query with software traversal, and its traversal of both levels.
 #include <lvk/ray_flags.glsl>
@@ -29,10 +29,10 @@ struct LvkSoftHit {
 };
 
 // The pending work. Stack entries from `top` on belong to others; those below `floor` are references of the TLAS.
-struct LvkSoftPlace {
+struct LvkSoftCursor {
     uint next;     // reference of the TLAS to visit before those on the stack, or LVK_SOFT_NONE
     uint instance; // instance whose BLAS is traversed, or LVK_SOFT_NONE
-    uvec2 group;   // nodes: a group as lvkSoftMeet8 returns it, or the index of a binary node and LVK_SOFT_ONE_NODE
+    uvec2 group;   // nodes: a group of lvkSoftIntersect8, or the index of a binary node and LVK_SOFT_ONE_NODE
     uvec2 leaves;  // primitives: the first, and a bit mask from it on
     uint top;
     uint floor;
@@ -48,7 +48,7 @@ struct LvkSoftState {
     uint mask;
     uint id;
     bool interrupted; // a candidate waits, and the query stores the stack
-    LvkSoftPlace place;
+    LvkSoftCursor cursor;
     LvkSoftHit candidate;
     LvkSoftHit committed;
 };
@@ -96,11 +96,11 @@ uint lvkSoftOwner = 0u;
 uint lvkSoftQueries = 0u;
 
 // Moves to the node or leaf of a reference.
-void lvkSoftGo(inout LvkSoftPlace place, uint reference) {
+void lvkSoftMoveTo(inout LvkSoftCursor cursor, uint reference) {
     bool isLeaf = (reference & LVK_SOFT_LEAF) != 0u;
     uint count = (reference & LVK_SOFT_LEAF_COUNT) / LVK_SOFT_LEAF_ONE + 1u;
-    place.group = isLeaf ? uvec2(0u) : uvec2(reference, LVK_SOFT_ONE_NODE);
-    place.leaves = isLeaf ? uvec2(reference & LVK_SOFT_LEAF_FIRST, (1u << count) - 1u) : uvec2(0u);
+    cursor.group = isLeaf ? uvec2(0u) : uvec2(reference, LVK_SOFT_ONE_NODE);
+    cursor.leaves = isLeaf ? uvec2(reference & LVK_SOFT_LEAF_FIRST, (1u << count) - 1u) : uvec2(0u);
 }
 
 bool lvkSoftIsCulled(uint flags, bool opaque) {
@@ -134,7 +134,7 @@ vec3 lvkSoftTransform(mat3x4 rows, vec4 v) {
 
 // Returns the address of the instances of the traced TLAS.
 uvec2 lvkSoftInstances(LvkSoftState state) {
-    return lvkSoftBehind(state.tlas, LvkSoftBlocks(state.tlas).at[1].y);
+    return lvkSoftOffsetAddress(state.tlas, LvkSoftBlocks(state.tlas).at[1].y);
 }
 
 // Returns the BLAS that an instance with this address refers to, and its first block. Follows a moved BLAS.
@@ -162,7 +162,7 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     }
     uvec4 head;
     level.structure = lvkSoftStructureOf(numbers.xy, head);
-    uvec4 places = lvkSoftBlock(LvkSoftBlocks(level.structure), 1u);
+    uvec4 offsets = lvkSoftBlock(LvkSoftBlocks(level.structure), 1u);
     uvec4 counts = lvkSoftBlock(LvkSoftBlocks(level.structure), 2u);
     uint flags = numbers.w >> 24;
     level.wide = head.x == LVK_SOFT_WIDE;
@@ -171,8 +171,8 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     level.opacity = lvkSoftOpacity(counts.w, flags, state.flags);
     level.cull = (flags & LVK_SOFT_NO_CULL) != 0u ? 0u : state.flags & LVK_SOFT_CULL_FACES;
     level.flip = (flags & LVK_SOFT_FLIP_FACING) != 0u;
-    level.nodes = places.x;
-    level.primitives = places.y;
+    level.nodes = offsets.x;
+    level.primitives = offsets.y;
     level.slabs = lvkSoftSlabsOf(origin, direction, lvkSoftLeast(level.structure, origin, direction));
     level.shear = lvkSoftShearOf(direction);
     bool isBox = level.kind == LVK_SOFT_BOXES;
@@ -185,44 +185,44 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
 }
 
 // Removes the next node of a wide tree from the group.
-uint lvkSoftTakeNode(inout LvkSoftPlace place, LvkSoftLevel level) {
-    uint bit = uint(findMSB(place.group.y));
+uint lvkSoftTakeNode(inout LvkSoftCursor cursor, LvkSoftLevel level) {
+    uint bit = uint(findMSB(cursor.group.y));
     uint slot = bit - 24u ^ level.slabs.octant;
-    uint before = bitCount(place.group.y & 0xFFu & (1u << slot) - 1u);
-    place.group.y ^= 1u << bit;
-    return place.group.x + before;
+    uint before = bitCount(cursor.group.y & 0xFFu & (1u << slot) - 1u);
+    cursor.group.y ^= 1u << bit;
+    return cursor.group.x + before;
 }
 
 // Visits the next node of the group.
-void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
+void lvkSoftVisit(inout LvkSoftCursor cursor, LvkSoftLevel level, vec2 range) {
     if (level.wide) {
-        uint node = lvkSoftTakeNode(place, level);
-        if (place.group.y >= LVK_SOFT_ANY_NODE) {
-            lvkSoftPushGroup(place.top, place.group);
+        uint node = lvkSoftTakeNode(cursor, level);
+        if (cursor.group.y >= LVK_SOFT_ANY_NODE) {
+            lvkSoftPushGroup(cursor.top, cursor.group);
         }
-        uvec4 met = lvkSoftMeet8(level.slabs, level.structure, level.nodes, node, range);
-        place.group = met.xy;
-        place.leaves = met.zw;
+        uvec4 hits = lvkSoftIntersect8(level.slabs, level.structure, level.nodes, node, range);
+        cursor.group = hits.xy;
+        cursor.leaves = hits.zw;
     } else {
-        uvec2 met = lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range, false,
-                                 vec3(0.0));
-        place.group = uvec2(0u);
-        if (met.y != LVK_SOFT_NONE) {
-            lvkSoftPushReference(place.top, met.y);
+        uvec2 hits = lvkSoftIntersect2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, cursor.group.x, range,
+                                       false, vec3(0.0));
+        cursor.group = uvec2(0u);
+        if (hits.y != LVK_SOFT_NONE) {
+            lvkSoftPushReference(cursor.top, hits.y);
         }
-        if (met.x != LVK_SOFT_NONE) {
-            lvkSoftGo(place, met.x);
+        if (hits.x != LVK_SOFT_NONE) {
+            lvkSoftMoveTo(cursor, hits.x);
         }
     }
 }
 
 // Pops the last entry that this level has pushed.
-void lvkSoftResume(inout LvkSoftPlace place, LvkSoftLevel level) {
-    uvec2 entry = lvkSoftPop(place.top, level.wide);
+void lvkSoftResume(inout LvkSoftCursor cursor, LvkSoftLevel level) {
+    uvec2 entry = lvkSoftPop(cursor.top, level.wide);
     if (level.wide) {
-        place.group = entry;
+        cursor.group = entry;
     } else {
-        lvkSoftGo(place, entry.x);
+        lvkSoftMoveTo(cursor, entry.x);
     }
 }
 
@@ -231,54 +231,54 @@ LvkSoftHit lvkSoftNoHit(float t) {
 }
 
 // Ends the traversal.
-void lvkSoftFinish(inout LvkSoftPlace place) {
-    place = LvkSoftPlace(LVK_SOFT_NONE, LVK_SOFT_NONE, uvec2(0u), uvec2(0u), 0u, 0u);
+void lvkSoftFinish(inout LvkSoftCursor cursor) {
+    cursor = LvkSoftCursor(LVK_SOFT_NONE, LVK_SOFT_NONE, uvec2(0u), uvec2(0u), 0u, 0u);
 }
 
 // Commits a hit; ends the traversal if that is enough.
-void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHit hit, uint kind) {
+void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftHit hit, uint kind) {
     state.committed = hit;
     state.committed.kind = kind;
     if ((state.flags & LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT) != 0u) {
-        lvkSoftFinish(place);
+        lvkSoftFinish(cursor);
     }
 }
 
 // Returns the vertex indices of a triangle, and the word with its ids.
-uvec4 lvkSoftNames(uvec2 structure, uint primitives, uint kind, uint primitive) {
+uvec4 lvkSoftVertexIndices(uvec2 structure, uint primitives, uint kind, uint primitive) {
     if (kind == LVK_SOFT_INDEXED) {
         return LvkSoftBlocks(structure).at[primitives + primitive];
     }
-    uvec3 leaf = LvkSoftTriples(lvkSoftBehind(structure, primitives)).at[primitive];
-    uvec2 rest = leaf.xy >> LVK_SOFT_NAME_BITS;
-    return uvec4(leaf.xy & LVK_SOFT_NAME, rest.x | rest.y << LVK_SOFT_REST_BITS, leaf.z);
+    uvec3 leaf = LvkSoftTriples(lvkSoftOffsetAddress(structure, primitives)).at[primitive];
+    uvec2 rest = leaf.xy >> LVK_SOFT_INDEX_BITS;
+    return uvec4(leaf.xy & LVK_SOFT_INDEX_MASK, rest.x | rest.y << LVK_SOFT_REST_BITS, leaf.z);
 }
 
 // Returns the vertices of a triangle whose leaf starts at block `first`. `words` are the other words of the leaf.
-void lvkSoftReadTriangle(LvkSoftBlocks blocks, uint first, out vec3 corners[3], out uvec3 words) {
+void lvkSoftReadTriangle(LvkSoftBlocks blocks, uint first, out vec3 vertices[3], out uvec3 words) {
     uvec4 a = lvkSoftBlock(blocks, first);
     uvec4 b = lvkSoftBlock(blocks, first + 1u);
     uvec4 c = lvkSoftBlock(blocks, first + 2u);
-    corners[0] = uintBitsToFloat(a.xyz);
-    corners[1] = uintBitsToFloat(b.xyz);
-    corners[2] = uintBitsToFloat(c.xyz);
+    vertices[0] = uintBitsToFloat(a.xyz);
+    vertices[1] = uintBitsToFloat(b.xyz);
+    vertices[2] = uintBitsToFloat(c.xyz);
     words = uvec3(a.w, b.w, c.w);
 }
 
 // Like lvkSoftReadTriangle, for any kind of leaf.
-void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive, out vec3 corners[3],
-                    out uvec3 words) {
+void lvkSoftReadVertices(uvec2 structure, uint primitives, uint kind, uint primitive, out vec3 vertices[3],
+                         out uvec3 words) {
     LvkSoftBlocks blocks = LvkSoftBlocks(structure);
     if (kind != LVK_SOFT_TRIANGLES) {
-        uvec4 vertices = lvkSoftNames(structure, primitives, kind, primitive);
-        uvec2 points = lvkSoftBehind(structure, blocks.at[1].z);
-        corners[0] = LvkSoftVertices(points).at[vertices.x];
-        corners[1] = LvkSoftVertices(points).at[vertices.y];
-        corners[2] = LvkSoftVertices(points).at[vertices.z];
-        words = uvec3(vertices.w, 0u, 0u);
+        uvec4 indices = lvkSoftVertexIndices(structure, primitives, kind, primitive);
+        uvec2 points = lvkSoftOffsetAddress(structure, blocks.at[1].z);
+        vertices[0] = LvkSoftVertices(points).at[indices.x];
+        vertices[1] = LvkSoftVertices(points).at[indices.y];
+        vertices[2] = LvkSoftVertices(points).at[indices.z];
+        words = uvec3(indices.w, 0u, 0u);
     } else {
         uint first = lvkSoftBegin(blocks, primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS);
-        lvkSoftReadTriangle(blocks, first, corners, words);
+        lvkSoftReadTriangle(blocks, first, vertices, words);
     }
 }
 
@@ -295,12 +295,12 @@ bool lvkSoftSaysOpaque(LvkSoftLevel level, LvkSoftHit hit) {
     if (level.kind == LVK_SOFT_TRIANGLES || level.kind == LVK_SOFT_BOXES) {
         return hit.opaque;
     }
-    uvec2 geometries = lvkSoftBehind(level.structure, LvkSoftBlocks(level.structure).at[1].w);
+    uvec2 geometries = lvkSoftOffsetAddress(level.structure, LvkSoftBlocks(level.structure).at[1].w);
     return (LvkSoftBlocks(geometries).at[hit.numbers.x].x & 1u) != 0u;
 }
 
 // Returns true if the ray hits or touches an AABB primitive. An AABB with swapped minimum and maximum is empty.
-bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
+bool lvkSoftHitsAabb(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     uint first = level.primitives + hit.primitive * LVK_SOFT_BOX_BLOCKS;
     uvec4 a = lvkSoftBlock(LvkSoftBlocks(level.structure), first);
     uvec4 b = lvkSoftBlock(LvkSoftBlocks(level.structure), first + 1u);
@@ -319,11 +319,11 @@ uint lvkSoftCulling(bool front) {
 
 // Returns true if the ray hits a triangle strictly between tMin and tMax, and the triangle's side is not culled.
 bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
-    vec3 corners[3];
+    vec3 vertices[3];
     uvec3 words;
-    lvkSoftCorners(level.structure, level.primitives, level.kind, hit.primitive, corners, words);
+    lvkSoftReadVertices(level.structure, level.primitives, level.kind, hit.primitive, vertices, words);
     LvkSoftPassage passage;
-    if (!lvkSoftPasses(level.shear, level.slabs.origin, corners, passage)) {
+    if (!lvkSoftPasses(level.shear, level.slabs.origin, vertices, passage)) {
         return false;
     }
     if (!(passage.t > state.tMin && passage.t < state.committed.t)) {
@@ -338,19 +338,19 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHi
 }
 
 // Tests the next primitive. Returns true if it is a candidate that the shader must judge.
-bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
-    uint primitive = place.leaves.x + uint(findLSB(place.leaves.y));
-    place.leaves.y &= place.leaves.y - 1u;
+bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
+    uint primitive = cursor.leaves.x + uint(findLSB(cursor.leaves.y));
+    cursor.leaves.y &= cursor.leaves.y - 1u;
     bool isBox = kLvkSoftHasCandidates && level.kind == LVK_SOFT_BOXES;
     LvkSoftHit hit = lvkSoftNoHit(0.0);
-    hit.instance = place.instance;
+    hit.instance = cursor.instance;
     hit.primitive = primitive;
-    bool isHit = isBox ? lvkSoftMeetsBox(state, level, hit) : lvkSoftHitsTriangle(state, level, hit);
+    bool isHit = isBox ? lvkSoftHitsAabb(state, level, hit) : lvkSoftHitsTriangle(state, level, hit);
     if (!isHit) {
         return false;
     }
     if (!kLvkSoftHasCandidates) {
-        lvkSoftCommit(state, place, hit, 1u);
+        lvkSoftCommit(state, cursor, hit, 1u);
         return false;
     }
     hit.opaque = level.opacity == LVK_SOFT_EACH ? lvkSoftSaysOpaque(level, hit) : level.opacity == LVK_SOFT_OPAQUE;
@@ -358,7 +358,7 @@ bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
         return false;
     }
     if (hit.opaque && !isBox) {
-        lvkSoftCommit(state, place, hit, 1u);
+        lvkSoftCommit(state, cursor, hit, 1u);
         return false;
     }
     state.candidate = hit;
@@ -367,105 +367,105 @@ bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
 }
 
 // Returns the next reference of the TLAS; LVK_SOFT_NONE if none is left.
-uint lvkSoftNextReference(inout LvkSoftPlace place) {
-    uint next = place.next;
-    place.next = LVK_SOFT_NONE;
-    return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPopReference(place.top);
+uint lvkSoftNextReference(inout LvkSoftCursor cursor) {
+    uint next = cursor.next;
+    cursor.next = LVK_SOFT_NONE;
+    return next != LVK_SOFT_NONE || cursor.top == 0u ? next : lvkSoftPopReference(cursor.top);
 }
 
 // Returns the next leaf of the TLAS that the ray hits, from a node on; LVK_SOFT_NONE if none is left.
-uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference) {
+uint lvkSoftDescend(LvkSoftState state, inout LvkSoftCursor cursor, uint reference) {
     LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
     LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction, LVK_SOFT_LEAST);
     vec3 slack = lvkSoftWorldSlack(slabs);
     uint nodes = tlas.at[1].x;
     while ((reference & LVK_SOFT_LEAF) == 0u) {
-        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t), true, slack);
-        if (met.y != LVK_SOFT_NONE) {
-            lvkSoftPushReference(place.top, met.y);
+        uvec2 hits = lvkSoftIntersect2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t), true, slack);
+        if (hits.y != LVK_SOFT_NONE) {
+            lvkSoftPushReference(cursor.top, hits.y);
         }
-        reference = met.x != LVK_SOFT_NONE ? met.x : lvkSoftNextReference(place);
+        reference = hits.x != LVK_SOFT_NONE ? hits.x : lvkSoftNextReference(cursor);
     }
     return reference;
 }
 
 // Returns the next instance whose bounds the ray hits, or LVK_SOFT_NONE.
-uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftPlace place) {
-    uint reference = lvkSoftNextReference(place);
+uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftCursor cursor) {
+    uint reference = lvkSoftNextReference(cursor);
     if ((reference & LVK_SOFT_LEAF) == 0u) { // otherwise the setup of the ray would be wasted
-        reference = lvkSoftDescend(state, place, reference);
+        reference = lvkSoftDescend(state, cursor, reference);
     }
     if (reference == LVK_SOFT_NONE) {
         return reference;
     }
     if ((reference & LVK_SOFT_LEAF_COUNT) != 0u) {
-        lvkSoftPushReference(place.top, reference + 1u - LVK_SOFT_LEAF_ONE); // the leaf without its first instance
+        lvkSoftPushReference(cursor.top, reference + 1u - LVK_SOFT_LEAF_ONE); // the leaf without its first instance
     }
     return reference & LVK_SOFT_LEAF_FIRST;
 }
 
 // Moves to the root or part of the next instance that the ray may hit; false if there is none.
-bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSoftLevel level) {
-    if (place.next == LVK_SOFT_NONE && place.top == 0u) {
+bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftCursor cursor, out LvkSoftLevel level) {
+    if (cursor.next == LVK_SOFT_NONE && cursor.top == 0u) {
         return false;
     }
     uvec2 instances = lvkSoftInstances(state);
     uint root = LVK_SOFT_NONE;
     while (root == LVK_SOFT_NONE) {
-        place.instance = lvkSoftNextInstance(state, place);
-        if (place.instance == LVK_SOFT_NONE) {
+        cursor.instance = lvkSoftNextInstance(state, cursor);
+        if (cursor.instance == LVK_SOFT_NONE) {
             return false;
         }
-        root = lvkSoftEnter(state, instances, place.instance, level);
+        root = lvkSoftEnter(state, instances, cursor.instance, level);
     }
-    place.floor = place.top;
-    lvkSoftGo(place, root);
+    cursor.floor = cursor.top;
+    lvkSoftMoveTo(cursor, root);
     return true;
 }
 
 // Traverses the BLAS of a level. Returns true if a candidate waits that the shader must judge.
-bool lvkSoftWalkLevel(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
+bool lvkSoftTraverseLevel(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
     while (true) {
-        while (place.leaves.y != 0u) {
-            if (lvkSoftTest(state, place, level)) {
+        while (cursor.leaves.y != 0u) {
+            if (lvkSoftTest(state, cursor, level)) {
                 return true;
             }
             if (kLvkSoftIsCpu) { // each iteration tests a primitive or visits a node
                 break;
             }
         }
-        if (kLvkSoftIsCpu && place.leaves.y != 0u) {
+        if (kLvkSoftIsCpu && cursor.leaves.y != 0u) {
             continue;
         }
-        if (place.group.y < LVK_SOFT_ANY_NODE) {
-            if (place.top == place.floor) {
+        if (cursor.group.y < LVK_SOFT_ANY_NODE) {
+            if (cursor.top == cursor.floor) {
                 break;
             }
-            lvkSoftResume(place, level);
+            lvkSoftResume(cursor, level);
         }
-        if (place.group.y >= LVK_SOFT_ANY_NODE) {
-            lvkSoftVisit(place, level, vec2(state.tMin, state.committed.t));
+        if (cursor.group.y >= LVK_SOFT_ANY_NODE) {
+            lvkSoftVisit(cursor, level, vec2(state.tMin, state.committed.t));
         }
     }
-    place.instance = LVK_SOFT_NONE;
+    cursor.instance = LVK_SOFT_NONE;
     return false;
 }
 
 // With candidates, a separate traversal would take longer to compile than it saves.
 #if defined(LVK_DEVICE_IS_CPU) && defined(LVK_OPAQUE_TRIANGLES_ONLY)
-#define LVK_SOFT_HAS_CPU_WALK
-#include <lvk/software_cpu_walk.glsl>
+#define LVK_SOFT_HAS_CPU_TRAVERSAL
+#include <lvk/software_cpu_traversal.glsl>
 #endif
 
 // Traverses the BLAS of the instance. Returns true if a candidate waits that the shader must judge.
-bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
-#ifdef LVK_SOFT_HAS_CPU_WALK
+bool lvkSoftTraverse(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
+#ifdef LVK_SOFT_HAS_CPU_TRAVERSAL
     if (level.wide && level.kind == LVK_SOFT_TRIANGLES) {
-        lvkSoftWalkTriangles(state, place, level);
+        lvkSoftTraverseTriangles(state, cursor, level);
         return false;
     }
 #endif
-    return lvkSoftWalkLevel(state, place, level);
+    return lvkSoftTraverseLevel(state, cursor, level);
 }
 
 // Traverses to the next candidate; false if there is none.
@@ -475,19 +475,19 @@ bool lvkSoftProceed(inout LvkSoftState state) {
         return false;
     }
     lvkSoftOwner = state.id;
-    LvkSoftPlace place = state.place;
+    LvkSoftCursor cursor = state.cursor;
     LvkSoftLevel level;
-    if (place.instance != LVK_SOFT_NONE) {
-        lvkSoftEnter(state, lvkSoftInstances(state), place.instance, level);
+    if (cursor.instance != LVK_SOFT_NONE) {
+        lvkSoftEnter(state, lvkSoftInstances(state), cursor.instance, level);
     }
-    while (place.instance != LVK_SOFT_NONE || lvkSoftFindInstance(state, place, level)) {
-        if (lvkSoftWalk(state, place, level)) {
+    while (cursor.instance != LVK_SOFT_NONE || lvkSoftFindInstance(state, cursor, level)) {
+        if (lvkSoftTraverse(state, cursor, level)) {
             state.interrupted = true;
-            state.place = place;
+            state.cursor = cursor;
             return true;
         }
     }
-    lvkSoftFinish(state.place);
+    lvkSoftFinish(state.cursor);
     return false;
 }
 

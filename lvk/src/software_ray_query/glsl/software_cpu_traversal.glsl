@@ -1,9 +1,9 @@
-#ifndef LVK_SOFTWARE_CPU_WALK_GLSL
-#define LVK_SOFTWARE_CPU_WALK_GLSL
+#ifndef LVK_SOFTWARE_CPU_TRAVERSAL_GLSL
+#define LVK_SOFTWARE_CPU_TRAVERSAL_GLSL
 
-// Part of <lvk/software_walk.glsl>: traversal on CPUs for the most common case, a BVH8 of opaque triangles. A CPU runs
-// eight invocations as one, and mispredicted branches cost most. So there are few branches, and the code after a test
-// does not depend on its result. Each iteration does the work that most of the eight need.
+// Part of <lvk/software_traversal.glsl>: traversal on CPUs for the most common case, a BVH8 of opaque triangles. A CPU
+// runs eight invocations as one, and mispredicted branches cost most. So there are few branches, and the code after a
+// test does not depend on its result. Each iteration does the work that most of the eight need.
 
 // Additional values of a level.
 struct LvkSoftTriangleLevel {
@@ -31,14 +31,14 @@ struct LvkSoftNearest {
 
 // Tests the next triangle of the group, and commits a hit if `counts`. Returns true if the ray ends there. The data of
 // the triangle's leaf is read once the nearest one is known.
-bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level,
+bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level,
                          LvkSoftTriangleLevel triangles, bool counts, inout LvkSoftNearest nearest) {
-    uint primitive = place.leaves.x + uint(findLSB(place.leaves.y));
-    place.leaves.y &= place.leaves.y - 1u;
-    vec3 corners[3], lengths;
+    uint primitive = cursor.leaves.x + uint(findLSB(cursor.leaves.y));
+    cursor.leaves.y &= cursor.leaves.y - 1u;
+    vec3 vertices[3], lengths;
     uvec3 words;
-    lvkSoftReadTriangle(lvkSoftItem(triangles.triangles, primitive, LVK_SOFT_TRIANGLE_BLOCKS), 0u, corners, words);
-    vec3 areas = lvkSoftAreas(level.shear, level.slabs.origin, corners, lengths);
+    lvkSoftReadTriangle(lvkSoftItem(triangles.triangles, primitive, LVK_SOFT_TRIANGLE_BLOCKS), 0u, vertices, words);
+    vec3 areas = lvkSoftAreas(level.shear, level.slabs.origin, vertices, lengths);
     float whole = areas.x + areas.y + areas.z;
     vec3 shares = lvkSoftShares(areas, whole);
     float t = lvkSoftDistance(level.shear, shares, lengths);
@@ -53,23 +53,24 @@ bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftPlace place, Lvk
 }
 
 // Visits the next node of the group. The rest of the group is pushed only if the ray hits inner children of the node.
-void lvkSoftVisitWide(inout LvkSoftPlace place, LvkSoftLevel level, LvkSoftTriangleLevel triangles, vec2 range) {
-    uint node = lvkSoftTakeNode(place, level);
-    uvec4 met = lvkSoftMeetNode(level.slabs, triangles.order,
-                                lvkSoftItem(triangles.nodes, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
-    bool goesIn = met.y >= LVK_SOFT_ANY_NODE;
-    if (goesIn && place.group.y >= LVK_SOFT_ANY_NODE) {
-        lvkSoftPushGroup(place.top, place.group);
+void lvkSoftVisitWide(inout LvkSoftCursor cursor, LvkSoftLevel level, LvkSoftTriangleLevel triangles, vec2 range) {
+    uint node = lvkSoftTakeNode(cursor, level);
+    uvec4 hits = lvkSoftIntersectNode(level.slabs, triangles.order,
+                                      lvkSoftItem(triangles.nodes, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
+    bool goesIn = hits.y >= LVK_SOFT_ANY_NODE;
+    if (goesIn && cursor.group.y >= LVK_SOFT_ANY_NODE) {
+        lvkSoftPushGroup(cursor.top, cursor.group);
     }
-    place.group = goesIn ? met.xy : place.group;
-    place.leaves = met.zw;
+    cursor.group = goesIn ? hits.xy : cursor.group;
+    cursor.leaves = hits.zw;
 }
 
 // Fills in the data of the hit.
-void lvkSoftTell(inout LvkSoftHit hit, LvkSoftLevel level, LvkSoftItems triangles, uint instance, LvkSoftNearest nearest) {
-    vec3 corners[3];
+void lvkSoftFillHit(inout LvkSoftHit hit, LvkSoftLevel level, LvkSoftItems triangles, uint instance,
+                    LvkSoftNearest nearest) {
+    vec3 vertices[3];
     uvec3 words;
-    lvkSoftReadTriangle(lvkSoftItem(triangles, nearest.primitive, LVK_SOFT_TRIANGLE_BLOCKS), 0u, corners, words);
+    lvkSoftReadTriangle(lvkSoftItem(triangles, nearest.primitive, LVK_SOFT_TRIANGLE_BLOCKS), 0u, vertices, words);
     hit.kind = 1u;
     hit.instance = instance;
     hit.primitive = nearest.primitive;
@@ -80,37 +81,37 @@ void lvkSoftTell(inout LvkSoftHit hit, LvkSoftLevel level, LvkSoftItems triangle
 
 // Traverses the BLAS of a level. An iteration tests up to two triangles, and visits a node if none is left. A ray that
 // ends does so after the visit, because other invocations need the visit anyway.
-void lvkSoftWalkTriangles(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
+void lvkSoftTraverseTriangles(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
     LvkSoftTriangleLevel triangles = lvkSoftTriangleLevelOf(level);
     LvkSoftNearest nearest = LvkSoftNearest(LVK_SOFT_NONE, 0.0);
     bool ends = false;
     while (!ends) {
-        if (place.leaves.y != 0u) {
-            ends = lvkSoftTestTriangle(state, place, level, triangles, true, nearest);
+        if (cursor.leaves.y != 0u) {
+            ends = lvkSoftTestTriangle(state, cursor, level, triangles, true, nearest);
         }
-        if (place.leaves.y != 0u) {
-            ends = lvkSoftTestTriangle(state, place, level, triangles, !ends, nearest) || ends;
+        if (cursor.leaves.y != 0u) {
+            ends = lvkSoftTestTriangle(state, cursor, level, triangles, !ends, nearest) || ends;
         }
-        if (place.leaves.y == 0u) {
-            if (place.group.y < LVK_SOFT_ANY_NODE) {
-                if (place.top == place.floor) {
+        if (cursor.leaves.y == 0u) {
+            if (cursor.group.y < LVK_SOFT_ANY_NODE) {
+                if (cursor.top == cursor.floor) {
                     break;
                 }
-                place.group = lvkSoftPopGroup(place.top);
+                cursor.group = lvkSoftPopGroup(cursor.top);
             }
             // Tested again, so that CPUs skip the visit once all rays have ended.
-            if (place.group.y >= LVK_SOFT_ANY_NODE) {
-                lvkSoftVisitWide(place, level, triangles, vec2(state.tMin, state.committed.t));
+            if (cursor.group.y >= LVK_SOFT_ANY_NODE) {
+                lvkSoftVisitWide(cursor, level, triangles, vec2(state.tMin, state.committed.t));
             }
         }
     }
     if (nearest.primitive != LVK_SOFT_NONE) {
-        lvkSoftTell(state.committed, level, triangles.triangles, place.instance, nearest);
+        lvkSoftFillHit(state.committed, level, triangles.triangles, cursor.instance, nearest);
     }
     if (ends) {
-        lvkSoftFinish(place);
+        lvkSoftFinish(cursor);
     }
-    place.instance = LVK_SOFT_NONE;
+    cursor.instance = LVK_SOFT_NONE;
 }
 
 #endif

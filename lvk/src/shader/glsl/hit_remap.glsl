@@ -1,5 +1,5 @@
-#ifndef LVK_HIT_NUMBERS_GLSL
-#define LVK_HIT_NUMBERS_GLSL
+#ifndef LVK_HIT_REMAP_GLSL
+#define LVK_HIT_REMAP_GLSL
 
 // Maps the ids of a hit to those of the application. If a mesh was split or its primitives were reordered, Vulkan
 // counts the library's own instances and primitives. A hit remap table with an entry for each of these instances maps
