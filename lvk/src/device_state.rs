@@ -128,10 +128,10 @@ impl DeviceState {
     }
 
     /// Destroys an object once no command buffer can use it.
-    pub(crate) fn free_later(&self, garbage: DeferredObject) {
+    pub(crate) fn free_later(&self, deferred: DeferredObject) {
         const COLLECT_INTERVAL: usize = 256;
-        self.mark_slot_retired(&garbage);
-        let waiting = self.submitter.retire(garbage);
+        self.mark_slot_retired(&deferred);
+        let waiting = self.submitter.retire(deferred);
         if waiting.is_multiple_of(COLLECT_INTERVAL)
             && let Err(error) = self.collect()
         {
@@ -140,9 +140,9 @@ impl DeviceState {
     }
 
     /// Marks the bindless slot of an object as invalid for commands recorded from now on.
-    fn mark_slot_retired(&self, garbage: &DeferredObject) {
+    fn mark_slot_retired(&self, deferred: &DeferredObject) {
         let newest = || self.submitter.newest_sequence();
-        match garbage {
+        match deferred {
             // Indices of Y'CbCr textures are constants, which the index checks do not cover.
             DeferredObject::Texture(texture) if texture.is_yuv() => {}
             DeferredObject::Texture(texture) => {
@@ -180,13 +180,13 @@ impl DeviceState {
 
     pub(crate) fn release_finished(&self, finished: Finished<DeferredObject>) -> Result<()> {
         finished.staged.into_iter().for_each(|sequence| self.staging.release(sequence));
-        finished.garbage.into_iter().for_each(|garbage| self.free_now(garbage));
+        finished.deferred.into_iter().for_each(|deferred| self.free_now(deferred));
         self.profiler.collect(finished.passed)
     }
 
     /// Drops an object that the GPU is done with, and frees its slot.
-    pub(crate) fn free_now(&self, garbage: DeferredObject) {
-        match garbage {
+    pub(crate) fn free_now(&self, deferred: DeferredObject) {
+        match deferred {
             DeferredObject::Buffer(buffer) => self.submitter.forget(buffer.id),
             DeferredObject::QueryPool(pool) => self.submitter.forget(pool.id),
             DeferredObject::Texture(texture) => {

@@ -11,19 +11,19 @@ use crate::pool::HandlePool;
 /// references.
 ///
 /// A lookup by handle returns no object that the pool would not return: if an object was removed from the pool, the
-/// cache drops all handles. It keeps the objects. `PLACES`, a power of two, is the number of handles it keeps.
-pub(crate) struct HandleCache<H, T, const PLACES: usize = 8> {
+/// cache drops all handles. It keeps the objects. `ENTRIES`, a power of two, is the number of handles it keeps.
+pub(crate) struct HandleCache<H, T, const ENTRIES: usize = 8> {
     objects: Vec<Arc<T>>,
     /// Indices by the address of the object, which is unique while the object is held. Empty while there are few
     /// objects.
     index_by_object: IdMap<usize>,
     /// Indices of recent handles, each in a slot that follows from the handle.
-    recent: [Option<(H, usize)>; PLACES],
+    recent: [Option<(H, usize)>; ENTRIES],
     /// Number of removals from the pool when the first of `recent` was found.
     removals: u64,
 }
 
-impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
+impl<H: Handle, T, const ENTRIES: usize> HandleCache<H, T, ENTRIES> {
     /// Up to this many objects are searched linearly, which is faster than a map.
     const LINEAR_SEARCH_MAX: usize = 16;
 
@@ -41,7 +41,7 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
     fn find_in_pool(&mut self, pool: &HandlePool<H, T>, handle: H) -> Result<usize> {
         let removals = pool.removals();
         if self.removals != removals {
-            self.recent = [None; PLACES];
+            self.recent = [None; ENTRIES];
             self.removals = removals;
         }
         let object = pool.get(handle)?;
@@ -76,7 +76,7 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
 
     /// Returns the slot of a handle. Handles of one pool differ most in their low bits, which count objects.
     fn cache_slot(handle: H) -> usize {
-        handle.bits() as usize % PLACES
+        handle.bits() as usize % ENTRIES
     }
 
     /// Clears everything and keeps the memory.
@@ -84,7 +84,7 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
         if !self.objects.is_empty() {
             self.objects.clear();
             self.index_by_object.clear();
-            self.recent = [None; PLACES];
+            self.recent = [None; ENTRIES];
         }
     }
 
@@ -106,9 +106,9 @@ impl<H: Handle, T, const PLACES: usize> HandleCache<H, T, PLACES> {
     }
 }
 
-impl<H: Copy, T, const PLACES: usize> Default for HandleCache<H, T, PLACES> {
+impl<H: Copy, T, const ENTRIES: usize> Default for HandleCache<H, T, ENTRIES> {
     fn default() -> Self {
-        Self { objects: Vec::new(), index_by_object: IdMap::default(), recent: [None; PLACES], removals: 0 }
+        Self { objects: Vec::new(), index_by_object: IdMap::default(), recent: [None; ENTRIES], removals: 0 }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The animated programs as a user meets them: help, pictures, sequences and Ctrl-C.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
-mod lacking;
+mod missing_features;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -230,7 +230,7 @@ fn possible() -> impl Iterator<Item = &'static Program> {
     let folder = tempfile::tempdir().unwrap();
     let lacks = |program: &&Program| {
         let picture = program.small(folder.path(), "a.png", &["--frames", "1"]);
-        let lack = (program.path == MESH_SHADERS).then(|| lacking::mesh_shaders(picture)).flatten();
+        let lack = (program.path == MESH_SHADERS).then(|| missing_features::mesh_shaders(picture)).flatten();
         lack.inspect(|lack| eprintln!("NOT TESTED, {lack}")).is_some()
     };
     let all: Vec<_> = PROGRAMS.iter().filter(|program| !lacks(program)).collect();
@@ -302,10 +302,10 @@ fn a_device_without_mesh_shaders_is_distinguished_from_other_errors() {
     let without = ["--frames", "1", "--profile", "core-only"];
     let outcome = Outcome::from_command(small(&without));
     assert_eq!(outcome.status, Some(1), "{}", outcome.err);
-    let lack = lacking::mesh_shaders(small(&without)).unwrap();
+    let lack = missing_features::mesh_shaders(small(&without)).unwrap();
     assert_names(&lack, &["mesh shaders", "--device"]);
     assert!(files(folder.path()).is_empty());
-    assert_eq!(lacking::mesh_shaders(small(&["--frames", "1", "--device", "nobody's"])), None);
+    assert_eq!(missing_features::mesh_shaders(small(&["--frames", "1", "--device", "nobody's"])), None);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The samples' windows as a user meets them, on an X server without a screen.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod lacking;
+mod missing_features;
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -132,7 +132,7 @@ fn omni_shadows_has_a_window() {
 fn mesh_shaders_has_a_window() {
     let program = env!("CARGO_BIN_EXE_mesh_shaders");
     let folder = tempfile::tempdir().unwrap();
-    match lacking::mesh_shaders(sample(program, &["--frames", "1"], folder.path())) {
+    match missing_features::mesh_shaders(sample(program, &["--frames", "1"], folder.path())) {
         None => prints_what_it_writes(program, &[]),
         Some(lack) => eprintln!("NOT TESTED, {lack}"),
     }
@@ -256,7 +256,7 @@ impl Session {
     }
 
     /// Waits for a line on standard error.
-    fn hear(&mut self, part: &str) {
+    fn wait_for_line(&mut self, part: &str) {
         self.wait(part, |session| session.said.try_iter().any(|line| line.contains(part)));
     }
 
@@ -276,7 +276,7 @@ impl Session {
     }
 
     /// Presses the key for screenshots, and answers the picture.
-    fn shoot(&mut self, path: &Path) -> RgbaImage {
+    fn take_screenshot(&mut self, path: &Path) -> RgbaImage {
         self.press(F12);
         self.wait("a screenshot", |_| path.exists());
         read_image(path)
@@ -328,20 +328,20 @@ fn keys_hide_the_panel_and_fly_and_the_image_follows_the_window() {
     let shot = |number: u32| folder.path().join(format!("rtx_textures_window_{number:04}.png"));
     session.press(SPACE);
     // The first frame lays the panel out and does not show it.
-    session.shoot(&shot(1));
-    let with_panel = session.shoot(&shot(2));
+    session.take_screenshot(&shot(1));
+    let with_panel = session.take_screenshot(&shot(2));
     session.press(F1);
-    let without = session.shoot(&shot(3));
+    let without = session.take_screenshot(&shot(3));
     assert!(differing(&with_panel, &without, BESIDE_PANEL) < 1e-3, "the animation stands");
     assert!(differing(&with_panel, &without, 0) > 0.1, "the panel is still there");
     session.key(KEY_W, true);
     thread::sleep(Duration::from_millis(500));
     session.key(KEY_W, false);
-    let flown = session.shoot(&shot(4));
+    let flown = session.take_screenshot(&shot(4));
     assert!(differing(&without, &flown, 0) > 0.1, "nothing has moved");
     session.resize([300, 260]);
     thread::sleep(Duration::from_millis(600));
-    assert_eq!(session.shoot(&shot(5)).dimensions(), (300, 260));
+    assert_eq!(session.take_screenshot(&shot(5)).dimensions(), (300, 260));
     session.close();
 }
 
@@ -352,13 +352,13 @@ fn an_animation_by_frames_stands_too() {
     let Some(mut session) = Session::new(program, &["--frames", "1000000"], folder.path()) else { return };
     let shot = |number: u32| folder.path().join(format!("hello_triangle_window_{number:04}.png"));
     session.press(F1);
-    let (first, second) = (session.shoot(&shot(1)), session.shoot(&shot(2)));
+    let (first, second) = (session.take_screenshot(&shot(1)), session.take_screenshot(&shot(2)));
     assert!(differing(&first, &second, 0) > 0.0, "it stands already");
     session.press(SPACE);
-    let first = session.shoot(&shot(3));
-    assert!(session.shoot(&shot(4)) == first, "it goes on");
+    let first = session.take_screenshot(&shot(3));
+    assert!(session.take_screenshot(&shot(4)) == first, "it goes on");
     session.press(SPACE);
-    assert!(session.shoot(&shot(5)) != first, "it still stands");
+    assert!(session.take_screenshot(&shot(5)) != first, "it still stands");
     session.close();
 }
 
@@ -381,10 +381,10 @@ fn a_window_displays_loading_progress_and_answers_keys_meanwhile() {
     let args = ["--triangles", "400000", "--samples", "1", "--depth", "0"];
     let Some(mut session) = Session::new(program, &args, folder.path()) else { return };
     let shot = |number: u32| folder.path().join(format!("large_scene_window_{number:04}.png"));
-    session.hear("making the valley");
+    session.wait_for_line("making the valley");
     // The progress fades in.
     thread::sleep(Duration::from_millis(500));
-    let loading = session.shoot(&shot(1));
+    let loading = session.take_screenshot(&shot(1));
     let background = loading.get_pixel(2, 2);
     let share = |is: &dyn Fn(&image::Rgba<u8>) -> bool| {
         loading.pixels().filter(|pixel| is(pixel)).count() as f64 / f64::from(SIZE[0] * SIZE[1])
@@ -392,11 +392,11 @@ fn a_window_displays_loading_progress_and_answers_keys_meanwhile() {
     let (bare, bright) = (share(&|pixel| pixel == background), share(&|pixel| pixel[1] > 120));
     assert!((0.2..0.95).contains(&bare), "{bare} of the window is bare");
     assert!(bright > 1e-3, "{bright} of the window is bright: no progress is to be read");
-    session.hear("building acceleration structures");
+    session.wait_for_line("building acceleration structures");
     let frames = frames_while_loading(&mut session);
     assert!(frames > 5, "{frames} frames");
     session.press(F1);
-    let picture = session.shoot(&shot(2));
+    let picture = session.take_screenshot(&shot(2));
     assert!(differing(&loading, &picture, 0) > 0.9, "there is no picture yet");
     session.close();
 }
@@ -410,7 +410,7 @@ fn a_window_closes_while_it_loads_and_leaves_nothing_behind() {
         let Some(mut session) = Session::new(program, &["--triangles", "1000000"], folder.path()) else {
             return;
         };
-        session.hear(stage);
+        session.wait_for_line(stage);
         let said = session.close();
         // The first stage takes so long anywhere that the others are not come to.
         let later = if number == 0 { &stages[1..] } else { &[] };
@@ -541,20 +541,20 @@ fn a_key_goes_through_the_formats() {
     let formats = yuv_formats(program, folder.path());
     let Some(mut session) = Session::new(program, &["--model", "bt601"], folder.path()) else { return };
     let mut shots = 0;
-    let mut shoot = |session: &mut Session| {
+    let mut take_screenshot = |session: &mut Session| {
         shots += 1;
-        session.shoot(&folder.path().join(format!("yuv_window_{shots:04}.png")))
+        session.take_screenshot(&folder.path().join(format!("yuv_window_{shots:04}.png")))
     };
     session.press(SPACE);
     session.press(F1);
-    shoot(&mut session);
-    let first = shoot(&mut session);
-    assert!(shoot(&mut session) == first, "the picture stands still");
+    take_screenshot(&mut session);
+    let first = take_screenshot(&mut session);
+    assert!(take_screenshot(&mut session) == first, "the picture stands still");
     let bits = |format: &String| if format.ends_with("10") { 10 } else { 8 };
     for format in formats.iter().cycle().skip(1).take(formats.len()) {
         session.press(KEY_N);
         thread::sleep(Duration::from_millis(300));
-        let next = shoot(&mut session);
+        let next = take_screenshot(&mut session);
         assert_eq!(next == first, bits(format) == bits(&formats[0]), "{format} of {formats:?}");
         let others = differing_by(8, &first, &next, 0);
         assert!(others < 0.01, "{format} shows something else in {others} of the picture");
@@ -581,15 +581,15 @@ fn shaders_are_compiled_as_they_change_and_wrong_ones_are_reported() {
     let shot = |number: u32| folder.path().join(format!("rtx_hello_window_{number:04}.png"));
     session.press(SPACE);
     session.press(F1);
-    let before = session.shoot(&shot(1));
+    let before = session.take_screenshot(&shot(1));
     let view = shaders.join("rtx_hello/view.glsl");
     let text = fs::read_to_string(&view).unwrap();
     fs::write(&view, text.replace("sqrt(corners)", "sqrt(corner)")).unwrap();
-    session.hear("corner");
-    assert!(session.shoot(&shot(2)) == before, "the old pipeline stays");
+    session.wait_for_line("corner");
+    assert!(session.take_screenshot(&shot(2)) == before, "the old pipeline stays");
     fs::write(&view, text.replace("sqrt(corners)", "vec3(1.0, 0.0, 0.0)")).unwrap();
-    session.hear("shaders compiled anew");
-    let red = session.shoot(&shot(3));
+    session.wait_for_line("shaders compiled anew");
+    let red = session.take_screenshot(&shot(3));
     assert!(differing(&before, &red, 0) > 0.05, "the new shader is not in use");
     session.close();
 }

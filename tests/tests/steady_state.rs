@@ -6,7 +6,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use lvk::test_hooks::{silent_context, staging_bytes, waiting_objects};
+use lvk::test_hooks::{null_command_context, staging_bytes, waiting_objects};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BuildFlags, BuildMode,
     ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies, DeviceInstances, Format,
@@ -116,7 +116,7 @@ fn draws_take_nothing_from_the_heap_and_frames_leave_nothing_there() {
     const DRAWS: u32 = 100;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(vulkan_library) = vulkan() else { return };
-    let ctx = silent_context(&ContextDesc { vulkan_library, ..Default::default() }).unwrap();
+    let ctx = null_command_context(&ContextDesc { vulkan_library, ..Default::default() }).unwrap();
     let frame = Frame::new(&ctx);
     let allocations = |frames, draws| {
         let before = COUNT.load(Ordering::Relaxed);
@@ -148,7 +148,7 @@ fn refits_of_unchanged_references_take_nothing_from_the_heap() {
     let Some(vulkan_library) = vulkan() else { return };
     let ray_query = RayQueryRequest::Hardware;
     let desc = ContextDesc { vulkan_library, ray_query, ..Default::default() };
-    let ctx = match silent_context(&desc) {
+    let ctx = match null_command_context(&desc) {
         Ok(ctx) => ctx,
         Err(error) => return eprintln!("SKIPPED, no ray queries by hardware: {error}"),
     };

@@ -27,7 +27,7 @@ impl CommandBuffer {
     /// Runs `groups` workgroups along x, y and z (`vkCmdDispatch`).
     pub fn dispatch(&mut self, groups: [u32; 3], dependencies: &Dependencies<'_>) -> Result<()> {
         let pipeline = self.ready_compute()?;
-        check_groups(&pipeline.name, groups, self.shared.gpu.caps.limits.max_dispatch_groups)?;
+        check_groups(&pipeline.name, groups, self.shared.gpu.caps.limits.max_dispatch_workgroups)?;
         let ray_query = pipeline.ray_query;
         self.flush_barriers_after(|cmd| cmd.use_compute(ray_query, dependencies))?;
         // SAFETY: a compute pipeline is bound and the counts are within the limits.

@@ -25,9 +25,10 @@ impl CommandBuffer {
         if is_built && tlas.hit_table.get().is_none() {
             return None;
         }
-        let rows = tlas.hit_table.get().filter(|_| blas_refs.needs_hit_remap).map_or(0, |rows| rows.address);
-        self.write_tlas_table(tlas.slot, tlas_table_entry(tlas, rows));
-        Some(rows)
+        let hit_table_address =
+            tlas.hit_table.get().filter(|_| blas_refs.needs_hit_remap).map_or(0, |table| table.address);
+        self.write_tlas_table(tlas.slot, tlas_table_entry(tlas, hit_table_address));
+        Some(hit_table_address)
     }
 
     /// Returns the slots and table entries of TLAS that this command buffer expects to have no hit remap table,
@@ -67,7 +68,7 @@ impl CommandBuffer {
     }
 }
 
-/// Returns the table entry of a TLAS whose hit remap table is at the address `rows`.
-fn tlas_table_entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
-    [rows, tlas.software.as_ref().map_or(0, SoftwareTlas::address)]
+/// Returns the table entry of a TLAS whose hit remap table is at the address `hit_table_address`.
+fn tlas_table_entry(tlas: &Tlas, hit_table_address: u64) -> [u64; 2] {
+    [hit_table_address, tlas.software.as_ref().map_or(0, SoftwareTlas::address)]
 }

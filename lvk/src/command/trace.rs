@@ -128,8 +128,8 @@ impl CommandBuffer {
 
 fn check_size(limits: &Limits, pipeline: &str, size: [u32; 3]) -> Result<()> {
     for (axis, side) in size.into_iter().enumerate() {
-        let groups = u64::from(limits.max_dispatch_groups[axis]);
-        let most = groups * u64::from(limits.max_group_size[axis]);
+        let groups = u64::from(limits.max_dispatch_workgroups[axis]);
+        let most = groups * u64::from(limits.max_workgroup_size[axis]);
         check_limit(pipeline, "number of rays along an axis", side.into(), most)?;
     }
     let rays = size.iter().fold(1_u64, |all, side| all.saturating_mul((*side).into()));

@@ -57,7 +57,7 @@ pub struct AccelMemory {
     /// Bytes of all acceleration structures, including destroyed ones that the GPU may still use.
     pub structure_bytes: u64,
     /// Unused bytes of shared buffers.
-    pub spare_bytes: u64,
+    pub free_bytes: u64,
     /// Bytes of the scratch buffers.
     pub scratch_bytes: u64,
 }
@@ -94,7 +94,7 @@ impl Context {
                 .map(|object| accel_struct_info_of(object))
                 .collect(),
             structure_bytes: shared.accel_storage.used_bytes(),
-            spare_bytes: shared.accel_storage.free_bytes(),
+            free_bytes: shared.accel_storage.free_bytes(),
             scratch_bytes: shared.scratch.iter().map(ScratchBuffer::bytes).sum(),
         }
     }

@@ -25,7 +25,7 @@ pub(super) fn fill_default_descriptors(ctx: &Context) -> Result<()> {
     let shared = ctx.device_state();
     let sampled = checker_texture(ctx, TextureUsage::SAMPLED)?;
     let storage = checker_texture(ctx, TextureUsage::STORAGE)?;
-    let sampler = SamplerDesc { debug_name: "dummy sampler", ..Default::default() };
+    let sampler = SamplerDesc { debug_name: "default sampler", ..Default::default() };
     let sampler = Sampler::new(&shared.gpu, &sampler, DEFAULT_SLOT)?;
     ctx.record_in_prologue(|cmd| {
         cmd.clear_tlas_table();
@@ -50,7 +50,7 @@ pub(super) fn fill_default_descriptors(ctx: &Context) -> Result<()> {
 /// Creates a default texture. Sampled and storage slots get one each, so that a store into an unused storage slot does
 /// not change what shaders sample from an unused slot.
 fn checker_texture(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
-    let desc = TextureDesc { extent: [2, 2], usage, debug_name: "dummy texture", ..Default::default() };
+    let desc = TextureDesc { extent: [2, 2], usage, debug_name: "default texture", ..Default::default() };
     let texture = Arc::new(Texture::new(&ctx.device_state().gpu, &desc, DEFAULT_SLOT)?);
     let pixels = [MAGENTA, BLACK, BLACK, MAGENTA].concat();
     ctx.upload_texture_object(&texture, &TextureRegion::default(), &pixels)?;
@@ -63,7 +63,8 @@ fn default_yuv_textures(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
     let mut defaults = Vec::new();
     for (number, conversion, raw) in shared.bindless.yuv_conversions() {
         let format = conversion.format;
-        let desc = TextureDesc { format, extent: [2, 2], debug_name: "dummy texture", ..Default::default() };
+        let desc =
+            TextureDesc { format, extent: [2, 2], debug_name: "default texture", ..Default::default() };
         let texture = Arc::new(Texture::with_conversion(&shared.gpu, &desc, DEFAULT_SLOT, raw)?);
         for aspect in format.uploaded_aspects() {
             let region = TextureRegion { aspect, ..Default::default() };
@@ -77,7 +78,7 @@ fn default_yuv_textures(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
 }
 
 fn new_empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {
-    let desc = TlasDesc { debug_name: "dummy tlas", ..Default::default() };
+    let desc = TlasDesc { debug_name: "default tlas", ..Default::default() };
     let tlas = Arc::new(new_tlas(ctx.device_state(), &desc, DEFAULT_SLOT)?);
     ctx.record_in_prologue(|cmd| cmd.update_tlas_object(&tlas, &[], BuildMode::Rebuild))?;
     Ok(tlas)

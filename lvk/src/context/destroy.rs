@@ -22,12 +22,12 @@ impl Context {
 }
 
 macro_rules! destroy {
-    ($($handle:ident: $pool:ident => $garbage:ident;)*) => {
+    ($($handle:ident: $pool:ident => $variant:ident;)*) => {
         $(impl Destroy for $handle {
             fn destroy_in(self, ctx: &Context) {
                 let shared: &DeviceState = ctx.device_state();
                 if let Ok(object) = shared.store.$pool.remove(self) {
-                    shared.free_later(DeferredObject::$garbage(object));
+                    shared.free_later(DeferredObject::$variant(object));
                 }
             }
         })*

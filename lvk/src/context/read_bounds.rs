@@ -36,40 +36,40 @@ pub(crate) struct InputBytes {
 impl Context {
     /// Returns the bounds of the primitives of each geometry of each mesh. Waits for the GPU.
     pub(super) fn read_bounds(&self, descs: &[&BlasDesc<'_>]) -> Result<Vec<Vec<Vec<Bounds>>>> {
-        let pieces = self.read_inputs(descs)?;
+        let inputs = self.read_inputs(descs)?;
         let of_mesh =
-            |desc: &&BlasDesc<'_>| desc.geometries.iter().map(|g| geometry_bounds(g, &pieces)).collect();
+            |desc: &&BlasDesc<'_>| desc.geometries.iter().map(|g| geometry_bounds(g, &inputs)).collect();
         Ok(descs.iter().map(of_mesh).collect())
     }
 
     /// Reads the inputs of meshes. Waits for the GPU.
     pub(crate) fn read_inputs(&self, descs: &[&BlasDesc<'_>]) -> Result<InputBytes> {
-        let mut pieces = InputBytes::default();
+        let mut inputs = InputBytes::default();
         for geometry in descs.iter().flat_map(|desc| desc.geometries) {
-            for piece in input_ranges(geometry) {
-                self.add_input_range(&mut pieces, piece)?;
+            for range in input_ranges(geometry) {
+                self.add_input_range(&mut inputs, range)?;
             }
         }
-        self.read_input_ranges(&mut pieces)?;
-        Ok(pieces)
+        self.read_input_ranges(&mut inputs)?;
+        Ok(inputs)
     }
 
-    fn add_input_range(&self, pieces: &mut InputBytes, piece: InputRange) -> Result<()> {
-        let (handle, offset, size) = piece;
-        if size == 0 || pieces.index_by_range.contains_key(&piece) {
+    fn add_input_range(&self, inputs: &mut InputBytes, range: InputRange) -> Result<()> {
+        let (handle, offset, size) = range;
+        if size == 0 || inputs.index_by_range.contains_key(&range) {
             return Ok(());
         }
         let buffer = self.device_state().store.buffers.get(handle)?;
-        pieces.index_by_range.insert(piece, pieces.bytes.len());
-        pieces.bytes.resize(pieces.bytes.len() + size as usize, 0);
-        let start = pieces.ranges.last().map_or(0, |last| last.end);
-        pieces.ranges.push(start..start + size);
-        pieces.buffers.push((buffer, offset));
+        inputs.index_by_range.insert(range, inputs.bytes.len());
+        inputs.bytes.resize(inputs.bytes.len() + size as usize, 0);
+        let start = inputs.ranges.last().map_or(0, |last| last.end);
+        inputs.ranges.push(start..start + size);
+        inputs.buffers.push((buffer, offset));
         Ok(())
     }
 
-    fn read_input_ranges(&self, pieces: &mut InputBytes) -> Result<()> {
-        let InputBytes { buffers: list, ranges, bytes, .. } = pieces;
+    fn read_input_ranges(&self, inputs: &mut InputBytes) -> Result<()> {
+        let InputBytes { buffers: list, ranges, bytes, .. } = inputs;
         let most = MAX_READ_BYTES.min(self.device_state().gpu.caps.limits.max_buffer_bytes).max(1);
         for (bytes, start) in bytes.chunks_mut(most as usize).zip((0_u64..).step_by(most as usize)) {
             let size = bytes.len() as u64;
@@ -95,9 +95,9 @@ impl Context {
 }
 
 impl InputBytes {
-    fn bytes_of(&self, piece: InputRange) -> &[u8] {
-        let place = self.index_by_range.get(&piece);
-        place.and_then(|start| self.bytes.get(*start..*start + piece.2 as usize)).unwrap_or_default()
+    fn bytes_of(&self, range: InputRange) -> &[u8] {
+        let start = self.index_by_range.get(&range);
+        start.and_then(|start| self.bytes.get(*start..*start + range.2 as usize)).unwrap_or_default()
     }
 }
 
@@ -111,7 +111,7 @@ fn overlaps(ranges: &[Range<u64>], window: Range<u64>) -> impl Iterator<Item = (
 
 /// Returns the buffer ranges that a geometry reads.
 fn input_ranges(geometry: &BlasGeometry) -> impl Iterator<Item = InputRange> {
-    let pieces = match geometry {
+    let ranges = match geometry {
         BlasGeometry::Aabbs(boxes) => {
             const BOX_BYTES: u64 = 24;
             let bytes = span_bytes(boxes.count, boxes.stride, BOX_BYTES);
@@ -121,7 +121,7 @@ fn input_ranges(geometry: &BlasGeometry) -> impl Iterator<Item = InputRange> {
             [Some(vertex_range(triangles)), index_range(triangles), matrix_range(triangles)]
         }
     };
-    pieces.into_iter().flatten()
+    ranges.into_iter().flatten()
 }
 
 fn vertex_range(triangles: &Triangles) -> InputRange {
@@ -150,36 +150,36 @@ fn span_bytes(count: u32, stride: u64, packed: u64) -> u64 {
     if count == 0 { 0 } else { u64::from(count - 1) * stride + packed }
 }
 
-fn geometry_bounds(geometry: &BlasGeometry, pieces: &InputBytes) -> Vec<Bounds> {
-    match geometry_bytes(geometry, pieces) {
+fn geometry_bounds(geometry: &BlasGeometry, inputs: &InputBytes) -> Vec<Bounds> {
+    match geometry_bytes(geometry, inputs) {
         GeometryBytes::Boxes(boxes) => boxes.all_bounds(),
         GeometryBytes::Triangles(triangles) => triangles.bounds(),
     }
 }
 
 /// Returns the input bytes of a geometry.
-pub(crate) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a InputBytes) -> GeometryBytes<'a> {
+pub(crate) fn geometry_bytes<'a>(geometry: &BlasGeometry, inputs: &'a InputBytes) -> GeometryBytes<'a> {
     match geometry {
         BlasGeometry::Aabbs(boxes) => {
-            let bytes = input_ranges(geometry).next().map_or(&[][..], |piece| pieces.bytes_of(piece));
+            let bytes = input_ranges(geometry).next().map_or(&[][..], |range| inputs.bytes_of(range));
             GeometryBytes::Boxes(AabbListBytes { bytes, stride: boxes.stride as usize, count: boxes.count })
         }
         BlasGeometry::Triangles(triangles) => {
-            let bytes = pieces.bytes_of(vertex_range(triangles));
+            let bytes = inputs.bytes_of(vertex_range(triangles));
             let vertices = VertexBytes {
                 bytes,
                 stride: triangles.vertex_stride as usize,
                 format: triangles.vertex_format,
                 count: triangles.vertex_count,
             };
-            let of_triangles = index_range(triangles).map(|piece| pieces.bytes_of(piece)).unwrap_or_default();
+            let of_triangles = index_range(triangles).map(|range| inputs.bytes_of(range)).unwrap_or_default();
             let indices = match triangles.indices.map(|indices| indices.format) {
                 // Acceleration structures are not built from 8-bit indices.
                 None | Some(IndexFormat::U8) => IndexBytes::None,
                 Some(IndexFormat::U16) => IndexBytes::U16(of_triangles),
                 Some(IndexFormat::U32) => IndexBytes::U32(of_triangles),
             };
-            let transform = geometry_transform(triangles, pieces);
+            let transform = geometry_transform(triangles, inputs);
             GeometryBytes::Triangles(TriangleBytes {
                 vertices,
                 indices,
@@ -190,13 +190,13 @@ pub(crate) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a InputBytes
     }
 }
 
-fn geometry_transform(triangles: &Triangles, pieces: &InputBytes) -> Option<[f32; 12]> {
+fn geometry_transform(triangles: &Triangles, inputs: &InputBytes) -> Option<[f32; 12]> {
     match triangles.transform? {
         GeometryTransform::Rows(rows) => Some(rows),
         GeometryTransform::Buffer { .. } => {
             let mut rows = [0.0; 12];
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut rows);
-            let found = pieces.bytes_of(matrix_range(triangles)?);
+            let found = inputs.bytes_of(matrix_range(triangles)?);
             (found.len() == bytes.len()).then(|| bytes.copy_from_slice(found))?;
             Some(rows)
         }

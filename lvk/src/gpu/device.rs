@@ -86,7 +86,7 @@ pub(crate) struct Gpu {
     pub(super) format_answers: FormatFeatureCache,
     pub(super) image_limits: ImageLimitCache,
     /// True if the caller created the device and destroys it.
-    is_foreign: bool,
+    is_external: bool,
     /// Declared last, so that it is destroyed after the device.
     pub(crate) instance: Instance,
 }
@@ -98,7 +98,7 @@ struct DeviceParts {
     features: Features,
     memory: DeviceMemory,
     queues: Queues,
-    is_foreign: bool,
+    is_external: bool,
 }
 
 impl Gpu {
@@ -113,12 +113,12 @@ impl Gpu {
                 return Err(error);
             }
         };
-        let raw = chosen.places.map(|QueueLocation { family, index }| {
+        let raw = chosen.queue_locations.map(|QueueLocation { family, index }| {
             // SAFETY: the device was created with this queue of the family.
             (unsafe { device.get_device_queue(family, index) }, family)
         });
         let queues = Queues::new(raw, request.queues);
-        let made = DeviceParts { device, caps, features, memory, queues, is_foreign: false };
+        let made = DeviceParts { device, caps, features, memory, queues, is_external: false };
         let mut gpu = Self::from_parts(instance, chosen.raw, made, request.debug_names);
         gpu.profile = request.profile.cloned().unwrap_or_default();
         gpu.extra_capabilities = request.extra.capabilities().to_vec();
@@ -149,7 +149,7 @@ impl Gpu {
             caps,
             features,
             queues: Queues::new(given, queues),
-            is_foreign: true,
+            is_external: true,
         };
         Ok(Self::from_parts(instance, chosen.raw, made, debug_names))
     }
@@ -160,7 +160,7 @@ impl Gpu {
         made: DeviceParts,
         debug_names: Option<bool>,
     ) -> Self {
-        let DeviceParts { device, mut caps, features, memory, queues, is_foreign } = made;
+        let DeviceParts { device, mut caps, features, memory, queues, is_external } = made;
         let raw = &instance.raw;
         let structures = caps.hardware_acceleration_structures();
         let host_copies = HostImageCopy::new(raw, &device, physical, &caps);
@@ -199,7 +199,7 @@ impl Gpu {
             features,
             profile: DeviceProfile::default(),
             extra_capabilities: Vec::new(),
-            is_foreign,
+            is_external,
             instance,
         }
     }
@@ -321,7 +321,7 @@ impl Gpu {
 impl Drop for Gpu {
     fn drop(&mut self) {
         self.memory().take();
-        if self.is_foreign {
+        if self.is_external {
             return;
         }
         // SAFETY: all objects of the device are destroyed: the context destroys them before its `Gpu`.
@@ -363,7 +363,7 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
 /// Uses one Vulkan queue for all queues if requested.
 fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
     if request == QueueRequest::Shared {
-        device.set_queues([device.places[0]; 3]);
+        device.set_queues([device.queue_locations[0]; 3]);
     }
 }
 
@@ -455,7 +455,7 @@ fn create(
     let all = all.push_next(&mut chain.v11).push_next(&mut chain.v12).push_next(&mut chain.v13);
     let mut all = chain.ext.append_to_chain(all, &|name| extensions.contains(&name));
     let priorities = [1.0; 3];
-    let queues = queue_infos(&chosen.places, &priorities);
+    let queues = queue_infos(&chosen.queue_locations, &priorities);
     let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
@@ -470,13 +470,13 @@ fn create(
 
 /// Returns one create info per queue family, with enough queues to include the highest index in use.
 fn queue_infos<'a>(
-    places: &[QueueLocation; 3],
+    queue_locations: &[QueueLocation; 3],
     priorities: &'a [f32; 3],
 ) -> Vec<vk::DeviceQueueCreateInfo<'a>> {
     let mut lasts = std::collections::BTreeMap::new();
-    for place in places {
-        let last = lasts.entry(place.family).or_insert(0);
-        *last = place.index.max(*last);
+    for location in queue_locations {
+        let last = lasts.entry(location.family).or_insert(0);
+        *last = location.index.max(*last);
     }
     let info = |(family, last): (u32, u32)| {
         let queues = &priorities[..=(last as usize).min(2)];

@@ -20,7 +20,7 @@ pub(crate) enum Rank {
     TlasContents,
     /// The scratch buffer of builds, which may be recreated.
     Scratch,
-    /// Resource states, command buffers and garbage of submissions.
+    /// Resource states, command buffers and deferred objects of submissions.
     Submitter,
     /// The bindless set, which is written right before a submission.
     Bindless,

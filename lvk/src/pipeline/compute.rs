@@ -50,8 +50,10 @@ impl ComputePipeline {
         module.check_stage(ShaderStage::Compute)?;
         let name = desc.debug_name;
         let limits = &gpu.caps.limits;
-        let largest =
-            WorkgroupLimits { size: limits.max_group_size, invocations: limits.max_group_invocations };
+        let largest = WorkgroupLimits {
+            size: limits.max_workgroup_size,
+            invocations: limits.max_workgroup_invocations,
+        };
         check_workgroup_size(name, module, desc.specialization, &largest)?;
         let shared = limits.max_shared_bytes;
         let most = WorkgroupMemoryLimits { shared, payload: 0, together: shared };

@@ -123,13 +123,16 @@ fn check_depth(gpu: &Gpu, name: &str, format: Format) -> Result<()> {
 fn check_mesh(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let (name, limits) = (desc.debug_name, &gpu.caps.limits.mesh);
     if let Some(task) = &modules.task {
-        let most =
-            WorkgroupLimits { size: limits.max_task_group_size, invocations: limits.max_task_invocations };
+        let most = WorkgroupLimits {
+            size: limits.max_task_workgroup_size,
+            invocations: limits.max_task_invocations,
+        };
         check_workgroup_size(name, task, desc.specialization, &most)?;
         check_workgroup_memory(name, task, desc.specialization, &task_memory(limits))?;
     }
     let Some(mesh) = &modules.mesh else { return Ok(()) };
-    let most = WorkgroupLimits { size: limits.max_mesh_group_size, invocations: limits.max_mesh_invocations };
+    let most =
+        WorkgroupLimits { size: limits.max_mesh_workgroup_size, invocations: limits.max_mesh_invocations };
     check_workgroup_size(name, mesh, desc.specialization, &most)?;
     check_workgroup_memory(name, mesh, desc.specialization, &mesh_memory(limits))?;
     let [vertices, primitives] = mesh.reflection.mesh_outputs;

@@ -67,7 +67,7 @@ pub(crate) struct Buffer {
     pub(crate) name: String,
     allocation: Option<ObjectMemory>,
     /// True if the buffer was created outside of the library, which then does not destroy it.
-    is_foreign: bool,
+    is_external: bool,
     /// Held while the host copies to or from the mapping, so that threads do not race for the same bytes.
     copying: Mutex<()>,
     gpu: Arc<Gpu>,
@@ -121,7 +121,7 @@ impl Buffer {
             memory: desc.memory,
             name: name.to_owned(),
             allocation: None,
-            is_foreign: false,
+            is_external: false,
             copying: Mutex::new(Rank::BufferBytes, ()),
             gpu: Arc::clone(gpu),
         };
@@ -153,7 +153,7 @@ impl Buffer {
             memory: MemoryKind::Device,
             name: name.to_owned(),
             allocation: None,
-            is_foreign: true,
+            is_external: true,
             copying: Mutex::new(Rank::BufferBytes, ()),
             gpu: Arc::clone(gpu),
         }
@@ -259,7 +259,7 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        if self.is_foreign {
+        if self.is_external {
             return;
         }
         // SAFETY: the owner has waited until the GPU is done with the buffer.

@@ -45,7 +45,7 @@ pub(crate) struct Image {
     /// True if the host writes the initial contents.
     pub(crate) host_filled: bool,
     /// True if the image was created outside of the library, which then does not destroy it.
-    is_foreign: bool,
+    is_external: bool,
     /// External owner of the image, if it must be kept alive.
     owner: Option<Arc<dyn Any + Send + Sync>>,
     gpu: Arc<Gpu>,
@@ -114,7 +114,7 @@ impl Image {
         desc: &TextureDesc<'_>,
         plan: &ImagePlan,
         raw: vk::Image,
-        is_foreign: bool,
+        is_external: bool,
     ) -> Self {
         Self {
             raw,
@@ -131,9 +131,9 @@ impl Image {
             handles: AtomicU32::new(1),
             transient: desc.memory == TextureMemory::Transient,
             memory: None,
-            is_exclusive: !is_foreign && gpu.queues.has_several_domains() && !is_shared(desc),
+            is_exclusive: !is_external && gpu.queues.has_several_domains() && !is_shared(desc),
             host_filled: false,
-            is_foreign,
+            is_external,
             owner: None,
             gpu: Arc::clone(gpu),
         }
@@ -220,7 +220,7 @@ impl Image {
 
 impl Drop for Image {
     fn drop(&mut self) {
-        if self.is_foreign {
+        if self.is_external {
             return;
         }
         // SAFETY: the owners have waited until the GPU is done with the image, and its views are destroyed.

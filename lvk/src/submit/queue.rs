@@ -81,7 +81,7 @@ pub(crate) struct Finished<T> {
     /// Sequence numbers of command buffers that have staging memory.
     pub(crate) staged: Vec<u64>,
     /// Items to destroy now.
-    pub(crate) garbage: Vec<T>,
+    pub(crate) deferred: Vec<T>,
     /// All work up to this value is done, on all queues.
     pub(crate) passed: u64,
 }
@@ -506,8 +506,8 @@ impl<T> SubmitterState<T> {
         let oldest = self.ring.oldest_open();
         let submitted = self.queue_sync.last_values().iter().copied().max().unwrap_or_default();
         let passed = self.queue_sync.completed_up_to(completed);
-        let garbage = self.deferred.take_completed(oldest, submitted, passed);
-        Finished { staged, garbage, passed }
+        let deferred = self.deferred.take_completed(oldest, submitted, passed);
+        Finished { staged, deferred, passed }
     }
 
     /// Returns the waits for images that the presentation engine still owns and the command buffer is the first to use.

@@ -116,12 +116,12 @@ fn cells() -> Vec<Cell> {
 
 /// Shader stages of a queue.
 fn shaders(queue_index: usize) -> impl Strategy<Value = Stages> {
-    let of_lane = [
+    let by_queue = [
         vec![Stages::COMPUTE, Stages::FRAGMENT, Stages::FRAGMENT | Stages::PRE_RASTER],
         vec![Stages::COMPUTE, Stages::RAY_TRACING, Stages::COMPUTE | Stages::RAY_TRACING],
         vec![Stages::TRANSFER],
     ];
-    prop::sample::select(of_lane[queue_index].clone())
+    prop::sample::select(by_queue[queue_index].clone())
 }
 
 /// Uses of a buffer or a texture by commands of a queue.
@@ -398,7 +398,7 @@ fn what_others_wrote_or_will_write_is_waited_for_as_if_it_were_written() {
 }
 
 #[test]
-fn garbage_waits_for_every_queue_that_is_busy_and_for_nothing_before() {
+fn deferred_objects_wait_for_every_busy_queue_and_for_nothing_before() {
     let queue_caps_of =
         |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
     let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);

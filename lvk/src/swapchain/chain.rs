@@ -108,12 +108,12 @@ impl Chain {
         let gpu = self.gpu();
         let functions = gpu.window_functions()?;
         let (chains, indices, waits) = ([self.raw], [index], [sync.drawn]);
-        let (modes, fences) = ([mode.raw()], [sync.shown.unwrap_or_default()]);
+        let (modes, fences) = ([mode.raw()], [sync.present_fence.unwrap_or_default()]);
         let mut mode = vk::SwapchainPresentModeInfoEXT::default().present_modes(&modes);
         let mut fence = vk::SwapchainPresentFenceInfoEXT::default().fences(&fences);
         let mut info =
             vk::PresentInfoKHR::default().wait_semaphores(&waits).swapchains(&chains).image_indices(&indices);
-        if sync.shown.is_some() {
+        if sync.present_fence.is_some() {
             info = info.push_next(&mut mode).push_next(&mut fence);
         }
         let queue = gpu.graphics_queue();
@@ -142,7 +142,7 @@ pub(crate) struct PresentSync {
     /// Signalled by the submission before the present. The presentation engine waits for it.
     pub(crate) drawn: vk::Semaphore,
     /// Signalled once a present no longer uses these objects, if the device supports present fences.
-    shown: Option<vk::Fence>,
+    present_fence: Option<vk::Fence>,
     /// True if the image was presented with these objects since its last acquisition.
     pub(crate) presented: bool,
     /// True if the presentation engine never finishes the image's presents, as far as the library can tell. For tests.
@@ -156,7 +156,7 @@ impl PresentSync {
         let drawn = new_semaphore(gpu, name)?;
         let mut sync = Self {
             drawn,
-            shown: None,
+            present_fence: None,
             presented: false,
             #[cfg(any(test, feature = "test-hooks"))]
             stalls: false,
@@ -165,7 +165,7 @@ impl PresentSync {
         if gpu.window_functions()?.maintenance.is_some() {
             // SAFETY: no preconditions.
             let fence = unsafe { gpu.device.create_fence(&vk::FenceCreateInfo::default(), None) };
-            sync.shown = Some(fence.map_err(Error::vulkan("vkCreateFence"))?);
+            sync.present_fence = Some(fence.map_err(Error::vulkan("vkCreateFence"))?);
         }
         Ok(sync)
     }
@@ -173,7 +173,7 @@ impl PresentSync {
     /// Resets the objects for the next present. The engine has released the image since the last one, so no wait is
     /// needed.
     pub(crate) fn reset(&self) -> Result<()> {
-        let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(()) };
+        let Some(fence) = self.present_fence.filter(|_| self.presented) else { return Ok(()) };
         if !self.wait(PRESENT_TIMEOUT_NS)? {
             return Err(Error::vulkan("vkWaitForFences")(vk::Result::TIMEOUT));
         }
@@ -187,13 +187,13 @@ impl PresentSync {
             return Some(true);
         }
         // SAFETY: the fence is alive. A lost device has no presents.
-        self.shown.map(|fence| unsafe { self.gpu.device.get_fence_status(fence) }.unwrap_or(true))
+        self.present_fence.map(|fence| unsafe { self.gpu.device.get_fence_status(fence) }.unwrap_or(true))
     }
 
     /// Waits at most `timeout_ns` nanoseconds until the presents are finished, if the device can tell. Returns true if
     /// they are finished.
     pub(crate) fn wait(&self, timeout_ns: u64) -> Result<bool> {
-        let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(true) };
+        let Some(fence) = self.present_fence.filter(|_| self.presented) else { return Ok(true) };
         // SAFETY: the fence is alive and belongs to a present.
         match unsafe { self.gpu.device.wait_for_fences(&[fence], true, timeout_ns) } {
             #[cfg(any(test, feature = "test-hooks"))]
@@ -210,7 +210,7 @@ impl Drop for PresentSync {
         // SAFETY: the owner has waited for the presents.
         unsafe {
             self.gpu.device.destroy_semaphore(self.drawn, None);
-            self.shown.into_iter().for_each(|fence| self.gpu.device.destroy_fence(fence, None));
+            self.present_fence.into_iter().for_each(|fence| self.gpu.device.destroy_fence(fence, None));
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::test_support::submit_hook;
 pub use crate::test_support::window::*;
 
 /// Creates a context whose recorded commands do nothing, to measure the library's own recording time.
-pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
+pub fn null_command_context(desc: &ContextDesc<'_>) -> Result<Context> {
     with_null_commands(|| Context::new(desc))
 }
 
@@ -30,11 +30,11 @@ pub fn fail_submission_after(submissions: u32) {
     fault_injection::fail_after(submissions);
 }
 
-/// Runs `deed` on this thread right before it acquires its next command buffer, in place of another thread.
+/// Runs `hook` on this thread right before it acquires its next command buffer, in place of another thread.
 ///
-/// Locks may be held then: `deed` may destroy objects, but must not submit.
-pub fn before_next_command_buffer(deed: impl FnOnce() + 'static) {
-    submit_hook::before_next_command_buffer(Box::new(deed));
+/// Locks may be held then: `hook` may destroy objects, but must not submit.
+pub fn before_next_command_buffer(hook: impl FnOnce() + 'static) {
+    submit_hook::before_next_command_buffer(Box::new(hook));
 }
 
 /// Returns the number of submissions so far.
@@ -53,11 +53,11 @@ pub fn waiting_objects(ctx: &Context) -> Result<usize> {
     Ok(ctx.device_state().submitter.deferred_count())
 }
 
-/// Compiles every kernel. Calls `tell` with the kernel's name first.
-pub fn compile_kernels(ctx: &Context, tell: &mut dyn FnMut(&str)) -> Result<()> {
+/// Compiles every kernel. Calls `on_kernel` with the kernel's name first.
+pub fn compile_kernels(ctx: &Context, on_kernel: &mut dyn FnMut(&str)) -> Result<()> {
     let shared = ctx.device_state();
     for kernel in Kernel::ALL {
-        tell(kernel.name());
+        on_kernel(kernel.name());
         shared.kernels.pipeline_of(&shared.gpu, &shared.layout, shared.pipeline_base().cache, *kernel)?;
     }
     Ok(())

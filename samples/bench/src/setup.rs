@@ -54,7 +54,7 @@ impl Setup {
 
     /// Opens the device with command functions that do nothing.
     pub(super) fn open_null_device(&self) -> Result<Context, BenchError> {
-        Ok(lvk::test_hooks::silent_context(&self.desc(&self.profile))?)
+        Ok(lvk::test_hooks::null_command_context(&self.desc(&self.profile))?)
     }
 
     /// Opens the device with this scratch budget.

@@ -124,7 +124,7 @@ pub fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
 pub fn device_text(capabilities: &Capabilities) -> String {
     let text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
     match &capabilities.profile {
-        Some(profile) => text + &format!("profile   {profile}, rehearsed on this device\n"),
+        Some(profile) => text + &format!("profile   {profile}, emulated on this device\n"),
         None => text,
     }
 }

@@ -35,7 +35,7 @@ impl Interrupt {
 
     /// A flag without signal handlers; only [`Interrupt::raise`] raises it.
     #[must_use]
-    pub fn deaf() -> Self {
+    pub fn without_handlers() -> Self {
         Self::default()
     }
 

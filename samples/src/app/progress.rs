@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::loading::{Status, Stopped};
 
 /// Delay before the progress is displayed.
-const PATIENCE: Duration = Duration::from_secs(2);
+const DELAY: Duration = Duration::from_secs(2);
 /// Time between two looks at the clock, and two steps of the spinner.
 const TICK: Duration = Duration::from_millis(100);
 /// Time between two lines about one stage.
@@ -32,7 +32,7 @@ pub struct Progress {
 #[derive(Debug, Clone, Copy)]
 struct Timing {
     start: Instant,
-    patience: Duration,
+    delay: Duration,
     tick: Duration,
 }
 
@@ -52,21 +52,21 @@ impl Progress {
 
     /// As [`visible`](Self::visible), but where standard error is no terminal each stage is a line there, with more lines for
     /// one that takes long.
-    pub fn spoken() -> Self {
+    pub fn with_log_lines() -> Self {
         let visible = Self::visible();
         Self { lines: (!visible.is_seen).then(Lines::default), ..visible }
     }
 
     /// Progress without output.
     pub fn hidden() -> Self {
-        let timing = Timing { start: Instant::now(), patience: PATIENCE, tick: TICK };
+        let timing = Timing { start: Instant::now(), delay: DELAY, tick: TICK };
         let target = ProgressDrawTarget::stderr;
         Self { timing, is_seen: false, target, shown: None, lines: None, status: None }
     }
 
-    /// Tells `status` of everything, too, and ends the work when that is asked to stop.
+    /// Reports everything to `status`, too, and ends the work when `status` is asked to stop.
     #[must_use]
-    pub fn told_to(self, status: &Status) -> Self {
+    pub fn with_status(self, status: &Status) -> Self {
         Self { status: Some(status.clone()), ..self }
     }
 
@@ -160,7 +160,7 @@ impl VisibleBar {
         let ticked = bar.clone();
         let tick = move || {
             while stopped.recv_timeout(timing.tick) == Err(RecvTimeoutError::Timeout) {
-                if ticked.is_hidden() && timing.start.elapsed() > timing.patience {
+                if ticked.is_hidden() && timing.start.elapsed() > timing.delay {
                     ticked.set_draw_target(target());
                 }
                 ticked.tick();
@@ -226,8 +226,8 @@ mod tests {
         }
     }
 
-    fn progress(patience: Duration) -> Progress {
-        let timing = Timing { start: Instant::now(), patience, tick: Duration::from_millis(1) };
+    fn progress(delay: Duration) -> Progress {
+        let timing = Timing { start: Instant::now(), delay, tick: Duration::from_millis(1) };
         let target = || ProgressDrawTarget::term_like(Box::new(Terminal));
         Progress { timing, is_seen: true, target, ..Progress::hidden() }
     }
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn whoever_is_told_can_stop_the_work() {
         let status = Status::default();
-        let mut progress = Progress::hidden().told_to(&status);
+        let mut progress = Progress::hidden().with_status(&status);
         progress.stage("a", 10);
         progress.set(5);
         assert_eq!(progress.go_on(), Ok(()));

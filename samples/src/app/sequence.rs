@@ -194,7 +194,7 @@ mod tests {
 
     impl Counter {
         fn new(raise_in: u32) -> Self {
-            Self { frame: 0, rendered: Vec::new(), raise_in, interrupt: Interrupt::deaf() }
+            Self { frame: 0, rendered: Vec::new(), raise_in, interrupt: Interrupt::without_handlers() }
         }
 
         fn render_frames(&mut self, job: &RenderJob) -> Result<RenderReport, RunError> {

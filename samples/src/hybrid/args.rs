@@ -21,15 +21,15 @@ pub struct HybridArgs {
 
     /// Method that finds the visible surfaces [default: hybrid, or standalone on a device that cannot]
     #[arg(long, value_enum)]
-    pub method: Option<Method>,
+    pub method: Option<MethodArg>,
 
     /// Data that the hybrid method's geometry pass leaves for the rays
-    #[arg(long, value_enum, default_value_t = GBuffer::Visibility)]
-    pub gbuffer: GBuffer,
+    #[arg(long, value_enum, default_value_t = GBufferArg::Visibility)]
+    pub gbuffer: GBufferArg,
 
     /// Rasteriser of visible triangles
-    #[arg(long, value_enum, default_value_t = Raster::Auto)]
-    pub raster: Raster,
+    #[arg(long, value_enum, default_value_t = RasterArg::Auto)]
+    pub raster: RasterArg,
 
     /// Most pixels of a triangle that one thread of the compute rasteriser takes on, for tuning
     #[arg(long, value_name = "PIXELS", hide = true)]
@@ -49,8 +49,8 @@ pub struct HybridArgs {
     pub depth: u32,
 
     /// Time at which the rays of mirrors and glass are traced; the image is the same
-    #[arg(long, value_enum, default_value_t = Bounces::Auto)]
-    pub bounces: Bounces,
+    #[arg(long, value_enum, default_value_t = BouncesArg::Auto)]
+    pub bounces: BouncesArg,
 
     /// Views of each pixel, 1 to 256, whose average smooths edges; each costs as much as the first
     #[arg(
@@ -72,7 +72,7 @@ pub struct HybridArgs {
 
 /// The method that finds the visible surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Method {
+pub enum MethodArg {
     /// Everything by rays, from the camera on.
     Standalone,
     /// Rasterise first; rays only for shadows, mirrors and glass.
@@ -81,7 +81,7 @@ pub enum Method {
 
 /// The data that the geometry pass leaves for the rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum GBuffer {
+pub enum GBufferArg {
     /// Position, normals, albedo and triangle, as in the paper.
     Paper,
     /// The triangle alone.
@@ -90,7 +90,7 @@ pub enum GBuffer {
 
 /// The rasteriser of visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Raster {
+pub enum RasterArg {
     /// By compute where the device can, as its picture is exactly that of rays; says how long each took in a few frames.
     Auto,
     /// By compute shaders with 64-bit atomics.
@@ -102,7 +102,7 @@ pub enum Raster {
 
 /// The time at which rays of mirrors and glass are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Bounces {
+pub enum BouncesArg {
     /// The best for the device and the method.
     Auto,
     /// At once, by the thread of the pixel.

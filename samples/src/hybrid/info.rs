@@ -75,12 +75,12 @@ pictures get their names when they are complete. A film of them: ffmpeg -framera
 
 /// The method that is named, if only by something that it alone has.
 fn wished_method(args: &HybridArgs) -> Option<Method> {
-    let names_hybrid = args.gbuffer == args::GBuffer::Paper
-        || args.raster != args::Raster::Auto
-        || args.bounces == args::Bounces::First;
+    let names_hybrid = args.gbuffer == args::GBufferArg::Paper
+        || args.raster != args::RasterArg::Auto
+        || args.bounces == args::BouncesArg::First;
     match args.method {
-        Some(args::Method::Standalone) => Some(Method::Standalone),
-        Some(args::Method::Hybrid) => Some(Method::Hybrid),
+        Some(args::MethodArg::Standalone) => Some(Method::Standalone),
+        Some(args::MethodArg::Hybrid) => Some(Method::Hybrid),
         None => names_hybrid.then_some(Method::Hybrid),
     }
 }
@@ -96,22 +96,22 @@ fn stand_in(capabilities: &Capabilities) -> String {
 
 fn config(args: &HybridArgs, [width, height]: [u32; 2], method: Method, path: RayPath) -> HybridConfig {
     let raster = match args.raster {
-        args::Raster::Auto => None,
-        args::Raster::Compute => Some(Raster::Compute),
-        args::Raster::Hardware => Some(Raster::Hardware),
+        args::RasterArg::Auto => None,
+        args::RasterArg::Compute => Some(Raster::Compute),
+        args::RasterArg::Hardware => Some(Raster::Hardware),
     };
     let geometry = match args.gbuffer {
-        args::GBuffer::Paper => Geometry::Paper,
-        args::GBuffer::Visibility => Geometry::Visibility(raster),
+        args::GBufferArg::Paper => Geometry::Paper,
+        args::GBufferArg::Visibility => Geometry::Visibility(raster),
     };
     let usual = RasterTuning::default();
     let (small_pixels, medium_pixels) = (args.small_triangle, args.medium_triangle);
     let tuning = RasterTuning { small_pixels, medium_pixels, ..usual };
     let bounces = match args.bounces {
-        args::Bounces::Auto => None,
-        args::Bounces::Inline => Some(Bounces::Inline),
-        args::Bounces::Queued => Some(Bounces::Queued),
-        args::Bounces::First => Some(Bounces::First),
+        args::BouncesArg::Auto => None,
+        args::BouncesArg::Inline => Some(Bounces::Inline),
+        args::BouncesArg::Queued => Some(Bounces::Queued),
+        args::BouncesArg::First => Some(Bounces::First),
     };
     let (max_depth, samples) = (args.depth, args.samples);
     HybridConfig { method, path, width, height, max_depth, bounces, samples, geometry, tuning }
@@ -174,8 +174,8 @@ mod tests {
         assert_eq!((run.width, run.height, scene.camera.number, args.depth), (1280, 720, 1, 4));
         assert_eq!((run.frames.clone(), run.round, run.resume), (None, 240, false));
         assert_eq!((args.method, args.tracing.rt, run.validate), (None, RayTracing::Auto, None));
-        assert_eq!((args.gbuffer, args.raster), (args::GBuffer::Visibility, args::Raster::Auto));
-        assert_eq!((args.bounces, args.samples), (args::Bounces::Auto, 1));
+        assert_eq!((args.gbuffer, args.raster), (args::GBufferArg::Visibility, args::RasterArg::Auto));
+        assert_eq!((args.bounces, args.samples), (args::BouncesArg::Auto, 1));
         assert_eq!((scene.scene.clone(), args.lamp), (None, args::Lamp::Still));
         assert_eq!(run.out_or("hybrid"), Path::new("hybrid.png"));
     }

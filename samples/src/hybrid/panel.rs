@@ -42,7 +42,7 @@ fn show_method(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabiliti
     let can_be = |config: &HybridConfig| can_be(config, capabilities);
     ui.horizontal(|ui| {
         ui.label("seen");
-        let by = |method| move |config| mended(HybridConfig { method, ..config });
+        let by = |method| move |config| corrected(HybridConfig { method, ..config });
         option_button(ui, config, "by rays", by(Method::Standalone), can_be);
         option_button(ui, config, "by rasteriser", by(Method::Hybrid), can_be);
     });
@@ -62,7 +62,7 @@ fn show_method(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabiliti
             |config| HybridConfig { geometry: triangles, ..config },
             can_be,
         );
-        let of_paper = |config| mended(HybridConfig { geometry: Geometry::Paper, ..config });
+        let of_paper = |config| corrected(HybridConfig { geometry: Geometry::Paper, ..config });
         option_button(ui, config, "the paper's", of_paper, can_be);
     });
 }
@@ -92,7 +92,7 @@ fn can_be(config: &HybridConfig, capabilities: &Capabilities) -> bool {
 }
 
 /// The configuration with bounces that its method has.
-fn mended(config: HybridConfig) -> HybridConfig {
+fn corrected(config: HybridConfig) -> HybridConfig {
     let is_lost = config.bounces == Some(Bounces::First) && !config.knows_triangles();
     HybridConfig { bounces: if is_lost { Some(Bounces::Inline) } else { config.bounces }, ..config }
 }
@@ -102,16 +102,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounces_that_a_method_lacks_are_given_up() {
+    fn bounces_that_a_method_lacks_become_inline() {
         let first = HybridConfig { bounces: Some(Bounces::First), ..HybridConfig::default() };
-        assert_eq!(mended(first), first);
-        for lacking in [
+        assert_eq!(corrected(first), first);
+        for unsupported in [
             HybridConfig { method: Method::Standalone, ..first },
             HybridConfig { geometry: Geometry::Paper, ..first },
         ] {
-            assert_eq!(mended(lacking), HybridConfig { bounces: Some(Bounces::Inline), ..lacking });
-            let queued = HybridConfig { bounces: Some(Bounces::Queued), ..lacking };
-            assert_eq!(mended(queued), queued);
+            assert_eq!(
+                corrected(unsupported),
+                HybridConfig { bounces: Some(Bounces::Inline), ..unsupported }
+            );
+            let queued = HybridConfig { bounces: Some(Bounces::Queued), ..unsupported };
+            assert_eq!(corrected(queued), queued);
         }
     }
 }

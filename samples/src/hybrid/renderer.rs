@@ -32,7 +32,7 @@ impl HybridRenderer {
     /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
     pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
-        let config = suited(config, scene, ctx.capabilities());
+        let config = valid_for(config, scene, ctx.capabilities());
         let gpu_scene = GpuScene::new(ctx, scene, HitGroups::default())?;
         Ok(Self {
             passes: FramePasses::new(ctx, &gpu_scene, &config)?,
@@ -214,7 +214,7 @@ impl HybridRenderer {
 }
 
 /// The configuration with what it leaves open decided, and without bounces where nothing mirrors or refracts.
-fn suited(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> HybridConfig {
+fn valid_for(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> HybridConfig {
     let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
     let suits = match (capabilities.is_cpu, config.knows_triangles()) {
         (true, _) if can_queue => Bounces::Queued,

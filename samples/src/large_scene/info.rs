@@ -181,7 +181,7 @@ fn in_background(
 
 /// The device is opened when it is known how many textures it is to have room for.
 fn at_once(load: &Load, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Loading<LargeScene>>, RunError> {
-    setup.progress = Progress::spoken();
+    setup.progress = Progress::with_log_lines();
     let world = load.world(&mut setup.progress)?;
     let textures = world.textures_needed();
     let tracing = DeviceNeeds::tracing(load.args.tracing.rt);

@@ -36,18 +36,18 @@ impl Counter {
             self.wait()?;
         }
         if self.coming.is_none() {
-            self.ask(ctx)?;
+            self.request_count(ctx)?;
         }
         cmd.fill_buffer(*self.buffer, 0, Self::BYTES, 0)
     }
 
     /// Reads the number of the last frame, which the GPU has finished.
     pub(super) fn read(&mut self, ctx: &Context) -> lvk::Result<()> {
-        self.ask(ctx)?;
+        self.request_count(ctx)?;
         self.wait()
     }
 
-    fn ask(&mut self, ctx: &Context) -> lvk::Result<()> {
+    fn request_count(&mut self, ctx: &Context) -> lvk::Result<()> {
         self.coming = Some(ctx.read_buffer_later(*self.buffer, 0..Self::BYTES)?);
         Ok(())
     }

@@ -138,13 +138,14 @@ impl Models {
 pub(super) fn instances(phase: f32) -> Vec<Instance> {
     use Material::{Glaze, Glow, Metal, Plaster, Tiles};
     let stone = [0.52, 0.44, 0.35];
-    let mut all = vec![still(Vec3::ZERO, [0.4; 3], Tiles), still(Vec3::ZERO, [0.72, 0.55, 0.4], Plaster)];
+    let mut all =
+        vec![unrotated(Vec3::ZERO, [0.4; 3], Tiles), unrotated(Vec3::ZERO, [0.72, 0.55, 0.4], Plaster)];
     for place in [[-2.9, 0.0, -3.2], [2.9, 0.0, -3.2], [-3.3, 0.0, 0.3], [3.3, 0.0, 0.3]] {
-        all.push(still(place.into(), stone, Glaze));
+        all.push(unrotated(place.into(), stone, Glaze));
     }
     let plinths = [Vec3::new(-1.35, 0.0, -2.5), Vec3::new(1.35, 0.0, -2.5)];
-    all.extend(plinths.map(|place| still(place, stone, Glaze)));
-    all.push(still(plinths[0] + Vec3::Y * 1.14, [0.05, 0.16, 0.2], Glaze));
+    all.extend(plinths.map(|place| unrotated(place, stone, Glaze)));
+    all.push(unrotated(plinths[0] + Vec3::Y * 1.14, [0.05, 0.16, 0.2], Glaze));
     let turning = Quat::from_rotation_y(TAU * phase);
     all.push(placed(plinths[1] + Vec3::Y * 1.22, turning, [0.85, 0.5, 0.22], Metal));
     let hanging = hanging(phase);
@@ -155,9 +156,9 @@ pub(super) fn instances(phase: f32) -> Vec<Instance> {
     all.push(instance(hanging * below * turned, brass, Metal));
     for number in 0..3 {
         let color = [[0.75, 0.12, 0.06], [0.08, 0.35, 0.4], [0.8, 0.6, 0.15]][number];
-        all.push(still(lamp(phase) + orbit(number, phase), color, Glaze));
+        all.push(unrotated(lamp(phase) + orbit(number, phase), color, Glaze));
     }
-    all.push(still(lamp(phase), [9.0, 6.6, 4.0], Glow));
+    all.push(unrotated(lamp(phase), [9.0, 6.6, 4.0], Glow));
     all
 }
 
@@ -187,7 +188,7 @@ fn orbit(number: usize, phase: f32) -> Vec3 {
     radius * (Quat::from_rotation_z(tilt) * Vec3::new(angle.cos(), 0.0, angle.sin()))
 }
 
-fn still(place: Vec3, color: [f32; 3], material: Material) -> Instance {
+fn unrotated(place: Vec3, color: [f32; 3], material: Material) -> Instance {
     placed(place, Quat::IDENTITY, color, material)
 }
 

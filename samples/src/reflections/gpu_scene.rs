@@ -108,7 +108,7 @@ impl GeometryArena {
         for model in models {
             let bounds = model.parts.iter().map(|(mesh, _)| mesh.bounds());
             let (low, high) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default();
-            let grid = Grid::over(low, high);
+            let grid = Grid::from_bounds(low, high);
             let parts = model.parts.iter().map(|(mesh, material)| arena.add(mesh, *material, grid)).collect();
             arena.models.push(PackedModel { grid, parts });
         }

@@ -27,8 +27,8 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The finest one over the box from `low` to `high`.
-    pub(super) fn over(low: Vec3, high: Vec3) -> Self {
+    /// Returns the finest grid over the bounds from `low` to `high`.
+    pub(super) fn from_bounds(low: Vec3, high: Vec3) -> Self {
         Self { centre: 0.5 * (low + high), extent: (0.5 * (high - low)).max(Vec3::splat(1e-4)) }
     }
 
@@ -80,7 +80,7 @@ mod tests {
             at in prop::array::uniform3(0.0_f32..=1.0),
         ) {
             let (low, size) = (Vec3::from(low), Vec3::from(size));
-            let grid = Grid::over(low, low + size);
+            let grid = Grid::from_bounds(low, low + size);
             let position = low + size * Vec3::from(at);
             let vertex = Vertex { position, normal: Vec3::Y, texcoord: Vec2::ZERO };
             let error = (unpacked(&grid.pack(&vertex), grid) - position).abs();

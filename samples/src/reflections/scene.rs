@@ -96,7 +96,7 @@ pub(super) mod material {
 
 impl HallScene {
     pub(super) fn new() -> Self {
-        let (models, placed) = furnish();
+        let (models, placed) = create_models();
         Self {
             models,
             placed,
@@ -119,7 +119,7 @@ pub(super) fn camera(phase: f32) -> Camera {
     Camera::looking_at(eye, [0.45 + 0.3 * sway, 1.0, -9.0], 50.0)
 }
 
-fn furnish() -> (Vec<Model>, Vec<Placed>) {
+fn create_models() -> (Vec<Model>, Vec<Placed>) {
     let upright = |x: f32, y: f32, z: f32| Affine3A::from_translation(Vec3::new(x, y, z));
     let here = vec![Affine3A::IDENTITY];
     let both = |x: f32, y: f32, zs: Vec<f32>| -> Vec<Affine3A> {

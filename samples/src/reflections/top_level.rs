@@ -83,16 +83,16 @@ impl TopLevel {
     ///
     /// There is no test against the view frustum: mirrors show what is behind the viewer.
     pub(super) fn record(&self, cmd: &mut CommandBuffer, eye: Vec3, min_angle: f32) -> lvk::Result<()> {
-        cmd.update_tlas(*self.tlas, &self.shown(eye, min_angle), BuildMode::Rebuild)
+        cmd.update_tlas(*self.tlas, &self.kept_instances(eye, min_angle), BuildMode::Rebuild)
     }
 
     /// Number of instances that [`record`](Self::record) puts into the TLAS.
     pub(super) fn count(&self, eye: Vec3, min_angle: f32) -> InstanceCount {
         let total = (self.instances.len() + self.animation.len()) as u32;
-        InstanceCount { kept: self.shown(eye, min_angle).len() as u32, total }
+        InstanceCount { kept: self.kept_instances(eye, min_angle).len() as u32, total }
     }
 
-    fn shown(&self, eye: Vec3, min_angle: f32) -> Vec<TlasInstance> {
+    fn kept_instances(&self, eye: Vec3, min_angle: f32) -> Vec<TlasInstance> {
         let culling = InstanceCulling { eye, min_angle, ..InstanceCulling::default() };
         let keeps = |candidate: &&Candidate| {
             let (low, high) = candidate.bounds;

@@ -33,7 +33,7 @@ impl RtxPipelineConfig {
 
     /// With a path and a depth that the device has: pipelines that cannot even trace a shadow ray from a hit shader leave it
     /// to queries, where there are any.
-    pub(super) fn suited(self, capabilities: &Capabilities) -> Self {
+    pub(super) fn valid_for(self, capabilities: &Capabilities) -> Self {
         let levels = capabilities.limits.max_ray_recursion;
         let depth = self.depth.min(Self::MAX_DEPTH);
         match self.rtx.path {

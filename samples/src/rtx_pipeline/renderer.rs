@@ -56,7 +56,7 @@ impl RtxPipeline {
     /// # Errors
     /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
     pub fn new(ctx: &Context, scene: &Scene, config: &RtxPipelineConfig) -> Result<Self, SampleError> {
-        let config = config.suited(ctx.capabilities());
+        let config = config.valid_for(ctx.capabilities());
         let target = config.rtx.create_target(ctx)?;
         let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
         let path = CameraPath::tour(scene, 0);

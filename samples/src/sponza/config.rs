@@ -60,7 +60,7 @@ impl SponzaConfig {
     ///
     /// # Errors
     /// [`SampleError::Missing`] for counted draws on a device without them, and for samples that are neither 1 nor 4.
-    pub(super) fn suited(self, ctx: &Context) -> Result<Self, SampleError> {
+    pub(super) fn valid_for(self, ctx: &Context) -> Result<Self, SampleError> {
         let has_counts = ctx.capabilities().has(OptionalFeature::DrawIndirectCount);
         let best = if has_counts { DrawPath::Counted } else { DrawPath::Padded };
         let draws = self.draws.unwrap_or(best);

@@ -84,7 +84,7 @@ impl Sponza {
     /// [`SampleError`] when the configuration is beyond the device, or the device fails.
     pub fn new(ctx: &Context, mut scene: Scene, config: &SponzaConfig) -> Result<Self, SampleError> {
         check_promises(&scene)?;
-        let config = config.suited(ctx)?;
+        let config = config.valid_for(ctx)?;
         let target = RenderTarget::with_samples(ctx, config.extent, config.samples)?;
         let draws = split_draws(&mut scene, config.triangles_per_draw);
         let path = CameraPath::tour(&scene, 0);

@@ -8,46 +8,46 @@ use lvk::{Context, Error, Holder, TextureHandle};
 use crate::app::scene_textures;
 use crate::scene::PAINTED;
 
-/// A texture that is wished for.
+/// A request for a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Wish {
+pub(super) struct LoadRequest {
     /// Its number in [`PAINTED`].
     pub(super) number: usize,
-    /// Tells wishes for the same texture apart.
+    /// Distinguishes requests for the same texture.
     pub(super) ticket: u64,
 }
 
 /// The result of a request.
-pub(super) type Answer = (Wish, lvk::Result<Holder<TextureHandle>>);
+pub(super) type Answer = (LoadRequest, lvk::Result<Holder<TextureHandle>>);
 
 /// The thread, with its ends of both ways.
 pub(super) struct Loader {
-    wishes: Option<Sender<Wish>>,
+    requests: Option<Sender<LoadRequest>>,
     answers: Receiver<Answer>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Loader {
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
-        let ((wishes, asked), (answer, answers), ctx) = (channel(), channel(), ctx.clone());
+        let ((requests, incoming), (answer, answers), ctx) = (channel(), channel(), ctx.clone());
         let work = move || {
-            // Ends where nobody wishes, or nobody wants to know, any more.
-            for wish in asked {
-                let texture = paint(&ctx, wish);
-                if answer.send((wish, texture)).is_err() {
+            // Ends when the loader drops its end of either channel.
+            for request in incoming {
+                let texture = paint(&ctx, request);
+                if answer.send((request, texture)).is_err() {
                     break;
                 }
             }
         };
         let spawned = thread::Builder::new().name("textures".to_owned()).spawn(work);
         let thread = spawned.map_err(|_| Error::OutOfHostMemory { call: "std::thread::Builder::spawn" })?;
-        Ok(Self { wishes: Some(wishes), answers, thread: Some(thread) })
+        Ok(Self { requests: Some(requests), answers, thread: Some(thread) })
     }
 
-    /// Asks for a texture; the answer comes when it comes.
-    pub(super) fn ask(&self, wish: Wish) {
+    /// Requests a texture. [`poll`](Self::poll) or [`wait`](Self::wait) returns it later.
+    pub(super) fn request(&self, request: LoadRequest) {
         // The thread listens as long as this lives.
-        let _ = self.wishes.as_ref().map(|wishes| wishes.send(wish));
+        let _ = self.requests.as_ref().map(|requests| requests.send(request));
     }
 
     /// An answer that is there.
@@ -63,13 +63,13 @@ impl Loader {
 
 impl Drop for Loader {
     fn drop(&mut self) {
-        self.wishes = None;
+        self.requests = None;
         // A texture that the thread is still painting is dropped with the answers.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
 /// The upload takes its place before the next submission, whichever thread makes that.
-fn paint(ctx: &Context, wish: Wish) -> lvk::Result<Holder<TextureHandle>> {
-    scene_textures::picture(ctx, &(PAINTED[wish.number].paint)())
+fn paint(ctx: &Context, request: LoadRequest) -> lvk::Result<Holder<TextureHandle>> {
+    scene_textures::picture(ctx, &(PAINTED[request.number].paint)())
 }

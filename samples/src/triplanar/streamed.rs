@@ -2,7 +2,7 @@
 
 use lvk::{Context, Format, Holder, TextureDesc, TextureHandle};
 
-use super::loader::{Loader, Wish};
+use super::loader::{LoadRequest, Loader};
 use crate::scene::PAINTED;
 
 /// Number of textures.
@@ -29,7 +29,7 @@ pub(super) struct Streamed {
 
 enum Slot {
     Resident(Holder<TextureHandle>),
-    /// With the ticket of the wish.
+    /// With the ticket of the request.
     Loading(u64),
     Unloaded,
 }
@@ -70,14 +70,14 @@ impl Streamed {
         if let Some(slot @ Slot::Unloaded) = self.slots.get_mut(number) {
             self.tickets += 1;
             *slot = Slot::Loading(self.tickets);
-            self.loader.ask(Wish { number, ticket: self.tickets });
+            self.loader.request(LoadRequest { number, ticket: self.tickets });
         }
     }
 
     /// Takes in what has been made since the last time.
     pub(super) fn take_in(&mut self) -> lvk::Result<()> {
-        while let Some((wish, texture)) = self.loader.poll() {
-            self.place(wish, texture)?;
+        while let Some((request, texture)) = self.loader.poll() {
+            self.install(request, texture)?;
         }
         Ok(())
     }
@@ -85,16 +85,20 @@ impl Streamed {
     /// Waits for everything that is coming.
     pub(super) fn wait(&mut self) -> lvk::Result<()> {
         while self.slots.iter().any(|slot| matches!(slot, Slot::Loading(_))) {
-            let Some((wish, texture)) = self.loader.wait() else { break };
-            self.place(wish, texture)?;
+            let Some((request, texture)) = self.loader.wait() else { break };
+            self.install(request, texture)?;
         }
         Ok(())
     }
 
     /// A texture that was given up meanwhile has another ticket, or none, and is dropped.
-    fn place(&mut self, wish: Wish, texture: lvk::Result<Holder<TextureHandle>>) -> lvk::Result<()> {
-        let slot = &mut self.slots[wish.number];
-        if matches!(slot, Slot::Loading(ticket) if *ticket == wish.ticket) {
+    fn install(
+        &mut self,
+        request: LoadRequest,
+        texture: lvk::Result<Holder<TextureHandle>>,
+    ) -> lvk::Result<()> {
+        let slot = &mut self.slots[request.number];
+        if matches!(slot, Slot::Loading(ticket) if *ticket == request.ticket) {
             *slot = Slot::Unloaded;
             *slot = Slot::Resident(texture?);
         }

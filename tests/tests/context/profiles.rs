@@ -33,7 +33,7 @@ fn built_in_profiles_leave_what_they_say() {
         assert_eq!(left.mesh_shader, real.mesh_shader && profile.mesh_shader, "{name}");
         let any = left.ray_tracing_pipeline || left.ray_query;
         assert_eq!(left.position_fetch, real.position_fetch && profile.position_fetch && any, "{name}");
-        assert_eq!(ctx.accel_memory().structure_bytes > 0, any, "{name}: the dummy structure");
+        assert_eq!(ctx.accel_memory().structure_bytes > 0, any, "{name}: the default TLAS");
     }
 }
 
@@ -190,7 +190,7 @@ fn limits_of_mesh_shaders_are_there_with_them_only() {
     let limits = |ctx: &Context| ctx.capabilities().limits.mesh;
     let has = ctx.capabilities().mesh_shader;
     assert_eq!(limits(&ctx) != Default::default(), has);
-    assert!(!has || limits(&ctx).max_mesh_groups_total >= 1 << 22, "{:?}", limits(&ctx));
+    assert!(!has || limits(&ctx).max_mesh_workgroups_total >= 1 << 22, "{:?}", limits(&ctx));
     let Some(ctx) = under(&DeviceProfile { mesh_shader: false, ..DeviceProfile::default() }) else { return };
     assert_eq!(limits(&ctx), Default::default());
     let device = ctx.raw_device().handle();

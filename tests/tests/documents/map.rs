@@ -64,11 +64,11 @@ fn files() -> Vec<String> {
             let listed = String::from_utf8(output.stdout).unwrap();
             listed.lines().filter(|file| project().join(file).exists()).map(str::to_owned).collect()
         }
-        _ => walk(&project(), ""),
+        _ => list_files(&project(), ""),
     }
 }
 
-fn walk(root: &Path, below: &str) -> Vec<String> {
+fn list_files(root: &Path, below: &str) -> Vec<String> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(root.join(below)).unwrap() {
         let entry = entry.unwrap();
@@ -76,7 +76,7 @@ fn walk(root: &Path, below: &str) -> Vec<String> {
         let path = if below.is_empty() { name.clone() } else { format!("{below}/{name}") };
         match entry.file_type().unwrap().is_dir() {
             true if name.starts_with('.') || name == "target" => {}
-            true => found.extend(walk(root, &path)),
+            true => found.extend(list_files(root, &path)),
             false => found.push(path),
         }
     }

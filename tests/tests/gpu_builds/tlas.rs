@@ -20,12 +20,12 @@ struct Record {
     structure: u64,
 }
 
-/// Acceleration structures to show, with their bounds.
-struct Shown {
+/// BLAS for a TLAS to reference, with their bounds.
+struct TestBlases {
     structures: Vec<(GpuStructure, CheckBounds)>,
 }
 
-impl Shown {
+impl TestBlases {
     fn new(ctx: &TestDevice) -> Self {
         let one = |count: usize| {
             let vertices = build_input_buffer(ctx, &scattered_triangles(count, count as u64));
@@ -61,16 +61,16 @@ impl Shown {
 
     /// Returns the least bounds of an instance, in 64 bits.
     fn world(&self, record: &Record, place: usize) -> Option<CheckBounds> {
-        let shown = self.structures[place].1;
+        let local = self.structures[place].1;
         let m = record.rows.map(f64::from);
         let determinant = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8])
             + m[2] * (m[4] * m[9] - m[5] * m[8]);
         let alive =
-            record.custom_index_and_mask >> 24 != 0 && determinant != 0.0 && shown[0][0] <= shown[1][0];
+            record.custom_index_and_mask >> 24 != 0 && determinant != 0.0 && local[0][0] <= local[1][0];
         alive.then(|| {
             let mut bounds = EMPTY;
             for corner in 0..8 {
-                let p: [f64; 3] = std::array::from_fn(|axis| f64::from(shown[corner >> axis & 1][axis]));
+                let p: [f64; 3] = std::array::from_fn(|axis| f64::from(local[corner >> axis & 1][axis]));
                 for row in 0..3 {
                     let r = &m[row * 4..row * 4 + 4];
                     let world = r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3];
@@ -121,18 +121,18 @@ impl Shown {
 #[test]
 fn every_instance_is_in_one_leaf() {
     let Some(ctx) = device() else { return };
-    let shown = Shown::new(&ctx);
-    let addresses: Vec<u64> = shown.structures.iter().map(|(structure, _)| structure.address).collect();
+    let blases = TestBlases::new(&ctx);
+    let addresses: Vec<u64> = blases.structures.iter().map(|(structure, _)| structure.address).collect();
     let table = build_input_buffer(&ctx, &addresses);
     for (count, capacity) in
         [(0, 0), (0, 10), (1, 1), (2, 5), (3, 3), (100, 100), (2048, 2048), (2049, 4000), (10_000, 10_000)]
     {
         for by_place in [false, true] {
-            let records = shown.records(count, by_place);
+            let records = blases.records(count, by_place);
             let buffer = build_input_buffer(&ctx, &records);
             let table = by_place.then_some((*table, addresses.len() as u32));
             let tlas = build_tlas(&ctx, *buffer, count as u32, capacity, table).unwrap();
-            shown.check(&ctx, &tlas, &records);
+            blases.check(&ctx, &tlas, &records);
         }
     }
 }
@@ -140,9 +140,9 @@ fn every_instance_is_in_one_leaf() {
 #[test]
 fn instances_that_no_ray_meets_are_left_out() {
     let Some(ctx) = device() else { return };
-    let shown = Shown::new(&ctx);
+    let blases = TestBlases::new(&ctx);
     for count in [40, 4000] {
-        let mut records = shown.records(count, false);
+        let mut records = blases.records(count, false);
         for (i, record) in records.iter_mut().enumerate() {
             match i % 7 {
                 0 => record.custom_index_and_mask &= 0x00ff_ffff,
@@ -152,16 +152,16 @@ fn instances_that_no_ray_meets_are_left_out() {
         }
         let buffer = build_input_buffer(&ctx, &records);
         let tlas = build_tlas(&ctx, *buffer, count as u32, count as u32, None).unwrap();
-        shown.check(&ctx, &tlas, &records);
+        blases.check(&ctx, &tlas, &records);
     }
 }
 
 #[test]
 fn blas_numbers_out_of_range_are_left_out() {
     let Some(ctx) = device() else { return };
-    let shown = Shown::new(&ctx);
-    let table = build_input_buffer(&ctx, &[shown.structures[0].0.address, 0]);
-    let mut records = shown.records(1, true).repeat(5);
+    let blases = TestBlases::new(&ctx);
+    let table = build_input_buffer(&ctx, &[blases.structures[0].0.address, 0]);
+    let mut records = blases.records(1, true).repeat(5);
     for (record, place) in records.iter_mut().zip([2, 1, 0, u64::from(u32::MAX), 1 << 32]) {
         record.structure = place;
     }
@@ -174,8 +174,8 @@ fn blas_numbers_out_of_range_are_left_out() {
 #[test]
 fn a_tlas_of_nothing_is_empty() {
     let Some(ctx) = device() else { return };
-    let shown = Shown::new(&ctx);
-    let mut records = shown.records(3000, false);
+    let blases = TestBlases::new(&ctx);
+    let mut records = blases.records(3000, false);
     records.iter_mut().for_each(|record| record.structure = 0);
     let buffer = build_input_buffer(&ctx, &records);
     let words = read(&ctx, &build_tlas(&ctx, *buffer, 3000, 3000, None).unwrap()).unwrap();

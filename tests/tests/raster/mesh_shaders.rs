@@ -434,10 +434,10 @@ fn workgroups_and_outputs_beyond_the_device_are_refused() {
             RenderPipelineDesc { color: &[PLAIN], specialization: &specialization, ..Default::default() };
         ctx.create_render_pipeline(&shaders.desc(&desc)).map(drop)
     };
-    make(limits.max_mesh_group_size[0].min(limits.max_mesh_invocations), 1).unwrap();
+    make(limits.max_mesh_workgroup_size[0].min(limits.max_mesh_invocations), 1).unwrap();
     let exceeded = |result: lvk::Result<()>| matches!(result, Err(Error::LimitExceeded { .. }));
-    assert!(exceeded(make(limits.max_mesh_group_size[0] + 1, 1)));
-    assert!(exceeded(make(1, limits.max_task_group_size[0] + 1)));
+    assert!(exceeded(make(limits.max_mesh_workgroup_size[0] + 1, 1)));
+    assert!(exceeded(make(1, limits.max_task_workgroup_size[0] + 1)));
     assert!(matches!(make(0, 1), Err(Error::InvalidUsage { .. })));
 }
 
@@ -510,12 +510,12 @@ fn draws_that_do_not_fit_the_pipeline_are_refused() {
     let exceeded = |result: lvk::Result<()>| matches!(result, Err(Error::LimitExceeded { .. }));
     for axis in 0..3 {
         let mut groups = [1; 3];
-        groups[axis] = limits.max_mesh_groups[axis].saturating_add(1);
+        groups[axis] = limits.max_mesh_workgroups[axis].saturating_add(1);
         assert!(exceeded(pass.draw_mesh_tasks(groups)), "{groups:?}");
     }
-    assert!(exceeded(pass.draw_mesh_tasks(limits.max_mesh_groups)), "{limits:?}");
+    assert!(exceeded(pass.draw_mesh_tasks(limits.max_mesh_workgroups)), "{limits:?}");
     pass.bind_render_pipeline(*task).unwrap();
-    assert!(exceeded(pass.draw_mesh_tasks([1, limits.max_task_groups[1].saturating_add(1), 1])));
+    assert!(exceeded(pass.draw_mesh_tasks([1, limits.max_task_workgroups[1].saturating_add(1), 1])));
     drop(pass);
     ctx.submit(cmd).unwrap();
     let bytes = first_bytes(&ctx, *target);

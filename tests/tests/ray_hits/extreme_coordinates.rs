@@ -22,17 +22,17 @@ const FLAGS: [BuildFlags; 4] = [
 
 /// Shape that the triangles form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Pieces {
+enum Shape {
     /// Each by itself.
     Triangles,
     /// Two share an edge, so that leaves may share vertices.
     Quads,
 }
 
-impl Pieces {
+impl Shape {
     fn leaves(self, primitive: u32) -> bool {
-        let piece = if self == Self::Quads { primitive / 2 } else { primitive };
-        piece.is_multiple_of(3)
+        let index = if self == Self::Quads { primitive / 2 } else { primitive };
+        index.is_multiple_of(3)
     }
 
     /// The corners of one of these three.
@@ -83,10 +83,10 @@ fn refit(ctx: &Context, gpu: &GpuScene, scene: &RayScene, vertices: &[[f32; 3]])
 
 /// Asserts that a ray that hit an unmoved triangle hits it still, bit for bit. A ray that hit another triangle may
 /// hit one behind it.
-fn check_near(what: &str, pieces: Pieces, before: &[HitRecord], after: &[HitRecord]) {
+fn check_near(what: &str, shape: Shape, before: &[HitRecord], after: &[HitRecord]) {
     for (number, (before, after)) in before.iter().zip(after).enumerate() {
-        if pieces.leaves(before.primitive) {
-            let is_behind = !pieces.leaves(after.primitive) && after.t > before.t;
+        if shape.leaves(before.primitive) {
+            let is_behind = !shape.leaves(after.primitive) && after.t > before.t;
             assert!(after.kind == MISSED || is_behind, "{what}, ray {number}: {after:?} after {before:?}");
         } else {
             assert_eq!(before, after, "{what}, ray {number}");
@@ -94,19 +94,19 @@ fn check_near(what: &str, pieces: Pieces, before: &[HitRecord], after: &[HitReco
     }
 }
 
-fn check_all(ctx: &Context, tracer: &RayTracer, pieces: Pieces, by: &str) -> Result<()> {
-    let (scene, rays) = (pieces.scene(), rays());
+fn check_all(ctx: &Context, tracer: &RayTracer, shape: Shape, by: &str) -> Result<()> {
+    let (scene, rays) = (shape.scene(), rays());
     for flags in FLAGS {
-        let what = format!("{pieces:?}, {flags:?}, {by}");
+        let what = format!("{shape:?}, {flags:?}, {by}");
         let gpu = scene.upload_with(ctx, flags, BuildFlags::default(), 0)?;
         let before = tracer.trace(&gpu.tlas, &rays, How::default())?;
         assert!(before.iter().all(|record| record.kind != MISSED), "{what}: a ray misses its triangle");
         for reach in [1e16, 1e30, 3e38] {
-            refit(ctx, &gpu, &scene, &pieces.moved(reach))?;
+            refit(ctx, &gpu, &scene, &shape.moved(reach))?;
             let after = tracer.trace(&gpu.tlas, &rays, How::default())?;
-            check_near(&format!("{what}, {reach:e}"), pieces, &before, &after);
+            check_near(&format!("{what}, {reach:e}"), shape, &before, &after);
         }
-        refit(ctx, &gpu, &scene, &pieces.moved(0.0))?;
+        refit(ctx, &gpu, &scene, &shape.moved(0.0))?;
         let again = tracer.trace(&gpu.tlas, &rays, How::default())?;
         assert_eq!(again, before, "{what}, back again");
     }
@@ -117,9 +117,9 @@ fn check_all(ctx: &Context, tracer: &RayTracer, pieces: Pieces, by: &str) -> Res
 fn what_stays_is_hit_while_neighbours_move_far_out() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
     let (plain, opaque) = (RayTracer::new(&ctx, Method::Query)?, RayTracer::for_opaque_triangles(&ctx)?);
-    for pieces in [Pieces::Triangles, Pieces::Quads] {
-        check_all(&ctx, &plain, pieces, "by query")?;
-        check_all(&ctx, &opaque, pieces, "all taken for opaque")?;
+    for shape in [Shape::Triangles, Shape::Quads] {
+        check_all(&ctx, &plain, shape, "by query")?;
+        check_all(&ctx, &opaque, shape, "all taken for opaque")?;
     }
     Ok(())
 }

@@ -199,10 +199,10 @@ fn small_accel_structs_share_buffers() -> Result<()> {
     assert!(after.structures.iter().map(|info| info.structure_bytes).sum::<u64>() >= grown);
     assert_eq!(grown, each * COUNT as u64);
     // Their memory comes from a buffer that existed; none was added.
-    assert_eq!(before.spare_bytes, after.spare_bytes + grown);
+    assert_eq!(before.free_bytes, after.free_bytes + grown);
     drop(made);
     ctx.wait_idle()?;
-    assert_eq!(ctx.accel_memory().spare_bytes, before.spare_bytes);
+    assert_eq!(ctx.accel_memory().free_bytes, before.free_bytes);
     Ok(())
 }
 

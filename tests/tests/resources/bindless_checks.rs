@@ -49,7 +49,7 @@ fn freed_and_unknown_textures_are_named_and_replaced() {
     let none = Dependencies::default();
     assert_eq!(fetch.run(&ctx, [good, 0, 0], 1, &none)[0][0], 3.0);
     assert_eq!(fetch.run(&ctx, [bad, 0, 0], 1, &none)[0][0], 4.0);
-    assert_eq!(fetch.run(&ctx, [0, 0, 0], 1, &none)[0], MAGENTA, "the dummy is nobody's mistake");
+    assert_eq!(fetch.run(&ctx, [0, 0, 0], 1, &none)[0], MAGENTA, "a read of the default texture is no fault");
     assert_eq!(ctx.index_faults().unwrap(), []);
     drop(gone);
     assert_eq!(fetch.run(&ctx, [bad, 0, 0], 1, &none)[0], MAGENTA);
@@ -203,8 +203,8 @@ fn ray_queries_check_their_accel_structs() {
 }
 
 /// Creates a module that reads texture 60, which does not exist. Its name is that of its stage.
-fn astray(ctx: &Context, stage: ShaderStage, text: &str) -> Holder<ShaderModuleHandle> {
-    let text = text.replace("ASTRAY", "textureBindlessFetch2D(60u, ivec2(0), 0)");
+fn module_with_bad_index(ctx: &Context, stage: ShaderStage, text: &str) -> Holder<ShaderModuleHandle> {
+    let text = text.replace("BAD_TEXEL", "textureBindlessFetch2D(60u, ivec2(0), 0)");
     let name = format!("{stage:?}");
     let source = ShaderSource::Glsl(&text);
     ctx.create_shader_module(&ShaderModuleDesc { stage, source, debug_name: &name, ..Default::default() })
@@ -228,17 +228,17 @@ fn caught(ctx: &Context) -> Vec<String> {
 const VERTEX: &str = "
     layout(location = 0) out vec4 color;
     void main() {
-        color = ASTRAY;
+        color = BAD_TEXEL;
         gl_Position = vec4(vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 4.0 - 1.0, 0.0, 1.0);
     }";
 const FRAGMENT: &str = "
     layout(location = 0) in vec4 color;
     layout(location = 0) out vec4 result;
-    void main() { result = color * 0.5 + ASTRAY * 0.25; }";
+    void main() { result = color * 0.5 + BAD_TEXEL * 0.25; }";
 const TASK: &str = "
     layout(local_size_x = 1) in;
     taskPayloadSharedEXT vec4 payload;
-    void main() { payload = ASTRAY; EmitMeshTasksEXT(1, 1, 1); }";
+    void main() { payload = BAD_TEXEL; EmitMeshTasksEXT(1, 1, 1); }";
 const MESH: &str = "
     layout(local_size_x = 1) in;
     layout(triangles, max_vertices = 3, max_primitives = 1) out;
@@ -249,7 +249,7 @@ const MESH: &str = "
         gl_PrimitiveTriangleIndicesEXT[0] = uvec3(0, 1, 2);
         for (uint i = 0; i < 3; ++i) {
             gl_MeshVerticesEXT[i].gl_Position = vec4(vec2(i & 1, i >> 1) * 4.0 - 1.0, 0.0, 1.0);
-            color[i] = payload * 0.5 + ASTRAY * 0.5;
+            color[i] = payload * 0.5 + BAD_TEXEL * 0.5;
         }
     }";
 
@@ -271,7 +271,8 @@ fn stages_that_draw_are_checked() {
         ctx.submit(cmd).unwrap();
         assert_eq!(pixels::<[f32; 4]>(&ctx, *target), [[0.75, 0.0, 0.75, 0.75]; 4]);
     };
-    let (vertex, fragment) = (astray(&ctx, Vertex, VERTEX), astray(&ctx, Fragment, FRAGMENT));
+    let (vertex, fragment) =
+        (module_with_bad_index(&ctx, Vertex, VERTEX), module_with_bad_index(&ctx, Fragment, FRAGMENT));
     draw(
         &RenderPipelineDesc { vertex: Some(*vertex), fragment: Some(*fragment), ..Default::default() },
         false,
@@ -281,7 +282,7 @@ fn stages_that_draw_are_checked() {
         eprintln!("NOT TESTED, the device has no mesh shaders");
         return;
     }
-    let (task, mesh) = (astray(&ctx, Task, TASK), astray(&ctx, Mesh, MESH));
+    let (task, mesh) = (module_with_bad_index(&ctx, Task, TASK), module_with_bad_index(&ctx, Mesh, MESH));
     let desc = RenderPipelineDesc {
         task: Some(*task),
         mesh: Some(*mesh),
@@ -298,7 +299,7 @@ const RAY_GEN: &str = "
     layout(location = 0) rayPayloadEXT float value;
     layout(location = 0) callableDataEXT float called;
     void main() {
-        float own = ASTRAY.x;
+        float own = BAD_TEXEL.x;
         traceRayEXT(kTLAS[tlas], LVK_RAY_FLAG_NO_OPAQUE, 0xff, 0, 0, 0, vec3(0), 0.0, vec3(0, 0, 1), 9.0, 0);
         result.at[0] = value + own;
         traceRayEXT(kTLAS[tlas], 0, 0xff, 0, 0, 0, vec3(0), 0.0, vec3(0, 0, -1), 9.0, 0);
@@ -318,13 +319,14 @@ fn stages_that_trace_are_checked() {
     let (_blas, tlas) = accel_structs(&ctx);
     let payload =
         |body: &str| format!("layout(location = 0) rayPayloadInEXT float value; void main() {{ {body} }}");
-    let ray_gen = astray(&ctx, RayGen, RAY_GEN);
-    let miss = astray(&ctx, Miss, &payload("value = 10.0 * ASTRAY.x;"));
-    let hit = astray(&ctx, ClosestHit, &payload("value = 20.0 * ASTRAY.x;"));
-    let any = astray(&ctx, AnyHit, &payload("if (ASTRAY.y > 0.5) { ignoreIntersectionEXT; }"));
+    let ray_gen = module_with_bad_index(&ctx, RayGen, RAY_GEN);
+    let miss = module_with_bad_index(&ctx, Miss, &payload("value = 10.0 * BAD_TEXEL.x;"));
+    let hit = module_with_bad_index(&ctx, ClosestHit, &payload("value = 20.0 * BAD_TEXEL.x;"));
+    let any =
+        module_with_bad_index(&ctx, AnyHit, &payload("if (BAD_TEXEL.y > 0.5) { ignoreIntersectionEXT; }"));
     let text =
-        "layout(location = 0) callableDataInEXT float called; void main() { called = 5.0 * ASTRAY.x; }";
-    let callable = astray(&ctx, Callable, text);
+        "layout(location = 0) callableDataInEXT float called; void main() { called = 5.0 * BAD_TEXEL.x; }";
+    let callable = module_with_bad_index(&ctx, Callable, text);
     let group = HitGroup { closest_hit: Some(*hit), any_hit: Some(*any), ..Default::default() };
     let pipeline = ctx
         .create_ray_tracing_pipeline(&RayTracingPipelineDesc {

@@ -36,7 +36,7 @@ use tempfile::TempDir;
 
 const SIZE: [u32; 2] = [40, 24];
 const OTHER_SIZE: [u32; 2] = [24, 40];
-const MOMENTS: [u32; 3] = [0, 3, 7];
+const FRAMES: [u32; 3] = [0, 3, 7];
 
 fn frame_time(frame: u32) -> FrameTime {
     FrameTime::from_frame(frame, 10)
@@ -48,13 +48,13 @@ fn one_by_one<S: Sample>(sample: &mut S) -> Vec<Vec<u8>> {
         sample.update(frame_time(frame)).map_err(Into::into).unwrap();
         headless::picture(sample).map_err(Into::into).unwrap()
     };
-    MOMENTS.map(&mut at).to_vec()
+    FRAMES.map(&mut at).to_vec()
 }
 
 /// The same with all frames on their way at once.
 fn at_once<S: Sample>(sample: &mut S, size: [u32; 2]) -> Vec<Vec<u8>> {
     let ctx = sample.context().clone();
-    let kept = MOMENTS.map(|frame| {
+    let kept = FRAMES.map(|frame| {
         let copy = texture(&ctx, size);
         sample.update(frame_time(frame)).map_err(Into::into).unwrap();
         let mut frame = Frame::free(&ctx).unwrap();
@@ -98,7 +98,7 @@ fn check<S: Sample>(seen: Seen, make: impl Fn([u32; 2]) -> S) {
 
 /// Renders `sample` at the first of the times.
 fn first<S: Sample>(sample: &mut S) -> Vec<u8> {
-    sample.update(frame_time(MOMENTS[0])).map_err(Into::into).unwrap();
+    sample.update(frame_time(FRAMES[0])).map_err(Into::into).unwrap();
     headless::picture(sample).map_err(Into::into).unwrap()
 }
 
@@ -146,7 +146,7 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
 }
 
 fn check_view<S: Sample>(sample: &mut S, seen: Seen, expected: &[u8]) {
-    sample.update(frame_time(MOMENTS[0])).map_err(Into::into).unwrap();
+    sample.update(frame_time(FRAMES[0])).map_err(Into::into).unwrap();
     assert!(sample.view().is_some() == (seen == Seen::FromAnywhere), "has it a camera?");
     let Some(view) = sample.view() else { return };
     sample.set_view(&Camera { vertical_fov_degrees: 0.5 * view.vertical_fov_degrees, ..view });

@@ -16,7 +16,7 @@ use lvk_tests::{device, device_with};
 
 /// No multiple of a workgroup.
 const SIZE: [u32; 2] = [163, 91];
-const MOMENT: f64 = 1.9;
+const TIME_SECONDS: f64 = 1.9;
 
 /// Of the same image by pipeline and by query.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
@@ -79,9 +79,9 @@ fn lists_hold_every_crossing_in_front() {
     let Some(ctx) = device() else { return };
     for (scene, least) in [(OitScene::default(), 3000), (crowd(), 10_000)] {
         let mut room = OitRenderer::new(&ctx, &scene, &plain(&ctx));
-        room.render(MOMENT);
+        room.render(TIME_SECONDS);
         let (lists, opaque) = (room.sample.glass_lists().unwrap(), room.sample.positions().unwrap());
-        let host = HostScene::new(&scene, MOMENT);
+        let host = HostScene::new(&scene, TIME_SECONDS);
         let (mut compared, mut doubtful) = (0, 0);
         for (sample, position) in opaque.iter().enumerate() {
             let pixel = [sample as u32 % SIZE[0], sample as u32 / SIZE[0]];
@@ -132,7 +132,7 @@ fn the_image_equals_one_of_sorted_lists() {
             let config = HybridOitConfig { supersampling: side, ..plain(&ctx) };
             let mut room =
                 OitRenderer::new(&ctx, &scene, &HybridOitConfig { node_capacity: Some(1 << 19), ..config });
-            let image = room.render(MOMENT);
+            let image = room.render(TIME_SECONDS);
             let lists = room.sample.glass_lists().unwrap();
             let behind = image_behind_glass(&ctx, &scene, side, 1);
             // Without glass nothing is sorted, and the 8 bits of samples would only add their rounding.
@@ -175,7 +175,7 @@ fn the_image_equals_one_of_sorted_lists() {
 fn image_behind_glass(ctx: &Context, scene: &OitScene, times: u32, supersampling: u32) -> RgbaImage {
     let [width, height] = SIZE.map(|pixels| times * pixels);
     let config = HybridOitConfig { width, height, supersampling, node_capacity: Some(0), ..plain(ctx) };
-    OitRenderer::new(ctx, scene, &config).render(MOMENT)
+    OitRenderer::new(ctx, scene, &config).render(TIME_SECONDS)
 }
 
 /// The image of samples, `side` a pixel along each side.
@@ -198,14 +198,14 @@ fn a_pool_that_runs_out_is_counted_and_safe() {
     let scene = OitScene::default();
     let config = plain(&ctx);
     let mut whole = OitRenderer::new(&ctx, &scene, &config);
-    let complete = whole.render(MOMENT);
+    let complete = whole.render(TIME_SECONDS);
     let asked = whole.sample.node_use().unwrap();
     assert_eq!(asked.lost(), 0);
     assert_eq!(whole.sample.glass_lists().unwrap().linked_count(), asked.asked as usize);
     for capacity in [0, 1, 1000, asked.asked] {
         let config = HybridOitConfig { node_capacity: Some(capacity), ..config };
         let mut room = OitRenderer::new(&ctx, &scene, &config);
-        let image = room.render(MOMENT);
+        let image = room.render(TIME_SECONDS);
         let nodes = room.sample.node_use().unwrap();
         assert_eq!((nodes.asked, nodes.capacity), (asked.asked, capacity));
         assert_eq!(nodes.lost(), asked.asked - capacity);
@@ -222,9 +222,9 @@ fn shadows_are_those_the_host_computes() {
     for scene in [OitScene::default(), sunk()] {
         for path in paths(&ctx) {
             let mut room = OitRenderer::new(&ctx, &scene, &HybridOitConfig { path, ..plain(&ctx) });
-            room.render(MOMENT);
+            room.render(TIME_SECONDS);
             let (positions, sunlight) = (room.sample.positions().unwrap(), room.sample.sunlight().unwrap());
-            let host = HostScene::new(&scene, MOMENT);
+            let host = HostScene::new(&scene, TIME_SECONDS);
             let mut counts = ShadowCounts::default();
             for (position, found) in
                 positions.iter().zip(&sunlight).filter(|(at, _)| at[3] > 0.0 && at[3] < 30.0)
@@ -300,7 +300,7 @@ fn a_frame_is_the_same_alone_and_in_a_sequence() {
 fn a_phone_would_render_the_same() {
     let Some(ctx) = device() else { return };
     let scene = OitScene::default();
-    let image = |ctx: &Context| OitRenderer::new(ctx, &scene, &plain(ctx)).render(MOMENT);
+    let image = |ctx: &Context| OitRenderer::new(ctx, &scene, &plain(ctx)).render(TIME_SECONDS);
     let expected = image(&ctx);
     let profile = DeviceProfile::mali_g715();
     let Some(phone) = device_with(|desc| desc.profile = Some(&profile)) else { return };
@@ -359,5 +359,5 @@ fn the_reference_image_detects_small_mistakes() {
 
 fn small_image(ctx: &Context, scene: &OitScene) -> RgbaImage {
     let config = HybridOitConfig::new(paths(ctx)[0], 240, 135);
-    OitRenderer::new(ctx, scene, &config).render(MOMENT)
+    OitRenderer::new(ctx, scene, &config).render(TIME_SECONDS)
 }

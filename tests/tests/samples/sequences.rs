@@ -33,8 +33,13 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> RenderReport {
         resume: false,
     };
     job.check().unwrap();
-    render_frames(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf())
-        .unwrap()
+    render_frames(
+        &mut Headless::new(&mut sequence),
+        &job,
+        &mut Progress::hidden(),
+        &Interrupt::without_handlers(),
+    )
+    .unwrap()
 }
 
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {

@@ -212,7 +212,7 @@ fn dispatches_are_checked() {
     let error = cmd.dispatch([1, 1, 1], &Dependencies::default()).unwrap_err();
     assert!(error.to_string().contains("bind a compute pipeline first"), "{error}");
     cmd.bind_compute_pipeline(*pipeline).unwrap();
-    let most = ctx.capabilities().limits.max_dispatch_groups;
+    let most = ctx.capabilities().limits.max_dispatch_workgroups;
     for axis in (0..3).filter(|axis| most[*axis] < u32::MAX) {
         let mut groups = [1; 3];
         groups[axis] = most[axis] + 1;

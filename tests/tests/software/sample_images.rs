@@ -19,7 +19,7 @@ use lvk_tests::{TestDevice, device_with};
 const SIZE: [u32; 2] = [160, 90];
 const DEPTH: u32 = 3;
 /// Of the image of the room of glass that is kept.
-const MOMENT: f64 = 1.9;
+const TIME_SECONDS: f64 = 1.9;
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// The same rays, but filters spread what a ray at an edge finds elsewhere.
 const SAME_FILTERED: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 0.01, flip: 0.004 };
@@ -120,7 +120,7 @@ fn sized(image: &RgbaImage) -> HybridConfig {
 /// The room of glass in the size of an image.
 fn glass_scene(ctx: &Context, like: &RgbaImage) -> RgbaImage {
     let config = HybridOitConfig::new(RayPath::Query, like.width(), like.height());
-    OitRenderer::new(ctx, &OitScene::default(), &config).render(MOMENT)
+    OitRenderer::new(ctx, &OitScene::default(), &config).render(TIME_SECONDS)
 }
 
 fn hall(ctx: &Context, [width, height]: [u32; 2]) -> RgbaImage {

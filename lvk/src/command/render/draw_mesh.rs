@@ -52,8 +52,8 @@ impl RenderPass<'_> {
 /// Fails if a draw has more workgroups than its first stage may have.
 fn check_groups(pipeline: &str, groups: [u32; 3], front_end: FrontEnd, limits: &MeshLimits) -> Result<()> {
     let (axes, total) = match front_end {
-        FrontEnd::TaskAndMesh => (limits.max_task_groups, limits.max_task_groups_total),
-        _ => (limits.max_mesh_groups, limits.max_mesh_groups_total),
+        FrontEnd::TaskAndMesh => (limits.max_task_workgroups, limits.max_task_workgroups_total),
+        _ => (limits.max_mesh_workgroups, limits.max_mesh_workgroups_total),
     };
     for (count, limit) in groups.into_iter().zip(axes) {
         check_limit(pipeline, "workgroup count along an axis", count.into(), limit.into())?;
@@ -69,16 +69,16 @@ mod tests {
     use crate::error::Error;
 
     const LIMITS: MeshLimits = MeshLimits {
-        max_task_groups: [8, 4, 2],
-        max_task_groups_total: 16,
-        max_mesh_groups: [100, 100, 100],
-        max_mesh_groups_total: 1_000,
-        max_task_group_size: [0; 3],
+        max_task_workgroups: [8, 4, 2],
+        max_task_workgroups_total: 16,
+        max_mesh_workgroups: [100, 100, 100],
+        max_mesh_workgroups_total: 1_000,
+        max_task_workgroup_size: [0; 3],
         max_task_invocations: 0,
         max_task_payload_bytes: 0,
         max_task_shared_bytes: 0,
         max_task_payload_and_shared_bytes: 0,
-        max_mesh_group_size: [0; 3],
+        max_mesh_workgroup_size: [0; 3],
         max_mesh_invocations: 0,
         max_mesh_shared_bytes: 0,
         max_mesh_payload_and_shared_bytes: 0,

@@ -63,11 +63,11 @@ pub struct Limits {
     /// Minimum and maximum width of lines in pixels (`lineWidthRange`).
     pub line_width: [f32; 2],
     /// Maximum workgroups of a dispatch along each axis (`maxComputeWorkGroupCount`).
-    pub max_dispatch_groups: [u32; 3],
+    pub max_dispatch_workgroups: [u32; 3],
     /// Maximum size of a compute workgroup along each axis, in invocations (`maxComputeWorkGroupSize`).
-    pub max_group_size: [u32; 3],
+    pub max_workgroup_size: [u32; 3],
     /// Maximum invocations of a compute workgroup (`maxComputeWorkGroupInvocations`).
-    pub max_group_invocations: u32,
+    pub max_workgroup_invocations: u32,
     /// Maximum shared memory of a compute workgroup in bytes (`maxComputeSharedMemorySize`), counted by
     /// std430 rules.
     pub max_shared_bytes: u32,
@@ -163,9 +163,9 @@ impl Limits {
             shading_rate: ShadingRateLimits::default(),
             max_patch_points: plain.max_tessellation_patch_size,
             line_width: plain.line_width_range,
-            max_dispatch_groups: plain.max_compute_work_group_count,
-            max_group_size: plain.max_compute_work_group_size,
-            max_group_invocations: plain.max_compute_work_group_invocations,
+            max_dispatch_workgroups: plain.max_compute_work_group_count,
+            max_workgroup_size: plain.max_compute_work_group_size,
+            max_workgroup_invocations: plain.max_compute_work_group_invocations,
             max_shared_bytes: plain.max_compute_shared_memory_size,
             max_indirect_draws: plain.max_draw_indirect_count,
             max_viewport: plain.max_viewport_dimensions,

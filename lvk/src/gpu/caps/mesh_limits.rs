@@ -6,16 +6,16 @@ use ash::vk;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MeshLimits {
     /// Maximum task workgroups of a draw along each axis (`maxTaskWorkGroupCount`).
-    pub max_task_groups: [u32; 3],
+    pub max_task_workgroups: [u32; 3],
     /// Maximum task workgroups of a draw in total (`maxTaskWorkGroupTotalCount`).
-    pub max_task_groups_total: u32,
+    pub max_task_workgroups_total: u32,
     /// Maximum mesh workgroups of a draw, or of one task workgroup, along each axis
     /// (`maxMeshWorkGroupCount`).
-    pub max_mesh_groups: [u32; 3],
+    pub max_mesh_workgroups: [u32; 3],
     /// Maximum mesh workgroups of a draw, or of one task workgroup, in total (`maxMeshWorkGroupTotalCount`).
-    pub max_mesh_groups_total: u32,
+    pub max_mesh_workgroups_total: u32,
     /// Maximum size of a task workgroup along each axis (`maxTaskWorkGroupSize`).
-    pub max_task_group_size: [u32; 3],
+    pub max_task_workgroup_size: [u32; 3],
     /// Maximum invocations of a task workgroup (`maxTaskWorkGroupInvocations`).
     pub max_task_invocations: u32,
     /// Maximum payload of a task workgroup in bytes (`maxTaskPayloadSize`).
@@ -26,7 +26,7 @@ pub struct MeshLimits {
     /// (`maxTaskPayloadAndSharedMemorySize`).
     pub max_task_payload_and_shared_bytes: u32,
     /// Maximum size of a mesh workgroup along each axis (`maxMeshWorkGroupSize`).
-    pub max_mesh_group_size: [u32; 3],
+    pub max_mesh_workgroup_size: [u32; 3],
     /// Maximum invocations of a mesh workgroup (`maxMeshWorkGroupInvocations`).
     pub max_mesh_invocations: u32,
     /// Maximum shared memory of a mesh workgroup in bytes (`maxMeshSharedMemorySize`).
@@ -44,16 +44,16 @@ impl MeshLimits {
     /// Returns the limits in `found`, which are all 0 unless they were queried.
     pub(crate) fn from_properties(found: &vk::PhysicalDeviceMeshShaderPropertiesEXT<'_>) -> Self {
         Self {
-            max_task_groups: found.max_task_work_group_count,
-            max_task_groups_total: found.max_task_work_group_total_count,
-            max_mesh_groups: found.max_mesh_work_group_count,
-            max_mesh_groups_total: found.max_mesh_work_group_total_count,
-            max_task_group_size: found.max_task_work_group_size,
+            max_task_workgroups: found.max_task_work_group_count,
+            max_task_workgroups_total: found.max_task_work_group_total_count,
+            max_mesh_workgroups: found.max_mesh_work_group_count,
+            max_mesh_workgroups_total: found.max_mesh_work_group_total_count,
+            max_task_workgroup_size: found.max_task_work_group_size,
             max_task_invocations: found.max_task_work_group_invocations,
             max_task_payload_bytes: found.max_task_payload_size,
             max_task_shared_bytes: found.max_task_shared_memory_size,
             max_task_payload_and_shared_bytes: found.max_task_payload_and_shared_memory_size,
-            max_mesh_group_size: found.max_mesh_work_group_size,
+            max_mesh_workgroup_size: found.max_mesh_work_group_size,
             max_mesh_invocations: found.max_mesh_work_group_invocations,
             max_mesh_shared_bytes: found.max_mesh_shared_memory_size,
             max_mesh_payload_and_shared_bytes: found.max_mesh_payload_and_shared_memory_size,

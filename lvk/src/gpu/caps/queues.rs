@@ -96,14 +96,14 @@ pub(crate) fn locate_queues(families: &[QueueFamily], graphics: u32) -> [QueueLo
 }
 
 /// Returns the properties of the queues at these locations.
-pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueueLocation; 3]) -> [QueueInfo; 3] {
+pub(crate) fn describe_queues(families: &[QueueFamily], locations: &[QueueLocation; 3]) -> [QueueInfo; 3] {
     let info = |queue: Queue| {
-        let place = places[queue.index()];
-        let alone = places.iter().filter(|other| **other == place).count() == 1;
-        let family = families.get(place.family as usize);
+        let location = locations[queue.index()];
+        let alone = locations.iter().filter(|other| **other == location).count() == 1;
+        let family = families.get(location.family as usize);
         QueueInfo {
             own_hardware: queue == Queue::Graphics || alone,
-            family: place.family,
+            family: location.family,
             timestamp_bits: family.map_or(0, |family| family.timestamp_bits),
             copy_granularity: family.map_or([1; 3], |family| family.copy_granularity),
         }
@@ -118,11 +118,11 @@ pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueueLocation;
 pub(crate) struct Queues {
     raw: Vec<Mutex<vk::Queue>>,
     /// Index into `raw` for each queue.
-    places: [usize; 3],
+    raw_index: [usize; 3],
     families: [u32; 3],
     /// True for each queue with a queue index of its own.
-    apart: [bool; 3],
-    rehearsed: bool,
+    is_separate: [bool; 3],
+    is_emulated: bool,
     /// The queue families in use, without duplicates.
     distinct: Vec<u32>,
 }
@@ -132,36 +132,37 @@ impl Queues {
     pub(crate) fn new(raw: [(vk::Queue, u32); 3], request: QueueRequest) -> Self {
         let raw = if request == QueueRequest::Shared { [raw[0]; 3] } else { raw };
         let mut queues: Vec<vk::Queue> = Vec::new();
-        let places = raw.map(|(queue, _)| {
+        let raw_index = raw.map(|(queue, _)| {
             queues.iter().position(|known| *known == queue).unwrap_or_else(|| {
                 queues.push(queue);
                 queues.len() - 1
             })
         });
         let families = raw.map(|(_, family)| family);
-        let rehearsed = request == QueueRequest::Emulated;
-        let apart = [0, 1, 2]
-            .map(|queue_index: usize| queue_index > 0 && (rehearsed || places[queue_index] != places[0]));
+        let is_emulated = request == QueueRequest::Emulated;
+        let is_separate = [0, 1, 2].map(|queue_index: usize| {
+            queue_index > 0 && (is_emulated || raw_index[queue_index] != raw_index[0])
+        });
         let mut distinct = families.to_vec();
         distinct.sort_unstable();
         distinct.dedup();
         let raw = queues.into_iter().map(|queue| Mutex::new(Rank::Queue, queue)).collect();
-        Self { raw, places, families, apart, rehearsed, distinct }
+        Self { raw, raw_index, families, is_separate, is_emulated, distinct }
     }
 
     /// Returns the queue index of a queue.
     pub(crate) fn queue_index(&self, queue: Queue) -> usize {
-        if self.apart[queue.index()] { queue.index() } else { 0 }
+        if self.is_separate[queue.index()] { queue.index() } else { 0 }
     }
 
     /// True if there is more than one queue index.
     pub(crate) fn has_several(&self) -> bool {
-        self.apart.contains(&true)
+        self.is_separate.contains(&true)
     }
 
     /// Locks the Vulkan queue of a queue index, which only one thread may use at a time.
     pub(crate) fn raw(&self, queue_index: usize) -> Guard<'_, vk::Queue> {
-        self.raw[self.places[queue_index]].lock()
+        self.raw[self.raw_index[queue_index]].lock()
     }
 
     /// Returns the family of a queue index.
@@ -176,12 +177,12 @@ impl Queues {
 
     /// Returns the ownership domain of a queue index. Queues of one domain share ownership of images.
     pub(crate) fn domain(&self, queue_index: usize) -> u32 {
-        if self.rehearsed { queue_index as u32 } else { self.families[queue_index] }
+        if self.is_emulated { queue_index as u32 } else { self.families[queue_index] }
     }
 
     /// True if images can be owned by one queue and not by another.
     pub(crate) fn has_several_domains(&self) -> bool {
-        (1..3).any(|queue_index| self.apart[queue_index] && self.domain(queue_index) != self.domain(0))
+        (1..3).any(|queue_index| self.is_separate[queue_index] && self.domain(queue_index) != self.domain(0))
     }
 }
 
@@ -196,7 +197,7 @@ mod tests {
     const COPIES: vk::QueueFlags = vk::QueueFlags::from_raw(0b1100);
     const DECODER: vk::QueueFlags = vk::QueueFlags::from_raw(0b10_1100);
 
-    fn place(list: &[(vk::QueueFlags, u32)], graphics: u32) -> [(u32, u32); 3] {
+    fn locate(list: &[(vk::QueueFlags, u32)], graphics: u32) -> [(u32, u32); 3] {
         let family = |(flags, count): &(vk::QueueFlags, u32)| QueueFamily {
             flags: *flags,
             count: *count,
@@ -204,32 +205,32 @@ mod tests {
             copy_granularity: [1; 3],
         };
         let families: Vec<_> = list.iter().map(family).collect();
-        locate_queues(&families, graphics).map(|place| (place.family, place.index))
+        locate_queues(&families, graphics).map(|location| (location.family, location.index))
     }
 
     #[test]
     fn families_that_can_do_least_else_come_first() {
         let nvidia = [(ALL, 16), (COPIES, 2), (COMPUTE, 8), (DECODER, 1)];
-        assert_eq!(place(&nvidia, 0), [(0, 0), (2, 0), (1, 0)]);
+        assert_eq!(locate(&nvidia, 0), [(0, 0), (2, 0), (1, 0)]);
         let video_before = [(ALL, 16), (DECODER, 1), (COPIES, 2), (COMPUTE, 8)];
-        assert_eq!(place(&video_before, 0), [(0, 0), (3, 0), (2, 0)]);
+        assert_eq!(locate(&video_before, 0), [(0, 0), (3, 0), (2, 0)]);
     }
 
     #[test]
     fn further_queues_of_a_family_are_taken_before_one_is_shared() {
-        assert_eq!(place(&[(ALL, 1)], 0), [(0, 0), (0, 0), (0, 0)]);
-        assert_eq!(place(&[(ALL, 2)], 0), [(0, 0), (0, 1), (0, 0)]);
-        assert_eq!(place(&[(ALL, 3)], 0), [(0, 0), (0, 1), (0, 2)]);
-        assert_eq!(place(&[(COMPUTE, 2), (ALL, 1)], 1), [(1, 0), (0, 0), (0, 1)]);
-        assert_eq!(place(&[(ALL, 1), (COMPUTE, 1)], 0), [(0, 0), (1, 0), (0, 0)]);
-        assert_eq!(place(&[(ALL, 1), (COPIES, 1)], 0), [(0, 0), (0, 0), (1, 0)]);
+        assert_eq!(locate(&[(ALL, 1)], 0), [(0, 0), (0, 0), (0, 0)]);
+        assert_eq!(locate(&[(ALL, 2)], 0), [(0, 0), (0, 1), (0, 0)]);
+        assert_eq!(locate(&[(ALL, 3)], 0), [(0, 0), (0, 1), (0, 2)]);
+        assert_eq!(locate(&[(COMPUTE, 2), (ALL, 1)], 1), [(1, 0), (0, 0), (0, 1)]);
+        assert_eq!(locate(&[(ALL, 1), (COMPUTE, 1)], 0), [(0, 0), (1, 0), (0, 0)]);
+        assert_eq!(locate(&[(ALL, 1), (COPIES, 1)], 0), [(0, 0), (0, 0), (1, 0)]);
     }
 
     #[test]
-    fn own_hardware_is_shared_with_nobody() {
-        let own = |places: [u32; 3]| {
-            let places = places.map(|index| QueueLocation { family: 0, index });
-            describe_queues(&[], &places).map(|info| info.own_hardware)
+    fn own_hardware_is_not_shared() {
+        let own = |indices: [u32; 3]| {
+            let locations = indices.map(|index| QueueLocation { family: 0, index });
+            describe_queues(&[], &locations).map(|info| info.own_hardware)
         };
         assert_eq!(own([0, 1, 2]), [true; 3]);
         assert_eq!(own([0, 0, 1]), [true, false, true]);
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn queues_of_one_handle_share_a_lane_unless_several_are_rehearsed() {
+    fn queues_of_one_handle_share_a_queue_index_unless_emulated() {
         let raw = |number: u64, family| (vk::Queue::from_raw(number), family);
         let one = [raw(1, 0); 3];
         let three = [raw(1, 0), raw(2, 4), raw(3, 2)];

@@ -24,7 +24,7 @@ pub(crate) struct Instance {
     pub(crate) windows: Option<WindowExtensions>,
     messenger: Messenger,
     /// True if the caller created the instance and destroys it.
-    is_foreign: bool,
+    is_external: bool,
 }
 
 /// Description of an instance.
@@ -59,7 +59,7 @@ impl Instance {
         let gpu_assisted = desc.validation == ValidationMode::GpuAssisted;
         let validated = layer.is_some();
         let Extensions { debug_utils, windows, .. } = extensions;
-        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, windows, messenger, is_foreign: false })
+        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, windows, messenger, is_external: false })
     }
 
     /// Wraps an instance that the caller created.
@@ -72,7 +72,7 @@ impl Instance {
             gpu_assisted: false,
             windows: None,
             messenger: Messenger::new(ValidationSink::default()),
-            is_foreign: true,
+            is_external: true,
         }
     }
 
@@ -92,7 +92,7 @@ impl Instance {
 impl Drop for Instance {
     fn drop(&mut self) {
         self.messenger.remove();
-        if self.is_foreign {
+        if self.is_external {
             return;
         }
         // SAFETY: the device is destroyed first, as `Gpu` declares it first.

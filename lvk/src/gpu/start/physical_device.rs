@@ -25,7 +25,7 @@ pub(crate) struct PhysicalDevice {
     pub(crate) queue_family: Option<u32>,
     pub(crate) families: Vec<QueueFamily>,
     /// The device's queue for each queue of the library.
-    pub(crate) places: [QueueLocation; 3],
+    pub(crate) queue_locations: [QueueLocation; 3],
     /// Required core features that the device lacks.
     pub(crate) missing: Vec<String>,
     /// Features as reported.
@@ -56,7 +56,7 @@ impl PhysicalDevice {
             local_memory_bytes: local_memory(instance, raw),
             queue_family: None,
             families,
-            places: Default::default(),
+            queue_locations: Default::default(),
             missing: Vec::new(),
             features: Features::default(),
             extensions: names.map(CStr::to_owned).collect(),
@@ -82,9 +82,9 @@ impl PhysicalDevice {
     }
 
     /// Sets the location of each queue, and the queue information derived from it.
-    pub(crate) fn set_queues(&mut self, places: [QueueLocation; 3]) {
-        self.places = places;
-        self.capabilities.queues = describe_queues(&self.families, &places);
+    pub(crate) fn set_queues(&mut self, queue_locations: [QueueLocation; 3]) {
+        self.queue_locations = queue_locations;
+        self.capabilities.queues = describe_queues(&self.families, &queue_locations);
         self.capabilities.limits.timestamp_bits = self.capabilities.queues[0].timestamp_bits;
     }
 

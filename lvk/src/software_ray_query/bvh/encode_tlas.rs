@@ -10,8 +10,9 @@ use crate::software_ray_query::layout::{
     BLOCK_BYTES, BlobHeader, Bvh2NodeRecord, FORMAT_BVH2, InstanceRecord, NONE,
 };
 
-/// Builds a tree over the instances and encodes it. Overlapping instances are split into parts, up to `room` records.
-pub(crate) fn encode_tlas(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
+/// Builds a BVH over the instances and encodes it. Overlapping instances are split into parts, up to `max_records`
+/// records.
+pub(crate) fn encode_tlas(instances: &[PlacedInstance], max_records: u32) -> Vec<u8> {
     if instances.is_empty() {
         let nothing = BlobHeader {
             format: FORMAT_BVH2,
@@ -23,7 +24,7 @@ pub(crate) fn encode_tlas(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
         };
         return bytemuck::bytes_of(&nothing).to_vec();
     }
-    let records = rebraid(instances, room as usize);
+    let records = rebraid(instances, max_records as usize);
     let bounds: Vec<Bounds> = records.iter().map(|placed| placed.bounds).collect();
     let tree = bvh2::build_bvh2(&bounds, 1);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);

@@ -15,8 +15,8 @@ const MIN_EXTRA_RECORDS: u32 = 16;
 
 /// Returns the maximum records of `instances` instances after re-braiding, and the capacity of their TLAS.
 pub(crate) fn record_capacity(instances: u32) -> u32 {
-    let may_be_apart = (2..=MAX_INSTANCES).contains(&instances);
-    instances + if may_be_apart { instances.max(MIN_EXTRA_RECORDS) } else { 0 }
+    let may_be_split = (2..=MAX_INSTANCES).contains(&instances);
+    instances + if may_be_split { instances.max(MIN_EXTRA_RECORDS) } else { 0 }
 }
 
 /// A record that may be split.
@@ -24,14 +24,13 @@ struct RebraidCandidate<'a> {
     instance: &'a PlacedInstance,
     part: &'a RebraidPart,
     record: PlacedInstance,
-    is_open: bool,
+    is_split: bool,
 }
 
 /// Splits the largest overlapping instances if their parts leave empty space. Stops before there are more records than
-/// [`record_capacity`] for these instances, or more than `room`.
-pub(crate) fn rebraid<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<PlacedInstance> {
-    let most =
-        room.min(crate::software_ray_query::bvh::rebraid::record_capacity(instances.len() as u32) as usize);
+/// [`record_capacity`] for these instances, or more than `max_records`.
+pub(crate) fn rebraid<'a>(instances: &'a [PlacedInstance], max_records: usize) -> Vec<PlacedInstance> {
+    let most = max_records.min(record_capacity(instances.len() as u32) as usize);
     if most <= instances.len() {
         return instances.to_vec();
     }
@@ -39,31 +38,31 @@ pub(crate) fn rebraid<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<P
         instance: of,
         part: &of.parts.whole,
         record: of.clone(),
-        is_open: false,
+        is_split: false,
     };
-    let mut shown: Vec<_> = instances.iter().map(whole).collect();
-    let mut count = shown.len();
+    let mut candidates: Vec<_> = instances.iter().map(whole).collect();
+    let mut count = candidates.len();
     let area = |bounds: &Bounds| bounds.half_area().to_bits(); // in order, as none is negative
     let overlapping = overlapping(instances).into_iter().enumerate().filter(|(_, overlaps)| *overlaps);
     let mut largest: BinaryHeap<_> =
-        overlapping.map(|(number, _)| (area(&shown[number].record.bounds), Reverse(number))).collect();
+        overlapping.map(|(number, _)| (area(&candidates[number].record.bounds), Reverse(number))).collect();
     while let Some((_, Reverse(number))) = largest.pop() {
-        let parts = split_candidate(&shown[number]);
+        let parts = split_candidate(&candidates[number]);
         if count + parts.len() > most + 1 {
             break;
         }
         let sum: f32 = parts.iter().map(|part| part.record.bounds.half_area()).sum();
-        if parts.len() < 2 || sum > shown[number].record.bounds.half_area() {
+        if parts.len() < 2 || sum > candidates[number].record.bounds.half_area() {
             continue;
         }
-        shown[number].is_open = true;
+        candidates[number].is_split = true;
         count += parts.len() - 1;
         for part in parts {
-            largest.push((area(&part.record.bounds), Reverse(shown.len())));
-            shown.push(part);
+            largest.push((area(&part.record.bounds), Reverse(candidates.len())));
+            candidates.push(part);
         }
     }
-    shown.into_iter().filter(|shown| !shown.is_open).map(|shown| shown.record).collect()
+    candidates.into_iter().filter(|candidate| !candidate.is_split).map(|candidate| candidate.record).collect()
 }
 
 /// Returns for each instance true if it overlaps another. Sweeps along the axis of the largest extent.
@@ -91,14 +90,14 @@ fn bounds_overlap(one: &Bounds, other: &Bounds) -> bool {
 }
 
 /// Returns a record for each part of a candidate.
-fn split_candidate<'a>(shown: &RebraidCandidate<'a>) -> Vec<RebraidCandidate<'a>> {
+fn split_candidate<'a>(candidate: &RebraidCandidate<'a>) -> Vec<RebraidCandidate<'a>> {
     let part = |part: &'a RebraidPart| {
-        let mut record = shown.instance.clone();
+        let mut record = candidate.instance.clone();
         record.instance.entry = part.reference;
         record.bounds = transform_bounds_rows(&record.instance.object_to_world, part.bounds);
-        RebraidCandidate { instance: shown.instance, part, record, is_open: false }
+        RebraidCandidate { instance: candidate.instance, part, record, is_split: false }
     };
-    shown.instance.parts.children_of(shown.part).iter().map(part).collect()
+    candidate.instance.parts.children_of(candidate.part).iter().map(part).collect()
 }
 
 #[cfg(test)]
@@ -119,13 +118,13 @@ mod tests {
     fn placed(transforms: &[Affine3A]) -> (Vec<u8>, Vec<PlacedInstance>) {
         let boxes = row(300, Vec3::ZERO);
         let (bytes, parts) = structure(&boxes);
-        let shown = InstancedBlas { address: 256, parts: Arc::new(parts) };
+        let blas = InstancedBlas { address: 256, parts: Arc::new(parts) };
         let instance = |transform: &Affine3A| TlasInstance {
             transform: transform_rows(transform),
             ..TlasInstance::new(AccelStructHandle::from_bits(1))
         };
         let all =
-            (0..).zip(transforms).filter_map(|(number, of)| place_instance(number, &instance(of), &shown));
+            (0..).zip(transforms).filter_map(|(number, of)| place_instance(number, &instance(of), &blas));
         (bytes, all.collect())
     }
 
@@ -142,10 +141,11 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(30))]
         #[test]
-        fn every_primitive_of_every_instance_is_in_one_record(transforms in transforms(), room in 0..60_usize) {
+        fn every_primitive_of_every_instance_is_in_one_record(transforms in transforms(), max_records in 0..60_usize) {
             let (bytes, instances) = placed(&transforms);
-            let records = rebraid(&instances, room);
-            prop_assert!(records.len() <= instances.len().max(room.min(super::record_capacity(instances.len() as u32) as usize)));
+            let records = rebraid(&instances, max_records);
+            let capacity = record_capacity(instances.len() as u32) as usize;
+            prop_assert!(records.len() <= instances.len().max(max_records.min(capacity)));
             let mut seen = HashMap::new();
             for record in &records {
                 let matrix = transforms[record.instance.number as usize];

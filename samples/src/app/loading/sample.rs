@@ -62,7 +62,7 @@ impl<S: Sample> Loading<S> {
     {
         let background = background(ctx)?;
         let status = Status::default();
-        let mut progress = Progress::spoken().told_to(&status);
+        let mut progress = Progress::with_log_lines().with_status(&status);
         let thread = thread::Builder::new()
             .name("loading".to_owned())
             .spawn(move || load(&mut progress))
