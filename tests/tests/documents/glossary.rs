@@ -2,13 +2,16 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use crate::contributing::{code_words, contributing, section};
 use crate::held_by::{cells, project};
-use crate::rust_tokens::{Kind, Token, tokens};
+use crate::rust_tokens::{Kind, Token, group_end, nesting, tokens};
 
 /// Folders whose names are checked.
-const FOLDERS: [&str; 3] = ["lvk/src", "samples", "tests/src"];
+const FOLDERS: [&str; 4] = ["lvk/src", "samples", "tests/src", "tests/tests"];
+/// Folders whose GLSL files have checked names.
+const GLSL_FOLDERS: [&str; 2] = ["lvk/src", "shaders"];
 const BARE_NAMES: &str = "Never a function's whole name:";
 /// The kind of a function that only its own file calls: it may be named by any word but a bare one.
 const PRIVATE_FN: &str = "private fn";
@@ -62,8 +65,9 @@ impl Glossary {
             return None;
         }
         let parts = words(&name.text);
-        let is_in =
-            |private: &&Vec<String>| parts.windows(private.len()).any(|part| part == private.as_slice());
+        let is_in = |private: &&Vec<String>| {
+            parts.windows(private.len()).any(|part| part.iter().zip(*private).all(is_same_or_plural))
+        };
         let private = self.private.iter().find(is_in)?;
         Some(format!("{}: {} {} has the word {:?}", name.place, name.kind, name.text, private.join(" ")))
     }
@@ -86,7 +90,11 @@ impl Glossary {
     }
 }
 
-/// The name of a module, a type or a function.
+fn is_same_or_plural((word, private): (&String, &String)) -> bool {
+    word == private || word.strip_suffix('s') == Some(private)
+}
+
+/// The name of a module, a type, a function or a GLSL file.
 #[derive(Debug)]
 struct Name {
     kind: String,
@@ -116,8 +124,12 @@ fn words(name: &str) -> Vec<String> {
     found
 }
 
-/// Returns the names that a file declares, its own and those of its folders among them.
+/// Returns the names that a file declares, its own and those of its folders among them; of a GLSL file, its own.
 fn names(file: &str, text: &str) -> Vec<Name> {
+    if let Some(stem) = file.strip_suffix(".glsl") {
+        let text = stem.rsplit('/').next().unwrap_or(stem).to_owned();
+        return vec![Name { kind: "GLSL file".to_owned(), text, place: file.to_owned() }];
+    }
     let own = file.trim_end_matches(".rs").trim_end_matches("/mod");
     let ends = own.match_indices('/').map(|(end, _)| end).chain([own.len()]);
     let modules = ends.map(|end| {
@@ -128,13 +140,14 @@ fn names(file: &str, text: &str) -> Vec<Name> {
     let mut found: Vec<_> = modules.collect();
     let declares = |word: &str| ["fn", "mod", "struct", "enum", "union", "trait", "type"].contains(&word);
     let tokens = tokens(text);
+    let traits = public_traits(&tokens);
     for (at, three) in tokens.windows(3).enumerate() {
         let [keyword, name, next] = three else { continue };
         let has_file = keyword.is_word("mod") && next.is_mark(";");
         if keyword.kind == Kind::Word && declares(keyword.text) && name.kind == Kind::Word && !has_file {
             let place = format!("{file}:{}", name.line);
             let kind = match keyword.text {
-                "fn" if !is_public(&tokens[..at]) => PRIVATE_FN,
+                "fn" if !is_public(&tokens[..at]) && !is_method_of(&traits, &tokens, at) => PRIVATE_FN,
                 kind => kind,
             };
             found.push(Name { kind: kind.to_owned(), text: name.text.to_owned(), place });
@@ -145,22 +158,43 @@ fn names(file: &str, text: &str) -> Vec<Name> {
 
 /// True if a declaration behind these tokens is `pub`, as far as the crate or all over.
 fn is_public(before: &[Token<'_>]) -> bool {
-    let words = before
-        .iter()
-        .rev()
-        .take_while(|token| !token.is_mark(";") && !token.is_mark("}") && !token.is_mark("{"));
-    words.take(6).any(|token| token.is_word("pub"))
+    let is_qualifier = |token: &Token<'_>| {
+        token.kind == Kind::Literal || ["const", "async", "unsafe", "extern"].iter().any(|q| token.is_word(q))
+    };
+    let qualifiers = before.iter().rev().take_while(|token| is_qualifier(token)).count();
+    let mut before = &before[..before.len() - qualifiers];
+    if before.last().is_some_and(|token| token.is_mark(")")) {
+        let open = before.iter().rposition(|token| token.is_mark("("));
+        before = &before[..open.unwrap_or(0)];
+    }
+    before.last().is_some_and(|token| token.is_word("pub"))
 }
 
-/// Returns the Rust files below a folder of the project, by path below the project.
-fn rust_files(folder: &str) -> Vec<(String, String)> {
+/// Returns where the bodies of public traits lie, without their braces.
+fn public_traits(tokens: &[Token<'_>]) -> Vec<Range<usize>> {
+    let traits = (0..tokens.len()).filter(|&at| tokens[at].is_word("trait") && is_public(&tokens[..at]));
+    let bodies = traits.filter_map(|at| {
+        let open = at + tokens[at..].iter().position(|token| token.is_mark("{"))?;
+        Some(open + 1..group_end(tokens, open) - 1)
+    });
+    bodies.collect()
+}
+
+/// True if the declaration at `at` stands directly in one of the bodies.
+fn is_method_of(bodies: &[Range<usize>], tokens: &[Token<'_>], at: usize) -> bool {
+    let is_direct = |body: &Range<usize>| tokens[body.start..at].iter().map(nesting).sum::<i32>() == 0;
+    bodies.iter().any(|body| body.contains(&at) && is_direct(body))
+}
+
+/// Returns the files below a folder of the project with this ending, by path below the project.
+fn files(folder: &str, ending: &str) -> Vec<(String, String)> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(project().join(folder)).unwrap() {
         let entry = entry.unwrap();
         let path = format!("{folder}/{}", entry.file_name().to_string_lossy());
         if entry.file_type().unwrap().is_dir() {
-            found.extend(rust_files(&path));
-        } else if path.ends_with(".rs") {
+            found.extend(files(&path, ending));
+        } else if path.ends_with(ending) {
             let text = std::fs::read_to_string(entry.path()).unwrap();
             found.push((path, text));
         }
@@ -172,8 +206,9 @@ fn rust_files(folder: &str) -> Vec<(String, String)> {
 #[test]
 fn names_use_the_words_of_the_glossary() {
     let glossary = Glossary::parse(&contributing()).unwrap();
-    let files: Vec<_> = FOLDERS.into_iter().flat_map(rust_files).collect();
-    let complaints = glossary.complaints(&files);
+    let rust = FOLDERS.into_iter().flat_map(|folder| files(folder, ".rs"));
+    let glsl = GLSL_FOLDERS.into_iter().flat_map(|folder| files(folder, ".glsl"));
+    let complaints = glossary.complaints(&rust.chain(glsl).collect::<Vec<_>>());
     assert!(complaints.is_empty(), "{} complaints:\n{}", complaints.len(), complaints.join("\n"));
 }
 
@@ -212,13 +247,16 @@ Never a function's whole name: `of`, `tell`.
 
     #[test]
     fn private_words_are_found_in_modules_types_and_functions() {
-        assert_eq!(complaints("a/lanes.rs", ""), ["a/lanes: module lanes has the word \"lanes\""]);
+        assert_eq!(complaints("a/lanes.rs", ""), ["a/lanes: module lanes has the word \"lane\""]);
         assert_eq!(complaints("shown/mod.rs", "").len(), 1);
         for (text, word) in [
             ("\npub(crate) struct ShownSet;", "shown"),
             ("\nenum Lane { A }", "lane"),
             ("\n    pub fn hand_over_texture() {}", "hand over"),
             ("\nmod shown {}", "shown"),
+            ("\nenum Showns { A }", "shown"),
+            ("\n#[inline] pub(in crate::a::b::c) const unsafe extern \"C\" fn lane() {}", "lane"),
+            ("\npub(crate) trait A: B<C> { type D; fn lane(&self) { fn shown() {} } }", "lane"),
         ] {
             let found = complaints("a.rs", text);
             assert!(
@@ -230,9 +268,16 @@ Never a function's whole name: `of`, `tell`.
     }
 
     #[test]
+    fn names_of_glsl_files_are_checked_without_their_folders() {
+        let found = complaints("lanes/shown.comp.glsl", "void of() {}");
+        assert_eq!(found, ["lanes/shown.comp.glsl: GLSL file shown.comp has the word \"shown\""]);
+    }
+
+    #[test]
     fn other_words_and_parts_of_words_pass() {
         let text = "struct Planes; fn clock() { let shown = lanes; } fn hand_it_over() {} fn type_of() {} type Fine = u8;
             // fn shown
+            trait A { fn lane(); } pub trait B { fn b() { fn lane() {} } } struct P(pub u8); fn shown() {}
             fn lane_width() {}";
         assert_eq!(complaints("a.rs", text), Vec::<String>::new());
     }

@@ -9,30 +9,17 @@ use crate::held_by::project;
 
 /// Endings of source files.
 const SOURCES: [&str; 3] = ["rs", "glsl", "md"];
-/// Levels of folders below the repository, and below the `src` of a crate, that the map lists.
-const LEVELS: usize = 2;
 
 /// Returns the folders that the map has to list for the files of a repository, by paths below it.
 fn folders<'a>(files: impl Iterator<Item = &'a str>) -> BTreeSet<&'a str> {
     let is_source = |file: &&str| file.rsplit_once('.').is_some_and(|(_, ending)| SOURCES.contains(&ending));
     let is_hidden = |file: &str| file.split('/').any(|part| part.starts_with('.') || part == "target");
-    files
-        .filter(is_source)
-        .filter(|file| !is_hidden(file))
-        .flat_map(parents)
-        .filter(|folder| is_listed(folder))
-        .collect()
+    files.filter(is_source).filter(|file| !is_hidden(file)).flat_map(parents).collect()
 }
 
 /// Returns all folders around a file.
 fn parents(file: &str) -> impl Iterator<Item = &str> {
     file.match_indices('/').map(|(end, _)| &file[..end])
-}
-
-fn is_listed(folder: &str) -> bool {
-    let levels = |path: &str| path.split('/').count();
-    let below_src = folder.split_once("/src/").map(|(_, below)| levels(below) <= LEVELS);
-    below_src.unwrap_or_else(|| folder.ends_with("/src") || levels(folder) <= LEVELS)
 }
 
 /// Returns what is wrong with the lines of a map.
@@ -108,10 +95,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_are_listed_down_to_two_levels() {
+    fn folders_are_listed_at_every_level() {
         let files =
             ["a/src/b/c/d/e.rs", "a/Cargo.toml", "f/g/h/i.glsl", ".ci/run.md", "target/j/k.rs", "l/m.png"];
-        let expected = ["a", "a/src", "a/src/b", "a/src/b/c", "f", "f/g"];
+        let expected = ["a", "a/src", "a/src/b", "a/src/b/c", "a/src/b/c/d", "f", "f/g", "f/g/h"];
         assert_eq!(folders(files.into_iter()), expected.into());
     }
 

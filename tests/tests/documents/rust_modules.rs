@@ -57,10 +57,8 @@ impl Crate {
 
     /// Builds the modules of `(path below src, text)` pairs.
     pub fn from_files<'a>(files: impl Iterator<Item = (&'a str, &'a str)>) -> Self {
-        let mut modules: BTreeMap<_, _> = files
-            .filter(|(file, _)| !is_test_file(file))
-            .map(|(file, text)| (module_path(file), read_module(file, text)))
-            .collect();
+        let mut modules: BTreeMap<_, _> =
+            files.map(|(file, text)| (module_path(file), read_module(file, text))).collect();
         let tests: Vec<ModulePath> = modules
             .iter()
             .flat_map(|(path, module)| module.test_modules.iter().map(|name| child(path, name)))
@@ -144,15 +142,6 @@ impl Crate {
         let mut sources = globs.filter_map(|glob| self.absolute(module, glob));
         sources.find(|source| is_declared(source)).unwrap_or(module.to_vec())
     }
-}
-
-/// True for files that only tests use, by their names.
-fn is_test_file(file: &str) -> bool {
-    let (folders, name) = file.rsplit_once('/').unwrap_or(("", file));
-    let is_test_folder = |folder: &str| folder == "test_support" || folder == "tests";
-    folders.split('/').any(is_test_folder)
-        || ["test_support.rs", "tests.rs"].contains(&name)
-        || ["_tests.rs", "_test.rs", "_model.rs"].iter().any(|ending| name.ends_with(ending))
 }
 
 /// Returns the module that a file below `src` holds.
@@ -355,19 +344,22 @@ mod tests {
     }
 
     #[test]
-    fn modules_for_tests_are_left_out() {
+    fn modules_for_tests_are_left_out_by_their_declaration_not_by_name() {
         let files = [
-            ("lib.rs", "mod a;"),
+            ("lib.rs", "mod a; mod b; #[cfg(any(test, feature = \"test-hooks\"))] mod test_support;"),
             ("a.rs", "#[cfg(test)] mod twin; #[cfg(test)] mod tests { use crate::b::B; } // crate::b::B"),
             ("a/twin.rs", "use crate::b::B;"),
-            ("b.rs", ""),
+            ("b.rs", "#[cfg(test)] mod c_tests; #[cfg(test)] mod test_model; mod size_model;"),
             ("b/c_tests.rs", ""),
-            ("test_support/mod.rs", ""),
+            ("b/size_model.rs", ""),
+            ("b/test_model.rs", ""),
+            ("test_support/mod.rs", "mod model;"),
+            ("test_support/model.rs", ""),
         ];
         let found = Crate::from_files(files.into_iter());
         assert_eq!(
             found.modules.values().map(|module| &*module.file).collect::<Vec<_>>(),
-            ["lib.rs", "a.rs", "b.rs"]
+            ["lib.rs", "a.rs", "b.rs", "b/size_model.rs"]
         );
         assert_eq!(targets(&files, "a"), BTreeSet::new());
     }
