@@ -30,7 +30,7 @@ const ROUNDING: f64 = 1e-5;
 /// Values of a hit, as `getters_query.comp.glsl` writes them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Found {
+struct QueryResult {
     hit: HitRecord,
     kind: u32,
     sbt_offset: u32,
@@ -48,8 +48,8 @@ struct Told {
     t_min: f32,
     origin: [f32; 3],
     direction: [f32; 3],
-    committed: Found,
-    candidate: Found,
+    committed: QueryResult,
+    candidate: QueryResult,
 }
 
 /// The push constants of `ray_records.glsl`.
@@ -160,7 +160,7 @@ fn check(name: &str, found: &[f32], expected: &[f64], tolerance: f64) {
 }
 
 /// Checks the values that the instance alone decides: its numbers and matrices, and the ray in its object space.
-fn check_instance(scene: &RayScene, ray: &Ray, found: &Found, what: &str) {
+fn check_instance(scene: &RayScene, ray: &Ray, found: &QueryResult, what: &str) {
     let placed = &scene.placed[found.hit.instance as usize];
     let object_to_world = DAffine3::from_cols_array(&placed.transform.to_cols_array().map(f64::from));
     let world_to_object = object_to_world.inverse();
@@ -275,7 +275,7 @@ fn misses_are_reported_as_zeros_in_software() -> Result<()> {
             for (ray, told) in rays.iter().zip(ask(&ctx, &pipeline, gpu, &rays, 0)?) {
                 for found in [told.committed, told.candidate] {
                     let hit = HitRecord { t: ray.t_max, kind: BACK, ..Zeroable::zeroed() };
-                    let expected = Found { hit, ..Zeroable::zeroed() };
+                    let expected = QueryResult { hit, ..Zeroable::zeroed() };
                     assert_eq!(bytemuck::bytes_of(&found), bytemuck::bytes_of(&expected), "{found:?}");
                 }
             }

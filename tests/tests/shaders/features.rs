@@ -13,11 +13,11 @@ use lvk_tests::raster::{pixels, target};
 use lvk_tests::subprocess::on_swiftshader;
 
 /// A device feature by name, and whether it was found.
-type Feature = (&'static str, fn(&Found) -> vk::Bool32);
+type Feature = (&'static str, fn(&SupportedFeatures) -> vk::Bool32);
 
 /// Features of the device.
 #[derive(Default)]
-struct Found {
+struct SupportedFeatures {
     core: vk::PhysicalDeviceFeatures,
     v11: vk::PhysicalDeviceVulkan11Features<'static>,
     v12: vk::PhysicalDeviceVulkan12Features<'static>,
@@ -25,7 +25,7 @@ struct Found {
     subgroups: vk::PhysicalDeviceVulkan11Properties<'static>,
 }
 
-impl Found {
+impl SupportedFeatures {
     fn query(ctx: &Context) -> Self {
         let mut found = Self::default();
         let (instance, device) = (ctx.raw_instance(), ctx.raw_physical_device());
@@ -48,7 +48,7 @@ impl Found {
 }
 
 /// Returns those of `features` that the device lacks.
-fn missing(found: &Found, features: &[Feature]) -> Vec<&'static str> {
+fn missing(found: &SupportedFeatures, features: &[Feature]) -> Vec<&'static str> {
     features.iter().filter(|(_, is_on)| is_on(found) == vk::FALSE).map(|(name, _)| *name).collect()
 }
 
@@ -154,7 +154,7 @@ fn created(
     needs: &[Feature],
 ) -> Option<Holder<ShaderModuleHandle>> {
     let module = create(ctx, stage, ShaderSource::Glsl(text));
-    let missing = missing(&Found::query(ctx), needs);
+    let missing = missing(&SupportedFeatures::query(ctx), needs);
     if missing.is_empty() {
         return Some(module.unwrap());
     }
@@ -243,7 +243,7 @@ fn features_work_or_are_refused_by_name() {
 fn features_that_are_missing_are_refused_by_name() {
     on_swiftshader(features_that_are_missing_are_refused_by_name, || {
         let Some(ctx) = device() else { return };
-        let found = Found::query(&ctx);
+        let found = SupportedFeatures::query(&ctx);
         let lacks = |shader: &&Use| !missing(&found, shader.needs).is_empty();
         assert!(USES.iter().filter(lacks).count() >= 3, "the device has nearly everything");
         expect_all(&ctx);
