@@ -194,7 +194,7 @@ fn reflections_has_a_window() {
     prints_what_it_writes(env!("CARGO_BIN_EXE_reflections"), &["--samples", "1"]);
 }
 
-/// A sample with a window of its own, somebody at its keys, and what it says on standard error.
+/// A sample in its own window, with simulated key presses, and its standard error.
 struct Session {
     program: Child,
     said: Receiver<String>,
@@ -295,7 +295,7 @@ impl Session {
         data.chunks_exact(4).map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
     }
 
-    /// Closes the window by its key. Answers what was said since somebody last listened.
+    /// Closes the window by its key. Returns the lines printed since the last call that waited for one.
     fn close(mut self) -> Vec<String> {
         self.press(ESCAPE);
         let deadline = Instant::now() + PATIENCE;
@@ -477,7 +477,7 @@ impl Session {
 }
 
 /// A screenshot of a size tells that frames have it, and that no swapchain is being made: a window that changes while one
-/// is made, between the question for its size and the answer, is a message of the validation layer nobody can prevent.
+/// is made, between the question for its size and the answer, causes a message of the validation layer that no application can prevent.
 #[test]
 fn two_hundred_sizes_of_a_window_are_followed() {
     let folder = tempfile::tempdir().unwrap();
@@ -503,7 +503,7 @@ fn two_hundred_sizes_of_a_window_are_followed() {
 /// A swapchain is made of a size that its window had when it was asked: told where the window has changed since.
 const SIZE_HAS_CHANGED: &str = "VUID-VkSwapchainCreateInfoKHR-pNext-07781";
 
-/// At any time, swapchains being made or not. The layer leaves out the one message that this can cause and nobody can prevent.
+/// At any time, swapchains being made or not. The layer is told to skip the one message that this can cause and that no application can prevent.
 #[test]
 fn two_hundred_sizes_in_a_hurry_are_followed_in_the_end() {
     let folder = tempfile::tempdir().unwrap();

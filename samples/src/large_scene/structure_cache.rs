@@ -70,7 +70,7 @@ impl StructureCache {
         }
     }
 
-    /// Replaces a file at once: whoever reads it finds the old bytes or the new ones.
+    /// Replaces a file atomically: a reader finds the old bytes or the new ones.
     fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
         std::fs::create_dir_all(&self.folder)?;
         let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;

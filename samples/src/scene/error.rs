@@ -5,7 +5,7 @@ use std::path::PathBuf;
 /// Errors of loading a scene. Every message names the file and says what to change.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// Nobody waits for it any more.
+    /// The load was cancelled.
     #[error(transparent)]
     Stopped(#[from] crate::app::loading::Stopped),
     /// There is no such file.

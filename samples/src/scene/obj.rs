@@ -123,7 +123,7 @@ fn finish(mesh: &mut Mesh, materials: &[Material], warnings: &mut Vec<String>, d
     mesh.arrange(materials)
 }
 
-/// A reader that reports how far it has come, and fails where nobody wants it to go on.
+/// A reader that reports its progress, and fails once the load is cancelled.
 struct Watched<'a> {
     rest: &'a [u8],
     total: usize,

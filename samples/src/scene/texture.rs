@@ -60,7 +60,7 @@ impl Texture {
 }
 
 /// Finds the file that an MTL means by `name`, seen from `folder`: as written (backslashes are separators),
-/// with other capitals, or, when the folders of the name are those of somebody else's machine, by its last part
+/// with other capitals, or, if the folders of the name do not exist on this machine, by its last part
 /// in `folder` or in `folder/textures`.
 pub(super) fn find_image(folder: &Path, name: &str) -> Option<PathBuf> {
     let name = name.replace('\\', "/");

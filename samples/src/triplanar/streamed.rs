@@ -57,8 +57,8 @@ impl Streamed {
         })
     }
 
-    /// Gives a texture up at once. The frames on their way keep what they show: the library destroys it behind them, and
-    /// nobody gets its number before.
+    /// Unloads a texture at once. Frames in flight still sample it: the library destroys the texture after them, and
+    /// reuses its index only then.
     pub(super) fn unload(&mut self, number: usize) {
         if let Some(slot) = self.slots.get_mut(number) {
             *slot = Slot::Unloaded;

@@ -218,7 +218,7 @@ impl<S: Sample> Running<S> {
             }
             WindowEvent::KeyboardInput { event, .. } => {
                 let PhysicalKey::Code(code) = event.physical_key else { return Ok(Next::Frame) };
-                // A key that goes up is let go, whoever it was meant for.
+                // A released key counts as released, even if the panel had the focus.
                 let is_down = event.state.is_pressed();
                 if (!is_down || !ui.wants_keyboard_input())
                     && let Some(action) = self.controls.key(code, is_down)
@@ -307,8 +307,8 @@ impl<S: Sample> Running<S> {
         Ok(if last { Next::Close } else { Next::Frame })
     }
 
-    /// A frame without a picture, now and then, so that whoever loads is not held up; none while the GPU is at work for that
-    /// one, so that the window is not held up either.
+    /// Draws a frame without an image now and then, so that the loading thread is not delayed. Draws none while the GPU works
+    /// for the load, so that the window is not delayed either.
     fn redraw_loading(&mut self, name: &str) -> Result<Next, RunError> {
         self.follow_size();
         if !self.ctx.is_done(self.latest)? {
