@@ -57,7 +57,7 @@ fn compile_all(chip: &str) {
 
 #[test]
 fn every_kernel_of_the_library_is_compiled() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../lvk/src/kernel");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../lvk/src/kernels");
     let mut texts = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
