@@ -154,10 +154,7 @@ fn a_profile_limits_top_levels() {
     let any = DeviceProfile { name: "phone".into(), ..DeviceProfile::default() };
     let range = |max_storage_buffer_range| DeviceProfile { max_storage_buffer_range, ..any.clone() };
     for (profile, what) in [
-        (
-            DeviceProfile { max_accel_structure_bytes: structure - 1, ..any.clone() },
-            Some("size of the TLAS"),
-        ),
+        (DeviceProfile { max_accel_structure_bytes: structure - 1, ..any.clone() }, Some("size of the TLAS")),
         (DeviceProfile { max_accel_scratch_bytes: scratch - 1, ..any.clone() }, Some("scratch of a build")),
         (range(structure.max(scratch) - 1), Some("in bytes")),
         (range(structure.max(scratch + alignment)), None),
