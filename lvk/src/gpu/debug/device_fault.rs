@@ -93,7 +93,8 @@ fn decode_kind(raw: vk::DeviceFaultAddressTypeEXT) -> FaultKind {
 
 /// Returns the text of a character array, with or without a terminating zero.
 fn decode_text(chars: &[c_char]) -> String {
-    let mut bytes: Vec<u8> = chars.iter().map(|c| c.cast_unsigned()).collect();
+    // `char` of C is signed on x86 and unsigned on ARM.
+    let mut bytes: Vec<u8> = chars.iter().flat_map(|c| c.to_ne_bytes()).collect();
     bytes.push(0);
     CStr::from_bytes_until_nul(&bytes).map(|text| text.to_string_lossy().into_owned()).unwrap_or_default()
 }
@@ -107,7 +108,7 @@ mod tests {
 
     fn chars<const N: usize>(text: &str) -> [c_char; N] {
         let mut all = [0; N];
-        all.iter_mut().zip(text.bytes()).for_each(|(place, byte)| *place = byte.cast_signed());
+        all.iter_mut().zip(text.bytes()).for_each(|(place, byte)| *place = c_char::from_ne_bytes([byte]));
         all
     }
 
