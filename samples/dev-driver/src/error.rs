@@ -3,14 +3,15 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::platform::{INSTALL_DRIVER, INSTALL_LAYER, INSTALL_LOADER};
+
 /// An error of [`prepare`](crate::prepare) and of the other functions of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriverError {
     /// The system has no driver with ray tracing, and the software driver could not be downloaded.
     #[error(
-        "no Vulkan driver with ray tracing was found and none can be downloaded because {cause}; install a GPU driver \
-         with ray tracing, or on Debian and Ubuntu `apt install mesa-vulkan-drivers libvulkan1` (Mesa 24.1 or newer)"
+        "no Vulkan driver with ray tracing was found and none can be downloaded because {cause}; {INSTALL_DRIVER}"
     )]
     NoDriver {
         /// Error of the download.
@@ -19,9 +20,8 @@ pub enum DriverError {
     },
     /// Validation was requested, the system has no current layer, and the layer could not be downloaded.
     #[error(
-        "no current Vulkan validation layer was found and none can be downloaded because {cause}; install \
-         VK_LAYER_KHRONOS_validation 1.3.296 or newer (package `vulkan-validationlayers`, or the Vulkan SDK), \
-         or run without validation"
+        "no current Vulkan validation layer was found and none can be downloaded because {cause}; \
+         {INSTALL_LAYER}, or run without validation"
     )]
     NoValidationLayer {
         /// Error of the download.
@@ -46,8 +46,7 @@ pub enum DriverError {
     },
     /// `LVK_DRIVER=system` is set, but the system has no Vulkan loader.
     #[error(
-        "LVK_DRIVER=system, but this system has no Vulkan loader ({reason}); install `libvulkan1` and a driver, or \
-         unset LVK_DRIVER"
+        "LVK_DRIVER=system, but this system has no Vulkan loader ({reason}); {INSTALL_LOADER}, or unset LVK_DRIVER"
     )]
     NoSystemLoader {
         /// The dynamic linker's message.
