@@ -62,7 +62,15 @@ fn layer_variable(
 mod tests {
     use super::*;
 
-    const OURS: &str = "/p/validation/explicit_layer.d";
+    fn ours() -> String {
+        let folder = Component::Validation.folder("/p".as_ref()).join(LAYER_FOLDER);
+        folder.into_os_string().into_string().unwrap()
+    }
+
+    /// A list with the separator of the platform.
+    fn list(folders: &[&str]) -> String {
+        env::join_paths(folders).unwrap().into_string().unwrap()
+    }
 
     fn variable(path: Option<&str>, added: Option<&str>) -> (&'static str, String) {
         let folders = [PathBuf::from("/p")];
@@ -72,14 +80,15 @@ mod tests {
 
     #[test]
     fn our_folder_is_added_once_and_last() {
-        assert_eq!(variable(None, None), ("VK_ADD_LAYER_PATH", OURS.into()));
-        assert_eq!(variable(None, Some("/own")), ("VK_ADD_LAYER_PATH", format!("/own:{OURS}")));
-        assert_eq!(variable(None, Some(OURS)), ("VK_ADD_LAYER_PATH", OURS.into()));
+        let ours = ours();
+        assert_eq!(variable(None, None), ("VK_ADD_LAYER_PATH", ours.clone()));
+        assert_eq!(variable(None, Some("/own")), ("VK_ADD_LAYER_PATH", list(&["/own", &ours])));
+        assert_eq!(variable(None, Some(&ours)), ("VK_ADD_LAYER_PATH", ours.clone()));
     }
 
     #[test]
     fn a_users_full_path_is_extended() {
-        assert_eq!(variable(Some("/full"), Some("/own")), ("VK_LAYER_PATH", format!("/full:{OURS}")));
-        assert_eq!(variable(Some(""), None), ("VK_ADD_LAYER_PATH", OURS.into()));
+        assert_eq!(variable(Some("/full"), Some("/own")), ("VK_LAYER_PATH", list(&["/full", &ours()])));
+        assert_eq!(variable(Some(""), None), ("VK_ADD_LAYER_PATH", ours()));
     }
 }

@@ -248,6 +248,7 @@ mod tests {
         assert_eq!(without_credentials("file:/srv/debian"), "file:/srv/debian");
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_failing_program_is_named_with_its_first_error() {
         let mut command = Command::new("sh");
