@@ -30,7 +30,7 @@ bool meets(Onward ray, out Shaded shaded) {
     uint triangle = firstTriangle + uint(lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED, frame.tlas));
     SurfacePoint point =
         pointOf(triangle, lvkRayQueryBarycentrics(query, LVK_COMMITTED), ray.origin, ray.direction, ray.cone);
-    bool isGlass = uint(lvkRayQuerySbtOffset(query, LVK_COMMITTED)) == kGlass;
+    bool isGlass = uint(lvkRayQueryInstanceShaderBindingTableRecordOffset(query, LVK_COMMITTED)) == kGlass;
     if (isGlass) {
         shaded = shadeGlass(point, ray.direction, ray.cone);
     } else {
