@@ -65,8 +65,8 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
     push_define(&mut text, stage_macro(stage), "1");
     push_define(&mut text, "LVK_SET", &layout::SET.to_string());
     declare_input_attachments(&mut text);
-    for (binding, name, _) in layout::BINDINGS {
-        push_define(&mut text, name, &binding.to_string());
+    for binding in layout::BINDINGS {
+        push_define(&mut text, binding.macro_name, &binding.number.to_string());
     }
     if options.formatless_read {
         push_extension(&mut text, "GL_EXT_shader_image_load_formatted");
