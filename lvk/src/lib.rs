@@ -54,6 +54,7 @@
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
+//! | write shaders, in GLSL, Slang or HLSL | [`ShaderModuleDesc`], [`manual::shader_interface`], [`HLSL_HEADER`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | build acceleration structures | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | declare the resources that a shader accesses | [`Dependencies`] |
@@ -216,7 +217,7 @@ pub use resource::view::TextureViewDesc;
 pub use resource::ycbcr::{ChromaSite, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
-pub use shader::{ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
+pub use shader::{HLSL_HEADER, ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
 #[cfg(feature = "window")]

@@ -145,7 +145,7 @@ fn check_function(words: &[u32], function: u32) -> Result<(), String> {
     Err("the entry point 'main' names no function of the module".to_owned())
 }
 
-fn execution_model(stage: ShaderStage) -> ExecutionModel {
+pub(crate) fn execution_model(stage: ShaderStage) -> ExecutionModel {
     match stage {
         ShaderStage::Vertex => ExecutionModel::Vertex,
         ShaderStage::TessControl => ExecutionModel::TessellationControl,

@@ -2,6 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
 mod damage;
+#[cfg(feature = "software-ray-query")]
+mod glsl_names;
+#[cfg(feature = "software-ray-query")]
+mod interface;
+#[cfg(feature = "software-ray-query")]
+mod interface_page;
 mod modules;
 mod preamble;
 mod shared;
