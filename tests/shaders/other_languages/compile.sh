@@ -29,10 +29,24 @@ if [[ -z $dxc ]]; then
     dxc=$scratch/compushady/backends/libdxcompiler_x86_64.so
 fi
 
+# 39001: arrays of several types share a binding. 41012: the profile is extended by what the shader uses.
+compile_slang() {
+    "$slangc" "$1.slang" -I $include -O0 -warnings-disable 39001,41012 -target spirv -profile spirv_1_6 \
+        -fvk-use-scalar-layout "${@:3}" -o "$out/$2.slang.spv"
+}
+
+compile_hlsl() {
+    python3 dxc.py "$dxc" "$1.hlsl" "$out/$2.hlsl.spv" -spirv -fspv-target-env=vulkan1.3 -E main -I $include \
+        -fvk-use-scalar-layout "${@:3}"
+}
+
 for shader in blend query; do
-    # 39001: arrays of several types share a binding. 41012: the profile is extended by what the shader uses.
-    "$slangc" $shader.slang -I $include -O0 -warnings-disable 39001,41012 -target spirv -profile spirv_1_6 \
-        -entry main -stage compute -fvk-use-scalar-layout -o "$out/$shader.slang.spv"
-    python3 dxc.py "$dxc" $shader.hlsl "$out/$shader.hlsl.spv" -spirv -fspv-target-env=vulkan1.3 -T cs_6_5 -E main \
-        -fvk-use-scalar-layout -I $include
+    compile_slang $shader $shader -entry main -stage compute
+    compile_hlsl $shader $shader -T cs_6_5
 done
+compile_slang pipeline pipeline.rgen -entry rayGen -stage raygeneration
+compile_slang pipeline pipeline.rmiss -entry miss -stage miss
+compile_slang pipeline pipeline.rchit -entry closestHit -stage closesthit
+compile_hlsl pipeline pipeline.rgen -T lib_6_5 -D STAGE=0
+compile_hlsl pipeline pipeline.rmiss -T lib_6_5 -D STAGE=1
+compile_hlsl pipeline pipeline.rchit -T lib_6_5 -D STAGE=2

@@ -1,16 +1,5 @@
-// Writes a hit record for each ray, as ../query.comp.glsl does. Rays and records are those of ../ray_records.glsl, in
-// halves of 16 bytes: some versions of DXC write no offsets for structs behind addresses.
-#include <lvk.hlsli>
-
-struct Push {
-    uint64_t rays;
-    uint64_t hits;
-    uint tlas;
-    uint count;
-    uint mask;
-    uint flags;
-};
-[[vk::push_constant]] Push push;
+// Writes a hit record for each ray, as ../query.comp.glsl does.
+#include "ray_records.hlsli"
 
 [numthreads(64, 1, 1)]
 void main(uint3 id : SV_DispatchThreadID) {

@@ -10,64 +10,71 @@ use bytemuck::NoUninit;
 use lvk::glam::Vec3;
 use lvk::{
     BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, DeviceProfile, Format,
-    GeometryFlags, Holder, RayQueryRequest, Result, SamplerDesc, ShaderModuleDesc, ShaderSource, ShaderStage,
-    TextureDesc, TextureHandle, TextureRegion, TextureUsage,
+    GeometryFlags, HitGroup, Holder, RayQueryRequest, Result, SamplerDesc, ShaderModuleDesc,
+    ShaderModuleHandle, ShaderSource, ShaderStage, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::ray_scene::RayScene;
-use lvk_tests::ray_tracer::{How, MISSED, Method, NO_OPAQUE, OPAQUE, RayTracer};
+use lvk_tests::ray_tracer::{
+    CULL_BACK, How, MISSED, Method, NO_OPAQUE, OPAQUE, RayTracer, requires_ray_queries,
+};
 use lvk_tests::rays::random_rays;
-use lvk_tests::{device, device_with};
+use lvk_tests::{TestDevice, device, device_with};
 
 /// A module of another compiler.
 struct Foreign {
     name: &'static str,
     bytes: &'static [u8],
-    /// Format of the storage image in `blend`. Slang's image has no format in the shader, DXC's has this one.
-    image: Format,
 }
 
-const BLEND: [Foreign; 2] = [
-    Foreign {
-        name: "blend.slang",
-        bytes: include_bytes!("../../shaders/other_languages/blend.slang.spv"),
-        image: Format::Rgba8Unorm,
-    },
-    Foreign {
-        name: "blend.hlsl",
-        bytes: include_bytes!("../../shaders/other_languages/blend.hlsl.spv"),
-        image: Format::Rgba32Float,
-    },
-];
+/// Returns the module of a file of the folder, without `.spv`.
+macro_rules! foreign {
+    ($name:literal) => {
+        Foreign {
+            name: $name,
+            bytes: include_bytes!(concat!("../../shaders/other_languages/", $name, ".spv")),
+        }
+    };
+}
 
-const QUERY: [Foreign; 2] = [
-    Foreign {
-        name: "query.slang",
-        bytes: include_bytes!("../../shaders/other_languages/query.slang.spv"),
-        image: Format::Rgba8Unorm,
-    },
-    Foreign {
-        name: "query.hlsl",
-        bytes: include_bytes!("../../shaders/other_languages/query.hlsl.spv"),
-        image: Format::Rgba8Unorm,
-    },
+/// With formats of the storage image. Slang's image has no format in the shader, DXC's has this one.
+const BLEND: [(Foreign, Format); 2] =
+    [(foreign!("blend.slang"), Format::Rgba8Unorm), (foreign!("blend.hlsl"), Format::Rgba32Float)];
+
+const QUERY: [Foreign; 2] = [foreign!("query.slang"), foreign!("query.hlsl")];
+
+/// Ray generation, miss and closest hit.
+const PIPELINES: [[Foreign; 3]; 2] = [
+    [foreign!("pipeline.rgen.slang"), foreign!("pipeline.rmiss.slang"), foreign!("pipeline.rchit.slang")],
+    [foreign!("pipeline.rgen.hlsl"), foreign!("pipeline.rmiss.hlsl"), foreign!("pipeline.rchit.hlsl")],
 ];
 
 impl Foreign {
-    fn words(&self) -> Vec<u32> {
-        bytemuck::pod_collect_to_vec(self.bytes)
+    fn module(&self, ctx: &Context, stage: ShaderStage) -> Result<Holder<ShaderModuleHandle>> {
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(self.bytes);
+        let source = ShaderSource::Spirv(&words);
+        ctx.create_shader_module(&ShaderModuleDesc {
+            stage,
+            source,
+            debug_name: self.name,
+            ..Default::default()
+        })
     }
 
     fn pipeline(&self, ctx: &Context) -> Result<Holder<ComputePipelineHandle>> {
-        let module = ctx.create_shader_module(&ShaderModuleDesc {
-            stage: ShaderStage::Compute,
-            source: ShaderSource::Spirv(&self.words()),
-            debug_name: self.name,
-            ..Default::default()
-        })?;
+        let module = self.module(ctx, ShaderStage::Compute)?;
         let desc = ComputePipelineDesc { module: Some(*module), debug_name: self.name, ..Default::default() };
         ctx.create_compute_pipeline(&desc)
     }
+}
+
+/// Returns a tracer of a ray generation, a miss and a closest-hit shader.
+fn ray_tracer(ctx: &Context, [ray_gen, miss, closest_hit]: &[Foreign; 3]) -> Result<RayTracer> {
+    let ray_gen = ray_gen.module(ctx, ShaderStage::RayGen)?;
+    let miss = miss.module(ctx, ShaderStage::Miss)?;
+    let closest_hit = closest_hit.module(ctx, ShaderStage::ClosestHit)?;
+    let group = HitGroup { closest_hit: Some(*closest_hit), ..Default::default() };
+    RayTracer::from_groups(ctx, *ray_gen, *miss, &[group])
 }
 
 /// Width and height of the stored image; not a multiple of a workgroup.
@@ -159,10 +166,10 @@ fn textures_buffers_and_storage_images_are_those_of_glsl() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let inputs = BlendInputs::new(&ctx)?;
     let glsl = compute_pipeline(&ctx, include_str!("../../shaders/other_languages/blend.comp.glsl"));
-    for foreign in &BLEND {
-        let expected = inputs.blend(&ctx, *glsl, foreign.image)?;
+    for (foreign, format) in &BLEND {
+        let expected = inputs.blend(&ctx, *glsl, *format)?;
         assert!(expected.iter().any(|byte| *byte != 0), "{}", foreign.name);
-        let found = inputs.blend(&ctx, *foreign.pipeline(&ctx)?, foreign.image)?;
+        let found = inputs.blend(&ctx, *foreign.pipeline(&ctx)?, *format)?;
         assert!(found == expected, "{}", foreign.name);
     }
     Ok(())
@@ -171,15 +178,15 @@ fn textures_buffers_and_storage_images_are_those_of_glsl() -> Result<()> {
 /// Wrong indices are found in SPIR-V of other compilers too.
 #[test]
 fn indices_are_checked() -> Result<()> {
-    for foreign in &BLEND {
+    for (foreign, format) in &BLEND {
         let Some(ctx) = device_with(|desc| desc.check_indices = true) else { return Ok(()) };
         let inputs = BlendInputs::new(&ctx)?;
         let glsl = compute_pipeline(&ctx, include_str!("../../shaders/other_languages/blend.comp.glsl"));
         let pipeline = foreign.pipeline(&ctx)?;
-        let expected = inputs.blend(&ctx, *glsl, foreign.image)?;
-        assert!(inputs.blend(&ctx, *pipeline, foreign.image)? == expected, "{}", foreign.name);
+        let expected = inputs.blend(&ctx, *glsl, *format)?;
+        assert!(inputs.blend(&ctx, *pipeline, *format)? == expected, "{}", foreign.name);
         assert!(ctx.index_faults()?.is_empty(), "{}", foreign.name);
-        inputs.blend_of(NO_TEXTURE, &ctx, *pipeline, foreign.image)?;
+        inputs.blend_of(NO_TEXTURE, &ctx, *pipeline, *format)?;
         let faults = ctx.index_faults()?;
         let found: Vec<_> = faults.iter().map(|fault| (fault.shader.as_str(), fault.index)).collect();
         assert_eq!(found, [(foreign.name, NO_TEXTURE)]);
@@ -187,31 +194,58 @@ fn indices_are_checked() -> Result<()> {
     Ok(())
 }
 
-/// Rays through many instances; with a profile whose meshes are split, ids of hits go through the hit remap table.
-#[test]
-fn ray_queries_hit_what_those_of_glsl_hit() -> Result<()> {
+/// Returns devices with these ray queries: one as it is, and one whose meshes are split, so that ids of hits go through
+/// the hit remap table.
+fn whole_and_split(ray_query: RayQueryRequest) -> Vec<TestDevice> {
     let split = DeviceProfile { max_blas_primitives: 40, ..DeviceProfile::default() };
-    let whole = device_with(|desc| desc.ray_query = RayQueryRequest::HardwareIfPresent);
+    let whole = device_with(|desc| desc.ray_query = ray_query);
     let split = device_with(|desc| {
-        desc.ray_query = RayQueryRequest::HardwareIfPresent;
+        desc.ray_query = ray_query;
         desc.profile = Some(&split);
     });
-    for ctx in [whole, split].into_iter().flatten() {
-        if !ctx.capabilities().ray_query {
-            eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
+    whole.into_iter().chain(split).collect()
+}
+
+/// Both tracers find the same hits, among instances that overlap.
+fn assert_same_hits(ctx: &Context, tracer: &RayTracer, glsl: &RayTracer, name: &str) -> Result<()> {
+    let scene = RayScene::scattered(GeometryFlags::OPAQUE).upload(ctx)?;
+    let rays = random_rays(25, 500, Vec3::splat(-4.0), Vec3::splat(4.0));
+    for flags in [0, OPAQUE, NO_OPAQUE, CULL_BACK] {
+        let how = How { flags, ..How::default() };
+        let expected = glsl.trace(&scene.tlas, &rays, how)?;
+        let hits = expected.iter().filter(|record| record.kind != MISSED).count();
+        assert!(hits > 50, "{hits} hits");
+        assert!(tracer.trace(&scene.tlas, &rays, how)? == expected, "{name}, flags {flags}");
+    }
+    Ok(())
+}
+
+#[test]
+fn ray_queries_hit_what_those_of_glsl_hit() -> Result<()> {
+    for ctx in whole_and_split(RayQueryRequest::HardwareIfPresent) {
+        if !requires_ray_queries(&ctx) {
             continue;
         }
-        let scene = RayScene::scattered(GeometryFlags::OPAQUE).upload(&ctx)?;
-        let rays = random_rays(25, 500, Vec3::splat(-4.0), Vec3::splat(4.0));
         let glsl = RayTracer::new(&ctx, Method::Query)?;
         for foreign in &QUERY {
             let tracer = RayTracer::from_query(&ctx, foreign.pipeline(&ctx)?);
-            for flags in [0, OPAQUE, NO_OPAQUE] {
-                let how = How { flags, ..How::default() };
-                let expected = glsl.trace(&scene.tlas, &rays, how)?;
-                let hits = expected.iter().filter(|record| record.kind != MISSED).count();
-                assert!(hits > 50, "{hits} hits");
-                assert!(tracer.trace(&scene.tlas, &rays, how)? == expected, "{} {flags}", foreign.name);
+            assert_same_hits(&ctx, &tracer, &glsl, foreign.name)?;
+        }
+    }
+    Ok(())
+}
+
+/// Devices without ray queries trace too: DXC declares the capability of queries in every ray generation shader.
+#[test]
+fn ray_tracing_pipelines_hit_what_those_of_glsl_hit() -> Result<()> {
+    for ray_query in [RayQueryRequest::HardwareIfPresent, RayQueryRequest::Off] {
+        for ctx in whole_and_split(ray_query) {
+            if !Method::available(&ctx).contains(&Method::Pipeline) {
+                continue;
+            }
+            let glsl = RayTracer::new(&ctx, Method::Pipeline)?;
+            for shaders in &PIPELINES {
+                assert_same_hits(&ctx, &ray_tracer(&ctx, shaders)?, &glsl, shaders[0].name)?;
             }
         }
     }
@@ -241,7 +275,8 @@ fn the_words_are_those_of_the_sources() {
     let out = tempfile::tempdir().unwrap();
     let run = Command::new("bash").arg(folder().join("compile.sh")).arg(out.path()).status().unwrap();
     assert!(run.success());
-    for foreign in BLEND.iter().chain(&QUERY) {
+    let blend = BLEND.iter().map(|(foreign, _)| foreign);
+    for foreign in blend.chain(&QUERY).chain(PIPELINES.iter().flatten()) {
         let file = format!("{}.spv", foreign.name);
         let compiled = std::fs::read(out.path().join(&file)).unwrap();
         if std::env::var_os("LVK_UPDATE_KERNELS").is_some() {

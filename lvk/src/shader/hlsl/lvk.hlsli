@@ -48,7 +48,8 @@ float4 textureBindless2DLod(uint tex, uint smp, float2 uv, float lod) {
     return kTextures2D[NonUniformResourceIndex(tex)].SampleLevel(kSamplers[NonUniformResourceIndex(smp)], uv, lod);
 }
 float4 textureBindless2DArrayLod(uint tex, uint smp, float3 uvLayer, float lod) {
-    return kTextures2DArray[NonUniformResourceIndex(tex)].SampleLevel(kSamplers[NonUniformResourceIndex(smp)], uvLayer, lod);
+    SamplerState by = kSamplers[NonUniformResourceIndex(smp)];
+    return kTextures2DArray[NonUniformResourceIndex(tex)].SampleLevel(by, uvLayer, lod);
 }
 float4 textureBindless3DLod(uint tex, uint smp, float3 uvw, float lod) {
     return kTextures3D[NonUniformResourceIndex(tex)].SampleLevel(kSamplers[NonUniformResourceIndex(smp)], uvw, lod);
