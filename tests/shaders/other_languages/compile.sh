@@ -31,7 +31,7 @@ fi
 
 # 39001: arrays of several types share a binding. 41012: the profile is extended by what the shader uses.
 compile_slang() {
-    "$slangc" "$1.slang" -I $include -O0 -warnings-disable 39001,41012 -target spirv -profile spirv_1_6 \
+    "$slangc" "$1" -I $include -O0 -warnings-disable 39001,41012 -target spirv -profile spirv_1_6 \
         -fvk-use-scalar-layout "${@:3}" -o "$out/$2.slang.spv"
 }
 
@@ -41,12 +41,14 @@ compile_hlsl() {
 }
 
 for shader in blend query; do
-    compile_slang $shader $shader -entry main -stage compute
+    compile_slang $shader.slang $shader -entry main -stage compute
     compile_hlsl $shader $shader -T cs_6_5
 done
-compile_slang pipeline pipeline.rgen -entry rayGen -stage raygeneration
-compile_slang pipeline pipeline.rmiss -entry miss -stage miss
-compile_slang pipeline pipeline.rchit -entry closestHit -stage closesthit
+compile_slang helpers.hlsl helpers -entry main -stage fragment
+compile_hlsl helpers helpers -T ps_6_5
+compile_slang pipeline.slang pipeline.rgen -entry rayGen -stage raygeneration
+compile_slang pipeline.slang pipeline.rmiss -entry miss -stage miss
+compile_slang pipeline.slang pipeline.rchit -entry closestHit -stage closesthit
 compile_hlsl pipeline pipeline.rgen -T lib_6_5 -D STAGE=0
 compile_hlsl pipeline pipeline.rmiss -T lib_6_5 -D STAGE=1
 compile_hlsl pipeline pipeline.rchit -T lib_6_5 -D STAGE=2

@@ -3,6 +3,7 @@
 //! The sources and their SPIR-V lie in `tests/shaders/other_languages`, with the script that compiles them.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -10,7 +11,7 @@ use bytemuck::NoUninit;
 use lvk::glam::Vec3;
 use lvk::{
     BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, DeviceProfile, Format,
-    GeometryFlags, HitGroup, Holder, RayQueryRequest, Result, SamplerDesc, ShaderModuleDesc,
+    GeometryFlags, HLSL_HEADER, HitGroup, Holder, RayQueryRequest, Result, SamplerDesc, ShaderModuleDesc,
     ShaderModuleHandle, ShaderSource, ShaderStage, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
@@ -48,6 +49,9 @@ const PIPELINES: [[Foreign; 3]; 2] = [
     [foreign!("pipeline.rgen.slang"), foreign!("pipeline.rmiss.slang"), foreign!("pipeline.rchit.slang")],
     [foreign!("pipeline.rgen.hlsl"), foreign!("pipeline.rmiss.hlsl"), foreign!("pipeline.rchit.hlsl")],
 ];
+
+/// A fragment shader that uses every name of `lvk.hlsli`.
+const HELPERS: [Foreign; 2] = [foreign!("helpers.slang"), foreign!("helpers.hlsl")];
 
 impl Foreign {
     fn module(&self, ctx: &Context, stage: ShaderStage) -> Result<Holder<ShaderModuleHandle>> {
@@ -194,6 +198,27 @@ fn indices_are_checked() -> Result<()> {
     Ok(())
 }
 
+/// The validation layer takes the code of each name of the header, with and without index checks.
+#[test]
+fn every_name_of_the_header_makes_valid_code() -> Result<()> {
+    let text = include_str!("../../shaders/other_languages/helpers.hlsl");
+    let words = HLSL_HEADER.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+    let starts = ["textureBindless", "lvkMap", "kTextures", "kSamplers", "kImages", "kTLAS", "LVK_"];
+    let names: BTreeSet<_> =
+        words.filter(|word| starts.iter().any(|start| word.starts_with(start))).collect();
+    let unused: Vec<_> = names.iter().filter(|name| !text.contains(**name)).collect();
+    assert!(names.len() > 25 && unused == [&"LVK_HLSLI", &"LVK_INPUT_AT"], "{unused:?} of {names:?}");
+    for check_indices in [false, true] {
+        let Some(ctx) = device_with(|desc| desc.check_indices = check_indices) else { return Ok(()) };
+        if requires_ray_queries(&ctx) {
+            for foreign in &HELPERS {
+                drop(foreign.module(&ctx, ShaderStage::Fragment)?);
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Returns devices with these ray queries: one as it is, and one whose meshes are split, so that ids of hits go through
 /// the hit remap table.
 fn whole_and_split(ray_query: RayQueryRequest) -> Vec<TestDevice> {
@@ -276,7 +301,7 @@ fn the_words_are_those_of_the_sources() {
     let run = Command::new("bash").arg(folder().join("compile.sh")).arg(out.path()).status().unwrap();
     assert!(run.success());
     let blend = BLEND.iter().map(|(foreign, _)| foreign);
-    for foreign in blend.chain(&QUERY).chain(PIPELINES.iter().flatten()) {
+    for foreign in blend.chain(&QUERY).chain(&HELPERS).chain(PIPELINES.iter().flatten()) {
         let file = format!("{}.spv", foreign.name);
         let compiled = std::fs::read(out.path().join(&file)).unwrap();
         if std::env::var_os("LVK_UPDATE_KERNELS").is_some() {

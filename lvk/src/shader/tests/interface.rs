@@ -274,7 +274,7 @@ fn extensions() -> String {
 
 fn bindings() -> String {
     let mut text =
-        format!("| `LVK_SET` | Binding | Macro | Descriptor type | Content |\n|---|---|---|---|---|\n");
+        String::from("| `LVK_SET` | Binding | Macro | Descriptor type | Content |\n|---|---|---|---|---|\n");
     for binding in layout::BINDINGS {
         let (number, ty) = (binding.number, binding.descriptor_type);
         let _ = writeln!(
