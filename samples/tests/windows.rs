@@ -227,10 +227,23 @@ impl Session {
         thread::spawn(move || lines.map_while(Result::ok).all(|line| say.send(line).is_ok()));
         let mut session = Self { program, said, keys, root, window: 0, _desktop: desktop };
         session.wait("its window", |session| session.find_window().is_some());
-        session.window = session.find_window().unwrap();
-        let time = x11rb::CURRENT_TIME;
-        session.keys.set_input_focus(InputFocus::PARENT, session.window, time).unwrap().check().unwrap();
+        session.focus();
         Some(session)
+    }
+
+    /// Takes the window that is visible as the one that keys go to.
+    fn focus(&mut self) {
+        self.window = self.find_window().unwrap();
+        let time = x11rb::CURRENT_TIME;
+        self.keys.set_input_focus(InputFocus::PARENT, self.window, time).unwrap().check().unwrap();
+    }
+
+    /// Destroys the window without asking the program, and waits for the next one.
+    fn destroy_window(&mut self) {
+        let gone = self.window;
+        self.keys.destroy_window(gone).unwrap().check().unwrap();
+        self.wait("another window", |session| session.find_window().is_some_and(|window| window != gone));
+        self.focus();
     }
 
     /// The visible window of some size.
@@ -359,6 +372,49 @@ fn an_animation_by_frames_stands_too() {
     assert!(session.take_screenshot(&shot(4)) == first, "it goes on");
     session.press(SPACE);
     assert!(session.take_screenshot(&shot(5)) != first, "it still stands");
+    session.close();
+}
+
+/// The window system takes the window, as Android does when an application is paused, and the sample goes on in another one
+/// by the same functions: on its device, with what was pressed before, and without a message of the validation layer.
+#[test]
+fn a_sample_goes_on_where_it_was_when_its_window_is_destroyed() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_rtx_textures");
+    let Some(mut session) = Session::new(program, &[], folder.path()) else { return };
+    let shot = |number: u32| folder.path().join(format!("rtx_textures_window_{number:04}.png"));
+    session.press(SPACE);
+    session.press(F1);
+    let before = session.take_screenshot(&shot(1));
+    for number in 2..12 {
+        session.destroy_window();
+        assert!(session.take_screenshot(&shot(number)) == before, "picture {number} is another one");
+    }
+    session.resize([300, 260]);
+    session.destroy_window();
+    assert!(session.take_screenshot(&shot(12)) == before, "a new window has the size of the first");
+    session.press(SPACE);
+    let animated = session.take_screenshot(&shot(13));
+    assert!(differing(&before, &animated, 0) > 0.0, "the animation stands");
+    let said = session.close();
+    let is_wrong = |line: &&String| ["warning", "error", "alive"].iter().any(|word| line.contains(word));
+    assert_eq!(said.iter().find(is_wrong), None);
+}
+
+#[test]
+fn a_sample_goes_on_loading_when_its_window_is_destroyed() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_large_scene");
+    let args = ["--triangles", "400000", "--samples", "1", "--depth", "0"];
+    let Some(mut session) = Session::new(program, &args, folder.path()) else { return };
+    let shot = |number: u32| folder.path().join(format!("large_scene_window_{number:04}.png"));
+    session.wait_for_line("making the valley");
+    let loading = session.take_screenshot(&shot(1));
+    session.destroy_window();
+    frames_while_loading(&mut session);
+    session.press(F1);
+    let picture = session.take_screenshot(&shot(2));
+    assert!(differing(&loading, &picture, 0) > 0.9, "there is no picture");
     session.close();
 }
 
