@@ -154,7 +154,7 @@ where
         Ok(Arc::new(window))
     }
 
-    /// Goes on after the window was lost without having been closed. On Android the window comes back with
+    /// Goes on after the window was lost without having been closed, or where the user asks for it. On Android the window comes back with
     /// [`resumed`](Self::resumed), elsewhere another one takes its place.
     fn reopen(&mut self, event_loop: &ActiveEventLoop) {
         self.suspended(event_loop);
@@ -193,7 +193,7 @@ enum Next {
     Frame,
     /// A frame, later: nothing is seen for now.
     Nap,
-    /// A frame in another window: this one is gone.
+    /// A frame in another window: this one is gone, or is to go.
     Reopen,
     /// Nothing any more.
     Close,
@@ -272,7 +272,11 @@ impl<S: Sample> Running<S> {
         self.size = window.inner_size().into();
         let handles = Arc::clone(&window) as Arc<dyn WindowHandles>;
         self.present_pass.resume(&handles, self.size)?;
-        self.window = window;
+        let before = std::mem::replace(&mut self.window, window);
+        if before.id() != self.window.id() {
+            // The context keeps the window that it was made for.
+            before.set_visible(false);
+        }
         (self.frames_here, self.is_suspended) = (0, false);
         self.clock.tick(Instant::now(), false);
         Ok(())
@@ -329,6 +333,7 @@ impl<S: Sample> Running<S> {
             Action::Panel => self.panel.is_open = !self.panel.is_open,
             Action::Next => self.sample.next(),
             Action::Reload => self.reload(),
+            Action::Reopen => return Next::Reopen,
             Action::Screenshot => self.wants_screenshot = true,
             Action::Close => return Next::Close,
         }
