@@ -188,6 +188,7 @@ pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
+pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;
 pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
 pub use gpu::start::external::RawContext;

@@ -73,6 +73,14 @@ pub enum Error {
         /// The problem and the remedy.
         message: String,
     },
+    /// The window of a swapchain is gone (`VK_ERROR_SURFACE_LOST_KHR`, also for another surface of the window).
+    #[error(
+        "{swapchain}: its window is gone; suspend the swapchain, and resume it in another window, or destroy it before its window"
+    )]
+    SurfaceLost {
+        /// Debug name of the swapchain.
+        swapchain: String,
+    },
     /// The queue of a command buffer does not support a command.
     #[error("{command} cannot be recorded for the {} queue; acquire a command buffer on {remedy}", queue.label())]
     WrongQueue {

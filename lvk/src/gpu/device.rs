@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU32;
 
 use ash::vk;
 
-use super::calibrated_timestamps::HostClock;
+use super::calibrated_timestamps::ClockReader;
 use super::caps::capabilities::{Capabilities, FeatureRequest};
 use super::caps::descriptor_limits::DescriptorLimits;
 use super::caps::features::Features;
@@ -70,7 +70,7 @@ pub(crate) struct Gpu {
     /// Writes the first contents of images from the host. `None` where that is not the faster way.
     pub(crate) host_copies: Option<HostImageCopy>,
     /// Reads the clocks of device and host together.
-    pub(crate) host_clock: Option<HostClock>,
+    pub(crate) clock_reader: Option<ClockReader>,
     /// Number of live samplers with a custom border colour. Devices allow few of them.
     pub(crate) custom_borders: AtomicU32,
     /// `None` if the context does not present to windows.
@@ -179,7 +179,7 @@ impl Gpu {
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_copies,
-            host_clock: HostClock::new(&instance, &device, physical, features.calibration),
+            clock_reader: ClockReader::new(&instance, &device, physical, features.calibration),
             #[cfg(feature = "window")]
             windows: super::start::surface::WindowFunctions::new(&instance, &device, |feature| {
                 caps.has(feature)

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use lvk::ContextDesc;
 
+use super::run_args::RunArgs;
+
 /// Names the folder; empty, nothing is kept.
 pub const VARIABLE: &str = "LVK_CACHE";
 
@@ -19,9 +21,14 @@ pub(super) struct Caches {
 
 impl Caches {
     /// Makes the folder for the sample called `name`; `None`, with a warning, where that fails, and where none is wished for.
-    pub(super) fn open(name: &str) -> Option<Self> {
+    pub(super) fn open(name: &str, args: &RunArgs) -> Option<Self> {
+        if args.no_cache {
+            return None;
+        }
         let variable = |name| std::env::var_os(name);
-        let folder = folder(variable(VARIABLE), variable("XDG_CACHE_HOME"), variable("HOME"))?;
+        let named = args.cache.clone();
+        let usual = || folder(variable(VARIABLE), variable("XDG_CACHE_HOME"), variable("HOME"));
+        let folder = named.or_else(usual)?;
         match std::fs::create_dir_all(&folder) {
             Ok(()) => Some(Self::below(&folder, name)),
             Err(error) => {

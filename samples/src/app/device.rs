@@ -47,7 +47,7 @@ pub(super) fn open(
 ) -> Result<Context, RunError> {
     use FeatureRequest::{Off, Optional, Required};
     use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
-    let caches = if args.no_cache { None } else { Caches::open(name) };
+    let caches = Caches::open(name, args);
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
             application_name: name,

@@ -94,6 +94,10 @@ pub struct RunArgs {
     #[arg(long, help_heading = "Device")]
     pub no_cache: bool,
 
+    /// Folder of what is kept for the next start, in place of the folders that --no-cache names
+    #[arg(long, value_name = "FOLDER", conflicts_with = "no_cache", help_heading = "Device")]
+    pub cache: Option<PathBuf>,
+
     /// Print the devices and what they can do, and exit
     #[arg(long, help_heading = "Device")]
     pub list_devices: bool,

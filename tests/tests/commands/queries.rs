@@ -423,6 +423,8 @@ fn clocks_of_gpu_and_host_go_together() {
     finish(&ctx, cmd);
     let second = ctx.calibrated_timestamps().unwrap();
     let (after, wall) = (monotonic(), start.elapsed());
+    // Drivers of Linux read the clock of instants.
+    assert_eq!([first.clock, second.clock], [lvk::HostClock::Monotonic; 2]);
     assert!(before <= first.host && first.host <= second.host && second.host <= after);
     assert!(second.host - first.host <= wall + Duration::from_millis(1));
     let stamp = ctx.timestamps_ms(*times, 0, 1).unwrap()[0].unwrap();
@@ -430,6 +432,12 @@ fn clocks_of_gpu_and_host_go_together() {
     let slack = first.deviation + second.deviation + Duration::from_micros(50);
     let seen = first.host_at(stamp);
     assert!(seen + slack >= first.host && seen <= second.host + slack, "{seen:?} of {first:?} to {second:?}");
+    // Both scales of the host are those of one clock, so their distances are the same.
+    let slack = slack + first.instant_deviation + second.instant_deviation;
+    let (apart, instants) = (second.host - first.host, second.instant - first.instant);
+    assert!(apart.abs_diff(instants) <= slack, "{first:?} to {second:?}");
+    let at = first.instant_at(stamp).unwrap();
+    assert!(start <= at + slack && at <= second.instant + slack, "{at:?} of {first:?} to {second:?}");
 }
 
 fn monotonic() -> Duration {

@@ -1,5 +1,6 @@
 //! Tests that hold documents and the tree of sources against each other.
 
+mod android;
 mod bindless_core;
 mod circles;
 mod contributing;

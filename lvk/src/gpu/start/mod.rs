@@ -11,3 +11,5 @@ pub(crate) mod surface;
 pub(crate) mod user_extensions;
 #[cfg_attr(not(feature = "window"), path = "window_disabled.rs")]
 pub(crate) mod window;
+#[cfg(feature = "window")]
+mod window_system;
