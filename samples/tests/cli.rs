@@ -395,6 +395,83 @@ fn devices_are_listed_a_line_each() {
     }
 }
 
+/// The program with a list of drivers, of which none can be used.
+fn with_drivers(files: &Path, args: &[&str]) -> Command {
+    let mut command = hybrid(args);
+    command.env("VK_DRIVER_FILES", files).env_remove("VK_ICD_FILENAMES").env_remove("LVK_DRIVER");
+    command
+}
+
+#[test]
+fn a_machine_without_a_driver_that_works_lists_why() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let library =
+        desk.file("libtoy.so", "a text in the place of a library, which is longer than the header of ELF");
+    let broken = desk.file("toy.json", format!(r#"{{"ICD": {{"library_path": "{library}"}}}}"#));
+    let absent = desk.input.path().join("absent.json");
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    for (manifest, parts) in [
+        (
+            Path::new(&broken),
+            ["toy.json", "libtoy.so", "invalid ELF header", "remedy: install the driver of"],
+        ),
+        (&absent, ["absent.json", "cannot be read", "No such file", "remedy: correct or remove"]),
+        (desk.output.path(), ["no driver manifest in", "VK_DRIVER_FILES=", "remedy: correct", "unset it"]),
+    ] {
+        let listed = Outcome::from_command(with_drivers(manifest, &["--list-devices"]));
+        listed.assert_success();
+        assert!(listed.out.starts_with("the loader ") && listed.out.lines().count() >= 4, "{}", listed.out);
+        assert_names(&listed.out, &parts);
+        let run = Outcome::from_command(with_drivers(manifest, &["--scene", &scene]));
+        run.assert_error(1, &parts);
+        assert_names(
+            &run.err,
+            &["no Vulkan device on this machine: the loader ", "vkCreateInstance returned"],
+        );
+    }
+}
+
+/// Neither a loader nor a driver, and none may be fetched.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_machine_without_a_loader_lists_what_to_install() {
+    let empty = tempfile::tempdir().unwrap();
+    let without_vulkan = |args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid"));
+        command.args(args).env("LVK_NO_DOWNLOAD", "1").env("LVK_VULKAN_DIR", empty.path());
+        for variable in ["LVK_DRIVER", "LVK_DEVICE", "VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
+            command.env_remove(variable);
+        }
+        for variable in ["XDG_CONFIG_DIRS", "XDG_DATA_DIRS", "HOME"] {
+            command.env(variable, empty.path());
+        }
+        // A file in the place of the loader comes before the system's.
+        std::fs::write(empty.path().join("libvulkan.so.1"), "").unwrap();
+        Outcome::from_command({
+            command.env("LD_LIBRARY_PATH", empty.path());
+            command
+        })
+    };
+    let listed = without_vulkan(&["--list-devices"]);
+    listed.assert_success();
+    assert_names(
+        &listed.out,
+        &[
+            "the loader libvulkan.so.1 cannot be opened: ",
+            "remedy: ",
+            "cannot be downloaded because LVK_NO_DOWNLOAD",
+        ],
+    );
+    let run = without_vulkan(&[]);
+    run.assert_error(
+        1,
+        &["no Vulkan driver with ray tracing", "the loader libvulkan.so.1 cannot", "LVK_NO_DOWNLOAD"],
+    );
+}
+
 #[test]
 fn samples_with_one_scene_list_it_and_all_list_devices() {
     if !has_device() {
