@@ -4,6 +4,7 @@ pub(crate) mod device_candidate;
 pub(crate) mod device_fault;
 mod driver_remedies;
 pub(crate) mod driver_report;
+mod driver_report_text;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,7 +14,8 @@ use ash::vk;
 use crate::queue::Queue;
 use device_candidate::DeviceCandidate;
 use device_fault::DeviceFault;
-use driver_report::{DriverReport, no_device_text};
+use driver_report::DriverReport;
+use driver_report_text::no_device_text;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

@@ -55,7 +55,7 @@ impl Instance {
         }
         let layer = find_layer(&entry, desc.validation)?;
         let extensions = Extensions::query(&entry, layer, desc)
-            .map_err(|error| without_drivers(error, &entry, desc.library))?;
+            .map_err(|error| blame_drivers(error, &entry, desc.library))?;
         let mut messenger = Messenger::new(desc.sink.clone());
         let raw = create_instance(&entry, desc, layer, &extensions, &messenger)?;
         if extensions.debug_utils
@@ -170,18 +170,22 @@ fn loader_report(entry: &ash::Entry, library: Option<&Path>) -> LoaderReport {
     LoaderReport::opened(library, loader_version(entry).unwrap_or((1, 0, 0)))
 }
 
-/// Returns [`Error::NoVulkan`] in place of an extension that is missing because no driver can be loaded.
-fn without_drivers(error: Error, entry: &ash::Entry, library: Option<&Path>) -> Error {
+/// Returns [`Error::NoVulkan`] in place of an error that the drivers cause: an extension is missing because no driver can be
+/// loaded, or the loader is out of memory because it cannot parse a manifest, as it says.
+fn blame_drivers(error: Error, entry: &ash::Entry, library: Option<&Path>) -> Error {
     use vk::Result as Code;
-    let is_missing = matches!(
-        error,
-        Error::Unsupported { .. } | Error::Vulkan { result: Code::ERROR_INCOMPATIBLE_DRIVER, .. }
-    );
-    if !is_missing {
-        return error;
+    let report = || DriverReport::query(loader_report(entry, library), Some(error.to_string()));
+    let blamed = match &error {
+        Error::Unsupported { .. } | Error::Vulkan { result: Code::ERROR_INCOMPATIBLE_DRIVER, .. } => {
+            Some(report()).filter(|report| !report.has_driver())
+        }
+        Error::OutOfHostMemory { .. } => Some(report()).filter(DriverReport::has_unread_manifest),
+        _ => None,
+    };
+    match blamed {
+        Some(report) => Error::NoVulkan { report: Arc::new(report) },
+        None => error,
     }
-    let report = DriverReport::query(loader_report(entry, library), Some(error.to_string()));
-    if report.has_driver() { error } else { Error::NoVulkan { report: Arc::new(report) } }
 }
 
 /// Returns the error for a loader that is too old, or finds no driver or device.
