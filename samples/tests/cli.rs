@@ -418,7 +418,7 @@ fn a_machine_without_a_driver_that_works_lists_why() {
     let desk = Desk::new();
     let library =
         desk.file("libtoy.so", "a text in the place of a library, which is longer than the header of ELF");
-    let broken = desk.file("toy.json", format!(r#"{{"ICD": {{"library_path": "{library}"}}}}"#));
+    let broken = desk.file("toy.json", format!(r#"{{"file_format_version": "1.0.0", "ICD": {{"library_path": "{library}", "api_version": "1.3.0"}}}}"#));
     let absent = desk.input.path().join("absent.json");
     let scene = desk.file("triangle.obj", TRIANGLE);
     for (manifest, parts) in [

@@ -63,8 +63,11 @@ fn drivers_that_cannot_be_loaded_are_named() {
     let Some(_) = vulkan() else { return };
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    std::fs::write(path("a.json"), r#"{"ICD": {"library_path": "./libtoy.so", "api_version": "1.3.1"}}"#)
-        .unwrap();
+    std::fs::write(
+        path("a.json"),
+        r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "./libtoy.so", "api_version": "1.3.1"}}"#,
+    )
+    .unwrap();
     std::fs::write(
         path("libtoy.so"),
         "a text in the place of a library, which is longer than the header of ELF",

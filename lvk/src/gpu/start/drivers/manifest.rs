@@ -74,11 +74,13 @@ fn read_text(path: &Path) -> Result<String, String> {
 impl Contents {
     fn parse(text: &str, folder: &Path) -> Result<Self, String> {
         let json = Json::parse(text)?;
+        // The loader skips a manifest without these fields, and tells of it only in its log.
+        json.get("file_format_version").ok_or("it has no \"file_format_version\"")?;
         let icd = json.get("ICD").ok_or("it has no object \"ICD\"")?;
         let field = |name: &str| icd.get(name).and_then(Json::text).map(str::to_owned);
         let library = field("library_path").filter(|path| !path.is_empty());
         let library = library.ok_or("its \"ICD\" has no \"library_path\"")?;
-        let api_version = field("api_version");
+        let api_version = Some(field("api_version").ok_or("its \"ICD\" has no \"api_version\"")?);
         Ok(Self { library: resolve(&library, folder), api_version, bits: field("library_arch") })
     }
 }
@@ -131,7 +133,8 @@ mod tests {
 
     use super::*;
 
-    const GOOD: &str = r#"{"ICD": {"library_path": "./libtoy.so", "api_version": "1.3.1"}}"#;
+    const GOOD: &str =
+        r#"{"file_format_version": "1.0.1", "ICD": {"library_path": "./libtoy.so", "api_version": "1.3.1"}}"#;
 
     /// Returns the manifest of this text, with variables and a library that opens.
     fn check(text: &str, variables: &[(&str, &str)]) -> DriverManifest {
@@ -155,9 +158,11 @@ mod tests {
     fn broken_manifests_say_why() {
         for (text, part) in [
             ("", "a JSON value is expected"),
-            ("{}", "no object \"ICD\""),
-            (r#"{"ICD": {"library_path": 7}}"#, "no \"library_path\""),
-            (r#"{"ICD": {"library_path": ""}}"#, "no \"library_path\""),
+            ("{}", "no \"file_format_version\""),
+            (r#"{"file_format_version": "1.0.0"}"#, "no object \"ICD\""),
+            (&GOOD.replace(r#""./libtoy.so""#, "7"), "no \"library_path\""),
+            (&GOOD.replace("./libtoy.so", ""), "no \"library_path\""),
+            (&GOOD.replace("api_version", "version"), "no \"api_version\""),
             ("{\n\"ICD\" {}}", "line 2: a colon"),
         ] {
             let manifest = check(text, &[]);
