@@ -175,7 +175,11 @@ pub use context::holder::Holder;
 pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
+pub use error::driver_report::{
+    DriverManifest, DriverReport, LoaderReport, ManifestOutcome, SearchedPath, VulkanReport,
+};
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;

@@ -1,6 +1,10 @@
 //! The error type of the library.
 
+pub(crate) mod device_candidate;
 pub(crate) mod device_fault;
+mod driver_remedies;
+pub(crate) mod driver_report;
+mod driver_report_text;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,7 +12,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::queue::Queue;
+use device_candidate::DeviceCandidate;
 use device_fault::DeviceFault;
+use driver_report::DriverReport;
+use driver_report_text::no_device_text;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -26,18 +33,26 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The Vulkan loader could not be opened or has no usable instance.
-    #[error("no Vulkan on this machine: {reason}; install a Vulkan driver and its loader (libvulkan.so.1)")]
+    /// The Vulkan loader could not be opened, is older than Vulkan 1.3, or finds no driver or no device. The text ends
+    /// with the remedies.
+    #[error("no Vulkan device on this machine: {report}")]
     NoVulkan {
-        /// The loader's error.
-        reason: String,
+        /// The loader, the failed command, and each driver manifest with the error of the dynamic linker.
+        report: Arc<DriverReport>,
     },
-    /// Devices exist, but none has the features that the caller requires.
-    #[error("no Vulkan device has what was required: {reasons}")]
+    /// Devices exist, but none has the features that the caller requires. The text ends with the remedies.
+    #[error(
+        "no Vulkan device has what was required: {}",
+        no_device_text(problem.as_deref(), candidates, drivers.as_deref())
+    )]
     NoDevice {
-        /// The problem with the requested device, if any, then each device with the features it lacks,
-        /// separated by `; `.
-        reasons: String,
+        /// The problem with the device that the caller requested by number or name.
+        problem: Option<String>,
+        /// Each device with the requirements that it does not meet.
+        candidates: Vec<DeviceCandidate>,
+        /// Loader and drivers; a driver that cannot be loaded explains the absence of a device. `None` for a device that
+        /// the caller created.
+        drivers: Option<Arc<DriverReport>>,
     },
     /// The device, its driver or a layer lacks a feature that a call needs.
     #[error("{what} is not supported: {why}")]

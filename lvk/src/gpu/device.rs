@@ -1,6 +1,7 @@
 //! Selects a physical device and creates the logical device, its queues and its memory allocator.
 
 use std::ffi::CStr;
+use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
 use ash::vk;
@@ -24,10 +25,11 @@ use super::start::external::RawContext;
 use super::start::instance::Instance;
 use super::start::physical_device::PhysicalDevice;
 use super::start::profile::DeviceProfile;
-use super::start::select::{Candidate, choose};
+use super::start::select::{Candidate, NoMatch, choose};
 use super::start::surface::SurfaceProbe;
 use super::start::user_extensions::UserExtensions;
 use super::start::window::{WindowExtensions, WindowRef};
+use crate::error::device_candidate::DeviceCandidate;
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
@@ -342,9 +344,6 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     for raw in instance.physical_devices()? {
         devices.push(PhysicalDevice::query(&instance.raw, raw)?);
     }
-    if devices.is_empty() {
-        return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
-    }
     let probe = request.window.map(|window| SurfaceProbe::new(instance, window)).transpose()?;
     let unknown = WindowExtensions::unavailable_features(instance.windows.as_ref());
     for device in &mut devices {
@@ -353,8 +352,16 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
             device.select_present_queue(probe.queue_family(device.raw));
         }
     }
-    let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
-    let index = choose(&candidates, request.wish)?;
+    let indexed = devices.iter_mut().enumerate();
+    let candidates: Vec<_> = indexed.map(|(index, device)| candidate(index, device, request)).collect();
+    let index = match choose(&candidates, request.wish) {
+        Ok(index) => index,
+        Err(NoMatch(problem)) => {
+            let candidates = candidates.into_iter().map(|candidate| candidate.device).collect();
+            let drivers = Some(Arc::new(instance.driver_report()));
+            return Err(Error::NoDevice { problem, candidates, drivers });
+        }
+    };
     let mut chosen = devices.swap_remove(index);
     use_single_queue(&mut chosen, request.queues);
     Ok(chosen)
@@ -368,7 +375,7 @@ fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
 }
 
 /// Returns the properties of the device that the selection depends on, with the profile applied.
-fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
+fn candidate(index: usize, device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
     let found = device.capabilities.clone();
     if let Some(profile) = request.profile {
         profile.apply(&mut device.capabilities);
@@ -398,10 +405,8 @@ fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candid
         request.query.prefers_hardware() && left.ray_query,
     ];
     Candidate {
-        name: left.device_name.clone(),
-        kind: device.kind,
+        device: DeviceCandidate { missing, ..device.candidate(index) },
         local_memory_bytes: device.local_memory_bytes,
-        missing,
         optional_score: wanted.into_iter().filter(|has| *has).count() as u32,
     }
 }

@@ -53,8 +53,8 @@ impl RawContext<'_> {
     pub(crate) fn physical(&self) -> Result<PhysicalDevice> {
         let mut found = PhysicalDevice::query(&self.instance, self.physical_device)?;
         if !found.missing.is_empty() {
-            let name = &found.capabilities.device_name;
-            return Err(Error::NoDevice { reasons: format!("{name}: {}", found.missing.join(", ")) });
+            let candidates = vec![found.candidate(0)];
+            return Err(Error::NoDevice { problem: None, candidates, drivers: None });
         }
         self.check_queues(&found.families)?;
         self.check_features(&found)?;

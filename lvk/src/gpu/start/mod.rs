@@ -1,6 +1,7 @@
 //! The steps that create a logical device: instance, selection of a device, extensions, features.
 
 pub(crate) mod driver_workarounds;
+mod drivers;
 pub(crate) mod external;
 pub(crate) mod instance;
 pub(crate) mod physical_device;

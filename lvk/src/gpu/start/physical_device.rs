@@ -4,7 +4,7 @@ use std::ffi::{CStr, CString};
 
 use ash::vk;
 
-use super::select::DeviceKind;
+use crate::error::device_candidate::{DeviceCandidate, DeviceKind};
 use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::features::{Calibration, Features, Subgroups, missing_required};
@@ -86,6 +86,19 @@ impl PhysicalDevice {
         self.queue_locations = queue_locations;
         self.capabilities.queues = describe_queues(&self.families, &queue_locations);
         self.capabilities.limits.timestamp_bits = self.capabilities.queues[0].timestamp_bits;
+    }
+
+    /// Returns the description of the device, with the features it lacks of those that every context requires.
+    pub(crate) fn candidate(&self, index: usize) -> DeviceCandidate {
+        let caps = &self.capabilities;
+        DeviceCandidate {
+            index,
+            name: caps.device_name.clone(),
+            kind: self.kind,
+            api_version: caps.api_version,
+            driver: format!("{} {}", caps.driver_name, caps.driver_info).trim().to_owned(),
+            missing: self.missing.clone(),
+        }
     }
 
     /// True if the device has the extension.
