@@ -157,13 +157,13 @@ impl DeviceProfile {
     }
 
     /// `core-only`: the current device without any optional feature: no ray tracing, no mesh shaders and no
-    /// [`OptionalFeature`](crate::OptionalFeature).
+    /// [`OptionalFeature`](crate::OptionalFeature) beside those of [`FeatureSet::PORTABILITY`], which Vulkan promises.
     pub fn core_only() -> Self {
         Self {
             name: Cow::Borrowed("core-only"),
             position_fetch: false,
             mesh_shader: false,
-            hidden: FeatureSet::ALL,
+            hidden: FeatureSet::ALL.without(FeatureSet::PORTABILITY),
             ..Self::no_ray_tracing()
         }
     }
@@ -342,7 +342,7 @@ mod tests {
         capabilities.remove_features(FeatureSet::NONE);
         assert!(capabilities.cube_arrays && capabilities.has(OptionalFeature::MeshShaderQueries));
         DeviceProfile::core_only().apply(&mut capabilities);
-        assert_eq!(capabilities.optional, FeatureSet::NONE);
+        assert_eq!(capabilities.optional, FeatureSet::PORTABILITY);
         assert!(!(capabilities.cube_arrays || capabilities.shader_int64 || capabilities.mesh_shader));
     }
 
