@@ -1,6 +1,5 @@
 //! Features that textures and samplers need and that devices with `VK_KHR_portability_subset` may lack.
 
-use super::sampler::SamplerDesc;
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureUsage};
 use crate::format::Format;
@@ -59,15 +58,14 @@ pub(super) fn view_needs(
     used([(swizzle != Swizzle::IDENTITY, SWIZZLE), (!format.has_components_of(image), REINTERPRETATION)])
 }
 
-/// Returns the uses of such features in the description of a sampler.
-pub(super) fn sampler_needs(desc: &SamplerDesc<'_>) -> impl Iterator<Item = PortabilityNeed> {
-    used([(desc.compare.is_some(), COMPARISON), (desc.lod_bias != 0.0, LOD_BIAS)])
+/// Returns the uses of such features in a sampler.
+pub(super) fn sampler_needs(compares: bool, lod_bias: f32) -> impl Iterator<Item = PortabilityNeed> {
+    used([(compares, COMPARISON), (lod_bias != 0.0, LOD_BIAS)])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::resource::sampler::CompareOp;
     use crate::resource::swizzle::Channel;
     use crate::resource::texture_desc::TextureKind;
 
@@ -125,11 +123,8 @@ mod tests {
 
     #[test]
     fn each_use_of_a_sampler_needs_its_feature() {
-        let plain = SamplerDesc::default();
-        assert!(features(sampler_needs(&plain)).is_empty());
-        let compare = SamplerDesc { compare: Some(CompareOp::Less), ..plain };
-        assert_eq!(features(sampler_needs(&compare)), [OptionalFeature::ComparisonSamplers]);
-        let biased = SamplerDesc { lod_bias: -0.5, ..plain };
-        assert_eq!(features(sampler_needs(&biased)), [OptionalFeature::SamplerLodBias]);
+        assert!(features(sampler_needs(false, 0.0)).is_empty());
+        assert_eq!(features(sampler_needs(true, 0.0)), [OptionalFeature::ComparisonSamplers]);
+        assert_eq!(features(sampler_needs(false, -0.5)), [OptionalFeature::SamplerLodBias]);
     }
 }
