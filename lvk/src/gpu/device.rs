@@ -529,3 +529,17 @@ fn device_extensions<'a>(
     names.dedup();
     names
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_portability_subset_is_enabled_where_the_device_lists_it() {
+        for portability_subset in [false, true] {
+            let caps = Capabilities { portability_subset, ..Capabilities::default() };
+            let names = device_extensions(&Features::default(), &caps, &UserExtensions::default());
+            assert_eq!(names.contains(&ash::khr::portability_subset::NAME), portability_subset);
+        }
+    }
+}

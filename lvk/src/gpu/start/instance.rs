@@ -261,3 +261,25 @@ fn layer_setting<'a>(key: &'a CStr, value: &'a [vk::Bool32; 1]) -> vk::LayerSett
     // ash counts bytes here; Vulkan counts values.
     vk::LayerSettingEXT { value_count: 1, ..setting }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_of_portability_are_listed_where_the_loader_hides_them() {
+        for portability in [false, true] {
+            let found = Extensions {
+                debug_utils: true,
+                layer_settings: false,
+                portability,
+                extra: &[],
+                windows: None,
+            };
+            let names = found.names();
+            // SAFETY: the names are constants.
+            let mut names = names.iter().map(|name| unsafe { CStr::from_ptr(*name) });
+            assert_eq!(names.any(|name| name == ash::khr::portability_enumeration::NAME), portability);
+        }
+    }
+}
