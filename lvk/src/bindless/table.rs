@@ -70,6 +70,9 @@ impl Bindless {
     pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, yuv: YuvSlots, check_indices: bool) -> Result<Self> {
         let others = DescriptorCounts::new(gpu);
         let left = gpu.descriptor_limits().budget(&others.reserved, yuv.descriptors());
+        let limits = &gpu.caps.limits;
+        // A profile may have tightened them.
+        let left = left.at_most(limits.max_bindless_textures, limits.max_bindless_samplers);
         let conversions = yuv.samplers();
         let textures = largest_fitting(left.texture_count(max_textures)?, |textures| {
             is_supported(gpu, &binding_counts(gpu, textures, left.samplers), &conversions)

@@ -14,6 +14,7 @@ use super::caps::format_features::FormatFeatureCache;
 use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
 use super::caps::optional_features::OptionalFeature;
+use super::caps::portability::{PortabilityNeed, first_missing};
 use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
@@ -287,6 +288,21 @@ impl Gpu {
         Err(Error::unsupported(what, format!("the device '{}' lacks {name}: {why}", self.caps.device_name)))
     }
 
+    /// Returns an error unless the device has the features of all `needs` of `object`.
+    pub(crate) fn require_portable(
+        &self,
+        object: &str,
+        needs: impl IntoIterator<Item = PortabilityNeed>,
+    ) -> Result<()> {
+        let Some(need) = first_missing(needs, self.caps.optional) else { return Ok(()) };
+        match self.require(need.feature, &format!("{} of {object}", need.what)) {
+            Err(Error::Unsupported { what, why }) => {
+                Err(Error::unsupported(what, format!("{why}; {}", need.remedy)))
+            }
+            answer => answer,
+        }
+    }
+
     /// Returns an error unless the device can draw the views of `view_mask` in one pass.
     pub(crate) fn check_view_mask(&self, name: &str, view_mask: u32) -> Result<()> {
         self.require(OptionalFeature::Multiview, &format!("the view mask {view_mask:#b} of '{name}'"))?;
@@ -510,10 +526,25 @@ fn device_extensions<'a>(
     extra: &UserExtensions<'a>,
 ) -> Vec<&'a CStr> {
     let libraries = caps.pipeline_libraries.then_some(ash::khr::pipeline_library::NAME);
-    let own = features.extensions().chain(caps.optional.extensions()).chain(libraries);
+    let subset = caps.portability_subset.then_some(ash::khr::portability_subset::NAME);
+    let own = features.extensions().chain(caps.optional.extensions()).chain(libraries).chain(subset);
     let mut names: Vec<&'a CStr> = own.map(|name| -> &'a CStr { name }).collect();
     names.extend_from_slice(extra.device_extensions());
     names.sort_unstable();
     names.dedup();
     names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_portability_subset_is_enabled_where_the_device_lists_it() {
+        for portability_subset in [false, true] {
+            let caps = Capabilities { portability_subset, ..Capabilities::default() };
+            let names = device_extensions(&Features::default(), &caps, &UserExtensions::default());
+            assert_eq!(names.contains(&ash::khr::portability_subset::NAME), portability_subset);
+        }
+    }
 }

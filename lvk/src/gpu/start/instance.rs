@@ -214,13 +214,21 @@ fn find_layer(entry: &ash::Entry, validation: ValidationMode) -> Result<Option<&
 struct Extensions<'a> {
     debug_utils: bool,
     layer_settings: bool,
+    /// True if the loader lists devices that implement a subset of Vulkan only on request.
+    portability: bool,
     extra: &'a [&'a CStr],
     windows: Option<WindowExtensions>,
 }
 
 impl<'a> Extensions<'a> {
     fn query(entry: &ash::Entry, layer: Option<&CStr>, desc: &InstanceDesc<'a>) -> Result<Self> {
-        let mut found = Self { debug_utils: false, layer_settings: false, extra: desc.extra, windows: None };
+        let mut found = Self {
+            debug_utils: false,
+            layer_settings: false,
+            portability: false,
+            extra: desc.extra,
+            windows: None,
+        };
         let mut missing = desc.extra.to_vec();
         for source in [None, layer].into_iter().take(if layer.is_some() { 2 } else { 1 }) {
             // SAFETY: the layer, if any, was found above.
@@ -229,6 +237,7 @@ impl<'a> Extensions<'a> {
             let has = |name: &CStr| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
             found.debug_utils |= has(ash::ext::debug_utils::NAME);
             found.layer_settings |= has(ash::ext::layer_settings::NAME);
+            found.portability |= source.is_none() && has(ash::khr::portability_enumeration::NAME);
             missing.retain(|name| !has(name));
             if source.is_none() {
                 found.windows =
@@ -245,10 +254,11 @@ impl<'a> Extensions<'a> {
     /// Returns the names of the extensions to enable. The settings extension is left out: the layer reads its
     /// settings without it, and loaders older than the extension refuse it.
     fn names(&self) -> Vec<*const std::ffi::c_char> {
-        let own = self.debug_utils.then_some(ash::ext::debug_utils::NAME);
+        let debug_utils = self.debug_utils.then_some(ash::ext::debug_utils::NAME);
+        let portability = self.portability.then_some(ash::khr::portability_enumeration::NAME);
+        let own = debug_utils.into_iter().chain(portability);
         let windows = self.windows.iter().flat_map(WindowExtensions::names).map(|name| -> &'a CStr { name });
-        let mut names: Vec<&CStr> =
-            own.into_iter().chain(self.extra.iter().copied()).chain(windows).collect();
+        let mut names: Vec<&CStr> = own.chain(self.extra.iter().copied()).chain(windows).collect();
         names.sort_unstable();
         names.dedup();
         names.into_iter().map(CStr::as_ptr).collect()
@@ -279,6 +289,9 @@ fn create_instance(
         .application_info(&application)
         .enabled_layer_names(&layers)
         .enabled_extension_names(&extension_names);
+    if extensions.portability {
+        info = info.flags(vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR);
+    }
     if layer.is_some() && extensions.debug_utils {
         info = info.push_next(&mut messages);
     }
@@ -324,4 +337,26 @@ fn layer_setting<'a>(key: &'a CStr, value: &'a [vk::Bool32; 1]) -> vk::LayerSett
         .values(bytes);
     // ash counts bytes here; Vulkan counts values.
     vk::LayerSettingEXT { value_count: 1, ..setting }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_of_portability_are_listed_where_the_loader_hides_them() {
+        for portability in [false, true] {
+            let found = Extensions {
+                debug_utils: true,
+                layer_settings: false,
+                portability,
+                extra: &[],
+                windows: None,
+            };
+            let names = found.names();
+            // SAFETY: the names are constants.
+            let mut names = names.iter().map(|name| unsafe { CStr::from_ptr(*name) });
+            assert_eq!(names.any(|name| name == ash::khr::portability_enumeration::NAME), portability);
+        }
+    }
 }

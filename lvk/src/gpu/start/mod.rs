@@ -1,5 +1,6 @@
 //! The steps that create a logical device: instance, selection of a device, extensions, features.
 
+mod built_in_profiles;
 pub(crate) mod driver_workarounds;
 mod drivers;
 pub(crate) mod external;

@@ -64,7 +64,7 @@ const BY_FEATURE: [CapabilityRow; 51] = [
     (C::ClipDistance, |f| f.core.shader_clip_distance, "shaderClipDistance"),
     (C::CullDistance, |f| f.core.shader_cull_distance, "shaderCullDistance"),
     (C::SampleRateShading, |f| f.core.sample_rate_shading, "sampleRateShading"),
-    (C::InterpolationFunction, |f| f.core.sample_rate_shading, "sampleRateShading"),
+    (C::InterpolationFunction, interpolation, "sampleRateShading or shaderSampleRateInterpolationFunctions"),
     (C::ImageGatherExtended, |f| f.core.shader_image_gather_extended, "shaderImageGatherExtended"),
     (C::ImageCubeArray, |f| f.core.image_cube_array, "imageCubeArray"),
     (C::SampledCubeArray, |f| f.core.image_cube_array, "imageCubeArray"),
@@ -279,6 +279,10 @@ fn shading_rate(features: &Features) -> vk::Bool32 {
 
 fn dot_product(features: &Features) -> vk::Bool32 {
     features.v13.shader_integer_dot_product
+}
+
+fn interpolation(features: &Features) -> vk::Bool32 {
+    features.core.sample_rate_shading & features.ext.portability.shader_sample_rate_interpolation_functions
 }
 
 /// True if one storage allows the capability. The operations are checked individually.
