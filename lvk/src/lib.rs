@@ -110,6 +110,14 @@
 //!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
 //! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
 //!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
+//!
+//! # Targets
+//!
+//! Targets are little-endian, of 32 or 64 bits. A big-endian target is a compile error: shaders read the bytes of a
+//! software BVH as words, and cache files hold them unchanged. No byte slice of the application needs an alignment.
+
+#[cfg(target_endian = "big")]
+compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
 
 mod accel;
 mod barrier;
