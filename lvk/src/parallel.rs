@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn threads_that_the_system_refuses_are_done_without() {
-        const TOO_LARGE: usize = 1 << 60;
+        const TOO_LARGE: usize = usize::MAX / 2;
         let (asked, runs) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let thread = || {
             let is_first = asked.fetch_add(1, Ordering::Relaxed) == 0;

@@ -1,4 +1,5 @@
 //! The samples' windows as a user meets them, on an X server without a screen.
+#![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod missing_features;

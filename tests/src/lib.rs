@@ -35,6 +35,7 @@ pub mod sphere_scene;
 pub mod subprocess;
 pub mod vertex_deform;
 pub mod warnings;
+#[cfg(target_os = "linux")]
 pub mod windows;
 
 pub use device::{TestDevice, device, device_with, without_software};

@@ -1,10 +1,10 @@
 //! Downloads missing components: one process at a time, all or nothing, with one line of output.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
+use std::io;
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use rustix::fs::FlockOperation;
 
 use crate::apt::{Apt, DownloadPlan};
 use crate::error::DownloadError;
@@ -78,8 +78,24 @@ fn install_atomically(
 
 /// Waits until `folder` is on the disk: a power failure must not leave a manifest beside incomplete libraries.
 fn sync_to_disk(folder: &Path) -> Result<(), DownloadError> {
-    let handle = File::open(folder).map_err(DownloadError::file("open", folder))?;
-    rustix::fs::syncfs(&handle).map_err(|error| DownloadError::file("flush", folder)(error.into()))
+    let listed = || DownloadError::file("list", folder);
+    for entry in fs::read_dir(folder).map_err(listed())? {
+        let entry = entry.map_err(listed())?;
+        let kind = entry.file_type().map_err(listed())?;
+        if kind.is_dir() {
+            sync_to_disk(&entry.path())?;
+        } else if kind.is_file() {
+            sync_file(&entry.path())?;
+        }
+    }
+    // Windows neither opens folders nor needs it.
+    if cfg!(unix) { sync_file(folder) } else { Ok(()) }
+}
+
+fn sync_file(path: &Path) -> Result<(), DownloadError> {
+    // Windows flushes files that are open for writing only.
+    let opened = File::options().read(true).write(cfg!(windows)).open(path);
+    opened.and_then(|file| file.sync_all()).map_err(DownloadError::file("flush", path))
 }
 
 /// Returns one line with the title, packages, origin and size of each item.
@@ -113,22 +129,33 @@ fn with_progress<T>(message: &str, job: impl FnOnce(&dyn Fn(f64)) -> T) -> T {
 /// Locks `root`. The lock ends when the returned file and its copies in child processes are closed. A package tool that
 /// outlives a killed process therefore keeps the lock and cannot write into the next attempt.
 fn lock_folder(root: &Path) -> Result<File, DownloadError> {
-    let path = root.join("lock");
-    let opened = File::options().read(true).write(true).create(true).truncate(false).open(&path);
-    let lock_file = opened.map_err(DownloadError::file("create", &path))?;
-    if rustix::fs::flock(&lock_file, FlockOperation::NonBlockingLockExclusive).is_err() {
-        eprintln!("lvk: another process is downloading into {}; waiting for it", root.display());
-        let locked =
-            rustix::io::retry_on_intr(|| rustix::fs::flock(&lock_file, FlockOperation::LockExclusive));
-        locked.map_err(|error| DownloadError::file("lock", &path)(error.into()))?;
-    }
+    let lock_file = file::open_lock(root)?;
+    let locked = match lock_file.try_lock() {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => {
+            eprintln!("lvk: another process is downloading into {}; waiting for it", root.display());
+            wait_for_lock(&lock_file)
+        }
+        Err(TryLockError::Error(error)) => Err(error),
+    };
+    locked.map_err(DownloadError::file("lock", root))?;
     Ok(lock_file)
+}
+
+/// Waits for the lock, also if signals interrupt the call.
+fn wait_for_lock(file: &File) -> io::Result<()> {
+    loop {
+        match file.lock() {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            locked => return locked,
+        }
+    }
 }
 
 /// Removes a folder and its contents. Succeeds if the folder does not exist.
 fn remove_folder(folder: &Path) -> Result<(), DownloadError> {
     match fs::remove_dir_all(folder) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
             Err(DownloadError::file("remove", folder)(error))
         }
         _ => Ok(()),
@@ -177,19 +204,41 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let held = lock_folder(root.path()).unwrap();
         let other = File::open(root.path().join("lock")).unwrap();
-        assert!(rustix::fs::flock(&other, FlockOperation::NonBlockingLockExclusive).is_err());
-        let other_child = std::process::Command::new("sleep").arg("60").spawn();
+        assert!(matches!(other.try_lock(), Err(TryLockError::WouldBlock)));
         drop(held);
-        // A process that another test forks at this moment holds a copy of the file until `exec`.
-        let is_free = || rustix::fs::flock(&other, FlockOperation::NonBlockingLockExclusive).is_ok();
-        let becomes_free = (0..500).any(|_| {
-            let free = is_free();
-            std::thread::sleep(Duration::from_millis(if free { 0 } else { 10 }));
-            free
-        });
-        assert!(becomes_free, "an unrelated child process holds the lock");
-        let mut other_child = other_child.unwrap();
-        other_child.kill().unwrap();
-        other_child.wait().unwrap();
+        assert!(becomes_free(&other));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_unrelated_child_process_does_not_keep_the_lock() {
+        let root = tempfile::tempdir().unwrap();
+        let held = lock_folder(root.path()).unwrap();
+        let other = File::open(root.path().join("lock")).unwrap();
+        let mut child = std::process::Command::new("sleep").arg("60").spawn().unwrap();
+        drop(held);
+        let is_free = becomes_free(&other);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(is_free);
+    }
+
+    /// Locks the file. A process that another test forks at this moment holds a copy of the file until `exec`.
+    fn becomes_free(file: &File) -> bool {
+        (0..500).any(|_| {
+            let is_free = file.try_lock().is_ok();
+            std::thread::sleep(Duration::from_millis(if is_free { 0 } else { 10 }));
+            is_free
+        })
+    }
+
+    #[test]
+    fn folders_and_their_files_are_flushed() {
+        let root = tempfile::tempdir().unwrap();
+        fs::create_dir(root.path().join("inner")).unwrap();
+        fs::write(root.path().join("inner/file"), "text").unwrap();
+        sync_to_disk(root.path()).unwrap();
+        let absent = root.path().join("absent");
+        assert!(sync_to_disk(&absent).unwrap_err().to_string().contains("absent"));
     }
 }

@@ -6,14 +6,15 @@ use std::sync::Arc;
 
 use lvk::VulkanReport;
 
+use crate::platform::{INSTALL_DRIVER, INSTALL_LAYER};
+
 /// An error of [`prepare`](crate::prepare) and of the other functions of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriverError {
     /// The system has no driver with ray tracing, and the software driver could not be downloaded.
     #[error(
-        "no Vulkan driver with ray tracing was found{} and none can be downloaded because {cause}; install a GPU driver \
-         with ray tracing, or on Debian and Ubuntu `apt install mesa-vulkan-drivers libvulkan1` (Mesa 24.1 or newer)",
+        "no Vulkan driver with ray tracing was found{} and none can be downloaded because {cause}; {INSTALL_DRIVER}",
         in_brackets(system.as_deref())
     )]
     NoDriver {
@@ -25,9 +26,8 @@ pub enum DriverError {
     },
     /// Validation was requested, the system has no current layer, and the layer could not be downloaded.
     #[error(
-        "no current Vulkan validation layer was found and none can be downloaded because {cause}; install \
-         VK_LAYER_KHRONOS_validation 1.3.296 or newer (package `vulkan-validationlayers`, or the Vulkan SDK), \
-         or run without validation"
+        "no current Vulkan validation layer was found and none can be downloaded because {cause}; \
+         {INSTALL_LAYER}, or run without validation"
     )]
     NoValidationLayer {
         /// Error of the download.

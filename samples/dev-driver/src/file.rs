@@ -1,6 +1,6 @@
 //! File operations whose errors name the file.
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::Path;
 
 use crate::error::DownloadError;
@@ -8,6 +8,13 @@ use crate::error::DownloadError;
 /// Creates `folder` and its parents.
 pub(super) fn create_dir_all(folder: &Path) -> Result<(), DownloadError> {
     fs::create_dir_all(folder).map_err(DownloadError::file("create", folder))
+}
+
+/// Opens the file that locks `folder`, and creates it if it does not exist.
+pub(super) fn open_lock(folder: &Path) -> Result<File, DownloadError> {
+    let path = folder.join("lock");
+    let opened = File::options().read(true).write(true).create(true).truncate(false).open(&path);
+    opened.map_err(DownloadError::file("create", &path))
 }
 
 /// Writes `text` to the file `path`.

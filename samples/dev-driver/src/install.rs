@@ -192,6 +192,7 @@ mod tests {
         assert_eq!(quoted_value(&text, "api_version"), Some("1.4.305"));
     }
 
+    #[cfg(unix)]
     #[test]
     fn links_are_followed_inside_the_packages_only() {
         let folder = tempfile::tempdir().unwrap();

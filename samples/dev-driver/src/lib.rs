@@ -3,7 +3,8 @@
 //!
 //! Call [`prepare`] before the first `lvk::Context` and pass [`Driver::loader`] to the context. The downloaded driver is
 //! Mesa's lavapipe from Debian's `bookworm-backports`. `apt-get` resolves, downloads and verifies the packages as the current
-//! user, into the project's `.vulkan` folder (or `~/.cache/lvk/vulkan` if the project folder no longer exists).
+//! user, into the project's `.vulkan` folder (or `vulkan` in [`cache_folder`] if the project folder no longer exists). Other
+//! platforms than 64-bit x86 Linux with glibc have no packages: there the system driver is used, with or without ray tracing.
 //!
 //! | Variable | Meaning |
 //! |---|---|
@@ -14,6 +15,7 @@
 //! | `VK_DRIVER_FILES`, `VK_ICD_FILENAMES` | drivers chosen by the user, used unchanged |
 
 mod apt;
+mod cache_folder;
 mod display;
 mod download;
 mod elf;
@@ -22,8 +24,12 @@ mod file;
 mod install;
 mod layer_json;
 mod layout;
+#[cfg(unix)]
 mod library_preload;
+#[cfg(not(unix))]
+mod library_preload_disabled;
 mod loader_environment;
+mod platform;
 mod settings;
 mod system_vulkan;
 
@@ -32,9 +38,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use lvk::VulkanReport;
 
+pub use cache_folder::cache_folder;
 pub use display::VirtualDisplay;
 pub use error::{DownloadError, DriverError};
 use layout::{Component, Manifest};
+#[cfg(not(unix))]
+use library_preload_disabled as library_preload;
 use settings::{DriverPreference, Settings};
 use system_vulkan::SystemVulkan;
 
@@ -182,7 +191,7 @@ fn choose_source(
         }
         // A child process inherits `VK_DRIVER_FILES` of the downloaded driver and must use the same driver.
         (DriverPreference::Auto, Ok(system))
-            if settings.driver_files.is_none() && system.can_trace_rays() =>
+            if settings.driver_files.is_none() && (!settings.has_packages || system.can_trace_rays()) =>
         {
             Ok(DriverSource::System)
         }
@@ -226,13 +235,13 @@ fn installed_folder(component: Component, settings: &Settings) -> Result<PathBuf
             DownloadError::Content { reason: "the downloaded folder was removed meanwhile".to_owned() },
         )
     };
-    component.find(&settings.folders).ok_or_else(gone)
+    settings.find(component).ok_or_else(gone)
 }
 
 /// Downloads the missing ones of `components` together.
 fn ensure_installed(settings: &Settings, components: &[Component]) -> Result<(), DriverError> {
     let missing: Vec<Component> =
-        components.iter().copied().filter(|component| component.find(&settings.folders).is_none()).collect();
+        components.iter().copied().filter(|component| settings.find(*component).is_none()).collect();
     match missing.first() {
         Some(first) => download_components(settings, &missing).map_err(|cause| driver_error(*first, cause)),
         None => Ok(()),
@@ -240,6 +249,9 @@ fn ensure_installed(settings: &Settings, components: &[Component]) -> Result<(),
 }
 
 fn download_components(settings: &Settings, missing: &[Component]) -> Result<(), DownloadError> {
+    if !settings.has_packages {
+        return Err(DownloadError::Platform);
+    }
     if !settings.download_allowed {
         return Err(DownloadError::Forbidden);
     }
@@ -265,7 +277,8 @@ mod tests {
         driver_files: Option<&str>,
     ) -> Settings {
         let driver_files = driver_files.map(Into::into);
-        Settings { preference, download_allowed: false, folders: vec![folder.to_path_buf()], driver_files }
+        let folders = vec![folder.to_path_buf()];
+        Settings { preference, has_packages: true, download_allowed: false, folders, driver_files }
     }
 
     fn no_system() -> Result<SystemVulkan, String> {
@@ -308,6 +321,21 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
+    #[test]
+    fn nothing_is_taken_from_a_folder_of_another_platform() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = Component::Driver.folder(root.path());
+        std::fs::create_dir(&folder).unwrap();
+        Manifest::default().write(&folder).unwrap();
+        let mut settings = settings(DriverPreference::Auto, root.path(), None);
+        assert_eq!(installed_folder(Component::Driver, &settings).unwrap(), folder);
+        settings.has_packages = false;
+        let error = installed_folder(Component::Driver, &settings).unwrap_err();
+        assert!(matches!(error, DriverError::NoDriver { cause: DownloadError::Platform }), "{error}");
+        assert!(error.to_string().contains(platform::INSTALL_DRIVER), "{error}");
+    }
+
+    #[cfg(unix)]
     #[test]
     fn a_damaged_driver_folder_is_named() {
         let root = tempfile::tempdir().unwrap();

@@ -4,8 +4,11 @@ use std::env;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use crate::cache_folder::cache_folder;
 use crate::error::{DownloadError, DriverError};
+use crate::file;
 use crate::layout::Component;
+use crate::platform::HAS_PACKAGES;
 
 /// The driver that the user prefers, from `LVK_DRIVER`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +42,8 @@ impl DriverPreference {
 pub(super) struct Settings {
     /// From `LVK_DRIVER`.
     pub(super) preference: DriverPreference,
+    /// True on the platform of the downloadable packages.
+    pub(super) has_packages: bool,
     /// From `LVK_NO_DOWNLOAD`.
     pub(super) download_allowed: bool,
     /// Folders for downloaded drivers, the preferred one first.
@@ -57,11 +62,15 @@ impl Settings {
         let folders = candidate_folders(
             path("LVK_VULKAN_DIR"),
             Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2),
-            path("XDG_CACHE_HOME"),
-            path("HOME"),
+            cache_folder(),
         );
         let driver_files = path("VK_DRIVER_FILES").or_else(|| path("VK_ICD_FILENAMES")).map(Into::into);
-        Ok(Self { preference, download_allowed, folders, driver_files })
+        Ok(Self { preference, has_packages: HAS_PACKAGES, download_allowed, folders, driver_files })
+    }
+
+    /// Returns the folder of a complete component; `None` where its libraries would not run.
+    pub(super) fn find(&self, component: Component) -> Option<PathBuf> {
+        self.has_packages.then(|| component.find(&self.folders))?
     }
 
     /// Returns the user's driver list; `None` if a parent process of this project set the variable.
@@ -71,10 +80,10 @@ impl Settings {
                 Component::Driver.folder(folder).join(super::layout::DRIVER_JSON) == Path::new(files)
             })
         };
-        self.driver_files.as_ref().filter(|files| !ours(files))
+        self.driver_files.as_ref().filter(|files| !self.has_packages || !ours(files))
     }
 
-    /// Returns the first folder that is writable, or can be created.
+    /// Returns the first folder that is writable, or can be created, and creates it.
     pub(super) fn writable_folder(&self) -> Result<&Path, DownloadError> {
         self.folders.iter().map(PathBuf::as_path).find(|folder| is_writable(folder)).ok_or_else(|| {
             let tried = self.folders.iter().map(|folder| folder.display().to_string());
@@ -84,27 +93,17 @@ impl Settings {
 }
 
 /// Returns the folders for downloaded drivers, the preferred one first. A folder that the user names is the only one.
-fn candidate_folders(
-    named: Option<PathBuf>,
-    project: Option<&Path>,
-    cache: Option<PathBuf>,
-    home: Option<PathBuf>,
-) -> Vec<PathBuf> {
+fn candidate_folders(named: Option<PathBuf>, project: Option<&Path>, cache: Option<PathBuf>) -> Vec<PathBuf> {
     if let Some(named) = named {
         return vec![std::path::absolute(&named).unwrap_or(named)];
     }
     let project = project.filter(|folder| folder.is_dir()).map(|folder| folder.join(".vulkan"));
-    let cache = cache.filter(|folder| folder.is_absolute()).or_else(|| home.map(|home| home.join(".cache")));
-    project.into_iter().chain(cache.map(|folder| folder.join("lvk/vulkan"))).collect()
+    project.into_iter().chain(cache.map(|folder| folder.join("vulkan"))).collect()
 }
 
-/// True if `folder`, or its nearest existing ancestor, is a writable folder.
+/// True if `folder` exists, or can be created, and takes the file that locks it.
 fn is_writable(folder: &Path) -> bool {
-    let existing = folder.ancestors().find(|ancestor| ancestor.exists());
-    existing.is_some_and(|folder| {
-        folder.is_dir()
-            && rustix::fs::access(folder, rustix::fs::Access::WRITE_OK | rustix::fs::Access::EXEC_OK).is_ok()
-    })
+    file::create_dir_all(folder).and_then(|()| file::open_lock(folder)).is_ok()
 }
 
 #[cfg(test)]
@@ -124,32 +123,24 @@ mod tests {
     #[test]
     fn a_named_folder_is_the_only_candidate() {
         let project = std::env::temp_dir();
-        let found = candidate_folders(
-            Some("/a/b".into()),
-            Some(&project),
-            Some("/cache".into()),
-            Some("/home/u".into()),
-        );
-        assert_eq!(found, [PathBuf::from("/a/b")]);
-        assert!(candidate_folders(Some("b".into()), None, None, None)[0].is_absolute());
+        let found = candidate_folders(Some(project.join("b")), Some(&project), Some("/cache/lvk".into()));
+        assert_eq!(found, [project.join("b")]);
+        assert!(candidate_folders(Some("b".into()), None, None)[0].is_absolute());
     }
 
     #[test]
     fn the_project_comes_before_the_cache() {
         let project = tempfile::tempdir().unwrap();
-        let cache = Some(PathBuf::from("/cache"));
-        let found = candidate_folders(None, Some(project.path()), cache, Some("/home/u".into()));
+        let found = candidate_folders(None, Some(project.path()), Some("/cache/lvk".into()));
         assert_eq!(found, [project.path().join(".vulkan"), "/cache/lvk/vulkan".into()]);
     }
 
     #[test]
     fn a_moved_project_falls_back_to_the_cache() {
         let gone = Path::new("/no/such/project");
-        let home = Some(PathBuf::from("/home/u"));
-        let expected = [PathBuf::from("/home/u/.cache/lvk/vulkan")];
-        assert_eq!(candidate_folders(None, Some(gone), None, home.clone()), expected);
-        assert_eq!(candidate_folders(None, Some(gone), Some("relative".into()), home), expected);
-        assert!(candidate_folders(None, Some(gone), None, None).is_empty());
+        let found = candidate_folders(None, Some(gone), Some("/cache/lvk".into()));
+        assert_eq!(found, [PathBuf::from("/cache/lvk/vulkan")]);
+        assert!(candidate_folders(None, Some(gone), None).is_empty());
     }
 
     #[test]
@@ -159,12 +150,14 @@ mod tests {
         std::fs::write(&file, "").unwrap();
         let settings = |folders| Settings {
             preference: DriverPreference::Auto,
+            has_packages: true,
             download_allowed: true,
             folders,
             driver_files: None,
         };
         let chosen = settings(vec![file.join("below a file"), good.path().join("new/deep")]);
         assert_eq!(chosen.writable_folder().unwrap(), good.path().join("new/deep"));
+        assert!(good.path().join("new/deep").is_dir());
         let message = settings(vec![file.join("x")]).writable_folder().unwrap_err().to_string();
         assert!(message.contains("LVK_VULKAN_DIR"), "{message}");
     }
@@ -174,6 +167,7 @@ mod tests {
         let ours = Path::new("/p/.vulkan").join("driver").join(crate::layout::DRIVER_JSON);
         let settings = |files: &Path| Settings {
             preference: DriverPreference::Auto,
+            has_packages: true,
             download_allowed: true,
             folders: vec!["/p/.vulkan".into()],
             driver_files: Some(files.into()),

@@ -25,10 +25,8 @@ impl Caches {
         if args.no_cache {
             return None;
         }
-        let variable = |name| std::env::var_os(name);
-        let named = args.cache.clone();
-        let usual = || folder(variable(VARIABLE), variable("XDG_CACHE_HOME"), variable("HOME"));
-        let folder = named.or_else(usual)?;
+        let usual = || folder(std::env::var_os(VARIABLE), lvk_dev_driver::cache_folder());
+        let folder = args.cache.clone().or_else(usual)?;
         match std::fs::create_dir_all(&folder) {
             Ok(()) => Some(Self::below(&folder, name)),
             Err(error) => {
@@ -64,14 +62,12 @@ impl Caches {
     }
 }
 
-/// The folder by our own variable, by that of the XDG base directories, which counts where it is absolute, or by default.
-fn folder(own: Option<OsString>, xdg: Option<OsString>, home: Option<OsString>) -> Option<PathBuf> {
-    if let Some(own) = own {
-        return (!own.is_empty()).then(|| own.into());
+/// The folder that the variable names, otherwise the user's; `None` if the variable is empty.
+fn folder(named: Option<OsString>, users: Option<PathBuf>) -> Option<PathBuf> {
+    match named {
+        Some(named) => (!named.is_empty()).then(|| named.into()),
+        None => users,
     }
-    let absolute = |name: Option<OsString>| name.map(PathBuf::from).filter(|path| path.is_absolute());
-    let base = absolute(xdg).or_else(|| Some(absolute(home)?.join(".cache")))?;
-    Some(base.join("lvk"))
 }
 
 #[cfg(test)]
@@ -79,16 +75,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_folder_is_where_users_expect_it() {
-        let of = |own: Option<&str>, xdg: Option<&str>, home: Option<&str>| {
-            let name = |name: Option<&str>| name.map(OsString::from);
-            folder(name(own), name(xdg), name(home))
+    fn the_variable_comes_before_the_folder_of_the_user() {
+        let of = |named: Option<&str>, users: Option<&str>| {
+            folder(named.map(OsString::from), users.map(PathBuf::from))
         };
-        assert_eq!(of(None, None, Some("/home/a")), Some("/home/a/.cache/lvk".into()));
-        assert_eq!(of(None, Some("/x"), Some("/home/a")), Some("/x/lvk".into()));
-        assert_eq!(of(None, Some("x"), Some("/home/a")), Some("/home/a/.cache/lvk".into()), "not absolute");
-        assert_eq!(of(Some("kept"), Some("/x"), Some("/home/a")), Some("kept".into()));
-        assert_eq!(of(Some(""), Some("/x"), Some("/home/a")), None, "switched off");
-        assert_eq!(of(None, None, None), None);
+        assert_eq!(of(None, Some("/u/lvk")), Some("/u/lvk".into()));
+        assert_eq!(of(Some("kept"), Some("/u/lvk")), Some("kept".into()));
+        assert_eq!(of(Some(""), Some("/u/lvk")), None, "switched off");
+        assert_eq!(of(None, None), None);
     }
 }

@@ -12,6 +12,7 @@ use std::process::{Child, Command, Stdio};
 
 use crate::error::DownloadError;
 use crate::file;
+use crate::platform::HAS_PACKAGES;
 use mirror::Mirror;
 
 /// A private apt state with up-to-date package lists.
@@ -200,7 +201,7 @@ fn read_lines(child: &mut Child, on_line: &mut impl FnMut(&str)) -> io::Result<S
 
 /// Checks the platform, and that Debian's keyring, the root of trust, is installed.
 fn check_requirements() -> Result<(), DownloadError> {
-    if !cfg!(all(target_os = "linux", target_arch = "x86_64", target_env = "gnu")) {
+    if !HAS_PACKAGES {
         return Err(DownloadError::Platform);
     }
     let keyring = apt_config::keyring();
