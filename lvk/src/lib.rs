@@ -42,6 +42,7 @@
 //! | open a device, query its capabilities | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
 //! | create objects | `Context::create_*`, each with its `*Desc` |
 //! | use part of a texture, or another format of it | [`Context::create_texture_view`], [`TextureViewDesc`] |
+//! | pass data of one frame to shaders | [`CommandBuffer::upload`], [`RenderPass::upload`] |
 //! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and similar methods |
 //! | record commands | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`], [`manual::rendering`] |

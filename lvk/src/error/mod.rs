@@ -23,7 +23,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// Errors of the library, in three groups by remedy:
 /// * mistakes of the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
 ///   [`WrongQueue`](Error::WrongQueue), [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants),
-///   [`Serialized`](Error::Serialized), [`OverBudget`](Error::OverBudget);
+///   [`Serialized`](Error::Serialized), [`OverBudget`](Error::OverBudget),
+///   [`UploadTooLarge`](Error::UploadTooLarge);
 /// * missing support by the device or its driver: [`NoVulkan`](Error::NoVulkan),
 ///   [`NoDevice`](Error::NoDevice), [`Unsupported`](Error::Unsupported),
 ///   [`LimitExceeded`](Error::LimitExceeded);
@@ -160,6 +161,17 @@ pub enum Error {
         used: u64,
         /// The budget, [`ContextDesc::accel_budget_bytes`](crate::ContextDesc), in bytes.
         budget: u64,
+    },
+    /// A value is larger than the memory that the context keeps for uploads.
+    #[error(
+        "an upload of {bytes} bytes is larger than ContextDesc::staging_bytes ({limit} bytes); raise it, or write the \
+         data to a buffer"
+    )]
+    UploadTooLarge {
+        /// Bytes of the value or slice.
+        bytes: u64,
+        /// Most bytes of one upload, [`ContextDesc::staging_bytes`](crate::ContextDesc).
+        limit: u64,
     },
     /// Device memory is exhausted.
     #[error("out of device memory while creating '{object}' ({bytes} bytes)")]
