@@ -331,7 +331,7 @@ mod tests {
         assert_eq!(installed_folder(Component::Driver, &settings).unwrap(), folder);
         settings.has_packages = false;
         let error = installed_folder(Component::Driver, &settings).unwrap_err();
-        assert!(matches!(error, DriverError::NoDriver { cause: DownloadError::Platform }), "{error}");
+        assert!(matches!(error, DriverError::NoDriver { cause: DownloadError::Platform, .. }), "{error}");
         assert!(error.to_string().contains(platform::INSTALL_DRIVER), "{error}");
     }
 
