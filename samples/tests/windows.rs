@@ -2,75 +2,20 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod missing_features;
+mod window_session;
 
 use std::fs;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
-use std::sync::mpsc::{Receiver, channel};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use image::RgbaImage;
-use lvk_dev_driver::{VirtualDisplay, virtual_display};
-use x11rb::connection::Connection;
-use x11rb::protocol::xproto::{
-    ConfigureWindowAux, ConnectionExt as _, ImageFormat, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
+use window_session::{
+    F1, KEY_N, KEY_W, SIZE, SPACE, Session, assert_success, desktop, read_image, sample, texts,
 };
-use x11rb::protocol::xtest::ConnectionExt as _;
-use x11rb::rust_connection::RustConnection;
 
-const SIZE: [u32; 2] = [416, 224];
 /// An x coordinate to the right of the panel.
 const BESIDE_PANEL: u32 = 352;
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// Of keys on X servers.
-const ESCAPE: u8 = 9;
-const KEY_W: u8 = 25;
-const KEY_N: u8 = 57;
-const SPACE: u8 = 65;
-const F1: u8 = 67;
-const F12: u8 = 96;
-
-/// The X server of a test; `None`, loudly, where there is none and none can be fetched.
-fn desktop() -> Option<VirtualDisplay> {
-    match virtual_display() {
-        Ok(display) => Some(display),
-        Err(error) => {
-            assert!(std::env::var_os("LVK_REQUIRE_GPU").is_none(), "{error}");
-            eprintln!("SKIPPED, no X server for windows: {error}");
-            None
-        }
-    }
-}
-
-fn sample(program: &str, args: &[&str], folder: &Path) -> Command {
-    let mut command = Command::new(program);
-    command.args(args).current_dir(folder);
-    command.args(["--width", &SIZE[0].to_string(), "--height", &SIZE[1].to_string()]);
-    command
-        .env_remove("WAYLAND_DISPLAY")
-        .env_remove("WAYLAND_SOCKET")
-        .env_remove("DISPLAY")
-        .env("LVK_CACHE", "")
-        .stdin(Stdio::null());
-    command
-}
-
-fn texts(output: &Output) -> (String, String) {
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (text(&output.stdout), text(&output.stderr))
-}
-
-fn assert_success(output: &Output) {
-    let (out, err) = texts(output);
-    assert_eq!(output.status.code(), Some(0), "{out}{err}");
-}
-
-fn read_image(path: &Path) -> RgbaImage {
-    image::open(path).unwrap().into_rgba8()
-}
 
 /// Share of the pixels right of `first` in which two pictures differ by more than rounding.
 fn differing(one: &RgbaImage, other: &RgbaImage, first: u32) -> f64 {
@@ -108,24 +53,32 @@ fn prints_what_it_writes(program: &str, args: &[&str]) {
     assert!(differing(&window, &frame, 0) > 0.1, "there is no panel");
 }
 
-#[test]
-fn deferred_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_deferred"), &["--lights", "60"]);
+/// Declares a test for each row: its name, the program, and arguments.
+macro_rules! windows_print_what_they_write {
+    ($($test:ident: $program:literal, $args:expr;)*) => {
+        $(#[test]
+        fn $test() {
+            prints_what_it_writes(env!(concat!("CARGO_BIN_EXE_", $program)), $args);
+        })*
+    };
 }
 
-#[test]
-fn hello_triangle_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_hello_triangle"), &[]);
-}
-
-#[test]
-fn render_to_cube_map_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_render_to_cube_map"), &["--face-size", "64"]);
-}
-
-#[test]
-fn omni_shadows_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_omni_shadows"), &["--show-cube"]);
+windows_print_what_they_write! {
+    deferred_has_a_window: "deferred", &["--lights", "60"];
+    hello_triangle_has_a_window: "hello_triangle", &[];
+    render_to_cube_map_has_a_window: "render_to_cube_map", &["--face-size", "64"];
+    omni_shadows_has_a_window: "omni_shadows", &["--show-cube"];
+    yuv_has_a_window: "yuv", &[];
+    triplanar_has_a_window: "triplanar", &[];
+    rtx_hello_has_a_window: "rtx_hello", &[];
+    rtx_textures_has_a_window: "rtx_textures", &[];
+    rtx_pipeline_has_a_window: "rtx_pipeline", &[];
+    rtx_ao_has_a_window: "rtx_ao", &["--passes", "1"];
+    sponza_has_a_window: "sponza", &["--shadow-size", "512"];
+    large_scene_has_a_window: "large_scene", &["--triangles", "20000", "--copies", "30", "--samples", "1"];
+    hybrid_has_a_window: "hybrid", &["--depth", "1"];
+    hybrid_oit_has_a_window: "hybrid_oit", &["--supersampling", "1"];
+    reflections_has_a_window: "reflections", &["--samples", "1"];
 }
 
 #[test]
@@ -135,188 +88,6 @@ fn mesh_shaders_has_a_window() {
     match missing_features::mesh_shaders(sample(program, &["--frames", "1"], folder.path())) {
         None => prints_what_it_writes(program, &[]),
         Some(lack) => eprintln!("NOT TESTED, {lack}"),
-    }
-}
-
-#[test]
-fn yuv_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_yuv"), &[]);
-}
-
-#[test]
-fn triplanar_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_triplanar"), &[]);
-}
-
-#[test]
-fn rtx_hello_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
-}
-
-#[test]
-fn rtx_textures_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_textures"), &[]);
-}
-
-#[test]
-fn rtx_pipeline_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_pipeline"), &[]);
-}
-
-#[test]
-fn rtx_ao_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_rtx_ao"), &["--passes", "1"]);
-}
-
-#[test]
-fn sponza_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_sponza"), &["--shadow-size", "512"]);
-}
-
-#[test]
-fn large_scene_has_a_window() {
-    let args = ["--triangles", "20000", "--copies", "30", "--samples", "1"];
-    prints_what_it_writes(env!("CARGO_BIN_EXE_large_scene"), &args);
-}
-
-#[test]
-fn hybrid_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_hybrid"), &["--depth", "1"]);
-}
-
-#[test]
-fn hybrid_oit_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_hybrid_oit"), &["--supersampling", "1"]);
-}
-
-#[test]
-fn reflections_has_a_window() {
-    prints_what_it_writes(env!("CARGO_BIN_EXE_reflections"), &["--samples", "1"]);
-}
-
-/// A sample in its own window, with simulated key presses, and its standard error.
-struct Session {
-    program: Child,
-    said: Receiver<String>,
-    keys: RustConnection,
-    root: u32,
-    window: u32,
-    _desktop: VirtualDisplay,
-}
-
-impl Session {
-    fn new(program: &str, args: &[&str], folder: &Path) -> Option<Self> {
-        Self::with_variables(program, args, folder, &[])
-    }
-
-    fn with_variables(
-        program: &str,
-        args: &[&str],
-        folder: &Path,
-        variables: &[(&str, &str)],
-    ) -> Option<Self> {
-        let desktop = desktop()?;
-        let (keys, screen) = RustConnection::connect(Some(desktop.name())).unwrap();
-        let root = keys.setup().roots[screen].root;
-        let mut command = sample(program, &[&["--window", "--validate"], args].concat(), folder);
-        desktop.attach(&mut command);
-        command.envs(variables.iter().copied());
-        let mut program = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        let lines = BufReader::new(program.stderr.take().unwrap()).lines();
-        let (say, said) = channel();
-        thread::spawn(move || lines.map_while(Result::ok).all(|line| say.send(line).is_ok()));
-        let mut session = Self { program, said, keys, root, window: 0, _desktop: desktop };
-        session.wait("its window", |session| session.find_window().is_some());
-        session.window = session.find_window().unwrap();
-        let time = x11rb::CURRENT_TIME;
-        session.keys.set_input_focus(InputFocus::PARENT, session.window, time).unwrap().check().unwrap();
-        Some(session)
-    }
-
-    /// The visible window of some size.
-    fn find_window(&self) -> Option<u32> {
-        let children = self.keys.query_tree(self.root).unwrap().reply().unwrap().children;
-        children.into_iter().find(|window| {
-            let size = self.keys.get_geometry(*window).unwrap().reply();
-            let is_seen = self.keys.get_window_attributes(*window).unwrap().reply();
-            size.is_ok_and(|size| size.width > 100)
-                && is_seen.is_ok_and(|seen| seen.map_state == x11rb::protocol::xproto::MapState::VIEWABLE)
-        })
-    }
-
-    fn wait(&mut self, what: &str, is_done: impl Fn(&mut Self) -> bool) {
-        let deadline = Instant::now() + PATIENCE;
-        while !is_done(self) {
-            let ended = self.program.try_wait().unwrap();
-            let said = || self.said.try_iter().collect::<Vec<_>>();
-            assert!(ended.is_none(), "{what}: the program has ended: {:?}", said());
-            assert!(Instant::now() < deadline, "{what}: {:?}", said());
-            thread::sleep(Duration::from_millis(20));
-        }
-    }
-
-    /// Waits for a line on standard error.
-    fn wait_for_line(&mut self, part: &str) {
-        self.wait(part, |session| session.said.try_iter().any(|line| line.contains(part)));
-    }
-
-    fn key(&self, key: u8, is_down: bool) {
-        let event = if is_down { KEY_PRESS_EVENT } else { KEY_RELEASE_EVENT };
-        self.keys
-            .xtest_fake_input(event, key, x11rb::CURRENT_TIME, self.root, 0, 0, 0)
-            .unwrap()
-            .check()
-            .unwrap();
-    }
-
-    fn press(&self, key: u8) {
-        self.key(key, true);
-        thread::sleep(Duration::from_millis(50));
-        self.key(key, false);
-    }
-
-    /// Presses the key for screenshots, and answers the picture.
-    fn take_screenshot(&mut self, path: &Path) -> RgbaImage {
-        self.press(F12);
-        self.wait("a screenshot", |_| path.exists());
-        read_image(path)
-    }
-
-    fn resize(&self, [width, height]: [u32; 2]) {
-        let size = ConfigureWindowAux::new().width(width).height(height);
-        self.keys.configure_window(self.window, &size).unwrap().check().unwrap();
-    }
-
-    /// The window's pixels on the server, without alpha.
-    fn seen(&self, [width, height]: [u32; 2]) -> Vec<[u8; 3]> {
-        let [width, height] = [width as u16, height as u16];
-        let asked = self.keys.get_image(ImageFormat::Z_PIXMAP, self.window, 0, 0, width, height, !0);
-        let data = asked.unwrap().reply().unwrap().data;
-        data.chunks_exact(4).map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
-    }
-
-    /// Closes the window by its key. Returns the lines printed since the last call that waited for one.
-    fn close(mut self) -> Vec<String> {
-        self.press(ESCAPE);
-        let deadline = Instant::now() + PATIENCE;
-        while self.program.try_wait().unwrap().is_none() {
-            assert!(Instant::now() < deadline, "it does not close");
-            thread::sleep(Duration::from_millis(20));
-        }
-        let mut out = String::new();
-        std::io::Read::read_to_string(&mut self.program.stdout.take().unwrap(), &mut out).unwrap();
-        // The program has ended, and so do its lines.
-        let said: Vec<_> = self.said.iter().collect();
-        assert!(out.contains("validation messages: 0"), "{out}{said:?}");
-        assert_eq!(self.program.wait().unwrap().code(), Some(0), "{out}{said:?}");
-        said
-    }
-}
-
-impl Drop for Session {
-    fn drop(&mut self) {
-        let _ = self.program.kill();
-        let _ = self.program.wait();
     }
 }
 
@@ -362,18 +133,6 @@ fn an_animation_by_frames_stands_too() {
     session.close();
 }
 
-/// Waits until a sample is loaded and returns the number of frames shown meanwhile.
-fn frames_while_loading(session: &mut Session) -> u32 {
-    let mut frames = None;
-    let deadline = Instant::now() + PATIENCE;
-    while frames.is_none() {
-        let line = session.said.recv_timeout(deadline.saturating_duration_since(Instant::now())).unwrap();
-        let rest = line.split_once("loaded in").and_then(|(_, rest)| rest.split_once("with "));
-        frames = rest.and_then(|(_, rest)| rest.split_once(" frames")?.0.parse().ok());
-    }
-    frames.unwrap()
-}
-
 #[test]
 fn a_window_displays_loading_progress_and_answers_keys_meanwhile() {
     let folder = tempfile::tempdir().unwrap();
@@ -393,7 +152,7 @@ fn a_window_displays_loading_progress_and_answers_keys_meanwhile() {
     assert!((0.2..0.95).contains(&bare), "{bare} of the window is bare");
     assert!(bright > 1e-3, "{bright} of the window is bright: no progress is to be read");
     session.wait_for_line("building acceleration structures");
-    let frames = frames_while_loading(&mut session);
+    let frames = session.frames_while_loading();
     assert!(frames > 5, "{frames} frames");
     session.press(F1);
     let picture = session.take_screenshot(&shot(2));
@@ -457,23 +216,6 @@ fn sizes(count: u32) -> impl Iterator<Item = [u32; 2]> {
         let end = if number % 8 == 5 { 4 } else { 400 };
         [1 + below(end), 1 + below(end)]
     })
-}
-
-impl Session {
-    /// Takes screenshots, each written to `path` and taken away, until one is as it should be.
-    fn shoot_until(&mut self, path: &Path, is_right: impl Fn(&Self, &RgbaImage) -> bool) {
-        for _ in 0..50 {
-            self.key(F12, true);
-            self.key(F12, false);
-            self.wait("a screenshot", |_| path.exists());
-            let shot = read_image(path);
-            fs::remove_file(path).unwrap();
-            if is_right(self, &shot) {
-                return;
-            }
-        }
-        unreachable!("no picture of the window is right");
-    }
 }
 
 /// A screenshot of a size tells that frames have it, and that no swapchain is being made: a window that changes while one
