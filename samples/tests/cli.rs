@@ -153,6 +153,15 @@ fn has_device() -> bool {
     found.is_ok()
 }
 
+/// A desk with a scene, where a device can render it.
+fn desk_with_device() -> Option<(Desk, String)> {
+    has_device().then(|| {
+        let desk = Desk::new();
+        let scene = desk.file("triangle.obj", TRIANGLE);
+        (desk, scene)
+    })
+}
+
 #[test]
 fn a_scene_that_cannot_be_loaded_is_named_and_leaves_nothing() {
     let desk = Desk::new();
@@ -528,11 +537,7 @@ fn samples_with_one_scene_list_it_and_all_list_devices() {
 
 #[test]
 fn a_device_that_is_not_there_is_device_trouble() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     desk.run(&["--scene", &scene, "--device", "voodoo"])
         .assert_error(1, &["'voodoo' names no device", "[0] "]);
     assert_eq!(desk.output_files(), Vec::<String>::new());
@@ -540,11 +545,7 @@ fn a_device_that_is_not_there_is_device_trouble() {
 
 #[test]
 fn a_device_without_ray_tracing_gets_a_message_of_what_it_lacks() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     let lacks =
         [("pipeline", "lacks ray tracing pipelines", ""), ("query", "lacks ray queries", "--rt software")];
     for (rt, lack, remedy) in lacks {
@@ -558,11 +559,7 @@ fn a_device_without_ray_tracing_gets_a_message_of_what_it_lacks() {
 
 #[test]
 fn a_device_that_finds_no_visible_triangles_traces_everything() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     for named in [&["--method", "hybrid"][..], &["--raster", "compute"], &["--bounces", "first"]] {
         let args = [&["--scene", &scene, "--rt", "software"], named].concat();
         let Some(command) = desk.without_ray_tracing(&args) else { return };
@@ -597,11 +594,7 @@ fn without_a_driver_and_a_way_to_one_the_user_learns_what_to_install() {
 /// The path follows from what the profile leaves, and the first lines say which profile and which path.
 #[test]
 fn a_profile_decides_the_path_and_is_printed() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     for (profile, path) in [("mali-g715", "ray queries"), ("no-ray-query", "ray tracing pipeline")] {
         let outcome = desk.run(&["--scene", &scene, "--frames", "1", "--profile", profile, "--validate"]);
         outcome.assert_success();
@@ -643,11 +636,7 @@ fn a_scene_too_large_for_the_profile_is_split_and_reported() {
 /// `hybrid | head -1` must not keep the picture from being written.
 #[test]
 fn a_closed_pipe_does_not_cost_the_image() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let mut command = desk.command(&["--scene", &scene]);

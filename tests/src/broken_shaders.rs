@@ -31,7 +31,7 @@ pub struct Mistake {
 #[macro_export]
 macro_rules! mistakes {
     ($($(#[$doc:meta])* $list:ident: $($file:literal: $what:literal: $right:expr => $wrong:expr;)*)*) => {
-        $($(#[$doc])* const $list: &[$crate::broken_shaders::Mistake] = &[
+        $($(#[$doc])* pub(super) const $list: &[$crate::broken_shaders::Mistake] = &[
             $($crate::broken_shaders::Mistake { what: $what, file: $file, right: $right, wrong: $wrong }),*
         ];)*
     };

@@ -8,6 +8,7 @@ mod build_tlas;
 pub(crate) mod compute;
 mod copy_accel;
 pub(crate) mod dependencies;
+mod instance_kernel;
 mod kernel_dispatch;
 mod label;
 mod open_build;

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use super::bvh::encode_blas::BlasBlob;
 use super::bvh::primitives::{Mesh, MeshPrimitives};
 use super::bvh::settings::BvhSettings;
-use super::validate_blob::{self, ExpectedMesh};
+use super::expected_mesh::ExpectedMesh;
+use super::validate_blob;
 use crate::cache_file::{fingerprint, read_file, replace_file};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
