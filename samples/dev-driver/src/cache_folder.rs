@@ -76,7 +76,10 @@ mod tests {
     #[test]
     fn the_home_folder_serves_without_the_variable() {
         assert_eq!(folder_with(Convention::Xdg, &[("HOME", "home")]), Some("home/.cache/lvk".into()));
-        assert_eq!(folder_with(Convention::Windows, &[("USERPROFILE", "u")]), Some("u/AppData/Local/lvk".into()));
+        assert_eq!(
+            folder_with(Convention::Windows, &[("USERPROFILE", "u")]),
+            Some("u/AppData/Local/lvk".into())
+        );
         for convention in [Convention::Xdg, Convention::Apple, Convention::Windows] {
             assert_eq!(folder_with(convention, &[]), None);
         }
