@@ -27,13 +27,15 @@ pub struct Mistake {
 }
 
 /// Declares constant lists of [`Mistake`]s: the name of a list, and a row for each of its mistakes, which has the file,
-/// the description, and the text that replaces another.
+/// the description, and the text that replaces another. `ALL` has all lists.
 #[macro_export]
 macro_rules! mistakes {
     ($($(#[$doc:meta])* $list:ident: $($file:literal: $what:literal: $right:expr => $wrong:expr;)*)*) => {
         $($(#[$doc])* pub(super) const $list: &[$crate::broken_shaders::Mistake] = &[
             $($crate::broken_shaders::Mistake { what: $what, file: $file, right: $right, wrong: $wrong }),*
         ];)*
+        /// All lists.
+        const ALL: &[&[$crate::broken_shaders::Mistake]] = &[$($list),*];
     };
 }
 

@@ -1,4 +1,7 @@
 //! The mistakes: texts of the samples' shaders, and what replaces them.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::Path;
 
 use lvk_tests::mistakes;
 
@@ -132,7 +135,7 @@ mistakes! {
         "sponza/surface.frag.glsl": "no lamp": "albedo * lamplight" => "0.0 * lamplight";
 
     HELLO:
-        "rtx_hello/view.glsl": "mirrored": "vec3(0.55 * seen.x" => "vec3(-0.55 * seen.x";
+        "rtx_hello/view.glsl": "mirrored": "+ ndc.x * camera.right" => "- ndc.x * camera.right";
         "rtx_hello/view.glsl": "white triangles": "sqrt(corners)" => "vec3(1.0)";
         "rtx_hello/view.glsl": "flat light": "mix(0.25, 1.0," => "mix(1.0, 1.0,";
         "rtx_hello/view.glsl": "an even backdrop": "2.0 * direction.y" => "0.0 * direction.y";
@@ -256,7 +259,7 @@ mistakes! {
         "hybrid/geometry.frag.glsl": "coarse normals": "point.normal)" => "point.geometricNormal)";
         "hybrid/geometry.frag.glsl": "moved things": "vec4(point.position," => "vec4(point.position + 0.05,";
     HYBRID_QUERY:
-        "hybrid/render.comp.glsl": "no rays": "local_size_y = 8) in;\n\nvoid main() {" => "local_size_y = 8) in;\n\nvoid main() {\n    return;";
+        "hybrid/render.comp.glsl": "no rays": "    uvec2 start = " => "    return;\n    uvec2 start = ";
         "hybrid/trace_query.glsl": "hits elsewhere": "lvkRayQueryBarycentrics(query, LVK_COMMITTED)" => "vec2(0.2)";
         "hybrid/trace_query.glsl": "other triangles": "hit.triangle = firstTriangle +" => "hit.triangle = 0u * firstTriangle +";
         "hybrid/trace_query.glsl": "glass casts shadows": "frame.tlas, flags, kMaskOpaque" => "frame.tlas, flags, kMaskAll";
@@ -344,4 +347,13 @@ mistakes! {
     LEAVES:
         "reflections/surface.glsl": "leaves are squares": ".a >= 0.5;" => ".a >= -1.0;";
         "reflections/leaf.rahit.glsl": "leaves are squares to rays": "ignoreIntersectionEXT;" => ";";
+}
+
+#[test]
+fn every_mistake_fits_its_file() {
+    let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders");
+    for mistake in ALL.iter().copied().flatten() {
+        let text = std::fs::read_to_string(shaders.join(mistake.file)).unwrap();
+        assert_eq!(text.matches(mistake.right).count(), 1, "{mistake:?}");
+    }
 }

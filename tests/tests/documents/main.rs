@@ -1,9 +1,9 @@
 //! Tests that hold documents and the tree of sources against each other.
 
 mod android;
-mod bindless_core;
 mod circles;
 mod contributing;
+mod features;
 mod glossary;
 mod held_by;
 mod layers;
