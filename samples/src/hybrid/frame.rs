@@ -146,11 +146,6 @@ pub(super) struct FrameConstants {
     pub(super) padding: [u32; 2],
 }
 
-/// Bytes from one sample's block to the next.
-pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
-
-const _: () = assert!(FRAME_BYTES.is_multiple_of(16));
-
 /// The push constants: where the block is, and which rows of the image, or pixels in their order, to render.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]

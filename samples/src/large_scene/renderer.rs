@@ -3,14 +3,13 @@
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Holder, TextureHandle};
+use lvk::{CommandBuffer, Context, TextureHandle};
 
 use super::figures::{Figures, Origin, bytes, number};
 use super::gpu_world::GpuWorld;
 use super::pipelines::RAYS;
 use super::world::World;
 use super::{LargeSceneConfig, Show};
-use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::progress::Progress;
 use crate::app::sample::{FrameTime, Sample};
@@ -28,7 +27,6 @@ pub struct LargeScene {
     config: LargeSceneConfig,
     world: GpuWorld,
     tracer: Tracer,
-    frame: Holder<BufferHandle>,
     constants: FrameConstants,
     path: CameraPath,
     camera: Camera,
@@ -70,7 +68,6 @@ impl LargeScene {
         let target = config.rtx.create_target(ctx)?;
         let gpu_world = GpuWorld::new(ctx, world, &config, progress)?;
         progress.stage("compiling shaders", 0);
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let [places, firsts] = gpu_world.tables(ctx)?;
         let farthest = world.farthest();
         let constants = FrameConstants {
@@ -97,7 +94,6 @@ impl LargeScene {
             world: gpu_world,
             target,
             config,
-            frame,
             constants,
             path,
         })
@@ -121,17 +117,16 @@ impl LargeScene {
         &self.world.figures
     }
 
-    fn upload_frame(&mut self) -> lvk::Result<()> {
+    fn upload_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.config.rtx.extent();
-        let constants = FrameConstants {
+        cmd.upload(&FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
             image: self.target.image_index(),
             depth: self.config.depth,
             samples: self.config.samples,
             show: self.config.show.number(),
             ..self.constants
-        };
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+        })
     }
 }
 
@@ -148,8 +143,7 @@ impl Sample for LargeScene {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        self.upload_frame()?;
-        let push = self.ctx.buffer_address(*self.frame)?;
+        let push = self.upload_frame(&mut frame.cmd)?;
         Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 

@@ -59,7 +59,7 @@ impl Body {
         ];
         let mut addresses = [0; 5];
         for (address, buffer) in addresses.iter_mut().zip(&buffers) {
-            *address = ctx.buffer_address(**buffer)?;
+            *address = buffer.address()?;
         }
         let blas = build(ctx, scene, *buffers[0], *buffers[3])?;
         Ok(Self { blas, triangle_count: count as u32, addresses, _held: (buffers, textures) })

@@ -3,12 +3,11 @@
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Holder, TextureHandle};
+use lvk::{Context, TextureHandle};
 
 use super::config::RtxPipelineConfig;
 use super::pipelines::RAYS;
 use super::switches::RtxPipelineSwitches;
-use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneAddresses, near_plane};
@@ -25,7 +24,6 @@ pub struct RtxPipeline {
     config: RtxPipelineConfig,
     scene: GpuScene,
     tracer: Tracer,
-    frame: Holder<BufferHandle>,
     constants: FrameConstants,
     lighting: Lighting,
     switches: RtxPipelineSwitches,
@@ -60,7 +58,6 @@ impl RtxPipeline {
         let target = config.rtx.create_target(ctx)?;
         let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
         let path = CameraPath::tour(scene, 0);
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let lighting = Lighting::new(scene);
         let switches = RtxPipelineSwitches { depth: config.depth, lights: lighting.light_count() };
         let constants = FrameConstants {
@@ -82,7 +79,6 @@ impl RtxPipeline {
             scene: gpu_scene,
             target,
             config,
-            frame,
             constants,
             lighting,
             switches,
@@ -141,8 +137,7 @@ impl Sample for RtxPipeline {
         self.constants.depth = self.switches.depth.min(self.config.depth);
         self.constants.lighting = self.lighting.with_lights(self.switches.lights);
         self.constants.camera = GpuCamera::new(&self.camera, width, height, self.near_plane);
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
-        let push = self.ctx.buffer_address(*self.frame)?;
+        let push = frame.cmd.upload(&self.constants)?;
         Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 

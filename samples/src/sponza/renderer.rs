@@ -4,8 +4,8 @@ use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use glam::{Quat, Vec3};
 use lvk::{
-    AddressMode, BufferHandle, BufferUsage, Context, Dependencies, Holder, Readback, RenderPipelineHandle,
-    SamplerDesc, SamplerHandle, TextureHandle,
+    AddressMode, BufferHandle, BufferUsage, CommandBuffer, Context, Dependencies, Holder, Readback,
+    RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
 };
 
 use super::config::{DrawPath, SponzaConfig};
@@ -16,7 +16,7 @@ use super::frustum::Frustum;
 use super::pipelines::{SKY, SURFACES};
 use super::shadow::Shadow;
 use super::sun_view::SunView;
-use crate::app::array_buffer::{array, buffer};
+use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
@@ -43,7 +43,6 @@ pub struct Sponza {
     draws: Vec<Draw>,
     bounds: ([f32; 3], [f32; 3]),
     light: Light,
-    frame: Holder<BufferHandle>,
     path: CameraPath,
     camera: Camera,
     near_plane: f32,
@@ -88,7 +87,6 @@ impl Sponza {
         let target = RenderTarget::with_samples(ctx, config.extent, config.samples)?;
         let draws = split_draws(&mut scene, config.triangles_per_draw);
         let path = CameraPath::tour(&scene, 0);
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
             target,
             culling: Culling::new(ctx, &draws)?,
@@ -99,7 +97,6 @@ impl Sponza {
             draws,
             bounds: scene.bounds(),
             light: Light::from_scene(&scene),
-            frame,
             camera: path.at(0.0),
             path,
             near_plane: near_plane(&scene),
@@ -189,14 +186,14 @@ impl Sponza {
         }
     }
 
-    fn upload_frame(&self) -> lvk::Result<()> {
+    fn upload_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.target.extent();
         let (draws, arguments, counts) = self.culling.addresses(&self.ctx)?;
         let frusta = self.frusta();
-        let constants = FrameConstants {
+        cmd.upload(&FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
             scene: self.scene.arrays.addresses(),
-            finishes: self.ctx.buffer_address(*self.scene.finishes)?,
+            finishes: self.scene.finishes.address()?,
             draws,
             views: [0, 1].map(|view| GpuView::new(&frusta[view], arguments[view])),
             counts,
@@ -207,8 +204,7 @@ impl Sponza {
             sky: self.scene.sky.index(),
             sky_sampler: self.scene.sky_sampler.index(),
             has_relief: self.config.normal_maps.into(),
-        };
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+        })
     }
 
     fn draw_surfaces(&self, to: &mut Frame<'_>, address: u64) -> lvk::Result<()> {
@@ -259,8 +255,7 @@ impl Sample for Sponza {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        self.upload_frame()?;
-        let address = self.ctx.buffer_address(*self.frame)?;
+        let address = self.upload_frame(&mut frame.cmd)?;
         frame.pass("culling", |cmd| self.culling.record(cmd, address))?;
         self.shadow.record(&mut frame.cmd, &self.culling, self.path_of_draws, address)?;
         self.draw_surfaces(frame, address)?;
