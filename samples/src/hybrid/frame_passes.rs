@@ -50,9 +50,9 @@ impl FramePasses {
         let tile_rows = tile_rows(config, ctx.capabilities().is_cpu).min(height);
         let rays = RayPass::new(ctx, config, width * tile_rows)?;
         let addresses = Addresses {
-            sums: accumulation.sums_address(ctx)?,
-            bounces: rays.reflective_pixel_addresses(ctx)?,
-            order: order.as_ref().map_or(Ok(0), |order| order.address(ctx))?,
+            sums: accumulation.sums_address()?,
+            bounces: rays.reflective_pixel_addresses()?,
+            order: order.as_ref().map_or(Ok(0), PixelOrder::address)?,
         };
         Ok(Self {
             indices: indices(scene, &geometry, accumulation.picture.index()),

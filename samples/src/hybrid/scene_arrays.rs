@@ -64,12 +64,12 @@ impl SceneArrays {
         let triangle_infos = array(ctx, "scene triangle infos", read, &infos)?;
         let materials = array(ctx, "scene materials", read, &materials)?;
         let addresses = SceneAddresses {
-            positions: ctx.buffer_address(*positions)?,
-            normals: ctx.buffer_address(*normals)?,
-            texcoords: ctx.buffer_address(*texcoords)?,
-            triangles: ctx.buffer_address(*triangles)?,
-            triangle_infos: ctx.buffer_address(*triangle_infos)?,
-            materials: ctx.buffer_address(*materials)?,
+            positions: positions.address()?,
+            normals: normals.address()?,
+            texcoords: texcoords.address()?,
+            triangles: triangles.address()?,
+            triangle_infos: triangle_infos.address()?,
+            materials: materials.address()?,
         };
         Ok(Self { positions, triangles, _held: [normals, texcoords, triangle_infos, materials], addresses })
     }

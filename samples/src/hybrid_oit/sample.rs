@@ -222,7 +222,7 @@ impl HybridOit {
 
     fn constants(&self) -> lvk::Result<FrameConstants> {
         let numbers = numbers(&self.scene, &self.config, &self.structures, &self.targets);
-        let addresses = self.buffers.addresses(&self.ctx)?;
+        let addresses = self.buffers.addresses()?;
         Ok(FrameConstants::new(&self.scene, self.config.extent(), addresses, numbers))
     }
 

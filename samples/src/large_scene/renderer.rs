@@ -68,7 +68,7 @@ impl LargeScene {
         let target = config.rtx.create_target(ctx)?;
         let gpu_world = GpuWorld::new(ctx, world, &config, progress)?;
         progress.stage("compiling shaders", 0);
-        let [places, firsts] = gpu_world.tables(ctx)?;
+        let [places, firsts] = gpu_world.tables()?;
         let farthest = world.farthest();
         let constants = FrameConstants {
             camera: GpuCamera::zeroed(),

@@ -188,7 +188,7 @@ impl Sponza {
 
     fn upload_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.target.extent();
-        let (draws, arguments, counts) = self.culling.addresses(&self.ctx)?;
+        let (draws, arguments, counts) = self.culling.addresses()?;
         let frusta = self.frusta();
         cmd.upload(&FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
