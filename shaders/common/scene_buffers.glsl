@@ -30,13 +30,8 @@ struct Light {
     float reach; // distance at which a point light has fallen to half
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleInfoArray {
-    TriangleInfo at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialArray {
-    Material at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleInfoArray { TriangleInfo at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialArray { Material at[]; };
 
 struct Scene {
     Vec3Array positions;

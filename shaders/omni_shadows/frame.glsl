@@ -3,11 +3,7 @@
 #define OMNI_SHADOWS_FRAME
 
 #include "common/camera.glsl"
-
-struct Vertex {
-    vec3 position;
-    vec3 normal;
-};
+#include "common/vertices.glsl"
 
 struct Instance {
     vec4 rows[3]; // world from model
@@ -15,17 +11,9 @@ struct Instance {
     uint material;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray {
-    Vertex at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CornerArray {
-    uint at[]; // numbers of vertices, three for each triangle
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer InstanceArray {
-    Instance at[];
-};
+// Numbers of vertices, three for each triangle.
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CornerArray { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer InstanceArray { Instance at[]; };
 
 // Materials.
 const uint kPlaster = 0u;

@@ -4,13 +4,8 @@
 
 #include "common/camera.glsl"
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words {
-    uint at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Floats {
-    float at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Floats { float at[]; };
 
 struct Material {
     vec3 albedo; // linear, multiplied with the texture
@@ -52,17 +47,9 @@ struct Light {
     float spread; // sine of half the angle of a distant light
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer MaterialArray {
-    Material at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray {
-    Geometry at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer InstanceArray {
-    Instance at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer MaterialArray { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray { Geometry at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer InstanceArray { Instance at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;

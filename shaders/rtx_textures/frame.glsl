@@ -20,13 +20,8 @@ struct Record {
     uint modelHigh;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray {
-    Vertex at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer RecordArray {
-    Record at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray { Vertex at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer RecordArray { Record at[]; };
 
 const uint kGround = 0u;
 const uint kCrate = 1u;
@@ -50,8 +45,6 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     float phase; // of the animation's round, 0 to 1
 };
 
-layout(push_constant, scalar) uniform PushConstants {
-    Frame frame;
-};
+layout(push_constant, scalar) uniform PushConstants { Frame frame; };
 
 #endif

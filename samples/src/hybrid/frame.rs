@@ -89,6 +89,19 @@ impl Lighting {
     }
 }
 
+/// The members of `Frame` that samples share which trace rays in a lit scene (`shaders/common/scene_frame.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SceneFrame {
+    pub(crate) camera: GpuCamera,
+    pub(crate) scene: SceneAddresses,
+    pub(crate) lighting: Lighting,
+    pub(crate) tlas: u32,
+    pub(crate) sky: u32,
+    pub(crate) surface_sampler: u32,
+    pub(crate) sky_sampler: u32,
+}
+
 /// Bindless indices (the tail of `Frame` in `shaders/hybrid/frame.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]

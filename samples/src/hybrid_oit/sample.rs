@@ -8,7 +8,7 @@ use super::config::HybridOitConfig;
 use super::frame::{FrameConstants, Numbers, Push};
 use super::glass_lists::{GlassLists, NodeUse};
 use super::image_passes::ImagePasses;
-use super::raster_passes::RasterPasses;
+use super::raster_passes::{PassInputs, RasterPasses};
 use super::scene::{OitScene, PERIOD_SECONDS};
 use super::shadow_pass::ShadowPass;
 use super::structures::Structures;
@@ -127,10 +127,11 @@ impl HybridOit {
         let count = samples(extent);
         frame.pass("animate", |cmd| self.images.record_animate(cmd, buffers, push, self.sphere_count))?;
         frame.pass("build", |cmd| self.structures.record(cmd))?;
-        self.raster.record_depth(&mut frame.cmd, targets, buffers, push)?;
-        self.raster.record_gbuffer(&mut frame.cmd, targets, buffers, push)?;
+        let inputs = PassInputs { targets, buffers, push };
+        self.raster.record_depth(&mut frame.cmd, &inputs)?;
+        self.raster.record_gbuffer(&mut frame.cmd, &inputs)?;
         frame.pass("shadows", |cmd| self.shadows.record(cmd, targets, buffers, push, extent))?;
-        frame.pass("glass lists", |cmd| self.raster.record_glass(cmd, targets, buffers, push, count))?;
+        frame.pass("glass lists", |cmd| self.raster.record_glass(cmd, &inputs, count))?;
         frame.pass("composite", |cmd| self.images.record_composite(cmd, targets, buffers, push, pixels))?;
         Ok(*self.targets.picture)
     }

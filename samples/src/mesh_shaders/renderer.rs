@@ -19,6 +19,7 @@ use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
+use crate::shapes::GpuVertex;
 
 /// Meshlets that a task workgroup looks at (`kMeshletsPerTask` in `shaders/mesh_shaders/payload.glsl`).
 const MESHLETS_PER_TASK: u32 = 32;
@@ -30,7 +31,7 @@ pub struct MeshShaders {
     ctx: Context,
     target: RenderTarget,
     pipeline: Holder<RenderPipelineHandle>,
-    vertices: Vec<Vertex>,
+    vertices: Vec<GpuVertex>,
     meshlets: Meshlets,
     counter: Counter,
     constants: FrameConstants,
@@ -40,17 +41,7 @@ pub struct MeshShaders {
     _buffers: [Holder<BufferHandle>; 4],
 }
 
-/// A corner of the knot's triangles (`Vertex` in `shaders/mesh_shaders/frame.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Vertex {
-    /// Its position.
-    pub position: [f32; 3],
-    /// Outwards, of length 1.
-    pub normal: [f32; 3],
-}
-
-/// `Frame` there.
+/// `Frame` in `shaders/mesh_shaders/frame.glsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct FrameConstants {
@@ -122,7 +113,7 @@ impl MeshShaders {
 
     /// Corners of the knot, at rest.
     #[must_use]
-    pub fn vertices(&self) -> &[Vertex] {
+    pub fn vertices(&self) -> &[GpuVertex] {
         &self.vertices
     }
 
@@ -211,12 +202,9 @@ impl Sample for MeshShaders {
 }
 
 /// The knot's vertices, and its pieces.
-fn model() -> (Vec<Vertex>, Meshlets) {
+fn model() -> (Vec<GpuVertex>, Meshlets) {
     let knot = knot();
-    let vertices = knot
-        .vertices
-        .iter()
-        .map(|vertex| Vertex { position: vertex.position.into(), normal: vertex.normal.into() });
+    let vertices = knot.vertices.iter().map(GpuVertex::from);
     let positions: Vec<Vec3> = knot.vertices.iter().map(|vertex| vertex.position).collect();
     let triangles: Vec<_> = knot.triangles.iter().map(|vertices| vertices.map(u32::from)).collect();
     (vertices.collect(), Meshlets::build(&positions, &triangles))

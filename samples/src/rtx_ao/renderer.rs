@@ -12,7 +12,7 @@ use super::body::Body;
 use super::config::RtxAoConfig;
 use super::frame::{FrameConstants, Lighting};
 use super::light_pass::{Cache, LightRays};
-use super::raster::Raster;
+use super::raster::{Drawn, Raster};
 use super::targets::Targets;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
@@ -181,12 +181,13 @@ impl RtxAo {
     /// One more pass. The structure is built in the first after a change.
     fn add_pass(&mut self, to: &mut Frame<'_>) -> lvk::Result<()> {
         let (frame, extent) = (self.upload_frame(&mut to.cmd)?, self.config.rtx.extent());
-        let (targets, bodies) = (&self.targets, &self.bodies[..]);
+        let targets = &self.targets;
         if self.passes == 0 {
             to.pass("TLAS build", |cmd| self.update_tlas(cmd))?;
         }
-        self.raster.record_depth(&mut to.cmd, targets, bodies, frame)?;
-        self.raster.record_surfaces(&mut to.cmd, targets, bodies, frame)?;
+        let drawn = Drawn { targets, bodies: &self.bodies, frame };
+        self.raster.record_depth(&mut to.cmd, &drawn)?;
+        self.raster.record_surfaces(&mut to.cmd, &drawn)?;
         if let Some(rays) = &self.rays {
             to.pass("rays", |cmd| rays.record(cmd, targets, extent, frame))?;
         }
@@ -232,11 +233,10 @@ impl Sample for RtxAo {
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
-        let rtx = self.config.rtx.sized(extent);
-        let target = rtx.create_target(&self.ctx)?;
-        let targets = Targets::new(&self.ctx, rtx.path, extent)?;
-        self.cache.sums = Cache::sums(&self.ctx, extent)?;
-        (self.target, self.targets, self.config.rtx) = (target, targets, rtx);
+        let targets = Targets::new(&self.ctx, self.config.rtx.path, extent)?;
+        let sums = Cache::sums(&self.ctx, extent)?;
+        self.target = self.config.rtx.resize(&self.ctx, extent)?;
+        (self.targets, self.cache.sums) = (targets, sums);
         self.passes = 0;
         Ok(())
     }

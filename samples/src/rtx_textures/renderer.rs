@@ -189,10 +189,8 @@ impl Sample for RtxTextures {
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
-        let config = self.config.sized(extent);
-        self.target = config.create_target(&self.ctx)?;
+        self.target = self.config.resize(&self.ctx, extent)?;
         self.constants.image = self.target.image_index();
-        self.config = config;
         Ok(())
     }
 

@@ -22,7 +22,7 @@ use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
 use crate::hybrid::{SceneArrays, check_promises, near_plane};
 use crate::raster::RasterPipeline;
-use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Material, PointLight, Scene};
+use crate::scene::{Ambient, Camera, CameraTour, DirectionalLight, GpuCamera, Material, PointLight, Scene};
 
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
@@ -43,8 +43,7 @@ pub struct Sponza {
     draws: Vec<Draw>,
     bounds: ([f32; 3], [f32; 3]),
     light: Light,
-    path: CameraPath,
-    camera: Camera,
+    tour: CameraTour,
     near_plane: f32,
     /// The frustum of a view that is kept while the camera goes on, to look at what was culled.
     kept: Option<Frustum>,
@@ -86,7 +85,6 @@ impl Sponza {
         let config = config.valid_for(ctx)?;
         let target = RenderTarget::with_samples(ctx, config.extent, config.samples)?;
         let draws = split_draws(&mut scene, config.triangles_per_draw);
-        let path = CameraPath::tour(&scene, 0);
         Ok(Self {
             target,
             culling: Culling::new(ctx, &draws)?,
@@ -97,8 +95,7 @@ impl Sponza {
             draws,
             bounds: scene.bounds(),
             light: Light::from_scene(&scene),
-            camera: path.at(0.0),
-            path,
+            tour: CameraTour::new(&scene, 0),
             near_plane: near_plane(&scene),
             ctx: ctx.clone(),
             path_of_draws: config.draws.unwrap_or(DrawPath::Padded),
@@ -112,8 +109,7 @@ impl Sponza {
     /// Tours the scene's cameras from the one with this index on.
     #[must_use]
     pub fn from_camera(mut self, scene: &Scene, first: usize) -> Self {
-        self.path = CameraPath::tour(scene, first);
-        self.camera = self.path.at(0.0);
+        self.tour = CameraTour::new(scene, first);
         self
     }
 
@@ -137,7 +133,7 @@ impl Sponza {
         if !self.config.culls {
             return [Frustum::ALL; 2];
         }
-        let seen = || Frustum::of_camera(&self.camera, self.target.aspect(), self.near_plane);
+        let seen = || Frustum::of_camera(&self.tour.camera, self.target.aspect(), self.near_plane);
         [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
     }
 
@@ -191,7 +187,7 @@ impl Sponza {
         let (draws, arguments, counts) = self.culling.addresses()?;
         let frusta = self.frusta();
         cmd.upload(&FrameConstants {
-            camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
+            camera: GpuCamera::new(&self.tour.camera, width, height, self.near_plane),
             scene: self.scene.arrays.addresses(),
             finishes: self.scene.finishes.address()?,
             draws,
@@ -250,7 +246,7 @@ impl Sample for Sponza {
     }
 
     fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
-        self.camera = self.path.at(time.phase());
+        self.tour.go_to(time.phase());
         Ok(())
     }
 
@@ -278,7 +274,7 @@ impl Sample for Sponza {
     }
 
     fn camera_mut(&mut self) -> Option<&mut Camera> {
-        Some(&mut self.camera)
+        Some(&mut self.tour.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
