@@ -16,9 +16,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Pla
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FirstArray { uint at[]; };
 
 // The quantity that pixels show.
-const uint kShowPicture = 0u;
-const uint kShowInstances = 1u;
-const uint kShowTriangles = 2u;
+const uint kShowPicture = 0u, kShowInstances = 1u, kShowTriangles = 2u;
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
 #include "common/scene_frame.glsl"

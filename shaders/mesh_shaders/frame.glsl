@@ -18,13 +18,9 @@ struct Meshlet {
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Meshlets { Meshlet at[]; };
-
 // Places in `VertexArray`, and triangles of three places of one byte in those.
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Numbers { uint at[]; };
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter {
-    uint drawn;
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { uint drawn; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;

@@ -119,8 +119,8 @@ const HYBRID_QUERY: [Mistake; 4] = [
     mistake(
         "glass casts shadows",
         "hybrid/trace_query.glsl",
-        "frame.tlas, flags, kMaskOpaque",
-        "frame.tlas, flags, kMaskAll",
+        "frame.tlas, kMaskOpaque",
+        "frame.tlas, kMaskAll",
     ),
 ];
 const QUEUED_PIPELINE: [Mistake; 1] = [mistake("no bounces", "hybrid/bounces.rgen.glsl", MAIN, NOTHING)];

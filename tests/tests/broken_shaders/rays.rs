@@ -75,7 +75,12 @@ const TOWN: [Mistake; 10] = [
 const TOWN_SKY: [Mistake; 1] =
     [mistake("no sky", "rtx_ao/accumulate.comp.glsl", "vec4(skyRadiance(", "vec4(0.0 * skyRadiance(")];
 const TOWN_QUERY: [Mistake; 3] = [
-    mistake("all is blocked", "rtx_ao/surface.frag.glsl", "!= LVK_COMMITTED_NONE", "!= 77u"),
+    mistake(
+        "all is blocked",
+        "rtx_ao/surface.frag.glsl",
+        "return occludedByQuery(",
+        "return true || occludedByQuery(",
+    ),
     mistake("rays too short", "rtx_ao/surface.frag.glsl", "direction, range);", "direction, 0.1 * range);"),
     mistake(
         "no normals",
@@ -117,7 +122,12 @@ const RECURSION: [Mistake; 13] = [
 ];
 const LOOP: [Mistake; 5] = [
     mistake("glass is solid", "rtx_pipeline/picture.comp.glsl", "== kGlass;", "== 77u;"),
-    mistake("glass casts shadows", "rtx_pipeline/picture.comp.glsl", "flags, kMaskSolid", "flags, kMaskAll"),
+    mistake(
+        "glass casts shadows",
+        "rtx_pipeline/picture.comp.glsl",
+        "frame.tlas, kMaskSolid",
+        "frame.tlas, kMaskAll",
+    ),
     mistake("mirrors lose nothing", "rtx_pipeline/picture.comp.glsl", "weight *= ray.weight;", ";"),
     mistake(
         "other triangles",
@@ -125,7 +135,12 @@ const LOOP: [Mistake; 5] = [
         "= firstTriangle + ",
         "= 0u * firstTriangle + ",
     ),
-    mistake("no light arrives", "rtx_pipeline/picture.comp.glsl", "!= LVK_COMMITTED_NONE", "!= 77u"),
+    mistake(
+        "no light arrives",
+        "rtx_pipeline/picture.comp.glsl",
+        "return occludedByQuery(",
+        "return true || occludedByQuery(",
+    ),
 ];
 
 const WAVES: [Mistake; 12] = [
