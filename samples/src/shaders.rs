@@ -20,6 +20,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "common/fresnel",
     "common/group_pixel",
     "common/lighting",
+    "common/no_texture",
     "common/occlusion_query",
     "common/octahedral",
     "common/phong",

@@ -3,8 +3,7 @@
 #define COMMON_SCENE_BUFFERS
 
 #include "common/arrays.glsl"
-
-const uint kNoTexture = 0xffffffffu;
+#include "common/no_texture.glsl"
 
 struct Material {
     vec3 albedo; // linear, multiplied with the texture

@@ -3,6 +3,7 @@
 #define REFLECTIONS_FRAME
 
 #include "common/camera.glsl"
+#include "common/no_texture.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Floats { float at[]; };
@@ -17,8 +18,6 @@ struct Material {
     float opacity; // 1 for opaque surfaces
     float density; // of a body of water, per unit of length; 0 for what has no depth
 };
-
-const uint kNoTexture = 0xffffffffu;
 
 // Memory layout of the vertices of a geometry.
 const uint kKindStatic = 0u; // 16 bytes: snorm16 position, octahedral normal, half texture coordinates

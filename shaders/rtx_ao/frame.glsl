@@ -4,8 +4,7 @@
 
 #include "common/arrays.glsl"
 #include "common/camera.glsl"
-
-const uint kNoTexture = 0xffffffffu;
+#include "common/no_texture.glsl"
 
 struct Paint {
     vec3 albedo; // linear, multiplied with the texture

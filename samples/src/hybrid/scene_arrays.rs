@@ -11,10 +11,8 @@ use lvk::{
 use super::frame::SceneAddresses;
 use super::texture_density::lod_constant;
 use crate::app::array_buffer::array;
+use crate::app::scene_textures::NO_TEXTURE;
 use crate::scene::{Material, Scene};
-
-/// `kNoTexture` in `shaders/common/scene_buffers.glsl`.
-const NO_TEXTURE: u32 = u32::MAX;
 
 /// Buffers of a scene that shaders read by address.
 pub(crate) struct SceneArrays {

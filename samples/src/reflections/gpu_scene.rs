@@ -14,10 +14,9 @@ use super::quantise::{Grid, PackedVertex};
 use super::scene::{HallScene, Material, Model, Placed};
 use super::transparency_sort::{SortBounds, farthest_first};
 use crate::app::array_buffer::array;
+use crate::app::scene_textures::NO_TEXTURE;
 use crate::shapes::Mesh;
 
-/// `kNoTexture` in `shaders/reflections/frame.glsl`.
-const NO_TEXTURE: u32 = u32::MAX;
 /// `kKindStatic`, `kKindSkinned` and `kKindLeaf` there.
 const KIND_STATIC: u32 = 0;
 const KIND_SKINNED: u32 = 1;

@@ -8,11 +8,8 @@ use lvk::{
 };
 
 use crate::app::array_buffer::array;
-use crate::app::scene_textures;
+use crate::app::scene_textures::{self, NO_TEXTURE};
 use crate::scene::{Material, Scene};
-
-/// `kNoTexture` in `shaders/rtx_ao/frame.glsl`.
-const NO_TEXTURE: u32 = u32::MAX;
 
 /// `Body` in `shaders/rtx_ao/frame.glsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]

@@ -321,7 +321,7 @@ impl OnDevice {
         let number = |map: u32| maps[map as usize].index();
         let finish = |material: &Material| GpuFinish {
             is_masked: material.is_masked.into(),
-            normal_map: material.normal_map.map_or(GpuFinish::NO_TEXTURE, number),
+            normal_map: material.normal_map.map_or(scene_textures::NO_TEXTURE, number),
         };
         let finishes: Vec<_> = scene.materials.iter().map(finish).collect();
         let sampler = |debug_name, address, max_anisotropy| {
