@@ -162,7 +162,7 @@ mistakes! {
     TOWN_SKY:
         "rtx_ao/accumulate.comp.glsl": "no sky": "vec4(skyRadiance(" => "vec4(0.0 * skyRadiance(";
     TOWN_QUERY:
-        "rtx_ao/surface.frag.glsl": "all is blocked": "!= LVK_COMMITTED_NONE" => "!= 77u";
+        "rtx_ao/surface.frag.glsl": "all is blocked": "return occludedByQuery(" => "return true || occludedByQuery(";
         "rtx_ao/surface.frag.glsl": "rays too short": "direction, range);" => "direction, 0.1 * range);";
         "rtx_ao/surface.frag.glsl": "no normals": "lightAt(inPosition, normal," => "lightAt(inPosition, geometric,";
 
@@ -182,10 +182,10 @@ mistakes! {
         "rtx_pipeline/picture.rgen.glsl": "no glass": "kMaskAll" => "kMaskSolid";
     LOOP:
         "rtx_pipeline/picture.comp.glsl": "glass is solid": "== kGlass;" => "== 77u;";
-        "rtx_pipeline/picture.comp.glsl": "glass casts shadows": "flags, kMaskSolid" => "flags, kMaskAll";
+        "rtx_pipeline/picture.comp.glsl": "glass casts shadows": "frame.tlas, kMaskSolid" => "frame.tlas, kMaskAll";
         "rtx_pipeline/picture.comp.glsl": "mirrors lose nothing": "weight *= ray.weight;" => ";";
         "rtx_pipeline/picture.comp.glsl": "other triangles": "= firstTriangle + " => "= 0u * firstTriangle + ";
-        "rtx_pipeline/picture.comp.glsl": "no light arrives": "!= LVK_COMMITTED_NONE" => "!= 77u";
+        "rtx_pipeline/picture.comp.glsl": "no light arrives": "return occludedByQuery(" => "return true || occludedByQuery(";
 
     WAVES:
         "rtx_textures/glazed.rchit.glsl": "nothing glazed": "asGlazed(" => "asPainted(";
@@ -262,7 +262,7 @@ mistakes! {
         "hybrid/render.comp.glsl": "no rays": "    uvec2 start = " => "    return;\n    uvec2 start = ";
         "hybrid/trace_query.glsl": "hits elsewhere": "lvkRayQueryBarycentrics(query, LVK_COMMITTED)" => "vec2(0.2)";
         "hybrid/trace_query.glsl": "other triangles": "hit.triangle = firstTriangle +" => "hit.triangle = 0u * firstTriangle +";
-        "hybrid/trace_query.glsl": "glass casts shadows": "frame.tlas, flags, kMaskOpaque" => "frame.tlas, flags, kMaskAll";
+        "hybrid/trace_query.glsl": "glass casts shadows": "frame.tlas, kMaskOpaque" => "frame.tlas, kMaskAll";
     QUEUED_PIPELINE:
         "hybrid/bounces.rgen.glsl": "no bounces": MAIN => NOTHING;
     QUEUED_QUERY:
