@@ -42,6 +42,7 @@
 //! | open a device, query its capabilities | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
 //! | create objects | `Context::create_*`, each with its `*Desc` |
 //! | use part of a texture, or another format of it | [`Context::create_texture_view`], [`TextureViewDesc`] |
+//! | pass data of one frame to shaders | [`CommandBuffer::upload`], [`RenderPass::upload`] |
 //! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and similar methods |
 //! | record commands | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`], [`manual::rendering`] |
@@ -54,6 +55,7 @@
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
+//! | write shaders, in GLSL, Slang or HLSL | [`ShaderModuleDesc`], [`manual::shader_interface`], [`HLSL_HEADER`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | build acceleration structures | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | declare the resources that a shader accesses | [`Dependencies`] |
@@ -109,6 +111,14 @@
 //!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
 //! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
 //!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
+//!
+//! # Targets
+//!
+//! Targets are little-endian, of 32 or 64 bits. A big-endian target is a compile error: shaders read the bytes of a
+//! software BVH as words, and cache files hold them unchanged. No byte slice of the application needs an alignment.
+
+#[cfg(target_endian = "big")]
+compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
 
 mod accel;
 mod barrier;
@@ -174,7 +184,11 @@ pub use context::holder::Holder;
 pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
+pub use error::driver_report::{
+    DriverManifest, DriverReport, LoaderReport, ManifestOutcome, SearchedPath, VulkanReport,
+};
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;
@@ -187,6 +201,7 @@ pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
+pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;
 pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
 pub use gpu::start::external::RawContext;
@@ -216,7 +231,7 @@ pub use resource::view::TextureViewDesc;
 pub use resource::ycbcr::{ChromaSite, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
-pub use shader::{ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
+pub use shader::{HLSL_HEADER, ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
 #[cfg(feature = "window")]

@@ -1,6 +1,10 @@
 //! Every sample of this crate, for programs and tests that go through all of them.
 
+use std::ffi::OsString;
+use std::process::ExitCode;
+
 use clap::Command;
+use winit::event_loop::EventLoopBuilder;
 
 use crate::app::cli;
 use crate::app::sample_info::SampleInfo;
@@ -19,11 +23,13 @@ pub struct CatalogueEntry {
     pub command: fn() -> Command,
     /// [`SampleInfo::pipelines`].
     pub pipelines: fn() -> Vec<SamplePipeline>,
+    /// Runs the program: [`cli::main_with`].
+    pub main: fn(Vec<OsString>, &mut EventLoopBuilder<()>) -> ExitCode,
 }
 
 impl CatalogueEntry {
     const fn new<S: SampleInfo>() -> Self {
-        Self { name: S::NAME, command: cli::command::<S>, pipelines: S::pipelines }
+        Self { name: S::NAME, command: cli::command::<S>, pipelines: S::pipelines, main: cli::main_with::<S> }
     }
 }
 
@@ -46,6 +52,21 @@ pub const SAMPLES: [CatalogueEntry; 16] = [
     CatalogueEntry::new::<triplanar::Triplanar>(),
     CatalogueEntry::new::<yuv::Yuv>(),
 ];
+
+/// Runs the sample that a line of text names, such as `rtx_ao --rt query`, with the arguments of the line and `more`: for
+/// systems that start a program without arguments. Words end at white space.
+#[must_use]
+pub fn run_line(line: &str, more: Vec<OsString>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
+    let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
+    match words.first().and_then(|name| SAMPLES.iter().find(|sample| name == sample.name)) {
+        Some(sample) => (sample.main)([words, more].concat(), event_loop),
+        None => {
+            let names = SAMPLES.map(|sample| sample.name).join(", ");
+            eprintln!("error: '{}' names no sample; there are {names}", line.trim());
+            ExitCode::from(2)
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! Meshes made by formulas.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 /// A corner of triangles.
@@ -9,6 +10,22 @@ pub(crate) struct Vertex {
     /// Unit length, outwards.
     pub(crate) normal: Vec3,
     pub(crate) texcoord: Vec2,
+}
+
+/// A corner without texture coordinates, as shaders read it (`Vertex` in `shaders/common/vertices.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct GpuVertex {
+    /// Its position.
+    pub position: [f32; 3],
+    /// Outwards, of length 1.
+    pub normal: [f32; 3],
+}
+
+impl From<&Vertex> for GpuVertex {
+    fn from(vertex: &Vertex) -> Self {
+        Self { position: vertex.position.into(), normal: vertex.normal.into() }
+    }
 }
 
 /// Triangles of fewer than 65,536 vertices.

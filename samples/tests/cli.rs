@@ -86,7 +86,7 @@ impl Outcome {
     fn from_command(mut command: Command) -> Self {
         let Output { status, stdout, stderr } = command.output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        Self { status: status.code(), out: text(stdout), err: text(stderr) }
+        Self { status: status.code(), out: text(stdout), err: without_driver_note(&text(stderr)) }
     }
 
     /// Fails unless the program ended with `status` and one line of error, which names all of `parts`.
@@ -110,6 +110,13 @@ impl Outcome {
     fn assert_success(&self) {
         assert_eq!(self.status, Some(0), "{}{}", self.out, self.err);
     }
+}
+
+/// Leaves out the line that gives the reason for the software driver, on machines that need it.
+fn without_driver_note(err: &str) -> String {
+    err.split_inclusive('\n')
+        .filter(|line| !line.starts_with("lvk: a software driver is used, because "))
+        .collect()
 }
 
 fn assert_names(text: &str, parts: &[&str]) {
@@ -144,6 +151,15 @@ fn has_device() -> bool {
         eprintln!("SKIPPED, no Vulkan device: {error}");
     }
     found.is_ok()
+}
+
+/// A desk with a scene, where a device can render it.
+fn desk_with_device() -> Option<(Desk, String)> {
+    has_device().then(|| {
+        let desk = Desk::new();
+        let scene = desk.file("triangle.obj", TRIANGLE);
+        (desk, scene)
+    })
 }
 
 #[test]
@@ -389,10 +405,112 @@ fn devices_are_listed_a_line_each() {
     let outcome = Outcome::from_command(hybrid(&["--list-devices"]));
     outcome.assert_success();
     assert!(!outcome.out.is_empty());
-    for (number, line) in outcome.out.lines().enumerate() {
+    let devices = outcome.out.lines().take_while(|line| !line.starts_with("the system's own Vulkan"));
+    for (number, line) in devices.enumerate() {
         assert!(line.starts_with(&format!("[{number}] ")), "{line}");
         assert_names(line, &["Vulkan 1.", "): ray tracing pipeline ", ", ray query "]);
     }
+}
+
+/// The program with a list of drivers, of which none can be used.
+fn with_drivers(files: &Path, args: &[&str]) -> Command {
+    let mut command = hybrid(args);
+    command.env("VK_DRIVER_FILES", files).env_remove("VK_ICD_FILENAMES").env_remove("LVK_DRIVER");
+    command
+}
+
+#[test]
+fn a_machine_without_a_driver_that_works_lists_why() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let library =
+        desk.file("libtoy.so", "a text in the place of a library, which is longer than the header of ELF");
+    let broken = desk.file("toy.json", format!(r#"{{"file_format_version": "1.0.0", "ICD": {{"library_path": "{library}", "api_version": "1.3.0"}}}}"#));
+    let absent = desk.input.path().join("absent.json");
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    for (manifest, parts) in [
+        (
+            Path::new(&broken),
+            ["toy.json", "libtoy.so", "invalid ELF header", "remedy: install the driver of"],
+        ),
+        (&absent, ["absent.json", "cannot be read", "No such file", "remedy: correct or remove"]),
+        (desk.output.path(), ["no driver manifest in", "VK_DRIVER_FILES=", "remedy: correct", "unset it"]),
+    ] {
+        let listed = Outcome::from_command(with_drivers(manifest, &["--list-devices"]));
+        listed.assert_success();
+        assert!(listed.out.starts_with("the loader ") && listed.out.lines().count() >= 4, "{}", listed.out);
+        assert_names(&listed.out, &parts);
+        let run = Outcome::from_command(with_drivers(manifest, &["--scene", &scene]));
+        run.assert_error(1, &parts);
+        assert_names(&run.err, &["no Vulkan device on this machine: the loader "]);
+    }
+}
+
+/// The software driver takes the place of a system whose loader cannot be opened.
+#[test]
+#[cfg(target_os = "linux")]
+fn the_reason_for_the_software_driver_is_one_line_and_the_list_has_the_rest() {
+    if !has_device() || std::env::var_os("VK_DRIVER_FILES").is_some() {
+        return;
+    }
+    let desk = Desk::new();
+    desk.file("libvulkan.so.1", "");
+    let (out, err) = {
+        let mut command = hybrid(&["--list-devices"]);
+        command
+            .env_remove("LVK_DRIVER")
+            .env_remove("VK_ICD_FILENAMES")
+            .env("LD_LIBRARY_PATH", desk.input.path());
+        let Output { stdout, stderr, .. } = command.output().unwrap();
+        (String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
+    };
+    let note = "lvk: a software driver is used, because the Vulkan loader libvulkan.so.1 cannot be opened\n";
+    assert_eq!(err, note);
+    assert!(out.starts_with("[0] "), "{out}");
+    assert_names(
+        &out,
+        &["\nthe system's own Vulkan, which", "\nthe loader libvulkan.so.1 cannot be opened: ", "\nremedy: "],
+    );
+}
+
+/// Neither a loader nor a driver, and none may be fetched.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_machine_without_a_loader_lists_what_to_install() {
+    let empty = tempfile::tempdir().unwrap();
+    let without_vulkan = |args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid"));
+        command.args(args).env("LVK_NO_DOWNLOAD", "1").env("LVK_VULKAN_DIR", empty.path());
+        for variable in ["LVK_DRIVER", "LVK_DEVICE", "VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
+            command.env_remove(variable);
+        }
+        for variable in ["XDG_CONFIG_DIRS", "XDG_DATA_DIRS", "HOME"] {
+            command.env(variable, empty.path());
+        }
+        // A file in the place of the loader comes before the system's.
+        std::fs::write(empty.path().join("libvulkan.so.1"), "").unwrap();
+        Outcome::from_command({
+            command.env("LD_LIBRARY_PATH", empty.path());
+            command
+        })
+    };
+    let listed = without_vulkan(&["--list-devices"]);
+    listed.assert_success();
+    assert_names(
+        &listed.out,
+        &[
+            "the loader libvulkan.so.1 cannot be opened: ",
+            "remedy: ",
+            "cannot be downloaded because LVK_NO_DOWNLOAD",
+        ],
+    );
+    let run = without_vulkan(&[]);
+    run.assert_error(
+        1,
+        &["no Vulkan driver with ray tracing", "the loader libvulkan.so.1 cannot", "LVK_NO_DOWNLOAD"],
+    );
 }
 
 #[test]
@@ -419,11 +537,7 @@ fn samples_with_one_scene_list_it_and_all_list_devices() {
 
 #[test]
 fn a_device_that_is_not_there_is_device_trouble() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     desk.run(&["--scene", &scene, "--device", "voodoo"])
         .assert_error(1, &["'voodoo' names no device", "[0] "]);
     assert_eq!(desk.output_files(), Vec::<String>::new());
@@ -431,11 +545,7 @@ fn a_device_that_is_not_there_is_device_trouble() {
 
 #[test]
 fn a_device_without_ray_tracing_gets_a_message_of_what_it_lacks() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     let lacks =
         [("pipeline", "lacks ray tracing pipelines", ""), ("query", "lacks ray queries", "--rt software")];
     for (rt, lack, remedy) in lacks {
@@ -449,11 +559,7 @@ fn a_device_without_ray_tracing_gets_a_message_of_what_it_lacks() {
 
 #[test]
 fn a_device_that_finds_no_visible_triangles_traces_everything() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     for named in [&["--method", "hybrid"][..], &["--raster", "compute"], &["--bounces", "first"]] {
         let args = [&["--scene", &scene, "--rt", "software"], named].concat();
         let Some(command) = desk.without_ray_tracing(&args) else { return };
@@ -488,11 +594,7 @@ fn without_a_driver_and_a_way_to_one_the_user_learns_what_to_install() {
 /// The path follows from what the profile leaves, and the first lines say which profile and which path.
 #[test]
 fn a_profile_decides_the_path_and_is_printed() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     for (profile, path) in [("mali-g715", "ray queries"), ("no-ray-query", "ray tracing pipeline")] {
         let outcome = desk.run(&["--scene", &scene, "--frames", "1", "--profile", profile, "--validate"]);
         outcome.assert_success();
@@ -534,11 +636,7 @@ fn a_scene_too_large_for_the_profile_is_split_and_reported() {
 /// `hybrid | head -1` must not keep the picture from being written.
 #[test]
 fn a_closed_pipe_does_not_cost_the_image() {
-    if !has_device() {
-        return;
-    }
-    let desk = Desk::new();
-    let scene = desk.file("triangle.obj", TRIANGLE);
+    let Some((desk, scene)) = desk_with_device() else { return };
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let mut command = desk.command(&["--scene", &scene]);

@@ -32,6 +32,7 @@ const KEY_W: u8 = 25;
 const KEY_N: u8 = 57;
 const SPACE: u8 = 65;
 const F1: u8 = 67;
+const F9: u8 = 75;
 const F12: u8 = 96;
 
 /// The X server of a test; `None`, loudly, where there is none and none can be fetched.
@@ -228,10 +229,23 @@ impl Session {
         thread::spawn(move || lines.map_while(Result::ok).all(|line| say.send(line).is_ok()));
         let mut session = Self { program, said, keys, root, window: 0, _desktop: desktop };
         session.wait("its window", |session| session.find_window().is_some());
-        session.window = session.find_window().unwrap();
-        let time = x11rb::CURRENT_TIME;
-        session.keys.set_input_focus(InputFocus::PARENT, session.window, time).unwrap().check().unwrap();
+        session.focus();
         Some(session)
+    }
+
+    /// Takes the window that is visible as the one that keys go to.
+    fn focus(&mut self) {
+        self.window = self.find_window().unwrap();
+        let time = x11rb::CURRENT_TIME;
+        self.keys.set_input_focus(InputFocus::PARENT, self.window, time).unwrap().check().unwrap();
+    }
+
+    /// Has the program give its window up, and waits for the next one.
+    fn reopen(&mut self) {
+        let before = self.window;
+        self.press(F9);
+        self.wait("another window", |session| session.find_window().is_some_and(|window| window != before));
+        self.focus();
     }
 
     /// The visible window of some size.
@@ -360,6 +374,54 @@ fn an_animation_by_frames_stands_too() {
     assert!(session.take_screenshot(&shot(4)) == first, "it goes on");
     session.press(SPACE);
     assert!(session.take_screenshot(&shot(5)) != first, "it still stands");
+    session.close();
+}
+
+/// As on Android when an application is paused and comes back, by the same functions: on its device, with what was pressed
+/// before, and without a message of the validation layer. A window that is destroyed from outside takes the same way, but
+/// winit panics where it asks for such a window before it has read that it is gone.
+#[test]
+fn a_sample_goes_on_where_it_was_in_another_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_rtx_textures");
+    let Some(mut session) = Session::new(program, &[], folder.path()) else { return };
+    let shot = |number: u32| folder.path().join(format!("rtx_textures_window_{number:04}.png"));
+    session.press(SPACE);
+    session.press(F1);
+    let before = session.take_screenshot(&shot(1));
+    for number in 2..12 {
+        session.reopen();
+        assert!(session.take_screenshot(&shot(number)) == before, "picture {number} is another one");
+    }
+    session.resize([300, 260]);
+    thread::sleep(Duration::from_millis(600));
+    assert_eq!(session.take_screenshot(&shot(12)).dimensions(), (300, 260));
+    session.reopen();
+    // The picture follows the size of the window a little later.
+    thread::sleep(Duration::from_millis(600));
+    assert!(session.take_screenshot(&shot(13)) == before, "a new window has the size of the first");
+    session.press(SPACE);
+    let animated = session.take_screenshot(&shot(14));
+    assert!(differing(&before, &animated, 0) > 0.0, "the animation stands");
+    let said = session.close();
+    let is_wrong = |line: &&String| ["warning", "error", "alive"].iter().any(|word| line.contains(word));
+    assert_eq!(said.iter().find(is_wrong), None);
+}
+
+#[test]
+fn a_sample_goes_on_loading_in_another_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_large_scene");
+    let args = ["--triangles", "400000", "--samples", "1", "--depth", "0"];
+    let Some(mut session) = Session::new(program, &args, folder.path()) else { return };
+    let shot = |number: u32| folder.path().join(format!("large_scene_window_{number:04}.png"));
+    session.wait_for_line("making the valley");
+    let loading = session.take_screenshot(&shot(1));
+    session.reopen();
+    frames_while_loading(&mut session);
+    session.press(F1);
+    let picture = session.take_screenshot(&shot(2));
+    assert!(differing(&loading, &picture, 0) > 0.9, "there is no picture");
     session.close();
 }
 

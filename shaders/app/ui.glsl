@@ -7,9 +7,7 @@ struct UiVertex {
     uint color;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer UiVertices {
-    UiVertex at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer UiVertices { UiVertex at[]; };
 
 layout(push_constant, scalar) uniform Push {
     UiVertices vertices;

@@ -3,8 +3,7 @@
 #define COMMON_SCENE_BUFFERS
 
 #include "common/arrays.glsl"
-
-const uint kNoTexture = 0xffffffffu;
+#include "common/no_texture.glsl"
 
 struct Material {
     vec3 albedo; // linear, multiplied with the texture
@@ -30,13 +29,8 @@ struct Light {
     float reach; // distance at which a point light has fallen to half
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleInfoArray {
-    TriangleInfo at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialArray {
-    Material at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TriangleInfoArray { TriangleInfo at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialArray { Material at[]; };
 
 struct Scene {
     Vec3Array positions;

@@ -9,17 +9,7 @@
 #include "hybrid/visibility.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
-    Camera camera;
-    Scene scene;
-    Light lights[2];
-    vec3 ambientAbove;
-    uint lightCount;
-    vec3 ambientBelow;
-    float offsetExtent; // see ray_offset.glsl
-    uint tlas;
-    uint sky; // index into kTexturesCube
-    uint surfaceSampler;
-    uint skySampler;
+#include "common/scene_frame.glsl"
     uint outputImage;
     uint gbufferPosition;
     uint gbufferSurface;

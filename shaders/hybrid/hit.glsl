@@ -6,8 +6,7 @@
 const uint kNoTriangle = 0xffffffffu;
 
 // Instance mask bits. Light passes through refractive triangles, so shadow rays do not look for them.
-const uint kMaskOpaque = 0x01u;
-const uint kMaskAll = 0x03u;
+const uint kMaskOpaque = 0x01u, kMaskAll = 0x03u;
 
 struct Hit {
     uint triangle; // or kNoTriangle

@@ -48,9 +48,7 @@ bool isClose(uint bits, uint other) {
     return other != kNoTriangle && uint(abs(int(other) - int(bits))) <= kCloseUnits;
 }
 
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer AtomicWords {
-    uint64_t at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer AtomicWords { uint64_t at[]; };
 
 uint64_t packed(uvec2 word) {
     return uint64_t(word.y) << 32 | uint64_t(word.x);

@@ -19,13 +19,8 @@ struct BouncePixel {
     vec3 color; // what it sends by itself
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer BouncePixels {
-    BouncePixel at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ColorArray {
-    vec3 at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer BouncePixels { BouncePixel at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ColorArray { vec3 at[]; };
 
 struct BounceQueue {
     BounceHead head;

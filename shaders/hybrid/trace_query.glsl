@@ -5,6 +5,7 @@
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 
+#include "common/occlusion_query.glsl"
 #include "hybrid/frame.glsl"
 #include "hybrid/hit.glsl"
 
@@ -23,12 +24,7 @@ Hit traceClosest(vec3 origin, float tmin, vec3 direction, float tmax) {
 }
 
 bool traceOccluded(vec3 origin, float tmin, vec3 direction, float tmax) {
-    LvkRayQuery query;
-    const uint flags = LVK_RAY_FLAG_OPAQUE | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT;
-    lvkRayQueryInitialize(query, frame.tlas, flags, kMaskOpaque, origin, tmin, direction, tmax);
-    while (lvkRayQueryProceed(query)) {
-    }
-    return lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
+    return occludedByQuery(frame.tlas, kMaskOpaque, origin, tmin, direction, tmax);
 }
 
 #endif

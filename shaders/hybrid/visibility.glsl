@@ -5,13 +5,8 @@
 // A 64-bit word a pixel, row by row: x has the bits of the triangle inverted, y those of its distance. So the smaller
 // word is the nearer triangle. Without a triangle both are kNoTriangle; where x is kAskRay, rounding decides what the
 // pixel shows, and so its ray must say.
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer VisibilityWords {
-    uvec2 at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray {
-    uint at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer VisibilityWords { uvec2 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
 
 struct Visibility {
     VisibilityWords words; // by the compute rasteriser

@@ -3,6 +3,7 @@
 #define MESH_SHADERS_FRAME
 
 #include "common/camera.glsl"
+#include "common/vertices.glsl"
 
 // Some triangles that lie side by side.
 struct Meshlet {
@@ -16,33 +17,16 @@ struct Meshlet {
     uint triangleCount;
 };
 
-struct Vertex {
-    vec3 position;
-    vec3 normal;
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Meshlets {
-    Meshlet at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices {
-    Vertex at[];
-};
-
-// Places in `Vertices`, and triangles of three places of one byte in those.
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Numbers {
-    uint at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter {
-    uint drawn;
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Meshlets { Meshlet at[]; };
+// Places in `VertexArray`, and triangles of three places of one byte in those.
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Numbers { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counter { uint drawn; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
     Camera cullingCamera; // what is culled cannot be seen from here
     Meshlets meshlets;
-    Vertices vertices;
+    VertexArray vertices;
     Numbers vertexNumbers;
     Numbers triangles;
     Counter counter;
@@ -52,9 +36,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     float apart; // how far meshlets move outwards
 };
 
-layout(push_constant, scalar) uniform Push {
-    Frame frame;
-};
+layout(push_constant, scalar) uniform Push { Frame frame; };
 
 // About the upright axis, with the animation.
 vec3 turned(vec3 direction) {

@@ -3,11 +3,7 @@
 #define OMNI_SHADOWS_FRAME
 
 #include "common/camera.glsl"
-
-struct Vertex {
-    vec3 position;
-    vec3 normal;
-};
+#include "common/vertices.glsl"
 
 struct Instance {
     vec4 rows[3]; // world from model
@@ -15,30 +11,13 @@ struct Instance {
     uint material;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray {
-    Vertex at[];
-};
+// Numbers of vertices, three for each triangle.
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CornerArray { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer InstanceArray { Instance at[]; };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CornerArray {
-    uint at[]; // numbers of vertices, three for each triangle
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer InstanceArray {
-    Instance at[];
-};
-
-// Materials.
-const uint kPlaster = 0u;
-const uint kTiles = 1u;
-const uint kMetal = 2u;
-const uint kGlaze = 3u;
-const uint kGlow = 4u;
-
-// Ways to filter the shadow.
-const uint kUnshadowed = 0u;
-const uint kHard = 1u;
-const uint kLinear = 2u;
-const uint kSoft = 3u;
+// Materials, and ways to filter the shadow.
+const uint kPlaster = 0u, kTiles = 1u, kMetal = 2u, kGlaze = 3u, kGlow = 4u;
+const uint kUnshadowed = 0u, kHard = 1u, kLinear = 2u, kSoft = 3u;
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;

@@ -3,14 +3,10 @@
 #define REFLECTIONS_FRAME
 
 #include "common/camera.glsl"
+#include "common/no_texture.glsl"
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words {
-    uint at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Floats {
-    float at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Floats { float at[]; };
 
 struct Material {
     vec3 albedo; // linear, multiplied with the texture
@@ -22,8 +18,6 @@ struct Material {
     float opacity; // 1 for opaque surfaces
     float density; // of a body of water, per unit of length; 0 for what has no depth
 };
-
-const uint kNoTexture = 0xffffffffu;
 
 // Memory layout of the vertices of a geometry.
 const uint kKindStatic = 0u; // 16 bytes: snorm16 position, octahedral normal, half texture coordinates
@@ -52,17 +46,9 @@ struct Light {
     float spread; // sine of half the angle of a distant light
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer MaterialArray {
-    Material at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray {
-    Geometry at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer InstanceArray {
-    Instance at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer MaterialArray { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray { Geometry at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer InstanceArray { Instance at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;

@@ -4,9 +4,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Positions {
-    vec3 at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Positions { vec3 at[]; };
 
 const vec3 kLow = vec3(-5.5, 0.05, -27.0);
 const vec3 kSize = vec3(11.0, 5.2, 29.0);

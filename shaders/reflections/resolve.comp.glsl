@@ -4,9 +4,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Sums {
-    vec4 at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Sums { vec4 at[]; };
 
 const float kExposure = 0.68;
 

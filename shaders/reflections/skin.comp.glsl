@@ -15,21 +15,10 @@ struct Bone {
     vec4 rows[3]; // from the mesh at rest to the world
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RestVertices {
-    RestVertex at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Bones {
-    Bone at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Positions {
-    vec3 at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Normals {
-    uint at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RestVertices { RestVertex at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Bones { Bone at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Positions { vec3 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Normals { uint at[]; };
 
 layout(push_constant, scalar) uniform Push {
     RestVertices rest;

@@ -14,9 +14,7 @@ struct Block {
     uint padding;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Blocks {
-    Block at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Blocks { Block at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera cameras[7]; // of the cube map's faces, and of the picture

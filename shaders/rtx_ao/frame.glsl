@@ -4,21 +4,15 @@
 
 #include "common/arrays.glsl"
 #include "common/camera.glsl"
-
-const uint kNoTexture = 0xffffffffu;
+#include "common/no_texture.glsl"
 
 struct Paint {
     vec3 albedo; // linear, multiplied with the texture
     uint tex; // index into kTextures2D, or kNoTexture
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PaintArray {
-    Paint at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray {
-    vec4 at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PaintArray { Paint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { vec4 at[]; };
 
 // Addresses are numbers: SwiftShader miscompiles copies of structs that hold buffer references.
 struct Body {
@@ -30,9 +24,7 @@ struct Body {
     uvec2 paints; // one for each triangle
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer BodyArray {
-    Body at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer BodyArray { Body at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;

@@ -2,6 +2,7 @@
 #ifndef RTX_AO_TARGETS
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
+#include "common/occlusion_query.glsl"
 #endif
 #include "rtx_ao/frame.glsl"
 
@@ -20,12 +21,7 @@ layout(location = 3) out vec4 outGeometric;
 layout(location = 1) out vec4 outLight;
 
 bool isBlocked(vec3 origin, vec3 direction, float range) {
-    LvkRayQuery query;
-    const uint flags = LVK_RAY_FLAG_OPAQUE | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT;
-    lvkRayQueryInitialize(query, frame.tlas, flags, 0xffu, origin, 0.0, direction, range);
-    while (lvkRayQueryProceed(query)) {
-    }
-    return lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
+    return occludedByQuery(frame.tlas, 0xffu, origin, 0.0, direction, range);
 }
 
 #include "rtx_ao/light.glsl"

@@ -3,16 +3,12 @@
 #include <lvk/ray_query.glsl>
 
 #include "common/group_pixel.glsl"
+#include "common/occlusion_query.glsl"
 #include "rtx_pipeline/picture.glsl"
 #include "rtx_pipeline/radiance.glsl"
 
 bool traceOccluded(vec3 origin, float tmin, vec3 direction, float tmax) {
-    LvkRayQuery query;
-    const uint flags = LVK_RAY_FLAG_OPAQUE | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT;
-    lvkRayQueryInitialize(query, frame.tlas, flags, kMaskSolid, origin, tmin, direction, tmax);
-    while (lvkRayQueryProceed(query)) {
-    }
-    return lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
+    return occludedByQuery(frame.tlas, kMaskSolid, origin, tmin, direction, tmax);
 }
 
 #include "rtx_pipeline/shade.glsl"
@@ -30,7 +26,7 @@ bool meets(Onward ray, out Shaded shaded) {
     uint triangle = firstTriangle + uint(lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED, frame.tlas));
     SurfacePoint point =
         pointOf(triangle, lvkRayQueryBarycentrics(query, LVK_COMMITTED), ray.origin, ray.direction, ray.cone);
-    bool isGlass = uint(lvkRayQuerySbtOffset(query, LVK_COMMITTED)) == kGlass;
+    bool isGlass = uint(lvkRayQueryInstanceShaderBindingTableRecordOffset(query, LVK_COMMITTED)) == kGlass;
     if (isGlass) {
         shaded = shadeGlass(point, ray.direction, ray.cone);
     } else {

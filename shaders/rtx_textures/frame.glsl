@@ -20,21 +20,12 @@ struct Record {
     uint modelHigh;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray {
-    Vertex at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray { Vertex at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer RecordArray { Record at[]; };
 
-layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer RecordArray {
-    Record at[];
-};
-
-const uint kGround = 0u;
-const uint kCrate = 1u;
-const uint kRing = 2u;
-
-// Places of hit groups in the pipeline, which queries tell apart by.
-const uint kPainted = 0u;
-const uint kGlazed = 1u;
+// Models, and places of hit groups in the pipeline, which queries tell apart by.
+const uint kGround = 0u, kCrate = 1u, kRing = 2u;
+const uint kPainted = 0u, kGlazed = 1u;
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
@@ -50,8 +41,6 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     float phase; // of the animation's round, 0 to 1
 };
 
-layout(push_constant, scalar) uniform PushConstants {
-    Frame frame;
-};
+layout(push_constant, scalar) uniform PushConstants { Frame frame; };
 
 #endif

@@ -1,11 +1,6 @@
-// Hit group kGlazed: reads the texture that the instance names.
-#include "rtx_textures/surface.glsl"
-
-layout(location = 0) rayPayloadInEXT Found payload;
-hitAttributeEXT vec2 barycentrics;
+// Hit group kGlazed.
+#include "rtx_textures/hit.glsl"
 
 void main() {
-    uint primitive = uint(lvkPrimitiveIndex(frame.tlas));
-    payload = asGlazed(surfaceOf(uint(gl_InstanceCustomIndexEXT), primitive, barycentrics, mat3(gl_ObjectToWorldEXT),
-                                 gl_WorldRayDirectionEXT, gl_HitTEXT, payload.distance));
+    payload = asGlazed(hitSurface());
 }

@@ -18,7 +18,8 @@ Found traceNearest(vec3 origin, vec3 direction, float travelled) {
     Found found = surfaceOf(customIndex, primitive, lvkRayQueryBarycentrics(query, LVK_COMMITTED),
                             mat3(lvkRayQueryObjectToWorld(query, LVK_COMMITTED)), direction,
                             lvkRayQueryT(query, LVK_COMMITTED), travelled);
-    return uint(lvkRayQuerySbtOffset(query, LVK_COMMITTED)) == kGlazed ? asGlazed(found) : asPainted(found);
+    uint group = lvkRayQueryInstanceShaderBindingTableRecordOffset(query, LVK_COMMITTED);
+    return group == kGlazed ? asGlazed(found) : asPainted(found);
 }
 
 bool reachesSky(vec3 origin, vec3 direction) {

@@ -13,18 +13,11 @@ struct Draw {
     uint vertexCount;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DrawArray {
-    Draw at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DrawArray { Draw at[]; };
 
 // Vertices, instances, first vertex and first instance of an indirect draw.
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ArgumentArray {
-    uvec4 at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CountArray {
-    uint at[]; // of each view
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ArgumentArray { uvec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CountArray { uint at[]; }; // of each view
 
 // Material data of this sample beside those of all samples.
 struct Finish {
@@ -32,9 +25,8 @@ struct Finish {
     uint normalMap; // or kNoTexture
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FinishArray {
-    Finish at[]; // of each material
-};
+// Of each material.
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FinishArray { Finish at[]; };
 
 struct View {
     vec4 planes[6]; // whose inner side is seen
@@ -73,9 +65,11 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint hasRelief; // whether normal maps count
 };
 
-layout(push_constant, scalar) uniform PushConstants {
-    Frame frame;
-};
+layout(push_constant, scalar) uniform PushConstants { Frame frame; };
+
+// The vertex at a corner of the triangles, counted through all of them.
+uint vertexAt(uint corner) { return frame.scene.triangles.at[corner / 3u][corner % 3u]; }
+uint materialAt(uint corner) { return frame.scene.triangleInfos.at[corner / 3u].material; }
 
 vec3 sunClip(vec3 position) {
     vec4 p = vec4(position, 1.0);

@@ -7,11 +7,10 @@ layout(location = 2) out vec2 outTexcoord;
 layout(location = 3) flat out uint outMaterial;
 
 void main() {
-    uint triangle = uint(gl_VertexIndex) / 3u;
-    uint corner = frame.scene.triangles.at[triangle][uint(gl_VertexIndex) % 3u];
-    outPosition = frame.scene.positions.at[corner];
-    outNormal = frame.scene.normals.at[corner];
-    outTexcoord = frame.scene.texcoords.at[corner];
-    outMaterial = frame.scene.triangleInfos.at[triangle].material;
+    uint vertex = vertexAt(uint(gl_VertexIndex));
+    outPosition = frame.scene.positions.at[vertex];
+    outNormal = frame.scene.normals.at[vertex];
+    outTexcoord = frame.scene.texcoords.at[vertex];
+    outMaterial = materialAt(uint(gl_VertexIndex));
     gl_Position = cameraClip(frame.camera, outPosition);
 }

@@ -3,11 +3,7 @@
 #define TRIPLANAR_FRAME
 
 #include "common/camera.glsl"
-
-struct Vertex {
-    vec3 position;
-    vec3 normal;
-};
+#include "common/vertices.glsl"
 
 // Something that is shown: one of the models at its place.
 struct Body {
@@ -19,17 +15,11 @@ struct Body {
     uint top;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Vertices {
-    Vertex at[];
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Bodies {
-    Body at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Bodies { Body at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
-    Vertices vertices;
+    VertexArray vertices;
     Bodies bodies;
     uint textures[7]; // of each number, the placeholder's where it is not there
     uint smp;
@@ -39,9 +29,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint byAngles; // 1 for textures by longitude and latitude, for comparison
 };
 
-layout(push_constant, scalar) uniform Push {
-    Frame frame;
-};
+layout(push_constant, scalar) uniform Push { Frame frame; };
 
 const vec3 kBackdrop = vec3(0.78, 0.80, 0.82);
 

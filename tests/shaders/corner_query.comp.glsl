@@ -5,14 +5,14 @@ void main() {
     START_RAY_QUERY;
     vec3 corners[3];
     while (lvkRayQueryProceed(rq)) {
-        lvkRayQueryTrianglePositions(rq, LVK_CANDIDATE, corners);
+        lvkRayQueryTriangleVertexPositions(rq, LVK_CANDIDATE, corners);
         if (corners[0].x + corners[1].x + corners[2].x >= 0.0) {
             lvkRayQueryConfirmIntersection(rq);
         }
     }
     HitRecord record = kNoHit;
     if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
-        lvkRayQueryTrianglePositions(rq, LVK_COMMITTED, corners);
+        lvkRayQueryTriangleVertexPositions(rq, LVK_COMMITTED, corners);
         record = HitRecord(corners[CORNER].x, corners[CORNER].yz, lvkRayQueryFrontFace(rq, LVK_COMMITTED) ? kFront : kBack,
                            lvkRayQueryInstanceId(rq, LVK_COMMITTED, tlas),
                            lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED),

@@ -34,7 +34,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Al
                     lvkRayQueryFrontFace(rq, which) ? kFront : kBack, \
                     uint(lvkRayQueryInstanceId(rq, which, tlas)), uint(lvkRayQueryInstanceCustomIndex(rq, which)), \
                     uint(lvkRayQueryGeometryIndex(rq, which)), uint(lvkRayQueryPrimitiveIndex(rq, which, tlas))), \
-          uint(lvkRayQueryType(rq, which)), uint(lvkRayQuerySbtOffset(rq, which)), \
+          uint(lvkRayQueryType(rq, which)), uint(lvkRayQueryInstanceShaderBindingTableRecordOffset(rq, which)), \
           lvkRayQueryObjectRayOrigin(rq, which), lvkRayQueryObjectRayDirection(rq, which), \
           lvkRayQueryObjectToWorld(rq, which), lvkRayQueryWorldToObject(rq, which))
 
@@ -54,7 +54,7 @@ void main() {
     candidate = FOUND(rq, LVK_CANDIDATE);
 #ifdef LVK_POSITION_FETCH
     vec3 corners[3];
-    lvkRayQueryTrianglePositions(rq, LVK_COMMITTED, corners);
+    lvkRayQueryTriangleVertexPositions(rq, LVK_COMMITTED, corners);
     candidate.objectOrigin = abs(corners[0]) + abs(corners[1]) + abs(corners[2]);
 #endif
 #else
@@ -63,6 +63,6 @@ void main() {
     }
 #endif
     AllTold told = AllTold(uvec2(hits));
-    told.at[index] = Told(lvkRayQueryFlags(rq), lvkRayQueryTMin(rq), lvkRayQueryWorldRayOrigin(rq),
+    told.at[index] = Told(lvkRayQueryRayFlags(rq), lvkRayQueryRayTMin(rq), lvkRayQueryWorldRayOrigin(rq),
                           lvkRayQueryWorldRayDirection(rq), committed, candidate);
 }

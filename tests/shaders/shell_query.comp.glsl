@@ -34,7 +34,7 @@ void main() {
             record.kind = 2;
             end = places.y;
         }
-        if (lvkRayQueryCandidateAabbOpaque(rq) && places.x >= ray.tMin && places.x <= end) {
+        if (lvkRayQueryCandidateAABBOpaque(rq) && places.x >= ray.tMin && places.x <= end) {
             lvkRayQueryGenerateIntersection(rq, places.x);
             record.kind = far ? 127 : 126;
         }

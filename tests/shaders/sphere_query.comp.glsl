@@ -17,7 +17,7 @@ void main() {
                                    lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE, tlas));
         vec3 origin = lvkRayQueryObjectRayOrigin(rq, LVK_CANDIDATE);
         vec3 direction = lvkRayQueryObjectRayDirection(rq, LVK_CANDIDATE);
-        float radius = kRadius[lvkRayQuerySbtOffset(rq, LVK_CANDIDATE)];
+        float radius = kRadius[lvkRayQueryInstanceShaderBindingTableRecordOffset(rq, LVK_CANDIDATE)];
         if (crossSphere(center, radius, origin, direction, places)) {
             float place = places.x >= ray.tMin ? places.x : places.y;
             if (place >= ray.tMin && place <= end) {
@@ -28,7 +28,7 @@ void main() {
     }
     HitRecord record = kNoHit;
     if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_GENERATED) {
-        uint group = lvkRayQuerySbtOffset(rq, LVK_COMMITTED);
+        uint group = lvkRayQueryInstanceShaderBindingTableRecordOffset(rq, LVK_COMMITTED);
         record = HitRecord(lvkRayQueryT(rq, LVK_COMMITTED), vec2(kRadius[group], float(kTag[group])), kTag[group],
                            lvkRayQueryInstanceId(rq, LVK_COMMITTED, tlas),
                            lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED),

@@ -26,15 +26,17 @@ pub struct Mistake {
     pub wrong: &'static str,
 }
 
-/// Creates a [`Mistake`].
-#[must_use]
-pub const fn mistake(
-    what: &'static str,
-    file: &'static str,
-    right: &'static str,
-    wrong: &'static str,
-) -> Mistake {
-    Mistake { what, file, right, wrong }
+/// Declares constant lists of [`Mistake`]s: the name of a list, and a row for each of its mistakes, which has the file,
+/// the description, and the text that replaces another. `ALL` has all lists.
+#[macro_export]
+macro_rules! mistakes {
+    ($($(#[$doc:meta])* $list:ident: $($file:literal: $what:literal: $right:expr => $wrong:expr;)*)*) => {
+        $($(#[$doc])* pub(super) const $list: &[$crate::broken_shaders::Mistake] = &[
+            $($crate::broken_shaders::Mistake { what: $what, file: $file, right: $right, wrong: $wrong }),*
+        ];)*
+        /// All lists.
+        const ALL: &[&[$crate::broken_shaders::Mistake]] = &[$($list),*];
+    };
 }
 
 /// Copy of `shaders/`.

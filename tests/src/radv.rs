@@ -306,13 +306,8 @@ fn open_device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::D
 }
 
 fn set_layout(device: &ash::Device) -> vk::DescriptorSetLayout {
-    let bindings = BINDINGS.map(|(binding, ty, count)| {
-        vk::DescriptorSetLayoutBinding::default()
-            .binding(binding)
-            .descriptor_type(ty)
-            .descriptor_count(count)
-            .stage_flags(vk::ShaderStageFlags::ALL)
-    });
+    let bindings =
+        BINDINGS.map(|(binding, ty, count)| layout_binding(binding, ty, count, vk::ShaderStageFlags::ALL));
     use vk::DescriptorBindingFlags as Flags;
     let mut flags = [Flags::PARTIALLY_BOUND | Flags::UPDATE_AFTER_BIND; BINDINGS.len()];
     flags[5] = Flags::PARTIALLY_BOUND;
@@ -325,15 +320,19 @@ fn set_layout(device: &ash::Device) -> vk::DescriptorSetLayout {
     unsafe { device.create_descriptor_set_layout(&info, None) }.unwrap()
 }
 
+fn layout_binding(
+    binding: u32,
+    ty: vk::DescriptorType,
+    count: u32,
+    stages: vk::ShaderStageFlags,
+) -> vk::DescriptorSetLayoutBinding<'static> {
+    let layout = vk::DescriptorSetLayoutBinding::default().binding(binding).stage_flags(stages);
+    layout.descriptor_type(ty).descriptor_count(count)
+}
+
 fn input_layout(device: &ash::Device) -> vk::DescriptorSetLayout {
-    let binding = |binding| {
-        vk::DescriptorSetLayoutBinding::default()
-            .binding(binding)
-            .descriptor_type(vk::DescriptorType::INPUT_ATTACHMENT)
-            .descriptor_count(1)
-            .stage_flags(vk::ShaderStageFlags::FRAGMENT)
-    };
-    let bindings: Vec<_> = (0..INPUTS).map(binding).collect();
+    let (ty, stages) = (vk::DescriptorType::INPUT_ATTACHMENT, vk::ShaderStageFlags::FRAGMENT);
+    let bindings: Vec<_> = (0..INPUTS).map(|binding| layout_binding(binding, ty, 1, stages)).collect();
     let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
     // SAFETY: the chip's limits are far above these counts.
     unsafe { device.create_descriptor_set_layout(&info, None) }.unwrap()

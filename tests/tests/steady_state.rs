@@ -62,8 +62,9 @@ impl Frame {
             let format = Format::Rgba8Unorm;
             ctx.create_texture(&TextureDesc { format, extent: [8, 8], usage, ..Default::default() }).unwrap()
         };
-        let vertex = "layout(push_constant) uniform Push { uint words[2]; };
-             void main() { gl_Position = vec4(words[gl_VertexIndex & 1]); }";
+        let vertex = "layout(buffer_reference, scalar) readonly buffer Words { uint at[2]; };
+             layout(push_constant) uniform Push { Words words; };
+             void main() { gl_Position = vec4(words.at[gl_VertexIndex & 1]); }";
         let fragment = "layout(location = 0) out vec4 color; void main() { color = vec4(1.0); }";
         let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
         Self {
@@ -97,7 +98,8 @@ impl Frame {
         let mut pass = cmd.begin_rendering(&pass).unwrap();
         pass.bind_render_pipeline(*self.draw).unwrap();
         for draw in 0..draws {
-            pass.push_constants(&[number, draw]).unwrap();
+            let words = pass.upload(&[number, draw]).unwrap();
+            pass.push_constants(&words).unwrap();
             pass.draw(0..3, 0..1).unwrap();
         }
         drop(pass);

@@ -455,8 +455,7 @@ fn a_window_that_is_closed_too_early_is_an_error_and_no_more() {
             Err(error) => told = Some(error),
         }
     }
-    let told = message::<()>(Err(told.expect("the window is gone")));
-    assert!(told.contains("window is gone"), "{told}");
+    assert!(matches!(told, Some(Error::SurfaceLost { .. })), "{told:?}");
     // The context is as good as before.
     drop(swapchain);
     let Some(desktop) = desktop() else { return };
@@ -464,6 +463,69 @@ fn a_window_that_is_closed_too_early_is_an_error_and_no_more() {
     let desc = SwapchainDesc { window: Some(other.clone()), ..Default::default() };
     let swapchain = ctx.create_swapchain(&desc).unwrap();
     present_until_visible(&ctx, *swapchain, &other, GREEN);
+}
+
+/// As on Android, where the window of an application goes when it is paused: the device stays, nothing leaks, and the
+/// validation layer is silent.
+#[test]
+fn a_swapchain_goes_on_in_another_window() {
+    let Some((mut window, ctx)) = window_with(|desc| desc.max_textures = 64) else { return };
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    present_until_visible(&ctx, *swapchain, &window, RED);
+    ctx.wait_idle().unwrap();
+    let objects = ctx.live_objects();
+    for round in 0..24_u32 {
+        let acquired = (round % 3 == 1).then(|| ctx.next_image(*swapchain).unwrap().unwrap());
+        if round % 4 == 2 {
+            // The window goes before anything says so.
+            window.close();
+            let lost = (0..8).find_map(|_| present_color(&ctx, *swapchain, RED).err());
+            assert!(matches!(lost, Some(Error::SurfaceLost { .. })), "{lost:?}");
+        }
+        ctx.suspend_swapchain(*swapchain).unwrap();
+        window.close();
+        ctx.suspend_swapchain(*swapchain).unwrap();
+        ctx.resize_swapchain(*swapchain, [9, 9]).unwrap();
+        assert!(ctx.next_image(*swapchain).unwrap().is_none());
+        assert!(message(ctx.swapchain_info(*swapchain)).contains("suspended"));
+        if let Some(image) = acquired {
+            let late = ctx.present(ctx.acquire_command_buffer().unwrap(), image);
+            assert!(message(late).contains("made anew"));
+        }
+        let extent = [40 + round, 60 - round];
+        window = desktop().unwrap().window(extent);
+        ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), extent).unwrap();
+        assert_eq!(ctx.swapchain_info(*swapchain).unwrap().extent, extent);
+        present_until_visible(&ctx, *swapchain, &window, [RED, GREEN, BLUE][round as usize % 3]);
+    }
+    ctx.wait_idle().unwrap();
+    assert_eq!(ctx.live_objects(), objects);
+    // The same window comes back, and one is exchanged while it is there.
+    ctx.suspend_swapchain(*swapchain).unwrap();
+    ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [0, 0]).unwrap();
+    assert!(ctx.next_image(*swapchain).unwrap().is_none(), "it is minimised");
+    let other = desktop().unwrap().window([20, 10]);
+    ctx.resume_swapchain(*swapchain, &(other.clone() as Arc<_>), [20, 10]).unwrap();
+    present_until_visible(&ctx, *swapchain, &other, GREEN);
+    let second =
+        ctx.create_swapchain(&SwapchainDesc { window: Some(window.clone()), ..Default::default() }).unwrap();
+    present_until_visible(&ctx, *second, &window, BLUE);
+}
+
+/// A surface that something keeps is told, as the window system may take its window.
+#[test]
+fn a_surface_that_a_command_buffer_keeps_is_told() {
+    let Some((window, ctx)) = window() else { return };
+    let desc = SwapchainDesc { debug_name: "main window", ..Default::default() };
+    let swapchain = ctx.create_swapchain(&desc).unwrap();
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    let recorded = fill(&ctx, image.texture(), RED).unwrap();
+    let told = message(ctx.suspend_swapchain(*swapchain));
+    assert!(told.contains("main window") && told.contains("not submitted"), "{told}");
+    drop(recorded);
+    ctx.wait_idle().unwrap();
+    ctx.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [64, 48]).unwrap();
+    present_until_visible(&ctx, *swapchain, &window, GREEN);
 }
 
 #[test]
@@ -497,4 +559,7 @@ fn what_windows_cannot_have_is_refused() {
     assert!(matches!(ctx.swapchain_info(handle), Err(Error::StaleHandle { .. })));
     assert!(matches!(ctx.resize_swapchain(handle, [1, 1]), Err(Error::StaleHandle { .. })));
     assert!(matches!(ctx.set_present_mode(handle, &[]), Err(Error::StaleHandle { .. })));
+    assert!(matches!(ctx.suspend_swapchain(handle), Err(Error::StaleHandle { .. })));
+    let resumed = ctx.resume_swapchain(handle, &(window as Arc<_>), [1, 1]);
+    assert!(matches!(resumed, Err(Error::StaleHandle { .. })));
 }

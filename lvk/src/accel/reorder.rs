@@ -76,17 +76,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-
-    fn scattered(count: u32) -> Vec<Bounds> {
-        let noise =
-            |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(7 * k) >> 8) as f32 / 16_777_216.0;
-        (0..count)
-            .map(|i| {
-                let low = Vec3::new(noise(i, 0), noise(i, 1), noise(i, 2));
-                Bounds { low, high: low + 0.01 }
-            })
-            .collect()
-    }
+    use crate::test_support::scattered_bounds::scattered_bounds;
 
     fn line(places: &[f32]) -> Vec<Bounds> {
         places.iter().map(|&x| Bounds { low: Vec3::X * x, high: Vec3::X * x + 1.0 }).collect()
@@ -104,7 +94,7 @@ mod tests {
 
     #[test]
     fn the_tree_is_many_times_smaller_than_unsorted() {
-        let bounds = scattered(4096);
+        let bounds = scattered_bounds(4096, 0.01);
         let unsorted: Vec<u32> = (0..4096).collect();
         let order = spatial_order(&bounds);
         let gain = median_tree_area(&bounds, &unsorted) / median_tree_area(&bounds, &order);
@@ -114,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_good_order_is_not_worth_changing() {
-        let bounds = scattered(4096);
+        let bounds = scattered_bounds(4096, 0.01);
         let sorted: Vec<Bounds> =
             spatial_order(&bounds).into_iter().map(|index| bounds[index as usize]).collect();
         assert!(!is_reorder_worthwhile(&sorted, &spatial_order(&sorted)));
@@ -143,7 +133,7 @@ mod tests {
 
     #[test]
     fn threads_do_not_change_the_result() {
-        let bounds = scattered(3 * MIN_PARALLEL_COUNT as u32);
+        let bounds = scattered_bounds(3 * MIN_PARALLEL_COUNT as u32, 0.01);
         let (mut alone, mut many) = (primitive_bounds(&bounds), primitive_bounds(&bounds));
         sort_median(&mut alone, 1);
         sort_median(&mut many, 5);

@@ -291,18 +291,12 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::test_support::scattered_bounds::scattered_bounds;
 
     const MIB: u64 = 1 << 20;
 
     fn scattered(count: u32) -> Vec<Bounds> {
-        let noise =
-            |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(7 * k) >> 8) as f32 / 16_777_216.0;
-        (0..count)
-            .map(|i| {
-                let low = Vec3::new(noise(i, 0), noise(i, 1), noise(i, 2));
-                Bounds { low, high: low + 0.001 }
-            })
-            .collect()
+        scattered_bounds(count, 0.001)
     }
 
     /// Sizes with a fixed base and `structure` and `scratch` bytes for each primitive.

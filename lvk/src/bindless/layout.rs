@@ -2,6 +2,8 @@
 //!
 //! The shader preamble and the check of foreign SPIR-V are both generated from these constants.
 
+use ash::vk;
+
 use crate::gpu::Gpu;
 use crate::gpu::caps::descriptor_limits::ReservedDescriptors;
 
@@ -27,15 +29,51 @@ pub(crate) const TLAS_TABLE: u32 = 5;
 /// Size of an entry of the TLAS table in bytes.
 pub(crate) const TLAS_TABLE_ENTRY_BYTES: u64 = 16;
 
-/// Each binding with its name in the preamble and its description in error messages.
-pub(crate) const BINDINGS: [(u32, &str, &str); 6] = [
-    (SAMPLED_IMAGES, "LVK_BINDING_SAMPLED_IMAGES", "sampled images"),
-    (SAMPLERS, "LVK_BINDING_SAMPLERS", "samplers"),
-    (STORAGE_IMAGES, "LVK_BINDING_STORAGE_IMAGES", "storage images"),
-    (YCBCR, "LVK_BINDING_YCBCR", "combined Y'CbCr samplers"),
-    (ACCEL_STRUCTS, "LVK_BINDING_ACCEL_STRUCTS", "top-level acceleration structures"),
-    (TLAS_TABLE, "LVK_BINDING_TLAS_TABLE", "the TLAS table"),
-];
+/// A binding of the bindless set.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Binding {
+    pub(crate) number: u32,
+    pub(crate) descriptor_type: vk::DescriptorType,
+    /// Its name in the preamble.
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
+    pub(crate) macro_name: &'static str,
+    /// Its content, for error messages.
+    pub(crate) holds: &'static str,
+}
+
+impl Binding {
+    const fn new(
+        number: u32,
+        descriptor_type: vk::DescriptorType,
+        macro_name: &'static str,
+        holds: &'static str,
+    ) -> Self {
+        Self { number, descriptor_type, macro_name, holds }
+    }
+}
+
+/// The bindings, in the order of their numbers.
+pub(crate) const BINDINGS: [Binding; 6] = {
+    use vk::DescriptorType as Type;
+    [
+        Binding::new(SAMPLED_IMAGES, Type::SAMPLED_IMAGE, "LVK_BINDING_SAMPLED_IMAGES", "sampled images"),
+        Binding::new(SAMPLERS, Type::SAMPLER, "LVK_BINDING_SAMPLERS", "samplers"),
+        Binding::new(STORAGE_IMAGES, Type::STORAGE_IMAGE, "LVK_BINDING_STORAGE_IMAGES", "storage images"),
+        Binding::new(YCBCR, Type::COMBINED_IMAGE_SAMPLER, "LVK_BINDING_YCBCR", "combined Y'CbCr samplers"),
+        Binding::new(
+            ACCEL_STRUCTS,
+            Type::ACCELERATION_STRUCTURE_KHR,
+            "LVK_BINDING_ACCEL_STRUCTS",
+            "top-level acceleration structures",
+        ),
+        Binding::new(TLAS_TABLE, Type::STORAGE_BUFFER, "LVK_BINDING_TLAS_TABLE", "the TLAS table"),
+    ]
+};
+
+/// Returns the descriptor type of one of the binding numbers above.
+pub(crate) const fn descriptor_type(binding: u32) -> vk::DescriptorType {
+    BINDINGS[binding as usize].descriptor_type
+}
 
 /// Descriptor counts of the bindless set, without textures and samplers.
 #[derive(Debug, Clone, Copy)]

@@ -70,6 +70,9 @@ impl Bindless {
     pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, yuv: YuvSlots, check_indices: bool) -> Result<Self> {
         let others = DescriptorCounts::new(gpu);
         let left = gpu.descriptor_limits().budget(&others.reserved, yuv.descriptors());
+        let limits = &gpu.caps.limits;
+        // A profile may have tightened them.
+        let left = left.at_most(limits.max_bindless_textures, limits.max_bindless_samplers);
         let conversions = yuv.samplers();
         let textures = largest_fitting(left.texture_count(max_textures)?, |textures| {
             is_supported(gpu, &binding_counts(gpu, textures, left.samplers), &conversions)
@@ -251,7 +254,7 @@ impl Bindless {
         for (slot, view) in slots {
             views.push(slot, image_info(view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL));
         }
-        self.write(&views, layout::YCBCR, vk::DescriptorType::COMBINED_IMAGE_SAMPLER);
+        self.write(&views, layout::YCBCR);
     }
 
     fn write_default_textures(&self, defaults: DefaultDescriptors, count: u32) {
@@ -279,8 +282,8 @@ impl Bindless {
     }
 
     fn write_images(&self, sampled: &Runs<vk::DescriptorImageInfo>, storage: &Runs<vk::DescriptorImageInfo>) {
-        self.write(sampled, layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE);
-        self.write(storage, layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE);
+        self.write(sampled, layout::SAMPLED_IMAGES);
+        self.write(storage, layout::STORAGE_IMAGES);
     }
 
     fn write_samplers(
@@ -293,13 +296,13 @@ impl Bindless {
             let sampler = owner.unwrap_or(defaults.sampler);
             samplers.push(slot, vk::DescriptorImageInfo::default().sampler(sampler));
         }
-        self.write(&samplers, layout::SAMPLERS, vk::DescriptorType::SAMPLER);
+        self.write(&samplers, layout::SAMPLERS);
     }
 
-    fn write(&self, runs: &Runs<vk::DescriptorImageInfo>, binding: u32, ty: vk::DescriptorType) {
+    fn write(&self, runs: &Runs<vk::DescriptorImageInfo>, binding: u32) {
         let writes: Vec<_> = runs
             .iter()
-            .map(|(first, infos)| self.descriptor_write(binding, first).descriptor_type(ty).image_info(infos))
+            .map(|(first, infos)| self.descriptor_write(binding, first).image_info(infos))
             .collect();
         if !writes.is_empty() {
             // SAFETY: the views and samplers are alive. Dirty slots are not in use by the GPU, as a slot is only
@@ -322,10 +325,7 @@ impl Bindless {
         for (first, raw) in runs.iter() {
             let mut structures =
                 vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(raw);
-            let mut write = self
-                .descriptor_write(layout::ACCEL_STRUCTS, first)
-                .descriptor_type(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR)
-                .push_next(&mut structures);
+            let mut write = self.descriptor_write(layout::ACCEL_STRUCTS, first).push_next(&mut structures);
             write.descriptor_count = raw.len() as u32;
             // SAFETY: as in `write`.
             unsafe { self.gpu.device.update_descriptor_sets(&[write], &[]) };
@@ -334,14 +334,17 @@ impl Bindless {
 
     fn write_tlas_table(&self, table: vk::Buffer) {
         let info = [vk::DescriptorBufferInfo::default().buffer(table).range(vk::WHOLE_SIZE)];
-        let write = self.descriptor_write(layout::TLAS_TABLE, 0);
-        let write = write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(&info);
+        let write = self.descriptor_write(layout::TLAS_TABLE, 0).buffer_info(&info);
         // SAFETY: the buffer lives as long as the set, and nothing has been submitted yet.
         unsafe { self.gpu.device.update_descriptor_sets(&[write], &[]) };
     }
 
     fn descriptor_write<'a>(&self, binding: u32, first: u32) -> vk::WriteDescriptorSet<'a> {
-        vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding).dst_array_element(first)
+        vk::WriteDescriptorSet::default()
+            .dst_set(self.set)
+            .dst_binding(binding)
+            .dst_array_element(first)
+            .descriptor_type(layout::descriptor_type(binding))
     }
 
     fn lock(&self) -> Guard<'_, BindlessState> {
@@ -400,17 +403,18 @@ fn image_info(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorIma
     vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)
 }
 
-type BindingCount = (u32, vk::DescriptorType, u32);
+/// A binding and its descriptor count.
+type BindingCount = (u32, u32);
 
 /// Returns the bindings with their descriptor counts, without the Y'CbCr binding.
 fn binding_counts(gpu: &Gpu, textures: u32, samplers: u32) -> [BindingCount; 5] {
     let others = DescriptorCounts::new(gpu);
     [
-        (layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE, textures),
-        (layout::SAMPLERS, vk::DescriptorType::SAMPLER, samplers),
-        (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
-        (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, others.hardware_tlas),
-        (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, others.tlas_tables),
+        (layout::SAMPLED_IMAGES, textures),
+        (layout::SAMPLERS, samplers),
+        (layout::STORAGE_IMAGES, textures),
+        (layout::ACCEL_STRUCTS, others.hardware_tlas),
+        (layout::TLAS_TABLE, others.tlas_tables),
     ]
 }
 
@@ -437,22 +441,22 @@ fn with_layout_info<T>(
     yuv: &[vk::Sampler],
     then: impl FnOnce(&vk::DescriptorSetLayoutCreateInfo<'_>) -> T,
 ) -> T {
-    let used: Vec<_> = counts.iter().filter(|(_, _, count)| *count > 0).collect();
+    let used: Vec<_> = counts.iter().filter(|(_, count)| *count > 0).collect();
     let mut bindings: Vec<_> = used
         .iter()
-        .map(|(binding, ty, count)| {
+        .map(|(binding, count)| {
             vk::DescriptorSetLayoutBinding::default()
                 .binding(*binding)
-                .descriptor_type(*ty)
+                .descriptor_type(layout::descriptor_type(*binding))
                 .descriptor_count(*count)
                 .stage_flags(vk::ShaderStageFlags::ALL)
         })
         .collect();
-    let mut flags: Vec<_> = used.iter().map(|(binding, _, _)| binding_flags(*binding)).collect();
+    let mut flags: Vec<_> = used.iter().map(|(binding, _)| binding_flags(*binding)).collect();
     if !yuv.is_empty() {
         let binding = vk::DescriptorSetLayoutBinding::default()
             .binding(layout::YCBCR)
-            .descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER)
+            .descriptor_type(layout::descriptor_type(layout::YCBCR))
             .immutable_samplers(yuv)
             .stage_flags(vk::ShaderStageFlags::ALL);
         bindings.push(binding);
@@ -482,12 +486,15 @@ fn create_set(
     counts: &[BindingCount],
     yuv: u32,
 ) -> Result<(vk::DescriptorPool, vk::DescriptorSet)> {
-    let yuv = (layout::YCBCR, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, yuv);
+    let yuv = (layout::YCBCR, yuv);
     let sizes: Vec<_> = counts
         .iter()
         .chain([&yuv])
-        .filter(|(_, _, count)| *count > 0)
-        .map(|(_, ty, count)| vk::DescriptorPoolSize::default().ty(*ty).descriptor_count(*count))
+        .filter(|(_, count)| *count > 0)
+        .map(|(binding, count)| {
+            let ty = layout::descriptor_type(*binding);
+            vk::DescriptorPoolSize::default().ty(ty).descriptor_count(*count)
+        })
         .collect();
     let info = vk::DescriptorPoolCreateInfo::default()
         .flags(vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND)

@@ -8,6 +8,7 @@ mod build_tlas;
 pub(crate) mod compute;
 mod copy_accel;
 pub(crate) mod dependencies;
+mod instance_kernel;
 mod kernel_dispatch;
 mod label;
 mod open_build;
@@ -26,6 +27,7 @@ pub(crate) mod trace;
 pub(crate) mod transfer;
 pub(crate) mod update_tlas;
 mod upload;
+mod upload_value;
 
 use std::mem::ManuallyDrop;
 use std::sync::Arc;
@@ -39,7 +41,7 @@ use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::queue::Queue;
 use crate::submit::Recording;
 use crate::submit::profiler::Scopes;
-use crate::upload::staging::StagingChunk;
+use crate::upload::staging::{ChunkMemory, StagingChunk};
 
 use recording_state::RecordingState;
 pub(crate) use recording_state::RecordingStatePool;
@@ -72,6 +74,8 @@ pub struct CommandBuffer {
     views: u32,
     /// Staging chunk that small regions are allocated from.
     staged: StagingChunk,
+    /// Chunk that [`upload`](Self::upload) allocates small values from.
+    uploaded: StagingChunk,
     /// `Some` if the command buffer is profiled.
     scopes: Option<Box<Scopes>>,
 }
@@ -108,7 +112,8 @@ impl CommandBuffer {
             rendering: false,
             had_pass: false,
             views: 1,
-            staged: StagingChunk::default(),
+            staged: StagingChunk::new(ChunkMemory::Cached),
+            uploaded: StagingChunk::new(ChunkMemory::NearGpu),
         }
     }
 

@@ -61,7 +61,8 @@ pub struct ContextDesc<'a> {
     /// [`Context::next_frame`](crate::Context::next_frame).
     pub frames_in_flight: u32,
     /// Staging memory that is kept, in bytes. Uploads are submitted automatically once they fill half of it. A larger
-    /// single upload takes more memory temporarily.
+    /// single upload takes more memory temporarily. Values of [`CommandBuffer::upload`](crate::CommandBuffer::upload)
+    /// lie in it too, and one value may have at most this size. 64 KiB are kept at least.
     pub staging_bytes: u64,
     /// Maximum scratch memory for builds of acceleration structures, in bytes. Counts replaced buffers that the GPU
     /// still uses. One build that needs more gets it.

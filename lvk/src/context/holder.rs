@@ -5,6 +5,8 @@ use std::ops::Deref;
 
 use super::Context;
 use super::destroy::Destroy;
+use crate::error::Result;
+use crate::handle::BufferHandle;
 
 /// Owner of the object behind a handle. Dropping it destroys the object once the GPU is done with it.
 ///
@@ -40,6 +42,14 @@ impl<H: Destroy> Holder<H> {
         // SAFETY: `holder` is never dropped nor read again, so the context clone is moved out exactly once.
         drop(unsafe { std::ptr::read(&holder.ctx) });
         holder.handle
+    }
+}
+
+impl Holder<BufferHandle> {
+    /// Returns the address of the buffer in shaders (`vkGetBufferDeviceAddress`), like
+    /// [`Context::buffer_address`].
+    pub fn address(&self) -> Result<u64> {
+        self.ctx.buffer_address(self.handle)
     }
 }
 

@@ -17,7 +17,8 @@ use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
 use crate::command::RecordingStatePool;
 use crate::device_state::DeviceState;
-use crate::error::Result;
+use crate::error::driver_report::{DriverReport, VulkanReport};
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::queues::QueueRequest;
@@ -40,8 +41,8 @@ impl Context {
     /// Loads Vulkan and creates a device that meets the requirements of `desc`.
     ///
     /// # Errors
-    /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
-    /// reason for each device when no device is suitable; [`Unsupported`](crate::Error::Unsupported) when validation is
+    /// [`NoVulkan`](crate::Error::NoVulkan) with the reason for each driver when there is no loader, driver or device;
+    /// [`NoDevice`](crate::Error::NoDevice) with the reason for each device when no device is suitable; [`Unsupported`](crate::Error::Unsupported) when validation is
     /// required and its layer is missing, the instance has no extension of [`ContextDesc::user_extensions`], or
     /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) is requested without the feature
     /// `software-ray-query`.
@@ -92,16 +93,59 @@ impl Context {
     ///
     /// `vulkan_library` is the loader to open; `None` opens the system's loader.
     pub fn devices(vulkan_library: Option<&Path>) -> Result<Vec<Capabilities>> {
-        let instance = Instance::new(&InstanceDesc {
-            application_name: "lvk",
-            library: vulkan_library,
-            validation: ValidationMode::Off,
-            extra: &[],
-            window: None,
-            sink: ValidationSink::default(),
-        })?;
-        let devices = instance.physical_devices()?;
-        devices.into_iter().map(|raw| Ok(PhysicalDevice::query(&instance.raw, raw)?.capabilities)).collect()
+        let instance = plain_instance(vulkan_library)?;
+        let devices = physical_devices(&instance)?;
+        Ok(devices.into_iter().map(|device| device.capabilities).collect())
+    }
+
+    /// Reports the loader, the driver manifests with the error of each library that cannot be opened, and the devices with
+    /// the features they lack. Never fails. Opens every driver, so call it after a failure only.
+    ///
+    /// `vulkan_library` is the loader to open; `None` opens the system's loader.
+    #[must_use]
+    pub fn vulkan_report(vulkan_library: Option<&Path>) -> VulkanReport {
+        let instance = match plain_instance(vulkan_library) {
+            Ok(instance) => instance,
+            Err(error) => {
+                let drivers = failed_report(error, || DriverReport::query_loader(vulkan_library));
+                return VulkanReport { drivers, devices: Vec::new() };
+            }
+        };
+        match physical_devices(&instance) {
+            Ok(devices) => {
+                let devices = devices.iter().enumerate().map(|(index, device)| device.candidate(index));
+                VulkanReport { drivers: instance.driver_report(), devices: devices.collect() }
+            }
+            Err(error) => {
+                let drivers = failed_report(error, || instance.driver_report());
+                VulkanReport { drivers, devices: Vec::new() }
+            }
+        }
+    }
+}
+
+/// Creates an instance without layers, windows and extensions.
+fn plain_instance(library: Option<&Path>) -> Result<Instance> {
+    Instance::new(&InstanceDesc {
+        application_name: "lvk",
+        library,
+        validation: ValidationMode::Off,
+        extra: &[],
+        window: None,
+        sink: ValidationSink::default(),
+    })
+}
+
+fn physical_devices(instance: &Instance) -> Result<Vec<PhysicalDevice>> {
+    let devices = instance.physical_devices()?;
+    devices.into_iter().map(|raw| PhysicalDevice::query(&instance.raw, raw)).collect()
+}
+
+/// Returns the report of the error, or `otherwise` with the error as its failure.
+fn failed_report(error: Error, otherwise: impl FnOnce() -> DriverReport) -> DriverReport {
+    match error {
+        Error::NoVulkan { report } => Arc::unwrap_or_clone(report),
+        error => DriverReport { failure: Some(error.to_string()), ..otherwise() },
     }
 }
 

@@ -1,7 +1,5 @@
 //! Results of queries and of calibrated timestamps.
 
-use std::time::Duration;
-
 use super::Context;
 use crate::error::Result;
 use crate::gpu::calibrated_timestamps::CalibratedTimestamps;
@@ -43,21 +41,17 @@ impl Context {
     }
 
     /// Reads the clocks of GPU and host at one moment (`vkGetCalibratedTimestampsKHR`), so that GPU timestamps can be
-    /// compared with host times. Does not wait.
+    /// compared with host times and instants. Does not wait. [`HostClock`](crate::HostClock) says which clock of the
+    /// host a driver reads.
     ///
     /// # Errors
     /// [`Unsupported`](crate::Error::Unsupported) without
-    /// [`Capabilities::calibrated_timestamps`](crate::Capabilities::calibrated_timestamps), and where the driver does
-    /// not support `CLOCK_MONOTONIC`.
+    /// [`Capabilities::calibrated_timestamps`](crate::Capabilities::calibrated_timestamps), and where the driver reads
+    /// none of the clocks of [`HostClock`](crate::HostClock).
     pub fn calibrated_timestamps(&self) -> Result<CalibratedTimestamps> {
         let gpu = &self.device_state().gpu;
-        let clock =
-            gpu.host_clock.as_ref().ok_or_else(|| gpu.unsupported("clocks of device and host together"))?;
-        let (ticks, host, deviation) = clock.read()?;
-        Ok(CalibratedTimestamps {
-            gpu_ms: gpu.milliseconds(ticks),
-            host: Duration::from_nanos(host),
-            deviation: Duration::from_nanos(deviation),
-        })
+        let reader =
+            gpu.clock_reader.as_ref().ok_or_else(|| gpu.unsupported("clocks of device and host together"))?;
+        reader.read(|ticks| gpu.milliseconds(ticks))
     }
 }

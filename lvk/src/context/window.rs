@@ -12,6 +12,7 @@ use crate::command::CommandBuffer;
 use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::format::Format;
+use crate::gpu::start::window::WindowHandles;
 use crate::handle::SwapchainHandle;
 use crate::resource::Texture;
 use crate::resource::image::Image;
@@ -81,7 +82,7 @@ impl Context {
     /// earlier value for it is then invalid.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) when the window is destroyed, [`StaleHandle`](Error::StaleHandle).
+    /// [`SurfaceLost`](Error::SurfaceLost) when the window is destroyed, [`StaleHandle`](Error::StaleHandle).
     pub fn next_image(&self, swapchain: SwapchainHandle) -> Result<Option<SwapchainImage>> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
@@ -161,6 +162,55 @@ impl Context {
         Ok(())
     }
 
+    /// Destroys the images, the `VkSwapchainKHR` and the `VkSurfaceKHR` of a swapchain before it returns, so that its
+    /// window can go, as an Android application's does when it is paused. Waits for the GPU. The handle stays:
+    /// [`next_image`](Self::next_image) returns `None` until [`resume_swapchain`](Self::resume_swapchain). Costs
+    /// nothing if the swapchain is suspended.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) if views of its images, or command buffers that were not submitted, keep
+    /// the surface: it is destroyed when they are dropped. The swapchain is suspended all the same.
+    /// [`StaleHandle`](Error::StaleHandle), [`DeviceLost`](Error::DeviceLost).
+    pub fn suspend_swapchain(&self, swapchain: SwapchainHandle) -> Result<()> {
+        let object = self.device_state().store.swapchains.get(swapchain)?;
+        let mut guard = object.lock();
+        let SwapchainInner { lifecycle, resources } = &mut *guard;
+        if lifecycle.is_suspended() {
+            return Ok(());
+        }
+        let surface = resources.surface.as_ref().map(Arc::downgrade);
+        lifecycle.suspend(&object.name, &mut LiveBackend { ctx: self, name: &object.name, resources })?;
+        if surface.is_some_and(|surface| surface.strong_count() > 0) {
+            let message = "views of its images, or command buffers that were not submitted, keep its surface; drop \
+                           them before its window goes";
+            return Err(Error::usage(&*object.name, message));
+        }
+        Ok(())
+    }
+
+    /// Continues a swapchain in `window`: another one, or its own, which the window system has given back. Creates
+    /// surface and images with the properties of [`SwapchainDesc`], as
+    /// [`create_swapchain`](Self::create_swapchain) does; the format may differ from that of the last window. A
+    /// swapchain that is not suspended is suspended first.
+    ///
+    /// # Errors
+    /// Those of [`create_swapchain`](Self::create_swapchain); the swapchain is then suspended.
+    /// [`StaleHandle`](Error::StaleHandle).
+    pub fn resume_swapchain(
+        &self,
+        swapchain: SwapchainHandle,
+        window: &Arc<dyn WindowHandles>,
+        extent: [u32; 2],
+    ) -> Result<()> {
+        let object = self.device_state().store.swapchains.get(swapchain)?;
+        let mut guard = object.lock();
+        self.check_alive(swapchain)?;
+        let SwapchainInner { lifecycle, resources } = &mut *guard;
+        resources.window = Arc::clone(window);
+        resources.config.extent = extent;
+        lifecycle.resume(&object.name, &mut LiveBackend { ctx: self, name: &object.name, resources })
+    }
+
     /// Sets the present mode to the first supported mode of `wishes`, or to [`PresentMode::Fifo`]. If the device cannot
     /// change the mode of a single image, the next [`next_image`](Self::next_image) recreates the swapchain.
     pub fn set_present_mode(&self, swapchain: SwapchainHandle, wishes: &[PresentMode]) -> Result<()> {
@@ -183,7 +233,8 @@ impl Context {
     ///
     /// # Errors
     /// [`StaleHandle`](Error::StaleHandle); [`Unsupported`](Error::Unsupported) if a recreated swapchain would have no
-    /// images, because the window supports none of the formats.
+    /// images, because the window supports none of the formats; [`InvalidUsage`](Error::InvalidUsage) while it is
+    /// suspended, because its properties follow from its window.
     pub fn swapchain_info(&self, swapchain: SwapchainHandle) -> Result<SwapchainInfo> {
         let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
@@ -199,6 +250,9 @@ impl Context {
                 image_count: current.images.len() as u32,
                 rebuilds,
             });
+        }
+        if lifecycle.is_suspended() {
+            return Err(Error::usage(&*object.name, "it is suspended; resume it in a window first"));
         }
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let planned =
@@ -244,21 +298,18 @@ impl PresentBackend for LiveBackend<'_> {
         Ok(choose::choose_extent(&state.limits, self.resources.config.extent))
     }
 
-    /// Waits for the GPU: a lost surface is rare, and its swapchains must be destroyed before the window can have
-    /// another surface.
-    fn recreate_surface(&mut self) -> Result<(), Failure> {
+    /// Waits for the GPU: this is rare, and swapchains must be destroyed before the window can have another surface.
+    fn release_surface(&mut self) -> Result<(), Failure> {
         self.resources.wait_for_presents()?;
         self.retire_current();
         self.ctx.wait_idle()?;
         self.resources.clear_retired();
         self.resources.surface = None;
-        self.surface().map(drop).map_err(|failure| match failure {
-            Failure::Other(error) => {
-                log::warn!("{}: its window supports no other surface: {error}", self.name);
-                Failure::SurfaceLost
-            }
-            failure => failure,
-        })
+        Ok(())
+    }
+
+    fn create_surface(&mut self) -> Result<(), Failure> {
+        self.surface().map(drop)
     }
 
     fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure> {

@@ -1,6 +1,10 @@
 //! The error type of the library.
 
+pub(crate) mod device_candidate;
 pub(crate) mod device_fault;
+mod driver_remedies;
+pub(crate) mod driver_report;
+mod driver_report_text;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,7 +12,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::queue::Queue;
+use device_candidate::DeviceCandidate;
 use device_fault::DeviceFault;
+use driver_report::DriverReport;
+use driver_report_text::no_device_text;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -16,7 +23,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// Errors of the library, in three groups by remedy:
 /// * mistakes of the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
 ///   [`WrongQueue`](Error::WrongQueue), [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants),
-///   [`Serialized`](Error::Serialized), [`OverBudget`](Error::OverBudget);
+///   [`Serialized`](Error::Serialized), [`OverBudget`](Error::OverBudget),
+///   [`UploadTooLarge`](Error::UploadTooLarge);
 /// * missing support by the device or its driver: [`NoVulkan`](Error::NoVulkan),
 ///   [`NoDevice`](Error::NoDevice), [`Unsupported`](Error::Unsupported),
 ///   [`LimitExceeded`](Error::LimitExceeded);
@@ -26,18 +34,26 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The Vulkan loader could not be opened or has no usable instance.
-    #[error("no Vulkan on this machine: {reason}; install a Vulkan driver and its loader (libvulkan.so.1)")]
+    /// The Vulkan loader could not be opened, is older than Vulkan 1.3, or finds no driver or no device. The text ends
+    /// with the remedies.
+    #[error("no Vulkan device on this machine: {report}")]
     NoVulkan {
-        /// The loader's error.
-        reason: String,
+        /// The loader, the failed command, and each driver manifest with the error of the dynamic linker.
+        report: Arc<DriverReport>,
     },
-    /// Devices exist, but none has the features that the caller requires.
-    #[error("no Vulkan device has what was required: {reasons}")]
+    /// Devices exist, but none has the features that the caller requires. The text ends with the remedies.
+    #[error(
+        "no Vulkan device has what was required: {}",
+        no_device_text(problem.as_deref(), candidates, drivers.as_deref())
+    )]
     NoDevice {
-        /// The problem with the requested device, if any, then each device with the features it lacks,
-        /// separated by `; `.
-        reasons: String,
+        /// The problem with the device that the caller requested by number or name.
+        problem: Option<String>,
+        /// Each device with the requirements that it does not meet.
+        candidates: Vec<DeviceCandidate>,
+        /// Loader and drivers; a driver that cannot be loaded explains the absence of a device. `None` for a device that
+        /// the caller created.
+        drivers: Option<Arc<DriverReport>>,
     },
     /// The device, its driver or a layer lacks a feature that a call needs.
     #[error("{what} is not supported: {why}")]
@@ -72,6 +88,14 @@ pub enum Error {
         object: String,
         /// The problem and the remedy.
         message: String,
+    },
+    /// The window of a swapchain is gone (`VK_ERROR_SURFACE_LOST_KHR`, also for another surface of the window).
+    #[error(
+        "{swapchain}: its window is gone; suspend the swapchain, and resume it in another window, or destroy it before its window"
+    )]
+    SurfaceLost {
+        /// Debug name of the swapchain.
+        swapchain: String,
     },
     /// The queue of a command buffer does not support a command.
     #[error("{command} cannot be recorded for the {} queue; acquire a command buffer on {remedy}", queue.label())]
@@ -137,6 +161,17 @@ pub enum Error {
         used: u64,
         /// The budget, [`ContextDesc::accel_budget_bytes`](crate::ContextDesc), in bytes.
         budget: u64,
+    },
+    /// A value is larger than the memory that the context keeps for uploads.
+    #[error(
+        "an upload of {bytes} bytes is larger than ContextDesc::staging_bytes ({limit} bytes); raise it, or write the \
+         data to a buffer"
+    )]
+    UploadTooLarge {
+        /// Bytes of the value or slice.
+        bytes: u64,
+        /// Most bytes of one upload, [`ContextDesc::staging_bytes`](crate::ContextDesc).
+        limit: u64,
     },
     /// Device memory is exhausted.
     #[error("out of device memory while creating '{object}' ({bytes} bytes)")]

@@ -1,5 +1,6 @@
 //! Formats of texels, vertices and indices, with the byte sizes of copies.
 
+mod components;
 mod table;
 mod vertex;
 

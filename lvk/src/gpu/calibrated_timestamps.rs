@@ -1,22 +1,34 @@
 //! The clocks of device and host, read at the same time.
 
-use std::time::Duration;
+use std::num::NonZeroU64;
+use std::time::{Duration, Instant};
 
 use ash::vk;
 
 use super::caps::features::Calibration;
+use super::host_clock::{HostClock, duration_of_ticks};
 use super::start::instance::Instance;
 use crate::error::{Error, Result};
 
-/// One instant on the clock of the GPU and on the clock of the host.
+/// One moment on the clock of the GPU and on the clock of the host.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CalibratedTimestamps {
     /// Milliseconds on the scale of [`Context::timestamps_ms`](crate::Context::timestamps_ms).
     pub gpu_ms: f64,
-    /// Time of the host's `CLOCK_MONOTONIC`, which [`Instant`](std::time::Instant) counts on Linux.
+    /// Time of [`clock`](Self::clock) since its start. Comparable with other readings of that clock, also by other
+    /// programs.
     pub host: Duration,
+    /// The clock that `host` is a time of: `CLOCK_MONOTONIC` on Linux and Android, the performance counter on Windows,
+    /// the clock that Metal samples on Apple's systems.
+    pub clock: HostClock,
     /// Maximum time between the two readings.
     pub deviation: Duration,
+    /// The same moment as an instant, whichever clock the system counts instants by. Read with the standard library
+    /// around the call of the driver.
+    pub instant: Instant,
+    /// Maximum distance of `instant` from the moment, beside [`deviation`](Self::deviation): half the time of the
+    /// call.
+    pub instant_deviation: Duration,
 }
 
 impl CalibratedTimestamps {
@@ -24,19 +36,38 @@ impl CalibratedTimestamps {
     /// host's clock and for values that are not finite. The clocks drift apart: read a new pair about every
     /// second.
     pub fn host_at(&self, gpu_ms: f64) -> Duration {
-        let apart = Duration::try_from_secs_f64((gpu_ms - self.gpu_ms).abs() * 1e-3).unwrap_or_default();
+        let apart = self.time_from(gpu_ms).unwrap_or_default();
         if gpu_ms < self.gpu_ms { self.host.saturating_sub(apart) } else { self.host.saturating_add(apart) }
+    }
+
+    /// Converts a GPU time to an instant. `None` for values that are not finite, and for times that an instant cannot
+    /// hold. The clocks drift apart, as for [`host_at`](Self::host_at).
+    pub fn instant_at(&self, gpu_ms: f64) -> Option<Instant> {
+        let apart = self.time_from(gpu_ms)?;
+        if gpu_ms < self.gpu_ms { self.instant.checked_sub(apart) } else { self.instant.checked_add(apart) }
+    }
+
+    /// Returns the time between this moment and a GPU time, without its sign.
+    fn time_from(&self, gpu_ms: f64) -> Option<Duration> {
+        Duration::try_from_secs_f64((gpu_ms - self.gpu_ms).abs() * 1e-3).ok()
     }
 }
 
-/// Reads both clocks.
-pub(crate) enum HostClock {
+/// Reads the clocks of device and host together.
+pub(crate) struct ClockReader {
+    functions: Functions,
+    clock: HostClock,
+    /// Ticks of a second of the host's clock.
+    frequency: NonZeroU64,
+}
+
+enum Functions {
     Ext(ash::ext::calibrated_timestamps::Device),
     Khr(ash::khr::calibrated_timestamps::Device),
 }
 
-impl HostClock {
-    /// `None` if the device or the driver cannot read both clocks, or supports only another host clock.
+impl ClockReader {
+    /// `None` if the device or the driver cannot read both clocks, or supports only unknown host clocks.
     pub(crate) fn new(
         instance: &Instance,
         device: &ash::Device,
@@ -44,36 +75,49 @@ impl HostClock {
         calibration: Calibration,
     ) -> Option<Self> {
         let (entry, raw) = (&instance.entry, &instance.raw);
-        let (clock, domains) = match calibration {
+        let (functions, domains) = match calibration {
             Calibration::None => return None,
             Calibration::Ext => {
                 let ext = ash::ext::calibrated_timestamps::Instance::new(entry, raw);
                 // SAFETY: the physical device belongs to the instance and has the extension.
                 let domains = unsafe { ext.get_physical_device_calibrateable_time_domains(physical) };
-                (Self::Ext(ash::ext::calibrated_timestamps::Device::new(raw, device)), domains)
+                (Functions::Ext(ash::ext::calibrated_timestamps::Device::new(raw, device)), domains)
             }
             Calibration::Khr => {
                 let khr = ash::khr::calibrated_timestamps::Instance::new(entry, raw);
                 // SAFETY: as above.
                 let domains = unsafe { khr.get_physical_device_calibrateable_time_domains(physical) };
-                (Self::Khr(ash::khr::calibrated_timestamps::Device::new(raw, device)), domains)
+                (Functions::Khr(ash::khr::calibrated_timestamps::Device::new(raw, device)), domains)
             }
         };
-        let domains = domains.unwrap_or_default();
-        let needed = [vk::TimeDomainKHR::DEVICE, vk::TimeDomainKHR::CLOCK_MONOTONIC];
-        needed.iter().all(|domain| domains.contains(domain)).then_some(clock)
+        let clock = HostClock::choose(&domains.unwrap_or_default())?;
+        Some(Self { functions, clock, frequency: clock.frequency()? })
     }
 
-    /// Returns the ticks of the device, the nanoseconds of the host, and the maximum deviation in
-    /// nanoseconds.
-    pub(crate) fn read(&self) -> Result<(u64, u64, u64)> {
-        let infos = [vk::TimeDomainKHR::DEVICE, vk::TimeDomainKHR::CLOCK_MONOTONIC]
+    /// Reads both clocks; `milliseconds` converts ticks of the device.
+    pub(crate) fn read(&self, milliseconds: impl FnOnce(u64) -> f64) -> Result<CalibratedTimestamps> {
+        let before = Instant::now();
+        let (device, host, deviation) = self.read_ticks()?;
+        let half = before.elapsed() / 2;
+        Ok(CalibratedTimestamps {
+            gpu_ms: milliseconds(device),
+            host: duration_of_ticks(host, self.frequency),
+            clock: self.clock,
+            deviation: Duration::from_nanos(deviation),
+            instant: before + half,
+            instant_deviation: half,
+        })
+    }
+
+    /// Returns the ticks of the device, those of the host, and the maximum deviation in nanoseconds.
+    fn read_ticks(&self) -> Result<(u64, u64, u64)> {
+        let infos = [vk::TimeDomainKHR::DEVICE, self.clock.domain()]
             .map(|domain| vk::CalibratedTimestampInfoKHR::default().time_domain(domain));
         // SAFETY: the device has the extension and both domains.
         let read = unsafe {
-            match self {
-                Self::Ext(device) => device.get_calibrated_timestamps(&infos),
-                Self::Khr(device) => device.get_calibrated_timestamps(&infos),
+            match &self.functions {
+                Functions::Ext(device) => device.get_calibrated_timestamps(&infos),
+                Functions::Khr(device) => device.get_calibrated_timestamps(&infos),
             }
         };
         let (values, deviation) = read.map_err(Error::vulkan("vkGetCalibratedTimestamps"))?;
@@ -83,15 +127,51 @@ impl HostClock {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    fn pair() -> CalibratedTimestamps {
+        CalibratedTimestamps {
+            gpu_ms: 500.0,
+            host: Duration::from_millis(7),
+            clock: HostClock::Monotonic,
+            deviation: Duration::ZERO,
+            instant: Instant::now(),
+            instant_deviation: Duration::ZERO,
+        }
+    }
 
     #[test]
     fn times_are_carried_over_in_both_directions() {
-        let pair =
-            CalibratedTimestamps { gpu_ms: 500.0, host: Duration::from_millis(7), deviation: Duration::ZERO };
+        let pair = pair();
         assert_eq!(pair.host_at(502.5), Duration::from_micros(9_500));
         assert_eq!(pair.host_at(499.0), Duration::from_millis(6));
         assert_eq!(pair.host_at(0.0), Duration::ZERO);
         assert_eq!(pair.host_at(f64::NAN), pair.host);
+        assert_eq!(pair.instant_at(500.0), Some(pair.instant));
+        assert_eq!(pair.instant_at(502.5), Some(pair.instant + Duration::from_micros(2_500)));
+        assert_eq!(pair.instant_at(499.0), Some(pair.instant - Duration::from_millis(1)));
+        for outside in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e30, -1e30] {
+            assert_eq!(pair.instant_at(outside), None, "{outside}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Both scales have the same distances, and no number of the GPU is too large for either.
+        #[test]
+        fn instants_and_host_times_agree(gpu_ms in prop_oneof![any::<f64>(), -1e3..1e6_f64]) {
+            let pair = CalibratedTimestamps { host: Duration::from_secs(10), ..pair() };
+            let host = pair.host_at(gpu_ms);
+            if let Some(instant) = pair.instant_at(gpu_ms)
+                && gpu_ms > -9e3
+            {
+                let later = instant.saturating_duration_since(pair.instant);
+                let earlier = pair.instant.saturating_duration_since(instant);
+                prop_assert_eq!(host + earlier, pair.host + later);
+            }
+        }
     }
 }

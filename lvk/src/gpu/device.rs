@@ -1,11 +1,12 @@
 //! Selects a physical device and creates the logical device, its queues and its memory allocator.
 
 use std::ffi::CStr;
+use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
 use ash::vk;
 
-use super::calibrated_timestamps::HostClock;
+use super::calibrated_timestamps::ClockReader;
 use super::caps::capabilities::{Capabilities, FeatureRequest};
 use super::caps::descriptor_limits::DescriptorLimits;
 use super::caps::features::Features;
@@ -13,6 +14,7 @@ use super::caps::format_features::FormatFeatureCache;
 use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
 use super::caps::optional_features::OptionalFeature;
+use super::caps::portability::{PortabilityNeed, first_missing};
 use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
@@ -24,10 +26,11 @@ use super::start::external::RawContext;
 use super::start::instance::Instance;
 use super::start::physical_device::PhysicalDevice;
 use super::start::profile::DeviceProfile;
-use super::start::select::{Candidate, choose};
+use super::start::select::{Candidate, NoMatch, choose};
 use super::start::surface::SurfaceProbe;
 use super::start::user_extensions::UserExtensions;
 use super::start::window::{WindowExtensions, WindowRef};
+use crate::error::device_candidate::DeviceCandidate;
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
@@ -70,7 +73,7 @@ pub(crate) struct Gpu {
     /// Writes the first contents of images from the host. `None` where that is not the faster way.
     pub(crate) host_copies: Option<HostImageCopy>,
     /// Reads the clocks of device and host together.
-    pub(crate) host_clock: Option<HostClock>,
+    pub(crate) clock_reader: Option<ClockReader>,
     /// Number of live samplers with a custom border colour. Devices allow few of them.
     pub(crate) custom_borders: AtomicU32,
     /// `None` if the context does not present to windows.
@@ -179,7 +182,7 @@ impl Gpu {
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_copies,
-            host_clock: HostClock::new(&instance, &device, physical, features.calibration),
+            clock_reader: ClockReader::new(&instance, &device, physical, features.calibration),
             #[cfg(feature = "window")]
             windows: super::start::surface::WindowFunctions::new(&instance, &device, |feature| {
                 caps.has(feature)
@@ -285,6 +288,21 @@ impl Gpu {
         Err(Error::unsupported(what, format!("the device '{}' lacks {name}: {why}", self.caps.device_name)))
     }
 
+    /// Returns an error unless the device has the features of all `needs` of `object`.
+    pub(crate) fn require_portable(
+        &self,
+        object: &str,
+        needs: impl IntoIterator<Item = PortabilityNeed>,
+    ) -> Result<()> {
+        let Some(need) = first_missing(needs, self.caps.optional) else { return Ok(()) };
+        match self.require(need.feature, &format!("{} of {object}", need.what)) {
+            Err(Error::Unsupported { what, why }) => {
+                Err(Error::unsupported(what, format!("{why}; {}", need.remedy)))
+            }
+            answer => answer,
+        }
+    }
+
     /// Returns an error unless the device can draw the views of `view_mask` in one pass.
     pub(crate) fn check_view_mask(&self, name: &str, view_mask: u32) -> Result<()> {
         self.require(OptionalFeature::Multiview, &format!("the view mask {view_mask:#b} of '{name}'"))?;
@@ -342,9 +360,6 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     for raw in instance.physical_devices()? {
         devices.push(PhysicalDevice::query(&instance.raw, raw)?);
     }
-    if devices.is_empty() {
-        return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
-    }
     let probe = request.window.map(|window| SurfaceProbe::new(instance, window)).transpose()?;
     let unknown = WindowExtensions::unavailable_features(instance.windows.as_ref());
     for device in &mut devices {
@@ -353,8 +368,16 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
             device.select_present_queue(probe.queue_family(device.raw));
         }
     }
-    let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
-    let index = choose(&candidates, request.wish)?;
+    let indexed = devices.iter_mut().enumerate();
+    let candidates: Vec<_> = indexed.map(|(index, device)| candidate(index, device, request)).collect();
+    let index = match choose(&candidates, request.wish) {
+        Ok(index) => index,
+        Err(NoMatch(problem)) => {
+            let candidates = candidates.into_iter().map(|candidate| candidate.device).collect();
+            let drivers = Some(Arc::new(instance.driver_report()));
+            return Err(Error::NoDevice { problem, candidates, drivers });
+        }
+    };
     let mut chosen = devices.swap_remove(index);
     use_single_queue(&mut chosen, request.queues);
     Ok(chosen)
@@ -368,7 +391,7 @@ fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
 }
 
 /// Returns the properties of the device that the selection depends on, with the profile applied.
-fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
+fn candidate(index: usize, device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
     let found = device.capabilities.clone();
     if let Some(profile) = request.profile {
         profile.apply(&mut device.capabilities);
@@ -398,10 +421,8 @@ fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candid
         request.query.prefers_hardware() && left.ray_query,
     ];
     Candidate {
-        name: left.device_name.clone(),
-        kind: device.kind,
+        device: DeviceCandidate { missing, ..device.candidate(index) },
         local_memory_bytes: device.local_memory_bytes,
-        missing,
         optional_score: wanted.into_iter().filter(|has| *has).count() as u32,
     }
 }
@@ -505,10 +526,25 @@ fn device_extensions<'a>(
     extra: &UserExtensions<'a>,
 ) -> Vec<&'a CStr> {
     let libraries = caps.pipeline_libraries.then_some(ash::khr::pipeline_library::NAME);
-    let own = features.extensions().chain(caps.optional.extensions()).chain(libraries);
+    let subset = caps.portability_subset.then_some(ash::khr::portability_subset::NAME);
+    let own = features.extensions().chain(caps.optional.extensions()).chain(libraries).chain(subset);
     let mut names: Vec<&'a CStr> = own.map(|name| -> &'a CStr { name }).collect();
     names.extend_from_slice(extra.device_extensions());
     names.sort_unstable();
     names.dedup();
     names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_portability_subset_is_enabled_where_the_device_lists_it() {
+        for portability_subset in [false, true] {
+            let caps = Capabilities { portability_subset, ..Capabilities::default() };
+            let names = device_extensions(&Features::default(), &caps, &UserExtensions::default());
+            assert_eq!(names.contains(&ash::khr::portability_subset::NAME), portability_subset);
+        }
+    }
 }

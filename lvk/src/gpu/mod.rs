@@ -4,6 +4,7 @@ pub(crate) mod calibrated_timestamps;
 pub(crate) mod caps;
 pub(crate) mod debug;
 pub(crate) mod device;
+pub(crate) mod host_clock;
 pub(crate) mod memory;
 pub(crate) mod object_memory;
 pub(crate) mod object_names;

@@ -16,9 +16,9 @@ use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 pub(crate) const GROUP_SIZE: u32 = 64;
 
 /// Declares every kernel: its name, the path of its SPIR-V below `src` without the extension, and the GLSL files of the
-/// same folder that are concatenated to its source. A group of kernels is compiled if its `cfg` holds.
+/// same folder, without `.glsl`, that are concatenated to its source. A group of kernels is compiled if its `cfg` holds.
 macro_rules! kernels {
-    ($(#[cfg($when:meta)] { $($(#[$doc:meta])* $name:ident = $file:literal, [$($piece:literal),*];)* })*) => {
+    ($(#[cfg($when:meta)] { $($(#[$doc:meta])* $name:ident = $file:literal, $pieces:literal;)* })*) => {
         /// The library's compute shaders.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
         pub(crate) enum Kernel {
@@ -42,9 +42,9 @@ macro_rules! kernels {
 
             /// Returns the path of the SPIR-V, and the files of the source.
             #[cfg(all(test, feature = "glsl"))]
-            fn source(self) -> (&'static str, &'static [&'static str]) {
+            fn source(self) -> (&'static str, &'static str) {
                 match self {
-                    $($(#[cfg($when)] Self::$name => ($file, &[$($piece),*]),)*)*
+                    $($(#[cfg($when)] Self::$name => ($file, $pieces),)*)*
                 }
             }
         }
@@ -54,83 +54,66 @@ macro_rules! kernels {
 kernels! {
     #[cfg(all())] {
         /// Gathers the indices or AABBs of a part of a mesh.
-        Gather = "kernels/gather", ["gather.comp.glsl"];
+        Gather = "kernels/gather", "gather.comp";
         /// Writes addresses and hit remap entries of instances.
-        Instances = "kernels/instances", ["instances.comp.glsl"];
+        Instances = "kernels/instances", "instances.comp";
     }
     #[cfg(feature = "software-ray-query")] {
         /// Resets the scratch memory after an earlier build.
-        BuildReset = "software_ray_query/kernels/reset", ["build_params.glsl", "reset.comp.glsl"];
+        BuildReset = "software_ray_query/kernels/reset", "build_params reset.comp";
         /// Computes the bounds of triangles and AABBs.
-        BuildPrimitives = "software_ray_query/kernels/primitives",
-            ["build_params.glsl", "box.glsl", "bounds.glsl", "input.glsl", "primitives.comp.glsl"];
+        BuildPrimitives = "software_ray_query/kernels/primitives", "build_params box bounds input primitives.comp";
         /// Computes the bounds of instances, and writes the instance records of the TLAS.
-        BuildInstances = "software_ray_query/kernels/instances",
-            ["build_params.glsl", "box.glsl", "bounds.glsl", "instance.glsl", "instances.comp.glsl"];
+        BuildInstances = "software_ray_query/kernels/instances", "build_params box bounds instance instances.comp";
         /// Computes the Morton codes of primitives.
-        BuildCodes = "software_ray_query/kernels/codes",
-            ["build_params.glsl", "box.glsl", "code.glsl", "codes.comp.glsl"];
+        BuildCodes = "software_ray_query/kernels/codes", "build_params box code codes.comp";
         /// Counts the digits of codes.
-        SortCount = "software_ray_query/kernels/sort_count", ["build_params.glsl", "rank.glsl", "sort_count.comp.glsl"];
+        SortCount = "software_ray_query/kernels/sort_count", "build_params rank sort_count.comp";
         /// Sums the counts.
-        SortScan = "software_ray_query/kernels/sort_scan", ["build_params.glsl", "rank.glsl", "sort_scan.comp.glsl"];
+        SortScan = "software_ray_query/kernels/sort_scan", "build_params rank sort_scan.comp";
         /// Moves codes to their sorted positions.
-        SortScatter = "software_ray_query/kernels/sort_scatter",
-            ["build_params.glsl", "rank.glsl", "sort_scatter.comp.glsl"];
+        SortScatter = "software_ray_query/kernels/sort_scatter", "build_params rank sort_scatter.comp";
         /// Builds the hierarchy.
-        BuildTree = "software_ray_query/kernels/tree",
-            ["build_params.glsl", "arrival_counters.glsl", "tree.glsl", "tree.comp.glsl"];
+        BuildTree = "software_ray_query/kernels/tree", "build_params arrival_counters tree tree.comp";
         /// Resets the arrival counters of nodes.
         ResetArrivals = "software_ray_query/kernels/reset_arrivals",
-            ["build_params.glsl", "arrival_counters.glsl", "reset_arrivals.comp.glsl"];
+            "build_params arrival_counters reset_arrivals.comp";
         /// Fits the bounds of binary nodes, and improves the tree by rotations.
         BuildImprove = "software_ray_query/kernels/improve",
-            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl",
-             "arrival_counters.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "improve.comp.glsl"];
+            "shared build_params box leaf leaf_bounds_scratch arrival_counters node rotate fit \
+             improve.comp";
         /// Collapses binary nodes to one level of wide nodes.
         Collapse = "software_ray_query/kernels/collapse",
-            ["build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl", "node.glsl",
-             "wide.glsl", "encode.glsl", "collapse.glsl", "collapse.comp.glsl"];
+            "build_params box leaf leaf_bounds_scratch node wide encode collapse collapse.comp";
         /// Writes all parts of a BLAS except its nodes.
         WriteBlas = "software_ray_query/kernels/blas_write",
-            ["build_params.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
-             "arrival_counters.glsl", "node.glsl", "wide.glsl", "packed.glsl", "blas_write.glsl",
-             "blas_write.comp.glsl"];
+            "build_params box input leaf leaf_write arrival_counters node wide packed blas_write \
+             blas_write.comp";
         /// Fits the bounds of packed wide nodes, which replace collapsed nodes that did not fit.
         FitPacked = "software_ray_query/kernels/fit_packed",
-            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds.glsl",
-             "arrival_counters.glsl", "node.glsl", "wide.glsl", "encode.glsl", "packed.glsl",
-             "fit_wide.glsl", "fit_packed.comp.glsl"];
+            "shared build_params box leaf leaf_bounds arrival_counters node wide encode packed fit_wide \
+             fit_packed.comp";
         /// Fits the bounds of binary nodes.
         FitBinary = "software_ray_query/kernels/fit",
-            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds.glsl",
-             "arrival_counters.glsl", "node.glsl", "no_rotation.glsl", "fit.glsl", "fit.comp.glsl"];
+            "shared build_params box leaf leaf_bounds arrival_counters node no_rotation fit fit.comp";
         /// Fits the bounds of wide nodes.
         FitWide = "software_ray_query/kernels/fit_wide",
-            ["shared.glsl", "build_params.glsl", "box.glsl", "leaf.glsl", "leaf_bounds.glsl",
-             "wide.glsl", "encode.glsl", "fit_wide.glsl", "fit_wide.comp.glsl"];
+            "shared build_params box leaf leaf_bounds wide encode fit_wide fit_wide.comp";
         /// Rewrites the primitives of leaves from moved inputs.
         RefitLeaves = "software_ray_query/kernels/refit",
-            ["build_params.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
-             "arrival_counters.glsl", "wide.glsl", "refit.glsl", "refit.comp.glsl"];
+            "build_params box input leaf leaf_write arrival_counters wide refit refit.comp";
         /// Builds the binary tree of a whole BLAS by one workgroup.
         BuildSmallBlas = "software_ray_query/kernels/small_blas",
-            ["shared.glsl", "build_params.glsl", "box.glsl", "bounds.glsl", "input.glsl",
-             "code.glsl", "rank.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl", "arrival_counters.glsl",
-             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "workgroup_barrier.glsl",
-             "small_blas.comp.glsl", "small.glsl"];
+            "shared build_params box bounds input code rank leaf leaf_bounds_scratch arrival_counters \
+             tree node rotate fit workgroup_barrier small_blas.comp small";
         /// Builds the rest of such a BLAS by one workgroup.
         BuildSmallWide = "software_ray_query/kernels/small_wide",
-            ["shared.glsl", "build_params.glsl", "box.glsl", "input.glsl", "leaf.glsl",
-             "leaf_bounds.glsl", "leaf_write.glsl", "arrival_counters.glsl", "node.glsl", "wide.glsl",
-             "encode.glsl", "collapse.glsl", "packed.glsl", "blas_write.glsl", "fit_wide.glsl",
-             "workgroup_barrier.glsl", "small_wide.comp.glsl"];
+            "shared build_params box input leaf leaf_bounds leaf_write arrival_counters node wide encode \
+             collapse packed blas_write fit_wide workgroup_barrier small_wide.comp";
         /// Builds a whole TLAS by one workgroup.
         BuildSmallTlas = "software_ray_query/kernels/small_tlas",
-            ["shared.glsl", "build_params.glsl", "box.glsl", "bounds.glsl", "instance.glsl",
-             "code.glsl", "rank.glsl", "leaf.glsl", "leaf_bounds_scratch.glsl", "arrival_counters.glsl",
-             "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "workgroup_barrier.glsl",
-             "small_tlas.comp.glsl", "small.glsl"];
+            "shared build_params box bounds instance code rank leaf leaf_bounds_scratch arrival_counters \
+             tree node rotate fit workgroup_barrier small_tlas.comp small";
     }
 }
 
@@ -276,7 +259,8 @@ mod tests {
         for kernel in Kernel::ALL {
             let (file, pieces) = kernel.source();
             let words = sources.join(format!("{file}.comp.spv"));
-            let text: String = pieces.iter().map(|piece| read(&words.with_file_name(piece))).collect();
+            let piece = |piece| read(&words.with_file_name(format!("{piece}.glsl")));
+            let text: String = pieces.split(' ').map(piece).collect();
             expect_words(&words, &text);
         }
         let tests = crate_folder.join("tests");

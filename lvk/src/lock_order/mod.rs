@@ -29,12 +29,6 @@ pub(crate) struct Mutex<T> {
     rank: LockPlace,
 }
 
-/// Access to the value of a [`Mutex`].
-pub(crate) struct Guard<'a, T> {
-    inner: MutexGuard<'a, T>,
-    _held: HeldLock,
-}
-
 impl<T> Mutex<T> {
     pub(crate) const fn new(rank: Rank, value: T) -> Self {
         Self { inner: std::sync::Mutex::new(value), rank: LockPlace::new(rank) }
@@ -44,28 +38,12 @@ impl<T> Mutex<T> {
     #[inline]
     pub(crate) fn lock(&self) -> Guard<'_, T> {
         let _held = HeldLock::new(self.rank);
-        Guard { inner: self.inner.lock().unwrap_or_else(PoisonError::into_inner), _held }
+        RankedGuard { inner: self.inner.lock().unwrap_or_else(PoisonError::into_inner), _held }
     }
 
     /// Returns the value without locking, by unique access.
     pub(crate) fn get_mut(&mut self) -> &mut T {
         self.inner.get_mut().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl<T> Deref for Guard<'_, T> {
-    type Target = T;
-
-    #[inline]
-    fn deref(&self) -> &T {
-        &self.inner
-    }
-}
-
-impl<T> DerefMut for Guard<'_, T> {
-    #[inline]
-    fn deref_mut(&mut self) -> &mut T {
-        &mut self.inner
     }
 }
 
@@ -77,18 +55,6 @@ pub(crate) struct RwLock<T> {
     rank: LockPlace,
 }
 
-/// Shared access to the value of an [`RwLock`].
-pub(crate) struct ReadGuard<'a, T> {
-    inner: RwLockReadGuard<'a, T>,
-    _held: HeldLock,
-}
-
-/// Exclusive access to the value of an [`RwLock`].
-pub(crate) struct WriteGuard<'a, T> {
-    inner: RwLockWriteGuard<'a, T>,
-    _held: HeldLock,
-}
-
 impl<T> RwLock<T> {
     pub(crate) const fn new(rank: Rank, value: T) -> Self {
         Self { inner: std::sync::RwLock::new(value), rank: LockPlace::new(rank) }
@@ -98,38 +64,42 @@ impl<T> RwLock<T> {
     #[inline]
     pub(crate) fn read(&self) -> ReadGuard<'_, T> {
         let _held = HeldLock::new(self.rank);
-        ReadGuard { inner: self.inner.read().unwrap_or_else(PoisonError::into_inner), _held }
+        RankedGuard { inner: self.inner.read().unwrap_or_else(PoisonError::into_inner), _held }
     }
 
     /// Waits until no thread holds the lock.
     #[inline]
     pub(crate) fn write(&self) -> WriteGuard<'_, T> {
         let _held = HeldLock::new(self.rank);
-        WriteGuard { inner: self.inner.write().unwrap_or_else(PoisonError::into_inner), _held }
+        RankedGuard { inner: self.inner.write().unwrap_or_else(PoisonError::into_inner), _held }
     }
 }
 
-impl<T> Deref for ReadGuard<'_, T> {
-    type Target = T;
+/// Access to the value of a lock, by the guard `G` of the standard library.
+pub(crate) struct RankedGuard<G> {
+    inner: G,
+    _held: HeldLock,
+}
+
+/// Access to the value of a [`Mutex`].
+pub(crate) type Guard<'a, T> = RankedGuard<MutexGuard<'a, T>>;
+/// Shared access to the value of an [`RwLock`].
+pub(crate) type ReadGuard<'a, T> = RankedGuard<RwLockReadGuard<'a, T>>;
+/// Exclusive access to the value of an [`RwLock`].
+pub(crate) type WriteGuard<'a, T> = RankedGuard<RwLockWriteGuard<'a, T>>;
+
+impl<G: Deref> Deref for RankedGuard<G> {
+    type Target = G::Target;
 
     #[inline]
-    fn deref(&self) -> &T {
+    fn deref(&self) -> &G::Target {
         &self.inner
     }
 }
 
-impl<T> Deref for WriteGuard<'_, T> {
-    type Target = T;
-
+impl<G: DerefMut> DerefMut for RankedGuard<G> {
     #[inline]
-    fn deref(&self) -> &T {
-        &self.inner
-    }
-}
-
-impl<T> DerefMut for WriteGuard<'_, T> {
-    #[inline]
-    fn deref_mut(&mut self) -> &mut T {
+    fn deref_mut(&mut self) -> &mut G::Target {
         &mut self.inner
     }
 }

@@ -24,6 +24,9 @@ pub mod ray_tracing_pipelines {}
 #[doc = include_str!("shaders.md")]
 pub mod shaders {}
 
+#[doc = include_str!("shader_interface.md")]
+pub mod shader_interface {}
+
 #[doc = include_str!("debugging.md")]
 pub mod debugging {}
 

@@ -77,6 +77,10 @@ impl BlendFactor {
         matches!(self, Self::Src1Color | Self::OneMinusSrc1Color | Self::Src1Alpha | Self::OneMinusSrc1Alpha)
     }
 
+    fn is_constant_alpha(self) -> bool {
+        matches!(self, Self::ConstantAlpha | Self::OneMinusConstantAlpha)
+    }
+
     fn is_constant(self) -> bool {
         use BlendFactor::{ConstantAlpha, ConstantColor, OneMinusConstantAlpha, OneMinusConstantColor};
         matches!(self, ConstantColor | OneMinusConstantColor | ConstantAlpha | OneMinusConstantAlpha)
@@ -162,6 +166,11 @@ impl Blend {
     /// True if a factor uses the fragment shader's second output.
     pub(super) fn is_dual_source(self) -> bool {
         self.factors().into_iter().any(BlendFactor::is_src1)
+    }
+
+    /// True if a factor of the colour is the alpha of the blend constants.
+    pub(super) fn takes_constant_alpha(self) -> bool {
+        [self.color.source, self.color.target].into_iter().any(BlendFactor::is_constant_alpha)
     }
 
     /// True if a factor uses the blend constants of the pass.

@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
 use super::local_read::check_inputs;
+use super::portability::check_strides;
 use super::rasterization::Topology;
 use super::render_modules::RenderModules;
 use super::state_check::check_state;
@@ -92,6 +93,10 @@ pub(super) fn check_modules(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &
     check_inputs(desc, modules)?;
     check_vertex_input(name, desc)?;
     check_vertex_formats(gpu, desc)?;
+    let alignment = gpu.caps.limits.vertex_stride_alignment;
+    if gpu.caps.portability_subset || alignment > 1 {
+        check_strides(name, desc.vertex_bindings, alignment)?;
+    }
     match &modules.vertex {
         Some(vertex) => check_locations(name, desc, &vertex.reflection.inputs),
         None => Ok(()),

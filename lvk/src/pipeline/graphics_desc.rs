@@ -12,7 +12,8 @@ use crate::handle::ShaderModuleHandle;
 /// A vertex buffer slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct VertexBinding {
-    /// Distance between consecutive vertices or instances, in bytes.
+    /// Distance between consecutive vertices or instances, in bytes: a multiple of
+    /// [`Limits::vertex_stride_alignment`](crate::Limits::vertex_stride_alignment).
     pub stride: u32,
     /// True if the attributes advance once for each instance instead of each vertex.
     pub per_instance: bool,

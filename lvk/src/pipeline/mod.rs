@@ -11,6 +11,7 @@ mod graphics_check;
 pub(crate) mod graphics_desc;
 pub(crate) mod local_read;
 pub(crate) mod pipeline_layout;
+mod portability;
 pub(crate) mod rasterization;
 mod rasterization_state;
 pub(crate) mod ray_tracing;

@@ -18,7 +18,8 @@ pub enum Topology {
     Triangles,
     /// Each vertex forms a triangle with the previous two.
     TriangleStrip,
-    /// Each vertex forms a triangle with the previous one and the first.
+    /// Each vertex forms a triangle with the previous one and the first
+    /// ([`OptionalFeature::TriangleFans`](crate::OptionalFeature)).
     TriangleFan,
     /// Every `points` vertices form a patch, for the tessellation stages; 1 to
     /// [`Limits::max_patch_points`](crate::Limits::max_patch_points).

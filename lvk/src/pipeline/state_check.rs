@@ -5,6 +5,7 @@ use ash::vk;
 use spirv::Capability;
 
 use super::graphics_desc::RenderPipelineDesc;
+use super::portability::needs;
 use super::rasterization::PolygonMode;
 use super::render_modules::RenderModules;
 use crate::error::{Error, Result};
@@ -15,6 +16,7 @@ use crate::shader::ShaderStage;
 /// Fails unless the device supports the fixed state.
 pub(super) fn check_state(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     check_raster(gpu, desc)?;
+    check_portability(gpu, desc, modules)?;
     check_samples(gpu, desc)?;
     check_stencil(desc)?;
     check_views(gpu, desc, modules)?;
@@ -36,6 +38,12 @@ fn check_raster(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
         return Err(Error::usage(name, format!("{bias:?} has parts that are no finite numbers")));
     }
     require(bias.clamp != 0.0, OptionalFeature::DepthBiasClamp, "a depth bias with a bound")
+}
+
+/// Fails if the state needs a feature that devices with `VK_KHR_portability_subset` may lack, and this one does.
+fn check_portability(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    let tessellated = modules.tess_eval.as_ref().and_then(|eval| eval.reflection.primitive);
+    gpu.require_portable(&format!("pipeline '{}'", desc.debug_name), needs(desc, tessellated))
 }
 
 fn check_line_width(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {

@@ -3,6 +3,7 @@
 use ash::vk;
 
 use super::image_usage::{raw_usage, usage_from_features};
+use super::portability::texture_needs;
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 use crate::error::{Error, Result, check_limit};
@@ -21,6 +22,7 @@ pub(crate) struct ImagePlan {
 pub(crate) fn check_image(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<ImagePlan> {
     let mips = check_shape(gpu, desc)?;
     check_view_formats(desc)?;
+    gpu.require_portable(&format!("texture '{}'", desc.debug_name), texture_needs(desc))?;
     let plan = ImagePlan { mips, flags: flags(gpu, desc, mips) };
     check_format(gpu, desc, &plan.info(desc))?;
     Ok(plan)

@@ -6,6 +6,7 @@ pub(crate) mod host_copy;
 pub(crate) mod image;
 mod image_check;
 pub(crate) mod image_usage;
+mod portability;
 pub(crate) mod query_pool;
 pub(crate) mod query_reset_state;
 pub(crate) mod region;

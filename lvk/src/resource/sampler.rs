@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use ash::vk;
 
+use super::portability::sampler_needs;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
@@ -270,6 +271,8 @@ fn check_sampler(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
     if numbers.iter().any(|n| n.is_nan()) || min_lod > max_lod {
         return wrong("level of detail, bias and anisotropy must be numbers, and the range in order");
     }
+    let needs = sampler_needs(desc.compare.is_some(), desc.lod_bias);
+    gpu.require_portable(&format!("sampler '{}'", desc.debug_name), needs)?;
     let limit = gpu.caps.limits.max_lod_bias;
     if desc.lod_bias.abs() > limit {
         return wrong(&format!("the level of detail can be biased by {limit}, not by {}", desc.lod_bias));

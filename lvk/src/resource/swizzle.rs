@@ -19,7 +19,8 @@ pub enum Channel {
     Alpha,
 }
 
-/// Sources of the four channels that a shader samples (`VkComponentMapping`).
+/// Sources of the four channels that a shader samples (`VkComponentMapping`). All but the
+/// [identity](Self::IDENTITY) need [`OptionalFeature::ViewSwizzle`](crate::OptionalFeature::ViewSwizzle).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Swizzle {
     /// Source of the red channel.

@@ -7,6 +7,7 @@ use ash::vk;
 use super::image::Image;
 use super::image_check::check_cube_arrays;
 use super::image_usage::raw_usage;
+use super::portability::view_needs;
 use super::region::{Region, TextureBounds, TextureRange, TextureRegion};
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
@@ -397,6 +398,8 @@ impl Texture {
                 self.name
             ));
         }
+        let needs = view_needs(desc.swizzle.compose(self.swizzle), format, self.image.format);
+        self.image.gpu().require_portable(&format!("texture view '{}'", desc.debug_name), needs)?;
         Ok(ResolvedView { kind, format, range, usage, aspect })
     }
 

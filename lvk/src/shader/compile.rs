@@ -4,6 +4,7 @@
 use super::front_end::compile_cached;
 use super::options::{CompileOptions, compile_error};
 use super::spirv::passes::strip_primitive_culling::strip_primitive_culling;
+use super::spirv::passes::strip_ray_query::strip_unused_ray_query;
 use super::spirv::words;
 use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
 #[cfg(not(feature = "glsl"))]
@@ -12,8 +13,8 @@ use crate::error::Result;
 
 /// Returns the SPIR-V of a module.
 ///
-/// GLSL is compiled to SPIR-V 1.6, or loaded from `cache` if it was compiled before. SPIR-V words are returned
-/// unchanged after a check of their structure.
+/// GLSL is compiled to SPIR-V 1.6, or loaded from `cache` if it was compiled before. SPIR-V words are returned after a
+/// check of their structure, without an unused capability of ray queries.
 pub(crate) fn compile(
     desc: &ShaderModuleDesc<'_>,
     options: &CompileOptions,
@@ -26,7 +27,7 @@ pub(crate) fn compile(
         ShaderSource::Glsl(text) => compile_cached(desc, text, options, cache),
         ShaderSource::Spirv(words) => {
             words::validate(words).map_err(|log| compile_error(desc.debug_name, log))?;
-            Ok(words.to_vec())
+            Ok(strip_unused_ray_query(words))
         }
     }
 }

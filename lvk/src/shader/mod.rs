@@ -35,5 +35,9 @@ pub(crate) use spirv::reflect::{Primitive, Reflection};
 pub(crate) use spirv::workgroup_memory::SharedBytes;
 pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};
 
+/// Text of `lvk.hlsli`, which declares the descriptors of the library for HLSL and Slang, for build scripts to write to
+/// a file. The manual's page [`shader_interface`](crate::manual::shader_interface) has the options of the compilers.
+pub const HLSL_HEADER: &str = include_str!("hlsl/lvk.hlsli");
+
 #[cfg(all(test, feature = "glsl"))]
 mod tests;

@@ -28,7 +28,7 @@ const CORE_LIBRARY: &[(&str, &str)] = &[
 
 /// Extensions that are enabled in every stage. An extension needs no device feature until its types or functions are
 /// used.
-const EXTENSIONS: [&str; 25] = [
+pub(super) const EXTENSIONS: [&str; 25] = [
     "GL_GOOGLE_include_directive",
     "GL_GOOGLE_cpp_style_line_directive",
     "GL_EXT_buffer_reference",
@@ -65,8 +65,8 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
     push_define(&mut text, stage_macro(stage), "1");
     push_define(&mut text, "LVK_SET", &layout::SET.to_string());
     declare_input_attachments(&mut text);
-    for (binding, name, _) in layout::BINDINGS {
-        push_define(&mut text, name, &binding.to_string());
+    for binding in layout::BINDINGS {
+        push_define(&mut text, binding.macro_name, &binding.number.to_string());
     }
     if options.formatless_read {
         push_extension(&mut text, "GL_EXT_shader_image_load_formatted");
@@ -123,7 +123,7 @@ fn push_define(text: &mut String, name: &str, value: &str) {
     let _ = writeln!(text, "#define {name} {value}");
 }
 
-fn stage_extensions(stage: ShaderStage) -> Option<&'static str> {
+pub(super) fn stage_extensions(stage: ShaderStage) -> Option<&'static str> {
     match stage {
         ShaderStage::Task | ShaderStage::Mesh => Some("GL_EXT_mesh_shader"),
         stage if stage.is_ray_tracing() => Some("GL_EXT_ray_tracing"),
@@ -131,7 +131,7 @@ fn stage_extensions(stage: ShaderStage) -> Option<&'static str> {
     }
 }
 
-fn stage_macro(stage: ShaderStage) -> &'static str {
+pub(super) fn stage_macro(stage: ShaderStage) -> &'static str {
     match stage {
         ShaderStage::Vertex => "LVK_STAGE_VERTEX",
         ShaderStage::TessControl => "LVK_STAGE_TESS_CONTROL",

@@ -115,6 +115,7 @@ pub enum ShaderSource<'a> {
     /// [`Error::Unsupported`](crate::Error::Unsupported). See [`ShaderModuleDesc`] for the features of the text.
     Glsl(&'a str),
     /// SPIR-V words up to version 1.6, in the byte order of the machine, with an entry point `main`.
+    /// [`manual::shader_interface`](crate::manual::shader_interface) has the sets and bindings.
     ///
     /// The structure is checked (header, instruction lengths, entry point, bindings). The semantics are not: run a
     /// validator over SPIR-V from an unknown source.
@@ -126,7 +127,8 @@ pub enum ShaderSource<'a> {
 /// # Features of GLSL text
 ///
 /// The text needs no `#version` (450 and 460 are accepted) and declares no descriptors: a preamble declares them in
-/// every stage. Line numbers in messages are those of the text.
+/// every stage. Line numbers in messages are those of the text. The manual's page
+/// [`shader_interface`](crate::manual::shader_interface) lists every name; this is an overview.
 ///
 /// ```glsl
 /// layout(local_size_x = 8, local_size_y = 8) in;

@@ -1,11 +1,12 @@
-//! Disk cache of trees that the CPU built.
+//! Disk cache of trees that the CPU built. The numbers of its files are little-endian, as those of the BLAS in memory.
 
 use std::path::{Path, PathBuf};
 
 use super::bvh::encode_blas::BlasBlob;
 use super::bvh::primitives::{Mesh, MeshPrimitives};
 use super::bvh::settings::BvhSettings;
-use super::validate_blob::{self, ExpectedMesh};
+use super::expected_mesh::ExpectedMesh;
+use super::validate_blob;
 use crate::cache_file::{fingerprint, read_file, replace_file};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
@@ -119,6 +120,17 @@ mod tests {
             primitives: MeshPrimitives::Boxes((0..count).map(place).collect()),
             vertices: Vec::new(),
             flags: vec![GeometryFlags::empty()],
+        }
+    }
+
+    #[test]
+    fn a_file_is_read_from_bytes_of_any_alignment() {
+        let mesh = mesh(50);
+        let built = encode_blas::encode_blas(&mesh, QUALITY);
+        let file = encode_file(&built);
+        for offset in 0..16 {
+            let shifted = [&vec![0; offset][..], &file].concat();
+            assert_eq!(decode_file(&shifted[offset..], &ExpectedMesh::from_mesh(&mesh)), Ok(built.clone()));
         }
     }
 

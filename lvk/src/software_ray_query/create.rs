@@ -28,11 +28,12 @@ use crate::software_ray_query::bvh::rebraid::record_capacity;
 use crate::software_ray_query::bvh::settings::BvhSettings;
 use crate::software_ray_query::bvh::subtrees::subtree_parts;
 use crate::software_ray_query::bvh_cache::BvhKey;
+use crate::software_ray_query::expected_mesh::ExpectedMesh;
 use crate::software_ray_query::gpu_build::layout::GpuBuildPlan;
 use crate::software_ray_query::rebraid_parts::RebraidParts;
 use crate::software_ray_query::storage::SoftwareAccelStorage;
 use crate::software_ray_query::tlas::SoftwareTlas;
-use crate::software_ray_query::validate_blob::{self, ExpectedMesh};
+use crate::software_ray_query::validate_blob;
 
 /// Marks serialized BVHs that no driver wrote. It is as long as the UUIDs that blobs of drivers begin with.
 const SOFTWARE_BLOB_UUID: [u8; 32] = *b"lvk software structure, form 3\0\0";

@@ -11,6 +11,7 @@ pub(crate) mod blas;
 pub(crate) mod bvh;
 pub(crate) mod bvh_cache;
 pub(crate) mod create;
+pub(crate) mod expected_mesh;
 pub(crate) mod gpu_build;
 pub(crate) mod layout;
 pub(crate) mod rebraid_parts;

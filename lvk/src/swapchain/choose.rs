@@ -107,11 +107,7 @@ impl Failure {
     pub(crate) fn into_error(self, name: &str) -> Error {
         match self {
             Self::OutOfDate => Error::usage(name, "its window is changing; try again"),
-            Self::SurfaceLost => {
-                let message =
-                    "its window is gone; destroy the swapchain before its window, and make another one";
-                Error::usage(name, message)
-            }
+            Self::SurfaceLost => Error::SurfaceLost { swapchain: name.to_owned() },
             Self::Other(error) => error,
         }
     }

@@ -10,8 +10,11 @@ pub(crate) trait PresentBackend {
     /// Returns the size of new images; `None` if no image can be presented.
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure>;
 
-    /// Retires the swapchain and creates another surface for the window.
-    fn recreate_surface(&mut self) -> Result<(), Failure>;
+    /// Destroys the swapchain and its surface, if they are there.
+    fn release_surface(&mut self) -> Result<(), Failure>;
+
+    /// Creates a surface for the window, which has none.
+    fn create_surface(&mut self) -> Result<(), Failure>;
 
     /// Recreates the swapchain. On failure there is no swapchain.
     fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure>;
@@ -40,6 +43,10 @@ enum SwapchainStatus {
     Suboptimal,
     OutOfDate,
     SurfaceLost,
+    /// The surface is destroyed, and another one is to be created.
+    SurfaceReleased,
+    /// The surface is destroyed until the application has another window, or has its window back.
+    Suspended,
 }
 
 /// An image that the application has acquired.
@@ -62,7 +69,7 @@ pub(crate) struct SwapchainState {
 
 /// Maximum number of recreation steps. A window that changes faster than swapchains are created is left for the next
 /// frame.
-const ATTEMPTS: u32 = 4;
+const ATTEMPTS: u32 = 5;
 
 impl SwapchainState {
     /// Creates the state before the first swapchain.
@@ -115,6 +122,10 @@ impl SwapchainState {
                     lost = true;
                     self.status = SwapchainStatus::SurfaceLost;
                 }
+                Err(Failure::Other(error)) if self.status == SwapchainStatus::SurfaceReleased => {
+                    log::warn!("{name}: its window supports no other surface: {error}");
+                    return Err(Failure::SurfaceLost.into_error(name));
+                }
                 Err(Failure::Other(error)) => return Err(error),
             }
         }
@@ -125,10 +136,15 @@ impl SwapchainState {
     fn recreate<T>(&mut self, backend: &mut impl PresentBackend) -> Result<RecreateStep<T>, Failure> {
         match self.status {
             SwapchainStatus::SurfaceLost => {
-                self.acquired = None;
-                backend.recreate_surface()?;
+                (self.acquired, self.extent) = (None, None);
+                backend.release_surface()?;
+                self.status = SwapchainStatus::SurfaceReleased;
+            }
+            SwapchainStatus::SurfaceReleased => {
+                backend.create_surface()?;
                 self.status = SwapchainStatus::OutOfDate;
             }
+            SwapchainStatus::Suspended => return Ok(RecreateStep::Nothing),
             SwapchainStatus::OutOfDate => {
                 let Some(extent) = backend.extent()? else { return Ok(RecreateStep::Nothing) };
                 (self.acquired, self.extent) = (None, None);
@@ -143,6 +159,22 @@ impl SwapchainState {
             SwapchainStatus::Good => {}
         }
         Ok(RecreateStep::Again)
+    }
+
+    /// Destroys the surface. There are no images until [`resume`](Self::resume).
+    pub(crate) fn suspend(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
+        (self.acquired, self.extent) = (None, None);
+        self.status = SwapchainStatus::Suspended;
+        backend.release_surface().map_err(|failure| failure.into_error(name))
+    }
+
+    /// Creates the surface of the window that the engine has now, and the swapchain. On failure the swapchain is
+    /// suspended.
+    pub(crate) fn resume(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
+        self.suspend(name, backend)?;
+        backend.create_surface().map_err(|failure| failure.into_error(name))?;
+        self.status = SwapchainStatus::OutOfDate;
+        self.prepare(name, backend)
     }
 
     fn acquire(&mut self, backend: &mut impl PresentBackend) -> Result<Option<u32>, Failure> {
@@ -164,6 +196,7 @@ impl SwapchainState {
     pub(crate) fn record_present(&mut self, answer: Result<bool, Failure>) -> Result<()> {
         self.acquired = None;
         match (self.status, answer) {
+            (SwapchainStatus::Suspended | SwapchainStatus::SurfaceReleased, _) => {}
             (_, Err(Failure::Other(error))) => {
                 self.status = SwapchainStatus::OutOfDate;
                 return Err(error);
@@ -182,9 +215,14 @@ impl SwapchainState {
 
     /// Marks the swapchain for recreation before its next image.
     pub(crate) fn mark_out_of_date(&mut self) {
-        if self.status != SwapchainStatus::SurfaceLost {
+        if matches!(self.status, SwapchainStatus::Good | SwapchainStatus::Suboptimal) {
             self.status = SwapchainStatus::OutOfDate;
         }
+    }
+
+    /// True between [`suspend`](Self::suspend) and [`resume`](Self::resume).
+    pub(crate) fn is_suspended(&self) -> bool {
+        self.status == SwapchainStatus::Suspended
     }
 
     /// Returns the size of the images; `None` if there are none.
@@ -226,6 +264,8 @@ mod tests {
         script: VecDeque<SurfaceEvent>,
         window: [u32; 2],
         images: Option<[u32; 2]>,
+        has_surface: bool,
+        suspends: bool,
         lost: bool,
         /// True if the images no longer match the window, and the engine has reported that.
         told: bool,
@@ -242,6 +282,8 @@ mod tests {
                 script: script.into(),
                 window: [8, 8],
                 images: None,
+                has_surface: true,
+                suspends: false,
                 lost: false,
                 told: true,
                 asked: false,
@@ -286,6 +328,7 @@ mod tests {
 
     impl PresentBackend for Scripted {
         fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
+            assert!(self.has_surface, "there is no surface");
             self.happen();
             if self.lost {
                 return Err(Failure::SurfaceLost);
@@ -294,9 +337,15 @@ mod tests {
             Ok((!self.window.contains(&0)).then_some(self.window))
         }
 
-        fn recreate_surface(&mut self) -> Result<(), Failure> {
-            assert!(self.lost, "a surface that is there is not to be renewed");
-            (self.lost, self.images, self.acquired, self.told) = (false, None, None, true);
+        fn release_surface(&mut self) -> Result<(), Failure> {
+            assert!(self.lost || self.suspends, "a surface that is there is not to be renewed");
+            (self.has_surface, self.images, self.acquired) = (false, None, None);
+            Ok(())
+        }
+
+        fn create_surface(&mut self) -> Result<(), Failure> {
+            assert!(!self.has_surface, "a window takes no second surface");
+            (self.has_surface, self.lost, self.told) = (true, false, true);
             self.happen();
             Ok(())
         }
@@ -332,6 +381,8 @@ mod tests {
         Present,
         Drop,
         Resize,
+        /// The window goes away, and comes back with the next frame of this kind.
+        Suspend,
     }
 
     fn event() -> impl Strategy<Value = SurfaceEvent> {
@@ -346,7 +397,7 @@ mod tests {
     }
 
     fn frames() -> impl Strategy<Value = Vec<ScriptedFrame>> {
-        let frame = prop_oneof![5 => Just(ScriptedFrame::Present), 1 => Just(ScriptedFrame::Drop), 1 => Just(ScriptedFrame::Resize)];
+        let frame = prop_oneof![5 => Just(ScriptedFrame::Present), 1 => Just(ScriptedFrame::Drop), 1 => Just(ScriptedFrame::Resize), 1 => Just(ScriptedFrame::Suspend)];
         prop::collection::vec(frame, 1..40)
     }
 
@@ -355,6 +406,14 @@ mod tests {
             if matches!(frame, ScriptedFrame::Resize) {
                 state.mark_out_of_date();
                 backend.asked = true;
+            }
+            if matches!(frame, ScriptedFrame::Suspend) {
+                suspend_or_resume(state, backend);
+            }
+            if state.is_suspended() {
+                assert_eq!(state.acquire_image("window", backend).unwrap(), None);
+                assert_eq!((state.extent(), backend.has_surface), (None, false));
+                continue;
             }
             // A window lost twice in one frame counts as destroyed.
             let Ok(Some(acquired)) = state.acquire_image("window", backend) else { continue };
@@ -369,6 +428,17 @@ mod tests {
         }
     }
 
+    fn suspend_or_resume(state: &mut SwapchainState, backend: &mut Scripted) {
+        backend.suspends = true;
+        if state.is_suspended() {
+            // The new window may be lost at once. Then its surface is to be replaced as at any other time.
+            let _ = state.resume("window", backend);
+        } else {
+            state.suspend("window", backend).unwrap();
+        }
+        backend.suspends = false;
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, cases: 2000, ..ProptestConfig::default() })]
 
@@ -381,6 +451,9 @@ mod tests {
             let (mut state, mut backend) = (SwapchainState::new(), Scripted::new(script));
             play(&mut state, &mut backend, &frames);
             backend.script.clear();
+            if state.is_suspended() {
+                suspend_or_resume(&mut state, &mut backend);
+            }
             backend.window = backend.window.map(|side| side.max(1));
             play(&mut state, &mut backend, &[ScriptedFrame::Present; 4]);
             let rebuilds = backend.rebuilds;
@@ -406,6 +479,54 @@ mod tests {
         backend.window = [4, 4];
         assert!(state.acquire_image("window", &mut backend).unwrap().is_some());
         assert_eq!((backend.rebuilds, state.extent()), (1, Some([4, 4])));
+    }
+
+    #[test]
+    fn a_suspended_swapchain_has_no_surface_and_its_image_is_no_longer_valid() {
+        let (mut state, mut backend) = (SwapchainState::new(), Scripted::new(Vec::new()));
+        let first = state.acquire_image("window", &mut backend).unwrap().unwrap();
+        suspend_or_resume(&mut state, &mut backend);
+        assert_eq!(state.acquired_index(first.ticket), None);
+        state.mark_out_of_date();
+        state.record_present(Err(Failure::OutOfDate)).unwrap();
+        assert_eq!(state.acquire_image("window", &mut backend).unwrap(), None);
+        assert!(state.is_suspended() && !backend.has_surface);
+        backend.window = [3, 5];
+        suspend_or_resume(&mut state, &mut backend);
+        assert_eq!((state.extent(), backend.rebuilds), (Some([3, 5]), 2));
+        let second = state.acquire_image("window", &mut backend).unwrap().unwrap();
+        assert!(second.ticket > first.ticket);
+    }
+
+    #[test]
+    fn a_window_that_takes_no_surface_leaves_the_swapchain_suspended() {
+        struct Refusing;
+        impl PresentBackend for Refusing {
+            fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
+                panic!("there is no surface")
+            }
+            fn release_surface(&mut self) -> Result<(), Failure> {
+                Ok(())
+            }
+            fn create_surface(&mut self) -> Result<(), Failure> {
+                Err(Error::unsupported("presentation to this window", "a test").into())
+            }
+            fn recreate_swapchain(&mut self, _: [u32; 2]) -> Result<(), Failure> {
+                panic!("there is no surface")
+            }
+            fn acquire(&mut self) -> Result<Acquired, Failure> {
+                panic!("there is no surface")
+            }
+        }
+        let mut state = SwapchainState::new();
+        let error = state.resume("window", &mut Refusing).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }), "{error:?}");
+        assert!(state.is_suspended());
+        assert_eq!(state.acquire_image("window", &mut Refusing).unwrap(), None);
+        // The window of a lost surface has had one before, so its refusal is a loss.
+        state.status = SwapchainStatus::SurfaceLost;
+        let error = state.acquire_image("window", &mut Refusing).unwrap_err();
+        assert!(matches!(error, Error::SurfaceLost { .. }), "{error:?}");
     }
 
     #[test]

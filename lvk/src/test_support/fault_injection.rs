@@ -1,4 +1,4 @@
-//! Fault injection: devices whose queues can refuse a submission, to test the library's error handling.
+//! Fault injection: devices that can refuse a submission or an allocation, to test the library's error handling.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_char};
@@ -11,11 +11,13 @@ thread_local! {
     static SUBMIT: Cell<Option<vk::PFN_vkQueueSubmit2>> = const { Cell::new(None) };
     /// Submissions of this thread before the one that fails.
     static SUBMITS_LEFT: Cell<Option<u32>> = const { Cell::new(None) };
+    static ALLOCATE: Cell<Option<vk::PFN_vkAllocateMemory>> = const { Cell::new(None) };
+    static IS_OUT_OF_MEMORY: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs `make`. Queues of the device that it creates can fail on this thread, until this function creates another
-/// device.
-pub(crate) fn with_failing_queues<T>(make: impl FnOnce() -> T) -> T {
+/// Runs `make`. Queues and allocations of the device that it creates can fail on this thread, until this function
+/// creates another device.
+pub(crate) fn with_failing_device<T>(make: impl FnOnce() -> T) -> T {
     INJECT_FAULTS.set(true);
     let made = make();
     INJECT_FAULTS.set(false);
@@ -25,6 +27,11 @@ pub(crate) fn with_failing_queues<T>(make: impl FnOnce() -> T) -> T {
 /// Makes one submission of this thread fail, after `submissions` that succeed.
 pub(crate) fn fail_after(submissions: u32) {
     SUBMITS_LEFT.set(Some(submissions));
+}
+
+/// Makes all allocations of device memory by this thread fail, or succeed again.
+pub(crate) fn set_out_of_memory(is_out_of_memory: bool) {
+    IS_OUT_OF_MEMORY.set(is_out_of_memory);
 }
 
 /// Returns the instance unchanged, or one whose devices can fail.
@@ -44,13 +51,35 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
     let real = REAL.get()?;
     // SAFETY: the caller's device and name are passed to the real function; the name ends with a zero.
     let (found, name) = unsafe { (real(device, name), CStr::from_ptr(name)) };
-    if name != c"vkQueueSubmit2" {
-        return found;
-    }
-    // SAFETY: the function of this name has this type, and both have the size of a pointer.
+    // SAFETY: the functions of these names have these types, and all have the size of a pointer.
     unsafe {
-        SUBMIT.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkQueueSubmit2>>(found));
-        Some(std::mem::transmute::<vk::PFN_vkQueueSubmit2, unsafe extern "system" fn()>(submit))
+        if name == c"vkQueueSubmit2" {
+            SUBMIT.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkQueueSubmit2>>(found));
+            return Some(std::mem::transmute::<vk::PFN_vkQueueSubmit2, unsafe extern "system" fn()>(submit));
+        }
+        if name == c"vkAllocateMemory" {
+            ALLOCATE
+                .set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkAllocateMemory>>(found));
+            return Some(std::mem::transmute::<vk::PFN_vkAllocateMemory, unsafe extern "system" fn()>(
+                allocate,
+            ));
+        }
+    }
+    found
+}
+
+/// # Safety
+/// As `vkAllocateMemory`, on the thread that created the device.
+unsafe extern "system" fn allocate(
+    device: vk::Device,
+    info: *const vk::MemoryAllocateInfo<'_>,
+    callbacks: *const vk::AllocationCallbacks<'_>,
+    memory: *mut vk::DeviceMemory,
+) -> vk::Result {
+    match ALLOCATE.get() {
+        // SAFETY: the caller upholds the contract of `vkAllocateMemory`.
+        Some(real) if !IS_OUT_OF_MEMORY.get() => unsafe { real(device, info, callbacks, memory) },
+        _ => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
     }
 }
 

@@ -19,15 +19,21 @@ pub fn null_command_context(desc: &ContextDesc<'_>) -> Result<Context> {
     with_null_commands(|| Context::new(desc))
 }
 
-/// Runs `make`. Submissions can fail for the context that it creates, as long as this thread uses it.
+/// Runs `make`. Submissions and allocations can fail for the context that it creates, as long as this thread uses it.
 pub fn with_fault_injection<T>(make: impl FnOnce() -> T) -> T {
-    fault_injection::with_failing_queues(make)
+    fault_injection::with_failing_device(make)
 }
 
 /// Makes one submission of this thread fail, after `submissions` queue submissions that succeed. The context must be
 /// created by [`with_fault_injection`].
 pub fn fail_submission_after(submissions: u32) {
     fault_injection::fail_after(submissions);
+}
+
+/// Makes all allocations of device memory by this thread fail, or succeed again. The context must be created by
+/// [`with_fault_injection`].
+pub fn set_out_of_memory(is_out_of_memory: bool) {
+    fault_injection::set_out_of_memory(is_out_of_memory);
 }
 
 /// Runs `hook` on this thread right before it acquires its next command buffer, in place of another thread.

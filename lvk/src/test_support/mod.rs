@@ -4,6 +4,8 @@
 pub(crate) mod fault_injection;
 pub mod hooks;
 pub(crate) mod null_commands;
+#[cfg(test)]
+pub(crate) mod scattered_bounds;
 #[cfg(feature = "software-ray-query")]
 pub(crate) mod software_ray_query;
 pub(crate) mod submit_hook;

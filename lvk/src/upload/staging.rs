@@ -22,8 +22,8 @@ pub(crate) struct StagingRegion {
 }
 
 /// A range of a page for small regions of one command buffer, allocated without the lock. No other region overlaps it.
-#[derive(Default)]
 pub(crate) struct StagingChunk {
+    memory: ChunkMemory,
     /// Keeps the mapping alive.
     _page: Option<Arc<Buffer>>,
     /// Host mapping of the page, and the device address of its first byte.
@@ -33,16 +33,32 @@ pub(crate) struct StagingChunk {
     end: u64,
 }
 
+/// Memory that a [`StagingChunk`] is allocated from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ChunkMemory {
+    /// Cached by the host, for data that the GPU reads once. Small writes to uncached memory cost far more than their
+    /// bytes: the next lock operation waits until they have crossed the bus.
+    Cached,
+    /// Nearest to the GPU, for data that many invocations read.
+    NearGpu,
+}
+
 impl StagingChunk {
     const BYTES: u64 = 4 << 10;
     /// Larger regions are allocated from pages.
     pub(crate) const MAX_BYTES: u64 = Self::BYTES / 4;
 
-    /// Creates a chunk that begins at this offset of a page.
-    fn new(page: Arc<Buffer>, offset: u64) -> Self {
-        let next = page.address + offset;
-        let mapping = page.mapping().map(|mapping| (mapping, page.address));
-        Self { _page: Some(page), mapping, next, end: next + Self::BYTES }
+    /// Creates a full chunk, which holds no memory.
+    pub(crate) fn new(memory: ChunkMemory) -> Self {
+        Self { memory, _page: None, mapping: None, next: 0, end: 0 }
+    }
+
+    /// Replaces the memory by a range that begins at this offset of a page.
+    fn renew(&mut self, page: Arc<Buffer>, offset: u64) {
+        self.next = page.address + offset;
+        self.end = self.next + Self::BYTES;
+        self.mapping = page.mapping().map(|mapping| (mapping, page.address));
+        self._page = Some(page);
     }
 
     /// Allocates a region at an address with this alignment, a power of two. Returns its device address and its bytes
@@ -65,15 +81,14 @@ impl StagingChunk {
 pub(crate) struct Staging {
     /// Pages in the host-visible memory nearest to the GPU.
     pages: StagingPool<Buffer>,
-    /// Cached pages, for chunks. Small writes to uncached memory cost far more than their bytes: the next lock
-    /// operation waits until they have crossed the bus.
+    /// Cached pages, for chunks of [`ChunkMemory::Cached`].
     cached: StagingPool<Buffer>,
     kept_bytes: u64,
     gpu: Arc<Gpu>,
 }
 
 impl Staging {
-    /// Size of a page. A larger region gets a page of its own.
+    /// Largest size of a page. A larger region gets a page of its own.
     const PAGE_BYTES: u64 = 4 << 20;
     const MIN_PAGE_BYTES: u64 = 64 << 10;
     /// Bytes of cached memory that are kept.
@@ -82,9 +97,16 @@ impl Staging {
     /// Creates staging memory that keeps `bytes` of pages.
     pub(crate) fn new(gpu: &Arc<Gpu>, bytes: u64) -> Self {
         let kept_bytes = bytes.max(Self::MIN_PAGE_BYTES);
-        let pages = StagingPool::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes);
+        // Several pages, so that one is filled while the GPU still reads the others.
+        let page_bytes = (kept_bytes / 4).clamp(Self::MIN_PAGE_BYTES, Self::PAGE_BYTES);
+        let pages = StagingPool::new(page_bytes, kept_bytes);
         let cached = StagingPool::new(Self::MIN_PAGE_BYTES, Self::KEPT_CACHED_BYTES);
         Self { pages, cached, kept_bytes, gpu: Arc::clone(gpu) }
+    }
+
+    /// Returns the bytes of pages that are kept for reuse.
+    pub(crate) fn kept_bytes(&self) -> u64 {
+        self.kept_bytes
     }
 
     /// Returns half of the kept bytes: one half may be pending while the other is copied.
@@ -137,10 +159,13 @@ impl Staging {
     /// Replaces a full chunk by a new one.
     #[inline(never)]
     fn renew_chunk(&self, chunk: &mut StagingChunk, sequence: u64) -> Result<()> {
-        let make = |size| new_page(&self.gpu, size, MemoryKind::Readback);
-        let (place, buffer) =
-            self.cached.allocate(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence), make)?;
-        *chunk = StagingChunk::new(buffer, place.offset);
+        let (pages, memory) = match chunk.memory {
+            ChunkMemory::Cached => (&self.cached, MemoryKind::Readback),
+            ChunkMemory::NearGpu => (&self.pages, MemoryKind::HostVisible),
+        };
+        let make = |size| new_page(&self.gpu, size, memory);
+        let (place, buffer) = pages.allocate(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence), make)?;
+        chunk.renew(buffer, place.offset);
         Ok(())
     }
 

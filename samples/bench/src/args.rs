@@ -45,14 +45,8 @@ pub struct BenchArgs {
     pub(super) list_devices: bool,
 
     /// Print the scenes that `paper --scenes` accepts by name, and exit; searches FOLDER, by default the folder in LVK_SCENES
-    #[arg(
-        long,
-        value_name = "FOLDER",
-        num_args = 0..=1,
-        default_missing_value = "",
-        value_parser = clap::value_parser!(OsString),
-        global = true
-    )]
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "")]
+    #[arg(value_parser = clap::value_parser!(OsString), global = true)]
     pub(super) list_scenes: Option<OsString>,
 
     /// Run with Vulkan validation; a message is an error, and times are not meaningful
@@ -103,12 +97,8 @@ pub(super) struct MeshArgs {
     pub(super) scene: Option<PathBuf>,
 
     /// Triangles of the generated mesh [default: by benchmark and device]
-    #[arg(
-        long,
-        value_name = "N",
-        conflicts_with = "scene",
-        value_parser = clap::value_parser!(u32).range(500..=100_000_000)
-    )]
+    #[arg(long, value_name = "N", conflicts_with = "scene")]
+    #[arg(value_parser = clap::value_parser!(u32).range(500..=100_000_000))]
     pub(super) triangles: Option<u32>,
 }
 

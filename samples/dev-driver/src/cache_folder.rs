@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     /// The folder where variables have the given paths below an absolute folder, and that folder is removed from it.
-    fn of(convention: Convention, variables: &[(&str, &str)]) -> Option<PathBuf> {
+    fn folder_with(convention: Convention, variables: &[(&str, &str)]) -> Option<PathBuf> {
         let root = env::temp_dir();
         let value = |name: &str| {
             let (_, path) = variables.iter().find(|(key, _)| *key == name)?;
@@ -68,17 +68,20 @@ mod tests {
     fn each_platform_has_its_folder() {
         let all =
             [("HOME", "home"), ("XDG_CACHE_HOME", "xdg"), ("LOCALAPPDATA", "data"), ("USERPROFILE", "u")];
-        assert_eq!(of(Convention::Xdg, &all), Some("xdg/lvk".into()));
-        assert_eq!(of(Convention::Apple, &all), Some("home/Library/Caches/lvk".into()));
-        assert_eq!(of(Convention::Windows, &all), Some("data/lvk".into()));
+        assert_eq!(folder_with(Convention::Xdg, &all), Some("xdg/lvk".into()));
+        assert_eq!(folder_with(Convention::Apple, &all), Some("home/Library/Caches/lvk".into()));
+        assert_eq!(folder_with(Convention::Windows, &all), Some("data/lvk".into()));
     }
 
     #[test]
     fn the_home_folder_serves_without_the_variable() {
-        assert_eq!(of(Convention::Xdg, &[("HOME", "home")]), Some("home/.cache/lvk".into()));
-        assert_eq!(of(Convention::Windows, &[("USERPROFILE", "u")]), Some("u/AppData/Local/lvk".into()));
+        assert_eq!(folder_with(Convention::Xdg, &[("HOME", "home")]), Some("home/.cache/lvk".into()));
+        assert_eq!(
+            folder_with(Convention::Windows, &[("USERPROFILE", "u")]),
+            Some("u/AppData/Local/lvk".into())
+        );
         for convention in [Convention::Xdg, Convention::Apple, Convention::Windows] {
-            assert_eq!(of(convention, &[]), None);
+            assert_eq!(folder_with(convention, &[]), None);
         }
     }
 

@@ -2,8 +2,11 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use crate::platform::{INSTALL_DRIVER, INSTALL_LAYER, INSTALL_LOADER};
+use lvk::VulkanReport;
+
+use crate::platform::{INSTALL_DRIVER, INSTALL_LAYER};
 
 /// An error of [`prepare`](crate::prepare) and of the other functions of this crate.
 #[derive(Debug, thiserror::Error)]
@@ -11,9 +14,12 @@ use crate::platform::{INSTALL_DRIVER, INSTALL_LAYER, INSTALL_LOADER};
 pub enum DriverError {
     /// The system has no driver with ray tracing, and the software driver could not be downloaded.
     #[error(
-        "no Vulkan driver with ray tracing was found and none can be downloaded because {cause}; {INSTALL_DRIVER}"
+        "no Vulkan driver with ray tracing was found{} and none can be downloaded because {cause}; {INSTALL_DRIVER}",
+        in_brackets(system.as_deref())
     )]
     NoDriver {
+        /// Report of the system's loader, drivers and devices. `None` if they were not wanted.
+        system: Option<Arc<VulkanReport>>,
         /// Error of the download.
         #[source]
         cause: DownloadError,
@@ -46,11 +52,11 @@ pub enum DriverError {
     },
     /// `LVK_DRIVER=system` is set, but the system has no Vulkan loader.
     #[error(
-        "LVK_DRIVER=system, but this system has no Vulkan loader ({reason}); {INSTALL_LOADER}, or unset LVK_DRIVER"
+        "LVK_DRIVER=system, but this system has no Vulkan loader ({report}); follow a remedy, or unset LVK_DRIVER"
     )]
     NoSystemLoader {
-        /// The dynamic linker's message.
-        reason: String,
+        /// Report of the loader and the drivers.
+        report: Arc<VulkanReport>,
     },
     /// An environment variable has an unknown value.
     #[error("{name}={value} is not valid; expected {expected}")]
@@ -63,7 +69,7 @@ pub enum DriverError {
         expected: &'static str,
     },
     /// A downloaded file cannot be used.
-    #[error("the downloaded {} cannot be used: {reason}; delete its folder and start again", path.display())]
+    #[error("the downloaded {} cannot be used: {reason}; {}", path.display(), remedy(reason))]
     Broken {
         /// The downloaded file.
         path: PathBuf,
@@ -120,9 +126,61 @@ pub enum DownloadError {
     },
 }
 
+impl DriverError {
+    /// Adds the report of the system's Vulkan to the lack of a driver.
+    pub(super) fn with_system(self, system: Option<Arc<VulkanReport>>) -> Self {
+        match self {
+            Self::NoDriver { cause, .. } => Self::NoDriver { cause, system },
+            error => error,
+        }
+    }
+}
+
+fn in_brackets(system: Option<&VulkanReport>) -> String {
+    system.map(|system| format!(" ({system})")).unwrap_or_default()
+}
+
+/// Returns the remedy for a file that cannot be used. A lack of memory or of file descriptors is no defect of the file.
+fn remedy(reason: &str) -> &'static str {
+    let is_short = |text: &str| reason.contains(text);
+    let shortages = ["Too many open files", "annot allocate memory", "Out of memory", "out of memory"];
+    let is_unmapped = is_short("failed to map segment") && !is_short("not permitted");
+    if is_unmapped || shortages.into_iter().any(is_short) {
+        "free memory, or raise the limits of the process (ulimit -a)"
+    } else {
+        "delete its folder and start again"
+    }
+}
+
 impl DownloadError {
     /// Returns a closure for `map_err` that adds the file and the attempted operation.
     pub(super) fn file<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> Self + 'a {
         move |source| Self::File { action, path: path.to_path_buf(), source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shortages_do_not_advise_to_delete_the_driver() {
+        let text = |reason: &str| {
+            DriverError::Broken { path: "/d/libtoy.so".into(), reason: reason.to_owned() }.to_string()
+        };
+        for reason in [
+            "libtoy.so: cannot open shared object file: Too many open files",
+            "libtoy.so: failed to map segment from shared object",
+            "libtoy.so: cannot create shared object descriptor: Cannot allocate memory",
+            "libtoy.so: cannot allocate memory in static TLS block",
+        ] {
+            assert!(text(reason).ends_with("(ulimit -a)"), "{}", text(reason));
+        }
+        for reason in [
+            "libtoy.so: invalid ELF header",
+            "libtoy.so: failed to map segment from shared object: Operation not permitted",
+        ] {
+            assert!(text(reason).ends_with("delete its folder and start again"), "{}", text(reason));
+        }
     }
 }

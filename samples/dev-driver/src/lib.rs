@@ -34,7 +34,9 @@ mod settings;
 mod system_vulkan;
 
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lvk::VulkanReport;
 
 pub use cache_folder::cache_folder;
 pub use display::VirtualDisplay;
@@ -61,6 +63,8 @@ pub struct Driver {
     pub loader: Option<PathBuf>,
     /// Origin of the driver.
     pub origin: DriverOrigin,
+    /// Report of the system's Vulkan, where the downloaded driver takes its place because it cannot trace rays.
+    pub system: Option<Arc<VulkanReport>>,
 }
 
 /// Origin of a [`Driver`].
@@ -86,7 +90,7 @@ struct Prepared {
 /// Provides a Vulkan driver to this process. Downloads a software driver if the system has none with ray tracing.
 ///
 /// Call this function before the first Vulkan call, from any thread. Later calls return the same driver at no cost. The
-/// function sets `VK_DRIVER_FILES` for a downloaded driver and adds the folder of the downloaded layer to
+/// function prints one line with the reason if it takes the downloaded driver for lack of another. It sets `VK_DRIVER_FILES` for a downloaded driver and adds the folder of the downloaded layer to
 /// `VK_ADD_LAYER_PATH`.
 ///
 /// # Errors
@@ -144,10 +148,17 @@ impl Prepared {
         let system = SystemVulkan::open();
         let has_layer = system.as_ref().is_ok_and(|system| request.validation && system.has_current_layer());
         let source = choose_source(&settings, system)?;
+        let report = source.replaces_system(&settings).then(|| Arc::new(system_vulkan::report()));
         let layer = [Component::Validation].into_iter().filter(|_| request.validation && !has_layer);
         let components: Vec<Component> = source.required_component().into_iter().chain(layer).collect();
-        ensure_installed(&settings, &components)?;
-        let driver = source.activate(&settings)?;
+        ensure_installed(&settings, &components).map_err(|error| {
+            let no_loader = (source == DriverSource::UserDrivers).then(|| Arc::new(system_vulkan::report()));
+            error.with_system(no_loader.or_else(|| report.clone()))
+        })?;
+        let driver = Driver { system: report, ..source.activate(&settings)? };
+        if let Some(report) = &driver.system {
+            eprintln!("lvk: a software driver is used, because {}", report.summary());
+        }
         loader_environment::set_variables(&settings, &driver);
         Ok(Self { settings, driver, has_layer: request.validation })
     }
@@ -171,7 +182,9 @@ fn choose_source(
     match (settings.preference, system) {
         (DriverPreference::Software, _) => Ok(DriverSource::Software),
         (DriverPreference::System, Ok(_)) => Ok(DriverSource::System),
-        (DriverPreference::System, Err(reason)) => Err(DriverError::NoSystemLoader { reason }),
+        (DriverPreference::System, Err(_)) => {
+            Err(DriverError::NoSystemLoader { report: Arc::new(system_vulkan::report()) })
+        }
         (DriverPreference::Auto, Ok(_)) if settings.user_driver_files().is_some() => Ok(DriverSource::System),
         (DriverPreference::Auto, Err(_)) if settings.user_driver_files().is_some() => {
             Ok(DriverSource::UserDrivers)
@@ -191,18 +204,25 @@ impl DriverSource {
         (self != Self::System).then_some(Component::Driver)
     }
 
+    /// True if the software driver is used because the system's drivers do not serve, and not because it is asked for.
+    fn replaces_system(self, settings: &Settings) -> bool {
+        self == Self::Software
+            && settings.preference == DriverPreference::Auto
+            && settings.driver_files.is_none()
+    }
+
     /// Loads the driver's libraries into this process where it was downloaded.
     fn activate(self, settings: &Settings) -> Result<Driver, DriverError> {
         if self == Self::System {
-            return Ok(Driver { loader: None, origin: DriverOrigin::System });
+            return Ok(Driver { loader: None, origin: DriverOrigin::System, system: None });
         }
         let folder = installed_folder(Component::Driver, settings)?;
         let loader = Some(folder.join(layout::LOADER));
         if self == Self::UserDrivers {
-            return Ok(Driver { loader, origin: DriverOrigin::System });
+            return Ok(Driver { loader, origin: DriverOrigin::System, system: None });
         }
         library_preload::preload(&folder, &Manifest::read(&folder).unwrap_or_default().preload)?;
-        Ok(Driver { loader, origin: DriverOrigin::Downloaded { folder } })
+        Ok(Driver { loader, origin: DriverOrigin::Downloaded { folder }, system: None })
     }
 }
 
@@ -240,7 +260,7 @@ fn download_components(settings: &Settings, missing: &[Component]) -> Result<(),
 
 fn driver_error(component: Component, cause: DownloadError) -> DriverError {
     match component {
-        Component::Driver => DriverError::NoDriver { cause },
+        Component::Driver => DriverError::NoDriver { cause, system: None },
         Component::Validation => DriverError::NoValidationLayer { cause },
         Component::Radv => DriverError::NoRadv { cause },
         Component::Display => DriverError::NoDisplay { cause },
@@ -274,7 +294,19 @@ mod tests {
         assert_eq!(choose(DriverPreference::Auto, Some("/own.json")).unwrap(), DriverSource::UserDrivers);
         assert_eq!(choose(DriverPreference::Software, Some("/own.json")).unwrap(), DriverSource::Software);
         let message = choose(DriverPreference::System, None).unwrap_err().to_string();
-        assert!(message.contains("LVK_DRIVER=system") && message.contains("no such library"), "{message}");
+        assert!(message.contains("LVK_DRIVER=system") && message.contains("the loader"), "{message}");
+    }
+
+    #[test]
+    fn only_an_unwanted_replacement_of_the_system_is_explained() {
+        let folder = tempfile::tempdir().unwrap();
+        let replaces = |source: DriverSource, preference, files| {
+            source.replaces_system(&settings(preference, folder.path(), files))
+        };
+        assert!(replaces(DriverSource::Software, DriverPreference::Auto, None));
+        assert!(!replaces(DriverSource::Software, DriverPreference::Software, None));
+        assert!(!replaces(DriverSource::Software, DriverPreference::Auto, Some("/ours.json")));
+        assert!(!replaces(DriverSource::System, DriverPreference::Auto, None));
     }
 
     #[test]
@@ -299,7 +331,7 @@ mod tests {
         assert_eq!(installed_folder(Component::Driver, &settings).unwrap(), folder);
         settings.has_packages = false;
         let error = installed_folder(Component::Driver, &settings).unwrap_err();
-        assert!(matches!(error, DriverError::NoDriver { cause: DownloadError::Platform }), "{error}");
+        assert!(matches!(error, DriverError::NoDriver { cause: DownloadError::Platform, .. }), "{error}");
         assert!(error.to_string().contains(platform::INSTALL_DRIVER), "{error}");
     }
 

@@ -22,7 +22,3 @@ pub(super) const INSTALL_LAYER: &str = if HAS_PACKAGES {
 } else {
     "install the Vulkan SDK 1.3.296 or newer, which brings VK_LAYER_KHRONOS_validation"
 };
-
-/// Advice where there is no Vulkan loader.
-pub(super) const INSTALL_LOADER: &str =
-    if HAS_PACKAGES { "install `libvulkan1` and a driver" } else { INSTALL_DRIVER };

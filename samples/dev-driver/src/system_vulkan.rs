@@ -1,6 +1,7 @@
 //! Queries the capabilities of the system's Vulkan installation.
 
 use ash::{Entry, Instance, vk};
+use lvk::{Context, VulkanReport};
 
 use crate::layer_json::LAYER_NAME;
 
@@ -43,6 +44,15 @@ impl SystemVulkan {
             layer.layer_name_as_c_str() == Ok(LAYER_NAME) && layer.spec_version >= MIN_LAYER_VERSION
         })
     }
+}
+
+/// Reports the system's loader, drivers and devices, none of which traces rays.
+pub(super) fn report() -> VulkanReport {
+    let mut report = Context::vulkan_report(None);
+    for device in &mut report.devices {
+        device.missing.push("ray tracing".to_owned());
+    }
+    report
 }
 
 fn can_trace(instance: &Instance, device: vk::PhysicalDevice) -> bool {

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use lvk::ContextDesc;
 
+use super::run_args::RunArgs;
+
 /// Names the folder; empty, nothing is kept.
 pub const VARIABLE: &str = "LVK_CACHE";
 
@@ -19,8 +21,12 @@ pub(super) struct Caches {
 
 impl Caches {
     /// Makes the folder for the sample called `name`; `None`, with a warning, where that fails, and where none is wished for.
-    pub(super) fn open(name: &str) -> Option<Self> {
-        let folder = folder(std::env::var_os(VARIABLE), lvk_dev_driver::cache_folder())?;
+    pub(super) fn open(name: &str, args: &RunArgs) -> Option<Self> {
+        if args.no_cache {
+            return None;
+        }
+        let usual = || folder(std::env::var_os(VARIABLE), lvk_dev_driver::cache_folder());
+        let folder = args.cache.clone().or_else(usual)?;
         match std::fs::create_dir_all(&folder) {
             Ok(()) => Some(Self::below(&folder, name)),
             Err(error) => {

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use lvk::{Context, ValidationSink, WindowHandles};
+use winit::event_loop::{EventLoop, EventLoopBuilder};
 
 use super::caches::Caches;
 use super::device::{self, DeviceNeeds};
@@ -91,9 +92,20 @@ pub fn parse<S: SampleInfo>(
 /// Runs the program of a sample with the arguments of the process.
 #[must_use]
 pub fn main<S: SampleInfo>() -> ExitCode {
-    match parse::<S>(std::env::args_os()) {
-        Ok(args) => run::<S>(&args),
-        Err(error) => error.exit(),
+    main_with::<S>(std::env::args_os().collect(), &mut EventLoop::builder())
+}
+
+/// Runs the program of a sample with other arguments, of which the first is its name, and another event loop for its
+/// window.
+#[must_use]
+pub fn main_with<S: SampleInfo>(words: Vec<OsString>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
+    match parse::<S>(words) {
+        Ok(args) => run_with::<S>(&args, event_loop),
+        Err(error) => {
+            // A closed pipe is no reason for another status.
+            let _ = error.print();
+            ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+        }
     }
 }
 
@@ -101,12 +113,16 @@ pub fn main<S: SampleInfo>() -> ExitCode {
 /// the images were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run<S: SampleInfo>(args: &CommandLine<S::Args>) -> ExitCode {
+    run_with::<S>(args, &mut EventLoop::builder())
+}
+
+fn run_with<S: SampleInfo>(args: &CommandLine<S::Args>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
     if let Some(listing) = S::listing(&args.sample) {
         print_line(&listing);
         return ExitCode::SUCCESS;
     }
     library_warnings::print();
-    match attempt(S::NAME, &args.run, |setup| S::open(&args.sample, setup)) {
+    match attempt(event_loop, S::NAME, &args.run, |setup| S::open(&args.sample, setup)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -206,7 +222,7 @@ impl<'a> SampleSetup<'a> {
     /// not exist.
     #[must_use]
     pub fn structure_cache(&self) -> Option<PathBuf> {
-        let caches = if self.args.no_cache { None } else { Caches::open(self.name) };
+        let caches = Caches::open(self.name, self.args);
         caches.map(|caches| caches.structures().to_owned())
     }
 
@@ -227,6 +243,7 @@ pub(crate) fn warn(warnings: &[String]) {
 }
 
 fn attempt<S: Sample>(
+    event_loop: &mut EventLoopBuilder<()>,
     name: &str,
     args: &RunArgs,
     make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
@@ -235,7 +252,7 @@ fn attempt<S: Sample>(
         return device::list(args.profile.as_ref());
     }
     if args.window {
-        return show(name, args, make);
+        return show(event_loop, name, args, make);
     }
     let out = args.out_or(name);
     let mut job = RenderJob {
@@ -271,6 +288,7 @@ fn attempt<S: Sample>(
 }
 
 fn show<S: Sample>(
+    event_loop: &mut EventLoopBuilder<()>,
     name: &str,
     args: &RunArgs,
     make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
@@ -285,7 +303,7 @@ fn show<S: Sample>(
         shader_folder::set_folder(folder).map_err(|folder| RunError::NoShaders { folder })?;
     }
     let sink = ValidationSink::default();
-    window::run(name, args, &sink, make)?;
+    window::run(event_loop, name, args, &sink, make)?;
     args.validate.map_or(Ok(()), |_| device::report_validation(&sink))
 }
 

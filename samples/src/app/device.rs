@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use lvk::{
-    Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, OptionalFeature, RayQueryPath,
-    RayQueryRequest, ValidationSink, WindowHandles, YuvConversion,
+    Capabilities, Context, ContextDesc, DeviceCandidate, DeviceProfile, FeatureRequest, OptionalFeature,
+    RayQueryPath, RayQueryRequest, ValidationSink, WindowHandles, YuvConversion,
 };
 
 use super::caches::Caches;
@@ -12,7 +12,7 @@ use super::print_line;
 use super::ray_args::RayTracing;
 use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
-use lvk_dev_driver::{self as driver, Driver, DriverRequest};
+use lvk_dev_driver::{self as driver, Driver, DriverError, DriverRequest};
 
 /// Requirements of a sample on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -47,7 +47,7 @@ pub(super) fn open(
 ) -> Result<Context, RunError> {
     use FeatureRequest::{Off, Optional, Required};
     use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
-    let caches = if args.no_cache { None } else { Caches::open(name) };
+    let caches = Caches::open(name, args);
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
             application_name: name,
@@ -86,11 +86,18 @@ pub(super) fn open(
 /// Names the way that needs no queries of the device, if these are what it lacks.
 fn without_queries(error: lvk::Error) -> RunError {
     match error {
-        lvk::Error::NoDevice { reasons } if reasons.contains("ray queries") => {
-            RunError::NoRayQueries { reasons }
+        lvk::Error::NoDevice { problem, candidates, .. } if candidates.iter().any(lacks_ray_queries) => {
+            let devices = candidates.iter().map(DeviceCandidate::to_string);
+            let reasons: Vec<_> = problem.into_iter().chain(devices).collect();
+            RunError::NoRayQueries { reasons: reasons.join("; ") }
         }
         error => error.into(),
     }
+}
+
+/// True if ray queries are missing, or hidden by a profile.
+fn lacks_ray_queries(device: &DeviceCandidate) -> bool {
+    device.missing.iter().any(|what| what.starts_with("ray queries"))
 }
 
 /// Describes the chosen path, and the reason.
@@ -104,19 +111,44 @@ fn choice(capabilities: &Capabilities) -> String {
     }
 }
 
-/// Prints the devices, one per line, as `profile` limits them.
+/// Prints the devices, one per line, as `profile` limits them. Without a device that can be used, prints the report of loader,
+/// drivers and devices; so it does below the software driver that takes their place.
 ///
 /// # Errors
-/// [`RunError`] if no driver can be prepared or Vulkan cannot list its devices.
+/// [`RunError`] for wrong variables, a damaged driver, and failures of Vulkan other than the lack of a device.
 pub fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
-    let driver = driver::prepare(&DriverRequest::default())?;
-    for (number, mut device) in Context::devices(driver.loader.as_deref())?.into_iter().enumerate() {
-        if let Some(profile) = profile {
-            profile.apply(&mut device);
+    let driver = match driver::prepare(&DriverRequest::default()) {
+        Ok(driver) => driver,
+        Err(DriverError::NoDriver { system: Some(system), cause }) => {
+            print_line(&format!("{system:#}\na software driver cannot be downloaded because {cause}"));
+            return Ok(());
         }
-        print_line(&device_line(number, &device));
+        Err(DriverError::NoSystemLoader { report }) => {
+            print_line(&format!("{report:#}"));
+            return Ok(());
+        }
+        Err(error) => return Err(error.into()),
+    };
+    match Context::devices(driver.loader.as_deref()) {
+        Ok(devices) => {
+            for (number, device) in devices.into_iter().enumerate() {
+                print_device(number, device, profile);
+            }
+        }
+        Err(lvk::Error::NoVulkan { report }) => print_line(&format!("{report:#}")),
+        Err(error) => return Err(error.into()),
+    }
+    if let Some(system) = driver.system {
+        print_line(&format!("the system's own Vulkan, which cannot trace rays:\n{system:#}"));
     }
     Ok(())
+}
+
+fn print_device(number: usize, mut device: Capabilities, profile: Option<&DeviceProfile>) {
+    if let Some(profile) = profile {
+        profile.apply(&mut device);
+    }
+    print_line(&device_line(number, &device));
 }
 
 /// Describes the device for the log, in one or two lines with their ends.

@@ -6,9 +6,8 @@ use super::pass_times::PassTimes;
 
 /// A frame under way: the commands so far, and where it is cut into submissions.
 ///
-/// Everything goes to one queue in the order in which it is recorded, [`Context::upload_buffer`] included, which takes its
-/// place before the next submission. So a sample needs one buffer of constants and not one for each frame in flight: a
-/// frame's upload waits on the GPU for what the frame before still reads.
+/// A sample needs no buffer of constants: [`CommandBuffer::upload`] returns the address of a copy, which is good until the
+/// GPU is done with the step. A frame of several steps uploads the constants for each.
 pub struct Frame<'a> {
     /// The command buffer of the frame.
     pub cmd: CommandBuffer,

@@ -20,13 +20,9 @@ pub struct RunArgs {
     pub frames: Option<Frames>,
 
     /// Frames until the animation has come round and repeats itself, at 30 a second
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 240,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(Frames::MAX_COUNT)),
-        help_heading = "Frames"
-    )]
+    #[arg(long, value_name = "N", default_value_t = 240)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=i64::from(Frames::MAX_COUNT)))]
+    #[arg(help_heading = "Frames")]
     pub round: u32,
 
     /// Leave out the frames of a sequence whose pictures are there
@@ -34,23 +30,13 @@ pub struct RunArgs {
     pub resume: bool,
 
     /// Width of the picture in pixels, 1 to 16384
-    #[arg(
-        long,
-        value_name = "PIXELS",
-        default_value_t = 1280,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)),
-        help_heading = "Output"
-    )]
+    #[arg(long, value_name = "PIXELS", default_value_t = 1280)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Output")]
     pub width: u32,
 
     /// Height of the picture in pixels, 1 to 16384
-    #[arg(
-        long,
-        value_name = "PIXELS",
-        default_value_t = 720,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)),
-        help_heading = "Output"
-    )]
+    #[arg(long, value_name = "PIXELS", default_value_t = 720)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)), help_heading = "Output")]
     pub height: u32,
 
     /// PNG to write; an existing file is replaced. For a sequence, with # for each digit of the frame's number
@@ -65,14 +51,8 @@ pub struct RunArgs {
     pub window: bool,
 
     /// Take the shaders from a folder like `shaders`, and compile them again whenever one changes
-    #[arg(
-        long,
-        value_name = "FOLDER",
-        num_args = 0..=1,
-        default_missing_value = "shaders",
-        requires = "window",
-        help_heading = "Window"
-    )]
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "shaders")]
+    #[arg(requires = "window", help_heading = "Window")]
     pub hot_reload: Option<PathBuf>,
 
     /// Device to use, by its number in --list-devices or part of its name
@@ -94,19 +74,17 @@ pub struct RunArgs {
     #[arg(long, help_heading = "Device")]
     pub no_cache: bool,
 
+    /// Folder of what is kept for the next start, in place of the folders that --no-cache names
+    #[arg(long, value_name = "FOLDER", conflicts_with = "no_cache", help_heading = "Device")]
+    pub cache: Option<PathBuf>,
+
     /// Print the devices and what they can do, and exit
     #[arg(long, help_heading = "Device")]
     pub list_devices: bool,
 
     /// Run with Vulkan validation; a message is an error
-    #[arg(
-        long,
-        value_enum,
-        value_name = "KIND",
-        num_args = 0..=1,
-        default_missing_value = "core",
-        help_heading = "Device"
-    )]
+    #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, default_missing_value = "core")]
+    #[arg(help_heading = "Device")]
     pub validate: Option<ValidationArg>,
 }
 

@@ -66,6 +66,9 @@ pub enum RunError {
         /// Error of the window system.
         reason: String,
     },
+    /// The window is gone, though it was not closed.
+    #[error("{0}")]
+    WindowLost(lvk::Error),
     /// The window holds its pixels in a way that no picture is made of.
     #[error(
         "no screenshot of a window whose format is {format:?}; without --window the sample writes its picture"
@@ -119,7 +122,7 @@ impl RunError {
             Self::Sample(error) => error.status(),
             Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
-            Self::NoScreenshot { .. } => 1,
+            Self::NoScreenshot { .. } | Self::WindowLost(_) => 1,
             Self::Driver(_) | Self::Validation(_) => 1,
         }
     }
@@ -127,6 +130,9 @@ impl RunError {
 
 impl From<lvk::Error> for RunError {
     fn from(error: lvk::Error) -> Self {
-        Self::device(error)
+        match error {
+            lvk::Error::SurfaceLost { .. } => Self::WindowLost(error),
+            error => Self::device(error),
+        }
     }
 }

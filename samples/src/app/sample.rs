@@ -25,8 +25,8 @@
 //!     }
 //!
 //!     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-//!         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
-//!         frame.pass("cloud", |cmd| self.draw(cmd))?;
+//!         let constants = frame.cmd.upload(&self.constants)?;
+//!         frame.pass("cloud", |cmd| self.draw(cmd, constants))?;
 //!         Ok(self.target.image())
 //!     }
 //! }

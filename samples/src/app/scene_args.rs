@@ -42,13 +42,8 @@ pub struct SceneArgs {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct CameraArgs {
     /// Camera, one of the scene's five; a sequence starts there and passes through all five
-    #[arg(
-        long = "camera",
-        value_name = "1-5",
-        default_value_t = 1,
-        value_parser = clap::value_parser!(u32).range(1..=5),
-        help_heading = "Scene"
-    )]
+    #[arg(long = "camera", value_name = "1-5", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=5), help_heading = "Scene")]
     pub number: u32,
 }
 
@@ -56,14 +51,8 @@ pub struct CameraArgs {
 #[derive(Debug, Clone, PartialEq, Eq, Args)]
 pub struct ListArgs {
     /// Print the scenes that --scene knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
-    #[arg(
-        long,
-        value_name = "FOLDER",
-        num_args = 0..=1,
-        default_missing_value = "",
-        value_parser = clap::value_parser!(OsString),
-        help_heading = "Scene"
-    )]
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "")]
+    #[arg(value_parser = clap::value_parser!(OsString), help_heading = "Scene")]
     pub list_scenes: Option<OsString>,
 }
 

@@ -5,6 +5,9 @@ use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureKind, Text
 use crate::hybrid::half_float::half_bits;
 use crate::scene::{Sky, Texture};
 
+/// Index of a texture that is not there (`kNoTexture` in `shaders/common/no_texture.glsl`).
+pub(crate) const NO_TEXTURE: u32 = u32::MAX;
+
 /// A picture of a scene, with all its mips.
 pub(crate) fn picture(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
     with_mips(ctx, texture, Format::Rgba8Srgb)

@@ -15,12 +15,8 @@ pub struct DeferredArgs {
     pub passes: Option<Passes>,
 
     /// Number of lights, 1 to 4096
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = DeferredConfig::LIGHTS,
-        value_parser = whole(1..=DeferredConfig::MAX_LIGHTS)
-    )]
+    #[arg(long, value_name = "N", default_value_t = DeferredConfig::LIGHTS)]
+    #[arg(value_parser = whole(1..=DeferredConfig::MAX_LIGHTS))]
     pub lights: u32,
 
     /// Quantity that the image shows

@@ -13,7 +13,7 @@ use super::hall::{Hall, MATERIALS};
 use super::pipelines::{Draw, Pipelines};
 use super::targets::Targets;
 use super::{DeferredConfig, Passes, View};
-use crate::app::array_buffer::{array, buffer};
+use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
@@ -31,8 +31,6 @@ pub struct Deferred {
     triangles: Holder<BufferHandle>,
     triangle_count: u32,
     nearest: Holder<SamplerHandle>,
-    frame: Holder<BufferHandle>,
-    frame_address: u64,
     camera: Camera,
     phase: f32,
     power: f32,
@@ -79,7 +77,6 @@ impl Deferred {
     pub fn new(ctx: &Context, config: &DeferredConfig) -> Result<Self, SampleError> {
         let passes = Passes::choose(config.passes, ctx)?;
         let hall = Hall::new();
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let nearest = SamplerDesc {
             mag_filter: Filter::Nearest,
             min_filter: Filter::Nearest,
@@ -94,8 +91,6 @@ impl Deferred {
             triangles: array(ctx, "triangles", BufferUsage::INDEX, &hall.triangles)?,
             triangle_count: hall.triangles.len() as u32,
             nearest: ctx.create_sampler(&nearest)?,
-            frame_address: ctx.buffer_address(*frame)?,
-            frame,
             camera: camera(0.0),
             phase: 0.0,
             power: 0.9,
@@ -123,8 +118,8 @@ impl Deferred {
         let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.resources.targets;
         Ok(FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, NEAR),
-            vertices: self.ctx.buffer_address(*self.vertices)?,
-            materials: self.ctx.buffer_address(*self.materials)?,
+            vertices: self.vertices.address()?,
+            materials: self.materials.address()?,
             colors: [albedo, normal, light].map(|texture| texture.index()),
             depth: depth.index(),
             nearest: self.nearest.index(),
@@ -137,7 +132,7 @@ impl Deferred {
     }
 
     /// All of it in one pass: nothing but the picture is kept.
-    fn draw_at_once(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+    fn draw_at_once(&self, cmd: &mut CommandBuffer, constants: u64) -> lvk::Result<()> {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &self.resources.targets.begun(0..4),
             depth: Some(self.resources.targets.far_away()),
@@ -145,21 +140,21 @@ impl Deferred {
             debug_name: "deferred",
             ..RenderPassDesc::default()
         })?;
-        self.draw_solid(&mut pass)?;
-        self.draw_light(&mut pass)?;
-        self.draw(&mut pass, Draw::Resolve, 3, 1)
+        self.draw_solid(&mut pass, constants)?;
+        self.draw_light(&mut pass, constants)?;
+        self.draw(&mut pass, constants, Draw::Resolve, [3, 1])
     }
 
-    fn surfaces_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+    fn surfaces_pass(&self, cmd: &mut CommandBuffer, constants: u64) -> lvk::Result<()> {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &self.resources.targets.begun(0..3),
             depth: Some(self.resources.targets.far_away()),
             ..RenderPassDesc::default()
         })?;
-        self.draw_solid(&mut pass)
+        self.draw_solid(&mut pass, constants)
     }
 
-    fn light_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+    fn light_pass(&self, cmd: &mut CommandBuffer, constants: u64) -> lvk::Result<()> {
         let Targets { colors: [albedo, normal, ..], depth, .. } = &self.resources.targets;
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &[self.resources.targets.light()],
@@ -170,10 +165,10 @@ impl Deferred {
             },
             ..RenderPassDesc::default()
         })?;
-        self.draw_light(&mut pass)
+        self.draw_light(&mut pass, constants)
     }
 
-    fn picture_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+    fn picture_pass(&self, cmd: &mut CommandBuffer, constants: u64) -> lvk::Result<()> {
         let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.resources.targets;
         let sampled = [**albedo, **normal, **light, **depth];
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
@@ -181,26 +176,32 @@ impl Deferred {
             dependencies: Dependencies { sampled_images: &sampled, ..Dependencies::default() },
             ..RenderPassDesc::default()
         })?;
-        self.draw(&mut pass, Draw::Resolve, 3, 1)
+        self.draw(&mut pass, constants, Draw::Resolve, [3, 1])
     }
 
-    fn draw_solid(&self, pass: &mut RenderPass<'_>) -> lvk::Result<()> {
+    fn draw_solid(&self, pass: &mut RenderPass<'_>, constants: u64) -> lvk::Result<()> {
         pass.bind_render_pipeline(self.resources.pipelines.get(Draw::Surfaces))?;
-        pass.push_constants(&self.frame_address)?;
+        pass.push_constants(&constants)?;
         pass.bind_index_buffer(*self.triangles, 0, IndexFormat::U32)?;
         pass.draw_indexed(0..3 * self.triangle_count, 0, 0..1)?;
-        self.draw(pass, Draw::Orbs, 4, self.config.lights)
+        self.draw(pass, constants, Draw::Orbs, [4, self.config.lights])
     }
 
-    fn draw_light(&self, pass: &mut RenderPass<'_>) -> lvk::Result<()> {
-        self.draw(pass, Draw::Ambient, 3, 1)?;
-        self.draw(pass, Draw::Lights, 60, self.config.lights)?;
-        self.draw(pass, Draw::Glow, 4, self.config.lights)
+    fn draw_light(&self, pass: &mut RenderPass<'_>, constants: u64) -> lvk::Result<()> {
+        self.draw(pass, constants, Draw::Ambient, [3, 1])?;
+        self.draw(pass, constants, Draw::Lights, [60, self.config.lights])?;
+        self.draw(pass, constants, Draw::Glow, [4, self.config.lights])
     }
 
-    fn draw(&self, pass: &mut RenderPass<'_>, draw: Draw, vertices: u32, instances: u32) -> lvk::Result<()> {
+    fn draw(
+        &self,
+        pass: &mut RenderPass<'_>,
+        constants: u64,
+        draw: Draw,
+        [vertices, instances]: [u32; 2],
+    ) -> lvk::Result<()> {
         pass.bind_render_pipeline(self.resources.pipelines.get(draw))?;
-        pass.push_constants(&self.frame_address)?;
+        pass.push_constants(&constants)?;
         pass.draw(0..vertices, 0..instances)
     }
 }
@@ -223,13 +224,13 @@ impl Sample for Deferred {
         if passes != self.resources.passes {
             self.resources = PassResources::new(&self.ctx, passes, self.config.extent)?;
         }
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants()?))?;
+        let constants = frame.cmd.upload(&self.constants()?)?;
         match passes {
-            Passes::One => frame.pass("one pass", |cmd| self.draw_at_once(cmd))?,
+            Passes::One => frame.pass("one pass", |cmd| self.draw_at_once(cmd, constants))?,
             Passes::Several => {
-                frame.pass("surfaces", |cmd| self.surfaces_pass(cmd))?;
-                frame.pass("light", |cmd| self.light_pass(cmd))?;
-                frame.pass("picture", |cmd| self.picture_pass(cmd))?;
+                frame.pass("surfaces", |cmd| self.surfaces_pass(cmd, constants))?;
+                frame.pass("light", |cmd| self.light_pass(cmd, constants))?;
+                frame.pass("picture", |cmd| self.picture_pass(cmd, constants))?;
             }
         }
         Ok(self.resources.targets.picture())

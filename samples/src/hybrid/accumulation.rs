@@ -21,8 +21,8 @@ impl Accumulation {
     }
 
     /// Address of the sums; 0 where there are none.
-    pub(super) fn sums_address(&self, ctx: &Context) -> lvk::Result<u64> {
-        self.sums.as_ref().map_or(Ok(0), |sums| ctx.buffer_address(**sums))
+    pub(super) fn sums_address(&self) -> lvk::Result<u64> {
+        self.sums.as_ref().map_or(Ok(0), |sums| sums.address())
     }
 
     /// The sums, for the ray pass to write.

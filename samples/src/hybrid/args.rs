@@ -40,12 +40,7 @@ pub struct HybridArgs {
     pub medium_triangle: Option<u32>,
 
     /// Maximum number of reflections and refractions of a ray, 0 to 16; 0 gives shadows only
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 4,
-        value_parser = whole(0..=MAX_DEPTH)
-    )]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(0..=MAX_DEPTH))]
     pub depth: u32,
 
     /// Time at which the rays of mirrors and glass are traced; the image is the same
@@ -53,12 +48,7 @@ pub struct HybridArgs {
     pub bounces: BouncesArg,
 
     /// Views of each pixel, 1 to 256, whose average smooths edges; each costs as much as the first
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 1,
-        value_parser = whole(1..=MAX_SAMPLES)
-    )]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=MAX_SAMPLES))]
     pub samples: u32,
 
     /// Motion of the lamp in a sequence

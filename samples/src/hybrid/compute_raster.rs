@@ -82,11 +82,11 @@ impl ComputeRaster {
     }
 
     /// Tells the shaders where its buffers are.
-    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityAddresses) -> lvk::Result<()> {
-        places.words = ctx.buffer_address(*self.words)?;
-        places.set_triangles = ctx.buffer_address(*self.set_triangles)?;
+    pub(super) fn name_in(&self, places: &mut VisibilityAddresses) -> lvk::Result<()> {
+        places.words = self.words.address()?;
+        places.set_triangles = self.set_triangles.address()?;
         places.set_capacity = self.set_capacity;
-        places.tiles = ctx.buffer_address(*self.tile_list)?;
+        places.tiles = self.tile_list.address()?;
         places.tile_capacity = self.tile_capacity;
         Ok(())
     }

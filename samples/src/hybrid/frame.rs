@@ -89,6 +89,19 @@ impl Lighting {
     }
 }
 
+/// The members of `Frame` that samples share which trace rays in a lit scene (`shaders/common/scene_frame.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SceneFrame {
+    pub(crate) camera: GpuCamera,
+    pub(crate) scene: SceneAddresses,
+    pub(crate) lighting: Lighting,
+    pub(crate) tlas: u32,
+    pub(crate) sky: u32,
+    pub(crate) surface_sampler: u32,
+    pub(crate) sky_sampler: u32,
+}
+
 /// Bindless indices (the tail of `Frame` in `shaders/hybrid/frame.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -145,11 +158,6 @@ pub(super) struct FrameConstants {
     pub(super) sample_count: u32,
     pub(super) padding: [u32; 2],
 }
-
-/// Bytes from one sample's block to the next.
-pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
-
-const _: () = assert!(FRAME_BYTES.is_multiple_of(16));
 
 /// The push constants: where the block is, and which rows of the image, or pixels in their order, to render.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

@@ -2,17 +2,16 @@
 
 use std::ops::Range;
 
-use lvk::{BufferHandle, CommandBuffer, Context, Holder};
+use lvk::{CommandBuffer, Context};
 
 use super::accumulation::Accumulation;
 use super::config::{Bounces, HybridConfig};
-use super::frame::{FRAME_BYTES, FrameConstants, Indices, Lighting, Push, ReflectivePixelAddresses};
+use super::frame::{FrameConstants, Indices, Lighting, Push, ReflectivePixelAddresses};
 use super::geometry_stage::GeometryStage;
 use super::gpu_scene::GpuScene;
 use super::launch_tiles::launch_tiles;
 use super::pixel_order::PixelOrder;
 use super::ray_pass::{GeometryLeft, RayPass};
-use crate::app::array_buffer::buffer;
 use crate::scene::GpuCamera;
 
 /// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
@@ -30,16 +29,12 @@ pub(super) struct FramePasses {
     rays: RayPass,
     addresses: Addresses,
     indices: Indices,
-    /// A block for each sample.
-    frame_buffer: Holder<BufferHandle>,
-    uploaded: Vec<FrameConstants>,
     width: u32,
     height: u32,
 }
 
 /// Addresses of buffers.
 struct Addresses {
-    frame: u64,
     sums: u64,
     bounces: ReflectivePixelAddresses,
     order: u64,
@@ -48,7 +43,6 @@ struct Addresses {
 impl FramePasses {
     pub(super) fn new(ctx: &Context, scene: &GpuScene, config: &HybridConfig) -> lvk::Result<Self> {
         let HybridConfig { width, height, samples, .. } = *config;
-        let frame_buffer = buffer(ctx, "frame constants", FRAME_BYTES * u64::from(samples))?;
         let accumulation = Accumulation::new(ctx, [width, height], samples)?;
         let geometry = GeometryStage::new(ctx, scene, config)?;
         let is_ordered = config.bounces == Some(Bounces::First) && config.max_depth > 0;
@@ -56,67 +50,57 @@ impl FramePasses {
         let tile_rows = tile_rows(config, ctx.capabilities().is_cpu).min(height);
         let rays = RayPass::new(ctx, config, width * tile_rows)?;
         let addresses = Addresses {
-            frame: ctx.buffer_address(*frame_buffer)?,
-            sums: accumulation.sums_address(ctx)?,
-            bounces: rays.reflective_pixel_addresses(ctx)?,
-            order: order.as_ref().map_or(Ok(0), |order| order.address(ctx))?,
+            sums: accumulation.sums_address()?,
+            bounces: rays.reflective_pixel_addresses()?,
+            order: order.as_ref().map_or(Ok(0), PixelOrder::address)?,
         };
         Ok(Self {
             indices: indices(scene, &geometry, accumulation.picture.index()),
-            uploaded: Vec::new(),
             launch_tiles: launch_tiles(height, tile_rows),
             geometry,
             accumulation,
             order,
             rays,
             addresses,
-            frame_buffer,
             width,
             height,
         })
     }
 
-    /// Tells the shaders how the scene is seen and lit, if that is news to them.
-    pub(super) fn upload(
-        &mut self,
-        ctx: &Context,
+    /// Returns the constants of one of `sample_count` samples.
+    pub(super) fn constants(
+        &self,
         view: &GpuCamera,
         scene: &GpuScene,
         lighting: Lighting,
-        sample_count: u32,
-    ) -> lvk::Result<()> {
-        let constants: Vec<_> = (0..sample_count)
-            .map(|sample_number| FrameConstants {
-                camera: view.for_sample(sample_number, sample_count),
-                scene: scene.addresses(),
-                lighting,
-                indices: self.indices,
-                visibility: self.geometry.addresses(),
-                bounces: self.addresses.bounces,
-                order: self.addresses.order,
-                sums: self.addresses.sums,
-                sample_number,
-                sample_count,
-                padding: [0; 2],
-            })
-            .collect();
-        if self.uploaded != constants {
-            ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&constants))?;
-            self.uploaded = constants;
+        [sample_number, sample_count]: [u32; 2],
+    ) -> FrameConstants {
+        FrameConstants {
+            camera: view.for_sample(sample_number, sample_count),
+            scene: scene.addresses(),
+            lighting,
+            indices: self.indices,
+            visibility: self.geometry.addresses(),
+            bounces: self.addresses.bounces,
+            order: self.addresses.order,
+            sums: self.addresses.sums,
+            sample_number,
+            sample_count,
+            padding: [0; 2],
         }
-        Ok(())
     }
 
-    /// Records what comes before the rays of a sample.
-    pub(super) fn record_geometry(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {
-        let push = self.push(sample, 0..self.height);
+    /// Records what comes before the rays of a sample, whose constants are at the address `frame`.
+    pub(super) fn record_geometry(&self, cmd: &mut CommandBuffer, frame: u64) -> lvk::Result<()> {
+        let push = Push { frame, first: 0, end: self.height };
         self.geometry.record(cmd, &push)?;
         self.order.as_ref().map_or(Ok(()), |order| order.record(cmd, &push, &self.geometry.left()))
     }
 
     /// Records the rays of a tile of a sample.
-    pub(super) fn record_tile(&self, cmd: &mut CommandBuffer, sample: u32, tile: usize) -> lvk::Result<()> {
-        let push = self.push(sample, self.launch_tiles[tile].clone());
+    pub(super) fn record_tile(&self, cmd: &mut CommandBuffer, frame: u64, tile: usize) -> lvk::Result<()> {
+        let Range { start: first, end } = self.launch_tiles[tile];
+        let push = Push { frame, first, end };
         self.rays.record(cmd, self.width, &push, &self.left(), &self.accumulation)
     }
 
@@ -125,11 +109,6 @@ impl FramePasses {
         let mut left = self.geometry.left();
         left.buffers.extend(self.order.as_ref().map(PixelOrder::buffer));
         left
-    }
-
-    fn push(&self, sample: u32, rows: Range<u32>) -> Push {
-        let frame = self.addresses.frame + FRAME_BYTES * u64::from(sample);
-        Push { frame, first: rows.start, end: rows.end }
     }
 }
 

@@ -64,13 +64,13 @@ impl HardwareRaster {
     }
 
     /// Tells the shaders where its buffers are.
-    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityAddresses) -> lvk::Result<()> {
+    pub(super) fn name_in(&self, places: &mut VisibilityAddresses) -> lvk::Result<()> {
         let left = &self.survivors;
-        places.survivor_bits = ctx.buffer_address(*left.bits)?;
-        places.survivor_counts = ctx.buffer_address(*left.counts)?;
-        places.survivor_indices = ctx.buffer_address(*left.indices)?;
-        places.survivors = ctx.buffer_address(*left.triangles)?;
-        places.draw = ctx.buffer_address(*left.arguments)?;
+        places.survivor_bits = left.bits.address()?;
+        places.survivor_counts = left.counts.address()?;
+        places.survivor_indices = left.indices.address()?;
+        places.survivors = left.triangles.address()?;
+        places.draw = left.arguments.address()?;
         Ok(())
     }
 

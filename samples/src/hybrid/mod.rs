@@ -38,7 +38,7 @@ mod visibility_pass;
 
 pub use args::HybridArgs;
 pub use config::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
-pub(crate) use frame::{Lighting, SceneAddresses, near_plane};
+pub(crate) use frame::{Lighting, SceneAddresses, SceneFrame, near_plane};
 pub use frame_timings::FrameTimings;
 pub(crate) use gpu_scene::{GpuScene, HitGroups};
 pub(crate) use panel::path_switch;

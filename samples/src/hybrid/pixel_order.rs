@@ -40,8 +40,8 @@ impl PixelOrder {
     }
 
     /// Address of the buffer.
-    pub(super) fn address(&self, ctx: &Context) -> lvk::Result<u64> {
-        ctx.buffer_address(*self.order)
+    pub(super) fn address(&self) -> lvk::Result<u64> {
+        self.order.address()
     }
 
     /// Resources that the ray pass reads.

@@ -62,8 +62,8 @@ impl RayPass {
     }
 
     /// Addresses of the queue.
-    pub(super) fn reflective_pixel_addresses(&self, ctx: &Context) -> lvk::Result<ReflectivePixelAddresses> {
-        self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.addresses(ctx))
+    pub(super) fn reflective_pixel_addresses(&self) -> lvk::Result<ReflectivePixelAddresses> {
+        self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.addresses())
     }
 
     /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left onto `accumulation`.

@@ -46,11 +46,8 @@ impl ReflectivePixels {
     }
 
     /// Tells the shaders where it is.
-    pub(super) fn addresses(&self, ctx: &Context) -> lvk::Result<ReflectivePixelAddresses> {
-        Ok(ReflectivePixelAddresses {
-            head: ctx.buffer_address(*self.head)?,
-            pixels: ctx.buffer_address(*self.pixels)?,
-        })
+    pub(super) fn addresses(&self) -> lvk::Result<ReflectivePixelAddresses> {
+        Ok(ReflectivePixelAddresses { head: self.head.address()?, pixels: self.pixels.address()? })
     }
 
     /// Records the reset of the queue.

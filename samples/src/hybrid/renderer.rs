@@ -1,7 +1,7 @@
 //! The sample as a type: give it a scene and a camera, get a picture.
 
 use crate::app::sample_error::SampleError;
-use lvk::{Capabilities, Context, TextureHandle, TextureRegion};
+use lvk::{Capabilities, CommandBuffer, Context, TextureHandle, TextureRegion};
 
 use super::config::{Bounces, HybridConfig, Method, Raster, RayPath};
 use super::frame::{Lighting, near_plane};
@@ -66,16 +66,16 @@ impl HybridRenderer {
     /// # Errors
     /// [`SampleError::Device`].
     pub fn record(&mut self, frame: &mut Frame<'_>, camera: &Camera) -> Result<TextureHandle, SampleError> {
-        self.upload_constants(camera)?;
         for sample in 0..self.config.samples {
             for tile in 0..self.passes.launch_tiles.len() {
                 if (sample, tile) != (0, 0) {
                     frame.next_step()?;
                 }
+                let address = self.upload_constants(&mut frame.cmd, camera, sample)?;
                 if tile == 0 && self.config.method == Method::Hybrid {
-                    frame.pass(GEOMETRY, |cmd| self.passes.record_geometry(cmd, sample))?;
+                    frame.pass(GEOMETRY, |cmd| self.passes.record_geometry(cmd, address))?;
                 }
-                frame.pass(RAYS, |cmd| self.passes.record_tile(cmd, sample, tile))?;
+                frame.pass(RAYS, |cmd| self.passes.record_tile(cmd, address, tile))?;
             }
         }
         Ok(*self.passes.accumulation.picture)
@@ -188,10 +188,10 @@ impl HybridRenderer {
         &self.ctx
     }
 
-    fn upload_constants(&mut self, camera: &Camera) -> lvk::Result<()> {
+    fn upload_constants(&self, cmd: &mut CommandBuffer, camera: &Camera, sample: u32) -> lvk::Result<u64> {
         let HybridConfig { width, height, samples, .. } = self.config;
         let view = GpuCamera::new(camera, width, height, self.near_plane);
-        self.passes.upload(&self.ctx, &view, &self.scene, self.lighting, samples)
+        cmd.upload(&self.passes.constants(&view, &self.scene, self.lighting, [sample, samples]))
     }
 
     /// Milliseconds of some geometry passes by `raster`; none where the device has no timestamps.
@@ -199,10 +199,10 @@ impl HybridRenderer {
         self.passes.geometry.choose(RasterChoice { raster, why: String::new() });
         let mut times = Vec::new();
         for _ in 0..MEASURED_FRAMES {
-            self.upload_constants(camera)?;
             let mut ignore = |_| {};
             let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
-            frame.pass(GEOMETRY, |cmd| self.passes.record_geometry(cmd, 0))?;
+            let address = self.upload_constants(&mut frame.cmd, camera, 0)?;
+            frame.pass(GEOMETRY, |cmd| self.passes.record_geometry(cmd, address))?;
             let took = frame.finish()?;
             if took.is_empty() {
                 break;

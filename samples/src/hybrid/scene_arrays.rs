@@ -11,10 +11,8 @@ use lvk::{
 use super::frame::SceneAddresses;
 use super::texture_density::lod_constant;
 use crate::app::array_buffer::array;
+use crate::app::scene_textures::NO_TEXTURE;
 use crate::scene::{Material, Scene};
-
-/// `kNoTexture` in `shaders/common/scene_buffers.glsl`.
-const NO_TEXTURE: u32 = u32::MAX;
 
 /// Buffers of a scene that shaders read by address.
 pub(crate) struct SceneArrays {
@@ -64,12 +62,12 @@ impl SceneArrays {
         let triangle_infos = array(ctx, "scene triangle infos", read, &infos)?;
         let materials = array(ctx, "scene materials", read, &materials)?;
         let addresses = SceneAddresses {
-            positions: ctx.buffer_address(*positions)?,
-            normals: ctx.buffer_address(*normals)?,
-            texcoords: ctx.buffer_address(*texcoords)?,
-            triangles: ctx.buffer_address(*triangles)?,
-            triangle_infos: ctx.buffer_address(*triangle_infos)?,
-            materials: ctx.buffer_address(*materials)?,
+            positions: positions.address()?,
+            normals: normals.address()?,
+            texcoords: texcoords.address()?,
+            triangles: triangles.address()?,
+            triangle_infos: triangle_infos.address()?,
+            materials: materials.address()?,
         };
         Ok(Self { positions, triangles, _held: [normals, texcoords, triangle_infos, materials], addresses })
     }

@@ -59,10 +59,10 @@ impl VisibilityPass {
         let mut places =
             VisibilityAddresses { triangle_count, image: NO_IMAGE, ..bytemuck::Zeroable::zeroed() };
         if let Some(compute) = &compute {
-            compute.name_in(ctx, &mut places)?;
+            compute.name_in(&mut places)?;
         }
         if let Some(hardware) = &hardware {
-            hardware.name_in(ctx, &mut places)?;
+            hardware.name_in(&mut places)?;
         }
         Ok(Self { compute, hardware, chosen, why: why.to_owned(), places })
     }

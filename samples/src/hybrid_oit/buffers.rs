@@ -86,20 +86,19 @@ impl Buffers {
     }
 
     /// Addresses of the buffers.
-    pub(super) fn addresses(&self, ctx: &Context) -> lvk::Result<Addresses> {
-        let of = |buffer: &Holder<BufferHandle>| ctx.buffer_address(**buffer);
+    pub(super) fn addresses(&self) -> lvk::Result<Addresses> {
         Ok(Addresses {
-            motions: of(&self.motions)?,
-            spheres: of(&self.spheres)?,
-            faces: of(&self.faces)?,
-            positions: of(&self.positions)?,
-            blocks: of(&self.blocks)?,
-            boxes: of(&self.boxes)?,
-            records: of(&self.records)?,
-            heads: of(&self.heads)?,
-            node_count: of(&self.node_count)?,
-            nodes: of(&self.nodes)?,
-            glass_light: of(&self.glass_light)?,
+            motions: self.motions.address()?,
+            spheres: self.spheres.address()?,
+            faces: self.faces.address()?,
+            positions: self.positions.address()?,
+            blocks: self.blocks.address()?,
+            boxes: self.boxes.address()?,
+            records: self.records.address()?,
+            heads: self.heads.address()?,
+            node_count: self.node_count.address()?,
+            nodes: self.nodes.address()?,
+            glass_light: self.glass_light.address()?,
         })
     }
 }

@@ -17,12 +17,8 @@ const FIRST_SECONDS: f64 = 1.9;
 #[command(next_help_heading = "Rendering")]
 pub struct HybridOitArgs {
     /// Samples a pixel along each side, 1 to 4: they smooth edges
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 2,
-        value_parser = whole(1..=HybridOitConfig::MAX_SUPERSAMPLING)
-    )]
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(value_parser = whole(1..=HybridOitConfig::MAX_SUPERSAMPLING))]
     pub supersampling: u32,
 
     /// Shadow rays a sample, 1 to 64; a single one gives hard shadows
@@ -35,14 +31,8 @@ pub struct HybridOitArgs {
     pub nodes: Option<u32>,
 
     /// Moment of the animation that frame 0 shows, in seconds
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = FIRST_SECONDS,
-        value_parser = seconds,
-        allow_negative_numbers = true,
-        help_heading = "Frames"
-    )]
+    #[arg(long, value_name = "SECONDS", default_value_t = FIRST_SECONDS, value_parser = seconds)]
+    #[arg(allow_negative_numbers = true, help_heading = "Frames")]
     pub time: f64,
 
     /// The built-in scene, and by what rays are traced

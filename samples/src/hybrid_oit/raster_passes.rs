@@ -28,6 +28,13 @@ pub(super) struct RasterPasses {
     glass_count: u32,
 }
 
+/// The resources of all passes.
+pub(super) struct PassInputs<'a> {
+    pub(super) targets: &'a Targets,
+    pub(super) buffers: &'a Buffers,
+    pub(super) push: &'a Push,
+}
+
 impl RasterPasses {
     /// Compiles the pipelines.
     pub(super) fn new(ctx: &Context, scene: &OitScene, buffers: &Buffers) -> lvk::Result<Self> {
@@ -48,13 +55,8 @@ impl RasterPasses {
     }
 
     /// Records the depth pass.
-    pub(super) fn record_depth(
-        &self,
-        cmd: &mut CommandBuffer,
-        targets: &Targets,
-        buffers: &Buffers,
-        push: &Push,
-    ) -> lvk::Result<()> {
+    pub(super) fn record_depth(&self, cmd: &mut CommandBuffer, inputs: &PassInputs<'_>) -> lvk::Result<()> {
+        let PassInputs { targets, buffers, push } = *inputs;
         let pass = cmd.begin_rendering(&RenderPassDesc {
             depth: Some(DepthAttachment::clear(*targets.depth, 0.0)),
             dependencies: Dependencies { read_buffers: &[*buffers.spheres], ..Dependencies::default() },
@@ -65,13 +67,8 @@ impl RasterPasses {
     }
 
     /// Records the G-buffer pass.
-    pub(super) fn record_gbuffer(
-        &self,
-        cmd: &mut CommandBuffer,
-        targets: &Targets,
-        buffers: &Buffers,
-        push: &Push,
-    ) -> lvk::Result<()> {
+    pub(super) fn record_gbuffer(&self, cmd: &mut CommandBuffer, inputs: &PassInputs<'_>) -> lvk::Result<()> {
+        let PassInputs { targets, buffers, push } = *inputs;
         let surface = ColorAttachment {
             load: ColorLoadOp::ClearUint([0; 4]),
             ..ColorAttachment::clear(*targets.surface, [0.0; 4])
@@ -90,11 +87,10 @@ impl RasterPasses {
     pub(super) fn record_glass(
         &self,
         cmd: &mut CommandBuffer,
-        targets: &Targets,
-        buffers: &Buffers,
-        push: &Push,
+        inputs: &PassInputs<'_>,
         samples: u64,
     ) -> lvk::Result<()> {
+        let PassInputs { targets, buffers, push } = *inputs;
         cmd.fill_buffer(*buffers.heads, 0, 4 * samples, u32::MAX)?;
         cmd.fill_buffer(*buffers.node_count, 0, 4, 0)?;
         let mut pass = cmd.begin_rendering(&RenderPassDesc {

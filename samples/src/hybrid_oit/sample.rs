@@ -1,19 +1,18 @@
 //! The sample as a type: give it a scene and a time, get a picture.
 
 use crate::app::sample_error::SampleError;
-use lvk::{BufferHandle, Context, Holder, TextureHandle, TextureRegion};
+use lvk::{Context, Holder, TextureHandle, TextureRegion};
 
 use super::buffers::Buffers;
 use super::config::HybridOitConfig;
 use super::frame::{FrameConstants, Numbers, Push};
 use super::glass_lists::{GlassLists, NodeUse};
 use super::image_passes::ImagePasses;
-use super::raster_passes::RasterPasses;
+use super::raster_passes::{PassInputs, RasterPasses};
 use super::scene::{OitScene, PERIOD_SECONDS};
 use super::shadow_pass::ShadowPass;
 use super::structures::Structures;
 use super::targets::Targets;
-use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::scene::Camera;
 
@@ -29,8 +28,7 @@ pub struct HybridOit {
     shadows: ShadowPass,
     sphere_count: u32,
     scene: OitScene,
-    constants: Holder<BufferHandle>,
-    push: Push,
+    time: f32,
 }
 
 impl HybridOit {
@@ -45,15 +43,13 @@ impl HybridOit {
         let buffers = Buffers::new(ctx, scene, samples(extent), config.nodes())?;
         let structures = Structures::new(ctx, scene, &buffers)?;
         let targets = Targets::new(ctx, extent, [config.width, config.height])?;
-        let constants = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
             images: ImagePasses::new(ctx)?,
             raster: RasterPasses::new(ctx, scene, &buffers)?,
             shadows: ShadowPass::new(ctx, config.path)?,
             sphere_count: (scene.balls.len() + scene.glass.len()) as u32,
-            push: Push { frame: ctx.buffer_address(*constants)?, time: 0.0, padding: 0 },
             scene: scene.clone(),
-            constants,
+            time: 0.0,
             ctx: ctx.clone(),
             config: *config,
             buffers,
@@ -66,7 +62,7 @@ impl HybridOit {
     /// itself every [`PERIOD_SECONDS`].
     pub fn update(&mut self, seconds: f64) {
         let time = if seconds.is_finite() { seconds } else { 0.0 };
-        self.push.time = time.rem_euclid(PERIOD_SECONDS) as f32;
+        self.time = time.rem_euclid(PERIOD_SECONDS) as f32;
     }
 
     /// Looks at the scene from elsewhere than it says.
@@ -125,17 +121,17 @@ impl HybridOit {
     /// # Errors
     /// [`SampleError::Device`].
     pub fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        let constants = self.constants()?;
-        self.ctx.upload_buffer(*self.constants, 0, bytemuck::bytes_of(&constants))?;
-        let Self { buffers, targets, push, .. } = &*self;
+        let push = &Push { frame: frame.cmd.upload(&self.constants()?)?, time: self.time, padding: 0 };
+        let Self { buffers, targets, .. } = &*self;
         let (extent, pixels) = (self.config.extent(), [self.config.width, self.config.height]);
         let count = samples(extent);
         frame.pass("animate", |cmd| self.images.record_animate(cmd, buffers, push, self.sphere_count))?;
         frame.pass("build", |cmd| self.structures.record(cmd))?;
-        self.raster.record_depth(&mut frame.cmd, targets, buffers, push)?;
-        self.raster.record_gbuffer(&mut frame.cmd, targets, buffers, push)?;
+        let inputs = PassInputs { targets, buffers, push };
+        self.raster.record_depth(&mut frame.cmd, &inputs)?;
+        self.raster.record_gbuffer(&mut frame.cmd, &inputs)?;
         frame.pass("shadows", |cmd| self.shadows.record(cmd, targets, buffers, push, extent))?;
-        frame.pass("glass lists", |cmd| self.raster.record_glass(cmd, targets, buffers, push, count))?;
+        frame.pass("glass lists", |cmd| self.raster.record_glass(cmd, &inputs, count))?;
         frame.pass("composite", |cmd| self.images.record_composite(cmd, targets, buffers, push, pixels))?;
         Ok(*self.targets.picture)
     }
@@ -227,7 +223,7 @@ impl HybridOit {
 
     fn constants(&self) -> lvk::Result<FrameConstants> {
         let numbers = numbers(&self.scene, &self.config, &self.structures, &self.targets);
-        let addresses = self.buffers.addresses(&self.ctx)?;
+        let addresses = self.buffers.addresses()?;
         Ok(FrameConstants::new(&self.scene, self.config.extent(), addresses, numbers))
     }
 

@@ -70,8 +70,8 @@ impl GpuWorld {
     }
 
     /// Addresses of the transforms of instances and of the first triangles of pieces.
-    pub(super) fn tables(&self, ctx: &Context) -> lvk::Result<[u64; 2]> {
-        Ok([ctx.buffer_address(*self.places)?, ctx.buffer_address(*self.firsts)?])
+    pub(super) fn tables(&self) -> lvk::Result<[u64; 2]> {
+        Ok([self.places.address()?, self.firsts.address()?])
     }
 }
 

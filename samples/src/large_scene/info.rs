@@ -28,14 +28,8 @@ pub struct LargeSceneArgs {
     pub scenes: Vec<PathBuf>,
 
     /// Show every OBJ in this folder and the folders in it, three levels deep [default: the folder of LVK_SCENES]
-    #[arg(
-        long,
-        value_name = "FOLDER",
-        num_args = 0..=1,
-        default_missing_value = "",
-        value_parser = clap::value_parser!(OsString),
-        help_heading = "Scene"
-    )]
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "")]
+    #[arg(value_parser = clap::value_parser!(OsString), help_heading = "Scene")]
     pub archive: Option<OsString>,
 
     /// Instances of each OBJ, or trees of the valley [default: 4 of each OBJ, 600 trees]
@@ -43,13 +37,8 @@ pub struct LargeSceneArgs {
     pub copies: Option<u32>,
 
     /// Triangles of the valley's ground and kinds of trees, before any is repeated
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 2_000_000,
-        value_parser = whole(1_000..=100_000_000),
-        help_heading = "Scene"
-    )]
+    #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = whole(1_000..=100_000_000))]
+    #[arg(help_heading = "Scene")]
     pub triangles: u32,
 
     /// Layout of objects that occur more than once
@@ -69,23 +58,13 @@ pub struct LargeSceneArgs {
     pub show: Show,
 
     /// Maximum number of reflections and refractions of a ray, 0 to 16
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 3,
-        value_parser = whole(0..=LargeSceneConfig::MAX_DEPTH),
-        help_heading = "Rendering"
-    )]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(0..=LargeSceneConfig::MAX_DEPTH))]
+    #[arg(help_heading = "Rendering")]
     pub depth: u32,
 
     /// Rays of each pixel, 1 to 256, whose average smooths edges
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 4,
-        value_parser = whole(1..=LargeSceneConfig::MAX_SAMPLES),
-        help_heading = "Rendering"
-    )]
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    #[arg(value_parser = whole(1..=LargeSceneConfig::MAX_SAMPLES), help_heading = "Rendering")]
     pub samples: u32,
 
     /// Leave acceleration structures as large as they are built

@@ -3,20 +3,19 @@
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Holder, TextureHandle};
+use lvk::{CommandBuffer, Context, TextureHandle};
 
 use super::figures::{Figures, Origin, bytes, number};
 use super::gpu_world::GpuWorld;
 use super::pipelines::RAYS;
 use super::world::World;
 use super::{LargeSceneConfig, Show};
-use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::progress::Progress;
 use crate::app::sample::{FrameTime, Sample};
-use crate::hybrid::{Lighting, SceneAddresses};
+use crate::hybrid::{Lighting, SceneFrame};
 use crate::rtx::Tracer;
-use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Scene};
+use crate::scene::{Ambient, Camera, CameraTour, DirectionalLight, GpuCamera, Scene};
 
 /// Distance of the near plane as a share of the world's farthest coordinate; rays start at the eye.
 const NEAR_SHARE: f32 = 1e-4;
@@ -28,10 +27,8 @@ pub struct LargeScene {
     config: LargeSceneConfig,
     world: GpuWorld,
     tracer: Tracer,
-    frame: Holder<BufferHandle>,
     constants: FrameConstants,
-    path: CameraPath,
-    camera: Camera,
+    tour: CameraTour,
     near_plane: f32,
 }
 
@@ -39,15 +36,9 @@ pub struct LargeScene {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct FrameConstants {
-    camera: GpuCamera,
-    scene: SceneAddresses,
-    lighting: Lighting,
+    scene: SceneFrame,
     places: u64,
     firsts: u64,
-    tlas: u32,
-    sky: u32,
-    surface_sampler: u32,
-    sky_sampler: u32,
     image: u32,
     depth: u32,
     samples: u32,
@@ -70,44 +61,38 @@ impl LargeScene {
         let target = config.rtx.create_target(ctx)?;
         let gpu_world = GpuWorld::new(ctx, world, &config, progress)?;
         progress.stage("compiling shaders", 0);
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
-        let [places, firsts] = gpu_world.tables(ctx)?;
+        let [places, firsts] = gpu_world.tables()?;
         let farthest = world.farthest();
         let constants = FrameConstants {
-            camera: GpuCamera::zeroed(),
-            scene: gpu_world.scene(),
-            lighting: lighting(world.scene(), farthest),
+            scene: SceneFrame {
+                camera: GpuCamera::zeroed(),
+                scene: gpu_world.scene(),
+                lighting: lighting(world.scene(), farthest),
+                tlas: gpu_world.structures.tlas.index(),
+                sky: gpu_world.sky.index(),
+                surface_sampler: gpu_world.surface_sampler.index(),
+                sky_sampler: gpu_world.sky_sampler.index(),
+            },
             places,
             firsts,
-            tlas: gpu_world.structures.tlas.index(),
-            sky: gpu_world.sky.index(),
-            surface_sampler: gpu_world.surface_sampler.index(),
-            sky_sampler: gpu_world.sky_sampler.index(),
-            image: target.image_index(),
-            depth: 0,
-            samples: 0,
-            show: 0,
+            ..FrameConstants::zeroed()
         };
-        let path = CameraPath::tour(world.scene(), 0);
         Ok(Self {
             tracer: Tracer::new(ctx, config.rtx.path, &RAYS)?,
-            camera: path.at(0.0),
+            tour: CameraTour::new(world.scene(), 0),
             near_plane: (NEAR_SHARE * farthest).max(f32::MIN_POSITIVE),
             ctx: ctx.clone(),
             world: gpu_world,
             target,
             config,
-            frame,
             constants,
-            path,
         })
     }
 
     /// Tours the world's cameras from the one with this index on.
     #[must_use]
     pub fn from_camera(mut self, world: &World, first: usize) -> Self {
-        self.path = CameraPath::tour(world.scene(), first);
-        self.camera = self.path.at(0.0);
+        self.tour = CameraTour::new(world.scene(), first);
         self
     }
 
@@ -121,17 +106,17 @@ impl LargeScene {
         &self.world.figures
     }
 
-    fn upload_frame(&mut self) -> lvk::Result<()> {
+    fn upload_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.config.rtx.extent();
-        let constants = FrameConstants {
-            camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
+        let camera = GpuCamera::new(&self.tour.camera, width, height, self.near_plane);
+        cmd.upload(&FrameConstants {
+            scene: SceneFrame { camera, ..self.constants.scene },
             image: self.target.image_index(),
             depth: self.config.depth,
             samples: self.config.samples,
             show: self.config.show.number(),
             ..self.constants
-        };
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+        })
     }
 }
 
@@ -143,25 +128,22 @@ impl Sample for LargeScene {
     }
 
     fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
-        self.camera = self.path.at(time.phase());
+        self.tour.go_to(time.phase());
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        self.upload_frame()?;
-        let push = self.ctx.buffer_address(*self.frame)?;
+        let push = self.upload_frame(&mut frame.cmd)?;
         Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
-        let rtx = self.config.rtx.sized(extent);
-        self.target = rtx.create_target(&self.ctx)?;
-        self.config.rtx = rtx;
+        self.target = self.config.rtx.resize(&self.ctx, extent)?;
         Ok(())
     }
 
     fn camera_mut(&mut self) -> Option<&mut Camera> {
-        Some(&mut self.camera)
+        Some(&mut self.tour.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -213,4 +195,4 @@ fn lighting(scene: &Scene, farthest: f32) -> Lighting {
     Lighting::sunlit(&scene.sun.unwrap_or(no_sun), &Ambient { above, below }, farthest)
 }
 
-const _: () = assert!(std::mem::offset_of!(FrameConstants, places) == 240);
+const _: () = assert!(std::mem::offset_of!(FrameConstants, places) == 256);

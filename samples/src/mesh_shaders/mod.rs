@@ -10,6 +10,7 @@ mod meshlets;
 mod pipelines;
 mod renderer;
 
+pub use crate::shapes::GpuVertex;
 pub use info::MeshShadersArgs;
 pub use meshlets::{Meshlet, Meshlets};
-pub use renderer::{MeshShaders, Vertex};
+pub use renderer::MeshShaders;

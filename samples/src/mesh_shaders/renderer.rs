@@ -7,7 +7,7 @@ use std::f32::consts::TAU;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use lvk::{
-    BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPipelineDesc,
+    BufferHandle, BufferUsage, CommandBuffer, Context, CullMode, Dependencies, Holder, RenderPipelineDesc,
     RenderPipelineHandle, TextureHandle,
 };
 
@@ -15,10 +15,11 @@ use super::counter::Counter;
 use super::knot::knot;
 use super::meshlets::Meshlets;
 use super::pipelines::MESHLETS;
-use crate::app::array_buffer::{array, buffer};
+use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
+use crate::shapes::GpuVertex;
 
 /// Meshlets that a task workgroup looks at (`kMeshletsPerTask` in `shaders/mesh_shaders/payload.glsl`).
 const MESHLETS_PER_TASK: u32 = 32;
@@ -30,10 +31,9 @@ pub struct MeshShaders {
     ctx: Context,
     target: RenderTarget,
     pipeline: Holder<RenderPipelineHandle>,
-    vertices: Vec<Vertex>,
+    vertices: Vec<GpuVertex>,
     meshlets: Meshlets,
     counter: Counter,
-    frame: Holder<BufferHandle>,
     constants: FrameConstants,
     camera: Camera,
     /// The camera for culling, if it is not the camera of the image.
@@ -41,17 +41,7 @@ pub struct MeshShaders {
     _buffers: [Holder<BufferHandle>; 4],
 }
 
-/// A corner of the knot's triangles (`Vertex` in `shaders/mesh_shaders/frame.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Vertex {
-    /// Its position.
-    pub position: [f32; 3],
-    /// Outwards, of length 1.
-    pub normal: [f32; 3],
-}
-
-/// `Frame` there.
+/// `Frame` in `shaders/mesh_shaders/frame.glsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct FrameConstants {
@@ -81,7 +71,6 @@ impl MeshShaders {
         let target = RenderTarget::with_depth(ctx, extent)?;
         let (vertices, meshlets) = model();
         let counter = Counter::new(ctx)?;
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let usage = BufferUsage::STORAGE;
         let buffers = [
             array(ctx, "meshlets", usage, &meshlets.meshlets)?,
@@ -92,11 +81,11 @@ impl MeshShaders {
         let constants = FrameConstants {
             camera: GpuCamera::zeroed(),
             culling_camera: GpuCamera::zeroed(),
-            meshlets: ctx.buffer_address(*buffers[0])?,
-            vertices: ctx.buffer_address(*buffers[1])?,
-            vertex_numbers: ctx.buffer_address(*buffers[2])?,
-            triangles: ctx.buffer_address(*buffers[3])?,
-            counter: ctx.buffer_address(*counter.buffer)?,
+            meshlets: buffers[0].address()?,
+            vertices: buffers[1].address()?,
+            vertex_numbers: buffers[2].address()?,
+            triangles: buffers[3].address()?,
+            counter: counter.buffer.address()?,
             count: meshlets.meshlets.len() as u32,
             culls: culls.into(),
             phase: 0.0,
@@ -109,7 +98,6 @@ impl MeshShaders {
             vertices,
             meshlets,
             counter,
-            frame,
             constants,
             camera: camera(0.0),
             held: None,
@@ -125,7 +113,7 @@ impl MeshShaders {
 
     /// Corners of the knot, at rest.
     #[must_use]
-    pub fn vertices(&self) -> &[Vertex] {
+    pub fn vertices(&self) -> &[GpuVertex] {
         &self.vertices
     }
 
@@ -135,18 +123,15 @@ impl MeshShaders {
         self.counter.latest()
     }
 
-    /// The buffer that all stages are culling_text of (`Frame` in `shaders/mesh_shaders/frame.glsl`).
-    #[must_use]
-    pub fn frame_buffer(&self) -> BufferHandle {
-        *self.frame
-    }
-
-    fn upload(&mut self) -> lvk::Result<()> {
+    /// Uploads the constants that all stages read (`Frame` in `shaders/mesh_shaders/frame.glsl`), and returns their address.
+    ///
+    /// # Errors
+    /// Those of [`CommandBuffer::upload`].
+    pub fn upload(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.target.extent();
         let seen_by = |camera: &Camera| GpuCamera::new(camera, width, height, NEAR_PLANE);
-        self.constants.camera = seen_by(&self.camera);
-        self.constants.culling_camera = seen_by(self.held.as_ref().unwrap_or(&self.camera));
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
+        let culling_camera = seen_by(self.held.as_ref().unwrap_or(&self.camera));
+        cmd.upload(&FrameConstants { camera: seen_by(&self.camera), culling_camera, ..self.constants })
     }
 
     fn culling_text(&self) -> String {
@@ -172,12 +157,12 @@ impl Sample for MeshShaders {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        self.upload()?;
+        let constants = self.upload(&mut frame.cmd)?;
         self.counter.begin(&self.ctx, &mut frame.cmd)?;
         let counts = Dependencies { buffers: &[*self.counter.buffer], ..Dependencies::default() };
         let mut pass = self.target.begin(&mut frame.cmd, "meshlets", BACKDROP, &counts)?;
         pass.bind_render_pipeline(*self.pipeline)?;
-        pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
+        pass.push_constants(&constants)?;
         pass.draw_mesh_tasks([self.constants.count.div_ceil(MESHLETS_PER_TASK), 1, 1])?;
         Ok(self.target.image())
     }
@@ -217,12 +202,9 @@ impl Sample for MeshShaders {
 }
 
 /// The knot's vertices, and its pieces.
-fn model() -> (Vec<Vertex>, Meshlets) {
+fn model() -> (Vec<GpuVertex>, Meshlets) {
     let knot = knot();
-    let vertices = knot
-        .vertices
-        .iter()
-        .map(|vertex| Vertex { position: vertex.position.into(), normal: vertex.normal.into() });
+    let vertices = knot.vertices.iter().map(GpuVertex::from);
     let positions: Vec<Vec3> = knot.vertices.iter().map(|vertex| vertex.position).collect();
     let triangles: Vec<_> = knot.triangles.iter().map(|vertices| vertices.map(u32::from)).collect();
     (vertices.collect(), Meshlets::build(&positions, &triangles))

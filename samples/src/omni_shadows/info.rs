@@ -20,12 +20,8 @@ pub struct OmniShadowsArgs {
     pub filter: ShadowFilter,
 
     /// Texels on an edge of the cube map, 16 to 4096
-    #[arg(
-        long,
-        value_name = "TEXELS",
-        default_value_t = 1024,
-        value_parser = whole(16..=OmniShadowsConfig::MAX_SHADOW_SIZE)
-    )]
+    #[arg(long, value_name = "TEXELS", default_value_t = 1024)]
+    #[arg(value_parser = whole(16..=OmniShadowsConfig::MAX_SHADOW_SIZE))]
     pub shadow_size: u32,
 
     /// Radius of the lamp in metres, 0 to 0.1: the larger, the softer

@@ -9,7 +9,7 @@ use lvk::transform_rows;
 
 use super::lattice::lattice;
 use crate::scene::Camera;
-use crate::shapes::Mesh;
+use crate::shapes::{GpuVertex, Mesh};
 
 /// Half the room's width, its height, half its length.
 pub(super) const ROOM: [f32; 3] = [4.2, 4.4, 4.6];
@@ -32,14 +32,6 @@ enum Material {
     Metal,
     Glaze,
     Glow,
-}
-
-/// `Vertex` in `shaders/omni_shadows/frame.glsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Vertex {
-    position: [f32; 3],
-    normal: [f32; 3],
 }
 
 /// `Instance` in `shaders/omni_shadows/frame.glsl`.
@@ -70,7 +62,7 @@ pub(super) struct Draw {
 /// All models, in the order in which [`instances`] places them.
 #[derive(Debug, Default)]
 pub(super) struct Models {
-    pub(super) vertices: Vec<Vertex>,
+    pub(super) vertices: Vec<GpuVertex>,
     pub(super) corners: Vec<u32>,
     pub(super) draws: Vec<Draw>,
 }
@@ -123,11 +115,7 @@ impl Models {
     fn add(&mut self, mesh: &Mesh, count: u32, casts: bool) {
         let (base, first, placed) =
             (self.vertices.len() as u32, self.corners.len() as u32, self.instance_count());
-        let vertex = |vertex: &crate::shapes::Vertex| Vertex {
-            position: vertex.position.into(),
-            normal: vertex.normal.into(),
-        };
-        self.vertices.extend(mesh.vertices.iter().map(vertex));
+        self.vertices.extend(mesh.vertices.iter().map(GpuVertex::from));
         self.corners.extend(mesh.triangles.iter().flatten().map(|corner| base + u32::from(*corner)));
         let corners = first..self.corners.len() as u32;
         self.draws.push(Draw { corners, instances: placed..placed + count, casts });

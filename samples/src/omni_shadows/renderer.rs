@@ -3,14 +3,14 @@
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::Zeroable;
-use lvk::{BufferHandle, BufferUsage, Context, Holder, SamplerHandle, TextureHandle};
+use lvk::{BufferHandle, BufferUsage, CommandBuffer, Context, Holder, SamplerHandle, TextureHandle};
 
 use super::config::{Faces, OmniShadowsConfig, ShadowFilter};
 use super::frame::FrameConstants;
-use super::models::{self, Draw, Instance, Models};
+use super::models::{self, Draw, Models};
 use super::scene_pass::ScenePass;
 use super::shadow_cube::{CubePass, ShadowCube, samplers};
-use crate::app::array_buffer::{array, buffer};
+use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
@@ -33,9 +33,6 @@ pub struct OmniShadows {
     scene_pass: ScenePass,
     draws: Vec<Draw>,
     triangle_count: u32,
-    instances: Holder<BufferHandle>,
-    frame: Holder<BufferHandle>,
-    frame_address: u64,
     constants: FrameConstants,
     camera: Camera,
     phase: f32,
@@ -52,14 +49,10 @@ impl OmniShadows {
         let models = Models::new();
         let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &models.vertices)?;
         let corners = array(ctx, "corners", BufferUsage::STORAGE, &models.corners)?;
-        let size = u64::from(models.instance_count()) * size_of::<Instance>() as u64;
-        let instances = buffer(ctx, "instances", size)?;
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let samplers = samplers(ctx)?;
         let constants = FrameConstants {
-            vertices: ctx.buffer_address(*vertices)?,
-            corners: ctx.buffer_address(*corners)?,
-            instances: ctx.buffer_address(*instances)?,
+            vertices: vertices.address()?,
+            corners: corners.address()?,
             lamp_near: LAMP_NEAR,
             intensity: INTENSITY,
             room: models::ROOM,
@@ -75,9 +68,6 @@ impl OmniShadows {
             config,
             triangle_count: models.triangle_count(),
             draws: models.draws,
-            instances,
-            frame_address: ctx.buffer_address(*frame)?,
-            frame,
             constants,
             camera: models::camera(0.0),
             phase: 0.0,
@@ -111,10 +101,11 @@ impl OmniShadows {
         self.cube_pass.is_multiview()
     }
 
-    fn upload(&mut self) -> lvk::Result<()> {
+    fn upload(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let OmniShadowsConfig { extent: [width, height], filter, lamp_radius, haze, .. } = self.config;
-        self.constants = FrameConstants {
+        let constants = FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, NEAR_PLANE),
+            instances: cmd.upload_slice(&models::instances(self.phase))?,
             light: models::lamp(self.phase).into(),
             bulb: lamp_radius,
             haze,
@@ -124,9 +115,7 @@ impl OmniShadows {
             texel: 2.0 / self.cube.size as f32,
             ..self.constants
         };
-        let instances = models::instances(self.phase);
-        self.ctx.upload_buffer(*self.instances, 0, bytemuck::cast_slice(&instances))?;
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
+        cmd.upload(&constants)
     }
 
     /// Takes over what the panel has set.
@@ -157,10 +146,10 @@ impl Sample for OmniShadows {
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.apply()?;
-        self.upload()?;
-        let Self { target, cube, cube_pass, scene_pass, draws, frame_address, config, .. } = &*self;
-        frame.pass("shadow cube", |cmd| cube_pass.record(cmd, cube, draws, *frame_address))?;
-        let shown = (*frame_address, config.shows_cube);
+        let constants = self.upload(&mut frame.cmd)?;
+        let Self { target, cube, cube_pass, scene_pass, draws, config, .. } = &*self;
+        frame.pass("shadow cube", |cmd| cube_pass.record(cmd, cube, draws, constants))?;
+        let shown = (constants, config.shows_cube);
         scene_pass.record(&mut frame.cmd, target, *cube.texture, draws, shown)?;
         Ok(target.image())
     }

@@ -15,8 +15,8 @@ use super::frame::{Push, words};
 use super::gpu_scene::{GeometryArena, index_range};
 use super::pipelines::{LEAVES, SKIN};
 use super::quantise::pack_normal;
-use super::serpent::{self, BONE_COUNT, Skin};
-use crate::app::array_buffer::{array, buffer};
+use super::serpent::{self, Skin};
+use crate::app::array_buffer::array;
 use crate::pipelines::SampleStage;
 
 /// Invocations of a work group of both compute shaders.
@@ -50,7 +50,6 @@ pub(super) struct Animation {
     pub(super) leaf_indices: Range<u32>,
     leaf_count: u32,
     rest: Holder<BufferHandle>,
-    bones: Holder<BufferHandle>,
     positions: Holder<BufferHandle>,
     normals: Holder<BufferHandle>,
     leaves: Holder<BufferHandle>,
@@ -94,23 +93,17 @@ impl Animation {
         let leaves = array(ctx, "leaf positions", input, &vec![[0.0_f32; 3]; 4 * leaf_count as usize])?;
         Ok(Self {
             skin_parts,
-            skin_positions: ctx.buffer_address(*positions)?,
-            skin_normals: ctx.buffer_address(*normals)?,
-            leaf_positions: ctx.buffer_address(*leaves)?,
+            skin_positions: positions.address()?,
+            skin_normals: normals.address()?,
+            leaf_positions: leaves.address()?,
             leaf_indices: arena.add_indices(&quads),
             leaf_count,
             rest: array(ctx, "skin at rest", BufferUsage::STORAGE, &rest)?,
-            bones: buffer(ctx, "bones", (BONE_COUNT * size_of::<[f32; 12]>()) as u64)?,
             positions,
             normals,
             leaves,
             skin_vertex_count: rest.len() as u32,
         })
-    }
-
-    /// Moves the bones to where they are at `phase` of the round, 0 to 1.
-    pub(super) fn upload_pose(&self, ctx: &Context, phase: f32) -> lvk::Result<()> {
-        ctx.upload_buffer(*self.bones, 0, bytemuck::cast_slice(&serpent::bones(phase)))
     }
 
     fn skin_geometries(&self, indices: BufferHandle) -> Vec<BlasGeometry> {
@@ -175,19 +168,21 @@ impl AnimationPasses {
         Ok(())
     }
 
-    /// Records what moves everything, and the builds that follow it. `frame` is the address of the frame's constants.
+    /// Records what moves everything to where it is at `phase` of the round, 0 to 1, and the builds that follow it. `frame`
+    /// is the address of the frame's constants.
     pub(super) fn record(
         &self,
-        ctx: &Context,
         cmd: &mut CommandBuffer,
         animation: &Animation,
+        phase: f32,
         frame: u64,
     ) -> lvk::Result<()> {
         cmd.push_label("skinning");
         cmd.bind_compute_pipeline(*self.skin)?;
+        let bones = cmd.upload_slice(&serpent::bones(phase))?;
         cmd.push_constants(&SkinPush {
-            rest: ctx.buffer_address(*animation.rest)?,
-            bones: ctx.buffer_address(*animation.bones)?,
+            rest: animation.rest.address()?,
+            bones,
             positions: animation.skin_positions,
             normals: animation.skin_normals,
             vertex_count: animation.skin_vertex_count.into(),

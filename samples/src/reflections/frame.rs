@@ -52,10 +52,10 @@ pub(super) struct Indices {
     pub(super) glass_reflection: u32,
     pub(super) composite: u32,
     pub(super) picture: u32,
-    pub(super) padding: [u32; 3],
+    pub(super) padding: u32,
 }
 
-/// The whole block, padded so that the next sample's is aligned.
+/// The whole block.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct FrameConstants {
@@ -67,11 +67,7 @@ pub(super) struct FrameConstants {
     pub(super) indices: Indices,
 }
 
-/// Bytes from one sample's block to the next.
-pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
-
-const _: () =
-    assert!(FRAME_BYTES.is_multiple_of(16) && std::mem::offset_of!(FrameConstants, frame_number) == 328);
+const _: () = assert!(std::mem::offset_of!(FrameConstants, frame_number) == 328);
 
 /// The push constants of all passes but the skinning.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

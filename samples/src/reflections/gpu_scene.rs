@@ -14,10 +14,9 @@ use super::quantise::{Grid, PackedVertex};
 use super::scene::{HallScene, Material, Model, Placed};
 use super::transparency_sort::{SortBounds, farthest_first};
 use crate::app::array_buffer::array;
+use crate::app::scene_textures::NO_TEXTURE;
 use crate::shapes::Mesh;
 
-/// `kNoTexture` in `shaders/reflections/frame.glsl`.
-const NO_TEXTURE: u32 = u32::MAX;
 /// `kKindStatic`, `kKindSkinned` and `kKindLeaf` there.
 const KIND_STATIC: u32 = 0;
 const KIND_SKINNED: u32 = 1;
@@ -184,8 +183,8 @@ impl GpuScene {
         animation: &Animation,
         textures: &[Holder<TextureHandle>],
     ) -> lvk::Result<Self> {
-        let mut lists = Lists { vertices: ctx.buffer_address(*vertices)?, ..Lists::default() };
-        lists.indices = ctx.buffer_address(*indices)?;
+        let mut lists = Lists { vertices: vertices.address()?, ..Lists::default() };
+        lists.indices = indices.address()?;
         for (number, model) in world.models.iter().enumerate() {
             lists.add_model(world, arena, number, model);
         }
@@ -198,9 +197,9 @@ impl GpuScene {
         let instances = array(ctx, "instances", read, &lists.instances)?;
         Ok(Self {
             indices,
-            materials: ctx.buffer_address(*materials)?,
-            geometries: ctx.buffer_address(*geometries)?,
-            instances: ctx.buffer_address(*instances)?,
+            materials: materials.address()?,
+            geometries: geometries.address()?,
+            instances: instances.address()?,
             opaque: lists.opaque,
             transparent: lists.transparent,
             layers: lists.layers,

@@ -25,12 +25,8 @@ pub struct ReflectionsArgs {
     pub samples: u32,
 
     /// Leave instances out of the acceleration structure that are seen under less than so many radians; 0 keeps all
-    #[arg(
-        long,
-        value_name = "RADIANS",
-        default_value_t = ReflectionsConfig::DEFAULT_MIN_ANGLE,
-        value_parser = up_to(std::f32::consts::PI)
-    )]
+    #[arg(long, value_name = "RADIANS", default_value_t = ReflectionsConfig::DEFAULT_MIN_ANGLE)]
+    #[arg(value_parser = up_to(std::f32::consts::PI))]
     pub min_angle: f32,
 
     /// Also measure the frame without leaving instances out, and say what that saves

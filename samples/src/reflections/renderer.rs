@@ -2,13 +2,13 @@
 
 use crate::app::sample_error::SampleError;
 use lvk::{
-    AddressMode, BufferHandle, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
+    AddressMode, CommandBuffer, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
     TextureHandle,
 };
 
 use super::animation::{Animation, AnimationPasses};
 use super::config::ReflectionsConfig;
-use super::frame::{FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, light_constants};
+use super::frame::{FrameConstants, Indices, NEAR_PLANE, WorldConstants, light_constants};
 use super::gpu_scene::{GeometryArena, GpuScene};
 use super::image_passes::ImagePasses;
 use super::panel;
@@ -19,7 +19,6 @@ use super::scene::{self, HallScene};
 use super::sky_light::harmonics;
 use super::targets::Targets;
 use super::top_level::{InstanceCount, TopLevel};
-use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::pass_times::PassTimes;
 use crate::app::sample::{FrameTime, Sample};
@@ -48,8 +47,6 @@ pub struct Reflections {
     images: ImagePasses,
     constants: WorldConstants,
     indices: Indices,
-    frame_buffer: Holder<BufferHandle>,
-    frame_address: u64,
     camera: Camera,
     phase: f32,
     wanted: PendingSettings<ReflectionsConfig>,
@@ -88,13 +85,11 @@ impl Reflections {
         };
         targets.name_in(&mut indices);
         textures.push(sky);
-        let frame_buffer = frame_buffer(ctx, config.samples)?;
         Ok(Self {
             constants: world_constants(&world, &gpu_scene),
             raster: RasterPasses::new(ctx)?,
             rays: RayPasses::new(ctx, config.path)?,
             images: ImagePasses::new(ctx)?,
-            frame_address: ctx.buffer_address(*frame_buffer)?,
             ctx: ctx.clone(),
             config: *config,
             gpu_scene,
@@ -103,7 +98,6 @@ impl Reflections {
             top_level,
             targets,
             indices,
-            frame_buffer,
             camera: scene::camera(0.0),
             phase: 0.0,
             wanted: PendingSettings::new(*config),
@@ -126,7 +120,6 @@ impl Reflections {
     /// GPU times of the passes of the first sample, where instances seen under less than `min_angle` are culled;
     /// none where the device has no timestamps.
     pub(super) fn time_sample(&self, min_angle: f32) -> Result<PassTimes, SampleError> {
-        self.upload_constants()?;
         let mut ignore = |_| {};
         let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
         self.record_sample(&mut frame, 0, min_angle)?;
@@ -158,16 +151,10 @@ impl Reflections {
         config.check(self.ctx.capabilities())?;
         let (ctx, before, extent) = (&self.ctx, self.config, [config.width, config.height]);
         let rays = (config.path != before.path).then(|| RayPasses::new(ctx, config.path)).transpose()?;
-        let frames = (config.samples != before.samples).then(|| frame_buffer(ctx, config.samples));
-        let frames = frames.transpose()?;
-        let address = frames.as_ref().map(|frames| ctx.buffer_address(**frames)).transpose()?;
         let targets = (extent != [before.width, before.height]).then(|| Targets::new(ctx, extent));
         if let Some(targets) = targets.transpose()? {
             self.targets = targets;
             self.targets.name_in(&mut self.indices);
-        }
-        if let (Some(frames), Some(address)) = (frames, address) {
-            (self.frame_buffer, self.frame_address) = (frames, address);
         }
         if let Some(rays) = rays {
             self.rays = rays;
@@ -177,29 +164,25 @@ impl Reflections {
         Ok(())
     }
 
-    fn upload_constants(&self) -> lvk::Result<()> {
-        let extent = [self.config.width, self.config.height];
-        let view = GpuCamera::new(&self.camera, extent[0], extent[1], NEAR_PLANE);
-        let all: Vec<FrameConstants> = (0..self.config.samples)
-            .map(|sample_number| FrameConstants {
-                view: view.for_sample(sample_number, self.config.samples),
-                world: self.constants,
-                frame_number: (self.phase * 16_777_216.0) as u32,
-                sample_number,
-                phase: self.phase,
-                indices: self.indices,
-            })
-            .collect();
-        self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&all))?;
-        self.animation.upload_pose(&self.ctx, self.phase)
+    fn upload_constants(&self, cmd: &mut CommandBuffer, sample_number: u32) -> lvk::Result<u64> {
+        let ReflectionsConfig { width, height, samples, .. } = self.config;
+        let view = GpuCamera::new(&self.camera, width, height, NEAR_PLANE);
+        cmd.upload(&FrameConstants {
+            view: view.for_sample(sample_number, samples),
+            world: self.constants,
+            frame_number: (self.phase * 16_777_216.0) as u32,
+            sample_number,
+            phase: self.phase,
+            indices: self.indices,
+        })
     }
 
     fn record_sample(&self, to: &mut Frame<'_>, sample: u32, min_angle: f32) -> lvk::Result<()> {
-        let frame = self.frame_address + FRAME_BYTES * u64::from(sample);
+        let frame = self.upload_constants(&mut to.cmd, sample)?;
         let extent = [self.config.width, self.config.height];
         let eye = self.camera.eye.into();
         if sample == 0 {
-            let move_all = |cmd: &mut _| self.moving_passes.record(&self.ctx, cmd, &self.animation, frame);
+            let move_all = |cmd: &mut _| self.moving_passes.record(cmd, &self.animation, self.phase, frame);
             to.pass("skinning and its builds", move_all)?;
             to.pass(TLAS_BUILD, |cmd| self.top_level.record(cmd, eye, min_angle))?;
         }
@@ -242,7 +225,6 @@ impl Sample for Reflections {
             let done = self.change(config);
             self.wanted.finish(done, self.config);
         }
-        self.upload_constants()?;
         for sample in 0..self.config.samples {
             if sample > 0 {
                 frame.next_step()?;
@@ -286,11 +268,6 @@ impl Sample for Reflections {
         (self.raster, self.rays, self.images) = (raster, rays, images);
         Ok(())
     }
-}
-
-/// Constants of each sample.
-fn frame_buffer(ctx: &Context, samples: u32) -> lvk::Result<Holder<BufferHandle>> {
-    buffer(ctx, "frame constants", FRAME_BYTES * u64::from(samples))
 }
 
 fn world_constants(world: &HallScene, gpu_scene: &GpuScene) -> WorldConstants {

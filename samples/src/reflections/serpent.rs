@@ -9,7 +9,7 @@ use lvk::transform_rows;
 use crate::shapes::Mesh;
 
 /// Bones of the chain, from the neck to the tip of the tail.
-pub(super) const BONE_COUNT: usize = 40;
+const BONE_COUNT: usize = 40;
 /// From bone to bone, in scene units.
 const BONE_LENGTH: f32 = 0.22;
 /// Length of the body.

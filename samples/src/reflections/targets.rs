@@ -60,7 +60,7 @@ impl Targets {
             glass_reflection: light("glass reflection")?,
             composite: make(COMPOSITE_FORMAT, TextureUsage::STORAGE | TextureUsage::TARGET, "composite")?,
             picture: make(Format::Rgba8Unorm, TextureUsage::STORAGE, "picture")?,
-            sums_address: ctx.buffer_address(*sums)?,
+            sums_address: sums.address()?,
             sums,
             extent,
         })

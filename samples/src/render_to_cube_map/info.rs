@@ -16,12 +16,8 @@ pub struct RenderToCubeMapArgs {
     pub faces: FacesArg,
 
     /// Side of a face in pixels, 16 to 4096
-    #[arg(
-        long,
-        value_name = "PIXELS",
-        default_value_t = 512,
-        value_parser = whole(16..=RenderToCubeMapConfig::MAX_FACE_SIZE)
-    )]
+    #[arg(long, value_name = "PIXELS", default_value_t = 512)]
+    #[arg(value_parser = whole(16..=RenderToCubeMapConfig::MAX_FACE_SIZE))]
     pub face_size: u32,
 
     /// Blur of the drop's reflection, 0 to 1

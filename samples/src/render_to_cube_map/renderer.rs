@@ -4,7 +4,7 @@ use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPass, RenderPipelineDesc,
+    CommandBuffer, Context, CullMode, Dependencies, Holder, RenderPass, RenderPipelineDesc,
     RenderPipelineHandle, TextureHandle,
 };
 
@@ -12,7 +12,6 @@ use super::config::{Faces, RenderToCubeMapConfig, has_six_views};
 use super::cube_map::{CubeMap, FACES};
 use super::pipelines::{self, IN_PICTURE, ON_ALL_FACES, ON_FACE};
 use super::surroundings::{Block, DROP, blocks, camera};
-use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
@@ -36,9 +35,6 @@ pub struct RenderToCubeMap {
     camera: Camera,
     phase: f32,
     waves: f32,
-    blocks_buffer: Holder<BufferHandle>,
-    frame: Holder<BufferHandle>,
-    push: Push,
 }
 
 /// All of them; none for six views where the device has none.
@@ -86,20 +82,15 @@ impl RenderToCubeMap {
     pub fn new(ctx: &Context, config: &RenderToCubeMapConfig) -> Result<Self, SampleError> {
         config.faces.check(ctx)?;
         let target = RenderTarget::with_depth(ctx, config.extent)?;
-        let blocks = blocks(0.0);
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
             target,
             config: *config,
             cube_map: CubeMap::new(ctx, config.face_size)?,
             pipelines: Pipelines::new(ctx)?,
-            blocks_buffer: array(ctx, "blocks", BufferUsage::STORAGE, &blocks)?,
-            blocks,
+            blocks: blocks(0.0),
             camera: camera(0.0),
             phase: 0.0,
             waves: 0.16,
-            push: Push { frame: ctx.buffer_address(*frame)?, view: PICTURE, padding: 0 },
-            frame,
             ctx: ctx.clone(),
         })
     }
@@ -122,12 +113,12 @@ impl RenderToCubeMap {
         &self.config
     }
 
-    fn upload(&self) -> lvk::Result<()> {
+    fn upload(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.config.extent;
         let [a, b, c, d, e, f] = GpuCamera::cube_faces(DROP, self.config.face_size, NEAR_PLANE);
         let constants = FrameConstants {
             cameras: [a, b, c, d, e, f, GpuCamera::new(&self.camera, width, height, NEAR_PLANE)],
-            blocks: self.ctx.buffer_address(*self.blocks_buffer)?,
+            blocks: cmd.upload_slice(&self.blocks)?,
             cube_map: self.cube_map.texture.index(),
             sampler: self.cube_map.sampler.index(),
             phase: self.phase,
@@ -135,14 +126,13 @@ impl RenderToCubeMap {
             lod: self.config.roughness * (self.cube_map.mips - 1) as f32,
             padding: 0,
         };
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))?;
-        self.ctx.upload_buffer(*self.blocks_buffer, 0, bytemuck::cast_slice(&self.blocks))
+        cmd.upload(&constants)
     }
 
-    /// Draws what stands around the drop, seen by the camera `view`.
-    fn draw(&self, pass: &mut RenderPass<'_>, by: &Surroundings, view: u32) -> lvk::Result<()> {
+    /// Draws what stands around the drop.
+    fn draw(&self, pass: &mut RenderPass<'_>, by: &Surroundings, push: &Push) -> lvk::Result<()> {
         pass.bind_render_pipeline(*by.blocks)?;
-        pass.push_constants(&Push { view, ..self.push })?;
+        pass.push_constants(push)?;
         pass.draw(0..BLOCK_CORNERS, 0..self.blocks.len() as u32)?;
         pass.bind_render_pipeline(*by.sky)?;
         pass.draw(0..SKY_CORNERS, 0..1)
@@ -164,14 +154,14 @@ impl Sample for RenderToCubeMap {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        self.upload()?;
+        let push = Push { frame: self.upload(&mut frame.cmd)?, view: PICTURE, padding: 0 };
         let (faces, on_faces) = self.pipelines.faces(self.config.faces);
         frame.pass("cube map", |cmd| {
-            self.cube_map.record(cmd, faces, |pass, view| self.draw(pass, on_faces, view))
+            self.cube_map.record(cmd, faces, |pass, view| self.draw(pass, on_faces, &Push { view, ..push }))
         })?;
         let reads = Dependencies { sampled_images: &[self.cube_map()], ..Dependencies::default() };
         let mut pass = self.target.begin(&mut frame.cmd, "picture", [0.0; 3], &reads)?;
-        self.draw(&mut pass, &self.pipelines.in_picture, PICTURE)?;
+        self.draw(&mut pass, &self.pipelines.in_picture, &push)?;
         pass.bind_render_pipeline(*self.pipelines.drop)?;
         pass.draw(0..DROP_CORNERS, 0..1)?;
         Ok(self.target.image())

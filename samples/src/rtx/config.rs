@@ -29,9 +29,16 @@ impl RtxConfig {
         Ok(Self { path, width, height })
     }
 
-    /// The same for a picture of `extent` pixels.
-    pub(crate) fn sized(self, [width, height]: [u32; 2]) -> Self {
-        Self { width, height, ..self }
+    /// Creates the target of images of `extent` pixels. Takes over the extent, unless this fails.
+    pub(crate) fn resize(
+        &mut self,
+        ctx: &Context,
+        [width, height]: [u32; 2],
+    ) -> Result<RenderTarget, SampleError> {
+        let resized = Self { width, height, ..*self };
+        let target = resized.create_target(ctx)?;
+        *self = resized;
+        Ok(target)
     }
 
     /// Width and height.

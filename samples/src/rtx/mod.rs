@@ -6,3 +6,10 @@ mod tracer;
 
 pub use config::RtxConfig;
 pub(crate) use tracer::{RayStages, Tracer, compute_pipeline, groups};
+
+/// Examples of the samples whose only arguments are those of ray tracing.
+pub(crate) const EXAMPLES: &str = "
+    | a picture, by the best path of the best device
+    --rt query --validate | by ray queries in a compute shader, with validation
+    --profile mali-g715 | as on a phone: ray queries
+";

@@ -8,11 +8,8 @@ use lvk::{
 };
 
 use crate::app::array_buffer::array;
-use crate::app::scene_textures;
+use crate::app::scene_textures::{self, NO_TEXTURE};
 use crate::scene::{Material, Scene};
-
-/// `kNoTexture` in `shaders/rtx_ao/frame.glsl`.
-const NO_TEXTURE: u32 = u32::MAX;
 
 /// `Body` in `shaders/rtx_ao/frame.glsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -59,7 +56,7 @@ impl Body {
         ];
         let mut addresses = [0; 5];
         for (address, buffer) in addresses.iter_mut().zip(&buffers) {
-            *address = ctx.buffer_address(**buffer)?;
+            *address = buffer.address()?;
         }
         let blas = build(ctx, scene, *buffers[0], *buffers[3])?;
         Ok(Self { blas, triangle_count: count as u32, addresses, _held: (buffers, textures) })

@@ -17,6 +17,14 @@ pub(super) struct Raster {
     surfaces: Holder<RenderPipelineHandle>,
 }
 
+/// The bodies to draw, and the targets to draw them to.
+pub(super) struct Drawn<'a> {
+    pub(super) targets: &'a Targets,
+    pub(super) bodies: &'a [Body],
+    /// Address of the constants.
+    pub(super) frame: u64,
+}
+
 impl Raster {
     pub(super) fn new(ctx: &Context, path: RayPath) -> lvk::Result<Self> {
         let (fragment, formats) = surface_fragment(path);
@@ -44,53 +52,42 @@ impl Raster {
     }
 
     /// The nearest depth of each pixel.
-    pub(super) fn record_depth(
-        &self,
-        cmd: &mut CommandBuffer,
-        targets: &Targets,
-        bodies: &[Body],
-        frame: u64,
-    ) -> lvk::Result<()> {
+    pub(super) fn record_depth(&self, cmd: &mut CommandBuffer, drawn: &Drawn<'_>) -> lvk::Result<()> {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            depth: Some(DepthAttachment::clear(*targets.depth, 0.0)),
+            depth: Some(DepthAttachment::clear(*drawn.targets.depth, 0.0)),
             debug_name: "depth",
             ..RenderPassDesc::default()
         })?;
-        draw_all(&mut pass, *self.depth, bodies, frame)
+        drawn.draw(&mut pass, *self.depth)
     }
 
     /// Records the pass that draws surfaces at that depth.
-    pub(super) fn record_surfaces(
-        &self,
-        cmd: &mut CommandBuffer,
-        targets: &Targets,
-        bodies: &[Body],
-        frame: u64,
-    ) -> lvk::Result<()> {
-        let colors: Vec<_> =
-            targets.colors().into_iter().map(|target| ColorAttachment::clear(target, [0.0; 4])).collect();
+    pub(super) fn record_surfaces(&self, cmd: &mut CommandBuffer, drawn: &Drawn<'_>) -> lvk::Result<()> {
+        let colors: Vec<_> = drawn
+            .targets
+            .colors()
+            .into_iter()
+            .map(|target| ColorAttachment::clear(target, [0.0; 4]))
+            .collect();
         let depth =
-            DepthAttachment { load: DepthLoadOp::Load, ..DepthAttachment::clear(*targets.depth, 0.0) };
+            DepthAttachment { load: DepthLoadOp::Load, ..DepthAttachment::clear(*drawn.targets.depth, 0.0) };
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &colors,
             depth: Some(depth),
             debug_name: "surfaces",
             ..RenderPassDesc::default()
         })?;
-        draw_all(&mut pass, *self.surfaces, bodies, frame)
+        drawn.draw(&mut pass, *self.surfaces)
     }
 }
 
-fn draw_all(
-    pass: &mut RenderPass<'_>,
-    pipeline: RenderPipelineHandle,
-    bodies: &[Body],
-    frame: u64,
-) -> lvk::Result<()> {
-    pass.bind_render_pipeline(pipeline)?;
-    for (number, body) in (0..).zip(bodies) {
-        pass.push_constants(&Push::new(frame, number))?;
-        pass.draw(0..3 * body.triangle_count, 0..1)?;
+impl Drawn<'_> {
+    fn draw(&self, pass: &mut RenderPass<'_>, pipeline: RenderPipelineHandle) -> lvk::Result<()> {
+        pass.bind_render_pipeline(pipeline)?;
+        for (number, body) in (0..).zip(self.bodies) {
+            pass.push_constants(&Push::new(self.frame, number))?;
+            pass.draw(0..3 * body.triangle_count, 0..1)?;
+        }
+        Ok(())
     }
-    Ok(())
 }

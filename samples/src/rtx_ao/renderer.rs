@@ -4,17 +4,16 @@ use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use glam::{Affine3A, Vec3};
 use lvk::{
-    AccelStructHandle, BufferHandle, BuildMode, CommandBuffer, Context, Holder, SamplerDesc, SamplerHandle,
-    TextureHandle, TlasDesc, TlasInstance, transform_rows,
+    AccelStructHandle, BuildMode, CommandBuffer, Context, Holder, SamplerDesc, SamplerHandle, TextureHandle,
+    TlasDesc, TlasInstance, transform_rows,
 };
 
-use super::body::{Body, BodyConstants};
+use super::body::Body;
 use super::config::RtxAoConfig;
 use super::frame::{FrameConstants, Lighting};
 use super::light_pass::{Cache, LightRays};
-use super::raster::Raster;
+use super::raster::{Drawn, Raster};
 use super::targets::Targets;
-use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::RayPath;
@@ -50,8 +49,6 @@ pub struct RtxAo {
     path: CameraPath,
     lighting: Lighting,
     sampler: Holder<SamplerHandle>,
-    frame: Holder<BufferHandle>,
-    tables: Holder<BufferHandle>,
     view: View,
     passes: u32,
 }
@@ -84,8 +81,6 @@ impl RtxAo {
             cache: Cache::new(ctx, extent)?,
             lighting: Lighting::new(scene, radius, tlas.index()),
             sampler: ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?,
-            frame: buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?,
-            tables: buffer(ctx, "bodies", (bodies.len() * size_of::<BodyConstants>()) as u64)?,
             view: View { camera: path.at(0.0), turns: 0.0 },
             path,
             ctx: ctx.clone(),
@@ -148,20 +143,16 @@ impl RtxAo {
         [Affine3A::IDENTITY, Affine3A::from_rotation_y(std::f32::consts::TAU * self.view.turns)]
     }
 
-    fn upload_bodies(&self) -> lvk::Result<()> {
+    fn upload_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let bodies = self.bodies.iter().zip(self.places());
-        let tables: Vec<_> = bodies.map(|(body, place)| body.constants(&place)).collect();
-        self.ctx.upload_buffer(*self.tables, 0, bytemuck::cast_slice(&tables))
-    }
-
-    fn upload_frame(&self) -> lvk::Result<()> {
+        let bodies: Vec<_> = bodies.map(|(body, place)| body.constants(&place)).collect();
         let [width, height] = self.config.rtx.extent();
         let View { camera, .. } = &self.view;
         let near = NEAR_SHARE * Vec3::from(camera.eye).distance(Vec3::from(camera.target));
         let constants = FrameConstants {
             camera: GpuCamera::new(camera, width, height, near).for_sample(self.passes, u32::MAX),
-            bodies: self.ctx.buffer_address(*self.tables)?,
-            sums: self.ctx.buffer_address(*self.cache.sums)?,
+            bodies: cmd.upload_slice(&bodies)?,
+            sums: self.cache.sums.address()?,
             light: self.lighting,
             image: self.target.image_index(),
             sampler: self.sampler.index(),
@@ -171,7 +162,7 @@ impl RtxAo {
             lift: LIFT_SHARE * self.radius(),
             padding: 0,
         };
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+        cmd.upload(&constants)
     }
 
     fn update_tlas(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
@@ -189,14 +180,14 @@ impl RtxAo {
 
     /// One more pass. The structure is built in the first after a change.
     fn add_pass(&mut self, to: &mut Frame<'_>) -> lvk::Result<()> {
-        self.upload_frame()?;
-        let (frame, extent) = (self.ctx.buffer_address(*self.frame)?, self.config.rtx.extent());
-        let (targets, bodies) = (&self.targets, &self.bodies[..]);
+        let (frame, extent) = (self.upload_frame(&mut to.cmd)?, self.config.rtx.extent());
+        let targets = &self.targets;
         if self.passes == 0 {
             to.pass("TLAS build", |cmd| self.update_tlas(cmd))?;
         }
-        self.raster.record_depth(&mut to.cmd, targets, bodies, frame)?;
-        self.raster.record_surfaces(&mut to.cmd, targets, bodies, frame)?;
+        let drawn = Drawn { targets, bodies: &self.bodies, frame };
+        self.raster.record_depth(&mut to.cmd, &drawn)?;
+        self.raster.record_surfaces(&mut to.cmd, &drawn)?;
         if let Some(rays) = &self.rays {
             to.pass("rays", |cmd| rays.record(cmd, targets, extent, frame))?;
         }
@@ -232,7 +223,6 @@ impl Sample for RtxAo {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        self.upload_bodies()?;
         for pass in 0..self.config.passes {
             if pass > 0 {
                 frame.next_step()?;
@@ -243,11 +233,10 @@ impl Sample for RtxAo {
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
-        let rtx = self.config.rtx.sized(extent);
-        let target = rtx.create_target(&self.ctx)?;
-        let targets = Targets::new(&self.ctx, rtx.path, extent)?;
-        self.cache.sums = Cache::sums(&self.ctx, extent)?;
-        (self.target, self.targets, self.config.rtx) = (target, targets, rtx);
+        let targets = Targets::new(&self.ctx, self.config.rtx.path, extent)?;
+        let sums = Cache::sums(&self.ctx, extent)?;
+        self.target = self.config.rtx.resize(&self.ctx, extent)?;
+        (self.targets, self.cache.sums) = (targets, sums);
         self.passes = 0;
         Ok(())
     }

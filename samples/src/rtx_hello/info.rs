@@ -8,11 +8,7 @@ impl SampleInfo for RtxHello {
     const NAME: &'static str = "rtx_hello";
     const ABOUT: &'static str =
         "Renders turning triangles, the first thing that rays can see, and writes pictures as PNG";
-    const EXAMPLES: &'static str = "
-        | a picture, by the best path of the best device
-        --rt query --validate | by ray queries in a compute shader, with validation
-        --profile mali-g715 | as on a phone: ray queries
-    ";
+    const EXAMPLES: &'static str = crate::rtx::EXAMPLES;
     type Args = BuiltInSceneRayArgs;
     type Sample = Self;
 

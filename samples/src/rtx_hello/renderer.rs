@@ -110,9 +110,7 @@ impl Sample for RtxHello {
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
-        let config = self.config.sized(extent);
-        self.target = config.create_target(&self.ctx)?;
-        self.config = config;
+        self.target = self.config.resize(&self.ctx, extent)?;
         Ok(())
     }
 

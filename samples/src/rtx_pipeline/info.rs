@@ -13,13 +13,8 @@ use crate::rtx::RtxConfig;
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct RtxPipelineArgs {
     /// Maximum number of reflections and refractions of a ray, 0 to 16; pipelines of some devices cannot trace so deep
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 4,
-        value_parser = whole(0..=RtxPipelineConfig::MAX_DEPTH),
-        help_heading = "Rendering"
-    )]
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    #[arg(value_parser = whole(0..=RtxPipelineConfig::MAX_DEPTH), help_heading = "Rendering")]
     pub depth: u32,
 
     /// The scene and its camera

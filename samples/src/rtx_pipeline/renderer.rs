@@ -3,17 +3,16 @@
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Holder, TextureHandle};
+use lvk::{Context, TextureHandle};
 
 use super::config::RtxPipelineConfig;
 use super::pipelines::RAYS;
 use super::switches::RtxPipelineSwitches;
-use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
-use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneAddresses, near_plane};
+use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneFrame, near_plane};
 use crate::rtx::{RayStages, Tracer};
-use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
+use crate::scene::{Camera, CameraTour, GpuCamera, Scene};
 
 /// Places of hit groups in the pipeline (`kSolid` and `kGlass` in `shaders/rtx_pipeline/radiance.glsl`).
 const HIT_GROUPS: HitGroups = HitGroups { opaque: 0, refractive: 1 };
@@ -25,12 +24,10 @@ pub struct RtxPipeline {
     config: RtxPipelineConfig,
     scene: GpuScene,
     tracer: Tracer,
-    frame: Holder<BufferHandle>,
     constants: FrameConstants,
     lighting: Lighting,
     switches: RtxPipelineSwitches,
-    path: CameraPath,
-    camera: Camera,
+    tour: CameraTour,
     near_plane: f32,
 }
 
@@ -38,13 +35,7 @@ pub struct RtxPipeline {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct FrameConstants {
-    camera: GpuCamera,
-    scene: SceneAddresses,
-    lighting: Lighting,
-    tlas: u32,
-    sky: u32,
-    surface_sampler: u32,
-    sky_sampler: u32,
+    scene: SceneFrame,
     image: u32,
     depth: u32,
 }
@@ -59,42 +50,39 @@ impl RtxPipeline {
         let config = config.valid_for(ctx.capabilities());
         let target = config.rtx.create_target(ctx)?;
         let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
-        let path = CameraPath::tour(scene, 0);
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let lighting = Lighting::new(scene);
         let switches = RtxPipelineSwitches { depth: config.depth, lights: lighting.light_count() };
         let constants = FrameConstants {
-            camera: GpuCamera::zeroed(),
-            scene: gpu_scene.addresses(),
-            lighting,
-            tlas: gpu_scene.tlas.index(),
-            sky: gpu_scene.sky.index(),
-            surface_sampler: gpu_scene.surface_sampler.index(),
-            sky_sampler: gpu_scene.sky_sampler.index(),
+            scene: SceneFrame {
+                camera: GpuCamera::zeroed(),
+                scene: gpu_scene.addresses(),
+                lighting,
+                tlas: gpu_scene.tlas.index(),
+                sky: gpu_scene.sky.index(),
+                surface_sampler: gpu_scene.surface_sampler.index(),
+                sky_sampler: gpu_scene.sky_sampler.index(),
+            },
             image: target.image_index(),
             depth: config.depth,
         };
         Ok(Self {
             tracer: tracer(ctx, &config)?,
-            camera: path.at(0.0),
+            tour: CameraTour::new(scene, 0),
             near_plane: near_plane(scene),
             ctx: ctx.clone(),
             scene: gpu_scene,
             target,
             config,
-            frame,
             constants,
             lighting,
             switches,
-            path,
         })
     }
 
     /// Tours the scene's cameras from the one with this index on.
     #[must_use]
     pub fn from_camera(mut self, scene: &Scene, first: usize) -> Self {
-        self.path = CameraPath::tour(scene, first);
-        self.camera = self.path.at(0.0);
+        self.tour = CameraTour::new(scene, first);
         self
     }
 
@@ -132,30 +120,27 @@ impl Sample for RtxPipeline {
     }
 
     fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
-        self.camera = self.path.at(time.phase());
+        self.tour.go_to(time.phase());
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         let [width, height] = self.config.rtx.extent();
         self.constants.depth = self.switches.depth.min(self.config.depth);
-        self.constants.lighting = self.lighting.with_lights(self.switches.lights);
-        self.constants.camera = GpuCamera::new(&self.camera, width, height, self.near_plane);
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
-        let push = self.ctx.buffer_address(*self.frame)?;
+        self.constants.scene.lighting = self.lighting.with_lights(self.switches.lights);
+        self.constants.scene.camera = GpuCamera::new(&self.tour.camera, width, height, self.near_plane);
+        let push = frame.cmd.upload(&self.constants)?;
         Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
-        let rtx = self.config.rtx.sized(extent);
-        self.target = rtx.create_target(&self.ctx)?;
+        self.target = self.config.rtx.resize(&self.ctx, extent)?;
         self.constants.image = self.target.image_index();
-        self.config.rtx = rtx;
         Ok(())
     }
 
     fn camera_mut(&mut self) -> Option<&mut Camera> {
-        Some(&mut self.camera)
+        Some(&mut self.tour.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {

@@ -8,11 +8,7 @@ impl SampleInfo for RtxTextures {
     const NAME: &'static str = "rtx_textures";
     const ABOUT: &'static str =
         "Renders textured crates and rings that a compute shader moves, and writes pictures as PNG";
-    const EXAMPLES: &'static str = "
-        | a picture, by the best path of the best device
-        --rt query --validate | by ray queries in a compute shader, with validation
-        --profile mali-g715 | as on a phone: ray queries
-    ";
+    const EXAMPLES: &'static str = crate::rtx::EXAMPLES;
     type Args = BuiltInSceneRayArgs;
     type Sample = Self;
 

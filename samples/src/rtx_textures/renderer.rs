@@ -42,8 +42,6 @@ pub struct RtxTextures {
     tlas: Holder<AccelStructHandle>,
     blas: Vec<AccelStructHandle>,
     records: Holder<BufferHandle>,
-    frame: Holder<BufferHandle>,
-    frame_address: u64,
     constants: FrameConstants,
     camera: Camera,
     textures: [u32; TEXTURES],
@@ -95,12 +93,11 @@ impl RtxTextures {
             .map(|picture| scene_textures::picture(ctx, picture))
             .collect::<Result<_, _>>()?;
         let records = buffer(ctx, "instances", RECORD_BYTES * u64::from(INSTANCE_COUNT))?;
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let constants = FrameConstants {
             camera: GpuCamera::zeroed(),
-            vertices: ctx.buffer_address(*vertices)?,
-            triangles: ctx.buffer_address(*triangles)?,
-            records: ctx.buffer_address(*records)?,
+            vertices: vertices.address()?,
+            triangles: triangles.address()?,
+            records: records.address()?,
             textures: [0; TEXTURES],
             first_triangle: std::array::from_fn(|model| models.ranges[model].start),
             tlas: tlas.index(),
@@ -118,8 +115,6 @@ impl RtxTextures {
             tlas,
             blas: blas.iter().map(|blas| **blas).collect(),
             records,
-            frame_address: ctx.buffer_address(*frame)?,
-            frame,
             constants,
             camera: camera(0.0),
             textures: std::array::from_fn(|number| textures[number % textures.len()].index()),
@@ -157,9 +152,9 @@ impl RtxTextures {
         TEXTURES
     }
 
-    fn write_instances(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+    fn write_instances(&self, cmd: &mut CommandBuffer, constants: u64) -> lvk::Result<()> {
         cmd.bind_compute_pipeline(*self.writer)?;
-        cmd.push_constants(&self.frame_address)?;
+        cmd.push_constants(&constants)?;
         let writes = Dependencies { buffers: &[*self.records], ..Dependencies::default() };
         cmd.dispatch([self.constants.count.div_ceil(GROUP), 1, 1], &writes)
     }
@@ -187,17 +182,15 @@ impl Sample for RtxTextures {
         let [width, height] = self.config.extent();
         self.apply_switches();
         self.constants.camera = GpuCamera::new(&self.camera, width, height, 0.1);
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
-        frame.pass("instances", |cmd| self.write_instances(cmd))?;
+        let constants = frame.cmd.upload(&self.constants)?;
+        frame.pass("instances", |cmd| self.write_instances(cmd, constants))?;
         frame.pass("TLAS build", |cmd| self.build_tlas(cmd))?;
-        Ok(self.tracer.record_image(frame, &self.target, &self.frame_address)?)
+        Ok(self.tracer.record_image(frame, &self.target, &constants)?)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
-        let config = self.config.sized(extent);
-        self.target = config.create_target(&self.ctx)?;
+        self.target = self.config.resize(&self.ctx, extent)?;
         self.constants.image = self.target.image_index();
-        self.config = config;
         Ok(())
     }
 

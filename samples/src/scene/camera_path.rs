@@ -55,6 +55,25 @@ impl CameraPath {
     }
 }
 
+/// A camera on the tour of a scene, which windows may move until the next frame.
+pub(crate) struct CameraTour {
+    path: CameraPath,
+    pub(crate) camera: Camera,
+}
+
+impl CameraTour {
+    /// A tour that begins at the camera with the index `first`; see [`CameraPath::tour`].
+    pub(crate) fn new(scene: &Scene, first: usize) -> Self {
+        let path = CameraPath::tour(scene, first);
+        Self { camera: path.at(0.0), path }
+    }
+
+    /// Moves the camera to where it is at `phase` of the round.
+    pub(crate) fn go_to(&mut self, phase: f32) {
+        self.camera = self.path.at(phase);
+    }
+}
+
 fn tour_at(stops: &[Camera], phase: f32) -> Camera {
     let count = stops.len();
     let along = phase * count as f32;

@@ -53,6 +53,7 @@ use crate::app::progress::Progress;
 
 pub use camera::Camera;
 pub use camera_path::CameraPath;
+pub(crate) use camera_path::CameraTour;
 pub use error::SceneError;
 pub(crate) use gpu_camera::GpuCamera;
 pub use light::{Ambient, DirectionalLight, PointLight, display};

@@ -54,10 +54,10 @@ impl Culling {
     }
 
     /// Addresses of the draws, of each view's arguments, and of the counts.
-    pub(super) fn addresses(&self, ctx: &Context) -> lvk::Result<(u64, [u64; VIEWS], u64)> {
+    pub(super) fn addresses(&self) -> lvk::Result<(u64, [u64; VIEWS], u64)> {
         let [camera, sun] = &self.arguments;
-        let arguments = [ctx.buffer_address(**camera)?, ctx.buffer_address(**sun)?];
-        Ok((ctx.buffer_address(*self.draws)?, arguments, ctx.buffer_address(*self.counts)?))
+        let arguments = [camera.address()?, sun.address()?];
+        Ok((self.draws.address()?, arguments, self.counts.address()?))
     }
 
     /// Records the dispatch: a work group for each view.

@@ -60,11 +60,6 @@ pub(super) struct GpuFinish {
     pub(super) normal_map: u32,
 }
 
-impl GpuFinish {
-    /// `kNoTexture` in `shaders/common/scene_buffers.glsl`.
-    pub(super) const NO_TEXTURE: u32 = u32::MAX;
-}
-
 /// `Draw`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]

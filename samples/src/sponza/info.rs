@@ -35,12 +35,8 @@ pub struct SponzaArgs {
     pub draw_triangles: u32,
 
     /// Texels on an edge of the shadow map, 16 to 8192
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 2048,
-        value_parser = whole(16..=SponzaConfig::MAX_SHADOW_SIZE)
-    )]
+    #[arg(long, value_name = "N", default_value_t = 2048)]
+    #[arg(value_parser = whole(16..=SponzaConfig::MAX_SHADOW_SIZE))]
     pub shadow_size: u32,
 
     /// Texels to each side that shadows are filtered over, 0 to 4

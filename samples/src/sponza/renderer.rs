@@ -4,8 +4,8 @@ use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use glam::{Quat, Vec3};
 use lvk::{
-    AddressMode, BufferHandle, BufferUsage, Context, Dependencies, Holder, Readback, RenderPipelineHandle,
-    SamplerDesc, SamplerHandle, TextureHandle,
+    AddressMode, BufferHandle, BufferUsage, CommandBuffer, Context, Dependencies, Holder, Readback,
+    RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
 };
 
 use super::config::{DrawPath, SponzaConfig};
@@ -16,13 +16,13 @@ use super::frustum::Frustum;
 use super::pipelines::{SKY, SURFACES};
 use super::shadow::Shadow;
 use super::sun_view::SunView;
-use crate::app::array_buffer::{array, buffer};
+use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
 use crate::hybrid::{SceneArrays, check_promises, near_plane};
 use crate::raster::RasterPipeline;
-use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Material, PointLight, Scene};
+use crate::scene::{Ambient, Camera, CameraTour, DirectionalLight, GpuCamera, Material, PointLight, Scene};
 
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
@@ -43,9 +43,7 @@ pub struct Sponza {
     draws: Vec<Draw>,
     bounds: ([f32; 3], [f32; 3]),
     light: Light,
-    frame: Holder<BufferHandle>,
-    path: CameraPath,
-    camera: Camera,
+    tour: CameraTour,
     near_plane: f32,
     /// The frustum of a view that is kept while the camera goes on, to look at what was culled.
     kept: Option<Frustum>,
@@ -87,8 +85,6 @@ impl Sponza {
         let config = config.valid_for(ctx)?;
         let target = RenderTarget::with_samples(ctx, config.extent, config.samples)?;
         let draws = split_draws(&mut scene, config.triangles_per_draw);
-        let path = CameraPath::tour(&scene, 0);
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
             target,
             culling: Culling::new(ctx, &draws)?,
@@ -99,9 +95,7 @@ impl Sponza {
             draws,
             bounds: scene.bounds(),
             light: Light::from_scene(&scene),
-            frame,
-            camera: path.at(0.0),
-            path,
+            tour: CameraTour::new(&scene, 0),
             near_plane: near_plane(&scene),
             ctx: ctx.clone(),
             path_of_draws: config.draws.unwrap_or(DrawPath::Padded),
@@ -115,8 +109,7 @@ impl Sponza {
     /// Tours the scene's cameras from the one with this index on.
     #[must_use]
     pub fn from_camera(mut self, scene: &Scene, first: usize) -> Self {
-        self.path = CameraPath::tour(scene, first);
-        self.camera = self.path.at(0.0);
+        self.tour = CameraTour::new(scene, first);
         self
     }
 
@@ -140,7 +133,7 @@ impl Sponza {
         if !self.config.culls {
             return [Frustum::ALL; 2];
         }
-        let seen = || Frustum::of_camera(&self.camera, self.target.aspect(), self.near_plane);
+        let seen = || Frustum::of_camera(&self.tour.camera, self.target.aspect(), self.near_plane);
         [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
     }
 
@@ -189,14 +182,14 @@ impl Sponza {
         }
     }
 
-    fn upload_frame(&self) -> lvk::Result<()> {
+    fn upload_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.target.extent();
-        let (draws, arguments, counts) = self.culling.addresses(&self.ctx)?;
+        let (draws, arguments, counts) = self.culling.addresses()?;
         let frusta = self.frusta();
-        let constants = FrameConstants {
-            camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
+        cmd.upload(&FrameConstants {
+            camera: GpuCamera::new(&self.tour.camera, width, height, self.near_plane),
             scene: self.scene.arrays.addresses(),
-            finishes: self.ctx.buffer_address(*self.scene.finishes)?,
+            finishes: self.scene.finishes.address()?,
             draws,
             views: [0, 1].map(|view| GpuView::new(&frusta[view], arguments[view])),
             counts,
@@ -207,8 +200,7 @@ impl Sponza {
             sky: self.scene.sky.index(),
             sky_sampler: self.scene.sky_sampler.index(),
             has_relief: self.config.normal_maps.into(),
-        };
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+        })
     }
 
     fn draw_surfaces(&self, to: &mut Frame<'_>, address: u64) -> lvk::Result<()> {
@@ -254,13 +246,12 @@ impl Sample for Sponza {
     }
 
     fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
-        self.camera = self.path.at(time.phase());
+        self.tour.go_to(time.phase());
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        self.upload_frame()?;
-        let address = self.ctx.buffer_address(*self.frame)?;
+        let address = self.upload_frame(&mut frame.cmd)?;
         frame.pass("culling", |cmd| self.culling.record(cmd, address))?;
         self.shadow.record(&mut frame.cmd, &self.culling, self.path_of_draws, address)?;
         self.draw_surfaces(frame, address)?;
@@ -283,7 +274,7 @@ impl Sample for Sponza {
     }
 
     fn camera_mut(&mut self) -> Option<&mut Camera> {
-        Some(&mut self.camera)
+        Some(&mut self.tour.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -330,7 +321,7 @@ impl OnDevice {
         let number = |map: u32| maps[map as usize].index();
         let finish = |material: &Material| GpuFinish {
             is_masked: material.is_masked.into(),
-            normal_map: material.normal_map.map_or(GpuFinish::NO_TEXTURE, number),
+            normal_map: material.normal_map.map_or(scene_textures::NO_TEXTURE, number),
         };
         let finishes: Vec<_> = scene.materials.iter().map(finish).collect();
         let sampler = |debug_name, address, max_anisotropy| {

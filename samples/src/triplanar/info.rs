@@ -12,13 +12,9 @@ use crate::scene::PAINTED;
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct TriplanarArgs {
     /// Textures to unload, with commas between them: a placeholder is shown in their place
-    #[arg(
-        long,
-        value_name = "NAMES",
-        value_delimiter = ',',
-        value_parser = PossibleValuesParser::new(PAINTED.map(|painted| painted.name)),
-        help_heading = "Rendering"
-    )]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(value_parser = PossibleValuesParser::new(PAINTED.map(|painted| painted.name)))]
+    #[arg(help_heading = "Rendering")]
     pub unload: Vec<String>,
 }
 

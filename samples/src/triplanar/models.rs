@@ -7,17 +7,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use crate::scene::{PAINTED, noise};
-use crate::shapes::Mesh;
+use crate::shapes::{GpuVertex, Mesh};
 
-/// `Vertex` in `shaders/triplanar/frame.glsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Vertex {
-    position: [f32; 3],
-    normal: [f32; 3],
-}
-
-/// `Body` there.
+/// `Body` in `shaders/triplanar/frame.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Body {
@@ -31,7 +23,7 @@ pub(super) struct Body {
 
 /// Triangles of all models in one list, and the bodies.
 pub(super) struct Models {
-    pub(super) vertices: Vec<Vertex>,
+    pub(super) vertices: Vec<GpuVertex>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) bodies: Vec<Body>,
     /// Corners of the model of each body, as places in `triangles`.
@@ -63,10 +55,7 @@ impl Models {
     fn add(&mut self, model: &Mesh) -> Range<u32> {
         let first = 3 * self.triangles.len() as u32;
         let base = self.vertices.len() as u32;
-        let vertices = model.vertices.iter();
-        self.vertices.extend(
-            vertices.map(|vertex| Vertex { position: vertex.position.into(), normal: vertex.normal.into() }),
-        );
+        self.vertices.extend(model.vertices.iter().map(GpuVertex::from));
         let triangles = model.triangles.iter();
         self.triangles.extend(triangles.map(|corners| corners.map(|corner| base + u32::from(corner))));
         first..3 * self.triangles.len() as u32

@@ -6,14 +6,14 @@ use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, IndexFormat, RenderPipelineDesc,
-    RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
+    BufferHandle, BufferUsage, CommandBuffer, Context, CullMode, Dependencies, Holder, IndexFormat,
+    RenderPipelineDesc, RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
 };
 
 use super::models::Models;
 use super::pipelines::MODELS;
 use super::streamed::{COUNT, Residency, Streamed};
-use crate::app::array_buffer::{array, buffer};
+use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera, PAINTED};
@@ -32,7 +32,6 @@ pub struct Triplanar {
     textures: Streamed,
     bodies: Models,
     triangles: Holder<BufferHandle>,
-    frame: Holder<BufferHandle>,
     constants: FrameConstants,
     camera: Camera,
     /// Frames since textures come and go by themselves, if they do.
@@ -68,10 +67,9 @@ impl Triplanar {
         let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &bodies.vertices)?;
         let placed = array(ctx, "bodies", BufferUsage::STORAGE, &bodies.bodies)?;
         let sampler = ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?;
-        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let constants = FrameConstants {
-            vertices: ctx.buffer_address(*vertices)?,
-            bodies: ctx.buffer_address(*placed)?,
+            vertices: vertices.address()?,
+            bodies: placed.address()?,
             sampler: sampler.index(),
             body_count: bodies.bodies.len() as u32,
             sharpness: 6.0,
@@ -85,7 +83,6 @@ impl Triplanar {
             textures,
             triangles: array(ctx, "triangles", BufferUsage::INDEX, &bodies.triangles)?,
             bodies,
-            frame,
             constants,
             camera: camera(0.0),
             turns: None,
@@ -123,11 +120,10 @@ impl Triplanar {
         self.textures.wait()
     }
 
-    fn upload(&mut self) -> lvk::Result<()> {
+    fn upload(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let [width, height] = self.target.extent();
-        self.constants.camera = GpuCamera::new(&self.camera, width, height, NEAR_PLANE);
-        self.constants.textures = self.textures.indices();
-        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
+        let camera = GpuCamera::new(&self.camera, width, height, NEAR_PLANE);
+        cmd.upload(&FrameConstants { camera, textures: self.textures.indices(), ..self.constants })
     }
 
     /// Lets one texture after the other go and come back.
@@ -169,12 +165,12 @@ impl Sample for Triplanar {
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.take_turns();
         self.textures.take_in()?;
-        self.upload()?;
+        let constants = self.upload(&mut frame.cmd)?;
         let nothing = Dependencies::default();
         let mut pass = self.target.begin(&mut frame.cmd, "bodies", BACKDROP, &nothing)?;
         pass.bind_render_pipeline(*self.pipeline)?;
         pass.bind_index_buffer(*self.triangles, 0, IndexFormat::U32)?;
-        pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
+        pass.push_constants(&constants)?;
         for (number, corners) in (0..).zip(&self.bodies.corners) {
             pass.draw_indexed(corners.clone(), 0, number..number + 1)?;
         }

@@ -423,6 +423,8 @@ fn clocks_of_gpu_and_host_go_together() {
     finish(&ctx, cmd);
     let second = ctx.calibrated_timestamps().unwrap();
     let (after, wall) = (monotonic(), start.elapsed());
+    #[cfg(target_os = "linux")]
+    assert_eq!([first.clock, second.clock], [lvk::HostClock::Monotonic; 2]);
     assert!(first.host <= second.host);
     assert!(
         before.is_none_or(|before| before <= first.host) && after.is_none_or(|after| second.host <= after)
@@ -433,6 +435,12 @@ fn clocks_of_gpu_and_host_go_together() {
     let slack = first.deviation + second.deviation + Duration::from_micros(50);
     let seen = first.host_at(stamp);
     assert!(seen + slack >= first.host && seen <= second.host + slack, "{seen:?} of {first:?} to {second:?}");
+    // Both scales of the host are those of one clock, so their distances are the same.
+    let slack = slack + first.instant_deviation + second.instant_deviation;
+    let (apart, instants) = (second.host - first.host, second.instant - first.instant);
+    assert!(apart.abs_diff(instants) <= slack, "{first:?} to {second:?}");
+    let at = first.instant_at(stamp).unwrap();
+    assert!(start <= at + slack && at <= second.instant + slack, "{at:?} of {first:?} to {second:?}");
 }
 
 /// The clock of the host that drivers read; `None` on Windows, where it is another.

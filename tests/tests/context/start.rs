@@ -7,7 +7,8 @@ use std::path::Path;
 use lvk::ash::vk;
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, ContextDesc, Error, FeatureRequest,
-    RayQueryRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc, Triangles, ValidationMode,
+    LoaderReport, ManifestOutcome, RayQueryRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc,
+    Triangles, ValidationMode,
 };
 use lvk_tests::compute::words_buffer;
 use lvk_tests::device::vulkan;
@@ -44,10 +45,74 @@ fn a_wrong_library_is_no_vulkan() {
         Context::devices(Some(nowhere)).map(drop),
     ] {
         match result {
-            Err(Error::NoVulkan { reason }) => assert!(reason.contains("/nowhere"), "{reason}"),
+            Err(Error::NoVulkan { report }) => {
+                assert!(
+                    matches!(&report.loader, LoaderReport::NotOpened { path, error }
+                        if path == nowhere && error.contains("/nowhere")),
+                    "{report}"
+                );
+            }
             other => unreachable!("{other:?}"),
         }
     }
+}
+
+/// Two broken drivers, one after the other in the variable that lists drivers.
+#[test]
+fn drivers_that_cannot_be_loaded_are_named() {
+    let Some(_) = vulkan() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(
+        path("a.json"),
+        r#"{"file_format_version": "1.0.0", "ICD": {"library_path": "./libtoy.so", "api_version": "1.3.1"}}"#,
+    )
+    .unwrap();
+    std::fs::write(
+        path("libtoy.so"),
+        "a text in the place of a library, which is longer than the header of ELF",
+    )
+    .unwrap();
+    std::fs::write(path("b.json"), "{").unwrap();
+    let listed = std::env::join_paths([path("a.json"), path("b.json")]).unwrap();
+    let variables =
+        [("VK_DRIVER_FILES", Some(listed.as_os_str())), ("VK_ICD_FILENAMES", None), ("LVK_DRIVER", None)];
+    in_subprocess(drivers_that_cannot_be_loaded_are_named, &variables, || {
+        let Some(library) = vulkan() else { return };
+        let report = match start(|_| ()) {
+            Err(Error::NoVulkan { report }) => report,
+            other => unreachable!("{other:?}"),
+        };
+        assert!(
+            matches!(&report.loader, LoaderReport::Opened { version, .. } if *version >= (1, 3, 0)),
+            "{report}"
+        );
+        let outcomes: Vec<_> = report.manifests.iter().map(|manifest| &manifest.outcome).collect();
+        assert!(
+            matches!(outcomes[..], [ManifestOutcome::LoadFailed { error }, ManifestOutcome::NotRead { .. }]
+                if error.contains("libtoy.so") && error.contains("invalid ELF header")),
+            "{report}"
+        );
+        let text = report.to_string();
+        for part in ["a.json", "b.json", "remedy: install the driver of", "remedy: correct or remove"] {
+            assert!(text.contains(part) && text.lines().count() == 1, "no '{part}' in {text}");
+        }
+        let listed = Context::vulkan_report(library);
+        assert!(listed.devices.is_empty());
+        assert_eq!(listed.drivers.manifests, report.manifests);
+        let summary = listed.summary();
+        assert!(summary.contains("a.json") && !summary.contains("remedy"), "{summary}");
+    });
+}
+
+#[test]
+fn the_report_lists_the_devices_that_work() {
+    let Some(ctx) = device() else { return };
+    let report = Context::vulkan_report(vulkan().flatten());
+    assert!(matches!(report.drivers.loader, LoaderReport::Opened { .. }), "{report}");
+    let own = report.devices.iter().find(|device| device.name == ctx.capabilities().device_name).unwrap();
+    assert_eq!((own.api_version, own.missing.len()), (ctx.capabilities().api_version, 0));
+    assert!(!report.to_string().contains("remedy"), "{report}");
 }
 
 #[test]
@@ -61,14 +126,18 @@ fn the_device_can_be_chosen_by_number_and_name() {
         let upper = name.to_uppercase();
         match start(|desc| desc.device = Some(&upper)) {
             Ok(chosen) => assert_eq!(chosen.capabilities().device_name, name),
-            Err(Error::NoDevice { reasons }) => assert!(reasons.contains("several"), "{reasons}"),
+            Err(Error::NoDevice { problem, .. }) => assert!(problem.unwrap().contains("several")),
             Err(other) => unreachable!("{other}"),
         }
         match start(|desc| desc.device = Some("no such device")) {
-            Err(Error::NoDevice { reasons }) => {
+            Err(Error::NoDevice { problem, candidates, drivers }) => {
+                assert_eq!(problem.as_deref(), Some("'no such device' names no device"));
+                assert!(candidates.iter().any(|device| device.name == name), "{candidates:?}");
+                let drivers = drivers.unwrap();
+                assert!(matches!(drivers.loader, LoaderReport::Opened { .. }), "{drivers}");
                 assert!(
-                    reasons.contains("'no such device' names no device") && reasons.contains(&name),
-                    "{reasons}"
+                    drivers.manifests.iter().any(|it| it.outcome == ManifestOutcome::Loaded),
+                    "{drivers}"
                 );
             }
             other => unreachable!("{other:?}"),
@@ -82,7 +151,7 @@ fn the_environment_overrides_the_description() {
     let wish = Some(OsStr::new("somewhere else"));
     in_subprocess(the_environment_overrides_the_description, &[("LVK_DEVICE", wish)], || {
         match start(|desc| desc.device = Some("0")) {
-            Err(Error::NoDevice { reasons }) => assert!(reasons.contains("'somewhere else'"), "{reasons}"),
+            Err(Error::NoDevice { problem, .. }) => assert!(problem.unwrap().contains("'somewhere else'")),
             other => unreachable!("{other:?}"),
         }
     });
@@ -163,8 +232,9 @@ fn a_device_without_ray_tracing_does_everything_else() {
         ] {
             let required = start(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (pipeline, query));
             match required {
-                Err(Error::NoDevice { reasons }) => {
-                    assert!(reasons.contains("SwiftShader") && reasons.contains(lack), "{reasons}");
+                Err(Error::NoDevice { candidates, .. }) => {
+                    let device = candidates[0].to_string();
+                    assert!(device.contains("SwiftShader") && device.contains(lack), "{device}");
                 }
                 other => unreachable!("{other:?}"),
             }

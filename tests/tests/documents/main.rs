@@ -1,8 +1,9 @@
 //! Tests that hold documents and the tree of sources against each other.
 
-mod bindless_core;
+mod android;
 mod circles;
 mod contributing;
+mod features;
 mod glossary;
 mod held_by;
 mod layers;

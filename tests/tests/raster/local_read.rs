@@ -388,7 +388,7 @@ fn stencil_is_read() {
         |pass| {
             pass.bind_render_pipeline(*mark)?;
             for column in 0..width {
-                pass.stencil_reference(column as u8 * 11, column as u8 * 11);
+                pass.stencil_reference(column as u8 * 11, column as u8 * 11).unwrap();
                 pass.scissor([column, 0], [1, height])?;
                 paint(pass, [0.0; 4], column as f32 / 32.0)?;
             }

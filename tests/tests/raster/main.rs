@@ -9,6 +9,7 @@ mod local_read;
 mod local_read_refusals;
 mod mesh_shaders;
 mod multisampling;
+mod portability;
 mod shading_rate;
 mod stages;
 mod state;

@@ -216,7 +216,7 @@ fn colour_depth_and_stencil_are_resolved_by_their_modes() {
             Err(other) => unreachable!("{other}"),
         };
         pass.bind_render_pipeline(*pipeline).unwrap();
-        pass.stencil_reference(77, 77);
+        pass.stencil_reference(77, 77).unwrap();
         paint(&mut pass, [0.0; 4], 0.0).unwrap();
         drop(pass);
         ctx.submit(cmd).unwrap();
@@ -243,7 +243,7 @@ fn equal_to(ctx: &Context, tested: TextureHandle, value: u8) -> Vec<f32> {
     let depth = Some(DepthAttachment::load(tested));
     run_pass(ctx, &RenderPassDesc { color: &color, depth, ..Default::default() }, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
-        pass.stencil_reference(value, value);
+        pass.stencil_reference(value, value).unwrap();
         paint(pass, [1.0; 4], 0.0)
     });
     pixels(ctx, drawn.handle())

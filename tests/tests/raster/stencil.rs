@@ -61,7 +61,7 @@ fn stencil_values(ctx: &Context, tested: TextureHandle, size: [u32; 2], candidat
     run_pass(ctx, &RenderPassDesc { color: &color, depth, ..Default::default() }, |pass| {
         pass.bind_render_pipeline(*equal)?;
         for candidate in candidates {
-            pass.stencil_reference(*candidate, *candidate);
+            pass.stencil_reference(*candidate, *candidate).unwrap();
             paint(pass, [f32::from(*candidate); 4], 0.0)?;
         }
         Ok(())
@@ -93,7 +93,7 @@ fn operations_change_values_as_their_names_say() {
     let (drawn, tested) = (target(&ctx, Format::R32Float, size), target(&ctx, BOTH, size));
     for start in STARTS {
         pass_over(&ctx, *drawn, *tested, start, |pass| {
-            pass.stencil_reference(REFERENCE, REFERENCE);
+            pass.stencil_reference(REFERENCE, REFERENCE).unwrap();
             for (column, pipeline) in (0..).zip(&pipelines) {
                 pass.bind_render_pipeline(**pipeline)?;
                 pass.scissor([column, 0], [1, 1])?;
@@ -129,7 +129,7 @@ fn each_outcome_has_its_own_operation_under_the_masks() {
         pass.bind_render_pipeline(*tests)?;
         for (column, (reference, depth)) in (0..).zip([(0x57, 0.25), (0x56, 0.75), (0x56, 0.25)]) {
             pass.scissor([column, 0], [1, 1])?;
-            pass.stencil_reference(reference, reference);
+            pass.stencil_reference(reference, reference).unwrap();
             paint(pass, [1.0; 4], depth)?;
         }
         Ok(())
@@ -153,7 +153,7 @@ fn front_and_back_faces_have_tests_and_references_of_their_own() {
     let (drawn, tested) = (target(&ctx, Format::R32Float, [2, 1]), target(&ctx, BOTH, [2, 1]));
     pass_over(&ctx, *drawn, *tested, 7, |pass| {
         pass.bind_render_pipeline(*sides)?;
-        pass.stencil_reference(40, 90);
+        pass.stencil_reference(40, 90).unwrap();
         pass.scissor([0, 0], [1, 1])?;
         paint(pass, [1.0; 4], 0.0)?;
         // Seen in a mirror, the winding is the other one.

@@ -57,13 +57,18 @@ fn beside(model: usize, index: u32) -> Placed {
     Placed { custom_index: 30 + index, ..Placed::new(model, transform) }
 }
 
+/// A model for each layout, of the mesh and a cube, side by side.
+fn beside_cubes(mesh: fn() -> Mesh) -> RayScene {
+    let model = |layout| vec![Part::new(mesh(), layout), Part::new(Mesh::cube_grid(1), layout)];
+    let models = LAYOUTS.map(model).to_vec();
+    RayScene { models, placed: (0..4).map(|index| beside(index as usize, index)).collect() }
+}
+
 #[test]
 fn triangles_without_area_are_not_hit() -> Result<()> {
     for ctx in devices() {
         let check = HitCheck::new(&ctx)?;
-        let model = |layout| vec![Part::new(with_slivers(), layout), Part::new(Mesh::cube_grid(1), layout)];
-        let models = LAYOUTS.map(model).to_vec();
-        let scene = RayScene { models, placed: (0..4).map(|index| beside(index as usize, index)).collect() };
+        let scene = beside_cubes(with_slivers);
         check.scene("without area", &scene.upload(&ctx)?.tlas, &scene)?;
     }
     Ok(())
@@ -73,9 +78,7 @@ fn triangles_without_area_are_not_hit() -> Result<()> {
 fn inactive_triangles_are_not_hit() -> Result<()> {
     for ctx in devices() {
         let check = HitCheck::new(&ctx)?;
-        let model = |layout| vec![Part::new(with_inactive(), layout), Part::new(Mesh::cube_grid(1), layout)];
-        let models = LAYOUTS.map(model).to_vec();
-        let scene = RayScene { models, placed: (0..4).map(|index| beside(index as usize, index)).collect() };
+        let scene = beside_cubes(with_inactive);
         let gpu = scene.upload(&ctx)?;
         if loses_neighbours_of_inactive(&ctx) {
             check_found(&check, &gpu, &scene)?;

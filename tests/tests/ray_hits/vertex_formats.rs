@@ -14,28 +14,16 @@ use lvk_tests::rays::Ray;
 use lvk_tests::reference::{Geometry, Instance, Reference};
 use lvk_tests::{TestDevice, device, device_with};
 
-const FORMATS: [VertexFormat; 10] = [
-    VertexFormat::F32,
-    VertexFormat::F32x2,
-    VertexFormat::F32x3,
-    VertexFormat::F32x4,
-    VertexFormat::F16x2,
-    VertexFormat::F16x4,
-    VertexFormat::Snorm16x2,
-    VertexFormat::Snorm16x4,
-    VertexFormat::Unorm8x4,
-    VertexFormat::U32,
-];
+const FORMATS: [VertexFormat; 10] = {
+    use VertexFormat::{F16x2, F16x4, F32, F32x2, F32x3, F32x4, Snorm16x2, Snorm16x4, U32, Unorm8x4};
+    [F32, F32x2, F32x3, F32x4, F16x2, F16x4, Snorm16x2, Snorm16x4, Unorm8x4, U32]
+};
 
 /// Formats that Vulkan demands of every device with acceleration structures (table "Mandatory format support").
-const MANDATORY: [VertexFormat; 6] = [
-    VertexFormat::F32x2,
-    VertexFormat::F32x3,
-    VertexFormat::F16x2,
-    VertexFormat::F16x4,
-    VertexFormat::Snorm16x2,
-    VertexFormat::Snorm16x4,
-];
+const MANDATORY: [VertexFormat; 6] = {
+    use VertexFormat::{F16x2, F16x4, F32x2, F32x3, Snorm16x2, Snorm16x4};
+    [F32x2, F32x3, F16x2, F16x4, Snorm16x2, Snorm16x4]
+};
 
 const INDICES: [Option<IndexFormat>; 3] = [None, Some(IndexFormat::U16), Some(IndexFormat::U32)];
 

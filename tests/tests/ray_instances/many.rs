@@ -178,7 +178,7 @@ fn offset_query(ctx: &Context) -> Result<RayTracer> {
                 record.kind = lvkRayQueryFrontFace(rq, LVK_COMMITTED) ? kFront : kBack;
                 record.instance = lvkRayQueryInstanceId(rq, LVK_COMMITTED, tlas);
                 record.customIndex = lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED);
-                record.geometry = lvkRayQuerySbtOffset(rq, LVK_COMMITTED);
+                record.geometry = lvkRayQueryInstanceShaderBindingTableRecordOffset(rq, LVK_COMMITTED);
             }
             hits.at[index] = record;
         }"#;

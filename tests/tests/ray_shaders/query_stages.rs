@@ -390,29 +390,22 @@ impl Stage {
     }
 }
 
-#[test]
-fn queries_of_the_compute_stage_see_what_was_built() -> Result<()> {
-    Stage::everything_is_seen(ShaderStage::Compute)
+/// Declares a test for each stage.
+macro_rules! queries_see_what_was_built {
+    ($($test:ident: $stage:ident;)*) => {
+        $(#[test]
+        fn $test() -> Result<()> {
+            Stage::everything_is_seen(ShaderStage::$stage)
+        })*
+    };
 }
 
-#[test]
-fn queries_of_the_vertex_stage_see_what_was_built() -> Result<()> {
-    Stage::everything_is_seen(ShaderStage::Vertex)
-}
-
-#[test]
-fn queries_of_the_fragment_stage_see_what_was_built() -> Result<()> {
-    Stage::everything_is_seen(ShaderStage::Fragment)
-}
-
-#[test]
-fn queries_of_the_mesh_stage_see_what_was_built() -> Result<()> {
-    Stage::everything_is_seen(ShaderStage::Mesh)
-}
-
-#[test]
-fn queries_of_the_task_stage_see_what_was_built() -> Result<()> {
-    Stage::everything_is_seen(ShaderStage::Task)
+queries_see_what_was_built! {
+    queries_of_the_compute_stage_see_what_was_built: Compute;
+    queries_of_the_vertex_stage_see_what_was_built: Vertex;
+    queries_of_the_fragment_stage_see_what_was_built: Fragment;
+    queries_of_the_mesh_stage_see_what_was_built: Mesh;
+    queries_of_the_task_stage_see_what_was_built: Task;
 }
 
 /// No pipeline queries rays when the pass begins behind a build, so that only a declared acceleration structure is waited for.

@@ -71,6 +71,37 @@ impl Traced {
     }
 }
 
+/// Returns a tracer with one hit shader for all geometries and instances of the [`scene`].
+fn tracer_with(
+    ctx: &Context,
+    ray_gen: &[Holder<ShaderModuleHandle>],
+    miss: &[Holder<ShaderModuleHandle>],
+    hit: &Holder<ShaderModuleHandle>,
+    callable: &[Holder<ShaderModuleHandle>],
+) -> Result<RayTracer> {
+    let [ray_gen, miss, callable] =
+        [ray_gen, miss, callable].map(|all| all.iter().map(|module| **module).collect::<Vec<_>>());
+    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &ray_gen,
+        miss: &miss,
+        hit_groups: &[HitGroup { closest_hit: Some(**hit), ..Default::default() }; 5],
+        callable: &callable,
+        ..Default::default()
+    })?;
+    Ok(RayTracer::from_pipeline(ctx, pipeline))
+}
+
+/// Compiles a shader once for each value of a definition.
+fn shader_for_each(
+    ctx: &Context,
+    stage: ShaderStage,
+    source: &str,
+    define: &str,
+    values: &[&str],
+) -> Result<Vec<Holder<ShaderModuleHandle>>> {
+    values.iter().map(|value| shader_with(ctx, stage, source, &[(define, value)])).collect()
+}
+
 fn ray_gens(ctx: &Context, all: &[&[(&str, &str)]]) -> Result<Vec<Holder<ShaderModuleHandle>>> {
     all.iter().map(|defines| shader_with(ctx, ShaderStage::RayGen, RAY_GEN, defines)).collect()
 }
@@ -125,21 +156,10 @@ fn the_miss_index_chooses_the_miss_shader() -> Result<()> {
         void main() { record = kNoHit; record.t = -TAG; }"#;
     let Some(ctx) = pipeline_device() else { return Ok(()) };
     let ray_gens = ray_gens(&ctx, &[&[("MISS_INDEX", "0")], &[("MISS_INDEX", "1")], &[("MISS_INDEX", "2")]])?;
-    let ray_gen: Vec<_> = ray_gens.iter().map(|module| **module).collect();
-    let misses: Result<Vec<_>> = ["7", "8", "9"]
-        .iter()
-        .map(|tag| shader_with(&ctx, ShaderStage::Miss, TAGGED_MISS, &[("TAG", tag)]))
-        .collect();
-    let miss: Vec<_> = misses?.into_iter().collect();
+    let misses = shader_for_each(&ctx, ShaderStage::Miss, TAGGED_MISS, "TAG", &["7", "8", "9"])?;
     let hit = shader(&ctx, ShaderStage::ClosestHit, HIT)?;
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &ray_gen,
-        miss: &miss.iter().map(|module| **module).collect::<Vec<_>>(),
-        hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }; 5],
-        ..Default::default()
-    })?;
+    let tracer = tracer_with(&ctx, &ray_gens, &misses, &hit, &[])?;
     let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, scene())?;
-    let tracer = RayTracer::from_pipeline(&ctx, pipeline);
     for (ray_gen, t) in [(0, -7.0), (2, -9.0), (1, -8.0)] {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
         HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
@@ -169,20 +189,11 @@ fn a_hit_shader_calls_the_callable_it_names() -> Result<()> {
     let ray_gen = shader(&ctx, ShaderStage::RayGen, RAY_GEN)?;
     let miss = shader(&ctx, ShaderStage::Miss, MISS)?;
     let hit = shader(&ctx, ShaderStage::ClosestHit, CALLING_HIT)?;
-    let callables: Result<Vec<_>> = ["value * 5", "value + 70000", "value ^ 0x3ff"]
-        .iter()
-        .map(|changed| shader_with(&ctx, ShaderStage::Callable, CALLABLE, &[("CHANGED", changed)]))
-        .collect();
-    let callables = callables?;
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }; 5],
-        callable: &callables.iter().map(|module| **module).collect::<Vec<_>>(),
-        ..Default::default()
-    })?;
+    let changed = ["value * 5", "value + 70000", "value ^ 0x3ff"];
+    let callables = shader_for_each(&ctx, ShaderStage::Callable, CALLABLE, "CHANGED", &changed)?;
+    let tracer = tracer_with(&ctx, &[ray_gen], &[miss], &hit, &callables)?;
     let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, scene())?;
-    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
     HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("callables");
     for hit in records.iter().filter(|record| record.kind != 0) {
         let value = hit.primitive;

@@ -3,6 +3,7 @@
 mod batches;
 mod blas_relocation;
 mod compaction;
+mod compaction_budgets;
 mod errors;
 mod leaks;
 mod many_geometries;

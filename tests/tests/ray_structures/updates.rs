@@ -13,7 +13,7 @@ use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{
     GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes,
 };
-use lvk_tests::ray_tracer::{How, Method, RayTracer, for_each_method};
+use lvk_tests::ray_tracer::{How, Job, Method, RayTracer, for_each_method};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 
@@ -138,26 +138,48 @@ fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
     })
 }
 
+/// A mesh that a dispatch deforms before each of its builds, and rays that meet it.
+struct DeformingMesh {
+    deformer: VertexDeformer,
+    tracer: RayTracer,
+    scene: RayScene,
+    gpu: GpuScene,
+    rays: Vec<Ray>,
+}
+
+impl DeformingMesh {
+    fn new(ctx: &Context, method: Method) -> Result<Self> {
+        let scene = deformable();
+        let gpu = scene.upload_with(ctx, UPDATABLE, UPDATABLE, 0)?;
+        let (deformer, tracer) = (VertexDeformer::new(ctx)?, RayTracer::new(ctx, method)?);
+        Ok(Self { deformer, tracer, scene, gpu, rays: rays() })
+    }
+
+    /// Deforms, builds and traces in one submission.
+    fn submit(&mut self, ctx: &Context, job: &Job, amount: f32, mode: BuildMode) -> Result<()> {
+        let Self { deformer, tracer, scene, gpu, .. } = self;
+        let mesh = &mut scene.models[0][0].mesh;
+        let mut cmd = ctx.acquire_command_buffer()?;
+        deformer.record(&mut cmd, *gpu.buffers[0].vertices, mesh, amount)?;
+        *mesh = deformed(mesh, amount);
+        cmd.build_blas(&[*gpu.models[0]], mode)?;
+        cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
+        tracer.record(&mut cmd, &gpu.tlas, job, How::default())?;
+        ctx.submit(cmd)?;
+        Ok(())
+    }
+}
+
 #[test]
 fn an_accel_struct_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let deformer = VertexDeformer::new(&ctx)?;
     for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let mut scene = deformable();
-        let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
-        let rays = rays();
-        let job = tracer.job(&rays)?;
+        let mut all = DeformingMesh::new(&ctx, method)?;
+        let job = all.tracer.job(&all.rays)?;
         for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.4, BuildMode::Rebuild)] {
-            let mesh = &scene.models[0][0].mesh;
-            let mut cmd = ctx.acquire_command_buffer()?;
-            deformer.record(&mut cmd, *gpu.buffers[0].vertices, mesh, amount)?;
-            cmd.build_blas(&[*gpu.models[0]], mode)?;
-            cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
-            tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
-            ctx.submit(cmd)?;
-            scene.models[0][0].mesh = deformed(mesh, amount);
-            agree(&format!("deformed by {amount}, {method:?}"), &rays, &tracer.read(&job)?, &scene);
+            all.submit(&ctx, &job, amount, mode)?;
+            let what = format!("deformed by {amount}, {method:?}");
+            agree(&what, &all.rays, &all.tracer.read(&job)?, &all.scene);
         }
     }
     Ok(())
@@ -185,31 +207,22 @@ fn an_accel_struct_is_rebuilt_from_uploaded_vertices() -> Result<()> {
 #[test]
 fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let deformer = VertexDeformer::new(&ctx)?;
     for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let mut scene = deformable();
-        let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
-        let rays = rays();
+        let mut all = DeformingMesh::new(&ctx, method)?;
         let mut frames = Vec::new();
         for number in 0..6 {
             ctx.next_frame()?;
             let (amount, mode) =
                 if number % 3 == 2 { (-0.35, BuildMode::Rebuild) } else { (0.2, BuildMode::Refit) };
-            let job = tracer.job(&rays)?;
-            let mut cmd = ctx.acquire_command_buffer()?;
-            deformer.record(&mut cmd, *gpu.buffers[0].vertices, &scene.models[0][0].mesh, amount)?;
-            cmd.build_blas(&[*gpu.models[0]], mode)?;
-            scene.models[0][0].mesh = deformed(&scene.models[0][0].mesh, amount);
-            scene.placed[0].transform = Affine3A::from_rotation_z(number as f32);
-            scene.placed[0].custom_index = number;
-            cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
-            tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
-            ctx.submit(cmd)?;
-            frames.push((job, scene.clone()));
+            let job = all.tracer.job(&all.rays)?;
+            all.scene.placed[0].transform = Affine3A::from_rotation_z(number as f32);
+            all.scene.placed[0].custom_index = number;
+            all.submit(&ctx, &job, amount, mode)?;
+            frames.push((job, all.scene.clone()));
         }
         for (number, (job, scene)) in frames.iter().enumerate() {
-            agree(&format!("frame {number} by {method:?}"), &rays, &tracer.read(job)?, scene);
+            let what = format!("frame {number} by {method:?}");
+            agree(&what, &all.rays, &all.tracer.read(job)?, scene);
         }
     }
     Ok(())

@@ -6,4 +6,5 @@ mod buffers;
 mod handles;
 mod host_copies;
 mod push_constants;
+mod uploaded_values;
 mod uploads;

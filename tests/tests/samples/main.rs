@@ -13,6 +13,7 @@ mod mesh_shaders;
 mod omni_shadows;
 mod panels;
 mod paper;
+mod profiles;
 mod reflections;
 mod render_to_cube_map;
 mod rtx_ao;

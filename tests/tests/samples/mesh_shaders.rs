@@ -78,10 +78,11 @@ fn by_vertex_shader(ctx: &Context, sample: &MeshShaders) -> RgbaImage {
     let pipeline = RasterPipeline::with_depth("mesh_shaders", "by vertex shader", &STAGES);
     let pipeline = pipeline.create_with(ctx, &state).unwrap();
     let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let constants = sample.upload(&mut cmd).unwrap();
     let backdrop = [0.010, 0.012, 0.020];
     let mut pass = target.begin(&mut cmd, "by vertex shader", backdrop, &Dependencies::default()).unwrap();
     pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.push_constants(&ctx.buffer_address(sample.frame_buffer()).unwrap()).unwrap();
+    pass.push_constants(&constants).unwrap();
     pass.draw(0..MOST_CORNERS, 0..sample.meshlets().meshlets.len() as u32).unwrap();
     drop(pass);
     ctx.submit(cmd).unwrap();

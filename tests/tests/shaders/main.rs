@@ -3,4 +3,5 @@
 mod cache;
 mod features;
 mod modules;
+mod other_languages;
 mod pipeline_cache;

@@ -122,14 +122,9 @@ impl RenderPass<'_> {
         stride: u32,
     ) -> Result<()> {
         self.check_draw()?;
-        let size = size_of::<vk::DrawIndirectCommand>() as u64;
-        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
-        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
-        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
-            // SAFETY: as in `draw`, and the arguments lie inside the buffer.
-            unsafe { device.cmd_draw_indirect(raw, buffer.raw, offset, count, stride) };
-        }
-        Ok(())
+        let (size, gpu) = (size_of::<vk::DrawIndirectCommand>(), &self.cmd.shared.gpu);
+        let command = gpu.device.fp_v1_0().cmd_draw_indirect;
+        self.draw_indirect_with(arguments, offset, draw_count, stride, size, command)
     }
 
     /// Draws by index `draw_count` times with arguments (`VkDrawIndexedIndirectCommand`) from a buffer with
@@ -143,27 +138,31 @@ impl RenderPass<'_> {
     ) -> Result<()> {
         self.check_draw()?;
         self.bound_index_buffer()?;
-        let size = size_of::<vk::DrawIndexedIndirectCommand>() as u64;
-        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
-        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
-        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
-            // SAFETY: as in `draw`, and the arguments lie inside the buffer.
-            unsafe { device.cmd_draw_indexed_indirect(raw, buffer.raw, offset, count, stride) };
-        }
-        Ok(())
+        let (size, gpu) = (size_of::<vk::DrawIndexedIndirectCommand>(), &self.cmd.shared.gpu);
+        let command = gpu.device.fp_v1_0().cmd_draw_indexed_indirect;
+        self.draw_indirect_with(arguments, offset, draw_count, stride, size, command)
     }
 
-    /// Returns the argument offset and the number of draws of each Vulkan call: one call for all draws, or one for each
-    /// if the device has no multi-draw.
-    pub(super) fn indirect_calls(
-        &self,
+    /// Records one of the three commands, which have the same signature, for arguments of `size` bytes a draw: one call
+    /// for all draws, or one for each if the device has no multi-draw.
+    pub(super) fn draw_indirect_with(
+        &mut self,
+        arguments: BufferHandle,
         offset: u64,
         draw_count: u32,
         stride: u32,
-    ) -> impl Iterator<Item = (u64, u32)> + use<> {
+        size: usize,
+        command: vk::PFN_vkCmdDrawIndirect,
+    ) -> Result<()> {
+        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size as u64)?;
         let multi = self.cmd.shared.gpu.caps.multi_draw_indirect;
         let (calls, draws) = if multi { (draw_count.min(1), draw_count) } else { (draw_count, 1) };
-        (0..calls).map(move |call| (offset + u64::from(call) * u64::from(stride), draws))
+        for call in 0..calls {
+            let offset = offset + u64::from(call) * u64::from(stride);
+            // SAFETY: the pass is ready for such a draw, as in `draw`, and the arguments lie inside the buffer.
+            unsafe { command(self.cmd.raw(), buffer.raw, offset, draws, stride) };
+        }
+        Ok(())
     }
 
     pub(super) fn indirect_buffer(

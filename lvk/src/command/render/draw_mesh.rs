@@ -38,14 +38,9 @@ impl RenderPass<'_> {
         stride: u32,
     ) -> Result<()> {
         self.check_mesh_draw()?;
-        let size = size_of::<vk::DrawMeshTasksIndirectCommandEXT>() as u64;
-        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
-        let (ext, raw) = (self.cmd.shared.gpu.mesh_functions()?, self.cmd.raw());
-        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
-            // SAFETY: as in `draw_mesh_tasks`, and the arguments lie inside the buffer.
-            unsafe { ext.cmd_draw_mesh_tasks_indirect(raw, buffer.raw, offset, count, stride) };
-        }
-        Ok(())
+        let size = size_of::<vk::DrawMeshTasksIndirectCommandEXT>();
+        let command = self.cmd.shared.gpu.mesh_functions()?.fp().cmd_draw_mesh_tasks_indirect_ext;
+        self.draw_indirect_with(arguments, offset, draw_count, stride, size, command)
     }
 }
 

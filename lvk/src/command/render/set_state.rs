@@ -6,21 +6,34 @@ use super::dynamic_state::{DynamicValues, READ_ONLY_DEPTH_ERROR};
 use super::pass::RenderPass;
 use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::OptionalFeature;
+use crate::gpu::caps::portability::PortabilityNeed;
 use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::PassState;
 use crate::pipeline::depth_stencil::DepthState;
 use crate::pipeline::rasterization::DepthBias;
 
+const SEPARATE_REFERENCES: PortabilityNeed = PortabilityNeed::new(
+    OptionalFeature::SeparateStencilReference,
+    "different stencil references of front and back faces",
+    "draw front and back faces one after the other, each with its reference",
+);
+
 impl RenderPass<'_> {
     /// Sets the stencil references of front and of back faces, for this and later pipelines of the pass
     /// (`vkCmdSetStencilReference`). Stencil values are compared with them and replaced by them. 0 at the begin of a
     /// pass.
-    pub fn stencil_reference(&mut self, front: u8, back: u8) {
+    ///
+    /// # Errors
+    /// [`Unsupported`](Error::Unsupported) if they differ on a device without
+    /// [`OptionalFeature::SeparateStencilReference`](crate::OptionalFeature::SeparateStencilReference).
+    pub fn stencil_reference(&mut self, front: u8, back: u8) -> Result<()> {
+        self.cmd.shared.gpu.require_portable("the pass", (front != back).then_some(SEPARATE_REFERENCES))?;
         self.dynamic.stencil_reference = [front, back];
         if self.dynamic.current.stencil_reference.is_some() {
             self.dynamic.current.stencil_reference = Some([front, back]);
             self.set_values(&DynamicValues { stencil_reference: Some([front, back]), ..Default::default() });
         }
+        Ok(())
     }
 
     /// Sets the constants of [`BlendFactor::ConstantColor`](crate::BlendFactor::ConstantColor) and the other constant

@@ -59,6 +59,9 @@ pub struct Capabilities {
     pub position_fetch: bool,
     /// Draws may use task and mesh shaders (`VK_EXT_mesh_shader`).
     pub mesh_shader: bool,
+    /// The device implements a subset of Vulkan (`VK_KHR_portability_subset`), as MoltenVK does. Features of
+    /// [`FeatureSet::PORTABILITY`] may be missing.
+    pub portability_subset: bool,
     /// The optional features that are enabled; see [`has`](Self::has).
     pub optional: FeatureSet,
     /// Name of the applied [`DeviceProfile`](crate::DeviceProfile). These capabilities are already reduced by
@@ -139,6 +142,9 @@ impl Capabilities {
         }
         if !self.has(OptionalFeature::PipelineShadingRate) {
             self.limits.shading_rate = ShadingRateLimits::default();
+        }
+        if !self.has(OptionalFeature::SamplerLodBias) {
+            self.limits.max_lod_bias = 0.0;
         }
         if !self.has(OptionalFeature::SamplerAnisotropy) {
             self.max_anisotropy = 1.0;

@@ -114,6 +114,11 @@ impl DescriptorLimits {
 }
 
 impl DescriptorBudget {
+    /// Returns the budget with at most so many textures and samplers.
+    pub(crate) fn at_most(self, textures: u32, samplers: u32) -> Self {
+        Self { textures: self.textures.min(textures), samplers: self.samplers.min(samplers) }
+    }
+
     /// Returns the number of textures that a context gets if it requests `wanted`.
     ///
     /// # Errors
@@ -243,6 +248,12 @@ mod tests {
         );
         let small_pools = DescriptorLimits { in_pools: 20_000, ..limits };
         assert_eq!(small_pools.budget(&reserved, 36).textures, (20_000 - 257 - 1_024 - 36) / 2);
+    }
+
+    #[test]
+    fn tightened_limits_bound_the_budget() {
+        let budget = DescriptorBudget { textures: 10, samplers: 2 };
+        assert_eq!(budget.at_most(9, 3), DescriptorBudget { textures: 9, samplers: 2 });
     }
 
     #[test]

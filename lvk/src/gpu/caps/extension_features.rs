@@ -22,6 +22,8 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) maintenance5: vk::PhysicalDeviceMaintenance5FeaturesKHR<'static>,
     pub(crate) fault: vk::PhysicalDeviceFaultFeaturesEXT<'static>,
     pub(crate) swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'static>,
+    /// All true on devices without `VK_KHR_portability_subset`.
+    pub(crate) portability: vk::PhysicalDevicePortabilitySubsetFeaturesKHR<'static>,
     /// Extensions without feature structures: true if the device has them.
     pub(crate) calibrated_timestamps: vk::Bool32,
     pub(crate) memory_budget: vk::Bool32,
@@ -82,7 +84,30 @@ impl ExtensionFeatures {
         if has(ash::ext::swapchain_maintenance1::NAME) {
             all = all.push_next(&mut self.swapchain_maintenance1);
         }
+        if has(ash::khr::portability_subset::NAME) {
+            all = all.push_next(&mut self.portability);
+        }
         all
+    }
+
+    /// Sets all features that Vulkan promises on devices without `VK_KHR_portability_subset`.
+    pub(crate) fn promise_portability(&mut self) {
+        self.portability = vk::PhysicalDevicePortabilitySubsetFeaturesKHR::default()
+            .constant_alpha_color_blend_factors(true)
+            .events(true)
+            .image_view_format_reinterpretation(true)
+            .image_view_format_swizzle(true)
+            .image_view2_d_on3_d_image(true)
+            .multisample_array_image(true)
+            .mutable_comparison_samplers(true)
+            .point_polygons(true)
+            .sampler_mip_lod_bias(true)
+            .separate_stencil_mask_ref(true)
+            .shader_sample_rate_interpolation_functions(true)
+            .tessellation_isolines(true)
+            .tessellation_point_mode(true)
+            .triangle_fans(true)
+            .vertex_attribute_access_beyond_stride(true);
     }
 
     /// Records which extensions without feature structures are available.

@@ -60,6 +60,9 @@ pub struct Limits {
     /// Maximum number of vertices of a patch, before and after the tessellation control stage
     /// (`maxTessellationPatchSize`).
     pub max_patch_points: u32,
+    /// Alignment of vertex strides in bytes (`minVertexInputBindingStrideAlignment`). Strides are multiples of
+    /// it; it is 1 on devices without `VK_KHR_portability_subset`.
+    pub vertex_stride_alignment: u32,
     /// Minimum and maximum width of lines in pixels (`lineWidthRange`).
     pub line_width: [f32; 2],
     /// Maximum workgroups of a dispatch along each axis (`maxComputeWorkGroupCount`).
@@ -162,6 +165,7 @@ impl Limits {
             },
             shading_rate: ShadingRateLimits::default(),
             max_patch_points: plain.max_tessellation_patch_size,
+            vertex_stride_alignment: 1,
             line_width: plain.line_width_range,
             max_dispatch_workgroups: plain.max_compute_work_group_count,
             max_workgroup_size: plain.max_compute_work_group_size,

@@ -11,6 +11,7 @@ pub(crate) mod image_limits;
 pub(crate) mod limits;
 pub(crate) mod mesh_limits;
 pub(crate) mod optional_features;
+pub(crate) mod portability;
 pub(crate) mod queues;
 pub(crate) mod ray_query_path;
 pub(crate) mod resolve_modes;

@@ -9,7 +9,8 @@ use super::features::Features;
 
 /// A feature that some devices have and the library does not need. It is enabled wherever the device has it,
 /// unless a [`DeviceProfile`](crate::DeviceProfile) hides it. [`Capabilities::has`](crate::Capabilities::has)
-/// returns true if it is enabled. Ray tracing and mesh shaders have separate flags.
+/// returns true if it is enabled. Ray tracing and mesh shaders have separate flags. The features of
+/// [`FeatureSet::PORTABILITY`] are promised by Vulkan: only devices that implement a subset of Vulkan lack some.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum OptionalFeature {
@@ -173,6 +174,39 @@ pub enum OptionalFeature {
     SwapchainMaintenance1,
     /// HDR metadata for the display of a window (`VK_EXT_hdr_metadata`).
     HdrMetadata,
+    /// Blend factors of colour that take the alpha of the blend constant (`constantAlphaColorBlendFactors`).
+    ConstantAlphaColorBlend,
+    /// Vulkan events (`events`). The library itself uses none.
+    Events,
+    /// Views whose format has other components than the texture, or components of other sizes
+    /// (`imageViewFormatReinterpretation`).
+    ViewFormatReinterpretation,
+    /// Swizzles of views (`imageViewFormatSwizzle`).
+    ViewSwizzle,
+    /// 2D views of 3D textures, through which passes draw to slices (`imageView2DOn3DImage`).
+    View2dOf3d,
+    /// Arrays of multisampled textures (`multisampleArrayImage`).
+    MultisampledArrays,
+    /// Comparison samplers in the bindless set (`mutableComparisonSamplers`).
+    ComparisonSamplers,
+    /// Polygons drawn as points (`pointPolygons`).
+    PointPolygons,
+    /// Biases of the level of detail in samplers (`samplerMipLodBias`).
+    SamplerLodBias,
+    /// Different stencil references of front and back faces (`separateStencilMaskRef`).
+    SeparateStencilReference,
+    /// `interpolateAtOffset`, `interpolateAtSample` and `interpolateAtCentroid` in fragment shaders
+    /// (`shaderSampleRateInterpolationFunctions`).
+    SampleInterpolation,
+    /// Tessellation of patches into lines (`tessellationIsolines`).
+    TessellationIsolines,
+    /// Tessellation of patches into points (`tessellationPointMode`).
+    TessellationPointMode,
+    /// Triangle fans (`triangleFans`).
+    TriangleFans,
+    /// Vertex attributes that end beyond the stride (`vertexAttributeAccessBeyondStride`). The library refuses
+    /// them on every device.
+    VertexAccessBeyondStride,
 }
 
 use OptionalFeature as F;
@@ -207,6 +241,11 @@ impl FeatureSet {
     pub const NONE: Self = Self(0);
     /// The set of all features, including those of later versions.
     pub const ALL: Self = Self(u128::MAX);
+    /// The features that Vulkan promises, except on devices with `VK_KHR_portability_subset`
+    /// ([`Capabilities::portability_subset`](crate::Capabilities::portability_subset)).
+    pub const PORTABILITY: Self = Self(
+        ((2 << F::VertexAccessBeyondStride as u32) - 1) & !((1 << F::ConstantAlphaColorBlend as u32) - 1),
+    );
 
     /// True if the set contains `feature`.
     pub fn contains(self, feature: OptionalFeature) -> bool {
@@ -298,7 +337,7 @@ struct FeatureRow {
 }
 
 #[rustfmt::skip]
-const ROWS: [FeatureRow; 79] = [
+const ROWS: [FeatureRow; 94] = [
     FeatureRow { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, field: |f| &mut f.core.full_draw_index_uint32 },
     FeatureRow { feature: F::CubeArrays, name: "imageCubeArray", extension: None, field: |f| &mut f.core.image_cube_array },
     FeatureRow { feature: F::GeometryShader, name: "geometryShader", extension: None, field: |f| &mut f.core.geometry_shader },
@@ -378,6 +417,21 @@ const ROWS: [FeatureRow; 79] = [
     FeatureRow { feature: F::Swapchain, name: "VK_KHR_swapchain", extension: Some(ash::khr::swapchain::NAME), field: |f| &mut f.ext.swapchain },
     FeatureRow { feature: F::SwapchainMaintenance1, name: "swapchainMaintenance1", extension: Some(ash::ext::swapchain_maintenance1::NAME), field: |f| &mut f.ext.swapchain_maintenance1.swapchain_maintenance1 },
     FeatureRow { feature: F::HdrMetadata, name: "VK_EXT_hdr_metadata", extension: Some(ash::ext::hdr_metadata::NAME), field: |f| &mut f.ext.hdr_metadata },
+    FeatureRow { feature: F::ConstantAlphaColorBlend, name: "constantAlphaColorBlendFactors", extension: None, field: |f| &mut f.ext.portability.constant_alpha_color_blend_factors },
+    FeatureRow { feature: F::Events, name: "events", extension: None, field: |f| &mut f.ext.portability.events },
+    FeatureRow { feature: F::ViewFormatReinterpretation, name: "imageViewFormatReinterpretation", extension: None, field: |f| &mut f.ext.portability.image_view_format_reinterpretation },
+    FeatureRow { feature: F::ViewSwizzle, name: "imageViewFormatSwizzle", extension: None, field: |f| &mut f.ext.portability.image_view_format_swizzle },
+    FeatureRow { feature: F::View2dOf3d, name: "imageView2DOn3DImage", extension: None, field: |f| &mut f.ext.portability.image_view2_d_on3_d_image },
+    FeatureRow { feature: F::MultisampledArrays, name: "multisampleArrayImage", extension: None, field: |f| &mut f.ext.portability.multisample_array_image },
+    FeatureRow { feature: F::ComparisonSamplers, name: "mutableComparisonSamplers", extension: None, field: |f| &mut f.ext.portability.mutable_comparison_samplers },
+    FeatureRow { feature: F::PointPolygons, name: "pointPolygons", extension: None, field: |f| &mut f.ext.portability.point_polygons },
+    FeatureRow { feature: F::SamplerLodBias, name: "samplerMipLodBias", extension: None, field: |f| &mut f.ext.portability.sampler_mip_lod_bias },
+    FeatureRow { feature: F::SeparateStencilReference, name: "separateStencilMaskRef", extension: None, field: |f| &mut f.ext.portability.separate_stencil_mask_ref },
+    FeatureRow { feature: F::SampleInterpolation, name: "shaderSampleRateInterpolationFunctions", extension: None, field: |f| &mut f.ext.portability.shader_sample_rate_interpolation_functions },
+    FeatureRow { feature: F::TessellationIsolines, name: "tessellationIsolines", extension: None, field: |f| &mut f.ext.portability.tessellation_isolines },
+    FeatureRow { feature: F::TessellationPointMode, name: "tessellationPointMode", extension: None, field: |f| &mut f.ext.portability.tessellation_point_mode },
+    FeatureRow { feature: F::TriangleFans, name: "triangleFans", extension: None, field: |f| &mut f.ext.portability.triangle_fans },
+    FeatureRow { feature: F::VertexAccessBeyondStride, name: "vertexAttributeAccessBeyondStride", extension: None, field: |f| &mut f.ext.portability.vertex_attribute_access_beyond_stride },
 ];
 
 #[cfg(test)]
@@ -405,6 +459,17 @@ mod tests {
                 assert_eq!(row.name == other.name, same);
             }
         }
+    }
+
+    #[test]
+    fn the_features_of_portability_are_those_of_its_structure() {
+        for row in &ROWS {
+            let mut features = Features::default();
+            features.ext.promise_portability();
+            let promised = *(row.field)(&mut features) == vk::TRUE;
+            assert_eq!(FeatureSet::PORTABILITY.contains(row.feature), promised, "{}", row.name);
+        }
+        assert_eq!(FeatureSet::PORTABILITY.iter().count(), 15);
     }
 
     #[test]

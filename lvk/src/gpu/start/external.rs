@@ -25,7 +25,9 @@ pub struct RawContext<'a> {
     pub device: ash::Device,
     /// Extensions enabled at creation of the device.
     pub device_extensions: &'a [&'a CStr],
-    /// Features that are enabled, beside those that every context requires.
+    /// Features that are enabled, beside those that every context requires. Those of
+    /// [`FeatureSet::PORTABILITY`] count only on devices with `VK_KHR_portability_subset`; other devices always have
+    /// them.
     pub features: FeatureSet,
     /// True if `accelerationStructure`, its `descriptorBindingAccelerationStructureUpdateAfterBind`, and
     /// `rayTracingPipeline` are enabled.
@@ -53,8 +55,8 @@ impl RawContext<'_> {
     pub(crate) fn physical(&self) -> Result<PhysicalDevice> {
         let mut found = PhysicalDevice::query(&self.instance, self.physical_device)?;
         if !found.missing.is_empty() {
-            let name = &found.capabilities.device_name;
-            return Err(Error::NoDevice { reasons: format!("{name}: {}", found.missing.join(", ")) });
+            let candidates = vec![found.candidate(0)];
+            return Err(Error::NoDevice { problem: None, candidates, drivers: None });
         }
         self.check_queues(&found.families)?;
         self.check_features(&found)?;
@@ -63,7 +65,7 @@ impl RawContext<'_> {
         caps.position_fetch = false;
         caps.pipeline_libraries &= self.has_extension(ash::khr::pipeline_library::NAME);
         caps.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
-        caps.remove_features(FeatureSet::ALL.without(self.features));
+        caps.remove_features(undeclared(self.features, caps.portability_subset));
         found.queue_family = Some(self.queue_family);
         found.set_queues(self.queue_locations());
         Ok(found)
@@ -107,6 +109,12 @@ impl RawContext<'_> {
             return Err(invalid(format!("feature {name} cannot be on: the device does not have it")));
         }
         let mut extensions: Vec<&CStr> = known.extensions().collect();
+        if found.capabilities.portability_subset && !self.has_extension(ash::khr::portability_subset::NAME) {
+            return Err(invalid(
+                "the device lists VK_KHR_portability_subset; enable it and name it in device_extensions"
+                    .to_owned(),
+            ));
+        }
         if self.ray_tracing_pipeline || self.ray_query {
             extensions
                 .extend([ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME]);
@@ -129,6 +137,13 @@ impl RawContext<'_> {
     }
 }
 
+/// Returns the features to treat as disabled: those not declared. Vulkan has no switch for the features of
+/// portability on devices that implement all of Vulkan.
+fn undeclared(declared: FeatureSet, portability_subset: bool) -> FeatureSet {
+    let absent = FeatureSet::ALL.without(declared);
+    if portability_subset { absent } else { absent.without(FeatureSet::PORTABILITY) }
+}
+
 fn check_family(
     families: &[QueueFamily],
     number: u32,
@@ -144,4 +159,19 @@ fn check_family(
 
 fn invalid(message: String) -> Error {
     Error::usage("from_raw", message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_of_portability_need_a_declaration_on_subsets_of_vulkan_only() {
+        let declared = FeatureSet::NONE.with(OptionalFeature::TriangleFans);
+        let whole = undeclared(declared, false);
+        assert!(!whole.contains(OptionalFeature::ViewSwizzle) && whole.contains(OptionalFeature::Int64));
+        let subset = undeclared(declared, true);
+        assert!(subset.contains(OptionalFeature::ViewSwizzle));
+        assert!(!subset.contains(OptionalFeature::TriangleFans));
+    }
 }

@@ -1,11 +1,13 @@
 //! Opens the Vulkan loader and creates an instance, with the validation layer if requested.
 
 use std::ffi::{CStr, CString};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use ash::vk;
 
 use super::window::{WindowExtensions, WindowRef};
+use crate::error::driver_report::{DriverReport, LoaderReport};
 use crate::error::{Error, Result};
 use crate::gpu::debug::messenger::{Messenger, ValidationMode, ValidationSink, c_name};
 
@@ -15,6 +17,8 @@ const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 pub(crate) struct Instance {
     pub(crate) entry: ash::Entry,
     pub(crate) raw: ash::Instance,
+    /// The loader that the caller named.
+    library: Option<PathBuf>,
     pub(crate) debug_utils: bool,
     /// True if the validation layer is enabled.
     pub(crate) validated: bool,
@@ -42,10 +46,16 @@ pub(crate) struct InstanceDesc<'a> {
 
 impl Instance {
     pub(crate) fn new(desc: &InstanceDesc<'_>) -> Result<Self> {
-        let entry = load_entry(desc.library)?;
-        check_version(&entry)?;
+        let entry = load_entry(desc.library).map_err(|error| {
+            let loader = LoaderReport::not_opened(desc.library, &error);
+            Error::NoVulkan { report: Arc::new(DriverReport::query(loader, None)) }
+        })?;
+        if loader_version(&entry)? < (1, 3, 0) {
+            return Err(no_vulkan(&entry, desc.library, None));
+        }
         let layer = find_layer(&entry, desc.validation)?;
-        let extensions = Extensions::query(&entry, layer, desc)?;
+        let extensions = Extensions::query(&entry, layer, desc)
+            .map_err(|error| blame_drivers(error, &entry, desc.library))?;
         let mut messenger = Messenger::new(desc.sink.clone());
         let raw = create_instance(&entry, desc, layer, &extensions, &messenger)?;
         if extensions.debug_utils
@@ -59,7 +69,18 @@ impl Instance {
         let gpu_assisted = desc.validation == ValidationMode::GpuAssisted;
         let validated = layer.is_some();
         let Extensions { debug_utils, windows, .. } = extensions;
-        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, windows, messenger, is_external: false })
+        let library = desc.library.map(Path::to_path_buf);
+        Ok(Self {
+            entry,
+            raw,
+            library,
+            debug_utils,
+            validated,
+            gpu_assisted,
+            windows,
+            messenger,
+            is_external: false,
+        })
     }
 
     /// Wraps an instance that the caller created.
@@ -67,6 +88,7 @@ impl Instance {
         Self {
             entry,
             raw,
+            library: None,
             debug_utils: extensions.contains(&ash::ext::debug_utils::NAME),
             validated: false,
             gpu_assisted: false,
@@ -81,11 +103,27 @@ impl Instance {
         self.messenger.sink()
     }
 
+    /// Returns the devices, at least one.
     pub(crate) fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>> {
+        const CALL: &str = "vkEnumeratePhysicalDevices";
         // SAFETY: the instance is alive.
-        unsafe { self.raw.enumerate_physical_devices() }.map_err(|result| Error::NoVulkan {
-            reason: format!("vkEnumeratePhysicalDevices returned {result}"),
-        })
+        let (devices, text) = match unsafe { self.raw.enumerate_physical_devices() } {
+            Ok(devices) => (devices, "found no device".to_owned()),
+            // The loader returns this if no driver has a device.
+            Err(result @ vk::Result::ERROR_INITIALIZATION_FAILED) => {
+                (Vec::new(), format!("returned {result:?}"))
+            }
+            Err(result) => return Err(Error::vulkan(CALL)(result)),
+        };
+        if !devices.is_empty() {
+            return Ok(devices);
+        }
+        Err(no_vulkan(&self.entry, self.library.as_deref(), Some(format!("{CALL} {text}"))))
+    }
+
+    /// Returns the report of loader and drivers. The instance keeps the drivers open, so they are not loaded anew.
+    pub(crate) fn driver_report(&self) -> DriverReport {
+        DriverReport::query(loader_report(&self.entry, self.library.as_deref()), None)
     }
 }
 
@@ -100,27 +138,60 @@ impl Drop for Instance {
     }
 }
 
-fn load_entry(library: Option<&Path>) -> Result<ash::Entry> {
+impl DriverReport {
+    /// Opens the loader, and searches and opens the drivers.
+    pub(crate) fn query_loader(library: Option<&Path>) -> Self {
+        match load_entry(library) {
+            Ok(entry) => Self::query(loader_report(&entry, library), None),
+            Err(error) => Self::query(LoaderReport::not_opened(library, &error), None),
+        }
+    }
+}
+
+fn load_entry(library: Option<&Path>) -> Result<ash::Entry, ash::LoadingError> {
     // SAFETY: the loader is a well-known system library; loading it runs its initialisers only.
-    let entry = unsafe {
+    unsafe {
         match library {
             Some(path) => ash::Entry::load_from(path),
             None => ash::Entry::load(),
         }
-    };
-    entry.map_err(|error| Error::NoVulkan { reason: error.to_string() })
+    }
 }
 
-fn check_version(entry: &ash::Entry) -> Result<()> {
+fn loader_version(entry: &ash::Entry) -> Result<(u32, u32, u32)> {
     // SAFETY: no preconditions.
     let version = unsafe { entry.try_enumerate_instance_version() }
         .map_err(Error::vulkan("vkEnumerateInstanceVersion"))?
         .unwrap_or(vk::API_VERSION_1_0);
-    if version >= vk::API_VERSION_1_3 {
-        return Ok(());
+    Ok((vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)))
+}
+
+fn loader_report(entry: &ash::Entry, library: Option<&Path>) -> LoaderReport {
+    LoaderReport::opened(library, loader_version(entry).unwrap_or((1, 0, 0)))
+}
+
+/// Returns [`Error::NoVulkan`] in place of an error that the drivers cause: an extension is missing because no driver can be
+/// loaded, or the loader is out of memory because it cannot parse a manifest, as it says.
+fn blame_drivers(error: Error, entry: &ash::Entry, library: Option<&Path>) -> Error {
+    use vk::Result as Code;
+    let report = || DriverReport::query(loader_report(entry, library), Some(error.to_string()));
+    let blamed = match &error {
+        Error::Unsupported { .. } | Error::Vulkan { result: Code::ERROR_INCOMPATIBLE_DRIVER, .. } => {
+            Some(report()).filter(|report| !report.has_driver())
+        }
+        Error::OutOfHostMemory { .. } => Some(report()).filter(DriverReport::has_unread_manifest),
+        _ => None,
+    };
+    match blamed {
+        Some(report) => Error::NoVulkan { report: Arc::new(report) },
+        None => error,
     }
-    let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
-    Err(Error::NoVulkan { reason: format!("the loader offers Vulkan {major}.{minor}, 1.3 is needed") })
+}
+
+/// Returns the error for a loader that is too old, or finds no driver or device.
+fn no_vulkan(entry: &ash::Entry, library: Option<&Path>, failure: Option<String>) -> Error {
+    let report = DriverReport::query(loader_report(entry, library), failure);
+    Error::NoVulkan { report: Arc::new(report) }
 }
 
 fn find_layer(entry: &ash::Entry, validation: ValidationMode) -> Result<Option<&'static CStr>> {
@@ -143,13 +214,21 @@ fn find_layer(entry: &ash::Entry, validation: ValidationMode) -> Result<Option<&
 struct Extensions<'a> {
     debug_utils: bool,
     layer_settings: bool,
+    /// True if the loader lists devices that implement a subset of Vulkan only on request.
+    portability: bool,
     extra: &'a [&'a CStr],
     windows: Option<WindowExtensions>,
 }
 
 impl<'a> Extensions<'a> {
     fn query(entry: &ash::Entry, layer: Option<&CStr>, desc: &InstanceDesc<'a>) -> Result<Self> {
-        let mut found = Self { debug_utils: false, layer_settings: false, extra: desc.extra, windows: None };
+        let mut found = Self {
+            debug_utils: false,
+            layer_settings: false,
+            portability: false,
+            extra: desc.extra,
+            windows: None,
+        };
         let mut missing = desc.extra.to_vec();
         for source in [None, layer].into_iter().take(if layer.is_some() { 2 } else { 1 }) {
             // SAFETY: the layer, if any, was found above.
@@ -158,6 +237,7 @@ impl<'a> Extensions<'a> {
             let has = |name: &CStr| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
             found.debug_utils |= has(ash::ext::debug_utils::NAME);
             found.layer_settings |= has(ash::ext::layer_settings::NAME);
+            found.portability |= source.is_none() && has(ash::khr::portability_enumeration::NAME);
             missing.retain(|name| !has(name));
             if source.is_none() {
                 found.windows =
@@ -174,10 +254,11 @@ impl<'a> Extensions<'a> {
     /// Returns the names of the extensions to enable. The settings extension is left out: the layer reads its
     /// settings without it, and loaders older than the extension refuse it.
     fn names(&self) -> Vec<*const std::ffi::c_char> {
-        let own = self.debug_utils.then_some(ash::ext::debug_utils::NAME);
+        let debug_utils = self.debug_utils.then_some(ash::ext::debug_utils::NAME);
+        let portability = self.portability.then_some(ash::khr::portability_enumeration::NAME);
+        let own = debug_utils.into_iter().chain(portability);
         let windows = self.windows.iter().flat_map(WindowExtensions::names).map(|name| -> &'a CStr { name });
-        let mut names: Vec<&CStr> =
-            own.into_iter().chain(self.extra.iter().copied()).chain(windows).collect();
+        let mut names: Vec<&CStr> = own.chain(self.extra.iter().copied()).chain(windows).collect();
         names.sort_unstable();
         names.dedup();
         names.into_iter().map(CStr::as_ptr).collect()
@@ -208,6 +289,9 @@ fn create_instance(
         .application_info(&application)
         .enabled_layer_names(&layers)
         .enabled_extension_names(&extension_names);
+    if extensions.portability {
+        info = info.flags(vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR);
+    }
     if layer.is_some() && extensions.debug_utils {
         info = info.push_next(&mut messages);
     }
@@ -220,7 +304,13 @@ fn create_instance(
     let made = made
         .map(crate::test_support::null_commands::wrap_null_commands)
         .map(crate::test_support::fault_injection::wrap_fault_injection);
-    made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance returned {result}") })
+    made.map_err(|result| match result {
+        // The loader returns this if it can load no driver.
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
+            no_vulkan(entry, desc.library, Some(format!("vkCreateInstance returned {result:?}")))
+        }
+        result => Error::vulkan("vkCreateInstance")(result),
+    })
 }
 
 /// Returns the switches of the validation layer, by its own setting names.
@@ -247,4 +337,26 @@ fn layer_setting<'a>(key: &'a CStr, value: &'a [vk::Bool32; 1]) -> vk::LayerSett
         .values(bytes);
     // ash counts bytes here; Vulkan counts values.
     vk::LayerSettingEXT { value_count: 1, ..setting }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_of_portability_are_listed_where_the_loader_hides_them() {
+        for portability in [false, true] {
+            let found = Extensions {
+                debug_utils: true,
+                layer_settings: false,
+                portability,
+                extra: &[],
+                windows: None,
+            };
+            let names = found.names();
+            // SAFETY: the names are constants.
+            let mut names = names.iter().map(|name| unsafe { CStr::from_ptr(*name) });
+            assert_eq!(names.any(|name| name == ash::khr::portability_enumeration::NAME), portability);
+        }
+    }
 }

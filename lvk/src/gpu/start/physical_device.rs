@@ -4,7 +4,7 @@ use std::ffi::{CStr, CString};
 
 use ash::vk;
 
-use super::select::DeviceKind;
+use crate::error::device_candidate::{DeviceCandidate, DeviceKind};
 use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::features::{Calibration, Features, Subgroups, missing_required};
@@ -88,6 +88,19 @@ impl PhysicalDevice {
         self.capabilities.limits.timestamp_bits = self.capabilities.queues[0].timestamp_bits;
     }
 
+    /// Returns the description of the device, with the features it lacks of those that every context requires.
+    pub(crate) fn candidate(&self, index: usize) -> DeviceCandidate {
+        let caps = &self.capabilities;
+        DeviceCandidate {
+            index,
+            name: caps.device_name.clone(),
+            kind: self.kind,
+            api_version: caps.api_version,
+            driver: format!("{} {}", caps.driver_name, caps.driver_info).trim().to_owned(),
+            missing: self.missing.clone(),
+        }
+    }
+
     /// True if the device has the extension.
     pub(crate) fn has_extension(&self, name: &CStr) -> bool {
         self.extensions.iter().any(|extension| extension.as_c_str() == name)
@@ -105,7 +118,9 @@ impl PhysicalDevice {
         found.limit_ray_tracing(usable, usable);
         found.limit_mesh_shaders(true);
         let pipeline_library = self.has_extension(ash::khr::pipeline_library::NAME);
+        let portability_subset = self.has_extension(ash::khr::portability_subset::NAME);
         let caps = &mut self.capabilities;
+        caps.portability_subset = portability_subset;
         let ray_tracing = &found.ext.ray_tracing;
         caps.ray_tracing_pipeline = ray_tracing.ray_tracing_pipeline == vk::TRUE;
         caps.trace_rays_indirect = ray_tracing.ray_tracing_pipeline_trace_rays_indirect == vk::TRUE;
@@ -131,6 +146,7 @@ impl PhysicalDevice {
         let mut mesh = vk::PhysicalDeviceMeshShaderPropertiesEXT::default();
         let mut rates = vk::PhysicalDeviceFragmentShadingRatePropertiesKHR::default();
         let mut borders = vk::PhysicalDeviceCustomBorderColorPropertiesEXT::default();
+        let mut portability = vk::PhysicalDevicePortabilitySubsetPropertiesKHR::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
         let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
@@ -153,6 +169,9 @@ impl PhysicalDevice {
         if self.capabilities.has(OptionalFeature::CustomBorderColors) {
             all = all.push_next(&mut borders);
         }
+        if self.capabilities.portability_subset {
+            all = all.push_next(&mut portability);
+        }
         // SAFETY: the chain holds only structures that the device supports, and lives until the call returns.
         unsafe { instance.get_physical_device_properties2(self.raw, &mut all) };
         self.features.subgroups = Subgroups {
@@ -172,6 +191,7 @@ impl PhysicalDevice {
         caps.limits.shading_rate = ShadingRateLimits::from_properties(&rates);
         caps.limits.max_allocation_bytes = v11.max_memory_allocation_size;
         caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
+        caps.limits.vertex_stride_alignment = portability.min_vertex_input_binding_stride_alignment.max(1);
         caps.limits.max_views = v11.max_multiview_view_count;
     }
 }
@@ -192,6 +212,9 @@ fn query_features(
     unsafe { instance.get_physical_device_features2(raw, &mut all) };
     found.core = all.features;
     found.ext.set_featureless_extensions(has);
+    if !has(ash::khr::portability_subset::NAME) {
+        found.ext.promise_portability();
+    }
     found.calibration = calibration_extension(has);
     found
 }

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::Capabilities;
+use crate::gpu::caps::limits::Limits;
 use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::gpu::caps::optional_features::FeatureSet;
 
@@ -55,6 +55,18 @@ pub struct DeviceProfile {
     pub max_accel_scratch_bytes: u64,
     /// Maximum shared memory of a compute, task or mesh workgroup in bytes.
     pub max_shared_bytes: u32,
+    /// Maximum number of invocations of a compute workgroup, and along each of its axes.
+    pub max_workgroup_invocations: u32,
+    /// Maximum size of push constants in bytes.
+    pub max_push_constant_bytes: u32,
+    /// Maximum width and height of 2D and cube textures and of render targets, in texels.
+    pub max_texture_side: u32,
+    /// Maximum number of textures of a context.
+    pub max_textures: u32,
+    /// Maximum number of samplers of a context.
+    pub max_samplers: u32,
+    /// Minimum alignment of vertex strides in bytes, rounded up to a power of two.
+    pub min_vertex_stride_alignment: u32,
     /// Maximum number of primitives in one BLAS.
     pub max_blas_primitives: u64,
     /// Minimum BLAS size in bytes per primitive. It replaces a smaller driver value; 0 keeps the driver's
@@ -79,6 +91,12 @@ impl Default for DeviceProfile {
             max_accel_structure_bytes: u64::MAX,
             max_accel_scratch_bytes: u64::MAX,
             max_shared_bytes: u32::MAX,
+            max_workgroup_invocations: u32::MAX,
+            max_push_constant_bytes: u32::MAX,
+            max_texture_side: u32::MAX,
+            max_textures: u32::MAX,
+            max_samplers: u32::MAX,
+            min_vertex_stride_alignment: 1,
             max_blas_primitives: u64::MAX,
             structure_bytes_per_primitive: 0,
             scratch_bytes_per_primitive: 0,
@@ -86,108 +104,7 @@ impl Default for DeviceProfile {
     }
 }
 
-/// Shared memory of a workgroup on phones, in bytes.
-const PHONE_SHARED_BYTES: u32 = 32 << 10;
-
-type BuiltIn = (&'static str, fn() -> DeviceProfile);
-
-/// The built-in profiles by name.
-const BUILT_IN: [BuiltIn; 6] = [
-    ("mali-g715", DeviceProfile::mali_g715),
-    ("xclipse-940", DeviceProfile::xclipse_940),
-    ("no-rt-pipeline", DeviceProfile::no_rt_pipeline),
-    ("no-ray-query", DeviceProfile::no_ray_query),
-    ("no-ray-tracing", DeviceProfile::no_ray_tracing),
-    ("core-only", DeviceProfile::core_only),
-];
-
 impl DeviceProfile {
-    /// `mali-g715`: Arm Mali-G715-Immortalis MC11 with driver r38p1.
-    ///
-    /// It has ray queries only. Neither an acceleration structure nor the scratch of a build may exceed the
-    /// 256 MiB range of a storage buffer. For a mesh of 2.8 million triangles the driver requires
-    /// 7,852,992,128 bytes of scratch and a BLAS of 612,837,208 bytes: 2,805 and 219 bytes per triangle. A
-    /// workgroup shares at most 32 KiB.
-    pub fn mali_g715() -> Self {
-        const RANGE: u64 = 256 << 20;
-        Self {
-            name: Cow::Borrowed("mali-g715"),
-            ray_tracing_pipeline: false,
-            position_fetch: false,
-            mesh_shader: false,
-            min_scratch_alignment: 256,
-            max_storage_buffer_range: RANGE,
-            max_accel_structure_bytes: RANGE,
-            max_accel_scratch_bytes: RANGE,
-            structure_bytes_per_primitive: 219,
-            scratch_bytes_per_primitive: 2_805,
-            max_shared_bytes: PHONE_SHARED_BYTES,
-            ..Self::default()
-        }
-    }
-
-    /// `xclipse-940`: Samsung Xclipse 940.
-    ///
-    /// It has ray tracing pipelines and ray queries, and no limit on the storage buffer range. For the same
-    /// mesh the driver requires 601,488,316 bytes of scratch and a BLAS of 461,519,536 bytes: 215 and 165
-    /// bytes per triangle. Shared memory of a workgroup is clamped to the 32 KiB that is common on phones.
-    pub fn xclipse_940() -> Self {
-        Self {
-            name: Cow::Borrowed("xclipse-940"),
-            structure_bytes_per_primitive: 165,
-            scratch_bytes_per_primitive: 215,
-            max_shared_bytes: PHONE_SHARED_BYTES,
-            ..Self::default()
-        }
-    }
-
-    /// `no-rt-pipeline`: the current device with ray queries only.
-    pub fn no_rt_pipeline() -> Self {
-        Self { name: Cow::Borrowed("no-rt-pipeline"), ray_tracing_pipeline: false, ..Self::default() }
-    }
-
-    /// `no-ray-query`: the current device with ray tracing pipelines only.
-    pub fn no_ray_query() -> Self {
-        Self { name: Cow::Borrowed("no-ray-query"), ray_query: false, ..Self::default() }
-    }
-
-    /// `no-ray-tracing`: the current device without hardware ray tracing.
-    pub fn no_ray_tracing() -> Self {
-        Self { name: Cow::Borrowed("no-ray-tracing"), ray_tracing_pipeline: false, ..Self::no_ray_query() }
-    }
-
-    /// `core-only`: the current device without any optional feature: no ray tracing, no mesh shaders and no
-    /// [`OptionalFeature`](crate::OptionalFeature).
-    pub fn core_only() -> Self {
-        Self {
-            name: Cow::Borrowed("core-only"),
-            position_fetch: false,
-            mesh_shader: false,
-            hidden: FeatureSet::ALL,
-            ..Self::no_ray_tracing()
-        }
-    }
-
-    /// Returns the names of the built-in profiles.
-    pub fn names() -> impl ExactSizeIterator<Item = &'static str> {
-        BUILT_IN.iter().map(|(name, _)| *name)
-    }
-
-    /// Returns the built-in profile with this name.
-    ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] with the list of names, if no profile has this name.
-    pub fn named(name: &str) -> Result<Self> {
-        match BUILT_IN.iter().find(|(known, _)| *known == name) {
-            Some((_, profile)) => Ok(profile()),
-            None => {
-                let names: Vec<_> = Self::names().collect();
-                let message = format!("no built-in profile has this name; there are {}", names.join(", "));
-                Err(Error::usage(format!("device profile '{name}'"), message))
-            }
-        }
-    }
-
     /// True if the profile hides any feature.
     pub(crate) fn has_restrictions(&self) -> bool {
         !(self.ray_tracing_pipeline && self.ray_query && self.position_fetch && self.mesh_shader)
@@ -202,6 +119,8 @@ impl DeviceProfile {
         capabilities.remove_features(self.hidden);
         let limits = &mut capabilities.limits;
         limits.scratch_alignment = stricter_alignment(limits.scratch_alignment, self.min_scratch_alignment);
+        limits.vertex_stride_alignment =
+            stricter_alignment(limits.vertex_stride_alignment, self.min_vertex_stride_alignment);
         let range = self.max_storage_buffer_range;
         for (limit, most) in [
             (&mut limits.max_storage_buffer_range, range),
@@ -211,14 +130,34 @@ impl DeviceProfile {
         ] {
             *limit = most.min(*limit);
         }
-        let mesh = &mut limits.mesh;
-        for limit in
-            [&mut limits.max_shared_bytes, &mut mesh.max_task_shared_bytes, &mut mesh.max_mesh_shared_bytes]
-        {
-            *limit = self.max_shared_bytes.min(*limit);
-        }
+        self.tighten_counts(limits);
         if !capabilities.mesh_shader {
             capabilities.limits.mesh = MeshLimits::default();
+        }
+    }
+
+    /// Tightens the limits of workgroups, push constants, textures and samplers.
+    fn tighten_counts(&self, limits: &mut Limits) {
+        let mesh = &mut limits.mesh;
+        let [width, height] = &mut limits.max_target_size;
+        let [x, y, z] = &mut limits.max_workgroup_size;
+        for (limit, most) in [
+            (&mut limits.max_shared_bytes, self.max_shared_bytes),
+            (&mut mesh.max_task_shared_bytes, self.max_shared_bytes),
+            (&mut mesh.max_mesh_shared_bytes, self.max_shared_bytes),
+            (&mut limits.max_workgroup_invocations, self.max_workgroup_invocations),
+            (x, self.max_workgroup_invocations),
+            (y, self.max_workgroup_invocations),
+            (z, self.max_workgroup_invocations),
+            (&mut limits.max_push_constant_bytes, self.max_push_constant_bytes),
+            (&mut limits.max_texture_2d, self.max_texture_side),
+            (&mut limits.max_texture_cube, self.max_texture_side),
+            (width, self.max_texture_side),
+            (height, self.max_texture_side),
+            (&mut limits.max_bindless_textures, self.max_textures),
+            (&mut limits.max_bindless_samplers, self.max_samplers),
+        ] {
+            *limit = most.min(*limit);
         }
     }
 }
@@ -234,7 +173,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::gpu::caps::limits::Limits;
     use crate::gpu::caps::optional_features::OptionalFeature;
 
     fn device() -> Capabilities {
@@ -250,6 +188,15 @@ mod tests {
                 max_accel_scratch_bytes: 1 << 40,
                 max_blas_primitives: 1 << 24,
                 max_shared_bytes: 64 << 10,
+                max_workgroup_size: [2048; 3],
+                max_workgroup_invocations: 2048,
+                max_push_constant_bytes: 8192,
+                max_texture_2d: 1 << 16,
+                max_texture_cube: 1 << 16,
+                max_target_size: [1 << 16; 2],
+                max_bindless_textures: 1 << 20,
+                max_bindless_samplers: 2000,
+                vertex_stride_alignment: 1,
                 mesh: MeshLimits {
                     max_task_shared_bytes: 64 << 10,
                     max_mesh_shared_bytes: 16 << 10,
@@ -279,6 +226,10 @@ mod tests {
     fn built_in_profiles_hide_what_their_names_say() {
         for (name, pipeline, query) in [
             ("mali-g715", false, true),
+            ("mali-g720", false, true),
+            ("adreno-840", true, true),
+            ("moltenvk", false, false),
+            ("portability-minimum", true, true),
             ("xclipse-940", true, true),
             ("no-rt-pipeline", false, true),
             ("no-ray-query", true, false),
@@ -300,6 +251,54 @@ mod tests {
         assert_eq!(limits.max_storage_buffer_range, range);
         assert_eq!((limits.max_accel_structure_bytes, limits.max_accel_scratch_bytes), (range, range));
         assert_eq!(limits.max_blas_primitives, 1 << 24);
+    }
+
+    #[test]
+    fn recent_phones_have_their_limits() {
+        for (profile, range, alignment) in
+            [(DeviceProfile::adreno_840(), (1 << 31) - 1, 128), (DeviceProfile::mali_g720(), 256 << 20, 256)]
+        {
+            let clamped = under(&profile);
+            let limits = clamped.limits;
+            assert_eq!((limits.max_storage_buffer_range, limits.scratch_alignment), (range, alignment));
+            assert_eq!((limits.max_push_constant_bytes, limits.max_workgroup_size), (256, [1024; 3]));
+            assert_eq!(limits.max_shared_bytes, 32 << 10);
+            assert!(!clamped.mesh_shader && !clamped.position_fetch, "{}", profile.name);
+        }
+        assert_eq!(under(&DeviceProfile::adreno_840()).limits.max_target_size, [16_384; 2]);
+    }
+
+    #[test]
+    fn moltenvk_has_its_limits_and_features() {
+        let mut capabilities = Capabilities { optional: FeatureSet::ALL, ..device() };
+        DeviceProfile::moltenvk().apply(&mut capabilities);
+        let limits = &capabilities.limits;
+        assert_eq!((limits.max_push_constant_bytes, limits.max_bindless_samplers), (4096, 1024));
+        assert_eq!((limits.max_texture_2d, limits.vertex_stride_alignment), (16_384, 1));
+        assert_eq!((limits.max_workgroup_invocations, limits.max_shared_bytes), (1024, 32 << 10));
+        for (feature, there) in [
+            (OptionalFeature::TriangleFans, true),
+            (OptionalFeature::ViewSwizzle, true),
+            (OptionalFeature::ComparisonSamplers, true),
+            (OptionalFeature::PointPolygons, false),
+            (OptionalFeature::TessellationIsolines, false),
+            (OptionalFeature::SamplerLodBias, false),
+            (OptionalFeature::BufferInt64Atomics, false),
+            (OptionalFeature::GeometryShader, false),
+            (OptionalFeature::TessellationShader, true),
+        ] {
+            assert_eq!(capabilities.has(feature), there, "{feature:?}");
+        }
+    }
+
+    #[test]
+    fn the_minimum_of_portability_hides_all_its_features_and_no_others() {
+        let mut capabilities = Capabilities { optional: FeatureSet::ALL, ..device() };
+        DeviceProfile::portability_minimum().apply(&mut capabilities);
+        assert!(FeatureSet::PORTABILITY.iter().all(|feature| !capabilities.has(feature)));
+        assert!(capabilities.has(OptionalFeature::GeometryShader));
+        assert_eq!(capabilities.limits.vertex_stride_alignment, 4);
+        assert!(capabilities.limits.max_lod_bias.abs() < f32::EPSILON);
     }
 
     #[test]
@@ -342,7 +341,7 @@ mod tests {
         capabilities.remove_features(FeatureSet::NONE);
         assert!(capabilities.cube_arrays && capabilities.has(OptionalFeature::MeshShaderQueries));
         DeviceProfile::core_only().apply(&mut capabilities);
-        assert_eq!(capabilities.optional, FeatureSet::NONE);
+        assert_eq!(capabilities.optional, FeatureSet::PORTABILITY);
         assert!(!(capabilities.cube_arrays || capabilities.shader_int64 || capabilities.mesh_shader));
     }
 
@@ -360,6 +359,7 @@ mod tests {
         fn profile()(
             on in any::<[bool; 4]>(), min_scratch_alignment in prop_oneof![any::<u32>(), 0..1025_u32],
             limits in [bytes(), bytes(), bytes(), bytes()], factors in any::<[u16; 2]>(),
+            counts in any::<[u16; 5]>(), stride in 0..9_u32,
         ) -> DeviceProfile {
             DeviceProfile {
                 name: "random".into(),
@@ -374,6 +374,12 @@ mod tests {
                 max_accel_scratch_bytes: limits[2],
                 max_blas_primitives: limits[3],
                 max_shared_bytes: limits[0] as u32,
+                max_workgroup_invocations: counts[0].into(),
+                max_push_constant_bytes: counts[1].into(),
+                max_texture_side: counts[2].into(),
+                max_textures: counts[3].into(),
+                max_samplers: counts[4].into(),
+                min_vertex_stride_alignment: stride,
                 structure_bytes_per_primitive: factors[0].into(),
                 scratch_bytes_per_primitive: factors[1].into(),
             }
@@ -398,9 +404,17 @@ mod tests {
         }
     }
 
-    fn amounts(limits: &Limits) -> [u64; 5] {
+    fn amounts(limits: &Limits) -> [u64; 13] {
         [
             limits.max_shared_bytes.into(),
+            limits.max_workgroup_size[2].into(),
+            limits.max_workgroup_invocations.into(),
+            limits.max_push_constant_bytes.into(),
+            limits.max_texture_2d.into(),
+            limits.max_texture_cube.into(),
+            limits.max_target_size[1].into(),
+            limits.max_bindless_textures.into(),
+            limits.max_bindless_samplers.into(),
             limits.max_storage_buffer_range,
             limits.max_accel_structure_bytes,
             limits.max_accel_scratch_bytes,
@@ -437,6 +451,8 @@ mod tests {
             prop_assert!(alignment.is_power_of_two());
             prop_assert_eq!(alignment % found.limits.scratch_alignment, 0);
             prop_assert!(alignment >= profile.min_scratch_alignment.min(1 << 31));
+            let stride = clamped.limits.vertex_stride_alignment;
+            prop_assert!(stride.is_power_of_two() && stride >= profile.min_vertex_stride_alignment);
         }
     }
 }

@@ -1,66 +1,33 @@
 //! Selects the physical device to use.
 
 use std::cmp::Reverse;
-use std::fmt;
 
-use crate::error::{Error, Result};
-
-/// Kind of a device, in order of preference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum DeviceKind {
-    /// Graphics card.
-    Discrete,
-    /// Integrated GPU, which shares memory with the CPU.
-    Integrated,
-    /// Virtual GPU: part of a device, inside a virtual machine.
-    Virtual,
-    /// Software driver.
-    Cpu,
-    /// Anything else.
-    Other,
-}
-
-impl fmt::Display for DeviceKind {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(match self {
-            Self::Discrete => "discrete",
-            Self::Integrated => "integrated",
-            Self::Virtual => "virtual",
-            Self::Cpu => "CPU",
-            Self::Other => "other",
-        })
-    }
-}
+use crate::error::device_candidate::{DeviceCandidate, DeviceKind};
 
 /// One device, reduced to the properties that the selection depends on.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
-    /// Name reported by the driver.
-    pub(crate) name: String,
-    /// Kind of the device.
-    pub(crate) kind: DeviceKind,
+    /// Name, kind and missing requirements.
+    pub(crate) device: DeviceCandidate,
     /// Bytes of device-local memory.
     pub(crate) local_memory_bytes: u64,
-    /// Required features that the device lacks. Empty if the device is usable.
-    pub(crate) missing: Vec<String>,
     /// Number of optional features that the device has.
     pub(crate) optional_score: u32,
 }
 
 impl Candidate {
-    fn describe(&self, index: usize) -> String {
-        let verdict = if self.missing.is_empty() {
-            "usable".to_owned()
-        } else {
-            format!("lacks {}", self.missing.join(", "))
-        };
-        format!("[{index}] {} ({}): {verdict}", self.name, self.kind)
+    fn is_usable(&self) -> bool {
+        self.device.missing.is_empty()
     }
 
     fn rank(&self) -> (Reverse<DeviceKind>, u32, u64) {
-        (Reverse(self.kind), self.optional_score, self.local_memory_bytes)
+        (Reverse(self.device.kind), self.optional_score, self.local_memory_bytes)
     }
 }
+
+/// No device can be chosen. Holds the problem with the requested device, if one was requested.
+#[derive(Debug, PartialEq)]
+pub(crate) struct NoMatch(pub(crate) Option<String>);
 
 /// Returns the index of the device to use.
 ///
@@ -68,31 +35,27 @@ impl Candidate {
 /// chosen: by kind, then by optional features, then by memory, then by index.
 ///
 /// # Errors
-/// [`Error::NoDevice`], which lists every device, if no device is usable, or if `requested` matches no
-/// device, several devices, or a device that lacks a required feature.
-pub(crate) fn choose(candidates: &[Candidate], requested: Option<&str>) -> Result<usize> {
+/// [`NoMatch`] if no device is usable, or if `requested` matches no device, several devices, or a device that lacks a
+/// required feature.
+pub(crate) fn choose(candidates: &[Candidate], requested: Option<&str>) -> Result<usize, NoMatch> {
     match requested.map(str::trim).filter(|requested| !requested.is_empty()) {
-        Some(requested) => choose_named(candidates, requested),
-        None => choose_best(candidates),
+        Some(requested) => choose_named(candidates, requested).map_err(|problem| NoMatch(Some(problem))),
+        None => choose_best(candidates).ok_or(NoMatch(None)),
     }
 }
 
-fn choose_best(candidates: &[Candidate]) -> Result<usize> {
-    let usable = candidates.iter().enumerate().filter(|(_, candidate)| candidate.missing.is_empty());
+fn choose_best(candidates: &[Candidate]) -> Option<usize> {
+    let usable = candidates.iter().enumerate().filter(|(_, candidate)| candidate.is_usable());
     // `max_by_key` returns the last of equal elements, so the list is reversed.
-    let best = usable.rev().max_by_key(|(_, candidate)| candidate.rank());
-    best.map(|(index, _)| index).ok_or_else(|| no_device(candidates, None))
+    usable.rev().max_by_key(|(_, candidate)| candidate.rank()).map(|(index, _)| index)
 }
 
-fn choose_named(candidates: &[Candidate], requested: &str) -> Result<usize> {
+fn choose_named(candidates: &[Candidate], requested: &str) -> Result<usize, String> {
     match matches(candidates, requested).as_slice() {
-        [index] if candidates[*index].missing.is_empty() => Ok(*index),
-        [index] => Err(no_device(
-            candidates,
-            Some(format!("'{requested}' names device {index}, which cannot be used")),
-        )),
-        [] => Err(no_device(candidates, Some(format!("'{requested}' names no device")))),
-        _ => Err(no_device(candidates, Some(format!("'{requested}' names several devices, give an index")))),
+        [index] if candidates[*index].is_usable() => Ok(*index),
+        [index] => Err(format!("'{requested}' names device {index}, which cannot be used")),
+        [] => Err(format!("'{requested}' names no device")),
+        _ => Err(format!("'{requested}' names several devices, give an index")),
     }
 }
 
@@ -103,15 +66,8 @@ fn matches(candidates: &[Candidate], requested: &str) -> Vec<usize> {
         return vec![index];
     }
     let requested = requested.to_lowercase();
-    let named = |candidate: &Candidate| candidate.name.to_lowercase().contains(&requested);
+    let named = |candidate: &Candidate| candidate.device.name.to_lowercase().contains(&requested);
     (0..candidates.len()).filter(|index| named(&candidates[*index])).collect()
-}
-
-fn no_device(candidates: &[Candidate], headline: Option<String>) -> Error {
-    let none = candidates.is_empty().then(|| "the driver reports no device".to_owned());
-    let lines = candidates.iter().enumerate().map(|(index, candidate)| candidate.describe(index));
-    let reasons: Vec<String> = headline.into_iter().chain(none).chain(lines).collect();
-    Error::NoDevice { reasons: reasons.join("; ") }
 }
 
 #[cfg(test)]
@@ -122,14 +78,9 @@ mod tests {
 
     fn device(name: &str, kind: DeviceKind, missing: &[&str]) -> Candidate {
         let missing = missing.iter().map(|what| (*what).to_owned()).collect();
-        Candidate { name: name.to_owned(), kind, local_memory_bytes: 1 << 30, missing, optional_score: 0 }
-    }
-
-    fn reasons(result: Result<usize>) -> String {
-        match result {
-            Err(Error::NoDevice { reasons }) => reasons,
-            other => panic!("expected NoDevice, not {other:?}"),
-        }
+        let (name, driver) = (name.to_owned(), String::new());
+        let device = DeviceCandidate { index: 0, name, kind, api_version: (1, 3, 0), driver, missing };
+        Candidate { device, local_memory_bytes: 1 << 30, optional_score: 0 }
     }
 
     fn machine() -> Vec<Candidate> {
@@ -164,37 +115,30 @@ mod tests {
     }
 
     #[test]
-    fn wish_that_cannot_be_met_lists_every_device() {
+    fn wish_that_cannot_be_met_is_a_problem() {
         for (requested, headline) in [
             ("voodoo", "'voodoo' names no device"),
             ("radeon", "'radeon' names several devices, give an index"),
             ("2", "'2' names device 2, which cannot be used"),
             ("580", "'580' names device 2, which cannot be used"),
         ] {
-            let text = reasons(choose(&machine(), Some(requested)));
-            let parts: Vec<&str> = text.split("; ").collect();
-            assert_eq!(parts[0], headline);
-            assert_eq!(parts[1], "[0] llvmpipe (CPU): usable");
-            assert_eq!(parts[3], "[2] Radeon RX 580 (discrete): lacks ray query, mesh shaders");
+            assert_eq!(choose(&machine(), Some(requested)), Err(NoMatch(Some(headline.to_owned()))));
         }
     }
 
     #[test]
     fn machine_without_devices_says_so() {
-        assert_eq!(reasons(choose(&[], None)), "the driver reports no device");
-        assert!(reasons(choose(&[], Some("0"))).contains("names no device"));
+        assert_eq!(choose(&[], None), Err(NoMatch(None)));
+        assert_eq!(choose(&[], Some("0")), Err(NoMatch(Some("'0' names no device".to_owned()))));
     }
 
     fn candidate() -> impl Strategy<Value = Candidate> {
         use DeviceKind::{Cpu, Discrete, Integrated, Other, Virtual};
         let kind = prop::sample::select(vec![Discrete, Integrated, Virtual, Cpu, Other]);
         ("[ab]{1,3}", kind, 0..4_u64, prop::bool::weighted(0.4), 0..3_u32).prop_map(
-            |(name, kind, local_memory_bytes, lacks, optional_score)| Candidate {
-                name,
-                kind,
-                local_memory_bytes,
-                missing: if lacks { vec!["ray query".to_owned()] } else { Vec::new() },
-                optional_score,
+            |(name, kind, local_memory_bytes, lacks, optional_score)| {
+                let missing: &[&str] = if lacks { &["ray query"] } else { &[] };
+                Candidate { local_memory_bytes, optional_score, ..device(&name, kind, missing) }
             },
         )
     }
@@ -206,18 +150,14 @@ mod tests {
         ) {
             match choose(&list, requested.as_deref()) {
                 Ok(index) => {
-                    prop_assert!(list[index].missing.is_empty());
-                    let better = |other: &&Candidate| other.missing.is_empty() && other.rank() > list[index].rank();
+                    prop_assert!(list[index].is_usable());
+                    let better = |other: &&Candidate| other.is_usable() && other.rank() > list[index].rank();
                     prop_assert!(requested.is_some_and(|requested| !requested.is_empty()) || !list.iter().any(|c| better(&c)));
                 }
-                Err(error) => {
-                    let text = error.to_string();
-                    prop_assert!(!text.contains('\n'));
-                    for (index, candidate) in list.iter().enumerate() {
-                        prop_assert!(text.contains(&candidate.describe(index)));
-                    }
+                Err(NoMatch(problem)) => {
                     let open = requested.is_none_or(|requested| requested.is_empty());
-                    prop_assert!(!open || list.iter().all(|candidate| !candidate.missing.is_empty()));
+                    prop_assert_eq!(problem.is_none(), open);
+                    prop_assert!(!open || list.iter().all(|candidate| !candidate.is_usable()));
                 }
             }
         }

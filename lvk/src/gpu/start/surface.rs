@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::instance::Instance;
 use super::window::{WindowHandles, WindowRef, display, raw_window, required_extensions};
+use super::window_system;
 use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::OptionalFeature;
 
@@ -89,6 +90,5 @@ pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) ->
     }
     // SAFETY: the extensions of the window system are enabled, the handles belong together, and the caller
     // keeps the window alive.
-    unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, window, None) }
-        .map_err(Error::vulkan("vkCreateSurfaceKHR"))
+    unsafe { window_system::create_surface(&instance.entry, &instance.raw, display, window) }
 }

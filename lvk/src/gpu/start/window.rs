@@ -5,6 +5,7 @@ use std::fmt;
 
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle};
 
+use super::window_system;
 use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
 
@@ -89,9 +90,7 @@ fn no_handle(error: raw_window_handle::HandleError) -> Error {
 }
 
 pub(super) fn required_extensions(display: RawDisplayHandle) -> Result<Vec<&'static CStr>> {
-    let names = ash_window::enumerate_required_extensions(display).map_err(|_| {
+    window_system::extensions(display).ok_or_else(|| {
         Error::unsupported("this kind of window", "Vulkan has no surfaces for its window system")
-    })?;
-    // SAFETY: the names are constants.
-    Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
+    })
 }

@@ -25,8 +25,8 @@
 #define lvkRayQueryConfirmIntersection(rq) rayQueryConfirmIntersectionEXT(rq)
 
 // Values of the ray.
-#define lvkRayQueryTMin(rq) rayQueryGetRayTMinEXT(rq)
-#define lvkRayQueryFlags(rq) uint(rayQueryGetRayFlagsEXT(rq))
+#define lvkRayQueryRayTMin(rq) rayQueryGetRayTMinEXT(rq)
+#define lvkRayQueryRayFlags(rq) uint(rayQueryGetRayFlagsEXT(rq))
 #define lvkRayQueryWorldRayOrigin(rq) rayQueryGetWorldRayOriginEXT(rq)
 #define lvkRayQueryWorldRayDirection(rq) rayQueryGetWorldRayDirectionEXT(rq)
 
@@ -39,15 +39,17 @@
     lvkMapPrimitive(tlas, rayQueryGetIntersectionInstanceIdEXT(rq, which), \
         rayQueryGetIntersectionGeometryIndexEXT(rq, which), rayQueryGetIntersectionPrimitiveIndexEXT(rq, which))
 #define lvkRayQueryInstanceCustomIndex(rq, which) rayQueryGetIntersectionInstanceCustomIndexEXT(rq, which)
-#define lvkRayQuerySbtOffset(rq, which) rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(rq, which)
+#define lvkRayQueryInstanceShaderBindingTableRecordOffset(rq, which) \
+    rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(rq, which)
 #define lvkRayQueryGeometryIndex(rq, which) rayQueryGetIntersectionGeometryIndexEXT(rq, which)
 #define lvkRayQueryBarycentrics(rq, which) rayQueryGetIntersectionBarycentricsEXT(rq, which)
 #define lvkRayQueryFrontFace(rq, which) rayQueryGetIntersectionFrontFaceEXT(rq, which)
 #ifdef LVK_POSITION_FETCH
 // Vertices of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
-#define lvkRayQueryTrianglePositions(rq, which, positions) rayQueryGetIntersectionTriangleVertexPositionsEXT(rq, which, positions)
+#define lvkRayQueryTriangleVertexPositions(rq, which, positions) \
+    rayQueryGetIntersectionTriangleVertexPositionsEXT(rq, which, positions)
 #endif
-#define lvkRayQueryCandidateAabbOpaque(rq) rayQueryGetIntersectionCandidateAABBOpaqueEXT(rq)
+#define lvkRayQueryCandidateAABBOpaque(rq) rayQueryGetIntersectionCandidateAABBOpaqueEXT(rq)
 #define lvkRayQueryObjectRayOrigin(rq, which) rayQueryGetIntersectionObjectRayOriginEXT(rq, which)
 #define lvkRayQueryObjectRayDirection(rq, which) rayQueryGetIntersectionObjectRayDirectionEXT(rq, which)
 #define lvkRayQueryObjectToWorld(rq, which) rayQueryGetIntersectionObjectToWorldEXT(rq, which)

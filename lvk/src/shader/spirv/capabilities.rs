@@ -33,6 +33,7 @@ const FREE: [C; 18] = [
 /// A capability, a function that returns true if it is allowed, and the name of the feature that allows it.
 type CapabilityRow = (C, fn(&Features) -> vk::Bool32, &'static str);
 
+#[rustfmt::skip]
 const BY_FEATURE: [CapabilityRow; 51] = [
     (C::Geometry, |f| f.core.geometry_shader, "geometryShader"),
     (C::Tessellation, |f| f.core.tessellation_shader, "tessellationShader"),
@@ -46,70 +47,34 @@ const BY_FEATURE: [CapabilityRow; 51] = [
     (C::Int64Atomics, int64_atomics, "shaderBufferInt64Atomics"),
     (C::AtomicFloat32AddEXT, float_add, "shaderBufferFloat32AtomicAdd"),
     (C::StorageBuffer8BitAccess, |f| f.v12.storage_buffer8_bit_access, "storageBuffer8BitAccess"),
-    (
-        C::UniformAndStorageBuffer8BitAccess,
-        |f| f.v12.uniform_and_storage_buffer8_bit_access,
-        "uniformAndStorageBuffer8BitAccess",
-    ),
+    (C::UniformAndStorageBuffer8BitAccess, |f| f.v12.uniform_and_storage_buffer8_bit_access, "uniformAndStorageBuffer8BitAccess"),
     (C::StoragePushConstant8, |f| f.v12.storage_push_constant8, "storagePushConstant8"),
     (C::StorageBuffer16BitAccess, |f| f.v11.storage_buffer16_bit_access, "storageBuffer16BitAccess"),
-    (
-        C::UniformAndStorageBuffer16BitAccess,
-        |f| f.v11.uniform_and_storage_buffer16_bit_access,
-        "uniformAndStorageBuffer16BitAccess",
-    ),
+    (C::UniformAndStorageBuffer16BitAccess, |f| f.v11.uniform_and_storage_buffer16_bit_access, "uniformAndStorageBuffer16BitAccess"),
     (C::StoragePushConstant16, |f| f.v11.storage_push_constant16, "storagePushConstant16"),
     (C::StorageInputOutput16, |f| f.v11.storage_input_output16, "storageInputOutput16"),
     (C::DrawParameters, |f| f.v11.shader_draw_parameters, "shaderDrawParameters"),
     (C::ClipDistance, |f| f.core.shader_clip_distance, "shaderClipDistance"),
     (C::CullDistance, |f| f.core.shader_cull_distance, "shaderCullDistance"),
     (C::SampleRateShading, |f| f.core.sample_rate_shading, "sampleRateShading"),
-    (C::InterpolationFunction, |f| f.core.sample_rate_shading, "sampleRateShading"),
+    (C::InterpolationFunction, interpolation, "sampleRateShading or shaderSampleRateInterpolationFunctions"),
     (C::ImageGatherExtended, |f| f.core.shader_image_gather_extended, "shaderImageGatherExtended"),
     (C::ImageCubeArray, |f| f.core.image_cube_array, "imageCubeArray"),
     (C::SampledCubeArray, |f| f.core.image_cube_array, "imageCubeArray"),
-    (
-        C::StorageImageExtendedFormats,
-        |f| f.core.shader_storage_image_extended_formats,
-        "shaderStorageImageExtendedFormats",
-    ),
-    (
-        C::StorageImageReadWithoutFormat,
-        |f| f.core.shader_storage_image_read_without_format,
-        "shaderStorageImageReadWithoutFormat",
-    ),
+    (C::StorageImageExtendedFormats, |f| f.core.shader_storage_image_extended_formats, "shaderStorageImageExtendedFormats"),
+    (C::StorageImageReadWithoutFormat, |f| f.core.shader_storage_image_read_without_format, "shaderStorageImageReadWithoutFormat"),
     (C::VulkanMemoryModel, |f| f.v12.vulkan_memory_model, "vulkanMemoryModel"),
-    (
-        C::VulkanMemoryModelDeviceScope,
-        |f| f.v12.vulkan_memory_model_device_scope,
-        "vulkanMemoryModelDeviceScope",
-    ),
-    (
-        C::DemoteToHelperInvocation,
-        |f| f.v13.shader_demote_to_helper_invocation,
-        "shaderDemoteToHelperInvocation",
-    ),
+    (C::VulkanMemoryModelDeviceScope, |f| f.v12.vulkan_memory_model_device_scope, "vulkanMemoryModelDeviceScope"),
+    (C::DemoteToHelperInvocation, |f| f.v13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
     (C::DotProduct, dot_product, "shaderIntegerDotProduct"),
     (C::DotProductInputAll, dot_product, "shaderIntegerDotProduct"),
     (C::DotProductInput4x8Bit, dot_product, "shaderIntegerDotProduct"),
     (C::DotProductInput4x8BitPacked, dot_product, "shaderIntegerDotProduct"),
     (C::RayTracingKHR, |f| f.ext.ray_tracing.ray_tracing_pipeline, "rayTracingPipeline"),
     (C::RayQueryKHR, |f| f.ext.ray_query.ray_query, "rayQuery"),
-    (
-        C::RayTraversalPrimitiveCullingKHR,
-        |f| f.ext.ray_tracing.ray_traversal_primitive_culling,
-        "rayTraversalPrimitiveCulling",
-    ),
-    (
-        C::RayTracingPositionFetchKHR,
-        |f| f.ext.position_fetch.ray_tracing_position_fetch,
-        "rayTracingPositionFetch",
-    ),
-    (
-        C::RayQueryPositionFetchKHR,
-        |f| f.ext.position_fetch.ray_tracing_position_fetch,
-        "rayTracingPositionFetch",
-    ),
+    (C::RayTraversalPrimitiveCullingKHR, |f| f.ext.ray_tracing.ray_traversal_primitive_culling, "rayTraversalPrimitiveCulling"),
+    (C::RayTracingPositionFetchKHR, |f| f.ext.position_fetch.ray_tracing_position_fetch, "rayTracingPositionFetch"),
+    (C::RayQueryPositionFetchKHR, |f| f.ext.position_fetch.ray_tracing_position_fetch, "rayTracingPositionFetch"),
     (C::MeshShadingEXT, |f| f.ext.mesh.mesh_shader, "meshShader"),
     (C::MinLod, |f| f.core.shader_resource_min_lod, "shaderResourceMinLod"),
     (C::VariablePointers, |f| f.v11.variable_pointers, "variablePointers"),
@@ -119,16 +84,8 @@ const BY_FEATURE: [CapabilityRow; 51] = [
     (C::StorageImageMultisample, multisampled_storage, "shaderStorageImageMultisample"),
     (C::ImageMSArray, multisampled_storage, "shaderStorageImageMultisample"),
     (C::FragmentShadingRateKHR, shading_rate, "pipelineFragmentShadingRate"),
-    (
-        C::FragmentBarycentricKHR,
-        |f| f.ext.barycentrics.fragment_shader_barycentric,
-        "fragmentShaderBarycentric",
-    ),
-    (
-        C::VariablePointersStorageBuffer,
-        |f| f.v11.variable_pointers_storage_buffer,
-        "variablePointersStorageBuffer",
-    ),
+    (C::FragmentBarycentricKHR, |f| f.ext.barycentrics.fragment_shader_barycentric, "fragmentShaderBarycentric"),
+    (C::VariablePointersStorageBuffer, |f| f.v11.variable_pointers_storage_buffer, "variablePointersStorageBuffer"),
 ];
 
 const BY_SUBGROUP: [(C, vk::SubgroupFeatureFlags); 7] = [
@@ -279,6 +236,10 @@ fn shading_rate(features: &Features) -> vk::Bool32 {
 
 fn dot_product(features: &Features) -> vk::Bool32 {
     features.v13.shader_integer_dot_product
+}
+
+fn interpolation(features: &Features) -> vk::Bool32 {
+    features.core.sample_rate_shading & features.ext.portability.shader_sample_rate_interpolation_functions
 }
 
 /// True if one storage allows the capability. The operations are checked individually.

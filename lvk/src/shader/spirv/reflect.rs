@@ -145,7 +145,7 @@ fn check_function(words: &[u32], function: u32) -> Result<(), String> {
     Err("the entry point 'main' names no function of the module".to_owned())
 }
 
-fn execution_model(stage: ShaderStage) -> ExecutionModel {
+pub(crate) fn execution_model(stage: ShaderStage) -> ExecutionModel {
     match stage {
         ShaderStage::Vertex => ExecutionModel::Vertex,
         ShaderStage::TessControl => ExecutionModel::TessellationControl,
@@ -277,9 +277,10 @@ fn binding(module: &ParsedModule, variable: &Variable) -> Result<u32, String> {
         return Err(format!("{what} is in set {set}, binding {binding}; {}", remedy()));
     }
     let wanted = descriptor_kind(module, variable.ty);
-    match layout::BINDINGS.iter().find(|known| known.0 == binding) {
+    match layout::BINDINGS.iter().find(|known| known.number == binding) {
         Some(_) if wanted == Some(binding) => Ok(binding),
-        Some((_, _, holds)) => {
+        Some(known) => {
+            let holds = known.holds;
             Err(format!("{what} is in set {set}, binding {binding}, which holds {holds}; {}", remedy()))
         }
         None => Err(format!("{what} is in set {set}, binding {binding}, which does not exist; {}", remedy())),
@@ -307,6 +308,6 @@ fn descriptor_kind(module: &ParsedModule, pointer: u32) -> Option<u32> {
 }
 
 fn remedy() -> String {
-    let holds = layout::BINDINGS.map(|(binding, _, what)| format!("{binding} {what}")).join(", ");
+    let holds = layout::BINDINGS.map(|binding| format!("{} {}", binding.number, binding.holds)).join(", ");
     format!("resources live in set {} at bindings {holds}; use the library's arrays and helpers", layout::SET)
 }

@@ -2,6 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
 mod damage;
+#[cfg(feature = "software-ray-query")]
+mod glsl_names;
+#[cfg(feature = "software-ray-query")]
+mod interface;
+#[cfg(feature = "software-ray-query")]
+mod interface_page;
 mod modules;
 mod preamble;
 mod shared;
@@ -115,14 +121,14 @@ const QUERY: &str = "
     lvkRayQueryInitialize(rq, 5u, LVK_RAY_FLAG_OPAQUE | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT, 0xFFu, vec3(0), 0.0, vec3(0, 0, 1), 9.0);
     while (lvkRayQueryProceed(rq)) {
         if (lvkRayQueryType(rq, LVK_CANDIDATE) == LVK_CANDIDATE_TRIANGLE) lvkRayQueryConfirmIntersection(rq);
-        else if (lvkRayQueryCandidateAabbOpaque(rq)) lvkRayQueryGenerateIntersection(rq, 1.0);
+        else if (lvkRayQueryCandidateAABBOpaque(rq)) lvkRayQueryGenerateIntersection(rq, 1.0);
         else lvkRayQueryTerminate(rq);
     }
     if (lvkRayQueryType(rq, LVK_COMMITTED) != LVK_COMMITTED_NONE) {
-        t += lvkRayQueryT(rq, LVK_COMMITTED) + lvkRayQueryTMin(rq);
+        t += lvkRayQueryT(rq, LVK_COMMITTED) + lvkRayQueryRayTMin(rq);
         n += uint(lvkRayQueryInstanceId(rq, LVK_COMMITTED, 0) + lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED)
             + lvkRayQueryGeometryIndex(rq, LVK_COMMITTED) + lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED, 0));
-        n += lvkRayQuerySbtOffset(rq, LVK_COMMITTED) + lvkRayQueryFlags(rq);
+        n += lvkRayQueryInstanceShaderBindingTableRecordOffset(rq, LVK_COMMITTED) + lvkRayQueryRayFlags(rq);
         v += vec3(lvkRayQueryBarycentrics(rq, LVK_COMMITTED), 0) + lvkRayQueryObjectRayOrigin(rq, LVK_COMMITTED)
             + lvkRayQueryObjectRayDirection(rq, LVK_COMMITTED) + lvkRayQueryWorldRayOrigin(rq) + lvkRayQueryWorldRayDirection(rq);
         b = lvkRayQueryFrontFace(rq, LVK_COMMITTED);

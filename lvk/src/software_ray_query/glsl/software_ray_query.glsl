@@ -130,8 +130,8 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 #define lvkRayQueryConfirmIntersection(rq) lvkSoftConfirm((rq).state)
 
 // Values of the ray.
-#define lvkRayQueryTMin(rq) ((rq).state.tMin)
-#define lvkRayQueryFlags(rq) ((rq).state.flags)
+#define lvkRayQueryRayTMin(rq) ((rq).state.tMin)
+#define lvkRayQueryRayFlags(rq) ((rq).state.flags)
 #define lvkRayQueryWorldRayOrigin(rq) ((rq).state.origin)
 #define lvkRayQueryWorldRayDirection(rq) ((rq).state.direction)
 
@@ -144,17 +144,17 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 #define lvkRayQueryPrimitiveIndex(rq, which, tlas) int(LVK_SOFT_HIT(rq, which).numbers.y)
 #define lvkRayQueryInstanceCustomIndex(rq, which) \
     int(lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 6u).z & 0x00FFFFFFu)
-#define lvkRayQuerySbtOffset(rq, which) \
+#define lvkRayQueryInstanceShaderBindingTableRecordOffset(rq, which) \
     (lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 6u).w & 0x00FFFFFFu)
 #define lvkRayQueryGeometryIndex(rq, which) int(LVK_SOFT_HIT(rq, which).numbers.x)
 #define lvkRayQueryBarycentrics(rq, which) (LVK_SOFT_HIT(rq, which).barycentrics)
 #define lvkRayQueryFrontFace(rq, which) (LVK_SOFT_HIT(rq, which).front)
 #ifdef LVK_POSITION_FETCH
 // Vertices of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
-#define lvkRayQueryTrianglePositions(rq, which, positions) \
+#define lvkRayQueryTriangleVertexPositions(rq, which, positions) \
     lvkSoftPositions((rq).state, LVK_SOFT_HIT(rq, which), positions)
 #endif
-#define lvkRayQueryCandidateAabbOpaque(rq) ((rq).state.candidate.opaque)
+#define lvkRayQueryCandidateAABBOpaque(rq) ((rq).state.candidate.opaque)
 #define lvkRayQueryObjectRayOrigin(rq, which) \
     lvkSoftObject((rq).state, LVK_SOFT_HIT(rq, which), vec4((rq).state.origin, 1.0))
 #define lvkRayQueryObjectRayDirection(rq, which) \

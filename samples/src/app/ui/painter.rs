@@ -150,7 +150,7 @@ impl Painter {
     pub fn record(&self, pass: &mut RenderPass<'_>) -> lvk::Result<()> {
         let Some((format, pipeline)) = &self.pipeline else { return Ok(()) };
         let linear_target = matches!(format, Format::Rgba8Srgb | Format::Bgra8Srgb).into();
-        let vertices = self.ctx.buffer_address(*self.vertices.buffer)?;
+        let vertices = self.vertices.buffer.address()?;
         pass.bind_render_pipeline(**pipeline)?;
         pass.bind_index_buffer(*self.indices.buffer, 0, IndexFormat::U32)?;
         for draw in &self.draws {

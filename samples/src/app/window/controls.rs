@@ -22,6 +22,8 @@ pub(super) enum Action {
     Next,
     /// Compiles all shaders again.
     Reload,
+    /// Goes on in another window, as after a pause on Android.
+    Reopen,
     /// Saves what the window shows.
     Screenshot,
     /// Closes the window.
@@ -29,7 +31,7 @@ pub(super) enum Action {
 }
 
 /// The keys, as the panel tells them; those of the camera first.
-const HELP: [(&str, &str); 9] = [
+const HELP: [(&str, &str); 10] = [
     ("drag", "look around"),
     ("W A S D", "fly"),
     ("Q E", "down, up"),
@@ -38,6 +40,7 @@ const HELP: [(&str, &str); 9] = [
     ("Space", "animation"),
     ("F1", "this panel"),
     ("F5", "shaders anew"),
+    ("F9", "another window"),
     ("F12, Esc", "screenshot, close"),
 ];
 
@@ -78,6 +81,7 @@ impl Controls {
             KeyCode::F1 => Some(Action::Panel),
             KeyCode::KeyN => Some(Action::Next),
             KeyCode::F5 => Some(Action::Reload),
+            KeyCode::F9 => Some(Action::Reopen),
             KeyCode::F12 => Some(Action::Screenshot),
             KeyCode::Escape => Some(Action::Close),
             _ => None,
@@ -170,7 +174,7 @@ mod tests {
     fn nobody_is_told_to_fly_without_a_camera() {
         let keys = |has_camera| help(has_camera).iter().map(|(key, _)| *key).collect::<Vec<_>>();
         assert_eq!(keys(true)[..CAMERA_KEYS], ["drag", "W A S D", "Q E", "Shift, wheel", "C"]);
-        assert_eq!(keys(false), ["Space", "F1", "F5", "F12, Esc"]);
+        assert_eq!(keys(false), ["Space", "F1", "F5", "F9", "F12, Esc"]);
     }
 
     #[test]

@@ -5,6 +5,7 @@ mod clock;
 mod controls;
 mod present_pass;
 mod resize;
+mod touch;
 mod ui_input;
 mod window_app;
 

@@ -1,9 +1,12 @@
 //! The pass that draws a sample's image and the panel to the swapchain.
 
+use std::sync::Arc;
+
 use egui::{Color32, LayerId, Rect, pos2};
 use lvk::{
     ColorAttachment, ColorSpace, CommandBuffer, Context, Dependencies, Holder, PresentMode, RenderPassDesc,
     SwapchainDesc, SwapchainHandle, SwapchainImage, TextureHandle, TextureUsage, TextureViewDesc,
+    WindowHandles,
 };
 
 use crate::app::ui::Painter;
@@ -49,6 +52,16 @@ impl PresentPass {
 
     pub(super) fn resize(&self, extent: [u32; 2]) -> lvk::Result<()> {
         self.ctx.resize_swapchain(*self.swapchain, extent)
+    }
+
+    /// Gives the window up, which may go afterwards.
+    pub(super) fn suspend(&self) -> lvk::Result<()> {
+        self.ctx.suspend_swapchain(*self.swapchain)
+    }
+
+    /// Goes on in `window`, `extent` pixels large.
+    pub(super) fn resume(&self, window: &Arc<dyn WindowHandles>, extent: [u32; 2]) -> lvk::Result<()> {
+        self.ctx.resume_swapchain(*self.swapchain, window, extent)
     }
 
     /// The painter of the panel.

@@ -42,6 +42,11 @@ impl UiInput {
         }
     }
 
+    /// The pointer in points.
+    pub(super) fn pointer(&self) -> Pos2 {
+        self.pointer
+    }
+
     /// Takes the events since the last call, and the modifier keys.
     pub(super) fn take_events(&mut self) -> (Vec<Event>, Modifiers) {
         (std::mem::take(&mut self.events), self.modifiers)

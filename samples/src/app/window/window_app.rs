@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Rect, ViewportInfo, vec2};
-use lvk::{Context, SubmitHandle, ValidationSink};
+use lvk::{Context, SubmitHandle, ValidationSink, WindowHandles};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, WindowEvent};
-use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopBuilder};
 use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
 
@@ -18,6 +18,7 @@ use super::clock::Clock;
 use super::controls::{Action, Controls, help};
 use super::present_pass::PresentPass;
 use super::resize::ResizeDebounce;
+use super::touch::Finger;
 use super::ui_input::{UiInput, notches};
 use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::frame::Frame;
@@ -37,6 +38,7 @@ const NAP: Duration = Duration::from_millis(30);
 /// Shows the sample that `make` makes, until its window is closed or `--frames` are shown. Messages of the validation layer
 /// go into `sink`.
 pub(in crate::app) fn run<S, M>(
+    event_loop: &mut EventLoopBuilder<()>,
     name: &str,
     args: &RunArgs,
     sink: &ValidationSink,
@@ -46,7 +48,7 @@ where
     S: Sample,
     M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 {
-    let event_loop = EventLoop::new().map_err(|error| RunError::window(&error))?;
+    let event_loop = event_loop.build().map_err(|error| RunError::window(&error))?;
     let mut program =
         WindowApp { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
     event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
@@ -74,22 +76,35 @@ where
     M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
-        if let Some(make) = self.make.take() {
-            match self.open(event_loop, make) {
-                Ok(running) => self.running = Some(running),
-                Err(error) => self.end(event_loop, Err(error)),
-            }
+        let resumed = match (self.make.take(), &mut self.running) {
+            (Some(make), _) => self.open(event_loop, make).map(|running| self.running = Some(running)),
+            (None, Some(running)) => running.resume(Arc::clone(&running.window)),
+            (None, None) => Ok(()),
+        };
+        self.go_on(event_loop, resumed);
+    }
+
+    /// On Android the window goes after this call, and comes back before [`resumed`](Self::resumed).
+    fn suspended(&mut self, event_loop: &ActiveEventLoop) {
+        let suspended = self.running.as_mut().map_or(Ok(()), Running::suspend);
+        event_loop.set_control_flow(ControlFlow::Wait);
+        if let Err(error) = suspended {
+            self.end(event_loop, Err(error));
         }
     }
 
-    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
-        let Some(running) = &mut self.running else { return };
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
+        // A window that was replaced may still have events.
+        let Some(running) = self.running.as_mut().filter(|running| running.window.id() == id) else { return };
         let done = match event {
             WindowEvent::CloseRequested => Ok(Next::Close),
+            WindowEvent::Destroyed => Ok(Next::Reopen),
+            WindowEvent::RedrawRequested if running.is_suspended => return,
             WindowEvent::RedrawRequested => running.redraw(self.name, self.args),
             event => running.event(&event),
         };
         match done {
+            Ok(Next::Frame) if running.is_suspended => {}
             Ok(Next::Frame) => {
                 self.rests_until = None;
                 event_loop.set_control_flow(ControlFlow::Poll);
@@ -100,6 +115,9 @@ where
                 event_loop.set_control_flow(ControlFlow::WaitUntil(until));
             }
             Ok(Next::Close) => self.end(event_loop, Ok(())),
+            // A window that was never drawn in would be followed by others without end.
+            Err(RunError::WindowLost(_)) if running.frames_here > 0 => self.reopen(event_loop),
+            Ok(Next::Reopen) => self.reopen(event_loop),
             Err(error) => self.end(event_loop, Err(error)),
         }
     }
@@ -107,7 +125,7 @@ where
     fn about_to_wait(&mut self, _: &ActiveEventLoop) {
         // A redraw that is asked for comes at once, whatever is waited for.
         let is_due = self.rests_until.is_none_or(|until| Instant::now() >= until);
-        if let Some(running) = self.running.as_ref().filter(|_| is_due) {
+        if let Some(running) = self.running.as_ref().filter(|running| is_due && !running.is_suspended) {
             running.window.request_redraw();
         }
     }
@@ -118,9 +136,7 @@ where
     M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 {
     fn open(&self, event_loop: &ActiveEventLoop, make: M) -> Result<Running<S>, RunError> {
-        let size = PhysicalSize::new(self.args.width, self.args.height);
-        let look = Window::default_attributes().with_title(self.name).with_inner_size(size);
-        let window = Arc::new(event_loop.create_window(look).map_err(|error| RunError::window(&error))?);
+        let window = self.new_window(event_loop)?;
         let mut setup = SampleSetup::new(self.name, self.args, self.sink);
         setup.window = Some(Arc::clone(&window) as Arc<_>);
         let ReadySample { sample, summary } = make(&mut setup)?;
@@ -129,6 +145,36 @@ where
             print_line(&summary);
         }
         Running::new(window, sample, self.args)
+    }
+
+    fn new_window(&self, event_loop: &ActiveEventLoop) -> Result<Arc<Window>, RunError> {
+        let size = PhysicalSize::new(self.args.width, self.args.height);
+        let look = Window::default_attributes().with_title(self.name).with_inner_size(size);
+        let window = event_loop.create_window(look).map_err(|error| RunError::window(&error))?;
+        Ok(Arc::new(window))
+    }
+
+    /// Goes on after the window was lost without having been closed, or where the user asks for it. On Android the window comes back with
+    /// [`resumed`](Self::resumed), elsewhere another one takes its place.
+    fn reopen(&mut self, event_loop: &ActiveEventLoop) {
+        self.suspended(event_loop);
+        if cfg!(target_os = "android") || event_loop.exiting() {
+            return;
+        }
+        let window = self.new_window(event_loop);
+        let resumed = match &mut self.running {
+            Some(running) => window.and_then(|window| running.resume(window)),
+            None => Ok(()),
+        };
+        self.go_on(event_loop, resumed);
+    }
+
+    fn go_on(&mut self, event_loop: &ActiveEventLoop, resumed: Result<(), RunError>) {
+        self.rests_until = None;
+        event_loop.set_control_flow(ControlFlow::Poll);
+        if let Err(error) = resumed {
+            self.end(event_loop, Err(error));
+        }
     }
 
     fn end(&mut self, event_loop: &ActiveEventLoop, ended: Result<(), RunError>) {
@@ -147,6 +193,8 @@ enum Next {
     Frame,
     /// A frame, later: nothing is seen for now.
     Nap,
+    /// A frame in another window: this one is gone, or is to go.
+    Reopen,
     /// Nothing any more.
     Close,
 }
@@ -159,6 +207,7 @@ struct Running<S> {
     controls: Controls,
     ui_input: UiInput,
     resize: ResizeDebounce,
+    finger: Finger,
     watch: Option<ShaderWatch>,
     camera_controller: CameraController,
     clock: Clock,
@@ -170,12 +219,19 @@ struct Running<S> {
     latest: SubmitHandle,
     ctx: Context,
     window: Arc<Window>,
+    /// Size of the window in pixels, as it was told last: a window that is gone cannot be asked.
+    size: [u32; 2],
+    /// Frames that the window has shown.
+    frames_here: u32,
+    /// True while there is no window to draw in.
+    is_suspended: bool,
 }
 
 impl<S: Sample> Running<S> {
     fn new(window: Arc<Window>, sample: S, args: &RunArgs) -> Result<Self, RunError> {
         let ctx = sample.context().clone();
-        let present_pass = PresentPass::new(&ctx, extent(&window))?;
+        let size = window.inner_size().into();
+        let present_pass = PresentPass::new(&ctx, size)?;
         let (mode, _) = present_pass.present_modes()?;
         ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
         let mut panel = Panel::new(mode);
@@ -188,6 +244,7 @@ impl<S: Sample> Running<S> {
             controls: Controls::default(),
             ui_input: UiInput::default(),
             resize: ResizeDebounce::new([args.width, args.height]),
+            finger: Finger::default(),
             watch: shader_folder::folder().map(|folder| ShaderWatch::new(&folder)),
             camera_controller: CameraController::new(),
             clock: Clock::new(Instant::now()),
@@ -197,23 +254,58 @@ impl<S: Sample> Running<S> {
             latest: SubmitHandle::default(),
             ctx,
             window,
+            size,
+            frames_here: 0,
+            is_suspended: false,
         })
     }
 
+    /// Gives the window up. Device, sample and panel stay as they are.
+    fn suspend(&mut self) -> Result<(), RunError> {
+        self.is_suspended = true;
+        self.controls.release_all();
+        Ok(self.present_pass.suspend()?)
+    }
+
+    /// Goes on in `window`. The animation goes on where it stood.
+    fn resume(&mut self, window: Arc<Window>) -> Result<(), RunError> {
+        self.size = window.inner_size().into();
+        let handles = Arc::clone(&window) as Arc<dyn WindowHandles>;
+        self.present_pass.resume(&handles, self.size)?;
+        let before = std::mem::replace(&mut self.window, window);
+        if before.id() != self.window.id() {
+            // The context keeps the window that it was made for.
+            before.set_visible(false);
+        }
+        (self.frames_here, self.is_suspended) = (0, false);
+        self.clock.tick(Instant::now(), false);
+        Ok(())
+    }
+
     fn event(&mut self, event: &WindowEvent) -> Result<Next, RunError> {
+        if let WindowEvent::Touch(touch) = event {
+            for event in self.finger.as_mouse(touch) {
+                self.event(&event)?;
+            }
+            return Ok(Next::Frame);
+        }
         self.ui_input.push(event, self.per_point());
+        let is_over_panel = self.is_over_panel();
         let ui = self.present_pass.ui();
         match event {
-            WindowEvent::Resized(size) => self.present_pass.resize([size.width, size.height])?,
+            WindowEvent::Resized(size) => {
+                self.size = [size.width, size.height];
+                self.present_pass.resize(self.size)?;
+            }
             WindowEvent::Focused(false) => self.controls.release_all(),
             WindowEvent::CursorMoved { position, .. } => {
                 self.controls.pointer([position.x as f32, position.y as f32]);
             }
             WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => {
                 let is_down = *state == ElementState::Pressed;
-                self.controls.drag(is_down && !ui.is_pointer_over_area());
+                self.controls.drag(is_down && !is_over_panel);
             }
-            WindowEvent::MouseWheel { delta, .. } if !ui.is_pointer_over_area() => {
+            WindowEvent::MouseWheel { delta, .. } if !is_over_panel => {
                 self.controls.wheel(notches(*delta));
             }
             WindowEvent::KeyboardInput { event, .. } => {
@@ -241,6 +333,7 @@ impl<S: Sample> Running<S> {
             Action::Panel => self.panel.is_open = !self.panel.is_open,
             Action::Next => self.sample.next(),
             Action::Reload => self.reload(),
+            Action::Reopen => return Next::Reopen,
             Action::Screenshot => self.wants_screenshot = true,
             Action::Close => return Next::Close,
         }
@@ -296,6 +389,7 @@ impl<S: Sample> Running<S> {
         let shot = (self.wants_screenshot || file.is_some())
             .then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
         self.latest = self.ctx.present(cmd, image)?;
+        self.frames_here = self.frames_here.saturating_add(1);
         self.shown += 1;
         self.clock.count_frame(self.panel.animates);
         if let Some(shot) = shot {
@@ -326,6 +420,7 @@ impl<S: Sample> Running<S> {
         self.present_pass.record(&mut cmd, &image, picture, input, |ui| sample.overlay(ui))?;
         let shot = self.wants_screenshot.then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
         self.latest = self.ctx.present(cmd, image)?;
+        self.frames_here = self.frames_here.saturating_add(1);
         if let Some(shot) = shot {
             self.save(shot, None, name)?;
         }
@@ -334,7 +429,7 @@ impl<S: Sample> Running<S> {
 
     /// Resizes the sample once the window keeps its size.
     fn follow_size(&mut self) {
-        if let Some(size) = self.resize.next(extent(&self.window), Instant::now())
+        if let Some(size) = self.resize.next(self.size, Instant::now())
             && let Err(error) = self.sample.resize(size).map_err(Into::into)
         {
             eprintln!("warning: pictures keep their size: {error}");
@@ -398,11 +493,13 @@ impl<S: Sample> Running<S> {
         input
     }
 
+    /// True if the pointer is on the panel, also where a finger has put it just now.
+    fn is_over_panel(&self) -> bool {
+        let layer = self.present_pass.ui().layer_id_at(self.ui_input.pointer());
+        layer.is_some_and(|layer| layer.order != egui::Order::Background)
+    }
+
     fn per_point(&self) -> f32 {
         self.window.scale_factor() as f32
     }
-}
-
-fn extent(window: &Window) -> [u32; 2] {
-    window.inner_size().into()
 }

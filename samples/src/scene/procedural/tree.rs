@@ -31,39 +31,21 @@ enum Crown {
 
 /// The kinds there are.
 pub(super) const KINDS: [Kind; 4] = [
-    Kind {
-        name: "fir",
-        height: 5.2,
-        crown: Crown::Tiers(9),
-        spread: 0.21,
-        leaf: [0.035, 0.085, 0.035],
-        bark: [0.16, 0.10, 0.06],
-    },
-    Kind {
-        name: "oak",
-        height: 4.0,
-        crown: Crown::Balls(9),
-        spread: 0.40,
-        leaf: [0.09, 0.17, 0.03],
-        bark: [0.15, 0.12, 0.09],
-    },
-    Kind {
-        name: "birch",
-        height: 4.4,
-        crown: Crown::Balls(6),
-        spread: 0.22,
-        leaf: [0.22, 0.30, 0.05],
-        bark: [0.62, 0.60, 0.56],
-    },
-    Kind {
-        name: "maple",
-        height: 3.6,
-        crown: Crown::Balls(7),
-        spread: 0.34,
-        leaf: [0.42, 0.15, 0.025],
-        bark: [0.17, 0.13, 0.10],
-    },
+    kind("fir", 5.2, Crown::Tiers(9), 0.21, [[0.035, 0.085, 0.035], [0.16, 0.10, 0.06]]),
+    kind("oak", 4.0, Crown::Balls(9), 0.40, [[0.09, 0.17, 0.03], [0.15, 0.12, 0.09]]),
+    kind("birch", 4.4, Crown::Balls(6), 0.22, [[0.22, 0.30, 0.05], [0.62, 0.60, 0.56]]),
+    kind("maple", 3.6, Crown::Balls(7), 0.34, [[0.42, 0.15, 0.025], [0.17, 0.13, 0.10]]),
 ];
+
+const fn kind(
+    name: &'static str,
+    height: f32,
+    crown: Crown,
+    spread: f32,
+    [leaf, bark]: [[f32; 3]; 2],
+) -> Kind {
+    Kind { name, height, crown, spread, leaf, bark }
+}
 
 /// Shades of leaves.
 const SHADES: [f32; 3] = [0.7, 1.0, 1.35];

@@ -1,9 +1,9 @@
-//! `docs/bindless-core.md`: each row names tests that exist, and the manual page that explains what is left out.
+//! `docs/features.md`: each row names tests that exist, and the manual page that explains what is left out.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use crate::held_by::{self, cells, project};
 
-const DOCUMENT: &str = include_str!("../../../docs/bindless-core.md");
+const DOCUMENT: &str = include_str!("../../../docs/features.md");
 const HEAD: [&str; 4] = ["Feature", "Here", "Held by", "Left out"];
 
 /// The rows below the head of the table, but for those that begin an area.
@@ -43,7 +43,7 @@ fn every_row_names_its_tests_and_the_page_of_its_reasons() {
 
 #[test]
 fn rows_that_lack_a_test_or_a_page_are_noticed() {
-    let test = "t: documents/bindless_core";
+    let test = "t: documents/features";
     for (held_by, left_out) in [
         ("-", "-"),
         ("", "-"),

@@ -1,0 +1,223 @@
+//! The remedy for each reason why no driver can be used.
+
+use std::path::Path;
+
+use super::driver_report::{DriverManifest, DriverReport, LoaderReport, ManifestOutcome};
+
+const INSTALL_LOADER: &str = if cfg!(windows) {
+    "install the current driver of the GPU's vendor, which brings the loader vulkan-1.dll"
+} else if cfg!(any(target_os = "macos", target_os = "ios")) {
+    "install the Vulkan SDK, which has the loader and the driver MoltenVK"
+} else if cfg!(target_os = "android") {
+    "use a device whose Android has Vulkan"
+} else {
+    "install the Vulkan loader: the package libvulkan1 (Debian, Ubuntu), vulkan-loader (Fedora) or vulkan-icd-loader (Arch)"
+};
+const INSTALL_DRIVER: &str = if cfg!(windows) {
+    "install the current driver of the GPU's vendor (drivers in the registry are not in this report)"
+} else if cfg!(any(target_os = "macos", target_os = "ios")) {
+    "install the Vulkan SDK, which has the driver MoltenVK"
+} else if cfg!(target_os = "android") {
+    "use a device whose Android has a Vulkan driver (the system's own drivers are not in this report)"
+} else {
+    "install a Vulkan driver: the GPU vendor's, or Mesa's package mesa-vulkan-drivers (Debian, Ubuntu, Fedora), \
+     vulkan-radeon or vulkan-intel (Arch)"
+};
+const RAISE_LIMITS: &str =
+    "free memory, or raise the limits of the process (ulimit -a): a driver needs more of them";
+const NO_DEVICE: &str = "every driver loads, but none offers a device: check that the GPU's kernel driver runs, that it has \
+     the version of the Vulkan driver, and that this user may open its device files (/dev/dri, /dev/nvidia*)";
+
+/// Returns the remedies for `report`, the most important first. `has_devices` is true if Vulkan reports a device.
+pub(super) fn driver_remedies(report: &DriverReport, has_devices: bool) -> Vec<String> {
+    let mut remedies = Vec::new();
+    match &report.loader {
+        LoaderReport::NotOpened { path, error } => remedies.push(loader_remedy(path, error)),
+        loader if loader.is_too_old() => {
+            remedies.push(format!("update the loader to Vulkan 1.3; {INSTALL_LOADER}"));
+        }
+        LoaderReport::Opened { .. } => {}
+    }
+    let used = || report.manifests.iter().filter(|manifest| !is_skipped(manifest));
+    remedies.extend(used().filter_map(manifest_remedy));
+    if used().next().is_none() && !has_devices {
+        remedies.push(no_manifest_remedy(report));
+    } else if remedies.is_empty() && !has_devices {
+        remedies.push(NO_DEVICE.to_owned());
+    }
+    let mut unique = Vec::new();
+    remedies.retain(|remedy| {
+        !unique.contains(remedy) && {
+            unique.push(remedy.clone());
+            true
+        }
+    });
+    remedies
+}
+
+/// Returns the library that the dynamic linker (of glibc or musl) did not find.
+pub(super) fn missing_library(error: &str) -> Option<&str> {
+    let of_musl = || error.strip_prefix("Error loading shared library ")?.split_once(": No such file");
+    error
+        .split_once(": cannot open shared object file: No such file")
+        .or_else(of_musl)
+        .map(|(name, _)| name.trim())
+        .filter(|name| !name.is_empty())
+}
+
+/// True if the dynamic linker ran out of memory or of file descriptors.
+fn is_shortage(error: &str) -> bool {
+    let cause = ["Too many open files", "Cannot allocate memory", "cannot allocate memory", "Out of memory"];
+    let unmapped = error.contains("failed to map segment") && !error.contains("not permitted");
+    unmapped || cause.iter().any(|cause| error.contains(cause))
+}
+
+fn is_skipped(manifest: &DriverManifest) -> bool {
+    matches!(manifest.outcome, ManifestOutcome::Skipped { .. })
+}
+
+fn loader_remedy(path: &Path, error: &str) -> String {
+    let is_own = |name: &str| Path::new(name).file_name() == path.file_name();
+    match missing_library(error) {
+        _ if is_shortage(error) => RAISE_LIMITS.to_owned(),
+        Some(name) if !is_own(name) => format!("install the package that has {name}, which the loader needs"),
+        _ if path.components().count() > 1 => {
+            format!("name an existing loader in place of {}, or none", path.display())
+        }
+        _ => INSTALL_LOADER.to_owned(),
+    }
+}
+
+fn manifest_remedy(manifest: &DriverManifest) -> Option<String> {
+    let path = manifest.path.display();
+    let is_own = |name: &str| {
+        let own = manifest.library.as_deref().and_then(Path::file_name);
+        own.is_some() && Path::new(name).file_name() == own
+    };
+    match &manifest.outcome {
+        ManifestOutcome::Loaded | ManifestOutcome::Skipped { .. } => None,
+        ManifestOutcome::LoadFailed { error } | ManifestOutcome::NotRead { error } if is_shortage(error) => {
+            Some(RAISE_LIMITS.to_owned())
+        }
+        ManifestOutcome::NotRead { .. } => {
+            Some(format!("correct or remove {path}, or install its driver again"))
+        }
+        ManifestOutcome::LoadFailed { error } => Some(match missing_library(error) {
+            Some(name) if !is_own(name) => {
+                format!("install the package that has {name}, which the driver of {path} needs")
+            }
+            _ => format!("install the driver of {path} again, for this architecture, or remove that file"),
+        }),
+    }
+}
+
+fn no_manifest_remedy(report: &DriverReport) -> String {
+    let variable = report.searched.iter().find_map(|searched| searched.variable);
+    if let Some(ManifestOutcome::Skipped { reason }) = report.manifests.first().map(|first| &first.outcome) {
+        return format!("use a driver that the loader does not skip ({reason})");
+    }
+    match variable {
+        Some(variable) if variable != "VK_ADD_DRIVER_FILES" => {
+            format!("correct {variable}, or unset it to use the drivers that are installed")
+        }
+        _ => INSTALL_DRIVER.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::driver_report::SearchedPath;
+    use super::*;
+
+    fn report(loader_error: Option<&str>, outcomes: &[ManifestOutcome]) -> DriverReport {
+        let path = "libvulkan.so.1".into();
+        let loader = match loader_error {
+            Some(error) => LoaderReport::NotOpened { path, error: error.to_owned() },
+            None => LoaderReport::Opened { path, version: (1, 3, 0) },
+        };
+        let manifest = |outcome: &ManifestOutcome| DriverManifest {
+            path: "/d/toy.json".into(),
+            library: Some("/d/libtoy.so".into()),
+            api_version: None,
+            outcome: outcome.clone(),
+        };
+        let manifests = outcomes.iter().map(manifest).collect();
+        DriverReport { loader, failure: None, searched: Vec::new(), manifests }
+    }
+
+    fn fails(error: &str) -> ManifestOutcome {
+        ManifestOutcome::LoadFailed { error: error.to_owned() }
+    }
+
+    /// Asserts that the only remedy contains `part`.
+    fn assert_remedy(report: &DriverReport, part: &str) {
+        let remedies = driver_remedies(report, false);
+        assert!(remedies.len() == 1 && remedies[0].contains(part), "no '{part}' in {remedies:?}");
+    }
+
+    fn not_found(name: &str) -> String {
+        format!("{name}: cannot open shared object file: No such file or directory")
+    }
+
+    #[test]
+    fn dynamic_linkers_name_the_missing_library() {
+        assert_eq!(missing_library(&not_found("libX11.so.6")), Some("libX11.so.6"));
+        let musl =
+            "Error loading shared library libX11.so.6: No such file or directory (needed by /l/libd.so)";
+        assert_eq!(missing_library(musl), Some("libX11.so.6"));
+        assert_eq!(missing_library("/d/libtoy.so: invalid ELF header"), None);
+        assert_eq!(missing_library(": cannot open shared object file: No such file"), None);
+    }
+
+    #[test]
+    fn loader_remedies_follow_the_error() {
+        let loaded = [ManifestOutcome::Loaded];
+        assert_remedy(&report(Some(&not_found("libvulkan.so.1")), &loaded), INSTALL_LOADER);
+        assert_remedy(
+            &report(Some(&not_found("libdl.so.2")), &loaded),
+            "has libdl.so.2, which the loader needs",
+        );
+        let text = "libvulkan.so.1: cannot open shared object file: Too many open files";
+        assert_remedy(&report(Some(text), &loaded), RAISE_LIMITS);
+        let mut named = report(Some(&not_found("/nowhere/libvulkan.so.1")), &loaded);
+        if let LoaderReport::NotOpened { path, .. } = &mut named.loader {
+            *path = "/nowhere/libvulkan.so.1".into();
+        }
+        assert_remedy(&named, "in place of /nowhere/libvulkan.so.1");
+        named.loader = LoaderReport::Opened { path: "l".into(), version: (1, 2, 200) };
+        assert_remedy(&named, "update the loader");
+    }
+
+    #[test]
+    fn driver_remedies_follow_the_error() {
+        assert_remedy(&report(None, &[]), INSTALL_DRIVER);
+        assert_remedy(&report(None, &[ManifestOutcome::Loaded]), NO_DEVICE);
+        assert_remedy(&report(None, &[fails(&not_found("libX11.so.6"))]), "the package that has libX11.so.6");
+        assert_remedy(
+            &report(None, &[fails(&not_found("/d/libtoy.so"))]),
+            "install the driver of /d/toy.json",
+        );
+        assert_remedy(&report(None, &[fails("/d/libtoy.so: invalid ELF header")]), "install the driver of");
+        let shortage = fails("/d/libtoy.so: failed to map segment from shared object");
+        assert_remedy(&report(None, &[shortage.clone(), shortage]), RAISE_LIMITS);
+        let not_read = ManifestOutcome::NotRead { error: "no JSON".to_owned() };
+        assert_remedy(&report(None, &[not_read]), "correct or remove /d/toy.json");
+        let skipped = ManifestOutcome::Skipped { reason: "for 32 bits".to_owned() };
+        assert_remedy(&report(None, &[skipped]), "(for 32 bits)");
+    }
+
+    #[test]
+    fn variables_that_name_no_driver_are_to_be_corrected() {
+        let mut report = report(None, &[]);
+        report.searched = vec![SearchedPath { path: "/x".into(), variable: Some("VK_DRIVER_FILES") }];
+        assert_remedy(&report, "unset it");
+        report.searched[0].variable = Some("VK_ADD_DRIVER_FILES");
+        assert_remedy(&report, INSTALL_DRIVER);
+    }
+
+    #[test]
+    fn usable_machine_needs_no_remedy() {
+        assert_eq!(driver_remedies(&report(None, &[ManifestOutcome::Loaded]), true), Vec::<String>::new());
+        assert_eq!(driver_remedies(&report(None, &[]), true), Vec::<String>::new());
+    }
+}
