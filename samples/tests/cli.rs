@@ -306,7 +306,7 @@ fn wrong_arguments_are_named() {
         ("--frames 0", ["--frames", "'0'"]),
         ("--method raster", ["--method", "standalone, hybrid"]),
         ("--rt mesh", ["--rt", "auto, pipeline, query"]),
-        ("--profile pixel", ["--profile", "mali-g715, xclipse-940"]),
+        ("--profile pixel", ["--profile", "mali-g715, mali-g720"]),
         ("--sceen a.obj", ["--sceen", "--scene"]),
         ("a.obj", ["a.obj", "Usage"]),
     ] {

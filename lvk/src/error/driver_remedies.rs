@@ -26,7 +26,8 @@ const INSTALL_DRIVER: &str = if cfg!(windows) {
 const RAISE_LIMITS: &str =
     "free memory, or raise the limits of the process (ulimit -a): a driver needs more of them";
 const NO_DEVICE: &str = "every driver loads, but none offers a device: check that the GPU's kernel driver runs, that it has \
-     the version of the Vulkan driver, and that this user may open its device files (/dev/dri, /dev/nvidia*)";
+     the version of the Vulkan driver, and that this user may open its device files (/dev/dri, /dev/nvidia*); \
+     VK_LOADER_DEBUG=all prints the reasons of the loader";
 
 /// Returns the remedies for `report`, the most important first. `has_devices` is true if Vulkan reports a device.
 pub(super) fn driver_remedies(report: &DriverReport, has_devices: bool) -> Vec<String> {
