@@ -3,7 +3,7 @@
 use lvk_tests::subprocess::rerun_on_swiftshader;
 
 #[test]
-#[ignore = "a minute, of the step swiftshader of .ci/run"]
+#[ignore = "a minute, of the check swiftshader of .ci/slow"]
 fn accel_structs_are_built_the_same_without_ray_tracing() {
     rerun_on_swiftshader(&[]);
 }

@@ -76,6 +76,7 @@ fn without() -> Option<TestDevice> {
 }
 
 #[test]
+#[ignore = "minutes in which SwiftShader compiles, of the check swiftshader of .ci/slow"]
 fn a_driver_without_ray_tracing_renders_the_obj_scene() {
     on_swiftshader(a_driver_without_ray_tracing_renders_the_obj_scene, || {
         let Some(ctx) = without() else { return };
@@ -103,6 +104,7 @@ fn a_driver_without_ray_tracing_renders_the_glass() {
 }
 
 #[test]
+#[ignore = "minutes in which SwiftShader compiles, of the check swiftshader of .ci/slow"]
 fn a_driver_without_ray_tracing_renders_the_hall() {
     on_swiftshader(a_driver_without_ray_tracing_renders_the_hall, || {
         let Some(ctx) = without() else { return };
