@@ -178,7 +178,8 @@ pub(crate) fn fetched<T>(found: Result<T, DriverError>, what: &str) -> Option<T>
 fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
     static LOADER: OnceLock<Result<Option<PathBuf>, String>> = OnceLock::new();
     let found = LOADER.get_or_init(|| {
-        let driver = prepare(&DriverRequest { validation: true }).map_err(|error| error.to_string())?;
+        let request = DriverRequest { validation: !matches!(validation(), ValidationMode::Off) };
+        let driver = prepare(&request).map_err(|error| error.to_string())?;
         set_driver_variables(driver.loader.as_deref());
         Ok(driver.loader)
     });

@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "test-images/a_test_of_the_harness_actual.png")]
+    #[should_panic(expected = "a_test_of_the_harness_actual.png")]
     fn images_that_differ_are_written() {
         assert_similar(
             "a test of the harness",

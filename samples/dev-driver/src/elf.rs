@@ -135,7 +135,8 @@ mod tests {
 }
 
 /// Tests of a library that the process has open.
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
+#[cfg(target_os = "linux")]
 mod library_tests {
     use std::sync::LazyLock;
 

@@ -62,7 +62,8 @@ mod tests {
     use super::*;
 
     fn name(path: &str, frame: u32) -> String {
-        FrameName::new(Path::new(path)).path_for(frame).display().to_string()
+        let path = FrameName::new(Path::new(path)).path_for(frame);
+        path.display().to_string().replace(std::path::MAIN_SEPARATOR, "/")
     }
 
     #[test]

@@ -107,7 +107,7 @@ impl Library {
         let name = &name.replace('\\', "/");
         let found = find_image(folder, name);
         let path = found.clone().unwrap_or_else(|| folder.join(name));
-        let key = (path.clone(), mask.clone());
+        let key = (file_identity(&path), mask.as_deref().map(file_identity));
         if let Some(&number) = self.texture_numbers.get(&key) {
             return number;
         }
@@ -134,7 +134,8 @@ impl Library {
     fn normal_map(&mut self, Image { folder, name }: &Image) -> Option<u32> {
         let found = find_image(folder, name);
         let path = found.clone().unwrap_or_else(|| folder.join(name));
-        if let Some(&number) = self.normal_map_numbers.get(&path) {
+        let key = file_identity(&path);
+        if let Some(&number) = self.normal_map_numbers.get(&key) {
             return number;
         }
         let read = match &found {
@@ -152,7 +153,7 @@ impl Library {
                 None
             }
         };
-        self.normal_map_numbers.insert(path, number);
+        self.normal_map_numbers.insert(key, number);
         number
     }
 
@@ -196,6 +197,11 @@ impl Library {
         let normal_map = relief.and_then(|relief| self.normal_map(&relief));
         Material { albedo_texture, is_masked, normal_map, ..material }
     }
+}
+
+/// The same for all names of one file: Windows and macOS ignore capitals. The path itself if there is no such file.
+fn file_identity(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 
 /// The files that a `mtllib` argument means: one name that may hold blanks, or several names.
