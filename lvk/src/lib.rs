@@ -234,6 +234,11 @@ pub use shader::compile_glsl;
 pub use shader::{HLSL_HEADER, ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
+#[cfg(unix)]
+pub use {
+    context::external_semaphore::{SemaphoreFdType, SemaphoreKind, SharedSemaphore},
+    gpu::memory::external::{DrmLayout, DrmPlane, MemoryFd, MemoryFdType},
+};
 #[cfg(feature = "window")]
 pub use {
     gpu::start::window::WindowHandles,

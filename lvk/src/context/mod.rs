@@ -10,6 +10,10 @@ mod create_ray_tracing;
 mod create_texture;
 mod default_descriptors;
 pub(crate) mod destroy;
+#[cfg(unix)]
+mod external_memory;
+#[cfg(unix)]
+pub(crate) mod external_semaphore;
 mod format_queries;
 pub(crate) mod frame;
 mod from_raw;

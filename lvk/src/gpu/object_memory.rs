@@ -68,6 +68,10 @@ impl Gpu {
     /// Frees memory.
     pub(crate) fn free(&self, memory: ObjectMemory) {
         self.heap_use.remove(&memory);
+        if memory.is_unmanaged() {
+            // SAFETY: the object that was bound to the memory is destroyed.
+            return unsafe { self.device.free_memory(memory.raw, None) };
+        }
         let freed = self.memory().as_mut().map_or(Ok(()), |all| all.free(memory));
         if let Err(error) = freed {
             log::error!("freeing device memory failed: {error}");

@@ -1,5 +1,6 @@
 //! Contexts: creation, devices, profiles, and interoperation with other engines.
 
+mod external_memory;
 mod interop;
 mod no_ray_tracing;
 mod profiles;

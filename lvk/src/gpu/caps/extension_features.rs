@@ -29,6 +29,10 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) memory_budget: vk::Bool32,
     pub(crate) swapchain: vk::Bool32,
     pub(crate) hdr_metadata: vk::Bool32,
+    pub(crate) external_memory_fd: vk::Bool32,
+    pub(crate) external_memory_dma_buf: vk::Bool32,
+    pub(crate) external_semaphore_fd: vk::Bool32,
+    pub(crate) drm_format_modifier: vk::Bool32,
 }
 
 impl ExtensionFeatures {
@@ -117,5 +121,9 @@ impl ExtensionFeatures {
         self.memory_budget = has(ash::ext::memory_budget::NAME).into();
         self.swapchain = has(ash::khr::swapchain::NAME).into();
         self.hdr_metadata = has(ash::ext::hdr_metadata::NAME).into();
+        self.external_memory_fd = has(ash::khr::external_memory_fd::NAME).into();
+        self.external_memory_dma_buf = has(ash::ext::external_memory_dma_buf::NAME).into();
+        self.external_semaphore_fd = has(ash::khr::external_semaphore_fd::NAME).into();
+        self.drm_format_modifier = has(ash::ext::image_drm_format_modifier::NAME).into();
     }
 }

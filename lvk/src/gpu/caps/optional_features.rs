@@ -207,6 +207,15 @@ pub enum OptionalFeature {
     /// Vertex attributes that end beyond the stride (`vertexAttributeAccessBeyondStride`). The library refuses
     /// them on every device.
     VertexAccessBeyondStride,
+    /// Memory shared by file descriptors (`VK_KHR_external_memory_fd`).
+    ExternalMemoryFd,
+    /// Memory shared as Linux dma-bufs (`VK_EXT_external_memory_dma_buf`).
+    ExternalMemoryDmaBuf,
+    /// Semaphores shared by file descriptors (`VK_KHR_external_semaphore_fd`).
+    ExternalSemaphoreFd,
+    /// Images whose memory layout a DRM format modifier describes (`VK_EXT_image_drm_format_modifier`). Textures in
+    /// dma-bufs need them.
+    DrmFormatModifier,
 }
 
 use OptionalFeature as F;
@@ -317,7 +326,7 @@ pub(crate) const OF_MESH_SHADERS: [OptionalFeature; 3] =
 pub(crate) const OF_WINDOWS: [OptionalFeature; 3] = [F::Swapchain, F::SwapchainMaintenance1, F::HdrMetadata];
 
 /// Pairs of a feature and the feature that it requires in Vulkan.
-const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 9] = [
+const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 10] = [
     (F::MultiviewGeometry, F::Multiview),
     (F::MultiviewTessellation, F::Multiview),
     (F::MultiviewMesh, F::Multiview),
@@ -327,6 +336,7 @@ const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 9] = [
     (F::SwapchainMaintenance1, F::Swapchain),
     (F::HdrMetadata, F::Swapchain),
     (F::VariablePointers, F::VariablePointersStorageBuffer),
+    (F::ExternalMemoryDmaBuf, F::ExternalMemoryFd),
 ];
 
 struct FeatureRow {
@@ -337,7 +347,7 @@ struct FeatureRow {
 }
 
 #[rustfmt::skip]
-const ROWS: [FeatureRow; 94] = [
+const ROWS: [FeatureRow; 98] = [
     FeatureRow { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, field: |f| &mut f.core.full_draw_index_uint32 },
     FeatureRow { feature: F::CubeArrays, name: "imageCubeArray", extension: None, field: |f| &mut f.core.image_cube_array },
     FeatureRow { feature: F::GeometryShader, name: "geometryShader", extension: None, field: |f| &mut f.core.geometry_shader },
@@ -432,6 +442,10 @@ const ROWS: [FeatureRow; 94] = [
     FeatureRow { feature: F::TessellationPointMode, name: "tessellationPointMode", extension: None, field: |f| &mut f.ext.portability.tessellation_point_mode },
     FeatureRow { feature: F::TriangleFans, name: "triangleFans", extension: None, field: |f| &mut f.ext.portability.triangle_fans },
     FeatureRow { feature: F::VertexAccessBeyondStride, name: "vertexAttributeAccessBeyondStride", extension: None, field: |f| &mut f.ext.portability.vertex_attribute_access_beyond_stride },
+    FeatureRow { feature: F::ExternalMemoryFd, name: "VK_KHR_external_memory_fd", extension: Some(ash::khr::external_memory_fd::NAME), field: |f| &mut f.ext.external_memory_fd },
+    FeatureRow { feature: F::ExternalMemoryDmaBuf, name: "VK_EXT_external_memory_dma_buf", extension: Some(ash::ext::external_memory_dma_buf::NAME), field: |f| &mut f.ext.external_memory_dma_buf },
+    FeatureRow { feature: F::ExternalSemaphoreFd, name: "VK_KHR_external_semaphore_fd", extension: Some(ash::khr::external_semaphore_fd::NAME), field: |f| &mut f.ext.external_semaphore_fd },
+    FeatureRow { feature: F::DrmFormatModifier, name: "VK_EXT_image_drm_format_modifier", extension: Some(ash::ext::image_drm_format_modifier::NAME), field: |f| &mut f.ext.drm_format_modifier },
 ];
 
 #[cfg(test)]
