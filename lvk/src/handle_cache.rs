@@ -125,7 +125,7 @@ mod tests {
     use crate::handle::BufferHandle;
 
     proptest! {
-        /// With more objects than slots, and with handles whose objects were removed, also if their place in the pool
+        /// Cases: more objects than slots, and handles whose objects were removed, also if their place in the pool
         /// was reused.
         #[test]
         fn whatever_the_pool_finds_is_found_and_nothing_else(

@@ -26,7 +26,7 @@ const SIZE: [u32; 2] = [416, 224];
 const BESIDE_PANEL: u32 = 352;
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Of keys on X servers.
+/// Key codes of X servers.
 const ESCAPE: u8 = 9;
 const KEY_W: u8 = 25;
 const KEY_N: u8 = 57;
@@ -240,7 +240,7 @@ impl Session {
         self.keys.set_input_focus(InputFocus::PARENT, self.window, time).unwrap().check().unwrap();
     }
 
-    /// Has the program give its window up, and waits for the next one.
+    /// Makes the program close its window, and waits for the next one.
     fn reopen(&mut self) {
         let before = self.window;
         self.press(F9);

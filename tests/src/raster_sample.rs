@@ -18,7 +18,7 @@ pub const ROUND: u32 = 100;
 /// When rendering fails.
 pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
     let moved = sample.update(FrameTime::from_frame(frame, ROUND));
-    moved.map_err(|error| -> RunError { error.into() }).expect("the sample has that moment");
+    moved.map_err(|error| -> RunError { error.into() }).expect("the sample has that frame time");
     image_now(sample)
 }
 

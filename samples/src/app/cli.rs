@@ -66,7 +66,7 @@ pub fn command<S: SampleInfo>() -> clap::Command {
     let lines = S::EXAMPLES.lines().filter_map(|line| line.split_once('|'));
     let mut examples: String = lines.map(|(args, meaning)| example(args, meaning)).collect();
     if !S::ROUND.is_empty() {
-        let meaning = format!("{}; ranges can be shared among machines", S::ROUND);
+        let meaning = format!("{}; several machines can share a range", S::ROUND);
         examples += &example("--frames 0..240 --out dir/frame_####.png", &meaning);
     }
     let command = CommandLine::<S::Args>::command().name(S::NAME).about(S::ABOUT);

@@ -294,7 +294,7 @@ mod tests {
         assert_eq!(progress.go_on(), Ok(()));
         status.stop();
         assert_eq!(progress.go_on(), Err(Stopped));
-        assert_eq!(Progress::hidden().go_on(), Ok(()), "that nobody can stop");
+        assert_eq!(Progress::hidden().go_on(), Ok(()), "progress without an interrupt");
     }
 
     #[test]

@@ -93,7 +93,7 @@ pub trait Sample {
     /// The device.
     fn context(&self) -> &Context;
 
-    /// Puts everything that moves where it is at `moment`, whatever was shown before, the camera included.
+    /// Moves everything, the camera included, to its place at a frame time, whatever frame came before.
     ///
     /// # Errors
     /// The sample's own.
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_moments_by_the_clock() {
+    fn the_clock_gives_each_frame_its_frame_time() {
         for (milliseconds, frame) in [(0, 0), (1000, 30), (2500, 75), (9000, 270)] {
             let (by_clock, by_frame) =
                 (FrameTime::from_millis(milliseconds, 240), FrameTime::from_frame(frame, 240));

@@ -20,7 +20,7 @@ pub struct HybridOitSequence {
     gone: f64,
     /// The camera of the scene.
     camera: Camera,
-    /// Of the frame that asked for most.
+    /// Node use of the frame that asked for most.
     nodes: NodeUse,
     wanted: PendingSettings<HybridOitConfig>,
 }

@@ -106,7 +106,7 @@ fn ground(half: Vec2) -> Scene {
     }
 }
 
-/// From above a corner, along a street, and above the middle.
+/// Returns cameras above a corner, along a street, and above the middle.
 fn cameras(half: Vec2) -> [Camera; 5] {
     let far = 0.5 * (half.x + half.y) + 1.0;
     let at = |x: f32, y: f32, z: f32| [x, y, z];

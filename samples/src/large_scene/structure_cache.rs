@@ -39,7 +39,7 @@ impl StructureKey {
 }
 
 impl StructureCache {
-    /// In this folder, which need not exist.
+    /// Creates a cache in a folder, which need not exist.
     pub(super) fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned() }
     }

@@ -17,7 +17,7 @@ const WIDEST_CONE: f32 = 0.1;
 pub struct Meshlet {
     /// Middle of a sphere around all corners.
     pub middle: [f32; 3],
-    /// Its radius.
+    /// Radius of that sphere.
     pub radius: f32,
     /// Axis of a cone around the normals of all triangles.
     pub axis: [f32; 3],

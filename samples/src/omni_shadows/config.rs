@@ -18,7 +18,7 @@ pub enum Faces {
 /// The filter of the shadow, in the order of `shaders/omni_shadows/frame.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ShadowFilter {
-    /// There is none.
+    /// No shadow.
     Off,
     /// One comparison.
     Hard,
@@ -65,7 +65,7 @@ impl OmniShadowsConfig {
         }
     }
 
-    /// With every number in its range.
+    /// Clamps every number to its range.
     pub(super) fn clamped(self) -> Self {
         let within = |value: f32, most| if value.is_nan() { 0.0 } else { value.clamp(0.0, most) };
         Self {

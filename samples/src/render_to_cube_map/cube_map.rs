@@ -26,7 +26,7 @@ pub(super) struct CubeMap {
 }
 
 impl CubeMap {
-    /// With faces of `size` pixels a side, and all mips.
+    /// Creates a cube map with faces of `size` pixels a side, and all mips.
     pub(super) fn new(ctx: &Context, size: u32) -> lvk::Result<Self> {
         let color = TextureDesc {
             kind: TextureKind::Cube,

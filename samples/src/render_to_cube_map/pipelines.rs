@@ -27,7 +27,7 @@ pub(super) struct Surroundings {
     pub(super) sky: RasterPipeline,
 }
 
-/// In the picture.
+/// Pipelines of the surroundings in the picture.
 pub(super) const IN_PICTURE: Surroundings = Surroundings {
     front: FrontFace::CounterClockwise,
     blocks: RasterPipeline::with_depth(
@@ -44,7 +44,7 @@ pub(super) const IN_PICTURE: Surroundings = Surroundings {
         )
     },
 };
-/// On one face.
+/// Pipelines of the surroundings on one face.
 pub(super) const ON_FACE: Surroundings = Surroundings {
     front: FrontFace::Clockwise,
     blocks: on_faces(
@@ -55,7 +55,7 @@ pub(super) const ON_FACE: Surroundings = Surroundings {
     ),
     sky: on_faces("render_to_cube_map: sky on a face", &[SKY_VERTEX, SKY_FRAGMENT], FARTHEST, 0),
 };
-/// On all faces at once.
+/// Pipelines of the surroundings on all faces at once.
 pub(super) const ON_ALL_FACES: Surroundings = Surroundings {
     front: FrontFace::Clockwise,
     blocks: on_faces(

@@ -95,7 +95,7 @@ impl RenderToCubeMap {
         })
     }
 
-    /// The floor and the blocks, as they are at the moment.
+    /// Returns the floor and the blocks at the current frame time.
     #[must_use]
     pub fn blocks(&self) -> &[Block] {
         &self.blocks

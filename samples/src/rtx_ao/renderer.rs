@@ -1,4 +1,4 @@
-//! The sample as a type: say the view, get a picture that each call improves.
+//! The sample as a type: a renderer of a scene and a view, whose picture improves with each call.
 
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;

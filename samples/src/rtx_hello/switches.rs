@@ -10,12 +10,12 @@ const MAX_REFITS: u32 = 32;
 /// The build mode of the TLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Following {
-    /// By refits, and by a rebuild after some of them.
+    /// Refits, and a rebuild after some of them.
     #[default]
     Both,
-    /// By refits alone.
+    /// Refits alone.
     Refits,
-    /// By a rebuild in every frame.
+    /// A rebuild in every frame.
     Rebuilds,
 }
 

@@ -25,7 +25,7 @@ use crate::scene::{Camera, GpuCamera, painted_textures};
 pub(super) const TEXTURES: usize = 6;
 /// Things in a row and in a column (`kColumns` in `shaders/rtx_textures/instances.comp.glsl`).
 const COLUMNS: u32 = 13;
-/// They and the ground.
+/// Number of instances: the things and the ground.
 pub(super) const INSTANCE_COUNT: u32 = COLUMNS * COLUMNS + 1;
 /// Bytes of an instance.
 const RECORD_BYTES: u64 = 64;

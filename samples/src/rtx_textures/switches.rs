@@ -8,7 +8,7 @@ pub struct RtxTexturesSwitches {
     /// Instances that the compute shader writes and rays see, from the ground on; at least 1, and no more than
     /// [`instance_count`](super::RtxTextures::instance_count).
     pub instances: u32,
-    /// By how many things each texture is handed on.
+    /// Number of things by which each texture is shifted.
     pub handed_on: u32,
     /// Colours between texels, and not those of the nearest ones.
     pub is_filtered: bool,

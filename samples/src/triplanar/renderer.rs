@@ -107,7 +107,7 @@ impl Triplanar {
         self.textures.unload(number);
     }
 
-    /// Has a texture made again that is away; frames show the placeholder until it is there.
+    /// Loads an unloaded texture again; frames show the placeholder until the texture is loaded.
     pub fn load(&mut self, number: usize) {
         self.textures.load(number);
     }

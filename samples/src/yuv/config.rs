@@ -19,11 +19,11 @@ pub enum YuvFormat {
 /// The matrix between Y'CbCr and colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum YuvModel {
-    /// Of standard definition.
+    /// Matrix of standard definition.
     Bt601,
-    /// Of high definition.
+    /// Matrix of high definition.
     Bt709,
-    /// Of ultra high definition.
+    /// Matrix of ultra high definition.
     Bt2020,
 }
 
@@ -75,7 +75,7 @@ impl YuvConfig {
         Self { extent, film: [640, 360], format: None, model, range, shows_planes: false }
     }
 
-    /// With every number in its range.
+    /// Clamps every number to its range.
     pub(super) fn clamped(self) -> Self {
         Self { film: self.film.map(|side| side.clamp(2, 4096) & !1), ..self }
     }

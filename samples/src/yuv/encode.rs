@@ -1,4 +1,4 @@
-//! From colours to planes of Y'CbCr.
+//! Encoder from colours to planes of Y'CbCr.
 
 use glam::Vec3;
 

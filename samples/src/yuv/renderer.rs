@@ -33,7 +33,7 @@ pub struct Yuv {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Push {
-    /// Of the whole target, the part that the picture covers.
+    /// Fraction of the target that the picture covers.
     covered: [f32; 2],
     /// Textures of Y, Cb and Cr, and the channels that hold them.
     planes: [u32; 3],

@@ -23,9 +23,9 @@ pub(super) struct VideoFormat {
 pub(super) struct VideoTexture {
     pub(super) video_format: VideoFormat,
     pub(super) texture: Holder<TextureHandle>,
-    /// Its planes, as textures of one or two channels.
+    /// Planes of the texture, as textures of one or two channels.
     pub(super) planes: Vec<Holder<TextureHandle>>,
-    /// For this texture alone: shaders know it by a constant.
+    /// Pipeline for this texture alone: shaders know the texture by a constant.
     pub(super) pipeline: Holder<RenderPipelineHandle>,
 }
 

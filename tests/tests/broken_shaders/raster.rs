@@ -26,7 +26,7 @@ use super::mistakes::{
     LAMP_FACES, LAMP_HARD, MESHLETS, STILL_LIFE, STILL_LIFE_BY_LAMP, TILES, TRIANGLE,
 };
 
-/// A moment at which everything has moved.
+/// A frame time at which everything has moved.
 const FRAME: u32 = 20;
 
 /// Breaks each shader, and takes an image of a sample made anew.

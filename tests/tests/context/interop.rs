@@ -46,7 +46,7 @@ struct Engine {
     device: ash::Device,
     queue: vk::Queue,
     pool: vk::CommandPool,
-    /// Its device has the extension and the feature on.
+    /// True if the extension and the feature are on.
     local_read: bool,
 }
 
@@ -347,7 +347,10 @@ fn exchange() {
     {
         let ctx = engine.context();
         assert!(ctx.capabilities().has(OptionalFeature::FullDrawIndex));
-        assert!(!ctx.capabilities().has(OptionalFeature::CubeArrays), "nobody said that it is on");
+        assert!(
+            !ctx.capabilities().has(OptionalFeature::CubeArrays),
+            "the engine did not list it as enabled"
+        );
         // SAFETY: the handles are as described and live on.
         let (texture, words) = unsafe {
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
@@ -443,7 +446,7 @@ fn local_reads() {
     let unsaid = engine.context();
     assert!(
         matches!(unsaid.create_texture(&read), Err(Error::Unsupported { .. })),
-        "nobody said that it is on"
+        "the engine did not list it as enabled"
     );
     drop(unsaid);
     if !engine.local_read {

@@ -187,7 +187,7 @@ fn is_method_of(bodies: &[Range<usize>], tokens: &[Token<'_>], at: usize) -> boo
 }
 
 /// Returns the files below a folder of the project with this ending, by path below the project.
-fn files(folder: &str, ending: &str) -> Vec<(String, String)> {
+pub fn files(folder: &str, ending: &str) -> Vec<(String, String)> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(project().join(folder)).unwrap() {
         let entry = entry.unwrap();

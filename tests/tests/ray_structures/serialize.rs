@@ -19,7 +19,7 @@ use lvk_tests::{TestDevice, device, device_with};
 const MOVING: BuildFlags =
     BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE).union(BuildFlags::ALLOW_COMPACTION);
 
-/// Of an acceleration structure of the devices that split.
+/// Primitive limit of a BLAS on devices that split.
 const MOST_PRIMITIVES: u64 = 60;
 
 /// Creates a context that splits BLASes of more primitives.

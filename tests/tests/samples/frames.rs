@@ -61,7 +61,7 @@ fn at_once<S: Sample>(sample: &mut S, size: [u32; 2]) -> Vec<Vec<u8>> {
         let image = sample.record(&mut frame).map_err(Into::into).unwrap();
         let region = TextureRegion::default();
         frame.cmd.copy_texture(image, &region, *copy, &region).unwrap();
-        assert!(frame.finish().unwrap().is_empty(), "nobody waited");
+        assert!(frame.finish().unwrap().is_empty(), "no readback is pending");
         copy
     });
     kept.map(|copy| ctx.download_texture(*copy, &TextureRegion::default()).unwrap()).to_vec()
@@ -162,7 +162,7 @@ fn check_panel<S: Sample>(sample: &mut S, expected: &[u8]) {
             egui::Window::new("panel").show(ui, |ui| sample.panel(ui));
         });
     }
-    assert!(first(sample) == expected, "a panel changes what nobody has touched");
+    assert!(first(sample) == expected, "a panel changes settings without input");
 }
 
 fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {

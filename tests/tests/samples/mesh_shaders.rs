@@ -103,7 +103,7 @@ fn what_is_left_out_is_not_missed() {
     }
 }
 
-/// From within the knot, from beside it, and with it behind the camera.
+/// Cases: cameras within the knot, beside it, and in front of it.
 #[test]
 fn what_lies_outside_the_image_is_left_out() {
     let Some(ctx) = mesh_device() else { return };

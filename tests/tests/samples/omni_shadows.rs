@@ -21,7 +21,7 @@ use lvk_tests::rays::Ray;
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// On SwiftShader: its samples lie elsewhere in a pixel, and its comparisons are filtered with fewer bits.
+/// Tolerance on SwiftShader, which has other sample positions and filters comparisons with fewer bits.
 const OTHER_DRIVER: Tolerance = Tolerance { psnr: 36.0, ssim: 0.98, differing_share: 0.4, flip: 0.04 };
 
 fn usual() -> OmniShadowsConfig {
@@ -147,7 +147,7 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
     counts
 }
 
-/// From the middle of the room to all six sides.
+/// Cases: views from the middle of the interior to all six sides.
 #[test]
 fn shadows_are_those_that_rays_find() {
     let Some(ctx) = device() else { return };

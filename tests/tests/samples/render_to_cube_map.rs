@@ -13,7 +13,7 @@ use lvk_tests::raster_sample::{SIZE, assert_refuses_impossible_sizes, image_of};
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// On SwiftShader: its filters have fewer bits.
+/// Tolerance on SwiftShader, whose filters have fewer bits.
 const OTHER_DRIVER: Tolerance = Tolerance { psnr: 36.0, ssim: 0.98, differing_share: 0.4, flip: 0.03 };
 /// Side of a face.
 const FACE: u32 = 64;

@@ -12,7 +12,7 @@ use lvk_tests::raster_sample::ROUND;
 use lvk_tests::rtx_sample::{SIZE, assert_paths_agree, assert_refuses_impossible_sizes, image_of};
 
 const SAME_RAYS: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
-/// On SwiftShader: its textures are filtered with fewer bits.
+/// Tolerance on SwiftShader, which filters textures with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 42.0, ssim: 0.998, differing_share: 0.35, flip: 0.05 };
 
 fn waves(ctx: &Context, path: RayPath) -> RtxTextures {

@@ -12,7 +12,7 @@ use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, ima
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// On SwiftShader: its filters have fewer bits, and are not anisotropic in the same way.
+/// Tolerance on SwiftShader, whose filters have fewer bits and another anisotropy.
 const OTHER_DRIVER: Tolerance = Tolerance { psnr: 30.0, ssim: 0.95, differing_share: 0.9, flip: 0.06 };
 
 fn sample(ctx: &Context) -> Triplanar {

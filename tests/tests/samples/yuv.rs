@@ -117,7 +117,7 @@ fn every_format_and_conversion_is_as_computed() {
     }
 }
 
-/// That the comparison above would notice a wrong matrix or range.
+/// Proves that the comparison above notices a wrong matrix or range.
 #[test]
 fn other_conversions_render_other_images() {
     let Some(ctx) = yuv_device() else { return };

@@ -74,7 +74,7 @@ impl File {
         self.bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
     }
 
-    /// With a checksum that is right.
+    /// Returns the bytes with a correct checksum.
     fn sealed(mut self) -> Vec<u8> {
         const HEADER_BYTES: usize = 28;
         let step = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01B3);

@@ -467,7 +467,7 @@ fn low_memory_is_low_with_updates_too() -> Result<()> {
         assert!(bytes < 28 * count, "{layout:?}: {bytes} bytes of {count} triangles");
         let mut more = mesh.clone();
         more.positions.resize(mesh.positions.len() + 5_000, [0.5; 3]);
-        assert_eq!(bytes_of(&ctx, &more, layout, small)?, bytes, "{layout:?}, vertices that nobody names");
+        assert_eq!(bytes_of(&ctx, &more, layout, small)?, bytes, "{layout:?}, unused vertices");
     }
     let copies = bytes_of(&ctx, &mesh, Layout::Unshared, BuildFlags::ALLOW_UPDATE)?;
     assert_eq!(bytes_of(&ctx, &mesh, Layout::Unshared, small)?, copies, "nothing is shared");

@@ -429,7 +429,7 @@ mod tests {
         assert!(GpuBuildPlan::tlas("s", 0).is_ok());
     }
 
-    /// If wide nodes are built again because they did not fit, the capacity suffices for any count.
+    /// The capacity suffices for any count if wide nodes are built again because they did not fit.
     #[test]
     fn there_is_room_for_full_nodes_of_any_count() {
         let full = |count: u32| {

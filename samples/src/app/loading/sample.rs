@@ -42,17 +42,17 @@ struct UnderWay<S> {
 type Made<S> = Result<ReadySample<S>, RunError>;
 
 impl<S: Sample> Loading<S> {
-    /// One that is there.
+    /// Wraps a sample that is already loaded.
     #[must_use]
     pub fn ready(sample: S) -> Self {
         Self { ctx: sample.context().clone(), state: State::Ready(sample) }
     }
 
-    /// Has `load` make it on a thread of its own. It is to look at [`Progress::go_on`] from time to time; what is said about
-    /// the sample is printed when it is there.
+    /// Runs `load` on a thread of its own. `load` must call [`Progress::go_on`] from time to time. The log lines about
+    /// the sample are printed when it is loaded.
     ///
     /// # Errors
-    /// [`RunError`] where there is no thread or no texture to be had. Those of `load` come from [`Sample::is_loading`].
+    /// [`RunError`] if the thread or the texture cannot be created. Errors of `load` come from [`Sample::is_loading`].
     pub fn start(
         ctx: &Context,
         load: impl FnOnce(&mut Progress) -> Made<S> + Send + 'static,

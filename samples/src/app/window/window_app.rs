@@ -84,7 +84,7 @@ where
         self.go_on(event_loop, resumed);
     }
 
-    /// On Android the window goes after this call, and comes back before [`resumed`](Self::resumed).
+    /// Suspends the sample: Android takes the window after this call and returns it before [`resumed`](Self::resumed).
     fn suspended(&mut self, event_loop: &ActiveEventLoop) {
         let suspended = self.running.as_mut().map_or(Ok(()), Running::suspend);
         event_loop.set_control_flow(ControlFlow::Wait);
