@@ -309,7 +309,7 @@ fn a_device_without_mesh_shaders_is_distinguished_from_other_errors() {
 }
 
 #[test]
-fn what_culling_saves_is_printed() {
+fn the_gain_of_culling_is_printed() {
     if !has_device() {
         return;
     }
