@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_add_up_and_numbers_follow_what_is_shown() {
+    fn scenes_add_up_and_copies_have_defaults() {
         let parsed = |line| parse_line::<LargeScene>(line).unwrap().sample;
         let args = parsed("--scene a.obj --scene b --archive");
         assert_eq!(args.scenes, [Path::new("a.obj"), Path::new("b")]);

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_is_read_and_replaced() {
+    fn stored_files_are_read_and_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let cache = StructureCache::new(&folder.path().join("made"));
         let key = StructureKey(7);

@@ -203,7 +203,7 @@ mod tests {
         }
 
         #[test]
-        fn what_a_cone_calls_hidden_shows_no_front((points, triangles) in soup(), eye in prop::array::uniform3(-3.0_f32..3.0)) {
+        fn a_cone_hides_only_back_faces((points, triangles) in soup(), eye in prop::array::uniform3(-3.0_f32..3.0)) {
             let (cut, eye) = (Meshlets::build(&points, &triangles), Vec3::from(eye));
             for meshlet in &cut.meshlets {
                 let seen = Vec3::from(meshlet.middle) - eye;

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_comes_too_close_to_the_lamp_and_all_stays_in_the_room() {
+    fn objects_keep_away_from_the_lamp_and_inside_the_walls() {
         for phase in [0.0, 0.2, 0.4, 0.6, 0.8] {
             let [casters, _] = Models::new().triangles(phase);
             for at in casters.into_iter().flatten().map(Vec3::from) {

@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_walk_ends_where_it_began() {
+    fn the_camera_path_ends_where_it_began() {
         let eye = |phase| Vec3::from(camera(phase).eye);
         let step = eye(0.0).distance(eye(1.0 / 240.0));
         assert!(eye(1.0).distance(eye(0.0)) < 1e-3);

@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn panes_in_a_row_come_in_their_order_from_either_end() {
+    fn panes_in_a_line_are_sorted_from_either_end() {
         let panes = [pane([0.0, 0.0, -6.0]), pane([0.2, 0.0, -2.0]), pane([0.0, 0.1, -4.0])];
         assert_eq!(farthest_first(&panes, Vec3::ZERO), [0, 2, 1]);
         assert_eq!(farthest_first(&panes, Vec3::new(0.0, 0.0, -9.0)), [1, 2, 0]);

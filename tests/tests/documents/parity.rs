@@ -287,7 +287,7 @@ fn every_area_and_every_weak_spot_is_there_once() {
 }
 
 #[test]
-fn no_feature_that_was_found_is_forgotten() {
+fn every_known_feature_is_in_the_table() {
     let rows = rows(PAGE).unwrap();
     let is_there =
         |area: &str, words: &str| rows.iter().any(|row| row.area == area && row.feature.contains(words));
@@ -297,7 +297,7 @@ fn no_feature_that_was_found_is_forgotten() {
 }
 
 #[test]
-fn rows_that_promise_without_holding_are_noticed() {
+fn entries_without_a_valid_test_are_noticed() {
     let row = |here, held_by| Row { area: "", feature: "x", here, held_by };
     for (here, held_by) in [
         ("the same", "-"),
