@@ -163,7 +163,7 @@ impl HybridRenderer {
     }
 
     /// Number of launches of a frame, over all samples.
-    pub fn band_count(&self) -> u64 {
+    pub fn tile_count(&self) -> u64 {
         self.passes.launch_tiles.len() as u64 * u64::from(self.config.samples)
     }
 

@@ -71,7 +71,7 @@ impl Figures {
 
     /// Names and values, a line each.
     #[must_use]
-    pub fn rows(&self) -> Vec<(&'static str, String)> {
+    pub fn entries(&self) -> Vec<(&'static str, String)> {
         let [built, now] = self.structure_bytes();
         let (structures, parts) = (self.structures.len(), self.parts());
         let saved = 100.0 * (1.0 - now as f64 / built.max(1) as f64);
@@ -103,7 +103,7 @@ impl Figures {
 
 impl fmt::Display for Figures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rows = self.rows();
+        let rows = self.entries();
         for (index, (name, value)) in rows.iter().enumerate() {
             let end = if index + 1 < rows.len() { "\n" } else { "" };
             write!(f, "{name:<9} {value}{end}")?;

@@ -6,7 +6,7 @@ use lvk::{Context, OptionalFeature};
 
 /// The number of passes that draw the faces of the cube map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Faces {
+pub enum ShadowFaces {
     /// All at once where the device can, else one after the other.
     Auto,
     /// All at once, by multiview.
@@ -36,7 +36,7 @@ pub struct OmniShadowsConfig {
     /// Texels on an edge of the cube map, 16 to [`OmniShadowsConfig::MAX_SHADOW_SIZE`].
     pub shadow_size: u32,
     /// The number of passes that draw its faces.
-    pub faces: Faces,
+    pub faces: ShadowFaces,
     /// The filter of the shadow.
     pub filter: ShadowFilter,
     /// Radius of the lamp in metres, which soft shadows follow from: 0 to 0.1.
@@ -57,7 +57,7 @@ impl OmniShadowsConfig {
         Self {
             extent,
             shadow_size: 1024,
-            faces: Faces::Auto,
+            faces: ShadowFaces::Auto,
             filter: ShadowFilter::Soft,
             lamp_radius: 0.012,
             haze: 0.005,
@@ -77,7 +77,7 @@ impl OmniShadowsConfig {
     }
 }
 
-impl Faces {
+impl ShadowFaces {
     /// True if the device can draw all at once.
     pub(super) fn can_be_one_pass(ctx: &Context) -> bool {
         let capabilities = ctx.capabilities();

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::config::{Faces, OmniShadowsConfig, ShadowFilter};
+use super::config::{OmniShadowsConfig, ShadowFaces, ShadowFilter};
 use super::{OmniShadows, pipelines};
 use crate::app::sample_info::prelude::*;
 use crate::app::value_parsers::{up_to, whole};
@@ -12,8 +12,8 @@ use crate::app::value_parsers::{up_to, whole};
 #[command(next_help_heading = "Rendering")]
 pub struct OmniShadowsArgs {
     /// Method of drawing the six faces of the shadow's cube map
-    #[arg(long, value_enum, default_value_t = Faces::Auto)]
-    pub faces: Faces,
+    #[arg(long, value_enum, default_value_t = ShadowFaces::Auto)]
+    pub faces: ShadowFaces,
 
     /// Filter of the shadow
     #[arg(long, value_enum, default_value_t = ShadowFilter::Soft)]

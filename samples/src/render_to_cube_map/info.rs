@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-use super::config::{Faces, RenderToCubeMapConfig};
+use super::config::{CubeMapFaces, RenderToCubeMapConfig};
 use super::{RenderToCubeMap, pipelines};
 use crate::app::sample_info::prelude::*;
 use crate::app::value_parsers::{up_to, whole};
@@ -54,7 +54,7 @@ impl SampleInfo for RenderToCubeMap {
 
     fn open(args: &RenderToCubeMapArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Self>, RunError> {
         let context = setup.device(&DeviceNeeds::default())?;
-        let faces = Faces::from_args(args.faces, context.capabilities());
+        let faces = CubeMapFaces::from_args(args.faces, context.capabilities());
         let config = RenderToCubeMapConfig {
             face_size: args.face_size,
             roughness: args.roughness,
@@ -62,8 +62,8 @@ impl SampleInfo for RenderToCubeMap {
         };
         let sample = Self::new(&context, &config)?;
         let by = match faces {
-            Faces::SixPasses => "six passes",
-            Faces::OnePass => "one pass of six views",
+            CubeMapFaces::SixPasses => "six passes",
+            CubeMapFaces::OnePass => "one pass of six views",
         };
         let (count, size) = (sample.blocks().len() - 1, config.face_size);
         let scene =

@@ -42,7 +42,7 @@ impl Frustum {
     }
 
     /// Returns the frustum of a view whose clip coordinates are rows of an affine matrix: x and y from -1 to 1, z from 0 to 1.
-    pub(super) fn of_rows([x, y, z]: [[f32; 4]; 3]) -> Self {
+    pub(super) fn from_clip_matrix([x, y, z]: [[f32; 4]; 3]) -> Self {
         let planes =
             [(x, 1.0, 1.0), (x, -1.0, 1.0), (y, 1.0, 1.0), (y, -1.0, 1.0), (z, 1.0, 0.0), (z, -1.0, 1.0)];
         let plane = |(row, sign, offset): ([f32; 4], f32, f32)| {
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_behind_or_beside_is_not_seen() {
+    fn boxes_behind_or_beside_are_outside() {
         let frustum = Frustum::of_camera(&camera(), ASPECT, 0.1);
         let [right, up, forward] = camera().frame().map(Vec3::from);
         let seen = |offset: Vec3| {

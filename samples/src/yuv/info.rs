@@ -55,7 +55,7 @@ impl SampleInfo for Yuv {
         let context = setup.device(&DeviceNeeds { yuv: &CONVERSIONS, ..DeviceNeeds::default() })?;
         let config = args.config(setup.extent());
         let sample = Self::new(&context, &config)?;
-        let (format, [width, height]) = (sample.format(), config.film);
+        let (format, [width, height]) = (sample.format(), config.video_size);
         let (model, range, all) = (config.model, config.range, sample.formats());
         let scene = format!(
             "a moving picture of {width}x{height} as {format:?}, {model:?}, {range:?} range; the device has {all:?}"

@@ -7,8 +7,8 @@ use lvk::{
 
 use super::config::{YuvFormat, YuvModel, YuvRange, conversion};
 use super::encode;
-use super::film::Film;
 use super::pipelines::PICTURE;
+use super::synthetic_video::SyntheticVideo;
 
 /// The format of a video texture and its conversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +56,7 @@ impl VideoTexture {
     /// The planes at `phase`, as bytes.
     pub(super) fn encode(&self, phase: f32) -> Vec<Vec<u8>> {
         let VideoFormat { format, model, range, size } = self.video_format;
-        encode::planes(&Film { size, phase }, format, model, range)
+        encode::planes(&SyntheticVideo { size, phase }, format, model, range)
     }
 
     /// Uploads the planes at `phase`.

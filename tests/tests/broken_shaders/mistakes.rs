@@ -93,7 +93,7 @@ mistakes! {
     LAMP_HARD:
         "omni_shadows/shadow.glsl": "no comparison": "return compareAlong(smp," => "return 1.0 + 0.0 * compareAlong(smp,";
 
-    FILM:
+    VIDEO:
         "yuv/picture.frag.glsl": "not decoded": "decodeSrgb(clamp(" => "(clamp(";
         "yuv/picture.frag.glsl": "upside down": "picture, place)" => "picture, vec2(place.x, 1.0 - place.y))";
         "yuv/picture.vert.glsl": "too large": "(2.0 * place - 1.0) * covered" => "(2.0 * place - 1.0)";

@@ -109,7 +109,7 @@ fn paths_are_changed_in_a_sample_that_runs() {
 
 /// Submits a frame without waiting for it.
 fn send(sample: &mut Deferred, frame: u32) {
-    sample.update(FrameTime::from_frame(frame, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(frame, ROUND));
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
     sample.record(&mut frame).unwrap();
     frame.finish().unwrap();

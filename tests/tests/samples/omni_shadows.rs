@@ -10,7 +10,7 @@ use lvk::{
 };
 use lvk_samples::app::sample::Sample;
 use lvk_samples::app::sample_error::SampleError;
-use lvk_samples::omni_shadows::{Faces, OmniShadows, OmniShadowsConfig, ShadowFilter};
+use lvk_samples::omni_shadows::{OmniShadows, OmniShadowsConfig, ShadowFaces, ShadowFilter};
 use lvk_samples::scene::Camera;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
 use lvk_tests::raster_sample::{
@@ -37,10 +37,10 @@ fn one_pass_and_six_give_the_same_image() {
     let Some(ctx) = device() else { return };
     let image = |faces| {
         let mut sample = lamp(&ctx, &OmniShadowsConfig { faces, shows_cube: true, ..usual() });
-        assert_eq!(sample.is_multiview(), faces == Faces::Multiview);
+        assert_eq!(sample.is_multiview(), faces == ShadowFaces::Multiview);
         image_of(&mut sample, 21)
     };
-    assert!(image(Faces::Multiview) == image(Faces::Single));
+    assert!(image(ShadowFaces::Multiview) == image(ShadowFaces::Single));
 }
 
 #[test]
@@ -48,7 +48,8 @@ fn devices_without_multiview_draw_face_by_face() {
     let Some(ctx) = device() else { return };
     let profile = DeviceProfile::core_only();
     let Some(bare) = device_with(|desc| desc.profile = Some(&profile)) else { return };
-    let asked = OmniShadows::new(&bare, &OmniShadowsConfig { faces: Faces::Multiview, ..usual() }).err();
+    let asked =
+        OmniShadows::new(&bare, &OmniShadowsConfig { faces: ShadowFaces::Multiview, ..usual() }).err();
     assert!(matches!(asked, Some(SampleError::Missing { .. })), "{asked:?}");
     let mut sample = lamp(&bare, &usual());
     assert!(!sample.is_multiview());

@@ -5,7 +5,7 @@
 use lvk::{Context, DeviceProfile};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::RtxConfig;
-use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSwitches};
+use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSettings};
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{
     Tolerance, assert_matches_reference, assert_similar, assert_swiftshader_matches,
@@ -44,16 +44,16 @@ fn depth_and_frame_time_count() {
 }
 
 #[test]
-fn switches_of_the_panel_take_depth_and_lights_away() {
+fn settings_of_the_panel_take_depth_and_lights_away() {
     let Some(ctx) = device() else { return };
     for path in paths(&ctx) {
         let mut sample = still(&ctx, path, 3);
-        let (first, all) = (image_of(&mut sample, 0), *sample.switches());
-        *sample.switches() = RtxPipelineSwitches { lights: 0, ..all };
+        let (first, all) = (image_of(&mut sample, 0), *sample.settings());
+        *sample.settings() = RtxPipelineSettings { lights: 0, ..all };
         assert_ne!(image_of(&mut sample, 0), first, "there is light");
-        *sample.switches() = RtxPipelineSwitches { depth: 0, ..all };
+        *sample.settings() = RtxPipelineSettings { depth: 0, ..all };
         assert_eq!(image_of(&mut sample, 0), image_of(&mut still(&ctx, path, 0), 0), "{path:?}");
-        *sample.switches() = RtxPipelineSwitches { depth: u32::MAX, lights: u32::MAX };
+        *sample.settings() = RtxPipelineSettings { depth: u32::MAX, lights: u32::MAX };
         assert_eq!(image_of(&mut sample, 0), first, "no more than there is");
     }
 }

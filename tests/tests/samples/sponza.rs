@@ -39,7 +39,7 @@ fn make(ctx: &Context, scene: &Scene, config: &SponzaConfig) -> Sponza {
 }
 
 fn image_of(sample: &mut Sponza, frame: u32) -> RgbaImage {
-    sample.update(FrameTime::from_frame(frame, 100)).unwrap();
+    sample.update(FrameTime::from_frame(frame, 100));
     image_now(sample)
 }
 

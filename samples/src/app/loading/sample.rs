@@ -99,7 +99,7 @@ impl<S: Sample> UnderWay<S> {
                 Err(error) => return Some(Err(error)),
             };
         if let Some(extent) = self.extent
-            && let Err(error) = sample.resize(extent).map_err(Into::into)
+            && let Err(error) = sample.resize(extent)
         {
             return Some(Err(error));
         }
@@ -120,8 +120,6 @@ impl<S> Drop for UnderWay<S> {
 }
 
 impl<S: Sample> Sample for Loading<S> {
-    type Error = RunError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
@@ -135,13 +133,15 @@ impl<S: Sample> Sample for Loading<S> {
         Ok(false)
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RunError> {
-        self.sample_mut().map_or(Ok(()), |sample| sample.update(time).map_err(Into::into))
+    fn update(&mut self, time: FrameTime) {
+        if let Some(sample) = self.sample_mut() {
+            sample.update(time);
+        }
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         match &mut self.state {
-            State::Ready(sample) => sample.record(frame).map_err(Into::into),
+            State::Ready(sample) => sample.record(frame),
             State::UnderWay(under_way) => {
                 under_way.frames += 1;
                 Ok(*under_way.background)
@@ -154,7 +154,7 @@ impl<S: Sample> Sample for Loading<S> {
     }
 
     fn after_frame(&mut self) -> Result<(), RunError> {
-        self.sample_mut().map_or(Ok(()), |sample| sample.after_frame().map_err(Into::into))
+        self.sample_mut().map_or(Ok(()), |sample| sample.after_frame())
     }
 
     fn remark(&self) -> Option<String> {
@@ -163,7 +163,7 @@ impl<S: Sample> Sample for Loading<S> {
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         match &mut self.state {
-            State::Ready(sample) => sample.resize(extent).map_err(Into::into),
+            State::Ready(sample) => sample.resize(extent),
             State::UnderWay(under_way) => {
                 under_way.extent = Some(extent);
                 Ok(())
@@ -207,6 +207,6 @@ impl<S: Sample> Sample for Loading<S> {
     }
 
     fn reload(&mut self) -> Result<(), RunError> {
-        self.sample_mut().map_or(Ok(()), |sample| sample.reload().map_err(Into::into))
+        self.sample_mut().map_or(Ok(()), |sample| sample.reload())
     }
 }
