@@ -228,7 +228,7 @@ pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, Sampler
 pub use resource::swizzle::{Channel, Swizzle};
 pub use resource::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 pub use resource::view::TextureViewDesc;
-pub use resource::ycbcr::{ChromaSite, YuvConversion, YuvModel, YuvRange};
+pub use resource::ycbcr::{ChromaLocation, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
 pub use shader::{HLSL_HEADER, ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};

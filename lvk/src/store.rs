@@ -69,7 +69,7 @@ pools! {
 pub struct LiveObject {
     /// Kind of the object, in the words of error messages: `buffer`, `render pipeline` and so on.
     pub kind: &'static str,
-    /// Its debug name.
+    /// Debug name of the object.
     pub name: String,
 }
 

@@ -529,7 +529,7 @@ fn a_surface_that_a_command_buffer_keeps_is_told() {
 }
 
 #[test]
-fn what_windows_cannot_have_is_refused() {
+fn invalid_swapchains_are_refused() {
     let Some((window, ctx)) = window() else { return };
     let refused = |desc: &SwapchainDesc<'_>| ctx.create_swapchain(desc).unwrap_err();
     let none = SwapchainDesc { usage: TextureUsage::empty(), debug_name: "bare", ..Default::default() };

@@ -497,7 +497,7 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_is_three_rows() {
+    fn a_transform_has_vulkans_row_order() {
         let transform = glam::Affine3A::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
         let rows = transform_rows(&transform);
         assert_eq!(rows, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0]);

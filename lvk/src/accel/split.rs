@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_stays_whole() {
+    fn a_mesh_within_the_limit_stays_whole() {
         let bounds = [scattered(10), Vec::new(), scattered(3)];
         let parts = plan_split("mesh", &bounds, &limits(1000, 1000, 13), &mut linear(0, 1, 1)).unwrap();
         assert_eq!(parts, [PartPlan { geometries: vec![(0..10).collect(), Vec::new(), (0..3).collect()] }]);
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_costly_geometry_is_cut_further_than_a_cheap_one() {
+    fn a_costly_geometry_is_split_further_than_a_cheap_one() {
         // The first geometry, all on the left, costs 50 times as much as the second one.
         let shifted = scattered(500).into_iter();
         let right = shifted
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn primitives_in_one_place_are_cut_by_their_number() {
+    fn primitives_in_one_place_are_split_by_count() {
         for one in [Bounds::ORIGIN, Bounds { low: Vec3::NAN, high: Vec3::NAN }] {
             let parts =
                 plan_split("mesh", &[vec![one; 100]], &limits(MIB, MIB, 30), &mut linear(0, 1, 1)).unwrap();

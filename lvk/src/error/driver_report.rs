@@ -27,7 +27,7 @@ pub struct DriverReport {
 pub enum LoaderReport {
     /// The loader was opened.
     Opened {
-        /// Its file, or the name that was opened where the file is unknown.
+        /// File of the loader, or the name that was opened where the file is unknown.
         path: PathBuf,
         /// Vulkan version of the loader: major, minor, patch.
         version: (u32, u32, u32),

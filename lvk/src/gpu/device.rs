@@ -15,7 +15,7 @@ use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
 use super::caps::optional_features::OptionalFeature;
 use super::caps::portability::{PortabilityNeed, first_missing};
-use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
+use super::caps::queues::{QueueLocation, QueueRequest, Queues};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
 use super::debug::debugger::has_debugger;
@@ -30,10 +30,10 @@ use super::start::select::{Candidate, NoMatch, choose};
 use super::start::surface::SurfaceProbe;
 use super::start::user_extensions::UserExtensions;
 use super::start::window::{WindowExtensions, WindowRef};
+use super::timestamp_scale::TimestampScale;
 use crate::error::device_candidate::DeviceCandidate;
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
-use crate::queue::Queue;
 
 /// Requirements of the caller for a device.
 #[derive(Debug, Clone, Copy)]
@@ -310,25 +310,9 @@ impl Gpu {
         check_limit(name, "count of views, up to the highest bit", views, self.caps.limits.max_views.into())
     }
 
-    /// Converts timestamp ticks to milliseconds since an arbitrary start.
-    pub(crate) fn milliseconds(&self, ticks: u64) -> f64 {
-        let limits = &self.caps.limits;
-        let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
-        (ticks & mask) as f64 * f64::from(limits.timestamp_period_ns) * 1e-6
-    }
-
-    /// Returns the ticks from `earlier` to `later`, which may come from different queues. The counter may
-    /// wrap once in between.
-    pub(crate) fn ticks_since(&self, earlier: u64, later: u64) -> u64 {
-        let bits = Queue::ALL.map(|queue| self.caps.queue(queue).timestamp_bits);
-        later.wrapping_sub(earlier) & shared_timestamp_bits(bits)
-    }
-
-    /// Returns the ticks from `earlier` to `later`, which may come from different queues. `None` if `later`
-    /// is not later.
-    pub(crate) fn ticks_until(&self, earlier: u64, later: u64) -> Option<u64> {
-        let (ticks, back) = (self.ticks_since(earlier, later), self.ticks_since(later, earlier));
-        (ticks > 0 && ticks <= back).then_some(ticks)
+    /// Returns the scale of the device's timestamps.
+    pub(crate) fn timestamps(&self) -> TimestampScale {
+        TimestampScale::new(&self.caps)
     }
 
     pub(crate) fn physical(&self) -> vk::PhysicalDevice {

@@ -10,5 +10,6 @@ pub(crate) mod object_memory;
 pub(crate) mod object_names;
 pub(crate) mod queries;
 pub(crate) mod start;
+pub(crate) mod timestamp_scale;
 
 pub(crate) use device::Gpu;

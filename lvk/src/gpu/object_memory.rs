@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lazy_memory_is_found_among_the_kinds_that_will_do() {
+    fn lazy_memory_is_chosen_among_the_valid_types() {
         let kind = |property_flags| vk::MemoryType { property_flags, heap_index: 0 };
         let (plain, lazy) = (
             kind(vk::MemoryPropertyFlags::DEVICE_LOCAL),

@@ -244,7 +244,8 @@ impl QueryPool {
     /// Returns milliseconds of each timestamp since an arbitrary start; `None` for timestamps that are not written yet.
     pub(crate) fn milliseconds(&self, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
         self.check_kind(self.kind == QueryKind::Timestamps, "times come from a pool of timestamps")?;
-        let milliseconds = |ticks: u64| self.gpu.milliseconds(ticks);
+        let timestamps = self.gpu.timestamps();
+        let milliseconds = |ticks: u64| timestamps.milliseconds(ticks);
         Ok(self.values(first, count)?.into_iter().map(|ticks| ticks.map(milliseconds)).collect())
     }
 

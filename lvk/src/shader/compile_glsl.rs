@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_device_can_do_decides_what_the_text_may_use() {
+    fn capabilities_of_the_device_decide_the_extensions_of_the_text() {
         let text = "layout(local_size_x = 1) in; layout(push_constant) uniform Push { uint image; };
             void main() { imageStore(kImages2D[image], ivec2(0), imageLoad(kImages2D[image], ivec2(1))); }";
         let capable = Capabilities { formatless_storage_read: true, ..Capabilities::default() };

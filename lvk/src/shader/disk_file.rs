@@ -148,12 +148,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_sealed_is_found_again(entry in entries()) {
+        fn sealed_data_is_read_again(entry in entries()) {
             prop_assert_eq!(decode_file(KEY, &encode_file(KEY, &entry)), Ok(entry));
         }
 
         #[test]
-        fn every_change_of_a_bit_and_every_cut_is_seen(
+        fn every_changed_bit_and_every_truncation_is_noticed(
             entry in entries(), at in any::<prop::sample::Index>(), bit in 0..8_u32
         ) {
             let mut file = encode_file(KEY, &entry);

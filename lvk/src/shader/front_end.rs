@@ -11,7 +11,7 @@ use super::include::Includes;
 use super::options::{CompileOptions, compile_error};
 use super::sanitize::{self, SourceError};
 use super::spirv::debug_source::embed_source;
-use super::spirv::passes::fold_sampled_image::fold_sampled_images;
+use super::spirv::passes::merge_sampled_image::merge_sampled_images;
 use super::spirv::passes::strip_unused_bindings::strip_unused_bindings;
 use super::{ShaderCache, ShaderModuleDesc, ShaderStage, diagnostics, preamble};
 use crate::error::Result;
@@ -56,7 +56,7 @@ fn translate(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Result<
     let name = desc.debug_name;
     let mut includes = Includes::new(desc.includes, desc.include_dirs);
     let words = match to_spirv(name, desc.stage, format!("{preamble}{text}"), &mut includes) {
-        Ok(words) => fold_sampled_images(strip_unused_bindings(words)),
+        Ok(words) => merge_sampled_images(strip_unused_bindings(words)),
         Err(error) => {
             return Err(compile_error(
                 name,

@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_stages_that_are_off_would_do_goes_with_them() {
+    fn accesses_of_disabled_stages_are_dropped_with_them() {
         let build = Stages::ACCEL_BUILD;
         let read = Access::SHADER_READ | Access::TRANSFER_READ;
         assert_eq!(

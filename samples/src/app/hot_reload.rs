@@ -48,7 +48,7 @@ impl ShaderWatch {
 /// Those of the shaders; the old pipelines then stay, of both.
 pub fn reload<S: Sample>(sample: &mut S, painter: &mut Painter) -> Result<(), RunError> {
     let recompiled = painter.recompiled()?;
-    sample.reload().map_err(Into::into)?;
+    sample.reload()?;
     painter.take_over(recompiled);
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use crate::pipelines::shader;
 use crate::raster::RasterPipeline;
@@ -41,18 +42,15 @@ impl HelloTriangle {
 }
 
 impl Sample for HelloTriangle {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.turn = time.phase();
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let nothing = Dependencies::default();
         let mut pass = self.target.begin(&mut frame.cmd, "triangle", self.backdrop, &nothing)?;
         pass.bind_render_pipeline(*self.pipeline)?;
@@ -61,7 +59,7 @@ impl Sample for HelloTriangle {
         Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::flat(&self.ctx, extent)?;
         Ok(())
     }
@@ -71,7 +69,7 @@ impl Sample for HelloTriangle {
         ui.color_edit_button_rgb(&mut self.backdrop);
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.pipeline = TRIANGLE.create(&self.ctx)?;
         Ok(())
     }

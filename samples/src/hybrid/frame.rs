@@ -78,7 +78,7 @@ impl Lighting {
         self.light_count
     }
 
-    /// With no more than the first `count` of them.
+    /// Keeps no more than the first `count` lights.
     pub(crate) fn with_lights(self, count: u32) -> Self {
         Self { light_count: self.light_count.min(count), ..self }
     }

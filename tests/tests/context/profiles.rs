@@ -74,7 +74,7 @@ fn the_device_is_made_without_what_is_hidden() {
 }
 
 #[test]
-fn what_a_profile_hides_cannot_be_required() {
+fn a_hidden_feature_cannot_be_required() {
     let Some(ctx) = without_software(|_| ()) else { return };
     let real: Capabilities = ctx.capabilities().clone();
     for (profile, pipeline, query, had, lack) in [

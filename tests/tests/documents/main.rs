@@ -3,6 +3,7 @@
 mod android;
 mod circles;
 mod contributing;
+mod docstrings;
 mod features;
 mod glossary;
 mod held_by;

@@ -65,16 +65,18 @@ fn a_refit_follows_vertices_written_by_a_dispatch() -> Result<()> {
             scene.models[0][0].mesh = deformed(&mesh, amount);
             let reference = scene.reference();
             let rays = rays_for(&reference);
-            let job = tracer.job(&rays)?;
+            let trace_buffers = tracer.buffers(&rays)?;
             let mut cmd = ctx.acquire_command_buffer()?;
             deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
             cmd.build_blas(&[*gpu.models[0]], mode)?;
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
-            tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
+            tracer.record(&mut cmd, &gpu.tlas, &trace_buffers, How::default())?;
             ctx.submit(cmd)?;
-            lvk_tests::hit_comparison::HitComparison::of_triangles(&rays, &tracer.read(&job)?, |ray| {
-                reference.closest(ray, 0xff)
-            })
+            lvk_tests::hit_comparison::HitComparison::of_triangles(
+                &rays,
+                &tracer.read(&trace_buffers)?,
+                |ray| reference.closest(ray, 0xff),
+            )
             .assert(&format!("{mode:?} after {amount}, {method:?}"));
         }
     }

@@ -289,7 +289,7 @@ fn a_context_ends_well_with_released_objects_and_uploads_that_never_ran() {
 }
 
 #[test]
-fn what_is_alive_is_listed_and_reported_by_name() {
+fn live_objects_are_listed_and_reported_by_name() {
     lvk_tests::warnings::capture_warnings();
     let Some(ctx) = device() else { return };
     assert_eq!(ctx.live_objects(), []);

@@ -15,7 +15,7 @@ use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, World};
 use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::omni_shadows::{OmniShadows, OmniShadowsConfig};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
-use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
+use lvk_samples::render_to_cube_map::{CubeMapFaces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig};
 use lvk_samples::rtx_hello::RtxHello;
@@ -46,8 +46,8 @@ fn under(profile: Option<&DeviceProfile>) -> Option<TestDevice> {
 }
 
 fn render<S: Sample>(mut sample: S) -> RgbaImage {
-    sample.update(FrameTime::from_frame(3, 10)).map_err(Into::into).unwrap();
-    let pixels = headless::picture(&mut sample).map_err(Into::into).unwrap();
+    sample.update(FrameTime::from_frame(3, 10));
+    let pixels = headless::picture(&mut sample).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).unwrap()
 }
 
@@ -100,8 +100,10 @@ fn samples_that_rasterise_render_under_moltenvk() {
         OmniShadows::new(ctx, &config).unwrap()
     });
     rehearse(&devices, "render_to_cube_map", &SAME_DRAWS, |ctx| {
-        let config =
-            RenderToCubeMapConfig { face_size: 32, ..RenderToCubeMapConfig::new(SIZE, Faces::SixPasses) };
+        let config = RenderToCubeMapConfig {
+            face_size: 32,
+            ..RenderToCubeMapConfig::new(SIZE, CubeMapFaces::SixPasses)
+        };
         RenderToCubeMap::new(ctx, &config).unwrap()
     });
     rehearse(&devices, "sponza", &SAME_DRAWS, |ctx| {
@@ -110,7 +112,7 @@ fn samples_that_rasterise_render_under_moltenvk() {
     });
     rehearse(&devices, "triplanar", &SAME_DRAWS, |ctx| Triplanar::new(ctx, SIZE).unwrap());
     rehearse(&devices, "yuv", &SAME_DRAWS, |ctx| {
-        Yuv::new(ctx, &YuvConfig { film: [80, 48], ..YuvConfig::new(SIZE) }).unwrap()
+        Yuv::new(ctx, &YuvConfig { video_size: [80, 48], ..YuvConfig::new(SIZE) }).unwrap()
     });
     let refused = MeshShaders::new(&devices[0], SIZE, true).err().unwrap().to_string();
     assert!(refused.contains("mesh shaders"), "{refused}");

@@ -526,7 +526,7 @@ fn impossible_views_are_typed_errors() {
 }
 
 #[test]
-fn what_one_view_writes_is_seen_through_another() {
+fn texels_written_through_one_view_are_read_through_another() {
     let Some(ctx) = device() else { return };
     let base = texture(&ctx, &TextureDesc { usage: SHADERS, mips: 1, ..Default::default() });
     let (written, read) = (one_mip(&ctx, *base, 0), one_mip(&ctx, *base, 0));

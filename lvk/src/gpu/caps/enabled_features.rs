@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_is_found_is_wanted() {
+    fn only_supported_features_are_enabled() {
         let mut found = Features::default();
         found.core.shader_int64 = vk::TRUE;
         found.core.sparse_binding = vk::TRUE;

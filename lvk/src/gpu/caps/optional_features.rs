@@ -455,7 +455,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_feature_stands_at_its_own_row() {
+    fn each_feature_is_at_its_own_table_index() {
         for (index, row) in ROWS.iter().enumerate() {
             assert_eq!(row.feature as usize, index, "{}", row.name);
         }
@@ -463,7 +463,7 @@ mod tests {
     }
 
     #[test]
-    fn each_row_has_a_place_and_a_name_of_its_own() {
+    fn each_table_entry_has_its_own_field_and_name() {
         for row in &ROWS {
             let mut features = Features::default();
             *(row.field)(&mut features) = vk::TRUE;
@@ -496,7 +496,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_on_is_found_and_in_the_set(found in any::<u128>(), set in any::<u128>()) {
+        fn enabled_features_are_in_the_set(found in any::<u128>(), set in any::<u128>()) {
             let (found, set) = (FeatureSet(found), FeatureSet(set));
             let mut device = Features::default();
             for row in found.iter().map(OptionalFeature::table_row) {

@@ -421,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_numbers_is_refused() {
+    fn counts_that_overflow_offsets_are_refused() {
         let shape = BlasShape { primitive_count: (1 << 27) + 1, ..MESH };
         assert!(GpuBuildPlan::blas("s", &shape).is_err());
         assert!(GpuBuildPlan::blas("s", &BlasShape { primitive_count: 1 << 27, ..shape }).is_ok());
@@ -429,9 +429,9 @@ mod tests {
         assert!(GpuBuildPlan::tlas("s", 0).is_ok());
     }
 
-    /// If wide nodes are built again because they did not fit, the capacity suffices for any count.
+    /// The capacity suffices for any count if wide nodes are built again because they did not fit.
     #[test]
-    fn there_is_room_for_full_nodes_of_any_count() {
+    fn the_capacity_suffices_for_full_nodes_of_any_count() {
         let full = |count: u32| {
             let mut level = count.div_ceil(24);
             let mut all = level;

@@ -53,7 +53,7 @@ struct Draw {
     scissor: Scissor,
     indices: Range<u32>,
     base_vertex: i32,
-    /// Of the texture and its sampler.
+    /// Descriptor slots of the texture and its sampler.
     numbers: [u32; 2],
 }
 

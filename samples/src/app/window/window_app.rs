@@ -84,7 +84,7 @@ where
         self.go_on(event_loop, resumed);
     }
 
-    /// On Android the window goes after this call, and comes back before [`resumed`](Self::resumed).
+    /// Suspends the sample: Android takes the window after this call and returns it before [`resumed`](Self::resumed).
     fn suspended(&mut self, event_loop: &ActiveEventLoop) {
         let suspended = self.running.as_mut().map_or(Ok(()), Running::suspend);
         event_loop.set_control_flow(ControlFlow::Wait);
@@ -358,7 +358,7 @@ impl<S: Sample> Running<S> {
     }
 
     fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
-        if self.sample.is_loading().map_err(Into::into)? {
+        if self.sample.is_loading()? {
             return self.redraw_loading(name);
         }
         self.ctx.next_frame()?;
@@ -367,7 +367,7 @@ impl<S: Sample> Running<S> {
         let Some(image) = self.present_pass.next_image()? else { return Ok(Next::Nap) };
         self.panel.count_frame(seconds);
         let mut frame = Frame::free(&self.ctx)?;
-        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let picture = self.sample.record(&mut frame)?;
         let mut cmd = frame.into_commands();
         let (input, profile) = (self.input(image.extent()), self.ctx.last_profile()?);
         let (_, modes) = self.present_pass.present_modes()?;
@@ -413,7 +413,7 @@ impl<S: Sample> Running<S> {
         // The animation begins with the picture.
         self.clock.tick(Instant::now(), false);
         let mut frame = Frame::free(&self.ctx)?;
-        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let picture = self.sample.record(&mut frame)?;
         let mut cmd = frame.into_commands();
         let input = self.input(image.extent());
         let sample = &mut self.sample;
@@ -430,7 +430,7 @@ impl<S: Sample> Running<S> {
     /// Resizes the sample once the window keeps its size.
     fn follow_size(&mut self) {
         if let Some(size) = self.resize.next(self.size, Instant::now())
-            && let Err(error) = self.sample.resize(size).map_err(Into::into)
+            && let Err(error) = self.sample.resize(size)
         {
             eprintln!("warning: pictures keep their size: {error}");
         }
@@ -447,7 +447,7 @@ impl<S: Sample> Running<S> {
         let time = self.clock.frame_time(args.frames.is_some(), args.round);
         let is_later = self.at != Some(time);
         if is_later {
-            self.sample.update(time).map_err(Into::into)?;
+            self.sample.update(time);
             self.at = Some(time);
         }
         if let (true, Some(camera)) = (is_steered || is_later, self.camera_controller.camera()) {

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loader_is_found_among_the_mappings() {
+    fn mappings_name_the_loader() {
         let maps = "7f00-7f01 r-xp 00000000 00:01 12  /usr/lib/libvulkan_lvp.so\n\
                     7f02-7f03 rw-p 00000000 00:00 0\n\
                     7f04-7f05 r--p 00000000 00:01 13  /opt/my libs/libvulkan.so.1.3.239\n";
