@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Context;
 use super::config::ContextDesc;
-use super::new::requested_queues;
+use super::new::external_request;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::start::external::RawContext;
@@ -40,11 +40,8 @@ impl Context {
     /// without the feature `software-ray-query`.
     pub unsafe fn from_raw(raw: RawContext<'_>, desc: &ContextDesc<'_>) -> Result<Self> {
         desc.ray_query.check()?;
-        let queues = requested_queues(desc);
         // SAFETY: by the caller's promise.
-        let gpu = unsafe {
-            Gpu::from_raw(raw, desc.ray_tracing_pipeline, desc.ray_query, desc.debug_names, queues)?
-        };
+        let gpu = unsafe { Gpu::from_raw(raw, &external_request(desc))? };
         Self::with_gpu(Arc::new(gpu), desc)
     }
 }

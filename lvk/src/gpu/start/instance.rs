@@ -92,10 +92,16 @@ impl Instance {
             debug_utils: extensions.contains(&ash::ext::debug_utils::NAME),
             validated: false,
             gpu_assisted: false,
-            windows: None,
+            windows: WindowExtensions::enabled(extensions),
             messenger: Messenger::new(ValidationSink::default()),
             is_external: true,
         }
+    }
+
+    /// True if the caller created the instance.
+    #[cfg(feature = "window")]
+    pub(crate) fn is_external(&self) -> bool {
+        self.is_external
     }
 
     /// Returns the messages of the validation layer.
