@@ -7,7 +7,7 @@ use ash::vk::{self, StructureType, TaggedStructure};
 
 use crate::error::{Error, Result};
 use crate::gpu::caps::extension_features::ExtensionFeatures;
-use crate::gpu::caps::features::Features;
+use crate::gpu::caps::features::{FeatureField, Features};
 
 /// The feature structures and extension names that a device needs for a context, as owned memory behind a
 /// `VkDeviceCreateInfo`. [`DeviceRequirements::feature_chain`](crate::DeviceRequirements::feature_chain) creates it.
@@ -137,7 +137,7 @@ struct Link {
 }
 
 /// Features of Vulkan 1.2 without a structure of a promoted extension, and the extensions that stand for them.
-const SUBSTITUTES: [(fn(&mut Features) -> &mut vk::Bool32, &CStr); 4] = [
+const SUBSTITUTES: [(FeatureField, &CStr); 4] = [
     (|f| &mut f.v12.sampler_mirror_clamp_to_edge, ash::khr::sampler_mirror_clamp_to_edge::NAME),
     (|f| &mut f.v12.draw_indirect_count, ash::khr::draw_indirect_count::NAME),
     (|f| &mut f.v12.sampler_filter_minmax, ash::ext::sampler_filter_minmax::NAME),
