@@ -109,20 +109,21 @@ impl RawContext<'_> {
         queues.map(|(queue, family)| QueueLocation { family, index: number(queue) as u32 })
     }
 
-    /// Checks what can be said of the handles without a use of the device.
+    /// Checks the handles without a use of the device.
     fn check_handles(&self) -> Result<()> {
         if self.instance.handle() == vk::Instance::null() {
             return Err(wrong("instance", "the handle is null"));
         }
-        check_physical_device(&self.instance, self.physical_device)?;
         if self.device.handle() == vk::Device::null() {
             return Err(wrong("device", "the handle is null"));
         }
         let names = ["queue", "compute_queue", "transfer_queue"];
-        match self.queues().iter().zip(names).find(|((queue, _), _)| *queue == vk::Queue::null()) {
-            Some((_, name)) => Err(wrong(name, "the handle is null")),
-            None => Ok(()),
+        if let Some((_, name)) =
+            self.queues().iter().zip(names).find(|((queue, _), _)| *queue == vk::Queue::null())
+        {
+            return Err(wrong(name, "the handle is null"));
         }
+        check_physical_device(&self.instance, self.physical_device)
     }
 
     fn check_queues(&self, families: &[QueueFamily]) -> Result<()> {
@@ -304,16 +305,4 @@ fn wrong(field: &str, message: impl Into<String>) -> Error {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn features_of_portability_need_a_declaration_on_subsets_of_vulkan_only() {
-        let declared = FeatureSet::NONE.with(OptionalFeature::TriangleFans);
-        let whole = undeclared(declared, false);
-        assert!(!whole.contains(OptionalFeature::ViewSwizzle) && whole.contains(OptionalFeature::Int64));
-        let subset = undeclared(declared, true);
-        assert!(subset.contains(OptionalFeature::ViewSwizzle));
-        assert!(!subset.contains(OptionalFeature::TriangleFans));
-    }
-}
+mod tests;

@@ -470,5 +470,4 @@ promoted_structures! {
 }
 
 #[cfg(test)]
-#[path = "feature_chain_tests.rs"]
 mod tests;
