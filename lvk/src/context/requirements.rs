@@ -36,10 +36,10 @@ impl Context {
     ///
     /// # Errors
     /// [`NoDevice`](crate::Error::NoDevice) with all that the device lacks of the requirements;
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a physical device that is not of the instance;
-    /// [`Unsupported`](crate::Error::Unsupported) where the instance has no surfaces for
-    /// the window, and for [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) without the feature
-    /// `software-ray-query`.
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a physical device that is not of the instance, and for a window
+    /// that needs an extension which is not among `instance_extensions`;
+    /// [`Unsupported`](crate::Error::Unsupported) for
+    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) without the feature `software-ray-query`.
     pub unsafe fn requirements<'a>(
         entry: &ash::Entry,
         instance: &ash::Instance,

@@ -48,12 +48,19 @@ impl<'a> DeviceRequirements<'a> {
         physical_device: vk::PhysicalDevice,
         request: &DeviceRequest<'_>,
     ) -> Result<Self> {
-        check_physical_device(instance, physical_device)?;
+        check_physical_device(instance, physical_device, "physical_device")?;
         let instance = Instance::external(entry.clone(), instance.clone(), instance_extensions);
         let mut found = PhysicalDevice::query(&instance.raw, physical_device)?;
         let unavailable = WindowExtensions::unavailable_features(instance.windows.as_ref());
         found.capabilities.remove_features(unavailable);
         if let Some(window) = request.window {
+            if let Some(name) = WindowExtensions::missing(instance.windows.as_ref(), window)? {
+                let name = name.to_string_lossy();
+                let message = format!(
+                    "{name} is missing; ContextDesc::window needs it, see Context::instance_requirements"
+                );
+                return Err(Error::usage("instance_extensions", message));
+            }
             let probe = SurfaceProbe::new(&instance, window)?;
             found.select_present_queue(probe.queue_family(found.raw));
         }

@@ -1,4 +1,5 @@
 //! The picture of both libraries against shadows that the CPU computes, without a message of the validation layer.
+//! wgpu switches on core and synchronization validation, and reports a missing layer by a warning.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::sync::Mutex;
@@ -70,8 +71,6 @@ fn compare(pixels: &[u8], light: [f32; 3]) -> usize {
 fn wgpu_draws_the_shadows_that_lvk_traces() {
     log::set_logger(&Log).unwrap();
     log::set_max_level(log::LevelFilter::Warn);
-    // SAFETY: this is the only test of the program, and no other thread runs yet.
-    unsafe { std::env::set_var("VK_KHRONOS_VALIDATION_VALIDATE_SYNC", "true") };
     let mut guest = Guest::new(SIDE, true).unwrap();
     for light in [[0.4, 0.3, 1.0], [-0.6, 0.2, 1.0], [0.0, 0.0, 1.0]] {
         let shadowed = compare(&guest.frame(light).unwrap(), light);

@@ -172,7 +172,7 @@ fn a_device_that_cannot_meet_the_requirements_is_refused() {
         Context::requirements(&instance.entry, &instance.raw, instance.extensions, device, &desc)
     };
     assert!(
-        matches!(&null, Err(Error::InvalidUsage { object, .. }) if object == "RawContext::physical_device"),
+        matches!(&null, Err(Error::InvalidUsage { object, .. }) if object == "physical_device"),
         "{null:?}"
     );
 }

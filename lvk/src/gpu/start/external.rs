@@ -123,7 +123,7 @@ impl RawContext<'_> {
         {
             return Err(wrong(name, "the handle is null"));
         }
-        check_physical_device(&self.instance, self.physical_device)
+        check_physical_device(&self.instance, self.physical_device, "RawContext::physical_device")
     }
 
     fn check_queues(&self, families: &[QueueFamily]) -> Result<()> {
@@ -255,10 +255,14 @@ impl RawContext<'_> {
     }
 }
 
-/// Checks that the instance lists the device.
-pub(crate) fn check_physical_device(instance: &ash::Instance, device: vk::PhysicalDevice) -> Result<()> {
+/// Checks that the instance lists the device. `object` names the device in errors.
+pub(crate) fn check_physical_device(
+    instance: &ash::Instance,
+    device: vk::PhysicalDevice,
+    object: &str,
+) -> Result<()> {
     if device == vk::PhysicalDevice::null() {
-        return Err(wrong("physical_device", "the handle is null"));
+        return Err(Error::usage(object, "the handle is null"));
     }
     // SAFETY: the caller of the public function promises a valid instance.
     let devices = unsafe { instance.enumerate_physical_devices() }
@@ -266,7 +270,7 @@ pub(crate) fn check_physical_device(instance: &ash::Instance, device: vk::Physic
     if devices.contains(&device) {
         return Ok(());
     }
-    Err(wrong("physical_device", "the instance does not list the device"))
+    Err(Error::usage(object, "the instance does not list the device"))
 }
 
 /// Returns the features to treat as disabled: those not declared. Vulkan has no switch for the features of

@@ -63,7 +63,7 @@ impl WindowExtensions {
     }
 
     /// Returns an extension that surfaces of the window need and `enabled` lacks.
-    pub(super) fn missing(enabled: Option<&Self>, window: WindowRef<'_>) -> Result<Option<&'static CStr>> {
+    pub(crate) fn missing(enabled: Option<&Self>, window: WindowRef<'_>) -> Result<Option<&'static CStr>> {
         let needed = required_extensions(display(window)?)?;
         let enabled = enabled.map_or(&[][..], Self::system);
         Ok(needed.into_iter().find(|name| !enabled.contains(name)))

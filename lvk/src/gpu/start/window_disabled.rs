@@ -23,7 +23,7 @@ impl WindowExtensions {
         None
     }
 
-    pub(super) fn missing(_: Option<&Self>, window: WindowRef<'_>) -> Result<Option<&'static CStr>> {
+    pub(crate) fn missing(_: Option<&Self>, window: WindowRef<'_>) -> Result<Option<&'static CStr>> {
         match *window {}
     }
 
