@@ -116,10 +116,10 @@ impl GuestEngine {
     }
 
     /// Creates a device with these requirements merged into `info`, which is valid for the device.
-    pub fn with_requirements<'a>(
+    pub fn with_requirements(
         instance: GuestInstance,
         requirements: DeviceRequirements<'static>,
-        info: vk::DeviceCreateInfo<'a>,
+        info: vk::DeviceCreateInfo<'_>,
     ) -> Self {
         let queues = requirements.queue_create_infos();
         let mut chain = requirements.feature_chain();
