@@ -7,12 +7,11 @@ use ash::{ext, khr};
 use super::*;
 use crate::gpu::caps::enabled_features::every_field;
 
-/// Extensions without structures, and those that the merge adds in other ways, are not read back.
+/// False for extensions without structures, which cannot be read back.
 fn has_structure(field: FeatureField) -> bool {
     let mut features = Features::default();
-    *field(&mut features) = vk::TRUE;
-    let ext = &features.ext;
-    (ext.calibrated_timestamps | ext.memory_budget | ext.swapchain | ext.hdr_metadata) == vk::FALSE
+    features.ext.set_featureless_extensions(&|_| true);
+    *field(&mut features) == vk::FALSE
 }
 
 /// Every extension that has a structure.
