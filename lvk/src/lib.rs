@@ -63,7 +63,7 @@
 //! | compute, build and copy while the graphics queue draws | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
-//! | use raw Vulkan calls, or another engine's device | [`manual::interop`] |
+//! | use raw Vulkan calls, or another engine's device | [`manual::interop`], [`Context::requirements`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
 //! | learn the concepts | [`manual`] |
 //!
@@ -204,7 +204,9 @@ pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSin
 pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;
 pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
+pub use gpu::requirements::DeviceRequirements;
 pub use gpu::start::external::RawContext;
+pub use gpu::start::feature_chain::FeatureChain;
 pub use gpu::start::profile::DeviceProfile;
 pub use gpu::start::user_extensions::UserExtensions;
 pub use handle::{

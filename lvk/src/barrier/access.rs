@@ -167,6 +167,10 @@ pub(crate) enum Layout {
     LocalRead,
     /// Shading rate attachment of a pass.
     ShadingRate,
+    /// Sampled images of other engines.
+    ExternalShaderRead,
+    /// Depth-stencil images of other engines, sampled or tested.
+    ExternalDepthRead,
 }
 
 /// One use of a resource by a command.

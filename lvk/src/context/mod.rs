@@ -29,6 +29,7 @@ mod prologue;
 mod query_results;
 pub(crate) mod read_bounds;
 pub(crate) mod readback;
+mod requirements;
 pub(crate) mod serialize;
 mod submit;
 mod transfer;

@@ -26,6 +26,7 @@ use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
 use crate::gpu::device::DeviceRequest;
 use crate::gpu::start::instance::{Instance, InstanceDesc};
 use crate::gpu::start::physical_device::PhysicalDevice;
+use crate::gpu::start::user_extensions::UserExtensions;
 use crate::kernels::Kernels;
 use crate::lock_order::{Mutex, Rank};
 use crate::pipeline::{PipelineCache, PipelineLayout};
@@ -60,14 +61,9 @@ impl Context {
         let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
         let request = DeviceRequest {
             wish: wish.as_deref().or(desc.device),
-            pipeline: desc.ray_tracing_pipeline,
-            query: desc.ray_query,
-            required: desc.required_features,
             profile: desc.profile,
             extra: desc.user_extensions,
-            debug_names: desc.debug_names,
-            queues: requested_queues(desc),
-            window: desc.window_ref(),
+            ..external_request(desc)
         };
         Self::with_gpu(Arc::new(Gpu::new(instance, &request)?), desc)
     }
@@ -149,9 +145,25 @@ fn failed_report(error: Error, otherwise: impl FnOnce() -> DriverReport) -> Driv
     }
 }
 
+/// Returns the request for a device that another engine creates. Members of `desc` that choose or change a device of
+/// the library do not count.
+pub(super) fn external_request<'a>(desc: &'a ContextDesc<'_>) -> DeviceRequest<'a> {
+    DeviceRequest {
+        wish: None,
+        pipeline: desc.ray_tracing_pipeline,
+        query: desc.ray_query,
+        required: desc.required_features,
+        profile: None,
+        extra: UserExtensions::default(),
+        debug_names: desc.debug_names,
+        queues: requested_queues(desc),
+        window: desc.window_ref(),
+    }
+}
+
 /// Returns the queues to request. Index checks need a shared queue, because command buffers record faults one after the
 /// other.
-pub(super) fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
+fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
     if desc.check_indices { QueueRequest::Shared } else { desc.queues }
 }
 

@@ -132,29 +132,26 @@ impl Gpu {
     ///
     /// # Safety
     /// The requirements of [`Context::from_raw`](crate::Context::from_raw).
-    pub(crate) unsafe fn from_raw(
-        raw: RawContext<'_>,
-        pipeline: FeatureRequest,
-        query: RayQueryRequest,
-        debug_names: Option<bool>,
-        queues: QueueRequest,
-    ) -> Result<Self> {
+    pub(crate) unsafe fn from_raw(raw: RawContext<'_>, request: &DeviceRequest<'_>) -> Result<Self> {
         let mut chosen = raw.physical()?;
-        use_single_queue(&mut chosen, queues);
+        use_single_queue(&mut chosen, request.queues);
         let mut caps = chosen.capabilities.clone();
-        caps.choose_ray_tracing(pipeline, query);
+        caps.choose_ray_tracing(request.pipeline, request.query);
         let given = raw.queues();
-        let instance = Instance::external(raw.entry, raw.instance, raw.instance_extensions);
-        let features = enabled_features(&instance, &chosen, &caps);
+        let instance = Instance::external(raw.entry.clone(), raw.instance.clone(), raw.instance_extensions);
+        if let Some(window) = request.window {
+            raw.check_window(&instance, window, &chosen)?;
+        }
+        let features = enabled_features(&chosen, &caps, false);
         let made = DeviceParts {
             memory: DeviceMemory::new(&instance.raw, &raw.device, chosen.raw)?,
             device: raw.device,
             caps,
             features,
-            queues: Queues::new(given, queues),
+            queues: Queues::new(given, request.queues),
             is_external: true,
         };
-        Ok(Self::from_parts(instance, chosen.raw, made, debug_names))
+        Ok(Self::from_parts(instance, chosen.raw, made, request.debug_names))
     }
 
     fn from_parts(
@@ -256,10 +253,13 @@ impl Gpu {
     #[cfg(feature = "window")]
     pub(crate) fn window_functions(&self) -> Result<&super::start::surface::WindowFunctions> {
         self.windows.as_ref().ok_or_else(|| {
-            Error::unsupported(
-                "a swapchain",
-                "the context was made without a window; set ContextDesc::window",
-            )
+            let why = if self.is_external {
+                "the engine's device has none on; they need VK_KHR_surface and the extension of the window system in \
+                 RawContext::instance_extensions, and VK_KHR_swapchain in device_extensions and features"
+            } else {
+                "the context was made without a window; set ContextDesc::window"
+            };
+            Error::unsupported("a swapchain", why)
         })
     }
 
@@ -368,14 +368,14 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
 }
 
 /// Uses one Vulkan queue for all queues if requested.
-fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
+pub(super) fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
     if request == QueueRequest::Shared {
         device.set_queues([device.queue_locations[0]; 3]);
     }
 }
 
 /// Returns the properties of the device that the selection depends on, with the profile applied.
-fn candidate(index: usize, device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
+pub(super) fn candidate(index: usize, device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
     let found = device.capabilities.clone();
     if let Some(profile) = request.profile {
         profile.apply(&mut device.capabilities);
@@ -451,7 +451,7 @@ fn create(
     caps: &Capabilities,
     extra: &UserExtensions<'_>,
 ) -> Result<(ash::Device, Features), vk::Result> {
-    let features = enabled_features(instance, chosen, caps);
+    let features = enabled_features(chosen, caps, instance.gpu_assisted);
     let extensions = device_extensions(&features, caps, extra);
     let mut chain = features;
     let mut all = vk::PhysicalDeviceFeatures2::default().features(chain.core);
@@ -474,7 +474,7 @@ fn create(
 }
 
 /// Returns one create info per queue family, with enough queues to include the highest index in use.
-fn queue_infos<'a>(
+pub(super) fn queue_infos<'a>(
     queue_locations: &[QueueLocation; 3],
     priorities: &'a [f32; 3],
 ) -> Vec<vk::DeviceQueueCreateInfo<'a>> {
@@ -492,19 +492,19 @@ fn queue_infos<'a>(
 
 /// Returns the features to enable. `robustBufferAccess` is left out for GPU-assisted validation, which finds no
 /// out-of-bounds access if the driver makes it harmless.
-fn enabled_features(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
+pub(super) fn enabled_features(chosen: &PhysicalDevice, caps: &Capabilities, gpu_assisted: bool) -> Features {
     let mut features = Features::supported_subset(&chosen.features, caps.optional);
     features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
     features.ext.position_fetch.ray_tracing_position_fetch &= vk::Bool32::from(caps.position_fetch);
     features.limit_mesh_shaders(caps.mesh_shader);
-    if instance.gpu_assisted {
+    if gpu_assisted {
         features.core.robust_buffer_access = vk::FALSE;
     }
     features
 }
 
 /// Returns the extensions to enable, without duplicates.
-fn device_extensions<'a>(
+pub(super) fn device_extensions<'a>(
     features: &Features,
     caps: &Capabilities,
     extra: &UserExtensions<'a>,

@@ -5,6 +5,7 @@
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
 
+use lvk::ash::vk::Handle;
 use lvk::ash::{self, vk};
 use lvk::{
     BufferHandle, BufferUsage, ColorAttachment, CommandBuffer, ComputePipelineHandle, Context, ContextDesc,
@@ -130,7 +131,10 @@ impl Engine {
             device_extensions: &[],
             features: FeatureSet::NONE.with(OptionalFeature::FullDrawIndex),
             ray_tracing_pipeline: false,
+            trace_rays_indirect: false,
+            primitive_culling: false,
             ray_query: false,
+            position_fetch: false,
             mesh_shader: false,
             queue: self.queue,
             queue_family: 0,
@@ -514,22 +518,30 @@ fn local_reads() {
 
 fn refusals() {
     let Some(engine) = Engine::new() else { return };
-    let refuse = |raw: RawContext<'_>, words: &str| {
+    let refuse = |raw: RawContext<'_>, field: &str, words: &str| {
         // SAFETY: what is wrong is found before anything is made.
         match unsafe { Context::from_raw(raw, &ContextDesc::default()) } {
             Err(Error::InvalidUsage { object, message }) => {
-                assert!(object == "from_raw" && message.contains(words), "{object}: {message}");
+                assert_eq!(object, format!("RawContext::{field}"), "{message}");
+                assert!(message.contains(words), "{message}");
             }
             other => unreachable!("{words}: {other:?}"),
         }
     };
-    refuse(RawContext { queue_family: 77, ..engine.raw() }, "no queue family 77");
-    refuse(RawContext { compute_queue: Some((engine.queue, 78)), ..engine.raw() }, "no queue family 78");
-    refuse(RawContext { transfer_queue: Some((engine.queue, 79)), ..engine.raw() }, "no queue family 79");
-    refuse(RawContext { mesh_shader: true, ..engine.raw() }, "VK_EXT_mesh_shader is not among");
-    refuse(RawContext { ray_query: true, ..engine.raw() }, "is not among device_extensions");
+    refuse(RawContext { queue_family: 77, ..engine.raw() }, "queue_family", "no queue family 77");
+    let other = Some((vk::Queue::from_raw(8), 78));
+    refuse(RawContext { compute_queue: other, ..engine.raw() }, "compute_queue", "no queue family 78");
+    refuse(RawContext { transfer_queue: other, ..engine.raw() }, "transfer_queue", "no queue family 78");
+    refuse(RawContext { queue: vk::Queue::null(), ..engine.raw() }, "queue", "null");
+    let stranger = vk::PhysicalDevice::from_raw(8);
+    refuse(RawContext { physical_device: stranger, ..engine.raw() }, "physical_device", "does not list");
+    let mesh = RawContext { mesh_shader: true, ..engine.raw() };
+    refuse(mesh, "device_extensions", "VK_EXT_mesh_shader is missing; `mesh_shader`");
+    let query = RawContext { ray_query: true, ..engine.raw() };
+    refuse(query, "device_extensions", "VK_KHR_acceleration_structure is missing; `ray_query`");
     let astc = FeatureSet::NONE.with(OptionalFeature::TextureCompressionAstcHdr);
-    refuse(RawContext { features: astc, ..engine.raw() }, "textureCompressionASTC_HDR cannot be on");
+    let astc = RawContext { features: astc, ..engine.raw() };
+    refuse(astc, "features", "textureCompressionASTC_HDR cannot be on");
 
     let ctx = engine.context();
     let (image, memory) = engine.image();

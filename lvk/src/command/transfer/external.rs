@@ -6,7 +6,7 @@ use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
-use crate::submit::emit_barriers::layout_from_vulkan;
+use crate::submit::exchanged_layout::exchanged_layout;
 use crate::submit::last_access::QueueAccess;
 
 /// Side of an exchange.
@@ -76,7 +76,8 @@ impl CommandBuffer {
         self.needs_graphics("the acquisition of a texture")?;
         self.check_shared_texture(texture)?;
         let found = self.shared.store.textures.get(texture)?;
-        let known = layout_from_vulkan(layout).map_err(|why| Error::usage(&found.name, why))?;
+        let known = exchanged_layout(layout, found.image.format, found.image.usage)
+            .map_err(|why| Error::usage(&found.name, why))?;
         self.shared.submitter.import_texture(found.image.id, found.image.shape, known);
         if layout == vk::ImageLayout::UNDEFINED {
             return Ok(());

@@ -5,7 +5,7 @@ use std::fmt;
 
 use ash::vk;
 
-use super::features::Features;
+use super::features::{FeatureField, Features};
 
 /// A feature that some devices have and the library does not need. It is enabled wherever the device has it,
 /// unless a [`DeviceProfile`](crate::DeviceProfile) hides it. [`Capabilities::has`](crate::Capabilities::has)
@@ -232,6 +232,11 @@ impl OptionalFeature {
         self.table_row().name
     }
 
+    /// Returns the members of all optional features.
+    pub(super) fn fields() -> impl Iterator<Item = FeatureField> {
+        ROWS.iter().map(|row| row.field)
+    }
+
     fn table_row(self) -> &'static FeatureRow {
         &ROWS[self as usize]
     }
@@ -343,7 +348,7 @@ struct FeatureRow {
     feature: OptionalFeature,
     name: &'static str,
     extension: Option<&'static CStr>,
-    field: fn(&mut Features) -> &mut vk::Bool32,
+    field: FeatureField,
 }
 
 #[rustfmt::skip]

@@ -219,7 +219,8 @@ fn query_features(
     found
 }
 
-fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
+/// Returns the extension that reads the clocks of device and host together.
+pub(super) fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
     if has(ash::khr::calibrated_timestamps::NAME) {
         Calibration::Khr
     } else if has(ash::ext::calibrated_timestamps::NAME) {
