@@ -200,6 +200,7 @@ pub use gpu::caps::queues::{QueueInfo, QueueRequest};
 pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
+pub use gpu::caps::subgroup_limits::SubgroupLimits;
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
 pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;

@@ -27,6 +27,7 @@ mod shader_groups;
 pub(crate) mod shader_module;
 pub(crate) mod stage;
 mod state_check;
+mod subgroup_size;
 mod workgroup_memory;
 mod workgroup_size;
 

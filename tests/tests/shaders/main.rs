@@ -5,3 +5,4 @@ mod features;
 mod modules;
 mod other_languages;
 mod pipeline_cache;
+mod subgroups;

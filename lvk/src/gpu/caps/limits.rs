@@ -6,6 +6,7 @@ use super::descriptor_limits::{DescriptorLimits, ReservedDescriptors};
 use super::mesh_limits::MeshLimits;
 use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::shading_rate::ShadingRateLimits;
+use super::subgroup_limits::SubgroupLimits;
 
 /// Number of TLAS descriptors that the library requests. Fewer if the device allows fewer.
 const WANTED_TLAS: u32 = 256;
@@ -121,6 +122,8 @@ pub struct Limits {
     pub sbt_base_alignment: u32,
     /// Maximum stride of a shader binding table in bytes (`maxShaderGroupStride`).
     pub sbt_max_stride: u32,
+    /// Limits of subgroups.
+    pub subgroup: SubgroupLimits,
     /// Limits of task and mesh shaders.
     pub mesh: MeshLimits,
 }
@@ -192,6 +195,7 @@ impl Limits {
             sbt_handle_alignment: pipeline.shader_group_handle_alignment.max(1),
             sbt_base_alignment: pipeline.shader_group_base_alignment.max(1),
             sbt_max_stride: pipeline.max_shader_group_stride,
+            subgroup: SubgroupLimits::default(),
             mesh: MeshLimits::default(),
         };
         size_bindless(&mut limits, v12, accel);
