@@ -55,6 +55,7 @@
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
+//! | compile shaders anew when their files change | [`Reloadable`], [`ShaderFiles`] |
 //! | write shaders, in GLSL, Slang or HLSL | [`ShaderModuleDesc`], [`manual::shader_interface`], [`HLSL_HEADER`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | build acceleration structures | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
@@ -132,6 +133,8 @@ mod format;
 mod gpu;
 mod handle;
 mod handle_cache;
+#[cfg(feature = "glsl")]
+mod hot_reload;
 mod kernels;
 mod leak_report;
 mod lock_order;
@@ -212,6 +215,8 @@ pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
+#[cfg(feature = "glsl")]
+pub use hot_reload::{Reloadable, ShaderFiles};
 pub use pipeline::blend::{Blend, BlendComponent, BlendFactor, BlendOp, ColorWriteMask};
 pub use pipeline::compute::ComputePipelineDesc;
 pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};

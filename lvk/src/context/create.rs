@@ -1,5 +1,7 @@
 //! Creation of buffers, samplers, shader modules, pipelines and query pools.
 
+#[cfg(feature = "glsl")]
+use std::path::Path;
 use std::sync::Arc;
 
 use super::Context;
@@ -17,7 +19,7 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::{Buffer, QueryPool, Sampler};
-use crate::shader::{ShaderCache, ShaderCacheStats, ShaderModuleDesc, find_raw_hit_builtin};
+use crate::shader::{CompileFiles, ShaderCache, ShaderCacheStats, ShaderModuleDesc, find_raw_hit_builtin};
 
 /// Slot of objects that take no bindless slot.
 pub(super) const NO_SLOT: u32 = 0;
@@ -52,11 +54,32 @@ impl Context {
     /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, such as
     /// those of the task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
+        let cache = self.device_state().shader_cache.as_ref();
+        self.create_module(desc, CompileFiles { cache, ..CompileFiles::default() })
+    }
+
+    /// As [`create_shader_module`](Self::create_shader_module). Calls `on_search` with each path at which an include is
+    /// searched.
+    #[cfg(feature = "glsl")]
+    pub(crate) fn create_module_from_files(
+        &self,
+        desc: &ShaderModuleDesc<'_>,
+        on_search: &dyn Fn(&Path),
+    ) -> Result<Holder<ShaderModuleHandle>> {
+        let cache = self.device_state().shader_cache.as_ref();
+        self.create_module(desc, CompileFiles { cache, on_search: Some(on_search) })
+    }
+
+    fn create_module(
+        &self,
+        desc: &ShaderModuleDesc<'_>,
+        files: CompileFiles<'_>,
+    ) -> Result<Holder<ShaderModuleHandle>> {
         let shared = self.device_state();
         let module = ShaderModule::new(
             &shared.gpu,
             desc,
-            shared.shader_cache.as_ref(),
+            files,
             Some(&shared.bindless),
             shared.layout.push_constant_bytes,
         )?;

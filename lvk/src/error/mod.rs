@@ -130,7 +130,7 @@ pub enum Error {
         /// Output of the compiler, with the line numbers of the caller's source.
         log: String,
     },
-    /// A file could not be written.
+    /// A file could not be read or written.
     #[error("file '{}': {message}", path.display())]
     File {
         /// The file.

@@ -54,6 +54,9 @@ pub(crate) enum Rank {
     PipelineCacheFile,
     /// The folder of compiled shaders.
     ShaderCacheFolder,
+    /// Times of the files that shaders were read from.
+    #[cfg_attr(not(feature = "glsl"), allow(dead_code, reason = "only GLSL is read from files"))]
+    ShaderFiles,
     /// Measurements of the profiler.
     Profiler,
     /// Unused recording states of command buffers.
@@ -78,7 +81,7 @@ pub(crate) enum Rank {
 #[cfg(debug_assertions)]
 impl Rank {
     /// All ranks, in their order.
-    pub(super) const ALL: [Self; 31] = [
+    pub(super) const ALL: [Self; 32] = [
         Self::Swapchain,
         Self::Compactions,
         Self::Pending,
@@ -101,6 +104,7 @@ impl Rank {
         Self::Kernels,
         Self::PipelineCacheFile,
         Self::ShaderCacheFolder,
+        Self::ShaderFiles,
         Self::Profiler,
         Self::RecordingStates,
         Self::ImageLimitCache,

@@ -1,30 +1,45 @@
 //! Produces SPIR-V words from a shader source.
 
 #[cfg(feature = "glsl")]
+use std::path::Path;
+
+#[cfg(feature = "glsl")]
 use super::front_end::compile_cached;
 use super::options::{CompileOptions, compile_error};
 use super::spirv::passes::strip_primitive_culling::strip_primitive_culling;
 use super::spirv::passes::strip_ray_query::strip_unused_ray_query;
 use super::spirv::words;
 use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
+
 #[cfg(not(feature = "glsl"))]
 use crate::error::Error;
 use crate::error::Result;
 
+/// Files that a compilation reads and writes; the default are includes only.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct CompileFiles<'a> {
+    /// The cache of compiled modules.
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only what is compiled is kept"))]
+    pub(crate) cache: Option<&'a ShaderCache>,
+    /// Called with each path at which an include is searched, before the search.
+    #[cfg(feature = "glsl")]
+    pub(crate) on_search: Option<&'a dyn Fn(&Path)>,
+}
+
 /// Returns the SPIR-V of a module.
 ///
-/// GLSL is compiled to SPIR-V 1.6, or loaded from `cache` if it was compiled before. SPIR-V words are returned after a
+/// GLSL is compiled to SPIR-V 1.6, or loaded from the cache if it was compiled before. SPIR-V words are returned after a
 /// check of their structure, without an unused capability of ray queries.
 pub(crate) fn compile(
     desc: &ShaderModuleDesc<'_>,
     options: &CompileOptions,
-    cache: Option<&ShaderCache>,
+    files: CompileFiles<'_>,
 ) -> Result<Vec<u32>> {
     match desc.source {
         ShaderSource::Glsl(text) if options.software_ray_query => {
-            compile_cached(desc, text, options, cache).map(|words| strip_primitive_culling(&words))
+            compile_cached(desc, text, options, files).map(|words| strip_primitive_culling(&words))
         }
-        ShaderSource::Glsl(text) => compile_cached(desc, text, options, cache),
+        ShaderSource::Glsl(text) => compile_cached(desc, text, options, files),
         ShaderSource::Spirv(words) => {
             words::validate(words).map_err(|log| compile_error(desc.debug_name, log))?;
             Ok(strip_unused_ray_query(words))
@@ -37,7 +52,7 @@ fn compile_cached(
     desc: &ShaderModuleDesc<'_>,
     _: &str,
     _: &CompileOptions,
-    _: Option<&ShaderCache>,
+    _: CompileFiles<'_>,
 ) -> Result<Vec<u32>> {
     let what = format!("GLSL source of shader '{}'", desc.debug_name);
     Err(Error::unsupported(
@@ -54,7 +69,7 @@ mod tests {
     #[test]
     fn glsl_names_the_missing_feature() {
         let desc = ShaderModuleDesc { source: ShaderSource::Glsl("void main() {}"), ..Default::default() };
-        match compile(&desc, &CompileOptions::default(), None) {
+        match compile(&desc, &CompileOptions::default(), CompileFiles::default()) {
             Err(Error::Unsupported { why, .. }) => assert!(why.contains("feature `glsl`")),
             other => panic!("{other:?}"),
         }

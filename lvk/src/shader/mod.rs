@@ -21,7 +21,7 @@ mod sanitize;
 pub(crate) mod spirv;
 mod stage;
 
-pub(crate) use compile::compile;
+pub(crate) use compile::{CompileFiles, compile};
 #[cfg(feature = "glsl")]
 pub use compile_glsl::compile_glsl;
 pub(crate) use disk_cache::ShaderCache;

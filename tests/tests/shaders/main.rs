@@ -2,6 +2,7 @@
 
 mod cache;
 mod features;
+mod hot_reload;
 mod modules;
 mod other_languages;
 mod pipeline_cache;
