@@ -23,6 +23,7 @@ use crate::handle::AccelStructHandle;
 use crate::kernels::Kernels;
 use crate::leak_report;
 use crate::lock_order::{Guard, Mutex};
+use crate::parallel::core_count;
 use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
@@ -124,7 +125,7 @@ impl DeviceState {
     /// Returns the layout and the cache for new pipelines.
     pub(crate) fn pipeline_base(&self) -> PipelineBase {
         let cache = self.pipeline_cache.as_ref().map_or(vk::PipelineCache::null(), |cache| cache.raw);
-        PipelineBase { layout: self.layout.raw, cache }
+        PipelineBase { layout: self.layout.raw, cache, max_threads: core_count() }
     }
 
     /// Destroys an object once no command buffer can use it.

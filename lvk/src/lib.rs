@@ -55,6 +55,7 @@
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
+//! | compile pipelines in the background | [`Context::create_render_pipeline_in_background`], [`PendingPipeline`] |
 //! | compile shaders anew when their files change | [`Reloadable`], [`ShaderFiles`] |
 //! | write shaders, in GLSL, Slang or HLSL | [`ShaderModuleDesc`], [`manual::shader_interface`], [`HLSL_HEADER`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
@@ -122,6 +123,7 @@
 compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
 
 mod accel;
+mod background;
 mod barrier;
 mod bindless;
 mod cache_file;
@@ -185,6 +187,7 @@ pub use context::destroy::Destroy;
 pub use context::frame::Frame;
 pub use context::holder::Holder;
 pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
+pub use context::pending_pipeline::PendingPipeline;
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};

@@ -106,7 +106,14 @@ impl Context {
     ) -> Result<Holder<RenderPipelineHandle>> {
         let shared = self.device_state();
         let find = |handle| shared.store.shader_modules.get(handle);
-        let pipeline = RenderPipeline::new(&shared.gpu, shared.pipeline_base(), desc, &find)?;
+        self.add_render_pipeline(RenderPipeline::new(&shared.gpu, shared.pipeline_base(), desc, &find)?)
+    }
+
+    pub(super) fn add_render_pipeline(
+        &self,
+        pipeline: RenderPipeline,
+    ) -> Result<Holder<RenderPipelineHandle>> {
+        let shared = self.device_state();
         shared.graphics_queries.insert(pipeline.query_stages);
         Ok(Holder::new(self, shared.store.render_pipelines.insert(pipeline), NO_SLOT))
     }
@@ -118,8 +125,14 @@ impl Context {
     ) -> Result<Holder<ComputePipelineHandle>> {
         let shared = self.device_state();
         let module = self.required_module(desc.module, desc.debug_name, "compute")?;
-        let pipeline = ComputePipeline::new(&shared.gpu, shared.pipeline_base(), desc, &module)?;
-        Ok(Holder::new(self, shared.store.compute_pipelines.insert(pipeline), NO_SLOT))
+        self.add_compute_pipeline(ComputePipeline::new(&shared.gpu, shared.pipeline_base(), desc, &module)?)
+    }
+
+    pub(super) fn add_compute_pipeline(
+        &self,
+        pipeline: ComputePipeline,
+    ) -> Result<Holder<ComputePipelineHandle>> {
+        Ok(Holder::new(self, self.device_state().store.compute_pipelines.insert(pipeline), NO_SLOT))
     }
 
     /// Creates a query pool (`vkCreateQueryPool`). All of its queries are reset and ready to be written.
@@ -133,7 +146,7 @@ impl Context {
         Ok(Holder::new(self, self.device_state().store.query_pools.insert(pool), NO_SLOT))
     }
 
-    fn required_module(
+    pub(super) fn required_module(
         &self,
         handle: Option<ShaderModuleHandle>,
         pipeline: &str,

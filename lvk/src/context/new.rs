@@ -12,6 +12,7 @@ use super::{Context, ContextInner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
+use crate::background::BackgroundJobs;
 use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
@@ -28,6 +29,7 @@ use crate::gpu::start::instance::{Instance, InstanceDesc};
 use crate::gpu::start::physical_device::PhysicalDevice;
 use crate::kernels::Kernels;
 use crate::lock_order::{Mutex, Rank};
+use crate::parallel::core_count;
 use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
@@ -76,6 +78,7 @@ impl Context {
     pub(super) fn with_gpu(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
         let shared = Arc::new(new_device_state(gpu, desc)?);
         let inner = ContextInner {
+            background: BackgroundJobs::new(core_count() / 2),
             prologue: Mutex::new(Rank::Pending, Prologue::default()),
             compactions: Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),

@@ -30,7 +30,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 ///   [`LimitExceeded`](Error::LimitExceeded);
 /// * failures at run time: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory),
 ///   [`OutOfHostMemory`](Error::OutOfHostMemory), [`File`](Error::File), [`DeviceLost`](Error::DeviceLost),
-///   [`Vulkan`](Error::Vulkan).
+///   [`Vulkan`](Error::Vulkan); [`Creation`](Error::Creation) adds the name of an object to one of these.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -195,6 +195,14 @@ pub enum Error {
         /// Fault report of the driver, if it provides one and a submission or wait detected the loss.
         fault: Option<Arc<DeviceFault>>,
     },
+    /// The creation of an object failed with an error that does not name the object.
+    #[error("{object}: {source}")]
+    Creation {
+        /// Debug name of the object.
+        object: String,
+        /// The error.
+        source: Box<Self>,
+    },
     /// Any other error of the driver.
     #[error("{call} failed: {result}")]
     Vulkan {
@@ -216,6 +224,19 @@ impl Error {
                 Self::OutOfDeviceMemory { object: call.to_owned(), bytes: 0 }
             }
             result => Self::Vulkan { call, result },
+        }
+    }
+
+    /// Adds the name of the object whose creation failed, if the error has no name of its own.
+    pub(crate) fn with_object(self, object: &str) -> Self {
+        match self {
+            Self::OutOfDeviceMemory { bytes: 0, .. } => {
+                Self::OutOfDeviceMemory { object: object.to_owned(), bytes: 0 }
+            }
+            Self::Vulkan { .. } | Self::OutOfHostMemory { .. } | Self::StaleHandle { .. } => {
+                Self::Creation { object: object.to_owned(), source: Box::new(self) }
+            }
+            named => named,
         }
     }
 

@@ -195,9 +195,10 @@ impl Kernel {
             debug_name: self.name(),
             ..Default::default()
         };
-        let module = ShaderModule::new(gpu, &desc, CompileFiles::default(), None, layout.push_constant_bytes)?;
+        let module =
+            ShaderModule::new(gpu, &desc, CompileFiles::default(), None, layout.push_constant_bytes)?;
         let desc = ComputePipelineDesc { debug_name: self.name(), ..Default::default() };
-        ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache }, &desc, &module)
+        ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache, max_threads: 1 }, &desc, &module)
     }
 }
 

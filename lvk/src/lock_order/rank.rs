@@ -67,6 +67,10 @@ pub(crate) enum Rank {
     SlotOwners,
     /// Work shared between threads.
     SharedWork,
+    /// Jobs that wait for a thread of the background.
+    BackgroundJobs,
+    /// The result of a pipeline that is compiled in the background.
+    PendingPipeline,
     /// A queue of the device.
     Queue,
     /// Device memory.
@@ -81,7 +85,7 @@ pub(crate) enum Rank {
 #[cfg(debug_assertions)]
 impl Rank {
     /// All ranks, in their order.
-    pub(super) const ALL: [Self; 32] = [
+    pub(super) const ALL: [Self; 34] = [
         Self::Swapchain,
         Self::Compactions,
         Self::Pending,
@@ -110,6 +114,8 @@ impl Rank {
         Self::ImageLimitCache,
         Self::SlotOwners,
         Self::SharedWork,
+        Self::BackgroundJobs,
+        Self::PendingPipeline,
         Self::Queue,
         Self::Memory,
         Self::DeviceLifetime,

@@ -10,6 +10,7 @@ pub(crate) mod graphics;
 mod graphics_check;
 pub(crate) mod graphics_desc;
 pub(crate) mod local_read;
+pub(crate) mod owned_desc;
 pub(crate) mod pipeline_layout;
 mod portability;
 pub(crate) mod rasterization;

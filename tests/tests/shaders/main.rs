@@ -1,5 +1,6 @@
 //! Shader modules and pipelines: from GLSL or SPIR-V, checked, and kept on disk.
 
+mod background;
 mod cache;
 mod features;
 mod hot_reload;
