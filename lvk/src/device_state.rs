@@ -25,7 +25,8 @@ use crate::leak_report;
 use crate::lock_order::{Guard, Mutex};
 use crate::parallel::core_count;
 use crate::pipeline::{
-    ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
+    ComputePipeline, GraphicsParts, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline,
+    RenderPipeline,
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
@@ -52,6 +53,8 @@ pub(crate) struct DeviceState {
     pub(crate) layout: PipelineLayout,
     /// The file of compiled pipelines, if the context keeps one.
     pub(crate) pipeline_cache: Option<PipelineCache>,
+    /// Parts that graphics pipelines are linked from.
+    pub(crate) graphics_parts: GraphicsParts,
     /// The cache of SPIR-V that was compiled from GLSL, if the context keeps one.
     pub(crate) shader_cache: Option<ShaderCache>,
     pub(crate) bindless: Bindless,

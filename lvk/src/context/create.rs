@@ -54,8 +54,7 @@ impl Context {
     /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, such as
     /// those of the task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
-        let cache = self.device_state().shader_cache.as_ref();
-        self.create_module(desc, CompileFiles { cache, ..CompileFiles::default() })
+        self.create_module(desc, CompileFiles::with_cache(self.device_state().shader_cache.as_ref()))
     }
 
     /// As [`create_shader_module`](Self::create_shader_module). Calls `on_search` with each path at which an include is
@@ -106,7 +105,13 @@ impl Context {
     ) -> Result<Holder<RenderPipelineHandle>> {
         let shared = self.device_state();
         let find = |handle| shared.store.shader_modules.get(handle);
-        self.add_render_pipeline(RenderPipeline::new(&shared.gpu, shared.pipeline_base(), desc, &find)?)
+        self.add_render_pipeline(RenderPipeline::new(
+            &shared.gpu,
+            shared.pipeline_base(),
+            desc,
+            &find,
+            &shared.graphics_parts,
+        )?)
     }
 
     pub(super) fn add_render_pipeline(

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::handle::{ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle};
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::graphics_desc::RenderPipelineDesc;
-use crate::pipeline::owned_desc::{OwnedComputeDesc, OwnedRayTracingDesc, OwnedRenderDesc};
+use crate::pipeline::owned_desc::{OwnedComputeDesc, OwnedModules, OwnedRayTracingDesc, OwnedRenderDesc};
 use crate::pipeline::ray_tracing_desc::RayTracingPipelineDesc;
 use crate::pipeline::{ComputePipeline, PipelineBase, RayTracingPipeline, RenderPipeline};
 
@@ -49,10 +49,11 @@ impl Context {
         &self,
         desc: &RenderPipelineDesc<'_>,
     ) -> Result<PendingPipeline<RenderPipelineHandle>> {
-        let owned =
-            OwnedRenderDesc::new(desc, &|handle| self.device_state().store.shader_modules.get(handle))?;
+        let find = |handle| self.device_state().store.shader_modules.get(handle);
+        let (owned, modules) = (OwnedRenderDesc::new(desc), OwnedModules::of_render(desc, &find)?);
         let create = move |shared: &DeviceState, base| {
-            RenderPipeline::new(&shared.gpu, base, &owned.desc(), &|handle| owned.modules.get(handle))
+            let find = |handle| modules.get(handle);
+            RenderPipeline::new(&shared.gpu, base, &owned.desc(), &find, &shared.graphics_parts)
         };
         Ok(self.create_in_background(desc.debug_name, create, Self::add_render_pipeline))
     }

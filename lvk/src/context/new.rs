@@ -30,7 +30,7 @@ use crate::gpu::start::physical_device::PhysicalDevice;
 use crate::kernels::Kernels;
 use crate::lock_order::{Mutex, Rank};
 use crate::parallel::core_count;
-use crate::pipeline::{PipelineCache, PipelineLayout};
+use crate::pipeline::{GraphicsParts, PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shader::ShaderCache;
@@ -177,6 +177,7 @@ fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState
         shader_cache: desc.shader_cache.map(ShaderCache::new),
         #[cfg(feature = "software-ray-query")]
         tree_cache: desc.tree_cache.map(crate::software_ray_query::bvh_cache::BvhCache::new),
+        graphics_parts: GraphicsParts::new(),
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),

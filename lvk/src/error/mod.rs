@@ -262,3 +262,24 @@ pub(crate) fn check_limit(object: &str, what: &'static str, requested: u64, limi
     }
     Err(Error::LimitExceeded { object: object.to_owned(), what, requested, limit })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_without_a_name_get_that_of_the_object() {
+        let text = |error: Error| error.with_object("water").to_string();
+        let failed = Error::vulkan("vkCreateGraphicsPipelines");
+        assert_eq!(
+            text(failed(vk::Result::ERROR_UNKNOWN)),
+            format!("water: vkCreateGraphicsPipelines failed: {}", vk::Result::ERROR_UNKNOWN)
+        );
+        let memory = Error::vulkan("vkCreateGraphicsPipelines")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        assert!(text(memory).contains("'water'"));
+        assert!(text(Error::OutOfHostMemory { call: "vkCreateShaderModule" }).starts_with("water: out of"));
+        assert_eq!(text(Error::usage("grass", "is green")), "grass: is green", "it has a name");
+        let lost = Error::DeviceLost { call: "vkQueueSubmit2", fault: None };
+        assert!(matches!(lost.with_object("water"), Error::DeviceLost { .. }));
+    }
+}

@@ -71,6 +71,8 @@ pub(crate) enum Rank {
     BackgroundJobs,
     /// The result of a pipeline that is compiled in the background.
     PendingPipeline,
+    /// Parts that graphics pipelines are linked from.
+    GraphicsParts,
     /// A queue of the device.
     Queue,
     /// Device memory.
@@ -85,7 +87,7 @@ pub(crate) enum Rank {
 #[cfg(debug_assertions)]
 impl Rank {
     /// All ranks, in their order.
-    pub(super) const ALL: [Self; 34] = [
+    pub(super) const ALL: [Self; 35] = [
         Self::Swapchain,
         Self::Compactions,
         Self::Pending,
@@ -116,6 +118,7 @@ impl Rank {
         Self::SharedWork,
         Self::BackgroundJobs,
         Self::PendingPipeline,
+        Self::GraphicsParts,
         Self::Queue,
         Self::Memory,
         Self::DeviceLifetime,

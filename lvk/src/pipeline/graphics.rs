@@ -8,6 +8,7 @@ use super::blend::{Blend, ColorWriteMask, blend_state};
 use super::depth_stencil::{DepthState, DepthTest, depth_stencil_state};
 use super::graphics_check::{check_modules, check_stages};
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute};
+use super::graphics_parts::{GraphicsParts, PipelinePart, is_linked_from_parts};
 use super::local_read::{InputIndices, inputs_read, inputs_written, writes_color};
 use super::pipeline_layout::PipelineBase;
 use super::rasterization::DepthBias;
@@ -95,6 +96,8 @@ pub(crate) struct RenderPipeline {
     /// Targets that draws may change.
     pub(crate) writes: InputAttachmentMask,
     pub(crate) name: Arc<str>,
+    /// Parts that the pipeline is linked from; empty if it was compiled as a whole.
+    _parts: Vec<Arc<PipelinePart>>,
     gpu: Arc<Gpu>,
 }
 
@@ -104,11 +107,20 @@ impl RenderPipeline {
         base: PipelineBase,
         desc: &RenderPipelineDesc<'_>,
         find: ModuleLookup<'_>,
+        parts: &GraphicsParts,
     ) -> Result<Self> {
         check_stages(gpu, desc)?;
         let modules = RenderModules::resolve(desc, find)?;
         check_modules(gpu, desc, &modules)?;
-        let raw = create_pipeline(gpu, base, desc, &modules)?;
+        // A constant that no module declares is an error of the whole pipeline.
+        Specialization::new(desc.debug_name, desc.specialization, modules.iter())?;
+        let written = written_targets(desc, &modules);
+        let plan = RenderPipelineDesc { color: &written, ..*desc };
+        let (raw, parts) = if is_linked_from_parts(gpu, desc, &modules) {
+            parts.link(gpu, base, &plan, &modules)?
+        } else {
+            (create_pipeline(gpu, base, &plan, &modules, None)?, Vec::new())
+        };
         gpu.name(raw, desc.debug_name);
         let push_constant_bytes = modules.iter().map(|m| m.reflection.push_constant_bytes).max();
         Ok(Self {
@@ -127,6 +139,7 @@ impl RenderPipeline {
             reads: inputs_read(&modules),
             writes: inputs_written(desc, &modules),
             name: desc.debug_name.into(),
+            _parts: parts,
             gpu: Arc::clone(gpu),
         })
     }
@@ -139,11 +152,13 @@ impl Drop for RenderPipeline {
     }
 }
 
-fn create_pipeline(
+/// Creates a pipeline, or the part of one that `library` names. Each colour target has its final write mask.
+pub(super) fn create_pipeline(
     gpu: &Gpu,
     base: PipelineBase,
     desc: &RenderPipelineDesc<'_>,
     modules: &RenderModules,
+    library: Option<&mut vk::GraphicsPipelineLibraryCreateInfoEXT<'_>>,
 ) -> Result<vk::Pipeline> {
     let constants = Specialization::new(desc.debug_name, desc.specialization, modules.iter())?;
     let constants = constants.info();
@@ -159,7 +174,7 @@ fn create_pipeline(
     let raster = rasterization(desc);
     let samples = multisampling(desc);
     let depth = depth_stencil_state(desc.depth, desc.stencil);
-    let blends = blend_states(desc, modules);
+    let blends: Vec<_> = desc.color.iter().map(|target| blend_state(target.blend, target.write)).collect();
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
     let dynamic = PassState::from_desc(desc).dynamic_states();
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
@@ -183,6 +198,9 @@ fn create_pipeline(
         .push_next(&mut rendering);
     if !inputs_read(modules).is_empty() {
         info = info.push_next(&mut indices);
+    }
+    if let Some(library) = library {
+        info = info.flags(info.flags | vk::PipelineCreateFlags::LIBRARY_KHR).push_next(library);
     }
     // SAFETY: the modules and the layout are alive; everything `info` points to lives until the call returns.
     let made = unsafe { gpu.device.create_graphics_pipelines(base.cache, &[info], None) };
@@ -223,16 +241,13 @@ fn vertex_attributes(desc: &RenderPipelineDesc<'_>) -> Vec<vk::VertexInputAttrib
     desc.vertex_attributes.iter().map(raw).collect()
 }
 
-/// Returns the blend state of each target. A target without an output of the fragment shader is not written.
-fn blend_states(
-    desc: &RenderPipelineDesc<'_>,
-    modules: &RenderModules,
-) -> Vec<vk::PipelineColorBlendAttachmentState> {
+/// Returns the targets. One without an output of the fragment shader is not written.
+fn written_targets(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Vec<ColorTarget> {
     let write = |place, target: &ColorTarget| {
         if writes_color(modules, place, target) { target.write } else { ColorWriteMask::empty() }
     };
     let targets = (0..).zip(desc.color);
-    targets.map(|(place, target)| blend_state(target.blend, write(place, target))).collect()
+    targets.map(|(place, target)| ColorTarget { write: write(place, target), ..*target }).collect()
 }
 
 fn rendering_info<'a>(

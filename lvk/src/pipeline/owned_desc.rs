@@ -14,6 +14,12 @@ use crate::handle::{Handle, ShaderModuleHandle};
 pub(crate) struct OwnedModules(Vec<(ShaderModuleHandle, Arc<ShaderModule>)>);
 
 impl OwnedModules {
+    /// Finds the modules of a graphics pipeline.
+    pub(crate) fn of_render(desc: &RenderPipelineDesc<'_>, find: ModuleLookup<'_>) -> Result<Self> {
+        let stages = [desc.vertex, desc.task, desc.mesh, desc.tess_control, desc.tess_eval];
+        Self::find(stages.into_iter().chain([desc.geometry, desc.fragment]).flatten(), find)
+    }
+
     fn find(handles: impl IntoIterator<Item = ShaderModuleHandle>, find: ModuleLookup<'_>) -> Result<Self> {
         let found = handles.into_iter().map(|handle| Ok((handle, find(handle)?)));
         found.collect::<Result<Vec<_>>>().map(Self)
@@ -70,7 +76,6 @@ pub(crate) struct OwnedRenderDesc {
     color: Vec<ColorTarget>,
     specialization: Vec<SpecializationConstant>,
     name: String,
-    pub(crate) modules: OwnedModules,
 }
 
 /// The lists of a [`RenderPipelineDesc`].
@@ -84,18 +89,15 @@ struct RenderLists<'a> {
 }
 
 impl OwnedRenderDesc {
-    pub(crate) fn new(desc: &RenderPipelineDesc<'_>, find: ModuleLookup<'_>) -> Result<Self> {
-        let stages = [desc.vertex, desc.task, desc.mesh, desc.tess_control, desc.tess_eval];
-        let handles = stages.into_iter().chain([desc.geometry, desc.fragment]).flatten();
-        Ok(Self {
+    pub(crate) fn new(desc: &RenderPipelineDesc<'_>) -> Self {
+        Self {
             plain: render_desc(desc, RenderLists::default()),
             bindings: desc.vertex_bindings.to_vec(),
             attributes: desc.vertex_attributes.to_vec(),
             color: desc.color.to_vec(),
             specialization: desc.specialization.to_vec(),
             name: desc.debug_name.to_owned(),
-            modules: OwnedModules::find(handles, find)?,
-        })
+        }
     }
 
     pub(crate) fn desc(&self) -> RenderPipelineDesc<'_> {
@@ -130,6 +132,7 @@ fn render_desc<'a>(plain: &RenderPipelineDesc<'_>, lists: RenderLists<'a>) -> Re
         sample_shading: plain.sample_shading,
         view_mask: plain.view_mask,
         shading_rate: plain.shading_rate,
+        fast_link: plain.fast_link,
         specialization: lists.specialization,
         debug_name: lists.name,
     }
@@ -158,6 +161,10 @@ impl OwnedRayTracingDesc {
         let general = [desc.ray_gen, desc.miss, desc.callable].into_iter().flatten().copied();
         let of_group = |group: &HitGroup<'_>| [group.closest_hit, group.any_hit, group.intersection];
         let handles = general.chain(desc.hit_groups.iter().flat_map(of_group).flatten());
+        Ok(Self::with_modules(desc, OwnedModules::find(handles, find)?))
+    }
+
+    fn with_modules(desc: &RayTracingPipelineDesc<'_>, modules: OwnedModules) -> Self {
         let records = |list: &[&[u8]]| list.iter().map(|record| record.to_vec()).collect();
         let without_record = |group: &HitGroup<'_>| HitGroup {
             closest_hit: group.closest_hit,
@@ -165,8 +172,8 @@ impl OwnedRayTracingDesc {
             intersection: group.intersection,
             record: &[],
         };
-        Ok(Self {
-            modules: OwnedModules::find(handles, find)?,
+        Self {
+            modules,
             ray_gen: desc.ray_gen.to_vec(),
             miss: desc.miss.to_vec(),
             callable: desc.callable.to_vec(),
@@ -184,7 +191,7 @@ impl OwnedRayTracingDesc {
             },
             specialization: desc.specialization.to_vec(),
             name: desc.debug_name.to_owned(),
-        })
+        }
     }
 
     /// Calls `create` with the description.
@@ -209,4 +216,78 @@ impl OwnedRayTracingDesc {
 
 fn borrowed(records: &Records) -> Vec<&[u8]> {
     records.iter().map(Vec::as_slice).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::{Format, VertexFormat};
+    use crate::handle::RayTracingLibraryHandle;
+    use crate::pipeline::depth_stencil::{DepthTest, StencilTest};
+    use crate::pipeline::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
+    use crate::pipeline::stage::SpecializationValue;
+    use crate::resource::sampler::CompareOp;
+
+    const CONSTANTS: &[SpecializationConstant] =
+        &[SpecializationConstant { id: 3, value: SpecializationValue::F32(0.5) }];
+
+    #[test]
+    fn an_owned_description_of_a_graphics_pipeline_equals_the_callers() {
+        let depth = DepthTest { format: Format::D32FloatS8, compare: CompareOp::Less, write: true };
+        let module = |bits| Some(ShaderModuleHandle::from_bits(bits));
+        let desc = RenderPipelineDesc {
+            vertex: module(1),
+            task: module(2),
+            mesh: module(3),
+            tess_control: module(4),
+            tess_eval: module(5),
+            geometry: module(6),
+            fragment: module(7),
+            topology: Topology::Patches { points: 3 },
+            cull: CullMode::Back,
+            front_face: FrontFace::Clockwise,
+            polygon: PolygonMode::Line,
+            line_width: 2.0,
+            depth_bias: Some(DepthBias { constant: 1.0, ..Default::default() }),
+            depth_clamp: true,
+            vertex_bindings: &[VertexBinding { stride: 8, per_instance: true }],
+            vertex_attributes: &[VertexAttribute { format: VertexFormat::F32x2, ..Default::default() }],
+            color: &[ColorTarget::new(Format::Rgba8Unorm)],
+            depth: Some(depth),
+            stencil: Some(StencilTest::default()),
+            samples: 4,
+            alpha_to_coverage: true,
+            sample_shading: 0.5,
+            view_mask: 3,
+            shading_rate: None,
+            fast_link: true,
+            specialization: CONSTANTS,
+            debug_name: "everything",
+        };
+        assert_eq!(OwnedRenderDesc::new(&desc).desc(), desc);
+    }
+
+    #[test]
+    fn an_owned_description_of_a_ray_tracing_pipeline_has_the_callers_lists() {
+        let [first, second, third] = [1, 2, 3].map(ShaderModuleHandle::from_bits);
+        let desc = RayTracingPipelineDesc {
+            ray_gen: &[first],
+            miss: &[second],
+            hit_groups: &[HitGroup { any_hit: Some(third), record: &[7, 8], ..Default::default() }],
+            callable: &[third, first],
+            ray_gen_records: &[&[1]],
+            miss_records: &[&[2, 3]],
+            callable_records: &[&[], &[4]],
+            libraries: &[RayTracingLibraryHandle::from_bits(9)],
+            max_recursion: 2,
+            max_callable_depth: 3,
+            max_payload_bytes: 4,
+            max_hit_attribute_bytes: 5,
+            specialization: CONSTANTS,
+            debug_name: "rays",
+        };
+        let plain = RayTracingPipelineDesc { libraries: &[], ..desc };
+        let lists = OwnedRayTracingDesc::with_modules(&desc, OwnedModules(Vec::new()));
+        lists.with_desc(|owned| assert_eq!(format!("{owned:?}"), format!("{plain:?}")));
+    }
 }

@@ -10,7 +10,6 @@ use super::spirv::passes::strip_primitive_culling::strip_primitive_culling;
 use super::spirv::passes::strip_ray_query::strip_unused_ray_query;
 use super::spirv::words;
 use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
-
 #[cfg(not(feature = "glsl"))]
 use crate::error::Error;
 use crate::error::Result;
@@ -24,6 +23,17 @@ pub(crate) struct CompileFiles<'a> {
     /// Called with each path at which an include is searched, before the search.
     #[cfg(feature = "glsl")]
     pub(crate) on_search: Option<&'a dyn Fn(&Path)>,
+}
+
+impl<'a> CompileFiles<'a> {
+    /// Returns the files of a compilation with this cache.
+    pub(crate) fn with_cache(cache: Option<&'a ShaderCache>) -> Self {
+        Self {
+            cache,
+            #[cfg(feature = "glsl")]
+            on_search: None,
+        }
+    }
 }
 
 /// Returns the SPIR-V of a module.

@@ -3,8 +3,8 @@
 
 use lvk::{
     ColorTarget, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Error, Format, HitGroup,
-    Holder, PendingPipeline, RayTracingPipelineDesc, RenderPipelineDesc, ShaderModuleHandle, ShaderStage,
-    SpecializationConstant, SpecializationValue,
+    Holder, PendingPipeline, RayTracingPipelineDesc, RayTracingPipelineHandle, RenderPipelineDesc,
+    ShaderModuleHandle, ShaderStage, SpecializationConstant, SpecializationValue,
 };
 use lvk_tests::compute::{compute_pipeline, module, read_words, words_buffer};
 use lvk_tests::device;
@@ -196,36 +196,47 @@ fn graphics_pipelines_are_compiled_in_the_background() {
     assert!(error.to_string().contains("no stages"), "{error}");
 }
 
-/// Shaders read their record, so the shader binding table was uploaded.
-#[test]
-fn ray_tracing_pipelines_are_compiled_in_the_background() {
-    let Some(ctx) = device() else { return };
-    if !ctx.capabilities().ray_tracing_pipeline {
-        eprintln!("NOT TESTED, {} has no ray tracing pipelines", ctx.capabilities().device_name);
-        return;
-    }
+const RECORD: u32 = 0x1234_5678;
+
+/// Starts ray tracing pipelines that write their shader record.
+fn start_rays(ctx: &Context, count: usize) -> Vec<PendingPipeline<RayTracingPipelineHandle>> {
     let text = "layout(buffer_reference, scalar) writeonly buffer Words { uint at[]; };
         layout(push_constant, scalar) uniform Push { Words words; };
         layout(shaderRecordEXT, scalar) buffer Record { uint value; } record;
         void main() { words.at[0] = record.value; }";
-    let ray_gen = module(&ctx, ShaderStage::RayGen, text);
-    let hit = module(&ctx, ShaderStage::ClosestHit, "void main() {}");
-    let record = 0x1234_5678_u32.to_ne_bytes();
-    let pending: Vec<_> = (0..4)
-        .map(|_| {
-            let records: &[&[u8]] = &[&record];
-            let desc = RayTracingPipelineDesc {
-                ray_gen: &[*ray_gen],
-                ray_gen_records: records,
-                hit_groups: &[HitGroup { closest_hit: Some(*hit), record: &record, ..Default::default() }],
-                debug_name: "rays",
-                ..Default::default()
-            };
-            ctx.create_ray_tracing_pipeline_in_background(&desc).unwrap()
-        })
-        .collect();
-    drop((ray_gen, hit));
-    for pipeline in pending {
+    let ray_gen = module(ctx, ShaderStage::RayGen, text);
+    let hit = module(ctx, ShaderStage::ClosestHit, "void main() {}");
+    let start = |_| {
+        let record = RECORD.to_ne_bytes();
+        let desc = RayTracingPipelineDesc {
+            ray_gen: &[*ray_gen],
+            ray_gen_records: &[&record],
+            hit_groups: &[HitGroup { closest_hit: Some(*hit), record: &record, ..Default::default() }],
+            debug_name: "rays",
+            ..Default::default()
+        };
+        ctx.create_ray_tracing_pipeline_in_background(&desc).unwrap()
+    };
+    (0..count).map(start).collect()
+}
+
+/// True if the device has ray tracing pipelines. Prints a line if not.
+fn has_rays(ctx: &Context) -> bool {
+    let has = ctx.capabilities().ray_tracing_pipeline;
+    if !has {
+        eprintln!("NOT TESTED, {} has no ray tracing pipelines", ctx.capabilities().device_name);
+    }
+    has
+}
+
+/// Shaders read their record, so the shader binding table was uploaded.
+#[test]
+fn ray_tracing_pipelines_are_compiled_in_the_background() {
+    let Some(ctx) = device() else { return };
+    if !has_rays(&ctx) {
+        return;
+    }
+    for pipeline in start_rays(&ctx, 4) {
         let pipeline = pipeline.wait().unwrap();
         let words = words_buffer(&ctx, &[0]);
         let mut cmd = ctx.acquire_command_buffer().unwrap();
@@ -234,6 +245,23 @@ fn ray_tracing_pipelines_are_compiled_in_the_background() {
         let buffers = &[*words];
         cmd.trace_rays([1, 1, 1], &Dependencies { buffers, ..Default::default() }).unwrap();
         ctx.submit(cmd).unwrap();
-        assert_eq!(read_words(&ctx, *words, 1), [0x1234_5678]);
+        assert_eq!(read_words(&ctx, *words, 1), [RECORD]);
+    }
+}
+
+/// NVIDIA's driver deadlocks if both happen at once, so the library locks them.
+#[test]
+fn devices_come_and_go_while_ray_tracing_pipelines_are_compiled() {
+    let Some(ctx) = device() else { return };
+    if !has_rays(&ctx) {
+        return;
+    }
+    let pending = start_rays(&ctx, 12);
+    for _ in 0..2 {
+        let Some(other) = device() else { return };
+        drop(start_rays(&other, 3));
+    }
+    for pipeline in pending {
+        assert!(pipeline.wait().is_ok());
     }
 }

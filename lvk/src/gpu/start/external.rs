@@ -115,6 +115,9 @@ impl RawContext<'_> {
                     .to_owned(),
             ));
         }
+        if known.contains(OptionalFeature::GraphicsPipelineLibrary) {
+            extensions.push(ash::khr::pipeline_library::NAME);
+        }
         if self.ray_tracing_pipeline || self.ray_query {
             extensions
                 .extend([ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME]);
