@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::graphics_desc::RenderPipelineDesc;
-use super::graphics_parts::Part;
+use super::pipeline_part::Part;
 use super::shader_module::{ModuleLookup, ShaderModule};
 use crate::barrier::Stages;
 use crate::error::Result;

@@ -1,40 +1,15 @@
 //! Produces SPIR-V words from a shader source.
 
 #[cfg(feature = "glsl")]
-use std::path::Path;
-
-#[cfg(feature = "glsl")]
 use super::front_end::compile_cached;
-use super::options::{CompileOptions, compile_error};
+use super::options::{CompileFiles, CompileOptions, compile_error};
 use super::spirv::passes::strip_primitive_culling::strip_primitive_culling;
 use super::spirv::passes::strip_ray_query::strip_unused_ray_query;
 use super::spirv::words;
-use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
+use super::{ShaderModuleDesc, ShaderSource};
 #[cfg(not(feature = "glsl"))]
 use crate::error::Error;
 use crate::error::Result;
-
-/// Files that a compilation reads and writes; the default are includes only.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct CompileFiles<'a> {
-    /// The cache of compiled modules.
-    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only what is compiled is kept"))]
-    pub(crate) cache: Option<&'a ShaderCache>,
-    /// Called with each path at which an include is searched, before the search.
-    #[cfg(feature = "glsl")]
-    pub(crate) on_search: Option<&'a dyn Fn(&Path)>,
-}
-
-impl<'a> CompileFiles<'a> {
-    /// Returns the files of a compilation with this cache.
-    pub(crate) fn with_cache(cache: Option<&'a ShaderCache>) -> Self {
-        Self {
-            cache,
-            #[cfg(feature = "glsl")]
-            on_search: None,
-        }
-    }
-}
 
 /// Returns the SPIR-V of a module.
 ///

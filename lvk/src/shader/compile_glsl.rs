@@ -1,8 +1,8 @@
 //! Compiles GLSL to SPIR-V without a context.
 
 use super::ShaderModuleDesc;
-use super::compile::{CompileFiles, compile};
-use super::options::CompileOptions;
+use super::compile::compile;
+use super::options::{CompileFiles, CompileOptions};
 use super::spirv::reflect::reflect;
 use crate::error::Result;
 use crate::gpu::caps::capabilities::Capabilities;

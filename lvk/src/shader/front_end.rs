@@ -6,10 +6,9 @@ use glslang::error::GlslangError;
 use glslang::limits::ResourceLimits;
 use glslang::{Compiler, CompilerOptions, ShaderInput, ShaderMessage, SpirvVersion, Target, VulkanVersion};
 
-use super::compile::CompileFiles;
 use super::disk_file::{CachedModule, Fingerprint};
 use super::include::Includes;
-use super::options::{CompileOptions, compile_error};
+use super::options::{CompileFiles, CompileOptions, compile_error};
 use super::sanitize::{self, SourceError};
 use super::spirv::debug_source::embed_source;
 use super::spirv::passes::fold_sampled_image::fold_sampled_images;

@@ -20,9 +20,9 @@ const SIZES: &str = "
     void main() {
         if (gl_LocalInvocationIndex == 0) { most = 0; least = 1000; }
         barrier();
-        uint active = subgroupAdd(1);
-        atomicMax(most, active);
-        atomicMin(least, active);
+        uint running = subgroupAdd(1);
+        atomicMax(most, running);
+        atomicMin(least, running);
         barrier();
         if (gl_LocalInvocationIndex == 0) {
             words.at[0] = gl_SubgroupSize;
