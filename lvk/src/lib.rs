@@ -55,6 +55,8 @@
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
+//! | compile pipelines in the background | [`Context::create_render_pipeline_in_background`], [`PendingPipeline`] |
+//! | compile shaders anew when their files change | [`Reloadable`], [`ShaderFiles`] |
 //! | write shaders, in GLSL, Slang or HLSL | [`ShaderModuleDesc`], [`manual::shader_interface`], [`HLSL_HEADER`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | build acceleration structures | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
@@ -121,6 +123,7 @@
 compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
 
 mod accel;
+mod background;
 mod barrier;
 mod bindless;
 mod cache_file;
@@ -132,6 +135,8 @@ mod format;
 mod gpu;
 mod handle;
 mod handle_cache;
+#[cfg(feature = "glsl")]
+mod hot_reload;
 mod kernels;
 mod leak_report;
 mod lock_order;
@@ -182,6 +187,7 @@ pub use context::destroy::Destroy;
 pub use context::frame::Frame;
 pub use context::holder::Holder;
 pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
+pub use context::pending_pipeline::PendingPipeline;
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
@@ -200,6 +206,7 @@ pub use gpu::caps::queues::{QueueInfo, QueueRequest};
 pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
+pub use gpu::caps::subgroup_limits::SubgroupLimits;
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
 pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;
@@ -213,6 +220,8 @@ pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
+#[cfg(feature = "glsl")]
+pub use hot_reload::{Reloadable, ShaderFiles};
 pub use pipeline::blend::{Blend, BlendComponent, BlendFactor, BlendOp, ColorWriteMask};
 pub use pipeline::compute::ComputePipelineDesc;
 pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};

@@ -5,6 +5,7 @@ mod compact;
 pub(crate) mod config;
 mod create;
 pub(crate) mod create_accel;
+mod create_in_background;
 mod create_pipelines;
 mod create_ray_tracing;
 mod create_texture;
@@ -23,6 +24,7 @@ mod index_faults;
 mod interop;
 mod live_objects;
 mod new;
+pub(crate) mod pending_pipeline;
 pub(crate) mod plan_blas;
 mod profiling;
 mod prologue;
@@ -39,6 +41,7 @@ mod window;
 use std::sync::Arc;
 
 use crate::accel::compaction::Compactions;
+use crate::background::BackgroundJobs;
 use crate::command::RecordingStatePool;
 use crate::device_state::DeviceState;
 use crate::gpu::caps::capabilities::Capabilities;
@@ -60,6 +63,8 @@ pub struct Context {
 }
 
 struct ContextInner {
+    /// Pipelines that are compiled in the background. Dropped first, since its jobs use the device.
+    background: BackgroundJobs,
     /// Uploads and builds that run before the next submission.
     prologue: Mutex<Prologue>,
     frames: Mutex<FrameRing>,

@@ -12,6 +12,7 @@ use super::{Context, ContextInner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
+use crate::background::BackgroundJobs;
 use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
@@ -29,7 +30,8 @@ use crate::gpu::start::physical_device::PhysicalDevice;
 use crate::gpu::start::user_extensions::UserExtensions;
 use crate::kernels::Kernels;
 use crate::lock_order::{Mutex, Rank};
-use crate::pipeline::{PipelineCache, PipelineLayout};
+use crate::parallel::core_count;
+use crate::pipeline::{GraphicsParts, PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shader::ShaderCache;
@@ -72,6 +74,7 @@ impl Context {
     pub(super) fn with_gpu(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
         let shared = Arc::new(new_device_state(gpu, desc)?);
         let inner = ContextInner {
+            background: BackgroundJobs::new(core_count() / 2),
             prologue: Mutex::new(Rank::Pending, Prologue::default()),
             compactions: Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),
@@ -186,6 +189,7 @@ fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState
         shader_cache: desc.shader_cache.map(ShaderCache::new),
         #[cfg(feature = "software-ray-query")]
         tree_cache: desc.tree_cache.map(crate::software_ray_query::bvh_cache::BvhCache::new),
+        graphics_parts: GraphicsParts::new(),
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),

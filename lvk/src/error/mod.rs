@@ -30,7 +30,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 ///   [`LimitExceeded`](Error::LimitExceeded);
 /// * failures at run time: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory),
 ///   [`OutOfHostMemory`](Error::OutOfHostMemory), [`File`](Error::File), [`DeviceLost`](Error::DeviceLost),
-///   [`Vulkan`](Error::Vulkan).
+///   [`Vulkan`](Error::Vulkan); [`Creation`](Error::Creation) adds the name of an object to one of these.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -130,7 +130,7 @@ pub enum Error {
         /// Output of the compiler, with the line numbers of the caller's source.
         log: String,
     },
-    /// A file could not be written.
+    /// A file could not be read or written.
     #[error("file '{}': {message}", path.display())]
     File {
         /// The file.
@@ -195,6 +195,14 @@ pub enum Error {
         /// Fault report of the driver, if it provides one and a submission or wait detected the loss.
         fault: Option<Arc<DeviceFault>>,
     },
+    /// The creation of an object failed with an error that does not name the object.
+    #[error("{object}: {source}")]
+    Creation {
+        /// Debug name of the object.
+        object: String,
+        /// The error.
+        source: Box<Self>,
+    },
     /// Any other error of the driver.
     #[error("{call} failed: {result}")]
     Vulkan {
@@ -219,6 +227,19 @@ impl Error {
         }
     }
 
+    /// Adds the name of the object whose creation failed, if the error has no name of its own.
+    pub(crate) fn with_object(self, object: &str) -> Self {
+        match self {
+            Self::OutOfDeviceMemory { bytes: 0, .. } => {
+                Self::OutOfDeviceMemory { object: object.to_owned(), bytes: 0 }
+            }
+            Self::Vulkan { .. } | Self::OutOfHostMemory { .. } | Self::StaleHandle { .. } => {
+                Self::Creation { object: object.to_owned(), source: Box::new(self) }
+            }
+            named => named,
+        }
+    }
+
     /// Returns the error for a mistake of the caller about `object`.
     pub(crate) fn usage(object: impl Into<String>, message: impl Into<String>) -> Self {
         Self::InvalidUsage { object: object.into(), message: message.into() }
@@ -240,4 +261,25 @@ pub(crate) fn check_limit(object: &str, what: &'static str, requested: u64, limi
         return Ok(());
     }
     Err(Error::LimitExceeded { object: object.to_owned(), what, requested, limit })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_without_a_name_get_that_of_the_object() {
+        let text = |error: Error| error.with_object("water").to_string();
+        let failed = Error::vulkan("vkCreateGraphicsPipelines");
+        assert_eq!(
+            text(failed(vk::Result::ERROR_UNKNOWN)),
+            format!("water: vkCreateGraphicsPipelines failed: {}", vk::Result::ERROR_UNKNOWN)
+        );
+        let memory = Error::vulkan("vkCreateGraphicsPipelines")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        assert!(text(memory).contains("'water'"));
+        assert!(text(Error::OutOfHostMemory { call: "vkCreateShaderModule" }).starts_with("water: out of"));
+        assert_eq!(text(Error::usage("grass", "is green")), "grass: is green", "it has a name");
+        let lost = Error::DeviceLost { call: "vkQueueSubmit2", fault: None };
+        assert!(matches!(lost.with_object("water"), Error::DeviceLost { .. }));
+    }
 }

@@ -509,7 +509,8 @@ pub(super) fn device_extensions<'a>(
     caps: &Capabilities,
     extra: &UserExtensions<'a>,
 ) -> Vec<&'a CStr> {
-    let libraries = caps.pipeline_libraries.then_some(ash::khr::pipeline_library::NAME);
+    let links = caps.pipeline_libraries || caps.has(OptionalFeature::GraphicsPipelineLibrary);
+    let libraries = links.then_some(ash::khr::pipeline_library::NAME);
     let subset = caps.portability_subset.then_some(ash::khr::portability_subset::NAME);
     let own = features.extensions().chain(caps.optional.extensions()).chain(libraries).chain(subset);
     let mut names: Vec<&'a CStr> = own.map(|name| -> &'a CStr { name }).collect();

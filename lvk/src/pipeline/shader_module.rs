@@ -10,7 +10,7 @@ use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::spirv::reflect::reflect;
-use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};
+use crate::shader::{CompileFiles, CompileOptions, Reflection, ShaderModuleDesc, ShaderStage};
 use crate::shader::{check_capabilities, check_stage, compile, with_checked_indices};
 
 /// Finds the module of a handle.
@@ -30,12 +30,12 @@ impl ShaderModule {
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         desc: &ShaderModuleDesc<'_>,
-        cache: Option<&ShaderCache>,
+        files: CompileFiles<'_>,
         bindless: Option<&Bindless>,
         max_push_bytes: u32,
     ) -> Result<Self> {
         check_stage(desc.debug_name, desc.stage, &gpu.features)?;
-        let words = compile(desc, &CompileOptions::from_capabilities(&gpu.caps), cache)?;
+        let words = compile(desc, &CompileOptions::from_capabilities(&gpu.caps), files)?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
         let extra = &gpu.extra_capabilities;

@@ -2,7 +2,7 @@
 
 use super::ShaderModuleDesc;
 use super::compile::compile;
-use super::options::CompileOptions;
+use super::options::{CompileFiles, CompileOptions};
 use super::spirv::reflect::reflect;
 use crate::error::Result;
 use crate::gpu::caps::capabilities::Capabilities;
@@ -20,7 +20,7 @@ use crate::gpu::caps::capabilities::Capabilities;
 /// [`Error::Shader`](crate::Error::Shader) with the compiler's text, or if the module declares resources outside the
 /// bindless set.
 pub fn compile_glsl(desc: &ShaderModuleDesc<'_>, capabilities: &Capabilities) -> Result<Vec<u32>> {
-    let words = compile(desc, &CompileOptions::from_capabilities(capabilities), None)?;
+    let words = compile(desc, &CompileOptions::from_capabilities(capabilities), CompileFiles::default())?;
     reflect(desc.debug_name, desc.stage, &words)?;
     Ok(words)
 }

@@ -26,7 +26,7 @@ pub(crate) use compile::compile;
 pub use compile_glsl::compile_glsl;
 pub(crate) use disk_cache::ShaderCache;
 pub use disk_cache::ShaderCacheStats;
-pub(crate) use options::CompileOptions;
+pub(crate) use options::{CompileFiles, CompileOptions};
 pub(crate) use spirv::capabilities::{check_capabilities, check_stage};
 pub(crate) use spirv::hit_builtins::find_raw_hit_builtin;
 pub(crate) use spirv::input_attachments::InputRead;

@@ -136,7 +136,12 @@ fn pipeline(
     specialization: &[SpecializationConstant],
 ) -> lvk::Result<Holder<ComputePipelineHandle>> {
     let (shader, debug_name) = (module(ctx, stage, &[])?, stage.name);
-    ctx.create_compute_pipeline(&ComputePipelineDesc { module: Some(*shader), specialization, debug_name })
+    ctx.create_compute_pipeline(&ComputePipelineDesc {
+        module: Some(*shader),
+        specialization,
+        debug_name,
+        ..ComputePipelineDesc::default()
+    })
 }
 
 /// A list with room for items of `bytes` in all.

@@ -161,6 +161,7 @@ impl Stages {
             module: Some(*shader),
             specialization: &self.specialization,
             debug_name: stage.name,
+            ..ComputePipelineDesc::default()
         })
     }
 }

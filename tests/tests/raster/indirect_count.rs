@@ -204,6 +204,7 @@ fn pipelines_made_at_once_are_those_made_one_by_one() {
             module: (number != 7).then_some(*compute),
             specialization,
             debug_name: "one of many",
+            ..Default::default()
         })
         .collect();
     let made = ctx.create_compute_pipelines(&descs);

@@ -3,6 +3,7 @@
 mod blending;
 mod draws;
 mod errors;
+mod fast_link;
 mod indirect_count;
 mod layers;
 mod local_read;

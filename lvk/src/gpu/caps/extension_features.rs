@@ -20,6 +20,7 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) border_color: vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'static>,
     pub(crate) host_image_copy: vk::PhysicalDeviceHostImageCopyFeaturesEXT<'static>,
     pub(crate) maintenance5: vk::PhysicalDeviceMaintenance5FeaturesKHR<'static>,
+    pub(crate) graphics_library: vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'static>,
     pub(crate) fault: vk::PhysicalDeviceFaultFeaturesEXT<'static>,
     pub(crate) swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'static>,
     /// All true on devices without `VK_KHR_portability_subset`.
@@ -81,6 +82,9 @@ impl ExtensionFeatures {
         }
         if has(ash::khr::maintenance5::NAME) {
             all = all.push_next(&mut self.maintenance5);
+        }
+        if has(ash::ext::graphics_pipeline_library::NAME) {
+            all = all.push_next(&mut self.graphics_library);
         }
         if has(ash::ext::device_fault::NAME) {
             all = all.push_next(&mut self.fault);

@@ -6,6 +6,7 @@ use super::descriptor_limits::{DescriptorLimits, ReservedDescriptors};
 use super::mesh_limits::MeshLimits;
 use super::resolve_modes::DepthResolveLimits;
 use super::shading_rate::ShadingRateLimits;
+use super::subgroup_limits::SubgroupLimits;
 
 /// Number of TLAS descriptors that the library requests. Fewer if the device allows fewer.
 const WANTED_TLAS: u32 = 256;
@@ -121,6 +122,8 @@ pub struct Limits {
     pub sbt_base_alignment: u32,
     /// Maximum stride of a shader binding table in bytes (`maxShaderGroupStride`).
     pub sbt_max_stride: u32,
+    /// Limits of subgroups.
+    pub subgroup: SubgroupLimits,
     /// Limits of task and mesh shaders.
     pub mesh: MeshLimits,
 }

@@ -166,6 +166,12 @@ pub enum OptionalFeature {
     CalibratedTimestamps,
     /// Budget and use of each memory heap (`VK_EXT_memory_budget`).
     MemoryBudget,
+    /// Graphics pipelines that are linked from parts (`graphicsPipelineLibrary`).
+    GraphicsPipelineLibrary,
+    /// Compute pipelines that choose the size of their subgroups (`subgroupSizeControl`).
+    SubgroupSizeControl,
+    /// Compute pipelines whose subgroups are full (`computeFullSubgroups`).
+    ComputeFullSubgroups,
     /// Fault report of a lost device (`deviceFault`).
     DeviceFault,
     /// Presenting to windows (`VK_KHR_swapchain`).
@@ -352,7 +358,7 @@ struct FeatureRow {
 }
 
 #[rustfmt::skip]
-const ROWS: [FeatureRow; 98] = [
+const ROWS: [FeatureRow; 101] = [
     FeatureRow { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, field: |f| &mut f.core.full_draw_index_uint32 },
     FeatureRow { feature: F::CubeArrays, name: "imageCubeArray", extension: None, field: |f| &mut f.core.image_cube_array },
     FeatureRow { feature: F::GeometryShader, name: "geometryShader", extension: None, field: |f| &mut f.core.geometry_shader },
@@ -428,6 +434,9 @@ const ROWS: [FeatureRow; 98] = [
     FeatureRow { feature: F::Maintenance5, name: "maintenance5", extension: Some(ash::khr::maintenance5::NAME), field: |f| &mut f.ext.maintenance5.maintenance5 },
     FeatureRow { feature: F::CalibratedTimestamps, name: "VK_KHR_calibrated_timestamps", extension: None, field: |f| &mut f.ext.calibrated_timestamps },
     FeatureRow { feature: F::MemoryBudget, name: "VK_EXT_memory_budget", extension: Some(ash::ext::memory_budget::NAME), field: |f| &mut f.ext.memory_budget },
+    FeatureRow { feature: F::GraphicsPipelineLibrary, name: "graphicsPipelineLibrary", extension: Some(ash::ext::graphics_pipeline_library::NAME), field: |f| &mut f.ext.graphics_library.graphics_pipeline_library },
+    FeatureRow { feature: F::SubgroupSizeControl, name: "subgroupSizeControl", extension: None, field: |f| &mut f.v13.subgroup_size_control },
+    FeatureRow { feature: F::ComputeFullSubgroups, name: "computeFullSubgroups", extension: None, field: |f| &mut f.v13.compute_full_subgroups },
     FeatureRow { feature: F::DeviceFault, name: "deviceFault", extension: Some(ash::ext::device_fault::NAME), field: |f| &mut f.ext.fault.device_fault },
     FeatureRow { feature: F::Swapchain, name: "VK_KHR_swapchain", extension: Some(ash::khr::swapchain::NAME), field: |f| &mut f.ext.swapchain },
     FeatureRow { feature: F::SwapchainMaintenance1, name: "swapchainMaintenance1", extension: Some(ash::ext::swapchain_maintenance1::NAME), field: |f| &mut f.ext.swapchain_maintenance1.swapchain_maintenance1 },

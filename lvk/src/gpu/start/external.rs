@@ -174,6 +174,10 @@ impl RawContext<'_> {
             let user = "the feature VK_KHR_calibrated_timestamps in `features`";
             return Err(lacks_extension(ash::khr::calibrated_timestamps::NAME, user));
         }
+        let library = ash::khr::pipeline_library::NAME;
+        if known.contains(OptionalFeature::GraphicsPipelineLibrary) && !self.has_extension(library) {
+            return Err(lacks_extension(library, "the feature graphicsPipelineLibrary in `features`"));
+        }
         self.check_instance_extensions(known)?;
         self.check_flags(found)
     }

@@ -30,7 +30,7 @@ fn desc(stage: ShaderStage, text: &str) -> ShaderModuleDesc<'_> {
 }
 
 fn build(desc: &ShaderModuleDesc<'_>) -> Result<Vec<u32>> {
-    compile(desc, &CompileOptions::default(), None)
+    compile(desc, &CompileOptions::default(), CompileFiles::default())
 }
 
 fn words(stage: ShaderStage, text: &str) -> Vec<u32> {

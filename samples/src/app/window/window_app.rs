@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Rect, ViewportInfo, vec2};
-use lvk::{Context, SubmitHandle, ValidationSink, WindowHandles};
+use lvk::{Context, ShaderFiles, SubmitHandle, ValidationSink, WindowHandles};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, WindowEvent};
@@ -23,7 +23,7 @@ use super::ui_input::{UiInput, notches};
 use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
-use crate::app::hot_reload::{ShaderWatch, reload};
+use crate::app::hot_reload::reload;
 use crate::app::print_line;
 use crate::app::run_args::RunArgs;
 use crate::app::run_error::RunError;
@@ -208,7 +208,7 @@ struct Running<S> {
     ui_input: UiInput,
     resize: ResizeDebounce,
     finger: Finger,
-    watch: Option<ShaderWatch>,
+    shader_files: Option<ShaderFiles>,
     camera_controller: CameraController,
     clock: Clock,
     /// The time that the sample shows.
@@ -245,7 +245,7 @@ impl<S: Sample> Running<S> {
             ui_input: UiInput::default(),
             resize: ResizeDebounce::new([args.width, args.height]),
             finger: Finger::default(),
-            watch: shader_folder::folder().map(|folder| ShaderWatch::new(&folder)),
+            shader_files: shader_folder::watched_files(),
             camera_controller: CameraController::new(),
             clock: Clock::new(Instant::now()),
             at: None,
@@ -439,7 +439,7 @@ impl<S: Sample> Running<S> {
     /// Applies changes of size, shaders, time and camera.
     fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
         self.follow_size();
-        if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {
+        if self.shader_files.as_ref().is_some_and(ShaderFiles::changed) {
             self.reload();
         }
         let steering = self.controls.take_steering();
