@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_is_taken() {
+    fn sizes_within_the_limits_are_accepted() {
         for (size, full, workgroup) in [
             (None, false, [7, 3, 1]),
             (None, true, [128, 3, 1]),

@@ -128,7 +128,7 @@ fn every_feature_reaches_a_chain_of_promoted_structures() {
 }
 
 #[test]
-fn what_the_engine_has_on_stays_on() {
+fn features_of_the_engine_stay_on() {
     let mut wanted = Features::default();
     wanted.core.shader_int64 = vk::TRUE;
     wanted.v12.timeline_semaphore = vk::TRUE;
