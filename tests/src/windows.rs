@@ -1,5 +1,5 @@
 //! Windows for tests, on an X server of their own without a screen.
-#![expect(clippy::expect_used, reason = "a test whose X server fails has failed")]
+#![expect(clippy::expect_used, clippy::panic, reason = "a test whose X server fails has failed")]
 
 use std::ffi::c_void;
 use std::num::NonZeroU32;
