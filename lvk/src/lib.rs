@@ -190,6 +190,8 @@ pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::pending_pipeline::PendingPipeline;
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+#[doc(hidden)]
+pub use error::causes::with_causes;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use error::driver_report::{

@@ -1,10 +1,12 @@
 //! The error type of the library.
 
+pub(crate) mod causes;
 pub(crate) mod device_candidate;
 pub(crate) mod device_fault;
 mod driver_remedies;
 pub(crate) mod driver_report;
 mod driver_report_text;
+mod platform_remedies;
 
 use std::path::PathBuf;
 use std::sync::Arc;
