@@ -122,6 +122,11 @@
 #[cfg(target_endian = "big")]
 compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
 
+/// Compiles the program of the README.
+#[cfg(all(doctest, feature = "glsl"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod accel;
 mod background;
 mod barrier;
