@@ -42,3 +42,4 @@ pub mod windows {}
 
 #[doc = include_str!("parity.md")]
 pub mod parity {}
+
