@@ -67,6 +67,7 @@
 //! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
 //! | use raw Vulkan calls, or another engine's device | [`manual::interop`], [`Context::requirements`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
+//! | port a program | [`manual::from_lightweightvk`], [`manual::from_wgpu`] |
 //! | learn the concepts | [`manual`] |
 //!
 //! # Barriers

@@ -12,6 +12,7 @@ mod layers;
 mod map;
 mod package;
 mod parity;
+mod porting;
 mod programs;
 mod readme;
 mod rust_modules;
