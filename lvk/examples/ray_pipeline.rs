@@ -11,11 +11,11 @@ const RAY_GEN: &str = r"
     }";
 const MISS: &str = r"
     layout(location = 0) rayPayloadInEXT vec3 color;
-    layout(shaderRecordEXT, scalar) readonly buffer Record { vec3 sky; };
+    layout(shaderRecordEXT, scalar) buffer Record { vec3 sky; };
     void main() { color = sky; }";
 const CLOSEST_HIT: &str = r"
     layout(location = 0) rayPayloadInEXT vec3 color;
-    layout(shaderRecordEXT, scalar) readonly buffer Record { vec3 surface; float stripes; };
+    layout(shaderRecordEXT, scalar) buffer Record { vec3 surface; float stripes; };
     hitAttributeEXT vec2 barycentrics;
     void main() {
         bool bright = fract(barycentrics.y * stripes) < 0.5;

@@ -53,14 +53,15 @@ impl Example {
         self.command.env("LD_LIBRARY_PATH", folders);
     }
 
-    /// Runs the example to its end and returns its output.
+    /// Runs the example to its end and returns its output, without the line by which the layer names its log.
     fn output(&mut self) -> String {
         let output = self.command.output().unwrap();
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         let (out, err) = (text(&output.stdout), text(&output.stderr));
         assert!(output.status.success(), "{out}{err}");
         self.assert_valid();
-        out
+        let lines = out.lines().filter(|line| !line.starts_with("Validation Layer Info"));
+        lines.map(|line| format!("{line}\n")).collect()
     }
 
     /// The layer creates its log when it is loaded.
