@@ -10,9 +10,9 @@ const SHADER: &str = r"
     void main() { result.value[gl_LocalInvocationIndex] = 7 * gl_LocalInvocationIndex; }";
 const COUNT: usize = 8;
 
-/// An engine that made a device by itself, a buffer that it reads, and a timeline semaphore.
+/// What an engine made on its device: a buffer that it reads, and a timeline semaphore.
 struct Engine {
-    raw: RawContext<'static>,
+    device: ash::Device,
     buffer: vk::Buffer,
     memory: vk::DeviceMemory,
     done: vk::Semaphore,
@@ -20,71 +20,50 @@ struct Engine {
 
 impl Engine {
     /// # Safety
-    /// Every handle is of the instance and the device made here. Those of `lvk` are dropped before.
-    unsafe fn new() -> Result<Self, Box<dyn std::error::Error>> {
-        let version = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-        let info = vk::InstanceCreateInfo::default().application_info(&version);
-        let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
-        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
-        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
-        let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-        // SAFETY: as above.
+    /// `types` are the memory types of the device.
+    unsafe fn new(device: ash::Device, types: &[vk::MemoryType]) -> Result<Self, Box<dyn std::error::Error>> {
+        let transfer = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
+        let shader = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        let info = vk::BufferCreateInfo::default().size(4 * COUNT as u64).usage(transfer | shader);
+        let host = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+        let address = vk::MemoryAllocateFlags::DEVICE_ADDRESS;
+        let mut address = vk::MemoryAllocateFlagsInfo::default().flags(address);
+        let timeline = vk::SemaphoreType::TIMELINE;
+        let mut timeline = vk::SemaphoreTypeCreateInfo::default().semaphore_type(timeline);
+        // SAFETY: the descriptions are valid, and the memory is large enough and of a type that the buffer may have.
         unsafe {
-            let entry = ash::Entry::load()?;
-            let instance = entry.create_instance(&info, None)?;
-            let physical = *instance.enumerate_physical_devices()?.first().ok_or("no device")?;
-            // All that the device has; `Context::from_raw` lists what a context needs.
-            instance.get_physical_device_features2(physical, &mut features);
-            features.features.robust_buffer_access = vk::FALSE;
-            let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut features);
-            let device = instance.create_device(physical, &info, None)?;
-            let queue = device.get_device_queue(0, 0);
-            let transfer = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
-            let shader = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
-            let info = vk::BufferCreateInfo::default().size(4 * COUNT as u64).usage(transfer | shader);
             let buffer = device.create_buffer(&info, None)?;
             let needed = device.get_buffer_memory_requirements(buffer);
-            let types = instance.get_physical_device_memory_properties(physical).memory_types;
-            let host = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-            let fits = |index: &u32| needed.memory_type_bits >> index & 1 == 1;
-            let memory_type = (0..32).filter(fits).find(|&i| types[i as usize].property_flags.contains(host));
-            let address = vk::MemoryAllocateFlags::DEVICE_ADDRESS;
-            let mut address = vk::MemoryAllocateFlagsInfo::default().flags(address);
+            let fits = |index: &usize| needed.memory_type_bits >> index & 1 == 1;
+            let memory_type =
+                (0..types.len()).filter(fits).find(|&index| types[index].property_flags.contains(host));
             let info = vk::MemoryAllocateInfo::default().allocation_size(needed.size).push_next(&mut address);
-            let info = info.memory_type_index(memory_type.ok_or("no memory for the host")?);
+            let info = info.memory_type_index(memory_type.ok_or("no memory for the host")? as u32);
             let memory = device.allocate_memory(&info, None)?;
             device.bind_buffer_memory(buffer, memory, 0)?;
-            let timeline = vk::SemaphoreType::TIMELINE;
-            let mut timeline = vk::SemaphoreTypeCreateInfo::default().semaphore_type(timeline);
             let info = vk::SemaphoreCreateInfo::default().push_next(&mut timeline);
             let done = device.create_semaphore(&info, None)?;
-            let raw = RawContext {
-                entry,
-                instance,
-                instance_extensions: &[],
-                physical_device: physical,
-                device,
-                device_extensions: &[],
-                features: FeatureSet::NONE,
-                ray_tracing_pipeline: false,
-                ray_query: false,
-                mesh_shader: false,
-                queue,
-                queue_family: 0,
-                compute_queue: None,
-                transfer_queue: None,
-            };
-            Ok(Self { raw, buffer, memory, done })
+            Ok(Self { device, buffer, memory, done })
+        }
+    }
+
+    /// Waits for the semaphore, and returns the numbers.
+    fn read(&self) -> Result<[u32; COUNT], vk::Result> {
+        let info = vk::SemaphoreWaitInfo::default().semaphores(std::slice::from_ref(&self.done)).values(&[1]);
+        // SAFETY: the memory has the size of the numbers, is mapped once, and nothing writes it any more.
+        unsafe {
+            self.device.wait_semaphores(&info, u64::MAX)?;
+            let mapped =
+                self.device.map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())?;
+            Ok(*mapped.cast::<[u32; COUNT]>())
         }
     }
 }
 
 /// Writes with `lvk` what the engine reads.
-fn write_as_guest(engine: &Engine) -> Result<()> {
+fn write_as_guest(ctx: &Context, engine: &Engine) -> Result<()> {
     let (buffer, size_bytes, usage) = (engine.buffer, 4 * COUNT as u64, BufferUsage::STORAGE);
     let import = ImportedBuffer { buffer, size_bytes, usage, concurrent: false, debug_name: "numbers" };
-    // SAFETY: the engine's objects belong together and outlive the context, and every needed feature is on.
-    let ctx = unsafe { Context::from_raw(engine.raw.clone(), &ContextDesc::default())? };
     // SAFETY: the buffer is as described, and the engine does not use it until its semaphore is signalled.
     let numbers = unsafe { ctx.import_buffer(&import)? };
     let (stage, source) = (ShaderStage::Compute, ShaderSource::Glsl(SHADER));
@@ -100,20 +79,29 @@ fn write_as_guest(engine: &Engine) -> Result<()> {
 }
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // SAFETY: `write_as_guest` drops everything of `lvk`; the memory is read after the last write.
+    let version = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+    let info = vk::InstanceCreateInfo::default().application_info(&version);
+    let desc = ContextDesc::default();
+    // SAFETY: the handles belong together, and are destroyed after the context and what it made.
     unsafe {
-        let engine = Engine::new()?;
-        write_as_guest(&engine)?;
-        let Engine { raw: RawContext { device, instance, .. }, buffer, memory, done } = &engine;
-        let info = vk::SemaphoreWaitInfo::default().semaphores(std::slice::from_ref(done)).values(&[1]);
-        device.wait_semaphores(&info, u64::MAX)?;
-        let mapped = device.map_memory(*memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())?;
-        println!("{:?}", *mapped.cast::<[u32; COUNT]>());
-        device.destroy_semaphore(*done, None);
-        device.destroy_buffer(*buffer, None);
-        device.free_memory(*memory, None);
+        let entry = ash::Entry::load()?;
+        let instance = entry.create_instance(&info, None)?;
+        let physical = *instance.enumerate_physical_devices()?.first().ok_or("no device")?;
+        let needs = Context::requirements(&entry, &instance, &[], physical, &desc)?;
+        let (queues, mut chain) = (needs.queue_create_infos(), needs.feature_chain());
+        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+        let device = instance.create_device(physical, &chain.merge_into(info)?, None)?;
+        let memory = instance.get_physical_device_memory_properties(physical);
+        let engine = Engine::new(device.clone(), memory.memory_types_as_slice())?;
+        let ctx = Context::from_raw(needs.raw_context(device.clone(), needs.queues(&device)), &desc)?;
+        write_as_guest(&ctx, &engine)?;
+        println!("{:?}", engine.read()?);
+        drop((ctx, needs));
+        device.destroy_semaphore(engine.done, None);
+        device.destroy_buffer(engine.buffer, None);
+        device.free_memory(engine.memory, None);
         device.destroy_device(None);
         instance.destroy_instance(None);
-        Ok(())
     }
+    Ok(())
 }
