@@ -67,6 +67,7 @@
 //! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
 //! | use raw Vulkan calls, or another engine's device | [`manual::interop`], [`Context::requirements`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
+//! | port a program | [`manual::from_lightweightvk`], [`manual::from_wgpu`] |
 //! | learn the concepts | [`manual`] |
 //!
 //! # Barriers
@@ -121,6 +122,11 @@
 
 #[cfg(target_endian = "big")]
 compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
+
+/// Compiles the program of the README.
+#[cfg(all(doctest, feature = "glsl"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod accel;
 mod background;
