@@ -189,6 +189,7 @@ pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault}
 pub use error::driver_report::{
     DriverManifest, DriverReport, LoaderReport, ManifestOutcome, SearchedPath, VulkanReport,
 };
+pub use error::limit_origin::LimitOrigin;
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;

@@ -138,7 +138,7 @@ impl RayTracingLibrary {
         let name = desc.debug_name;
         gpu.ray_tracing_functions()?;
         if !gpu.caps.pipeline_libraries {
-            return Err(gpu.unsupported(&format!("ray tracing library '{name}': pipeline libraries")));
+            return Err(gpu.unsupported(&format!("pipeline libraries, of which '{name}' is one")));
         }
         let desc = &desc.as_pipeline();
         check_interface(gpu, desc)?;

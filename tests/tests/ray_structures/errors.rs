@@ -198,7 +198,8 @@ fn refits_that_are_not_possible_are_refused() -> Result<()> {
         intact.refuse("so rebuild", |cmd| cmd.update_tlas(*updatable, &other, BuildMode::Refit))?;
     }
     for mode in [BuildMode::Refit, BuildMode::Rebuild] {
-        let words = "of six: instance count is 7";
+        let words = "of six: instance count is 7, the TLAS was created for at most 6; create it with a larger \
+                     TlasDesc::capacity";
         intact.refuse(words, |cmd| cmd.update_tlas(*updatable, &[one; 7], mode))?;
     }
     intact.refuse("instance count is 2", |cmd| cmd.update_tlas(tlas, &[one; 2], BuildMode::Rebuild))?;
