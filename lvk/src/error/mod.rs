@@ -5,6 +5,7 @@ pub(crate) mod device_fault;
 mod driver_remedies;
 pub(crate) mod driver_report;
 mod driver_report_text;
+pub(crate) mod layout_difference;
 pub(crate) mod limit_origin;
 
 use std::fmt;
@@ -18,6 +19,7 @@ use device_candidate::DeviceCandidate;
 use device_fault::DeviceFault;
 use driver_report::DriverReport;
 use driver_report_text::no_device_text;
+use layout_difference::{LayoutDifference, differences_text};
 use limit_origin::LimitOrigin;
 
 /// Result of every fallible call of the library.
@@ -27,6 +29,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// * mistakes of the caller: [`StaleHandle`](Error::StaleHandle), [`ForeignHandle`](Error::ForeignHandle),
 ///   [`InvalidUsage`](Error::InvalidUsage),
 ///   [`WrongQueue`](Error::WrongQueue), [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants),
+///   [`LayoutMismatch`](Error::LayoutMismatch), [`ShaderRecord`](Error::ShaderRecord),
 ///   [`Serialized`](Error::Serialized), [`OverBudget`](Error::OverBudget),
 ///   [`UploadTooLarge`](Error::UploadTooLarge);
 /// * missing support by the device or its driver: [`NoVulkan`](Error::NoVulkan),
@@ -143,6 +146,40 @@ pub enum Error {
         offset: u32,
         /// Number of bytes pushed.
         size: u32,
+    },
+    /// A Rust struct and the block of a shader that reads its bytes have different members.
+    #[error(
+        "pipeline '{pipeline}': the struct {struct_name} differs from the {block} of shader '{shader}': {}",
+        differences_text(differences)
+    )]
+    LayoutMismatch {
+        /// Debug name of the pipeline or library.
+        pipeline: String,
+        /// Debug name of the shader module.
+        shader: String,
+        /// Kind and name of the block.
+        block: String,
+        /// Name of the Rust struct.
+        struct_name: &'static str,
+        /// The differences, at least one.
+        differences: Vec<LayoutDifference>,
+    },
+    /// A shader reads more bytes of its record than the record has.
+    #[error(
+        "pipeline '{pipeline}': the record of {group} has {size} bytes, but shader '{shader}' reads {expected} bytes; make \
+         the Rust struct match the shader's block"
+    )]
+    ShaderRecord {
+        /// Debug name of the pipeline or library.
+        pipeline: String,
+        /// The shader or hit group that has the record: its kind, and its number in the list of the description.
+        group: String,
+        /// Debug name of the shader module.
+        shader: String,
+        /// Number of bytes that the shader declares.
+        expected: u64,
+        /// Number of bytes of the record.
+        size: u64,
     },
     /// A shader did not compile, or its SPIR-V cannot be used.
     #[error("shader '{name}': {log}")]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::block_layout::{BlockLayout, check_layouts};
 use super::pipeline_layout::PipelineBase;
 use super::shader_module::ShaderModule;
 use super::stage::{Specialization, SpecializationConstant, stage_info};
@@ -21,13 +22,15 @@ pub struct ComputePipelineDesc<'a> {
     pub module: Option<ShaderModuleHandle>,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
+    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    pub layouts: &'a [BlockLayout<'a>],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
 
 impl Default for ComputePipelineDesc<'_> {
     fn default() -> Self {
-        Self { module: None, specialization: &[], debug_name: "compute pipeline" }
+        Self { module: None, specialization: &[], layouts: &[], debug_name: "compute pipeline" }
     }
 }
 
@@ -49,6 +52,7 @@ impl ComputePipeline {
     ) -> Result<Self> {
         module.check_stage(ShaderStage::Compute)?;
         let name = desc.debug_name;
+        check_layouts(name, desc.layouts, std::iter::once(module))?;
         let limits = &gpu.caps.limits;
         let largest = WorkgroupLimits {
             size: limits.max_workgroup_size,

@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use super::block_layout::check_layouts;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
 use super::local_read::check_inputs;
 use super::portability::check_strides;
@@ -84,6 +85,7 @@ pub(super) fn check_modules(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &
     for (module, stage) in stages {
         module.as_ref().map_or(Ok(()), |module| module.check_stage(stage))?;
     }
+    check_layouts(name, desc.layouts, modules.iter())?;
     let targets = desc.color.len() as u64;
     check_limit(name, "colour target count", targets, gpu.caps.limits.max_color_targets.into())?;
     desc.color.iter().try_for_each(|target| check_color(gpu, name, target))?;

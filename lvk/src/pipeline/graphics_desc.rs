@@ -1,6 +1,7 @@
 //! Descriptions of graphics pipelines.
 
 use super::blend::{Blend, ColorWriteMask};
+use super::block_layout::BlockLayout;
 use super::depth_stencil::{DepthTest, StencilTest};
 use super::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
 use super::rendering_formats::RenderingFormats;
@@ -126,6 +127,8 @@ pub struct RenderPipelineDesc<'a> {
     pub shading_rate: Option<ShadingRate>,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
+    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    pub layouts: &'a [BlockLayout<'a>],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
@@ -166,6 +169,7 @@ impl Default for RenderPipelineDesc<'_> {
             view_mask: 0,
             shading_rate: None,
             specialization: &[],
+            layouts: &[],
             debug_name: "render pipeline",
         }
     }

@@ -188,7 +188,7 @@ fn a_released_object_outlives_its_holder() {
     assert_eq!(kept, copy);
     assert_eq!(read_words(&ctx, kept, 1), [5]);
     ctx.destroy(kept);
-    stale(ctx.buffer_address(kept), "buffer");
+    Refusal::Stale.expect(ctx.buffer_address(kept), "buffer");
 }
 
 fn drop_and_expect_stale<H: Destroy>(ctx: &Context, holder: Holder<H>, check: impl FnOnce(&Context, H)) {
@@ -201,12 +201,16 @@ fn drop_and_expect_stale<H: Destroy>(ctx: &Context, holder: Holder<H>, check: im
 fn dropping_a_holder_destroys() {
     let Some(ctx) = device() else { return };
     drop_and_expect_stale(&ctx, words_buffer(&ctx, &[1]), |ctx, handle| {
-        stale(ctx.buffer_address(handle), "buffer")
+        Refusal::Stale.expect(ctx.buffer_address(handle), "buffer")
     });
     let texture = ctx.create_texture(&TextureDesc::default()).unwrap();
-    drop_and_expect_stale(&ctx, texture, |ctx, handle| stale(ctx.raw_image(handle), "texture"));
+    drop_and_expect_stale(&ctx, texture, |ctx, handle| {
+        Refusal::Stale.expect(ctx.raw_image(handle), "texture")
+    });
     let sampler = ctx.create_sampler(&SamplerDesc::default()).unwrap();
-    drop_and_expect_stale(&ctx, sampler, |ctx, handle| stale(ctx.raw_sampler(handle), "sampler"));
+    drop_and_expect_stale(&ctx, sampler, |ctx, handle| {
+        Refusal::Stale.expect(ctx.raw_sampler(handle), "sampler")
+    });
 }
 
 #[test]
