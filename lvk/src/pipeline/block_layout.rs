@@ -36,19 +36,19 @@ use crate::shader::spirv::blocks::{Block, BlockKind};
 /// # Ok(()) }
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BlockLayout<'a> {
-    target: BlockTarget<'a>,
+pub struct BlockLayout {
+    target: BlockTarget,
     layout: StructLayout,
 }
 
 /// The blocks that a [`BlockLayout`] is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum BlockTarget<'a> {
+enum BlockTarget {
     PushConstants,
-    BufferReference(&'a str),
+    BufferReference(&'static str),
 }
 
-impl<'a> BlockLayout<'a> {
+impl BlockLayout {
     /// Returns the layout of the push constants.
     pub const fn push_constants<T: ShaderLayout>() -> Self {
         Self { target: BlockTarget::PushConstants, layout: T::LAYOUT }
@@ -56,7 +56,7 @@ impl<'a> BlockLayout<'a> {
 
     /// Returns the layout of the `buffer_reference` blocks whose type is called `block`. If the only member of the block
     /// is an array without a length, `T` is an element of it.
-    pub const fn buffer_reference<T: ShaderLayout>(block: &'a str) -> Self {
+    pub const fn buffer_reference<T: ShaderLayout>(block: &'static str) -> Self {
         Self { target: BlockTarget::BufferReference(block), layout: T::LAYOUT }
     }
 
@@ -73,7 +73,7 @@ impl<'a> BlockLayout<'a> {
 /// Fails unless each layout is equal to the blocks of the shaders that it is for, and there is one.
 pub(super) fn check_layouts<'a>(
     pipeline: &str,
-    layouts: &[BlockLayout<'_>],
+    layouts: &[BlockLayout],
     modules: impl Iterator<Item = &'a ShaderModule> + Clone,
 ) -> Result<()> {
     for layout in layouts {
@@ -158,7 +158,7 @@ fn block_label(block: &Block) -> String {
 /// Returns the error for a layout whose block no shader has.
 fn no_block_error<'a>(
     pipeline: &str,
-    layout: &BlockLayout<'_>,
+    layout: &BlockLayout,
     modules: impl Iterator<Item = &'a ShaderModule>,
 ) -> Error {
     let struct_name = layout.layout.name;

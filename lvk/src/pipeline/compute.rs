@@ -33,7 +33,7 @@ pub struct ComputePipelineDesc<'a> {
     /// [`OptionalFeature::ComputeFullSubgroups`](crate::OptionalFeature::ComputeFullSubgroups).
     pub full_subgroups: bool,
     /// Rust structs for the blocks of the shaders, compared with them at creation.
-    pub layouts: &'a [BlockLayout<'a>],
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }

@@ -136,7 +136,7 @@ pub struct RenderPipelineDesc<'a> {
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
     /// Rust structs for the blocks of the shaders, compared with them at creation.
-    pub layouts: &'a [BlockLayout<'a>],
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }

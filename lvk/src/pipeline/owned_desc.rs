@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use super::compute::ComputePipelineDesc;
+use super::block_layout::BlockLayout;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
 use super::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
 use super::shader_module::{ModuleLookup, ShaderModule};
+use super::shader_record::ShaderRecord;
 use super::stage::SpecializationConstant;
 use crate::error::{Error, Result};
 use crate::handle::{Handle, ShaderModuleHandle};
+use crate::shader::shader_layout::StructLayout;
 
 /// The modules of a pipeline. They stay alive although their handles may be destroyed.
 pub(crate) struct OwnedModules(Vec<(ShaderModuleHandle, Arc<ShaderModule>)>);
@@ -29,7 +32,7 @@ impl OwnedModules {
         let found = self.0.iter().find(|(known, _)| *known == handle);
         found
             .map(|(_, module)| Arc::clone(module))
-            .ok_or(Error::StaleHandle { kind: ShaderModuleHandle::KIND })
+            .ok_or(Error::StaleHandle { kind: ShaderModuleHandle::KIND, name: None })
     }
 }
 
@@ -37,26 +40,29 @@ impl OwnedModules {
 pub(crate) struct OwnedComputeDesc {
     plain: ComputePipelineDesc<'static>,
     specialization: Vec<SpecializationConstant>,
+    layouts: Vec<BlockLayout>,
     name: String,
 }
 
 impl OwnedComputeDesc {
     pub(crate) fn new(desc: &ComputePipelineDesc<'_>) -> Self {
         Self {
-            plain: compute_desc(desc, &[], ""),
+            plain: compute_desc(desc, &[], &[], ""),
             specialization: desc.specialization.to_vec(),
+            layouts: desc.layouts.to_vec(),
             name: desc.debug_name.to_owned(),
         }
     }
 
     pub(crate) fn desc(&self) -> ComputePipelineDesc<'_> {
-        compute_desc(&self.plain, &self.specialization, &self.name)
+        compute_desc(&self.plain, &self.specialization, &self.layouts, &self.name)
     }
 }
 
 fn compute_desc<'a>(
     plain: &ComputePipelineDesc<'_>,
     specialization: &'a [SpecializationConstant],
+    layouts: &'a [BlockLayout],
     debug_name: &'a str,
 ) -> ComputePipelineDesc<'a> {
     ComputePipelineDesc {
@@ -64,6 +70,7 @@ fn compute_desc<'a>(
         specialization,
         required_subgroup_size: plain.required_subgroup_size,
         full_subgroups: plain.full_subgroups,
+        layouts,
         debug_name,
     }
 }
@@ -75,6 +82,7 @@ pub(crate) struct OwnedRenderDesc {
     attributes: Vec<VertexAttribute>,
     color: Vec<ColorTarget>,
     specialization: Vec<SpecializationConstant>,
+    layouts: Vec<BlockLayout>,
     name: String,
 }
 
@@ -85,6 +93,7 @@ struct RenderLists<'a> {
     attributes: &'a [VertexAttribute],
     color: &'a [ColorTarget],
     specialization: &'a [SpecializationConstant],
+    layouts: &'a [BlockLayout],
     name: &'a str,
 }
 
@@ -96,13 +105,14 @@ impl OwnedRenderDesc {
             attributes: desc.vertex_attributes.to_vec(),
             color: desc.color.to_vec(),
             specialization: desc.specialization.to_vec(),
+            layouts: desc.layouts.to_vec(),
             name: desc.debug_name.to_owned(),
         }
     }
 
     pub(crate) fn desc(&self) -> RenderPipelineDesc<'_> {
-        let Self { bindings, attributes, color, specialization, name, .. } = self;
-        render_desc(&self.plain, RenderLists { bindings, attributes, color, specialization, name })
+        let Self { bindings, attributes, color, specialization, layouts, name, .. } = self;
+        render_desc(&self.plain, RenderLists { bindings, attributes, color, specialization, layouts, name })
     }
 }
 
@@ -134,6 +144,7 @@ fn render_desc<'a>(plain: &RenderPipelineDesc<'_>, lists: RenderLists<'a>) -> Re
         shading_rate: plain.shading_rate,
         fast_link: plain.fast_link,
         specialization: lists.specialization,
+        layouts: lists.layouts,
         debug_name: lists.name,
     }
 }
@@ -150,11 +161,28 @@ pub(crate) struct OwnedRayTracingDesc {
     callable_records: Records,
     plain: RayTracingPipelineDesc<'static>,
     specialization: Vec<SpecializationConstant>,
+    layouts: Vec<BlockLayout>,
     name: String,
     pub(crate) modules: OwnedModules,
 }
 
-type Records = Vec<Vec<u8>>;
+type Records = Vec<OwnedRecord>;
+
+/// A [`ShaderRecord`] that owns its bytes.
+struct OwnedRecord {
+    bytes: Vec<u8>,
+    layout: Option<StructLayout>,
+}
+
+impl OwnedRecord {
+    fn new(record: &ShaderRecord<'_>) -> Self {
+        Self { bytes: record.bytes().to_vec(), layout: record.layout() }
+    }
+
+    fn record(&self) -> ShaderRecord<'_> {
+        ShaderRecord::with_layout(&self.bytes, self.layout)
+    }
+}
 
 impl OwnedRayTracingDesc {
     pub(crate) fn new(desc: &RayTracingPipelineDesc<'_>, find: ModuleLookup<'_>) -> Result<Self> {
@@ -165,12 +193,12 @@ impl OwnedRayTracingDesc {
     }
 
     fn with_modules(desc: &RayTracingPipelineDesc<'_>, modules: OwnedModules) -> Self {
-        let records = |list: &[&[u8]]| list.iter().map(|record| record.to_vec()).collect();
+        let records = |list: &[ShaderRecord<'_>]| list.iter().map(OwnedRecord::new).collect();
         let without_record = |group: &HitGroup<'_>| HitGroup {
             closest_hit: group.closest_hit,
             any_hit: group.any_hit,
             intersection: group.intersection,
-            record: &[],
+            record: ShaderRecord::default(),
         };
         Self {
             modules,
@@ -178,7 +206,7 @@ impl OwnedRayTracingDesc {
             miss: desc.miss.to_vec(),
             callable: desc.callable.to_vec(),
             hit_groups: desc.hit_groups.iter().map(without_record).collect(),
-            hit_records: desc.hit_groups.iter().map(|group| group.record.to_vec()).collect(),
+            hit_records: desc.hit_groups.iter().map(|group| OwnedRecord::new(&group.record)).collect(),
             ray_gen_records: records(desc.ray_gen_records),
             miss_records: records(desc.miss_records),
             callable_records: records(desc.callable_records),
@@ -190,6 +218,7 @@ impl OwnedRayTracingDesc {
                 ..Default::default()
             },
             specialization: desc.specialization.to_vec(),
+            layouts: desc.layouts.to_vec(),
             name: desc.debug_name.to_owned(),
         }
     }
@@ -197,7 +226,7 @@ impl OwnedRayTracingDesc {
     /// Calls `create` with the description.
     pub(crate) fn with_desc<R>(&self, create: impl FnOnce(&RayTracingPipelineDesc<'_>) -> R) -> R {
         let hit_groups: Vec<HitGroup<'_>> = std::iter::zip(&self.hit_groups, &self.hit_records)
-            .map(|(group, record)| HitGroup { record, ..*group })
+            .map(|(group, record)| HitGroup { record: record.record(), ..*group })
             .collect();
         create(&RayTracingPipelineDesc {
             ray_gen: &self.ray_gen,
@@ -208,14 +237,15 @@ impl OwnedRayTracingDesc {
             miss_records: &borrowed(&self.miss_records),
             callable_records: &borrowed(&self.callable_records),
             specialization: &self.specialization,
+            layouts: &self.layouts,
             debug_name: &self.name,
             ..self.plain
         })
     }
 }
 
-fn borrowed(records: &Records) -> Vec<&[u8]> {
-    records.iter().map(Vec::as_slice).collect()
+fn borrowed(records: &[OwnedRecord]) -> Vec<ShaderRecord<'_>> {
+    records.iter().map(OwnedRecord::record).collect()
 }
 
 #[cfg(test)]
@@ -227,6 +257,11 @@ mod tests {
     use crate::pipeline::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
     use crate::pipeline::stage::SpecializationValue;
     use crate::resource::sampler::CompareOp;
+
+    crate::shader_struct! {
+        #[repr(C)]
+        struct Push { image: u32 }
+    }
 
     const CONSTANTS: &[SpecializationConstant] =
         &[SpecializationConstant { id: 3, value: SpecializationValue::F32(0.5) }];
@@ -262,6 +297,7 @@ mod tests {
             shading_rate: None,
             fast_link: true,
             specialization: CONSTANTS,
+            layouts: &[BlockLayout::push_constants::<Push>()],
             debug_name: "everything",
         };
         assert_eq!(OwnedRenderDesc::new(&desc).desc(), desc);
@@ -273,17 +309,18 @@ mod tests {
         let desc = RayTracingPipelineDesc {
             ray_gen: &[first],
             miss: &[second],
-            hit_groups: &[HitGroup { any_hit: Some(third), record: &[7, 8], ..Default::default() }],
+            hit_groups: &[HitGroup { any_hit: Some(third), record: ShaderRecord::from_bytes(&[7, 8]), ..Default::default() }],
             callable: &[third, first],
-            ray_gen_records: &[&[1]],
-            miss_records: &[&[2, 3]],
-            callable_records: &[&[], &[4]],
+            ray_gen_records: &[ShaderRecord::from_bytes(&[1])],
+            miss_records: &[ShaderRecord::from_bytes(&[2, 3])],
+            callable_records: &[ShaderRecord::default(), ShaderRecord::from_bytes(&[4])],
             libraries: &[RayTracingLibraryHandle::from_bits(9)],
             max_recursion: 2,
             max_callable_depth: 3,
             max_payload_bytes: 4,
             max_hit_attribute_bytes: 5,
             specialization: CONSTANTS,
+            layouts: &[BlockLayout::push_constants::<Push>()],
             debug_name: "rays",
         };
         let plain = RayTracingPipelineDesc { libraries: &[], ..desc };

@@ -56,7 +56,7 @@ pub struct RayTracingPipelineDesc<'a> {
     pub specialization: &'a [SpecializationConstant],
     /// Rust structs for the blocks of the pipeline's own shaders, compared with them at creation. Records have their
     /// layouts with them ([`ShaderRecord::new`]).
-    pub layouts: &'a [BlockLayout<'a>],
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }

@@ -47,7 +47,7 @@ pub struct RayTracingLibraryDesc<'a> {
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
     /// See [`RayTracingPipelineDesc::layouts`].
-    pub layouts: &'a [BlockLayout<'a>],
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }

@@ -32,6 +32,15 @@ impl<'a> ShaderRecord<'a> {
         Self { bytes, layout: None }
     }
 
+    pub(super) fn with_layout(bytes: &'a [u8], layout: Option<StructLayout>) -> Self {
+        Self { bytes, layout }
+    }
+
+    /// Returns the layout of the struct that the record was made of.
+    pub(super) fn layout(&self) -> Option<StructLayout> {
+        self.layout
+    }
+
     /// Returns the bytes of the record.
     pub const fn bytes(&self) -> &'a [u8] {
         self.bytes

@@ -188,7 +188,7 @@ lvk::shader_struct! {
 }
 
 /// The layouts of both, for every pipeline of the sample.
-pub(super) const LAYOUTS: &[BlockLayout<'static>] =
+pub(super) const LAYOUTS: &[BlockLayout] =
     &[BlockLayout::push_constants::<Push>(), BlockLayout::buffer_reference::<FrameConstants>("Frame")];
 
 /// Distance of the near plane in scene units: small against the scene, but not so small that depth suffers.

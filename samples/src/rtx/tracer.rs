@@ -29,7 +29,7 @@ pub(crate) struct RayStages {
     /// The compute stage, of work groups of 8 x 8 pixels.
     pub(crate) query: SampleStage,
     /// Structs that the stages read.
-    pub(crate) layouts: &'static [BlockLayout<'static>],
+    pub(crate) layouts: &'static [BlockLayout],
 }
 
 /// One of the two.
@@ -109,7 +109,7 @@ fn query_pipeline(
     ctx: &Context,
     sample: &str,
     stage: SampleStage,
-    layouts: &[BlockLayout<'_>],
+    layouts: &[BlockLayout],
 ) -> lvk::Result<Holder<ComputePipelineHandle>> {
     debug_assert_eq!(stage.stage, ShaderStage::Compute);
     let module = stage.create(ctx, sample)?;

@@ -68,7 +68,7 @@ fn equal_layouts_make_a_pipeline_that_reads_them() {
 fn differences_of_a_compute_pipeline_name_everything() {
     let Some(ctx) = device() else { return };
     let module = module(&ctx, ShaderStage::Compute, SHADER);
-    let create = |layouts: &[BlockLayout<'_>]| {
+    let create = |layouts: &[BlockLayout]| {
         let desc =
             ComputePipelineDesc { module: Some(*module), layouts, debug_name: "fill", ..Default::default() };
         ctx.create_compute_pipeline(&desc).unwrap_err()
