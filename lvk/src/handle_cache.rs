@@ -131,7 +131,7 @@ mod tests {
         fn the_cache_answers_as_the_pool_does(
             steps in prop::collection::vec((0..3_u8, any::<prop::sample::Index>()), 1..120)
         ) {
-            let pool = HandlePool::<BufferHandle, u32>::new(0x9e37_79b9_7f4a_7c15);
+            let pool = HandlePool::<BufferHandle, u32>::new(0x9e37_79b9_7f4a_7c15, |_| "");
             let mut found = HandleCache::<BufferHandle, u32>::default();
             let mut handles = vec![pool.insert(0)];
             for (kind, which) in steps {

@@ -58,6 +58,7 @@
 //! | compile pipelines in the background | [`Context::create_render_pipeline_in_background`], [`PendingPipeline`] |
 //! | compile shaders anew when their files change | [`Reloadable`], [`ShaderFiles`] |
 //! | write shaders, in GLSL, Slang or HLSL | [`ShaderModuleDesc`], [`manual::shader_interface`], [`HLSL_HEADER`] |
+//! | compare Rust structs with the blocks of shaders | [`shader_struct!`], [`BlockLayout`], [`ShaderRecord`], [`manual::shaders`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | build acceleration structures | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | declare the resources that a shader accesses | [`Dependencies`] |
@@ -67,6 +68,7 @@
 //! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
 //! | use raw Vulkan calls, or another engine's device | [`manual::interop`], [`Context::requirements`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
+//! | port a program | [`manual::from_lightweightvk`], [`manual::from_wgpu`] |
 //! | learn the concepts | [`manual`] |
 //!
 //! # Barriers
@@ -91,6 +93,8 @@
 //!   causes undefined behaviour on the GPU, as in every bindless design. [`ContextDesc::check_indices`] finds wrong
 //!   indices. Slot 0 of each array and every free slot hold a visible default descriptor. Among the textures, it is a
 //!   2D texture.
+//! * Bytes that shaders read by address. [`BlockLayout`] compares the layout of a struct with that of the block, but not
+//!   whether the address leads to such a struct.
 //! * Vertices. Indices and draws may read beyond the end of a vertex buffer.
 //! * Workgroup memory with unresolved array lengths. The library checks declared shared variables and task payloads
 //!   against the limits of their stage, with the constants of each pipeline. It resolves only array lengths that use
@@ -121,6 +125,11 @@
 
 #[cfg(target_endian = "big")]
 compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
+
+/// Compiles the program of the README.
+#[cfg(all(doctest, feature = "glsl"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod accel;
 mod background;
@@ -190,11 +199,15 @@ pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::pending_pipeline::PendingPipeline;
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+#[doc(hidden)]
+pub use error::causes::with_causes;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use error::driver_report::{
     DriverManifest, DriverReport, LoaderReport, ManifestOutcome, SearchedPath, VulkanReport,
 };
+pub use error::layout_difference::LayoutDifference;
+pub use error::limit_origin::LimitOrigin;
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;
@@ -223,12 +236,14 @@ pub use handle::{
 #[cfg(feature = "glsl")]
 pub use hot_reload::{Reloadable, ShaderFiles};
 pub use pipeline::blend::{Blend, BlendComponent, BlendFactor, BlendOp, ColorWriteMask};
+pub use pipeline::block_layout::BlockLayout;
 pub use pipeline::compute::ComputePipelineDesc;
 pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};
 pub use pipeline::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
 pub use pipeline::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
-pub use pipeline::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc, record_bytes};
+pub use pipeline::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
 pub use pipeline::ray_tracing_library::RayTracingLibraryDesc;
+pub use pipeline::shader_record::{ShaderRecord, record_bytes};
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use queue::Queue;
 pub use resource::buffer::{BufferDesc, BufferUsage};
@@ -242,6 +257,9 @@ pub use resource::view::TextureViewDesc;
 pub use resource::ycbcr::{ChromaLocation, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
+#[doc(hidden)]
+pub use shader::shader_layout::{MemberProbe, PlainMember};
+pub use shader::shader_layout::{NestedLayout, ShaderLayout, StructLayout, StructMember};
 pub use shader::{HLSL_HEADER, ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};

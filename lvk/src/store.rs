@@ -26,7 +26,7 @@ macro_rules! pools {
                 let mask = next_context_mask();
                 Self {
                     context_id: mask,
-                    $($(#[$attribute])* $pool: HandlePool::new(mask),)*
+                    $($(#[$attribute])* $pool: HandlePool::new(mask, <$object as Named>::name),)*
                 }
             }
 

@@ -1,5 +1,5 @@
 //! Windows for tests, on an X server of their own without a screen.
-#![expect(clippy::expect_used, reason = "a test whose X server fails has failed")]
+#![expect(clippy::expect_used, clippy::panic, reason = "a test whose X server fails has failed")]
 
 use std::ffi::c_void;
 use std::num::NonZeroU32;
@@ -45,11 +45,20 @@ pub fn desktop() -> Option<&'static Desktop> {
     DESKTOP.get_or_init(Desktop::new).as_ref()
 }
 
+/// Starts an X server for programs that a test starts. Prints a line and returns `None` where there is none and none
+/// can be fetched.
+///
+/// # Panics
+/// As [`desktop`].
+pub fn display() -> Option<VirtualDisplay> {
+    fetched(virtual_display(), "X server for windows")
+}
+
 impl Desktop {
     fn new() -> Option<Self> {
         // The driver brings libxcb along.
         vulkan()?;
-        let server = fetched(virtual_display(), "X server for windows")?;
+        let server = display()?;
         if let Err(error) = load_libxcb() {
             unavailable(&format!("libxcb cannot be opened: {error}"));
         }

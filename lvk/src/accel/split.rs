@@ -2,7 +2,8 @@
 
 use super::partition::{PrimitiveBounds, partition_sah, primitive_bounds, union_bounds};
 use super::primitive_bounds::Bounds;
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit_of};
 
 /// Limits of one acceleration structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +51,13 @@ pub(crate) fn plan_split(
         starts.push(total);
         total += geometry.len() as u64;
     }
-    check_limit(name, "primitive count of all parts together", total, u32::MAX.into())?;
+    check_limit_of(
+        LimitOrigin::Library,
+        name,
+        "primitive count of all parts together",
+        total,
+        u32::MAX.into(),
+    )?;
     let mut planner = SplitPlanner { name, starts, limits, sizes, parts: Vec::new() };
     planner.plan_parts(&mut primitive_bounds(bounds.iter().flatten()))?;
     Ok(planner.parts)
@@ -81,6 +88,7 @@ impl SplitPlanner<'_> {
                 what: demand.what,
                 requested: demand.requested,
                 limit: demand.limit,
+                origin: LimitOrigin::Device,
             });
         }
         let parts = self.min_part_count(&counts, demand.parts, items.len() as u64)?;

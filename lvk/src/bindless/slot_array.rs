@@ -1,6 +1,7 @@
 //! Slots of one descriptor array with their owners.
 
 use super::slot_allocator::Slots;
+use crate::error::limit_origin::LimitOrigin;
 use crate::error::{Error, Result};
 
 /// Slots of one kind and their owners.
@@ -22,6 +23,7 @@ impl<T: Copy> SlotArray<T> {
             what: self.kind,
             requested: limit + 1,
             limit,
+            origin: LimitOrigin::Descriptors,
         })
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::block_layout::{BlockLayout, check_layouts};
 use super::pipeline_layout::PipelineBase;
 use super::shader_module::ShaderModule;
 use super::stage::{Specialization, SpecializationConstant, stage_info};
@@ -31,6 +32,8 @@ pub struct ComputePipelineDesc<'a> {
     /// multiple of `required_subgroup_size`, or of the largest subgroup size without it. Needs
     /// [`OptionalFeature::ComputeFullSubgroups`](crate::OptionalFeature::ComputeFullSubgroups).
     pub full_subgroups: bool,
+    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    pub layouts: &'a [BlockLayout<'a>],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
@@ -42,6 +45,7 @@ impl Default for ComputePipelineDesc<'_> {
             specialization: &[],
             required_subgroup_size: None,
             full_subgroups: false,
+            layouts: &[],
             debug_name: "compute pipeline",
         }
     }
@@ -65,6 +69,7 @@ impl ComputePipeline {
     ) -> Result<Self> {
         module.check_stage(ShaderStage::Compute)?;
         let name = desc.debug_name;
+        check_layouts(name, desc.layouts, std::iter::once(module))?;
         let limits = &gpu.caps.limits;
         let largest = WorkgroupLimits {
             size: limits.max_workgroup_size,

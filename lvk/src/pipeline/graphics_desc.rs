@@ -1,6 +1,7 @@
 //! Descriptions of graphics pipelines.
 
 use super::blend::{Blend, ColorWriteMask};
+use super::block_layout::BlockLayout;
 use super::depth_stencil::{DepthTest, StencilTest};
 use super::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
 use super::rendering_formats::RenderingFormats;
@@ -134,6 +135,8 @@ pub struct RenderPipelineDesc<'a> {
     pub fast_link: bool,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
+    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    pub layouts: &'a [BlockLayout<'a>],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
@@ -175,6 +178,7 @@ impl Default for RenderPipelineDesc<'_> {
             shading_rate: None,
             fast_link: false,
             specialization: &[],
+            layouts: &[],
             debug_name: "render pipeline",
         }
     }

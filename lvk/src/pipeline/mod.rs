@@ -1,6 +1,7 @@
 //! Shader modules and pipelines.
 
 pub(crate) mod blend;
+pub(crate) mod block_layout;
 pub(crate) mod cache;
 pub(crate) mod cache_file;
 pub(crate) mod compute;
@@ -30,6 +31,7 @@ mod sbt;
 mod sbt_order;
 mod shader_groups;
 pub(crate) mod shader_module;
+pub(crate) mod shader_record;
 pub(crate) mod stage;
 mod state_check;
 mod subgroup_size;

@@ -240,10 +240,9 @@ impl Buffer {
         if offset.checked_add(size).is_some_and(|end| end <= self.size_bytes) {
             return Ok(());
         }
-        Err(Error::usage(
-            &self.name,
-            format!("bytes {offset}..{offset}+{size} are outside of the buffer's {} bytes", self.size_bytes),
-        ))
+        let message =
+            format!("{size} bytes at byte {offset} are outside of the buffer's {} bytes", self.size_bytes);
+        Err(Error::usage(&self.name, message))
     }
 
     /// Fails unless the buffer was created with `usage`.
@@ -343,7 +342,9 @@ fn check_size(gpu: &Gpu, desc: &BufferDesc<'_>) -> Result<u64> {
 
 fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsageFlags> {
     if usage.contains(BufferUsage::ACCEL_INPUT) && !gpu.has_acceleration_structures() {
-        return Err(gpu.unsupported(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
+        return Err(
+            gpu.unsupported(&format!("acceleration structures, which buffer '{name}' is for (ACCEL_INPUT)"))
+        );
     }
     // The library's own builders read inputs like any other shader.
     let accel_input = match gpu.accel {

@@ -236,7 +236,7 @@ impl Image {
         let more = |count: u32| (count > 0).then_some(count + 1);
         match self.handles.fetch_update(Ordering::AcqRel, Ordering::Acquire, more) {
             Ok(_) => Ok(()),
-            Err(_) => Err(Error::StaleHandle { kind: TextureHandle::KIND }),
+            Err(_) => Err(Error::StaleHandle { kind: TextureHandle::KIND, name: None }),
         }
     }
 

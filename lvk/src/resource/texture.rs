@@ -349,7 +349,12 @@ impl Texture {
         if bytes == expected {
             return Ok(region);
         }
-        let message = format!("{bytes} bytes were given for texels of {expected} bytes");
+        let [width, height, depth] = region.extent;
+        let (layers, format) = (region.layers, self.format);
+        let message = format!(
+            "{bytes} bytes were given, but the region takes {expected} bytes: {width} x {height} x {depth} texels of \
+             {format:?} in {layers} layer(s); give the bytes of all texels, tightly packed"
+        );
         Err(Error::usage(&self.name, message))
     }
 

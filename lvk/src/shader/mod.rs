@@ -13,11 +13,13 @@ mod disk_file;
 mod front_end;
 #[cfg(feature = "glsl")]
 mod include;
+pub(crate) mod layout_comparison;
 mod options;
 #[cfg(feature = "glsl")]
 mod preamble;
 #[cfg(feature = "glsl")]
 mod sanitize;
+pub(crate) mod shader_layout;
 pub(crate) mod spirv;
 mod stage;
 

@@ -10,7 +10,7 @@ use lvk::{
 };
 
 use super::config::RasterTuning;
-use super::frame::{Push, VisibilityAddresses};
+use super::frame::{LAYOUTS, Push, VisibilityAddresses};
 use super::shader_module::module;
 use crate::app::array_buffer::buffer;
 
@@ -139,6 +139,7 @@ fn pipeline(
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module: Some(*shader),
         specialization,
+        layouts: LAYOUTS,
         debug_name,
         ..ComputePipelineDesc::default()
     })

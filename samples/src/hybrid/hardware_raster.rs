@@ -11,7 +11,7 @@ use lvk::{
 };
 
 use super::compute_raster::groups_for;
-use super::frame::{Push, VisibilityAddresses};
+use super::frame::{LAYOUTS, Push, VisibilityAddresses};
 use super::geometry_pass::NO_TRIANGLE;
 use super::shader_module::module;
 
@@ -110,6 +110,7 @@ impl HardwareRaster {
             color: &[target],
             depth: Some(DepthAttachment { store: false, ..DepthAttachment::clear(*self.depth, 0.0) }),
             dependencies: Dependencies { read_buffers: &read, ..Dependencies::default() },
+            layouts: LAYOUTS,
             debug_name: "visibility pass",
             ..Default::default()
         })?;
@@ -154,6 +155,7 @@ fn compute(ctx: &Context, stage: &SampleStage) -> lvk::Result<Holder<ComputePipe
     let shader = module(ctx, stage, &[])?;
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module: Some(*shader),
+        layouts: LAYOUTS,
         debug_name: stage.name,
         ..ComputePipelineDesc::default()
     })
@@ -172,6 +174,7 @@ fn draw(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
             compare: CompareOp::GreaterOrEqual,
             write: true,
         }),
+        layouts: LAYOUTS,
         debug_name: "visibility pass",
         ..RenderPipelineDesc::default()
     })

@@ -33,17 +33,19 @@ pub struct LargeScene {
     near_plane: f32,
 }
 
-/// `Frame` in `shaders/large_scene/frame.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct FrameConstants {
-    scene: SceneFrame,
-    places: u64,
-    firsts: u64,
-    image: u32,
-    depth: u32,
-    samples: u32,
-    show: u32,
+lvk::shader_struct! {
+    /// `Frame` in `shaders/large_scene/frame.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct FrameConstants {
+        scene as scene_frame: SceneFrame,
+        places: u64,
+        firsts: u64,
+        image: u32,
+        depth: u32,
+        samples: u32,
+        show: u32,
+    }
 }
 
 impl LargeScene {

@@ -35,13 +35,15 @@ pub struct RtxHello {
     _vertices: Holder<BufferHandle>,
 }
 
-/// `Push` in `shaders/rtx_hello/view.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Push {
-    camera: GpuCamera,
-    tlas: u32,
-    image: u32,
+lvk::shader_struct! {
+    /// `Push` in `shaders/rtx_hello/view.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct Push {
+        camera: GpuCamera,
+        tlas: u32,
+        image: u32,
+    }
 }
 
 impl RtxHello {

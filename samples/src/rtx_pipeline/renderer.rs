@@ -32,13 +32,15 @@ pub struct RtxPipeline {
     near_plane: f32,
 }
 
-/// `Frame` in `shaders/rtx_pipeline/frame.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct FrameConstants {
-    scene: SceneFrame,
-    image: u32,
-    depth: u32,
+lvk::shader_struct! {
+    /// `Frame` in `shaders/rtx_pipeline/frame.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct FrameConstants {
+        scene as scene_frame: SceneFrame,
+        image: u32,
+        depth: u32,
+    }
 }
 
 impl RtxPipeline {

@@ -58,21 +58,23 @@ struct Held {
     _textures: Vec<Holder<TextureHandle>>,
 }
 
-/// `Frame` in `shaders/rtx_textures/frame.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct FrameConstants {
-    camera: GpuCamera,
-    vertices: u64,
-    triangles: u64,
-    records: u64,
-    textures: [u32; TEXTURES],
-    first_triangle: [u32; 3],
-    tlas: u32,
-    image: u32,
-    sampler: u32,
-    count: u32,
-    phase: f32,
+lvk::shader_struct! {
+    /// `Frame` in `shaders/rtx_textures/frame.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct FrameConstants {
+        camera: GpuCamera,
+        vertices: u64,
+        triangles: u64,
+        records: u64,
+        textures: [u32; TEXTURES],
+        first_triangle: [u32; 3],
+        tlas: u32,
+        image: u32,
+        sampler as smp: u32,
+        count: u32,
+        phase: f32,
+    }
 }
 
 impl RtxTextures {

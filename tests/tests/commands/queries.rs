@@ -354,6 +354,7 @@ fn misuse_is_refused_while_it_is_recorded() {
     refused(cmd.begin_query(*samples, 0), "reset it first");
     cmd.write_timestamp(*times, 0).unwrap();
     refused(cmd.write_timestamp(*times, 0), "reset it first");
+    refused(cmd.reset_queries(*times, std::ops::Range { start: 2, end: 1 }), "2..1 of queries ends before");
     cmd.reset_queries(*times, 0..1).unwrap();
     cmd.write_timestamp(*times, 0).unwrap();
     finish(&ctx, cmd);

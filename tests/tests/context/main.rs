@@ -1,12 +1,9 @@
 //! Contexts: creation, devices, profiles, and interoperation with other engines.
 
-<<<<<<< HEAD
-mod external_memory;
-=======
 mod exchanged_layouts;
+mod external_memory;
 #[cfg(target_os = "linux")]
 mod guest_windows;
->>>>>>> 38c683e (interop: test devices that have exactly the requirements of a context)
 mod interop;
 mod no_ray_tracing;
 mod profiles;

@@ -163,7 +163,7 @@ fn a_profile_limits_top_levels() {
         let Some(ctx) = under(&profile) else { return };
         match (ctx.create_tlas(&desc), what) {
             (Ok(_), None) => {}
-            (Err(Error::LimitExceeded { object, what: found, requested, limit }), Some(what)) => {
+            (Err(Error::LimitExceeded { object, what: found, requested, limit, .. }), Some(what)) => {
                 assert!(
                     object == "the world" && found.contains(what) && requested > limit,
                     "{object}: {found}"

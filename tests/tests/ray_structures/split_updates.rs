@@ -103,7 +103,7 @@ fn a_rebuild_follows_other_indices() -> Result<()> {
             bytemuck::cast_slice(indices)
         };
         let buffer = gpu.buffers[0].indices.as_ref();
-        ctx.upload_buffer(**buffer.ok_or(Error::StaleHandle { kind: "buffer" })?, 0, bytes)?;
+        ctx.upload_buffer(**buffer.ok_or(Error::StaleHandle { kind: "buffer", name: None })?, 0, bytes)?;
         let mut cmd = ctx.acquire_command_buffer()?;
         cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
@@ -351,7 +351,7 @@ fn a_triangle_that_does_not_fit_is_an_error() -> Result<()> {
             assert_eq!(made?.len(), 2);
             continue;
         }
-        let Err(Error::LimitExceeded { object, what, requested, limit }) = &made else {
+        let Err(Error::LimitExceeded { object, what, requested, limit, .. }) = &made else {
             unreachable!("{:?}", made.map(|made| made.len()))
         };
         assert!(object == "huge" && requested > limit, "{object}: {what} {requested} {limit}");

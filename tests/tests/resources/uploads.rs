@@ -250,6 +250,8 @@ fn uploads_and_readbacks_outside_of_an_object_are_errors() {
         Err(Error::InvalidUsage { .. }) => {}
         other => unreachable!("{other:?}"),
     };
+    let reversed = ctx.read_buffer_later(*buffer, Range { start: 8, end: 4 }).unwrap_err();
+    assert_eq!(reversed.to_string(), "words: the range 8..4 of bytes ends before it begins");
     usage(ctx.read_buffer_later(*buffer, Range { start: 8, end: 4 }));
     usage(ctx.read_buffer_later(*buffer, 0..65));
     usage(ctx.read_buffer_later(*buffer, 65..65));

@@ -417,7 +417,7 @@ fn a_view_outlives_the_handle_of_its_texture() {
         assert!(first_texel(&ctx, &second).iter().all(|seen| (seen - expected).abs() < 1e-5));
         assert_eq!(ctx.download_texture(*second, &TextureRegion::default()).unwrap(), [51 * round; 4]);
         let stale = ctx.create_texture_view(&TextureViewDesc { texture: Some(handle), ..Default::default() });
-        assert!(matches!(stale, Err(Error::StaleHandle { kind: "texture" })), "{stale:?}");
+        assert!(matches!(stale, Err(Error::StaleHandle { kind: "texture", .. })), "{stale:?}");
         drop((second, other));
     }
 }

@@ -330,6 +330,7 @@ extension_structures! {
     border_color: PhysicalDeviceCustomBorderColorFeaturesEXT, ext::custom_border_color;
     host_image_copy: PhysicalDeviceHostImageCopyFeaturesEXT, ext::host_image_copy;
     maintenance5: PhysicalDeviceMaintenance5FeaturesKHR, khr::maintenance5;
+    graphics_library: PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT, ext::graphics_pipeline_library;
     fault: PhysicalDeviceFaultFeaturesEXT, ext::device_fault;
     swapchain_maintenance1: PhysicalDeviceSwapchainMaintenance1FeaturesEXT, ext::swapchain_maintenance1;
     portability: PhysicalDevicePortabilitySubsetFeaturesKHR, khr::portability_subset;

@@ -8,6 +8,7 @@ mod glsl_names;
 mod interface;
 #[cfg(feature = "software-ray-query")]
 mod interface_page;
+mod layouts;
 mod modules;
 mod preamble;
 mod shared;

@@ -6,8 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use egui::epaint::{ClippedPrimitive, Primitive, Vertex};
 use egui::{FullOutput, Rect};
 use lvk::{
-    Blend, BufferDesc, BufferHandle, BufferUsage, ColorTarget, Context, CullMode, Format, Holder,
-    IndexFormat, RenderPass, RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
+    Blend, BlockLayout, BufferDesc, BufferHandle, BufferUsage, ColorTarget, Context, CullMode, Format,
+    Holder, IndexFormat, RenderPass, RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
 };
 
 use super::atlas::Atlas;
@@ -64,15 +64,18 @@ struct Scissor {
     extent: [u32; 2],
 }
 
-/// `Push` in `shaders/app/ui.glsl`.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Push {
-    vertices: u64,
-    clip_per_point: [f32; 2],
-    numbers: [u32; 2],
-    linear_target: u32,
-    padding: u32,
+lvk::shader_struct! {
+    /// `Push` in `shaders/app/ui.glsl`.
+    #[derive(Debug, Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    struct Push {
+        vertices: u64,
+        clip_per_point: [f32; 2],
+        tex: u32,
+        smp: u32,
+        linear_target: u32,
+        _padding: u32,
+    }
 }
 
 impl Painter {
@@ -154,13 +157,9 @@ impl Painter {
         pass.bind_render_pipeline(**pipeline)?;
         pass.bind_index_buffer(*self.indices.buffer, 0, IndexFormat::U32)?;
         for draw in &self.draws {
-            pass.push_constants(&Push {
-                vertices,
-                clip_per_point: self.clip_per_point,
-                numbers: draw.numbers,
-                linear_target,
-                padding: 0,
-            })?;
+            let ([tex, smp], clip_per_point) = (draw.numbers, self.clip_per_point);
+            let push = Push { vertices, clip_per_point, tex, smp, linear_target, _padding: 0 };
+            pass.push_constants(&push)?;
             pass.scissor(draw.scissor.offset, draw.scissor.extent)?;
             pass.draw_indexed(draw.indices.clone(), draw.base_vertex, 0..1)?;
         }
@@ -225,6 +224,7 @@ fn pipeline(ctx: &Context, format: Format) -> lvk::Result<Holder<RenderPipelineH
         fragment: Some(*fragment),
         cull: CullMode::None,
         color: &[ColorTarget { blend: Some(Blend::PREMULTIPLIED_ALPHA), ..ColorTarget::from(format) }],
+        layouts: &[BlockLayout::push_constants::<Push>()],
         debug_name: "user interface",
         ..RenderPipelineDesc::default()
     })

@@ -8,6 +8,7 @@ mod manifest_search;
 
 use std::path::{Path, PathBuf};
 
+use crate::error::causes::with_causes;
 use crate::error::driver_report::{DriverReport, LoaderReport};
 use manifest::{check_manifest, open_library};
 use manifest_search::{manifest_files, searched_paths};
@@ -39,7 +40,7 @@ impl LoaderReport {
     pub(crate) fn not_opened(library: Option<&Path>, error: &ash::LoadingError) -> Self {
         Self::NotOpened {
             path: library.unwrap_or(Path::new(LOADER_NAME)).to_owned(),
-            error: error.to_string(),
+            error: with_causes(error),
         }
     }
 

@@ -30,6 +30,7 @@ fn all_extensions() -> Vec<&'static CStr> {
         ext::custom_border_color::NAME,
         ext::host_image_copy::NAME,
         khr::maintenance5::NAME,
+        ext::graphics_pipeline_library::NAME,
         ext::device_fault::NAME,
         ext::swapchain_maintenance1::NAME,
         khr::portability_subset::NAME,
