@@ -65,18 +65,18 @@ pub enum LayoutDifference {
     OnlyInStruct {
         /// Member of the Rust struct.
         member: String,
-        /// Its offset.
+        /// Offset of the member.
         offset: u64,
-        /// Its size in bytes.
+        /// Size of the member in bytes.
         bytes: u64,
     },
     /// The Rust struct lacks a member of the block.
     OnlyInBlock {
         /// Member of the block.
         block_member: String,
-        /// Its offset.
+        /// Offset of the member.
         offset: u64,
-        /// Its size in bytes.
+        /// Size of the member in bytes.
         bytes: u64,
     },
 }

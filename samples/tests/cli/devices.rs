@@ -2,9 +2,8 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
-use std::time::Duration;
-use std::time::Instant;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
 use crate::program::{
     Desk, HEIGHT, Outcome, TRIANGLE, WIDTH, assert_names, desk_with_device, has_device, hybrid,

@@ -14,8 +14,8 @@ pub(crate) const HEIGHT: u32 = 36;
 
 /// A folder of input files and an empty one for output.
 pub(crate) struct Desk {
-    input: TempDir,
-    output: TempDir,
+    pub(crate) input: TempDir,
+    pub(crate) output: TempDir,
 }
 
 /// The result of a run of the program.

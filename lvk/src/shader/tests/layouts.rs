@@ -218,7 +218,7 @@ fn a_list_without_a_length_is_compared_by_its_elements() {
 }
 
 #[test]
-fn blocks_of_all_kinds_are_found_and_records_measured() {
+fn blocks_of_all_kinds_are_listed_and_records_measured() {
     let text = shader(
         ShaderStage::Miss,
         "layout(buffer_reference, scalar) buffer Items { vec3 at[]; };
