@@ -104,13 +104,16 @@
 //!
 //! # Features
 //!
-//! All features are enabled by default. The code and the crates of a disabled feature are not compiled.
+//! All features but `glam` are enabled by default. The code and the crates of a disabled feature are not compiled.
 //!
 //! * `glsl` compiles GLSL at run time. It needs a C++17 compiler when the library is built. Without it, modules take
 //!   only SPIR-V words, and [`ShaderSource::Glsl`] is [`Error::Unsupported`].
 //! * `software-ray-query` contains the library's own BVH builders and traversal, for devices without ray queries.
 //!   Without it, such devices have no ray queries: [`RayQueryRequest::Auto`] selects hardware or nothing,
 //!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
+//! * `glam` adds `transform_rows`, which takes a transform of the crate `glam`, and exports the crate as `lvk::glam`.
+//!   No other item has types of `glam`: transforms are `[f32; 12]` ([`rows_from_columns`]), points and matrices are
+//!   arrays.
 //! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
 //!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
 //!
@@ -162,13 +165,14 @@ mod upload;
 pub use test_support::hooks as test_hooks;
 
 pub use ash;
-pub use glam;
+#[cfg(feature = "glam")]
+pub use {accel::instance::transform_rows, glam};
 
 pub use accel::culling::InstanceCulling;
 pub use accel::desc::{BlasDesc, PrimitiveOrder};
 pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
-pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
+pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, rows_from_columns};
 pub use accel::tlas_desc::TlasDesc;
 pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;

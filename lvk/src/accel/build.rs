@@ -8,6 +8,7 @@ use ash::vk;
 
 use super::flags::{AccelStructSizes, BuildFlags};
 use super::geometry::{BlasGeometry, VulkanGeometry, check_geometries, host_or_device_address};
+use super::instance::IDENTITY_ROWS;
 use super::primitive_map::PrimitiveMap;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -227,9 +228,8 @@ pub(crate) const TRANSFORM_BYTES: u64 = 48;
 
 /// The transform matrices given by value, identity for other geometries; `None` if no geometry has one.
 pub(crate) fn transform_matrices(geometries: &[BlasGeometry]) -> Option<Vec<f32>> {
-    const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let any = geometries.iter().any(|geometry| geometry.transform_rows().is_some());
     any.then(|| {
-        geometries.iter().flat_map(|geometry| geometry.transform_rows().unwrap_or(IDENTITY)).collect()
+        geometries.iter().flat_map(|geometry| geometry.transform_rows().unwrap_or(IDENTITY_ROWS)).collect()
     })
 }

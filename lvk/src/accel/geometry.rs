@@ -89,7 +89,7 @@ impl Triangles {
 /// A matrix of 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GeometryTransform {
-    /// A matrix by value; see [`transform_rows`](crate::transform_rows).
+    /// A matrix by value; [`rows_from_columns`](crate::rows_from_columns) converts columns.
     Rows([f32; 12]),
     /// 48 bytes in a buffer, read by every build.
     Buffer {
