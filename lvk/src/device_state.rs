@@ -28,6 +28,7 @@ use crate::pipeline::{
     ComputePipeline, GraphicsParts, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline,
     RenderPipeline,
 };
+use crate::resource::image::Image;
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
 use crate::store::Store;
@@ -195,7 +196,7 @@ impl DeviceState {
             DeferredObject::QueryPool(pool) => self.submitter.forget(pool.id),
             DeferredObject::Texture(texture) => {
                 if texture.image.remove_texture() {
-                    self.submitter.forget(texture.image.id);
+                    self.forget_image(&texture.image);
                 }
                 if texture.is_yuv() {
                     self.bindless.free_yuv(texture.slot);
@@ -214,7 +215,7 @@ impl DeviceState {
             }
             DeferredObject::TextureRef(texture) => {
                 if texture.image.remove_texture() {
-                    self.submitter.forget(texture.image.id);
+                    self.forget_image(&texture.image);
                 }
             }
             DeferredObject::RenderPipeline(_)
@@ -226,6 +227,11 @@ impl DeviceState {
             #[cfg(feature = "window")]
             DeferredObject::Swapchain(_) => {}
         }
+    }
+
+    fn forget_image(&self, image: &Image) {
+        self.submitter.forget(image.id);
+        image.transient_place.iter().for_each(|place| self.submitter.forget(place.member().bytes));
     }
 
     /// Removes every object that is still alive, and reports the objects by name.

@@ -42,6 +42,7 @@
 //! | open a device, query its capabilities | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
 //! | create objects | `Context::create_*`, each with its `*Desc` |
 //! | use part of a texture, or another format of it | [`Context::create_texture_view`], [`TextureViewDesc`] |
+//! | let targets of a frame share memory | [`Context::create_transient_heap`], [`CommandBuffer::begin_transient_step`] |
 //! | pass data of one frame to shaders | [`CommandBuffer::upload`], [`RenderPass::upload`] |
 //! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and similar methods |
 //! | record commands | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
@@ -194,6 +195,7 @@ pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::pending_pipeline::PendingPipeline;
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+pub use context::transient_heap::TransientHeap;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use error::driver_report::{
@@ -242,6 +244,7 @@ pub use resource::region::{TextureRange, TextureRegion};
 pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, SamplerDesc, SamplerReductionMode};
 pub use resource::swizzle::{Channel, Swizzle};
 pub use resource::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
+pub use resource::transient_heap::{TransientHeapDesc, TransientHeapMemory, TransientTexture};
 pub use resource::view::TextureViewDesc;
 pub use resource::ycbcr::{ChromaLocation, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]

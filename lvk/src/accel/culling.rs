@@ -196,7 +196,8 @@ mod tests {
         for (half, distance) in [(0.5_f32, 10.0_f32), (3.0, 40.0), (0.01, 1.0)] {
             let center = EYE + Vec3::new(0.6, 0.0, 0.8) * distance;
             let angle = 2.0 * (f64::from(half) * 3_f64.sqrt() / f64::from(distance)).asin() as f32;
-            let culling = |min_angle| InstanceCulling { eye: EYE.to_array(), min_angle, ..Default::default() };
+            let culling =
+                |min_angle| InstanceCulling { eye: EYE.to_array(), min_angle, ..Default::default() };
             assert!(culling(angle * 0.999).keeps(center - half, center + half));
             assert!(!culling(angle * 1.001).keeps(center - half, center + half));
         }
@@ -232,7 +233,9 @@ mod tests {
         assert!(strict.keeps_instance(high, low, &transform), "inverted");
         transform[6] = f32::NAN;
         assert!(strict.keeps_instance(low, high, &transform));
-        assert!(InstanceCulling { eye: [f32::NAN; 3], planes: [[f32::NAN; 4]; 6], ..strict }.keeps(low, high));
+        assert!(
+            InstanceCulling { eye: [f32::NAN; 3], planes: [[f32::NAN; 4]; 6], ..strict }.keeps(low, high)
+        );
         let lax = InstanceCulling { frustum_margin: f32::NAN, min_angle: f32::NAN, ..strict };
         assert!(lax.keeps(low, high));
     }
@@ -312,6 +315,11 @@ mod tests {
         };
         let all_outside = |plane: &Vec4| corners(low, high).iter().all(|corner| outside(plane, corner));
         let surrounds = EYE.cmpge(low).all() && EYE.cmple(high).all();
-        surrounds || !culling.planes.map(Vec4::from).iter().any(|plane| plane.xyz() != Vec3::ZERO && all_outside(plane))
+        surrounds
+            || !culling
+                .planes
+                .map(Vec4::from)
+                .iter()
+                .any(|plane| plane.xyz() != Vec3::ZERO && all_outside(plane))
     }
 }

@@ -25,6 +25,7 @@ mod subresource_accesses;
 mod tlas_table;
 pub(crate) mod trace;
 pub(crate) mod transfer;
+mod transient_steps;
 pub(crate) mod update_tlas;
 mod upload;
 mod upload_value;
@@ -148,6 +149,7 @@ impl CommandBuffer {
         self.make_visible();
         self.make_visible_to_host();
         self.flush_barriers();
+        self.end_transient_steps();
         self.write_label_timestamp(None);
         self.reference_query_pools();
         self.finished = true;

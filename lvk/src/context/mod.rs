@@ -35,6 +35,7 @@ mod requirements;
 pub(crate) mod serialize;
 mod submit;
 mod transfer;
+pub(crate) mod transient_heap;
 #[cfg(feature = "window")]
 mod window;
 
