@@ -10,6 +10,7 @@ use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::BlasStructures;
 use crate::accel::blas_refs::{AccelGeneration, BlasRef};
 use crate::accel::compaction::CompactedSizeQuery;
+use crate::accel::micromap::Micromap;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::accel::tlas::TlasContents;
@@ -100,6 +101,8 @@ pub(crate) enum DeferredObject {
     ComputePipeline(#[expect(dead_code, reason = "held only to be dropped")] Arc<ComputePipeline>),
     RayTracingPipeline(Arc<RayTracingPipeline>),
     QueryPool(Arc<QueryPool>),
+    /// A micromap. Each BLAS whose triangles have it has a reference too.
+    Micromap(Arc<Micromap>),
     AccelStruct(Arc<AccelStruct>),
     #[cfg(feature = "window")]
     Swapchain(
@@ -205,6 +208,11 @@ impl DeviceState {
                 }
             }
             DeferredObject::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),
+            DeferredObject::Micromap(micromap) => {
+                if let Some(unused) = Arc::into_inner(micromap) {
+                    self.submitter.forget(unused.storage.id);
+                }
+            }
             DeferredObject::AccelStruct(object) => self.free_accel_struct(&object),
             DeferredObject::RayTracingPipeline(pipeline) => self.submitter.forget(pipeline.table.id),
             DeferredObject::TlasContents(contents) => self.recycle_instance_source(*contents),

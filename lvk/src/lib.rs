@@ -174,6 +174,9 @@ pub use accel::desc::{BlasDesc, PrimitiveOrder};
 pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, rows_from_columns};
+pub use accel::micromap_desc::{
+    OpacityFormat, OpacityMap, OpacityMicromapDesc, OpacityState, TriangleOpacity,
+};
 pub use accel::tlas_desc::TlasDesc;
 pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
@@ -205,7 +208,7 @@ pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;
 pub use gpu::caps::capabilities::{Capabilities, FeatureRequest};
-pub use gpu::caps::limits::Limits;
+pub use gpu::caps::limits::{Limits, MicromapLimits};
 pub use gpu::caps::mesh_limits::MeshLimits;
 pub use gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 pub use gpu::caps::queues::{QueueInfo, QueueRequest};
@@ -223,8 +226,9 @@ pub use gpu::start::feature_chain::FeatureChain;
 pub use gpu::start::profile::DeviceProfile;
 pub use gpu::start::user_extensions::UserExtensions;
 pub use handle::{
-    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, OpacityMicromapHandle, QueryPoolHandle,
+    RayTracingLibraryHandle, RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle,
+    ShaderModuleHandle, TextureHandle,
 };
 #[cfg(feature = "glsl")]
 pub use hot_reload::{Reloadable, ShaderFiles};

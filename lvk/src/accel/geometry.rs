@@ -130,6 +130,9 @@ pub enum BlasGeometry {
     Aabbs(Aabbs),
 }
 
+/// The identity transform, in rows.
+pub(crate) const IDENTITY_ROWS: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
 /// A geometry in Vulkan's form, with its number of primitives.
 #[derive(Clone, Copy)]
 pub(crate) struct VulkanGeometry {

@@ -6,6 +6,7 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 
 use super::blas_refs::{BitSet, BlasRef, BlasRefCollector, BlasRefSet, ResolveBlas};
+use super::geometry::IDENTITY_ROWS;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::{AccelStructHandle, BufferHandle};
 use crate::parallel::{core_count, parallel_for};
@@ -63,9 +64,6 @@ impl TlasInstance {
         }
     }
 }
-
-/// The identity transform, in rows.
-pub(crate) const IDENTITY_ROWS: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// Returns the rows of an affine transform in Vulkan's order (`VkTransformMatrixKHR`), from its columns: the images of
 /// the three axes, and the translation.

@@ -4,6 +4,7 @@ pub(crate) mod accesses;
 pub(crate) mod barriers;
 pub(crate) mod bind;
 pub(crate) mod build_blas;
+mod build_micromap;
 mod build_tlas;
 pub(crate) mod compute;
 mod copy_accel;
