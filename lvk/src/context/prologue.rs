@@ -97,6 +97,9 @@ impl Context {
         region: &TextureRegion,
         bytes: &[u8],
     ) -> Result<()> {
+        if let Some(place) = &target.image.transient_place {
+            return Err(place.not_begun(&target.name));
+        }
         let region = target.check_upload(region, bytes.len() as u64)?;
         self.upload_region(target, region, bytes)
     }

@@ -110,7 +110,6 @@ impl HardwareRaster {
             color: &[target],
             depth: Some(DepthAttachment { store: false, ..DepthAttachment::clear(*self.depth, 0.0) }),
             dependencies: Dependencies { read_buffers: &read, ..Dependencies::default() },
-            layouts: LAYOUTS,
             debug_name: "visibility pass",
             ..Default::default()
         })?;
