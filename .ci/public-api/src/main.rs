@@ -4,7 +4,7 @@
 const UNUSED: [&str; 6] =
     ["Freeze", "RefUnwindSafe", "StructuralPartialEq", "Unpin", "UnsafeUnpin", "UnwindSafe"];
 /// Functions of common traits, which the line of the trait stands for.
-const OF_TRAITS: [&str; 5] = ["clone", "default", "eq", "fmt", "hash"];
+const OF_TRAITS: [&str; 7] = ["clone", "cmp", "default", "eq", "fmt", "hash", "partial_cmp"];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let json = std::env::args_os().nth(1).ok_or("name the JSON file of rustdoc")?;
@@ -15,10 +15,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             line.strip_prefix("impl").and_then(|rest| rest.split_once(" for ")).map(|(name, _)| name);
         let is_unused =
             trait_name.is_some_and(|name| UNUSED.iter().any(|unused| name.ends_with(&format!("::{unused}"))));
-        let function =
-            line.strip_prefix("pub fn ").and_then(|rest| rest.split('(').next()?.rsplit("::").next());
-        let is_of_trait =
-            function.is_some_and(|name| OF_TRAITS.contains(&name.split('<').next().unwrap_or(name)));
+        let head = line.split('(').next().unwrap_or_default();
+        let is_of_trait = OF_TRAITS
+            .iter()
+            .any(|name| head.ends_with(&format!("::{name}")) || head.contains(&format!("::{name}<__")));
         if !is_unused && !is_of_trait {
             println!("{line}");
         }
