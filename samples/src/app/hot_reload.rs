@@ -4,10 +4,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-use super::run_error::RunError;
-use super::sample::Sample;
-use super::ui::Painter;
-
 /// Time between two looks at the folder.
 const PERIOD: Duration = Duration::from_millis(300);
 
@@ -40,17 +36,6 @@ impl ShaderWatch {
         self.files = found;
         changed
     }
-}
-
-/// Compiles the shaders of `sample` and of what paints over it anew. All of them are taken over, or none.
-///
-/// # Errors
-/// Those of the shaders; the old pipelines then stay, of both.
-pub fn reload<S: Sample>(sample: &mut S, painter: &mut Painter) -> Result<(), RunError> {
-    let recompiled = painter.recompiled()?;
-    sample.reload().map_err(Into::into)?;
-    painter.take_over(recompiled);
-    Ok(())
 }
 
 /// Leaves out files that cannot be read; their compilation reports the error.

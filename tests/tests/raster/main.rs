@@ -2,6 +2,7 @@
 
 mod blending;
 mod draws;
+mod egui_painter;
 mod errors;
 mod indirect_count;
 mod layers;
