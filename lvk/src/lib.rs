@@ -62,7 +62,8 @@
 //! | submit, wait, pace frames | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
 //! | compute, build and copy while the graphics queue draws | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
-//! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
+//! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`], [`CommandBuffer::push_label`] |
+//! | find out why a device was lost | [`DeviceLossReport`], [`ContextDesc::checkpoints`] |
 //! | use raw Vulkan calls, or another engine's device | [`manual::interop`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
 //! | learn the concepts | [`manual`] |
@@ -102,7 +103,7 @@
 //!
 //! # Features
 //!
-//! All features are enabled by default. The code and the crates of a disabled feature are not compiled.
+//! The code and the crates of a disabled feature are not compiled. Enabled by default are:
 //!
 //! * `glsl` compiles GLSL at run time. It needs a C++17 compiler when the library is built. Without it, modules take
 //!   only SPIR-V words, and [`ShaderSource::Glsl`] is [`Error::Unsupported`].
@@ -111,6 +112,15 @@
 //!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
 //! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
 //!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
+//!
+//! Profilers are not:
+//!
+//! * `profiling` opens a scope of the crate [`profiling`](https://docs.rs/profiling) around calls that can take long:
+//!   submissions, waits, presents, acquisitions, creation of pipelines and shaders, uploads and builds. The application
+//!   chooses the profiler by a feature of that crate, or by `puffin`, `tracing` or `tracy` of this one.
+//! * `puffin` and `tracing` send the scopes to the profiler of that name.
+//! * `tracy` sends the scopes to Tracy, and the labels of command buffers as GPU zones: see
+//!   [`manual::measuring`].
 //!
 //! # Targets
 //!
@@ -126,6 +136,7 @@ mod bindless;
 mod cache_file;
 mod command;
 mod context;
+mod cpu_scope;
 mod device_state;
 mod error;
 mod format;
@@ -186,6 +197,9 @@ pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
+pub use error::device_loss::{
+    DeviceLossReport, LabelProgress, QueueLossReport, ReportedLabel, UnfinishedCommands,
+};
 pub use error::driver_report::{
     DriverManifest, DriverReport, LoaderReport, ManifestOutcome, SearchedPath, VulkanReport,
 };
@@ -200,6 +214,7 @@ pub use gpu::caps::queues::{QueueInfo, QueueRequest};
 pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
+pub use gpu::debug::label::Label;
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
 pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;

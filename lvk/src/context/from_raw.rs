@@ -43,7 +43,8 @@ impl Context {
         let queues = requested_queues(desc);
         // SAFETY: by the caller's promise.
         let gpu = unsafe {
-            Gpu::from_raw(raw, desc.ray_tracing_pipeline, desc.ray_query, desc.debug_names, queues)?
+            let (pipeline, query) = (desc.ray_tracing_pipeline, desc.ray_query);
+            Gpu::from_raw(raw, pipeline, query, desc.debug_names, desc.checkpoints, queues)?
         };
         Self::with_gpu(Arc::new(gpu), desc)
     }

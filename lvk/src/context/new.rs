@@ -66,6 +66,7 @@ impl Context {
             profile: desc.profile,
             extra: desc.user_extensions,
             debug_names: desc.debug_names,
+            checkpoints: desc.checkpoints,
             queues: requested_queues(desc),
             window: desc.window_ref(),
         };

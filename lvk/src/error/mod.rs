@@ -2,6 +2,7 @@
 
 pub(crate) mod device_candidate;
 pub(crate) mod device_fault;
+pub(crate) mod device_loss;
 mod driver_remedies;
 pub(crate) mod driver_report;
 mod driver_report_text;
@@ -13,7 +14,7 @@ use ash::vk;
 
 use crate::queue::Queue;
 use device_candidate::DeviceCandidate;
-use device_fault::DeviceFault;
+use device_loss::DeviceLossReport;
 use driver_report::DriverReport;
 use driver_report_text::no_device_text;
 
@@ -188,12 +189,11 @@ pub enum Error {
         call: &'static str,
     },
     /// The device is lost, and the context cannot be used any more.
-    #[error("the device was lost in {call}{}; create a new context", fault_suffix(fault))]
+    #[error("{report}; create a new context")]
     DeviceLost {
-        /// The Vulkan command that reported the loss.
-        call: &'static str,
-        /// Fault report of the driver, if it provides one and a submission or wait detected the loss.
-        fault: Option<Arc<DeviceFault>>,
+        /// The command that reported the loss, the fault, and what the queues were doing. Every later error of the
+        /// context's submissions and waits has the report of the first.
+        report: Arc<DeviceLossReport>,
     },
     /// Any other error of the driver.
     #[error("{call} failed: {result}")]
@@ -210,13 +210,18 @@ impl Error {
     /// Converts the result of `call` to an error.
     pub(crate) fn vulkan(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
         move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => Self::DeviceLost { call, fault: None },
+            vk::Result::ERROR_DEVICE_LOST => Self::device_lost(call),
             vk::Result::ERROR_OUT_OF_HOST_MEMORY => Self::OutOfHostMemory { call },
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
                 Self::OutOfDeviceMemory { object: call.to_owned(), bytes: 0 }
             }
             result => Self::Vulkan { call, result },
         }
+    }
+
+    /// Returns the error for the loss of the device in `call`, of which no more is known yet.
+    pub(crate) fn device_lost(call: &'static str) -> Self {
+        Self::DeviceLost { report: Arc::new(DeviceLossReport { call, ..DeviceLossReport::default() }) }
     }
 
     /// Returns the error for a mistake of the caller about `object`.
@@ -228,10 +233,6 @@ impl Error {
     pub(crate) fn unsupported(what: impl Into<String>, why: impl Into<String>) -> Self {
         Self::Unsupported { what: what.into(), why: why.into() }
     }
-}
-
-fn fault_suffix(fault: &Option<Arc<DeviceFault>>) -> String {
-    fault.as_ref().map(|fault| format!(" ({fault})")).unwrap_or_default()
 }
 
 /// Returns [`Error::LimitExceeded`] if `requested` exceeds `limit`.

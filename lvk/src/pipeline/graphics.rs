@@ -18,6 +18,7 @@ use super::shader_module::ModuleLookup;
 use super::stage::{Specialization, stage_info};
 use crate::barrier::Stages;
 use crate::bindless::input_attachments::InputAttachmentMask;
+use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
@@ -105,6 +106,7 @@ impl RenderPipeline {
         desc: &RenderPipelineDesc<'_>,
         find: ModuleLookup<'_>,
     ) -> Result<Self> {
+        cpu_scope!("create graphics pipeline");
         check_stages(gpu, desc)?;
         let modules = RenderModules::resolve(desc, find)?;
         check_modules(gpu, desc, &modules)?;

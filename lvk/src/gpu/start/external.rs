@@ -64,6 +64,7 @@ impl RawContext<'_> {
         caps.mesh_shader &= self.mesh_shader;
         caps.position_fetch = false;
         caps.pipeline_libraries &= self.has_extension(ash::khr::pipeline_library::NAME);
+        caps.checkpoints &= self.has_extension(ash::nv::device_diagnostic_checkpoints::NAME);
         caps.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
         caps.remove_features(undeclared(self.features, caps.portability_subset));
         found.queue_family = Some(self.queue_family);
