@@ -1,12 +1,14 @@
 //! The error type of the crate.
 
+use std::fmt;
+
 use egui::TextureId;
 
 /// Result of every fallible call of the crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Errors of a painter.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// An error of the library.
@@ -67,4 +69,11 @@ pub enum Error {
     /// A paint callback was made for another painter of egui.
     #[error("a paint callback holds no lvk_egui::Callback; make it by Callback::shape")]
     ForeignCallback,
+}
+
+impl fmt::Debug for Error {
+    /// Formats the error like `Display`.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, out)
+    }
 }

@@ -200,10 +200,10 @@ impl Painter {
         Ok(Push {
             vertices: self.vertices.buffer.address()?,
             clip_per_point: size_px.map(|side| 2.0 * pixels_per_point / side.max(1) as f32),
-            texture: 0,
-            sampler: 0,
+            tex: 0,
+            smp: 0,
             flags: if is_linear { LINEAR_TARGET } else { 0 },
-            padding: 0,
+            _padding: 0,
         })
     }
 
@@ -241,7 +241,7 @@ impl Painter {
 
 impl Push {
     fn show(&mut self, shown: &ShownTexture) {
-        (self.texture, self.sampler) = (shown.texture, shown.sampler);
+        (self.tex, self.smp) = (shown.texture, shown.sampler);
         self.flags &= LINEAR_TARGET;
         self.flags |= if shown.encoding == TexelEncoding::Linear { LINEAR_TEXELS } else { 0 };
     }

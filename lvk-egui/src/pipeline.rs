@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    Blend, ColorTarget, CompareOp, Context, CullMode, DepthTest, Format, Holder, RenderPipelineDesc,
+    Blend, BlockLayout, ColorTarget, CompareOp, Context, CullMode, DepthTest, Format, Holder, RenderPipelineDesc,
     RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage,
 };
 
@@ -28,17 +28,19 @@ impl From<Format> for Target {
     }
 }
 
-/// `Push` in `shaders/push.glsl`.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Push {
-    pub(crate) vertices: u64,
-    pub(crate) clip_per_point: [f32; 2],
-    pub(crate) texture: u32,
-    pub(crate) sampler: u32,
-    /// [`LINEAR_TARGET`] and [`LINEAR_TEXELS`].
-    pub(crate) flags: u32,
-    pub(crate) padding: u32,
+lvk::shader_struct! {
+    /// `Push` in `shaders/push.glsl`.
+    #[derive(Debug, Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Push {
+        pub(crate) vertices: u64,
+        pub(crate) clip_per_point: [f32; 2],
+        pub(crate) tex: u32,
+        pub(crate) smp: u32,
+        /// [`LINEAR_TARGET`] and [`LINEAR_TEXELS`].
+        pub(crate) flags: u32,
+        pub(crate) _padding: u32,
+    }
 }
 
 /// The target holds linear light.
@@ -89,6 +91,7 @@ pub(crate) fn create_pipeline(ctx: &Context, target: &Target) -> Result<Holder<R
         color: &[ColorTarget::blended(target.color, Blend::PREMULTIPLIED_ALPHA)],
         depth: target.depth.map(depth),
         samples: target.samples,
+        layouts: &[BlockLayout::push_constants::<Push>()],
         debug_name: "egui",
         ..RenderPipelineDesc::default()
     });

@@ -23,8 +23,10 @@ use crate::handle::AccelStructHandle;
 use crate::kernels::Kernels;
 use crate::leak_report;
 use crate::lock_order::{Guard, Mutex};
+use crate::parallel::core_count;
 use crate::pipeline::{
-    ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
+    ComputePipeline, GraphicsParts, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline,
+    RenderPipeline,
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
@@ -51,6 +53,8 @@ pub(crate) struct DeviceState {
     pub(crate) layout: PipelineLayout,
     /// The file of compiled pipelines, if the context keeps one.
     pub(crate) pipeline_cache: Option<PipelineCache>,
+    /// Parts that graphics pipelines are linked from.
+    pub(crate) graphics_parts: GraphicsParts,
     /// The cache of SPIR-V that was compiled from GLSL, if the context keeps one.
     pub(crate) shader_cache: Option<ShaderCache>,
     pub(crate) bindless: Bindless,
@@ -124,7 +128,7 @@ impl DeviceState {
     /// Returns the layout and the cache for new pipelines.
     pub(crate) fn pipeline_base(&self) -> PipelineBase {
         let cache = self.pipeline_cache.as_ref().map_or(vk::PipelineCache::null(), |cache| cache.raw);
-        PipelineBase { layout: self.layout.raw, cache }
+        PipelineBase { layout: self.layout.raw, cache, max_threads: core_count() }
     }
 
     /// Destroys an object once no command buffer can use it.

@@ -6,8 +6,9 @@ mod sealed {
     pub trait Sealed {}
 }
 
-/// A handle: a typed, generational, 64-bit key. It is `Copy`. Use of a handle that is stale or belongs to
-/// another context is safe and returns [`Error::StaleHandle`](crate::Error::StaleHandle).
+/// A handle: a typed, generational, 64-bit key. It is `Copy`. Use of a handle is always safe: if its object was
+/// destroyed, the result is [`Error::StaleHandle`](crate::Error::StaleHandle), and if its object belongs to another
+/// context, [`Error::ForeignHandle`](crate::Error::ForeignHandle).
 pub trait Handle: sealed::Sealed + Copy + Eq + fmt::Debug + Send + Sync + 'static {
     /// Kind of the object, as error messages name it.
     const KIND: &'static str;

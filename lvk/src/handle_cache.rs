@@ -125,13 +125,13 @@ mod tests {
     use crate::handle::BufferHandle;
 
     proptest! {
-        /// With more objects than slots, and with handles whose objects were removed, also if their place in the pool
+        /// Cases: more objects than slots, and handles whose objects were removed, also if their place in the pool
         /// was reused.
         #[test]
-        fn whatever_the_pool_finds_is_found_and_nothing_else(
+        fn the_cache_answers_as_the_pool_does(
             steps in prop::collection::vec((0..3_u8, any::<prop::sample::Index>()), 1..120)
         ) {
-            let pool = HandlePool::<BufferHandle, u32>::new(0x9e37_79b9_7f4a_7c15);
+            let pool = HandlePool::<BufferHandle, u32>::new(0x9e37_79b9_7f4a_7c15, |_| "");
             let mut found = HandleCache::<BufferHandle, u32>::default();
             let mut handles = vec![pool.insert(0)];
             for (kind, which) in steps {

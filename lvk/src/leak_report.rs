@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn many_names_are_cut_short() {
+    fn a_list_of_many_names_ends_early() {
         let objects: Vec<_> = (0..25).map(|number| live_object("texture", &format!("{number:02}"))).collect();
         let text = leak_report(&objects).unwrap();
         assert!(

@@ -55,7 +55,10 @@
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
+//! | compile pipelines in the background | [`Context::create_render_pipeline_in_background`], [`PendingPipeline`] |
+//! | compile shaders anew when their files change | [`Reloadable`], [`ShaderFiles`] |
 //! | write shaders, in GLSL, Slang or HLSL | [`ShaderModuleDesc`], [`manual::shader_interface`], [`HLSL_HEADER`] |
+//! | compare Rust structs with the blocks of shaders | [`shader_struct!`], [`BlockLayout`], [`ShaderRecord`], [`manual::shaders`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | build acceleration structures | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | declare the resources that a shader accesses | [`Dependencies`] |
@@ -64,8 +67,9 @@
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`], [`CommandBuffer::push_label`] |
 //! | find out why a device was lost | [`DeviceLossReport`], [`ContextDesc::checkpoints`] |
-//! | use raw Vulkan calls, or another engine's device | [`manual::interop`] |
+//! | use raw Vulkan calls, or another engine's device | [`manual::interop`], [`Context::requirements`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
+//! | port a program | [`manual::from_lightweightvk`], [`manual::from_wgpu`] |
 //! | learn the concepts | [`manual`] |
 //!
 //! # Barriers
@@ -90,6 +94,8 @@
 //!   causes undefined behaviour on the GPU, as in every bindless design. [`ContextDesc::check_indices`] finds wrong
 //!   indices. Slot 0 of each array and every free slot hold a visible default descriptor. Among the textures, it is a
 //!   2D texture.
+//! * Bytes that shaders read by address. [`BlockLayout`] compares the layout of a struct with that of the block, but not
+//!   whether the address leads to such a struct.
 //! * Vertices. Indices and draws may read beyond the end of a vertex buffer.
 //! * Workgroup memory with unresolved array lengths. The library checks declared shared variables and task payloads
 //!   against the limits of their stage, with the constants of each pipeline. It resolves only array lengths that use
@@ -130,7 +136,13 @@
 #[cfg(target_endian = "big")]
 compile_error!("lvk needs a little-endian target: shaders read the bytes of its software BVHs as words");
 
+/// Compiles the program of the README.
+#[cfg(all(doctest, feature = "glsl"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod accel;
+mod background;
 mod barrier;
 mod bindless;
 mod cache_file;
@@ -143,6 +155,8 @@ mod format;
 mod gpu;
 mod handle;
 mod handle_cache;
+#[cfg(feature = "glsl")]
+mod hot_reload;
 mod kernels;
 mod leak_report;
 mod lock_order;
@@ -193,8 +207,11 @@ pub use context::destroy::Destroy;
 pub use context::frame::Frame;
 pub use context::holder::Holder;
 pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
+pub use context::pending_pipeline::PendingPipeline;
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+#[doc(hidden)]
+pub use error::causes::with_causes;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use error::device_loss::{
@@ -203,6 +220,8 @@ pub use error::device_loss::{
 pub use error::driver_report::{
     DriverManifest, DriverReport, LoaderReport, ManifestOutcome, SearchedPath, VulkanReport,
 };
+pub use error::layout_difference::LayoutDifference;
+pub use error::limit_origin::LimitOrigin;
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;
@@ -214,25 +233,32 @@ pub use gpu::caps::queues::{QueueInfo, QueueRequest};
 pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
+pub use gpu::caps::subgroup_limits::SubgroupLimits;
 pub use gpu::debug::label::Label;
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
 pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;
 pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
+pub use gpu::requirements::DeviceRequirements;
 pub use gpu::start::external::RawContext;
+pub use gpu::start::feature_chain::FeatureChain;
 pub use gpu::start::profile::DeviceProfile;
 pub use gpu::start::user_extensions::UserExtensions;
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
+#[cfg(feature = "glsl")]
+pub use hot_reload::{Reloadable, ShaderFiles};
 pub use pipeline::blend::{Blend, BlendComponent, BlendFactor, BlendOp, ColorWriteMask};
+pub use pipeline::block_layout::BlockLayout;
 pub use pipeline::compute::ComputePipelineDesc;
 pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};
 pub use pipeline::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
 pub use pipeline::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
-pub use pipeline::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc, record_bytes};
+pub use pipeline::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
 pub use pipeline::ray_tracing_library::RayTracingLibraryDesc;
+pub use pipeline::shader_record::{ShaderRecord, record_bytes};
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use queue::Queue;
 pub use resource::buffer::{BufferDesc, BufferUsage};
@@ -243,12 +269,20 @@ pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, Sampler
 pub use resource::swizzle::{Channel, Swizzle};
 pub use resource::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 pub use resource::view::TextureViewDesc;
-pub use resource::ycbcr::{ChromaSite, YuvConversion, YuvModel, YuvRange};
+pub use resource::ycbcr::{ChromaLocation, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
+#[doc(hidden)]
+pub use shader::shader_layout::{MemberProbe, PlainMember};
+pub use shader::shader_layout::{NestedLayout, ShaderLayout, StructLayout, StructMember};
 pub use shader::{HLSL_HEADER, ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
+#[cfg(unix)]
+pub use {
+    context::external_semaphore::{SemaphoreFdType, SemaphoreKind, SharedSemaphore},
+    gpu::memory::external::{DrmLayout, DrmPlane, MemoryFd, MemoryFdType},
+};
 #[cfg(feature = "window")]
 pub use {
     gpu::start::window::WindowHandles,

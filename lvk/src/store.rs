@@ -26,7 +26,7 @@ macro_rules! pools {
                 let mask = next_context_mask();
                 Self {
                     context_id: mask,
-                    $($(#[$attribute])* $pool: HandlePool::new(mask),)*
+                    $($(#[$attribute])* $pool: HandlePool::new(mask, <$object as Named>::name),)*
                 }
             }
 
@@ -69,7 +69,7 @@ pools! {
 pub struct LiveObject {
     /// Kind of the object, in the words of error messages: `buffer`, `render pipeline` and so on.
     pub kind: &'static str,
-    /// Its debug name.
+    /// Debug name of the object.
     pub name: String,
 }
 

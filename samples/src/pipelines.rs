@@ -102,7 +102,7 @@ const fn kind_of(name: &str) -> ShaderStage {
 pub struct SamplePipeline {
     /// For messages.
     pub name: &'static str,
-    /// In the order of the shader binding table where rays are traced.
+    /// Stages; for ray tracing in the order of the shader binding table.
     pub stages: Vec<SampleStage>,
     /// Formats of the colour targets it draws to.
     pub color: Vec<Format>,

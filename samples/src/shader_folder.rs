@@ -3,15 +3,18 @@
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{LazyLock, OnceLock};
 
-use lvk::{Context, Error, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource};
+use lvk::{Context, Holder, ShaderFiles, ShaderModuleDesc, ShaderModuleHandle};
 
 /// Names a folder with what `shaders/` of the project holds; its texts are taken instead of those in the binary.
 pub const VARIABLE: &str = "LVK_SHADERS";
 
 /// The folder that `--hot-reload` names.
 static TAKEN: OnceLock<PathBuf> = OnceLock::new();
+
+/// The files that shaders were compiled from, so that their changes are noticed.
+static FILES: LazyLock<ShaderFiles> = LazyLock::new(ShaderFiles::new);
 
 /// Takes texts from `folder` from now on. Answers the folder where it is none.
 pub(crate) fn set_folder(folder: &Path) -> Result<(), PathBuf> {
@@ -48,11 +51,17 @@ pub(crate) fn folder() -> Option<PathBuf> {
     LENT.with_borrow(Clone::clone).or_else(|| TAKEN.get().cloned()).or_else(named)
 }
 
+/// The files that shaders were compiled from, if a folder is named.
+pub(crate) fn watched_files() -> Option<ShaderFiles> {
+    folder().map(|_| FILES.clone())
+}
+
 /// Compiles a stage of `sample`, whose GLSL is the file `<sample>/<debug name>.glsl` of the folder if one is named, and
 /// the description's own otherwise.
 ///
 /// # Errors
-/// [`Error::InvalidUsage`] when the file cannot be read, [`Error::Shader`] when the GLSL is wrong.
+/// [`Error::File`](lvk::Error::File) when the file cannot be read, [`Error::Shader`](lvk::Error::Shader) when the GLSL is
+/// wrong.
 pub fn create_module(
     ctx: &Context,
     sample: &str,
@@ -60,27 +69,12 @@ pub fn create_module(
 ) -> lvk::Result<Holder<ShaderModuleHandle>> {
     match folder() {
         None => ctx.create_shader_module(desc),
-        Some(folder) => create_from(ctx, &folder, sample, desc),
+        Some(folder) => {
+            let path = folder.join(sample).join(format!("{}.glsl", desc.debug_name));
+            let include_dirs: &[&Path] = &[&folder];
+            FILES.create_module(ctx, path, &ShaderModuleDesc { includes: &[], include_dirs, ..*desc })
+        }
     }
-}
-
-fn create_from(
-    ctx: &Context,
-    folder: &Path,
-    sample: &str,
-    desc: &ShaderModuleDesc<'_>,
-) -> lvk::Result<Holder<ShaderModuleHandle>> {
-    let path = folder.join(sample).join(format!("{}.glsl", desc.debug_name));
-    let text = std::fs::read_to_string(&path).map_err(|error| Error::InvalidUsage {
-        object: desc.debug_name.to_owned(),
-        message: format!("{}: {error}; {VARIABLE} names a folder like 'shaders'", path.display()),
-    })?;
-    ctx.create_shader_module(&ShaderModuleDesc {
-        source: ShaderSource::Glsl(&text),
-        includes: &[],
-        include_dirs: &[folder],
-        ..*desc
-    })
 }
 
 #[cfg(test)]

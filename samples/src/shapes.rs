@@ -16,9 +16,9 @@ pub(crate) struct Vertex {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct GpuVertex {
-    /// Its position.
+    /// Position of the corner.
     pub position: [f32; 3],
-    /// Outwards, of length 1.
+    /// Normal outwards, of length 1.
     pub normal: [f32; 3],
 }
 

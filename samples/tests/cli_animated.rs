@@ -305,11 +305,11 @@ fn a_device_without_mesh_shaders_is_distinguished_from_other_errors() {
     let lack = missing_features::mesh_shaders(small(&without)).unwrap();
     assert_names(&lack, &["mesh shaders", "--device"]);
     assert!(files(folder.path()).is_empty());
-    assert_eq!(missing_features::mesh_shaders(small(&["--frames", "1", "--device", "nobody's"])), None);
+    assert_eq!(missing_features::mesh_shaders(small(&["--frames", "1", "--device", "no such device"])), None);
 }
 
 #[test]
-fn what_culling_saves_is_printed() {
+fn the_gain_of_culling_is_printed() {
     if !has_device() {
         return;
     }

@@ -17,7 +17,7 @@ const NOT_WITH_OPAQUE: u32 = NO_OPAQUE | CULL_OPAQUE | CULL_NO_OPAQUE;
 /// Pipelines of every method.
 pub struct HitCheck {
     tracers: Vec<(Method, RayTracer)>,
-    /// By a module that treats all triangles as opaque.
+    /// Tracer of a module that treats all triangles as opaque.
     opaque: Option<RayTracer>,
 }
 

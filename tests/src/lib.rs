@@ -7,6 +7,7 @@ pub mod bvh8;
 pub mod compute;
 pub mod device;
 pub mod gpu_built;
+pub mod guest_engine;
 pub mod half;
 pub mod hit_check;
 pub mod hit_comparison;

@@ -16,9 +16,9 @@ pub struct OitRenderer {
 /// A sphere at one time.
 #[derive(Debug, Clone, Copy)]
 pub struct Sphere {
-    /// Its centre.
+    /// Centre of the sphere.
     pub center: DVec3,
-    /// Its radius.
+    /// Radius of the sphere.
     pub radius: f64,
     /// Absorption of glass in a unit of length; `None` for balls.
     pub absorption: Option<DVec3>,

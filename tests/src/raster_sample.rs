@@ -3,7 +3,6 @@
 
 use image::RgbaImage;
 use lvk_samples::app::headless;
-use lvk_samples::app::run_error::RunError;
 use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::app::sample_error::SampleError;
 
@@ -17,8 +16,7 @@ pub const ROUND: u32 = 100;
 /// # Panics
 /// When rendering fails.
 pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
-    let moved = sample.update(FrameTime::from_frame(frame, ROUND));
-    moved.map_err(|error| -> RunError { error.into() }).expect("the sample has that moment");
+    sample.update(FrameTime::from_frame(frame, ROUND));
     image_now(sample)
 }
 
@@ -28,7 +26,7 @@ pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
 /// When rendering fails.
 pub fn image_now<S: Sample>(sample: &mut S) -> RgbaImage {
     let rendered = headless::picture(sample);
-    let pixels = rendered.map_err(|error| -> RunError { error.into() }).expect("the sample renders");
+    let pixels = rendered.expect("the sample renders");
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).expect("the image has the size that was asked for")
 }
 

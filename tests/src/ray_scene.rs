@@ -37,9 +37,9 @@ pub enum Layout {
 /// One geometry of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    /// Its triangles.
+    /// Triangles of the geometry.
     pub mesh: Mesh,
-    /// Their memory layout.
+    /// Memory layout of the triangles.
     pub layout: Layout,
     /// Transform of the vertices before the build.
     pub transform: Option<Affine3A>,

@@ -138,7 +138,7 @@ enum AnyPipeline {
 }
 
 /// Rays on the GPU, and the buffer of their hit records.
-pub struct Job {
+pub struct TraceBuffers {
     rays: Holder<BufferHandle>,
     hits: Holder<BufferHandle>,
     count: u32,
@@ -222,68 +222,74 @@ impl RayTracer {
     }
 
     /// Uploads rays.
-    pub fn job(&self, rays: &[Ray]) -> Result<Job> {
+    pub fn buffers(&self, rays: &[Ray]) -> Result<TraceBuffers> {
         let buffer = |size_bytes, data, debug_name| {
             self.ctx.create_buffer(&BufferDesc { size_bytes, data, debug_name, ..Default::default() })
         };
-        Ok(Job {
+        Ok(TraceBuffers {
             rays: buffer(0, Some(bytemuck::cast_slice(rays)), "rays")?,
             hits: buffer((rays.len() * size_of::<HitRecord>()) as u64, None, "hit records")?,
             count: rays.len() as u32,
         })
     }
 
-    /// Records the trace of a job.
+    /// Records a trace.
     pub fn record(
         &self,
         cmd: &mut CommandBuffer,
         tlas: &Holder<AccelStructHandle>,
-        job: &Job,
+        trace_buffers: &TraceBuffers,
         how: How,
     ) -> Result<()> {
-        self.record_at(cmd, tlas.index(), job, how)
+        self.record_at(cmd, tlas.index(), trace_buffers, how)
     }
 
     /// As [`record`](Self::record), for the TLAS of a bindless index.
-    pub fn record_at(&self, cmd: &mut CommandBuffer, tlas: u32, job: &Job, how: How) -> Result<()> {
+    pub fn record_at(
+        &self,
+        cmd: &mut CommandBuffer,
+        tlas: u32,
+        trace_buffers: &TraceBuffers,
+        how: How,
+    ) -> Result<()> {
         let push = Push {
-            rays: self.ctx.buffer_address(*job.rays)?,
-            hits: self.ctx.buffer_address(*job.hits)?,
+            rays: self.ctx.buffer_address(*trace_buffers.rays)?,
+            hits: self.ctx.buffer_address(*trace_buffers.hits)?,
             tlas,
-            count: job.count,
+            count: trace_buffers.count,
             mask: how.mask.into(),
             flags: how.flags,
         };
-        let writes = Dependencies { buffers: &[*job.hits], ..Default::default() };
+        let writes = Dependencies { buffers: &[*trace_buffers.hits], ..Default::default() };
         match &self.pipeline {
             AnyPipeline::RayTracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(&push)?;
-                let size = [LAUNCH_WIDTH, job.count.div_ceil(LAUNCH_WIDTH), 1];
+                let size = [LAUNCH_WIDTH, trace_buffers.count.div_ceil(LAUNCH_WIDTH), 1];
                 cmd.trace_rays_with(how.ray_gen, size, &writes)
             }
             AnyPipeline::Compute(pipeline) => {
                 cmd.bind_compute_pipeline(**pipeline)?;
                 cmd.push_constants(&push)?;
-                cmd.dispatch([job.count.div_ceil(THREADS), 1, 1], &writes)
+                cmd.dispatch([trace_buffers.count.div_ceil(THREADS), 1, 1], &writes)
             }
         }
     }
 
-    /// Waits for a submitted job and reads its records.
-    pub fn read(&self, job: &Job) -> Result<Vec<HitRecord>> {
-        let mut records = vec![HitRecord::zeroed(); job.count as usize];
-        self.ctx.download_buffer(*job.hits, 0, bytemuck::cast_slice_mut(&mut records))?;
+    /// Waits for a submitted trace and reads its records.
+    pub fn read(&self, trace_buffers: &TraceBuffers) -> Result<Vec<HitRecord>> {
+        let mut records = vec![HitRecord::zeroed(); trace_buffers.count as usize];
+        self.ctx.download_buffer(*trace_buffers.hits, 0, bytemuck::cast_slice_mut(&mut records))?;
         Ok(records)
     }
 
     /// Traces rays, waits, and reads the records.
     pub fn trace(&self, tlas: &Holder<AccelStructHandle>, rays: &[Ray], how: How) -> Result<Vec<HitRecord>> {
-        let job = self.job(rays)?;
+        let trace_buffers = self.buffers(rays)?;
         let mut cmd = self.ctx.acquire_command_buffer()?;
-        self.record(&mut cmd, tlas, &job, how)?;
+        self.record(&mut cmd, tlas, &trace_buffers, how)?;
         self.ctx.submit(cmd)?;
-        self.read(&job)
+        self.read(&trace_buffers)
     }
 }
 

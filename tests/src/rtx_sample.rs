@@ -4,7 +4,6 @@
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::app::run_error::RunError;
 use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
@@ -23,9 +22,8 @@ pub const SIZE: [u32; 2] = [158, 89];
 /// # Panics
 /// When rendering fails.
 pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
-    let moved = sample.update(FrameTime::from_frame(frame, ROUND));
-    moved.map_err(|error| -> RunError { error.into() }).expect("the sample can be updated");
-    let pixels = headless::picture(sample).map_err(|error| -> RunError { error.into() });
+    sample.update(FrameTime::from_frame(frame, ROUND));
+    let pixels = headless::picture(sample);
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels.expect("the sample renders"))
         .expect("the image has this size")
 }

@@ -3,7 +3,7 @@
 use lvk::glam::Vec3;
 use lvk::{
     Aabbs, AccelStructHandle, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context, GeometryFlags,
-    HitGroup, Holder, Result, ShaderStage,
+    HitGroup, Holder, Result, ShaderRecord, ShaderStage,
 };
 
 use crate::hit_check::HitCheck;
@@ -120,7 +120,7 @@ fn sphere_pipeline(ctx: &Context, defines: &[(&str, &str)]) -> Result<RayTracer>
     let groups = records.each_ref().map(|record| HitGroup {
         closest_hit: Some(*hit),
         intersection: Some(*sphere),
-        record,
+        record: ShaderRecord::from_bytes(record),
         ..Default::default()
     });
     RayTracer::from_groups(ctx, *ray_gen, *miss, &groups)

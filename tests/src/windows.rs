@@ -1,5 +1,5 @@
 //! Windows for tests, on an X server of their own without a screen.
-#![expect(clippy::expect_used, reason = "a test whose X server fails has failed")]
+#![expect(clippy::expect_used, clippy::panic, reason = "a test whose X server fails has failed")]
 
 use std::ffi::c_void;
 use std::num::NonZeroU32;
@@ -10,6 +10,10 @@ use std::sync::{Arc, OnceLock};
 use lvk::raw_window_handle::{
     DisplayHandle, HandleError, HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle,
     WindowHandle, XcbDisplayHandle, XcbWindowHandle,
+};
+use lvk::{
+    ColorAttachment, CommandBuffer, Context, RenderPassDesc, Result, SubmitHandle, SwapchainHandle,
+    TextureHandle,
 };
 use lvk_dev_driver::{VirtualDisplay, virtual_display};
 use x11rb::connection::Connection;
@@ -41,11 +45,20 @@ pub fn desktop() -> Option<&'static Desktop> {
     DESKTOP.get_or_init(Desktop::new).as_ref()
 }
 
+/// Starts an X server for programs that a test starts. Prints a line and returns `None` where there is none and none
+/// can be fetched.
+///
+/// # Panics
+/// As [`desktop`].
+pub fn display() -> Option<VirtualDisplay> {
+    fetched(virtual_display(), "X server for windows")
+}
+
 impl Desktop {
     fn new() -> Option<Self> {
         // The driver brings libxcb along.
         vulkan()?;
-        let server = fetched(virtual_display(), "X server for windows")?;
+        let server = display()?;
         if let Err(error) = load_libxcb() {
             unavailable(&format!("libxcb cannot be opened: {error}"));
         }
@@ -126,7 +139,7 @@ impl Drop for TestWindow {
 }
 
 impl HasWindowHandle for TestWindow {
-    fn window_handle(&self) -> Result<WindowHandle<'_>, HandleError> {
+    fn window_handle(&self) -> std::result::Result<WindowHandle<'_>, HandleError> {
         let id = NonZeroU32::new(self.id).ok_or(HandleError::Unavailable)?;
         let raw = RawWindowHandle::Xcb(XcbWindowHandle::new(id));
         // SAFETY: the window lives as long as `self`, unless a test closes it, which X servers take.
@@ -135,13 +148,60 @@ impl HasWindowHandle for TestWindow {
 }
 
 impl HasDisplayHandle for TestWindow {
-    fn display_handle(&self) -> Result<DisplayHandle<'_>, HandleError> {
+    fn display_handle(&self) -> std::result::Result<DisplayHandle<'_>, HandleError> {
         let connection: NonNull<c_void> =
             NonNull::new(self.desktop.connection.get_raw_xcb_connection()).ok_or(HandleError::Unavailable)?;
         let raw = XcbDisplayHandle::new(Some(connection), self.desktop.screen as i32);
         // SAFETY: the connection lives until the end of the program.
         Ok(unsafe { DisplayHandle::borrow_raw(RawDisplayHandle::Xcb(raw)) })
     }
+}
+
+/// Records a pass that fills the texture with a colour.
+///
+/// # Errors
+/// Those of the library.
+pub fn fill(ctx: &Context, texture: TextureHandle, color: [f32; 4]) -> Result<CommandBuffer> {
+    let mut cmd = ctx.acquire_command_buffer()?;
+    let target = ColorAttachment::clear(texture, color);
+    drop(cmd.begin_rendering(&RenderPassDesc { color: &[target], ..Default::default() })?);
+    Ok(cmd)
+}
+
+/// Presents a frame of one colour; `None` where nothing could be shown.
+///
+/// # Errors
+/// Those of the library.
+pub fn present_color(
+    ctx: &Context,
+    swapchain: SwapchainHandle,
+    color: [f32; 4],
+) -> Result<Option<SubmitHandle>> {
+    let Some(image) = ctx.next_image(swapchain)? else { return Ok(None) };
+    let cmd = fill(ctx, image.texture(), color)?;
+    ctx.present(cmd, image).map(Some)
+}
+
+/// Shows frames until the window has the colour: presents come to the screen in their own time.
+///
+/// # Panics
+/// When the window does not show it after 200 frames.
+pub fn present_until_visible(
+    ctx: &Context,
+    swapchain: SwapchainHandle,
+    window: &TestWindow,
+    color: [f32; 4],
+) {
+    let wanted = [color[0], color[1], color[2]].map(|part| (part * 255.0) as u8);
+    for _ in 0..200 {
+        present_color(ctx, swapchain, color).expect("the frame is presented");
+        ctx.wait_idle().expect("the frame is presented");
+        if window.pixel(3, 2) == wanted {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    panic!("the window shows {:?}, not {wanted:?}", window.pixel(3, 2));
 }
 
 fn c_string(text: &str) -> std::ffi::CString {

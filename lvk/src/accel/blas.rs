@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn builds_given_up_leave_the_counts_alone() {
+    fn cancelled_builds_leave_the_counts_alone() {
         let blas = blas();
         for (submitted, refit, counts) in [
             (true, false, (1, 0)),

@@ -364,14 +364,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read(blob in any_blob()) {
+        fn files_are_read_as_they_were_written(blob in any_blob()) {
             let bytes = encode_blas_file(&blob);
             prop_assert_eq!(bytes.len(), encoded_bytes(&blob));
             prop_assert_eq!(decode_blas_file(&bytes), Ok(blob));
         }
 
         #[test]
-        fn a_cut_or_a_changed_bit_is_an_error(blob in any_blob(), place in any::<prop::sample::Index>(), bit in 0..8_u32) {
+        fn truncation_or_a_changed_bit_is_an_error(blob in any_blob(), place in any::<prop::sample::Index>(), bit in 0..8_u32) {
             let mut bytes = encode_blas_file(&blob);
             let place = place.index(bytes.len());
             prop_assert!(decode_blas_file(&bytes[..place]).is_err());

@@ -336,7 +336,7 @@ mod tests {
             count in 1..100_usize,
             lists in prop::collection::vec(prop::collection::vec(any::<prop::sample::Index>(), 0..200), 1..5)
         ) {
-            let pool = Structures::new(7);
+            let pool = Structures::new(7, |_| "");
             let handles: Vec<_> = (0..count).map(|_| pool.insert(blas())).collect();
             let resolve = |handle| find(&pool, handle);
             let (mut known, mut marks) = (BlasRefSet::default(), BitSet::default());
@@ -361,7 +361,7 @@ mod tests {
 
     #[test]
     fn a_set_stands_until_something_of_it_is_gone_or_has_moved() {
-        let pool = Structures::new(7);
+        let pool = Structures::new(7, |_| "");
         let handles = [pool.insert(blas()), pool.insert(blas())];
         let resolve = |handle| find(&pool, handle);
         let set = || BlasRefSet::new(handles.map(|handle| resolve(handle).unwrap()).into());

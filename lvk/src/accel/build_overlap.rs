@@ -54,7 +54,7 @@ struct BuildTargets {
 }
 
 impl BuildTargets {
-    /// This many concurrent builds occupy a device. The limit keeps searches in `ids` short.
+    /// Limit of concurrent builds: this many occupy a device, and searches in `ids` stay short.
     const MAX_TARGETS: usize = 64;
 
     fn clear(&mut self) {

@@ -120,14 +120,14 @@ mod tests {
     }
 
     #[test]
-    fn what_had_no_room_is_tried_again_when_memory_was_freed() {
+    fn a_copy_without_memory_is_tried_again_when_memory_was_freed() {
         assert!(copy(None).should_retry(100));
         assert!(copy(Some(100)).should_retry(99));
         assert!(!copy(Some(100)).should_retry(100));
     }
 
     #[test]
-    fn copies_are_given_up_when_nothing_will_free_memory() {
+    fn copies_are_cancelled_when_nothing_will_free_memory() {
         let body =
             Arc::new(BlasStructures { structures: Vec::new(), compacted_from: None, rebuildable: true });
         let mut all = Compactions { copies: vec![copy(Some(1)), copy(None)], ..Default::default() };

@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_surrounds_the_eye_is_kept() {
+    fn a_box_around_the_eye_is_kept() {
         let strict = InstanceCulling {
             eye: EYE,
             planes: [Vec4::new(1.0, 0.0, 0.0, -1000.0); 6],
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_is_kept() {
+    fn boxes_of_nan_are_kept() {
         let strict = InstanceCulling {
             planes: [Vec4::new(1.0, 0.0, 0.0, -1000.0); 6],
             min_angle: 1.0,

@@ -53,7 +53,7 @@ impl BuildFlags {
     pub(crate) fn check_blas(self, gpu: &Gpu, name: &str) -> Result<()> {
         self.check(name)?;
         if self.contains(Self::POSITION_FETCH) && !gpu.caps.position_fetch {
-            return Err(gpu.unsupported(&format!("'{name}' with POSITION_FETCH: the fetch of positions")));
+            return Err(gpu.unsupported(&format!("POSITION_FETCH, which '{name}' has in its flags")));
         }
         Ok(())
     }

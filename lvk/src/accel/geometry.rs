@@ -5,7 +5,8 @@ use std::sync::Arc;
 use ash::vk;
 use bitflags::bitflags;
 
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit, check_limit_of};
 use crate::format::{IndexFormat, VertexFormat};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
@@ -89,7 +90,7 @@ impl Triangles {
 /// A matrix of 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GeometryTransform {
-    /// By value; see [`transform_rows`](crate::transform_rows).
+    /// A matrix by value; see [`transform_rows`](crate::transform_rows).
     Rows([f32; 12]),
     /// 48 bytes in a buffer, read by every build.
     Buffer {
@@ -249,7 +250,7 @@ fn convert_triangles(
     let unit = u64::from(format.component_bytes());
     check_alignment(name, "vertex offset", triangles.vertex_offset, unit)?;
     check_alignment(name, "vertex stride", stride, unit)?;
-    check_limit(name, "vertex stride in bytes", stride, u32::MAX.into())?;
+    check_limit_of(LimitOrigin::Vulkan, name, "vertex stride in bytes", stride, u32::MAX.into())?;
     check_elements(&vertices, triangles.vertex_offset, triangles.vertex_count, stride, packed)?;
     let matrix = match triangles.transform {
         Some(GeometryTransform::Buffer { buffer, offset }) => transform_address(name, buffer, offset, find)?,
@@ -317,7 +318,7 @@ fn convert_aabbs(
     let stride = if aabbs.stride == 0 { BOX_BYTES } else { aabbs.stride };
     check_alignment(&buffer.name, "box offset", aabbs.offset, 8)?;
     check_alignment(&buffer.name, "box stride", stride, 8)?;
-    check_limit(&buffer.name, "box stride in bytes", stride, u32::MAX.into())?;
+    check_limit_of(LimitOrigin::Vulkan, &buffer.name, "box stride in bytes", stride, u32::MAX.into())?;
     check_elements(&buffer, aabbs.offset, aabbs.count, stride, BOX_BYTES)?;
     let data = vk::AccelerationStructureGeometryAabbsDataKHR::default()
         .data(host_or_device_address(buffer.address + aabbs.offset))

@@ -6,7 +6,8 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 
 use super::blas_refs::{BitSet, BlasRef, BlasRefCollector, BlasRefSet, ResolveBlas};
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit_of};
 use crate::handle::{AccelStructHandle, BufferHandle};
 use crate::parallel::{core_count, parallel_for};
 use crate::resource::Buffer;
@@ -347,7 +348,13 @@ impl InstancePlan {
         } else {
             refers.iter().map(|place| u64::from(spans[*place as usize][1])).sum()
         };
-        check_limit(name, "number of instances, parts of split meshes included", built, u32::MAX.into())?;
+        check_limit_of(
+            LimitOrigin::Vulkan,
+            name,
+            "number of instances, parts of split meshes included",
+            built,
+            u32::MAX.into(),
+        )?;
         Ok(Self { blas_refs, ref_indices: refers, built_count: built as u32 })
     }
 
@@ -441,7 +448,13 @@ impl InstanceSource {
     /// Number of instances for Vulkan.
     pub(crate) fn built_count(&self, name: &str) -> Result<u32> {
         let count = u64::from(self.count) * u64::from(self.copies);
-        check_limit(name, "number of instances, parts of split meshes included", count, u32::MAX.into())?;
+        check_limit_of(
+            LimitOrigin::Vulkan,
+            name,
+            "number of instances, parts of split meshes included",
+            count,
+            u32::MAX.into(),
+        )?;
         Ok(count as u32)
     }
 }
@@ -497,7 +510,7 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_is_three_rows() {
+    fn a_transform_has_vulkans_row_order() {
         let transform = glam::Affine3A::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
         let rows = transform_rows(&transform);
         assert_eq!(rows, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0]);
@@ -545,7 +558,7 @@ mod tests {
             same in any::<bool>(),
             wrong in prop::option::weighted(0.2, any::<prop::sample::Index>()),
         ) {
-            let pool = HandlePool::<AccelStructHandle, Blas>::new(7);
+            let pool = HandlePool::<AccelStructHandle, Blas>::new(7, |_| "");
             let handles: Vec<_> = (0..count).map(|_| pool.insert(blas())).collect();
             let resolve = |handle| {
                 Ok(BlasRef::new(handle, ResourceId(0), BuildFlags::empty(), pool.get(handle)?))

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::error::{Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Result, check_limit_of};
 use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
@@ -33,7 +34,13 @@ impl PrimitiveMap {
         let primitive_bytes = if boxes { BOX_BYTES } else { TRIANGLE_BYTES };
         let total: u64 = geometries.iter().map(|list| list.len() as u64).sum();
         let words = total + geometries.len() as u64;
-        check_limit(name, "primitives and geometries of a part", words, u32::MAX.into())?;
+        check_limit_of(
+            LimitOrigin::Library,
+            name,
+            "primitives and geometries of a part",
+            words,
+            u32::MAX.into(),
+        )?;
         let inputs = Arc::new(new_buffer(gpu, name, total * primitive_bytes, BufferUsage::ACCEL_INPUT)?);
         Ok(Self {
             table: Arc::new(new_buffer(gpu, name, words * 4, BufferUsage::STORAGE)?),

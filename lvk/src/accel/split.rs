@@ -2,7 +2,8 @@
 
 use super::partition::{PrimitiveBounds, partition_sah, primitive_bounds, union_bounds};
 use super::primitive_bounds::Bounds;
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit_of};
 
 /// Limits of one acceleration structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +51,13 @@ pub(crate) fn plan_split(
         starts.push(total);
         total += geometry.len() as u64;
     }
-    check_limit(name, "primitive count of all parts together", total, u32::MAX.into())?;
+    check_limit_of(
+        LimitOrigin::Library,
+        name,
+        "primitive count of all parts together",
+        total,
+        u32::MAX.into(),
+    )?;
     let mut planner = SplitPlanner { name, starts, limits, sizes, parts: Vec::new() };
     planner.plan_parts(&mut primitive_bounds(bounds.iter().flatten()))?;
     Ok(planner.parts)
@@ -81,6 +88,7 @@ impl SplitPlanner<'_> {
                 what: demand.what,
                 requested: demand.requested,
                 limit: demand.limit,
+                origin: LimitOrigin::Device,
             });
         }
         let parts = self.min_part_count(&counts, demand.parts, items.len() as u64)?;
@@ -326,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_stays_whole() {
+    fn a_mesh_within_the_limit_stays_whole() {
         let bounds = [scattered(10), Vec::new(), scattered(3)];
         let parts = plan_split("mesh", &bounds, &limits(1000, 1000, 13), &mut linear(0, 1, 1)).unwrap();
         assert_eq!(parts, [PartPlan { geometries: vec![(0..10).collect(), Vec::new(), (0..3).collect()] }]);
@@ -379,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn a_costly_geometry_is_cut_further_than_a_cheap_one() {
+    fn a_costly_geometry_is_split_further_than_a_cheap_one() {
         // The first geometry, all on the left, costs 50 times as much as the second one.
         let shifted = scattered(500).into_iter();
         let right = shifted
@@ -410,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn primitives_in_one_place_are_cut_by_their_number() {
+    fn primitives_in_one_place_are_split_by_count() {
         for one in [Bounds::ORIGIN, Bounds { low: Vec3::NAN, high: Vec3::NAN }] {
             let parts =
                 plan_split("mesh", &[vec![one; 100]], &limits(MIB, MIB, 30), &mut linear(0, 1, 1)).unwrap();

@@ -329,7 +329,7 @@ mod tests {
     /// Contents that one command sets and the next command of the same command buffer replaces are still read by the
     /// first.
     #[test]
-    fn what_is_shown_is_kept_until_the_gpu_is_done_with_it() {
+    fn referenced_blas_are_kept_until_the_gpu_is_done_with_them() {
         let target = structure();
         let [(first, is_first), (second, is_second), (third, is_third)] = [set(), set(), set()];
         let mut updates = TlasTrackers::default();
@@ -356,7 +356,7 @@ mod tests {
 
     /// Command buffers that are not submitted change no contents and keep nothing alive.
     #[test]
-    fn a_command_buffer_that_is_given_up_keeps_nothing() {
+    fn a_cancelled_command_buffer_keeps_nothing() {
         let target = structure();
         let mut updates = TlasTrackers::default();
         let [(first, is_first), (second, is_second)] = [set(), set()];

@@ -167,6 +167,10 @@ pub(crate) enum Layout {
     LocalRead,
     /// Shading rate attachment of a pass.
     ShadingRate,
+    /// Sampled images of other engines.
+    ExternalShaderRead,
+    /// Depth-stencil images of other engines, sampled or tested.
+    ExternalDepthRead,
 }
 
 /// One use of a resource by a command.
@@ -393,7 +397,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_single_stage_has_a_row_and_an_access() {
+    fn every_single_stage_has_a_table_entry_and_an_access() {
         let rows: Vec<usize> = Stages::all().iter().map(Stages::index).collect();
         assert_eq!(rows, (0..Stages::COUNT).collect::<Vec<_>>());
         assert!(Stages::all().iter().all(|stage| !stage.possible_access().is_empty()));

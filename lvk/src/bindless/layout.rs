@@ -34,10 +34,10 @@ pub(crate) const TLAS_TABLE_ENTRY_BYTES: u64 = 16;
 pub(crate) struct Binding {
     pub(crate) number: u32,
     pub(crate) descriptor_type: vk::DescriptorType,
-    /// Its name in the preamble.
+    /// Name of the binding in the preamble.
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) macro_name: &'static str,
-    /// Its content, for error messages.
+    /// Content of the binding, for error messages.
     pub(crate) holds: &'static str,
 }
 

@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn dummy_is_written_first_and_never_given_away() {
+    fn the_default_descriptor_is_written_first_and_never_allocated() {
         let mut slots = Slots::new(3);
         assert_eq!(slots.take_dirty(), [0]);
         slots.free(0);

@@ -1,6 +1,7 @@
 //! Slots of one descriptor array with their owners.
 
 use super::slot_allocator::Slots;
+use crate::error::limit_origin::LimitOrigin;
 use crate::error::{Error, Result};
 
 /// Slots of one kind and their owners.
@@ -22,6 +23,7 @@ impl<T: Copy> SlotArray<T> {
             what: self.kind,
             requested: limit + 1,
             limit,
+            origin: LimitOrigin::Descriptors,
         })
     }
 
@@ -64,7 +66,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn descriptors_show_their_owners_and_no_dummy_is_written_over_a_dummy(
+        fn descriptors_are_those_of_their_owners_and_no_default_replaces_a_default(
             changes in prop::collection::vec((0..6_u32, prop::option::of(1..4_u32)), 0..60)
         ) {
             const DUMMY: u32 = 0;

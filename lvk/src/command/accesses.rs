@@ -200,7 +200,7 @@ mod tests {
     }
 
     proptest! {
-        /// With few and with many buffers, and again after a command was cancelled.
+        /// Cases: few buffers, many buffers, and a second run after a command was cancelled.
         #[test]
         fn a_buffer_used_twice_counts_once(
             commands in prop::collection::vec(prop::collection::vec((0..60_u64, 0..3_usize), 0..120), 1..4)

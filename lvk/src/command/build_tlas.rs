@@ -14,7 +14,8 @@ use crate::accel::scratch::aligned_scratch_address;
 use crate::accel::tlas::Tlas;
 use crate::accel::tlas_tracker::{RecordedTlasBuild, TlasChange, TlasTracker};
 use crate::barrier::{ResourceId, Stages, Use};
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit_of};
 use crate::resource::Buffer;
 use crate::submit::last_access::QueueAccess;
 
@@ -200,7 +201,7 @@ impl TlasBuildRequest<'_> {
 
 /// Fails if the caller has more instances than the TLAS was created for.
 pub(super) fn check_capacity(target: &AccelStruct, tlas: &Tlas, count: u64) -> Result<()> {
-    check_limit(&target.name, "instance count", count, tlas.capacity.into())
+    check_limit_of(LimitOrigin::TlasCapacity, &target.name, "instance count", count, tlas.capacity.into())
 }
 
 #[cold]

@@ -1,9 +1,9 @@
-//! Instances of a TLAS that the kernel [`Kernel::Instances`] writes: its input, and its dispatch.
+//! Instances of a TLAS that the kernel [`Kernel::Instances`] writes: its input, its dispatch, and the build from its output.
 
 use std::sync::Arc;
 
 use super::CommandBuffer;
-use super::build_tlas::VulkanInstances;
+use super::build_tlas::{TlasBuildRequest, VulkanInstances};
 use super::transfer::BufferCopy;
 use crate::accel::AccelStruct;
 use crate::accel::blas_refs::BlasRefSet;
@@ -47,8 +47,65 @@ impl KernelInstances {
 }
 
 impl CommandBuffer {
+    /// Builds from instances that a kernel writes. On a device without acceleration structures, only checks the
+    /// instances.
+    #[inline(never)]
+    pub(super) fn update_with_kernel(
+        &mut self,
+        update: TlasBuildRequest<'_>,
+        instances: &[TlasInstance],
+        memory: &mut PlanMemory,
+    ) -> Result<TlasChange> {
+        let TlasBuildRequest { target, tlas, previous, .. } = update;
+        let count = instances.len() as u32;
+        let find = |handle| self.shared.blas_ref(handle);
+        let plan = InstancePlan::new(&target.name, instances, previous.blas_refs, memory, &find)?;
+        if tlas.structure.is_none() {
+            let blas_refs = Some(Arc::clone(&plan.blas_refs));
+            memory.ref_indices = plan.into_ref_indices();
+            let refit = update.check_counts(count, count)?;
+            return Ok(TlasChange { count, built_count: count, blas_refs, source: None, refit });
+        }
+        let refit = update.check_counts(count, plan.built_count)?;
+        let (source, blas_refs) = self.host_source(&target.name, instances, plan, memory)?;
+        let built_count = source.built_count(&target.name)?;
+        let kernel_instances = self.record_instances(target, tlas, blas_refs, source, built_count)?;
+        self.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, refit)?;
+        Ok(kernel_instances.into_change(count, refit))
+    }
+
+    /// Builds the Vulkan TLAS from instances in a buffer.
+    pub(super) fn build_from_buffer(
+        &mut self,
+        update: TlasBuildRequest<'_>,
+        instances: &DeviceInstances<'_>,
+        blas_refs: Arc<BlasRefSet>,
+        mut source: InstanceSource,
+    ) -> Result<TlasChange> {
+        let TlasBuildRequest { target, tlas, previous, .. } = update;
+        let built_count = source.built_count(&target.name)?;
+        let refit = update.check_counts(instances.count, built_count)?;
+        self.keep_source_copy(&target.name, instances, &blas_refs, &mut source)?;
+        let kernel_instances = self.record_instances(target, tlas, blas_refs, source, built_count)?;
+        self.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, refit)?;
+        Ok(kernel_instances.into_change(instances.count, refit))
+    }
+
+    /// Builds from the instances of a kernel that is already recorded.
+    pub(super) fn build_from_kernel(
+        &mut self,
+        target: &AccelStruct,
+        tlas: &Tlas,
+        kernel_instances: &KernelInstances,
+        is_first: bool,
+        refit: bool,
+    ) -> Result<()> {
+        let built = self.build_tlas(target, tlas, kernel_instances.build_instances(), is_first, refit);
+        built.map_err(|error| self.poison(&target.name, error))
+    }
+
     /// Returns the kernel's input: the instances, and the owners of the instances for extra parts.
-    pub(super) fn host_source(
+    fn host_source(
         &mut self,
         name: &str,
         instances: &[TlasInstance],
@@ -133,7 +190,7 @@ impl CommandBuffer {
     }
 
     /// Copies the caller's buffer if BLAS may move later, since its contents may have changed by then.
-    pub(super) fn keep_source_copy(
+    fn keep_source_copy(
         &mut self,
         name: &str,
         instances: &DeviceInstances<'_>,

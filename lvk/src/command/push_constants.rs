@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pipeline_does_not_run_on_constants_nobody_pushed() {
+    fn a_pipeline_does_not_run_without_its_push_constants() {
         let mut constants = PushConstants { pushed: word_mask(0, 16), ..Default::default() };
         assert!(constants.check_pushed("p", 16).is_ok());
         assert!(constants.check_pushed("p", 20).is_err());

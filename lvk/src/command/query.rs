@@ -23,7 +23,11 @@ impl CommandBuffer {
     pub fn reset_queries(&mut self, pool: QueryPoolHandle, queries: Range<u32>) -> Result<()> {
         self.needs_compute("a reset of queries")?;
         let pool = self.shared.store.query_pools.get(pool)?;
-        let count = queries.end.saturating_sub(queries.start);
+        let Some(count) = queries.end.checked_sub(queries.start) else {
+            let Range { start, end } = queries;
+            let message = format!("the range {start}..{end} of queries ends before it begins");
+            return Err(Error::usage(&pool.name, message));
+        };
         pool.check_range(queries.start, count)?;
         self.state.queries.check_reset(&pool, queries.clone())?;
         if count > 0 {

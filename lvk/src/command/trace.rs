@@ -84,7 +84,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         const ARGUMENT_BYTES: u64 = 12;
         if !self.shared.gpu.caps.trace_rays_indirect {
-            return Err(self.shared.gpu.unsupported("trace_rays_indirect: indirect traces"));
+            return Err(self.shared.gpu.unsupported("trace_rays_indirect"));
         }
         let (pipeline, regions) = self.check_trace(ray_gen)?;
         let buffer = self.shared.store.buffers.get(arguments)?;

@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use super::CommandBuffer;
 use super::build_tlas::{TlasBuildRequest, VulkanInstances, check_capacity};
-use super::instance_kernel::{INSTANCE_ALIGNMENT, KernelInstances};
+use super::instance_kernel::INSTANCE_ALIGNMENT;
 use super::open_build::OpenBuild;
 use super::recording_state::RecordingState;
 use crate::accel::AccelStruct;
 use crate::accel::blas_refs::{BitSet, BlasRefSet};
 use crate::accel::flags::BuildMode;
 use crate::accel::instance::{
-    DeviceInstances, INSTANCE_BYTES, InstancePlan, InstanceSource, PlanMemory, TlasInstance, WrittenRefs,
-    first_needs_only_address, instance_bytes, write_addresses, write_unchanged,
+    DeviceInstances, INSTANCE_BYTES, InstanceSource, TlasInstance, WrittenRefs, first_needs_only_address,
+    instance_bytes, write_addresses, write_unchanged,
 };
 use crate::accel::tlas::Tlas;
 use crate::accel::tlas_tracker::{RecordedTlasBuild, TlasChange, TlasEntry, TlasTrackers};
@@ -231,33 +231,6 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Builds from instances that a kernel writes. On a device without acceleration structures, only checks the
-    /// instances.
-    #[inline(never)]
-    fn update_with_kernel(
-        &mut self,
-        update: TlasBuildRequest<'_>,
-        instances: &[TlasInstance],
-        memory: &mut PlanMemory,
-    ) -> Result<TlasChange> {
-        let TlasBuildRequest { target, tlas, previous, .. } = update;
-        let count = instances.len() as u32;
-        let find = |handle| self.shared.blas_ref(handle);
-        let plan = InstancePlan::new(&target.name, instances, previous.blas_refs, memory, &find)?;
-        if tlas.structure.is_none() {
-            let blas_refs = Some(Arc::clone(&plan.blas_refs));
-            memory.ref_indices = plan.into_ref_indices();
-            let refit = update.check_counts(count, count)?;
-            return Ok(TlasChange { count, built_count: count, blas_refs, source: None, refit });
-        }
-        let refit = update.check_counts(count, plan.built_count)?;
-        let (source, blas_refs) = self.host_source(&target.name, instances, plan, memory)?;
-        let built_count = source.built_count(&target.name)?;
-        let kernel_instances = self.record_instances(target, tlas, blas_refs, source, built_count)?;
-        self.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, refit)?;
-        Ok(kernel_instances.into_change(count, refit))
-    }
-
     /// Updates the TLAS of an entry with instances in a buffer.
     fn update_entry_from_buffer(
         &mut self,
@@ -296,23 +269,6 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Builds the Vulkan TLAS from instances in a buffer.
-    fn build_from_buffer(
-        &mut self,
-        update: TlasBuildRequest<'_>,
-        instances: &DeviceInstances<'_>,
-        blas_refs: Arc<BlasRefSet>,
-        mut source: InstanceSource,
-    ) -> Result<TlasChange> {
-        let TlasBuildRequest { target, tlas, previous, .. } = update;
-        let built_count = source.built_count(&target.name)?;
-        let refit = update.check_counts(instances.count, built_count)?;
-        self.keep_source_copy(&target.name, instances, &blas_refs, &mut source)?;
-        let kernel_instances = self.record_instances(target, tlas, blas_refs, source, built_count)?;
-        self.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, refit)?;
-        Ok(kernel_instances.into_change(instances.count, refit))
-    }
-
     /// Applies the updates recorded so far as if they were submitted. Only for the command buffer that is submitted
     /// before every other one.
     pub(crate) fn apply_tlas_updates(&mut self) {
@@ -323,19 +279,6 @@ impl CommandBuffer {
                 open_builds.push(OpenBuild::for_tlas(Arc::clone(target)))
             });
         }
-    }
-
-    /// Builds from the instances of a kernel that is already recorded.
-    fn build_from_kernel(
-        &mut self,
-        target: &AccelStruct,
-        tlas: &Tlas,
-        kernel_instances: &KernelInstances,
-        is_first: bool,
-        refit: bool,
-    ) -> Result<()> {
-        let built = self.build_tlas(target, tlas, kernel_instances.build_instances(), is_first, refit);
-        built.map_err(|error| self.poison(&target.name, error))
     }
 
     /// Returns the error of the software part of an update. Poisons the command buffer if the device part is already

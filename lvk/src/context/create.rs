@@ -1,5 +1,7 @@
 //! Creation of buffers, samplers, shader modules, pipelines and query pools.
 
+#[cfg(feature = "glsl")]
+use std::path::Path;
 use std::sync::Arc;
 
 use super::Context;
@@ -17,7 +19,7 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::{Buffer, QueryPool, Sampler};
-use crate::shader::{ShaderCache, ShaderCacheStats, ShaderModuleDesc, find_raw_hit_builtin};
+use crate::shader::{CompileFiles, ShaderCache, ShaderCacheStats, ShaderModuleDesc, find_raw_hit_builtin};
 
 /// Slot of objects that take no bindless slot.
 pub(super) const NO_SLOT: u32 = 0;
@@ -52,11 +54,31 @@ impl Context {
     /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, such as
     /// those of the task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
+        self.create_module(desc, CompileFiles::with_cache(self.device_state().shader_cache.as_ref()))
+    }
+
+    /// As [`create_shader_module`](Self::create_shader_module). Calls `on_search` with each path at which an include is
+    /// searched.
+    #[cfg(feature = "glsl")]
+    pub(crate) fn create_module_from_files(
+        &self,
+        desc: &ShaderModuleDesc<'_>,
+        on_search: &dyn Fn(&Path),
+    ) -> Result<Holder<ShaderModuleHandle>> {
+        let cache = self.device_state().shader_cache.as_ref();
+        self.create_module(desc, CompileFiles { cache, on_search: Some(on_search) })
+    }
+
+    fn create_module(
+        &self,
+        desc: &ShaderModuleDesc<'_>,
+        files: CompileFiles<'_>,
+    ) -> Result<Holder<ShaderModuleHandle>> {
         let shared = self.device_state();
         let module = ShaderModule::new(
             &shared.gpu,
             desc,
-            shared.shader_cache.as_ref(),
+            files,
             Some(&shared.bindless),
             shared.layout.push_constant_bytes,
         )?;
@@ -83,7 +105,20 @@ impl Context {
     ) -> Result<Holder<RenderPipelineHandle>> {
         let shared = self.device_state();
         let find = |handle| shared.store.shader_modules.get(handle);
-        let pipeline = RenderPipeline::new(&shared.gpu, shared.pipeline_base(), desc, &find)?;
+        self.add_render_pipeline(RenderPipeline::new(
+            &shared.gpu,
+            shared.pipeline_base(),
+            desc,
+            &find,
+            &shared.graphics_parts,
+        )?)
+    }
+
+    pub(super) fn add_render_pipeline(
+        &self,
+        pipeline: RenderPipeline,
+    ) -> Result<Holder<RenderPipelineHandle>> {
+        let shared = self.device_state();
         shared.graphics_queries.insert(pipeline.query_stages);
         Ok(Holder::new(self, shared.store.render_pipelines.insert(pipeline), NO_SLOT))
     }
@@ -95,8 +130,14 @@ impl Context {
     ) -> Result<Holder<ComputePipelineHandle>> {
         let shared = self.device_state();
         let module = self.required_module(desc.module, desc.debug_name, "compute")?;
-        let pipeline = ComputePipeline::new(&shared.gpu, shared.pipeline_base(), desc, &module)?;
-        Ok(Holder::new(self, shared.store.compute_pipelines.insert(pipeline), NO_SLOT))
+        self.add_compute_pipeline(ComputePipeline::new(&shared.gpu, shared.pipeline_base(), desc, &module)?)
+    }
+
+    pub(super) fn add_compute_pipeline(
+        &self,
+        pipeline: ComputePipeline,
+    ) -> Result<Holder<ComputePipelineHandle>> {
+        Ok(Holder::new(self, self.device_state().store.compute_pipelines.insert(pipeline), NO_SLOT))
     }
 
     /// Creates a query pool (`vkCreateQueryPool`). All of its queries are reset and ready to be written.
@@ -110,7 +151,7 @@ impl Context {
         Ok(Holder::new(self, self.device_state().store.query_pools.insert(pool), NO_SLOT))
     }
 
-    fn required_module(
+    pub(super) fn required_module(
         &self,
         handle: Option<ShaderModuleHandle>,
         pipeline: &str,

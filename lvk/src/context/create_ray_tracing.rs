@@ -7,6 +7,7 @@ use super::create::NO_SLOT;
 use super::holder::Holder;
 use crate::error::{Error, Result};
 use crate::handle::{RayTracingLibraryHandle, RayTracingPipelineHandle};
+use crate::pipeline::ray_tracing::SbtContents;
 use crate::pipeline::ray_tracing_desc::RayTracingPipelineDesc;
 use crate::pipeline::ray_tracing_library::RayTracingLibraryDesc;
 use crate::pipeline::{RayTracingLibrary, RayTracingPipeline};
@@ -26,12 +27,26 @@ impl Context {
     ) -> Result<Holder<RayTracingPipelineHandle>> {
         let shared = self.device_state();
         let find = |handle| shared.store.shader_modules.get(handle);
-        let libraries = desc.libraries.iter().map(|handle| shared.store.ray_tracing_libraries.get(*handle));
-        let libraries = libraries.collect::<Result<Vec<_>>>()?;
+        let libraries = self.ray_tracing_libraries(desc.libraries)?;
         let base = shared.pipeline_base();
-        let (pipeline, table) = RayTracingPipeline::new(&shared.gpu, base, desc, &find, &libraries)?;
+        self.add_ray_tracing_pipeline(RayTracingPipeline::new(&shared.gpu, base, desc, &find, &libraries)?)
+    }
+
+    pub(super) fn ray_tracing_libraries(
+        &self,
+        handles: &[RayTracingLibraryHandle],
+    ) -> Result<Vec<Arc<RayTracingLibrary>>> {
+        handles.iter().map(|handle| self.device_state().store.ray_tracing_libraries.get(*handle)).collect()
+    }
+
+    /// Adds a pipeline, and uploads its shader binding table.
+    pub(super) fn add_ray_tracing_pipeline(
+        &self,
+        (pipeline, table): (RayTracingPipeline, SbtContents),
+    ) -> Result<Holder<RayTracingPipelineHandle>> {
         let target = Arc::clone(&pipeline.table);
-        let holder = Holder::new(self, shared.store.ray_tracing_pipelines.insert(pipeline), NO_SLOT);
+        let handle = self.device_state().store.ray_tracing_pipelines.insert(pipeline);
+        let holder = Holder::new(self, handle, NO_SLOT);
         self.upload_to_buffer(&target, table.offset, &table.bytes)?;
         Ok(holder)
     }

@@ -91,7 +91,7 @@ impl Context {
     }
 
     /// Uploads the initial contents. Without contents, makes the texture readable by shaders.
-    fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
+    pub(super) fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
         let texture = self.device_state().store.textures.get(handle)?;
         let Some(data) = desc.data else {
             return self.make_texture_visible(&texture);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Context;
 use super::config::ContextDesc;
-use super::new::requested_queues;
+use super::new::external_request;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::start::external::RawContext;
@@ -13,8 +13,11 @@ impl Context {
     /// Creates a context on the caller's instance, device and queues. The caller keeps their ownership: the context
     /// destroys none of them.
     ///
-    /// Members of `desc` that configure device creation are ignored: the library, the device, validation and its sink,
-    /// required features, the profile, and user extensions. Its ray tracing requests apply as far as `raw` allows them.
+    /// [`requirements`](Self::requirements) says what the device needs, and
+    /// [`DeviceRequirements::raw_context`](crate::DeviceRequirements::raw_context) fills in `raw`. Members of `desc` that
+    /// configure device creation are ignored: the library, the device, validation and its sink, required features, the
+    /// profile, and user extensions. Its ray tracing requests apply as far as `raw` allows them. A window needs the
+    /// extensions for its window system and for swapchains in `raw`.
     ///
     /// # Safety
     /// The handles must belong together and live until the last clone, holder and command buffer of the context is
@@ -34,18 +37,15 @@ impl Context {
     ///
     /// # Errors
     /// [`NoDevice`](crate::Error::NoDevice) where the device lacks a requirement of the library;
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) where the device cannot have a declared feature, an extension is
-    /// missing from the list, or a queue family lacks a capability that its queue needs;
+    /// [`InvalidUsage`](crate::Error::InvalidUsage), whose object is the field of `raw`, for null handles, a physical
+    /// device that is not of the instance, features that the device cannot have, extensions that a feature or the window
+    /// needs and that are not listed, queue families that lack a capability, and one queue with two families;
     /// [`Unsupported`](crate::Error::Unsupported) for [`RayQueryRequest::Software`](crate::RayQueryRequest::Software)
     /// without the feature `software-ray-query`.
     pub unsafe fn from_raw(raw: RawContext<'_>, desc: &ContextDesc<'_>) -> Result<Self> {
         desc.ray_query.check()?;
-        let queues = requested_queues(desc);
         // SAFETY: by the caller's promise.
-        let gpu = unsafe {
-            let (pipeline, query) = (desc.ray_tracing_pipeline, desc.ray_query);
-            Gpu::from_raw(raw, pipeline, query, desc.debug_names, desc.checkpoints, queues)?
-        };
+        let gpu = unsafe { Gpu::from_raw(raw, &external_request(desc))? };
         Self::with_gpu(Arc::new(gpu), desc)
     }
 }

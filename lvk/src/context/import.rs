@@ -11,7 +11,7 @@ use crate::queue::Queue;
 use crate::resource::buffer::BufferUsage;
 use crate::resource::texture_desc::TextureDesc;
 use crate::resource::{Buffer, Texture};
-use crate::submit::emit_barriers::layout_from_vulkan;
+use crate::submit::exchanged_layout::exchanged_layout;
 use crate::submit::{Submission, SubmitHandle};
 
 /// Describes an external image to import.
@@ -23,8 +23,10 @@ pub struct ImportedTexture<'a> {
     /// `data` and `generate_mips` are ignored.
     pub desc: TextureDesc<'a>,
     /// Layout of the whole image when the context first uses it: `UNDEFINED`, `GENERAL`, `READ_ONLY_OPTIMAL`,
-    /// `COLOR_ATTACHMENT_OPTIMAL`, `DEPTH_STENCIL_ATTACHMENT_OPTIMAL`, `TRANSFER_SRC_OPTIMAL` or
-    /// `TRANSFER_DST_OPTIMAL`.
+    /// `SHADER_READ_ONLY_OPTIMAL`, `DEPTH_STENCIL_READ_ONLY_OPTIMAL`, `COLOR_ATTACHMENT_OPTIMAL`,
+    /// `DEPTH_STENCIL_ATTACHMENT_OPTIMAL`, `TRANSFER_SRC_OPTIMAL` or `TRANSFER_DST_OPTIMAL`. The layouts of attachments
+    /// and `DEPTH_STENCIL_READ_ONLY_OPTIMAL` need [`TextureUsage::TARGET`](crate::TextureUsage::TARGET); read-only
+    /// colour images need [`SAMPLED`](crate::TextureUsage::SAMPLED).
     pub layout: vk::ImageLayout,
     /// True if the object was created with `VK_SHARING_MODE_CONCURRENT` for the families of all queues
     /// ([`Context::raw_queue_family_of`]). Otherwise it belongs to the graphics queue's family, and other queues must
@@ -82,8 +84,8 @@ impl Context {
     /// finished, or the submission waits for them with a semaphore of [`submit_with`](Self::submit_with).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a null image, a layout that is not in the list, and descriptions that
-    /// no texture can have; [`Unsupported`](Error::Unsupported) and [`LimitExceeded`](Error::LimitExceeded) as in
+    /// [`InvalidUsage`](Error::InvalidUsage) for a null image, a layout that is not in the list or that the image cannot
+    /// have, and descriptions that no texture can have; [`Unsupported`](Error::Unsupported) and [`LimitExceeded`](Error::LimitExceeded) as in
     /// [`create_texture`](Self::create_texture).
     pub unsafe fn import_texture(&self, import: &ImportedTexture<'_>) -> Result<Holder<TextureHandle>> {
         let (shared, desc) = (self.device_state(), &import.desc);
@@ -98,7 +100,8 @@ impl Context {
             let message = "an imported texture has its contents; upload others by upload_texture";
             return Err(Error::usage(desc.debug_name, message));
         }
-        let layout = layout_from_vulkan(import.layout).map_err(|why| Error::usage(desc.debug_name, why))?;
+        let layout = exchanged_layout(import.layout, desc.format, desc.usage)
+            .map_err(|why| Error::usage(desc.debug_name, why))?;
         let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = Texture::import(&shared.gpu, desc, import.image, slot)
             .and_then(|texture| super::create_texture::default_views(&texture).map(|views| (texture, views)));
@@ -143,10 +146,13 @@ impl Context {
     /// The image is in that layout once the waits of the next submission are satisfied.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for a layout that is not in the list of [`ImportedTexture::layout`].
+    /// [`InvalidUsage`](Error::InvalidUsage) for a layout that is not in the list of [`ImportedTexture::layout`] or that
+    /// the image cannot have.
     pub unsafe fn acquire_texture(&self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.device_state().store.textures.get(texture)?;
-        let layout = layout_from_vulkan(layout).map_err(|why| Error::usage(&texture.name, why))?;
+        let image = &texture.image;
+        let layout = exchanged_layout(layout, image.format, image.usage)
+            .map_err(|why| Error::usage(&texture.name, why))?;
         self.device_state().submitter.import_texture(texture.image.id, texture.image.shape, layout);
         Ok(())
     }

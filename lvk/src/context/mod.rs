@@ -5,11 +5,16 @@ mod compact;
 pub(crate) mod config;
 mod create;
 pub(crate) mod create_accel;
+mod create_in_background;
 mod create_pipelines;
 mod create_ray_tracing;
 mod create_texture;
 mod default_descriptors;
 pub(crate) mod destroy;
+#[cfg(unix)]
+mod external_memory;
+#[cfg(unix)]
+pub(crate) mod external_semaphore;
 mod format_queries;
 pub(crate) mod frame;
 mod from_raw;
@@ -19,6 +24,7 @@ mod index_faults;
 mod interop;
 mod live_objects;
 mod new;
+pub(crate) mod pending_pipeline;
 pub(crate) mod plan_blas;
 mod profiling;
 mod prologue;
@@ -26,6 +32,7 @@ mod query_results;
 mod queue_labels;
 pub(crate) mod read_bounds;
 pub(crate) mod readback;
+mod requirements;
 pub(crate) mod serialize;
 mod submit;
 mod transfer;
@@ -35,6 +42,7 @@ mod window;
 use std::sync::Arc;
 
 use crate::accel::compaction::Compactions;
+use crate::background::BackgroundJobs;
 use crate::command::RecordingStatePool;
 use crate::device_state::DeviceState;
 use crate::gpu::caps::capabilities::Capabilities;
@@ -56,6 +64,8 @@ pub struct Context {
 }
 
 struct ContextInner {
+    /// Pipelines that are compiled in the background. Dropped first, since its jobs use the device.
+    background: BackgroundJobs,
     /// Uploads and builds that run before the next submission.
     prologue: Mutex<Prologue>,
     frames: Mutex<FrameRing>,

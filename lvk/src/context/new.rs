@@ -12,6 +12,7 @@ use super::{Context, ContextInner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
+use crate::background::BackgroundJobs;
 use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
@@ -26,9 +27,11 @@ use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
 use crate::gpu::device::DeviceRequest;
 use crate::gpu::start::instance::{Instance, InstanceDesc};
 use crate::gpu::start::physical_device::PhysicalDevice;
+use crate::gpu::start::user_extensions::UserExtensions;
 use crate::kernels::Kernels;
 use crate::lock_order::{Mutex, Rank};
-use crate::pipeline::{PipelineCache, PipelineLayout};
+use crate::parallel::core_count;
+use crate::pipeline::{GraphicsParts, PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shader::ShaderCache;
@@ -60,15 +63,9 @@ impl Context {
         let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
         let request = DeviceRequest {
             wish: wish.as_deref().or(desc.device),
-            pipeline: desc.ray_tracing_pipeline,
-            query: desc.ray_query,
-            required: desc.required_features,
             profile: desc.profile,
             extra: desc.user_extensions,
-            debug_names: desc.debug_names,
-            checkpoints: desc.checkpoints,
-            queues: requested_queues(desc),
-            window: desc.window_ref(),
+            ..external_request(desc)
         };
         Self::with_gpu(Arc::new(Gpu::new(instance, &request)?), desc)
     }
@@ -77,6 +74,7 @@ impl Context {
     pub(super) fn with_gpu(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
         let shared = Arc::new(new_device_state(gpu, desc)?);
         let inner = ContextInner {
+            background: BackgroundJobs::new(core_count() / 2),
             prologue: Mutex::new(Rank::Pending, Prologue::default()),
             compactions: Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),
@@ -150,9 +148,26 @@ fn failed_report(error: Error, otherwise: impl FnOnce() -> DriverReport) -> Driv
     }
 }
 
+/// Returns the request for a device that another engine creates. Members of `desc` that choose or change a device of
+/// the library do not count.
+pub(super) fn external_request<'a>(desc: &'a ContextDesc<'_>) -> DeviceRequest<'a> {
+    DeviceRequest {
+        wish: None,
+        pipeline: desc.ray_tracing_pipeline,
+        query: desc.ray_query,
+        required: desc.required_features,
+        profile: None,
+        extra: UserExtensions::default(),
+        debug_names: desc.debug_names,
+        checkpoints: desc.checkpoints,
+        queues: requested_queues(desc),
+        window: desc.window_ref(),
+    }
+}
+
 /// Returns the queues to request. Index checks need a shared queue, because command buffers record faults one after the
 /// other.
-pub(super) fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
+fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
     if desc.check_indices { QueueRequest::Shared } else { desc.queues }
 }
 
@@ -175,6 +190,7 @@ fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState
         shader_cache: desc.shader_cache.map(ShaderCache::new),
         #[cfg(feature = "software-ray-query")]
         tree_cache: desc.tree_cache.map(crate::software_ray_query::bvh_cache::BvhCache::new),
+        graphics_parts: GraphicsParts::new(),
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),

@@ -52,6 +52,6 @@ impl Context {
         let gpu = &self.device_state().gpu;
         let reader =
             gpu.clock_reader.as_ref().ok_or_else(|| gpu.unsupported("clocks of device and host together"))?;
-        reader.read(|ticks| gpu.milliseconds(ticks))
+        reader.read(|ticks| gpu.timestamps().milliseconds(ticks))
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Context;
 use crate::command::transfer::BufferCopy;
 use crate::device_state::DeferredObject;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::Buffer;
@@ -60,6 +60,11 @@ impl std::fmt::Debug for Readback {
     }
 }
 
+/// Returns the error for a range of `what` that ends before it begins.
+fn reversed_range(object: &str, what: &str, Range { start, end }: Range<u64>) -> Error {
+    Error::usage(object, format!("the range {start}..{end} of {what} ends before it begins"))
+}
+
 impl Context {
     /// Starts a copy of bytes of a buffer in any memory to the host, after everything submitted so far. Does not wait.
     ///
@@ -68,8 +73,12 @@ impl Context {
     /// [`StaleHandle`](crate::Error::StaleHandle).
     pub fn read_buffer_later(&self, buffer: BufferHandle, range: Range<u64>) -> Result<Readback> {
         let find = || self.device_state().store.buffers.get(buffer);
-        let size = range.end.checked_sub(range.start).unwrap_or(u64::MAX);
-        find()?.check_range(range.start, size)?;
+        let found = find()?;
+        let Some(size) = range.end.checked_sub(range.start) else {
+            return Err(reversed_range(&found.name, "bytes", range));
+        };
+        found.check_range(range.start, size)?;
+        drop(found);
         let copy = BufferCopy { source_offset: range.start, target_offset: 0, size };
         self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]))
     }

@@ -63,7 +63,7 @@ impl fmt::Display for DeviceFault {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{}", self.description)?;
         for FaultAddress { kind, range, .. } in &self.addresses {
-            write!(out, "; {kind:?} at {:#x} to {:#x}", range.start, range.end - 1)?;
+            write!(out, "; {kind:?} at {:#x} to {:#x}", range.start, range.end.saturating_sub(1))?;
         }
         for VendorFault { description, code, data } in &self.vendor {
             write!(out, "; {description} (code {code:#x}, data {data:#x})")?;

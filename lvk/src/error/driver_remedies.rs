@@ -3,31 +3,21 @@
 use std::path::Path;
 
 use super::driver_report::{DriverManifest, DriverReport, LoaderReport, ManifestOutcome};
+use super::platform_remedies::Platform;
 
-const INSTALL_LOADER: &str = if cfg!(windows) {
-    "install the current driver of the GPU's vendor, which brings the loader vulkan-1.dll"
-} else if cfg!(any(target_os = "macos", target_os = "ios")) {
-    "install the Vulkan SDK, which has the loader and the driver MoltenVK"
-} else if cfg!(target_os = "android") {
-    "use a device whose Android has Vulkan"
-} else {
-    "install the Vulkan loader: the package libvulkan1 (Debian, Ubuntu), vulkan-loader (Fedora) or vulkan-icd-loader (Arch)"
-};
-const INSTALL_DRIVER: &str = if cfg!(windows) {
-    "install the current driver of the GPU's vendor (drivers in the registry are not in this report)"
-} else if cfg!(any(target_os = "macos", target_os = "ios")) {
-    "install the Vulkan SDK, which has the driver MoltenVK"
-} else if cfg!(target_os = "android") {
-    "use a device whose Android has a Vulkan driver (the system's own drivers are not in this report)"
-} else {
-    "install a Vulkan driver: the GPU vendor's, or Mesa's package mesa-vulkan-drivers (Debian, Ubuntu, Fedora), \
-     vulkan-radeon or vulkan-intel (Arch)"
-};
+const PLATFORM: Platform = Platform::CURRENT;
+
 const RAISE_LIMITS: &str =
     "free memory, or raise the limits of the process (ulimit -a): a driver needs more of them";
-const NO_DEVICE: &str = "every driver loads, but none offers a device: check that the GPU's kernel driver runs, that it has \
-     the version of the Vulkan driver, and that this user may open its device files (/dev/dri, /dev/nvidia*); \
-     VK_LOADER_DEBUG=all prints the reasons of the loader";
+
+/// A library that the dynamic linker did not find.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MissingLibrary<'a> {
+    /// The library of this name or path.
+    Named(&'a str),
+    /// The library that was opened, or one that it needs: Windows does not say which.
+    Unnamed,
+}
 
 /// Returns the remedies for `report`, the most important first. `has_devices` is true if Vulkan reports a device.
 pub(super) fn driver_remedies(report: &DriverReport, has_devices: bool) -> Vec<String> {
@@ -35,7 +25,7 @@ pub(super) fn driver_remedies(report: &DriverReport, has_devices: bool) -> Vec<S
     match &report.loader {
         LoaderReport::NotOpened { path, error } => remedies.push(loader_remedy(path, error)),
         loader if loader.is_too_old() => {
-            remedies.push(format!("update the loader to Vulkan 1.3; {INSTALL_LOADER}"));
+            remedies.push(format!("update the loader to Vulkan 1.3; {}", PLATFORM.install_loader()));
         }
         LoaderReport::Opened { .. } => {}
     }
@@ -44,7 +34,7 @@ pub(super) fn driver_remedies(report: &DriverReport, has_devices: bool) -> Vec<S
     if used().next().is_none() && !has_devices {
         remedies.push(no_manifest_remedy(report));
     } else if remedies.is_empty() && !has_devices {
-        remedies.push(NO_DEVICE.to_owned());
+        remedies.push(PLATFORM.no_device().to_owned());
     }
     let mut unique = Vec::new();
     remedies.retain(|remedy| {
@@ -56,14 +46,22 @@ pub(super) fn driver_remedies(report: &DriverReport, has_devices: bool) -> Vec<S
     remedies
 }
 
-/// Returns the library that the dynamic linker (of glibc or musl) did not find.
-pub(super) fn missing_library(error: &str) -> Option<&str> {
-    let of_musl = || error.strip_prefix("Error loading shared library ")?.split_once(": No such file");
-    error
-        .split_once(": cannot open shared object file: No such file")
-        .or_else(of_musl)
-        .map(|(name, _)| name.trim())
-        .filter(|name| !name.is_empty())
+/// Returns the library that the dynamic linker (of glibc, musl, Apple, Android or Windows) did not find.
+fn missing_library(error: &str) -> Option<MissingLibrary<'_>> {
+    if error.contains("LoadLibrary") && error.contains("(os error 126)") {
+        return Some(MissingLibrary::Unnamed);
+    }
+    let of_glibc = || Some(error.split_once(": cannot open shared object file: No such file")?.0);
+    let of_musl = || Some(between(error, "Error loading shared library ", ": No such file")?);
+    let of_apple = || error.split_once("Library not loaded: ")?.1.lines().next();
+    let of_android = || between(error, "library \"", "\" not found");
+    let name = of_glibc().or_else(of_musl).or_else(of_apple).or_else(of_android)?.trim();
+    (!name.is_empty()).then_some(MissingLibrary::Named(name))
+}
+
+/// Returns the text between the first `start` and the next `end`.
+fn between<'a>(text: &'a str, start: &str, end: &str) -> Option<&'a str> {
+    Some(text.split_once(start)?.1.split_once(end)?.0)
 }
 
 /// True if the dynamic linker ran out of memory or of file descriptors.
@@ -81,11 +79,17 @@ fn loader_remedy(path: &Path, error: &str) -> String {
     let is_own = |name: &str| Path::new(name).file_name() == path.file_name();
     match missing_library(error) {
         _ if is_shortage(error) => RAISE_LIMITS.to_owned(),
-        Some(name) if !is_own(name) => format!("install the package that has {name}, which the loader needs"),
+        Some(MissingLibrary::Named(name)) if !is_own(name) => {
+            format!("install the package that has {name}, which the loader needs")
+        }
+        Some(MissingLibrary::Unnamed) if path.components().count() > 1 => format!(
+            "name an existing loader in place of {0}, or none; if {0} exists, install the libraries that it needs",
+            path.display()
+        ),
         _ if path.components().count() > 1 => {
             format!("name an existing loader in place of {}, or none", path.display())
         }
-        _ => INSTALL_LOADER.to_owned(),
+        _ => PLATFORM.install_loader().to_owned(),
     }
 }
 
@@ -104,9 +108,12 @@ fn manifest_remedy(manifest: &DriverManifest) -> Option<String> {
             Some(format!("correct or remove {path}, or install its driver again"))
         }
         ManifestOutcome::LoadFailed { error } => Some(match missing_library(error) {
-            Some(name) if !is_own(name) => {
+            Some(MissingLibrary::Named(name)) if !is_own(name) => {
                 format!("install the package that has {name}, which the driver of {path} needs")
             }
+            Some(MissingLibrary::Unnamed) => format!(
+                "install the driver of {path} again: its library, or one that the library needs, is missing"
+            ),
             _ => format!("install the driver of {path} again, for this architecture, or remove that file"),
         }),
     }
@@ -121,7 +128,7 @@ fn no_manifest_remedy(report: &DriverReport) -> String {
         Some(variable) if variable != "VK_ADD_DRIVER_FILES" => {
             format!("correct {variable}, or unset it to use the drivers that are installed")
         }
-        _ => INSTALL_DRIVER.to_owned(),
+        _ => PLATFORM.install_driver().to_owned(),
     }
 }
 
@@ -160,20 +167,39 @@ mod tests {
         format!("{name}: cannot open shared object file: No such file or directory")
     }
 
+    const WINDOWS_126: &str =
+        "LoadLibraryExW failed: The specified module could not be found. (os error 126)";
+    const APPLE: &str = "dlopen(/d/libtoy.so, 0x0005): Library not loaded: @rpath/libMoltenVK.dylib\n  \
+                         Referenced from: <1> /d/libtoy.so\n  Reason: tried: '/usr/lib/libMoltenVK.dylib' (no such file)";
+
     #[test]
     fn dynamic_linkers_name_the_missing_library() {
-        assert_eq!(missing_library(&not_found("libX11.so.6")), Some("libX11.so.6"));
-        let musl =
-            "Error loading shared library libX11.so.6: No such file or directory (needed by /l/libd.so)";
-        assert_eq!(missing_library(musl), Some("libX11.so.6"));
-        assert_eq!(missing_library("/d/libtoy.so: invalid ELF header"), None);
-        assert_eq!(missing_library(": cannot open shared object file: No such file"), None);
+        for (error, expected) in [
+            (not_found("libX11.so.6").as_str(), Some("libX11.so.6")),
+            (
+                "Error loading shared library libX11.so.6: No such file or directory (needed by /l/libd.so)",
+                Some("libX11.so.6"),
+            ),
+            (APPLE, Some("@rpath/libMoltenVK.dylib")),
+            (
+                "dlopen failed: library \"libhardware.so\" not found: needed by /d/libtoy.so in namespace",
+                Some("libhardware.so"),
+            ),
+            ("/d/libtoy.so: invalid ELF header", None),
+            (": cannot open shared object file: No such file", None),
+            ("LoadLibraryExW failed: %1 is not a valid Win32 application. (os error 193)", None),
+            ("Required key not available (os error 126)", None),
+        ] {
+            assert_eq!(missing_library(error), expected.map(MissingLibrary::Named), "{error}");
+        }
+        assert_eq!(missing_library(WINDOWS_126), Some(MissingLibrary::Unnamed));
     }
 
     #[test]
     fn loader_remedies_follow_the_error() {
         let loaded = [ManifestOutcome::Loaded];
-        assert_remedy(&report(Some(&not_found("libvulkan.so.1")), &loaded), INSTALL_LOADER);
+        assert_remedy(&report(Some(&not_found("libvulkan.so.1")), &loaded), PLATFORM.install_loader());
+        assert_remedy(&report(Some(WINDOWS_126), &loaded), PLATFORM.install_loader());
         assert_remedy(
             &report(Some(&not_found("libdl.so.2")), &loaded),
             "has libdl.so.2, which the loader needs",
@@ -185,19 +211,25 @@ mod tests {
             *path = "/nowhere/libvulkan.so.1".into();
         }
         assert_remedy(&named, "in place of /nowhere/libvulkan.so.1");
+        if let LoaderReport::NotOpened { error, .. } = &mut named.loader {
+            *error = WINDOWS_126.to_owned();
+        }
+        assert_remedy(&named, "if /nowhere/libvulkan.so.1 exists, install the libraries that it needs");
         named.loader = LoaderReport::Opened { path: "l".into(), version: (1, 2, 200) };
         assert_remedy(&named, "update the loader");
     }
 
     #[test]
     fn driver_remedies_follow_the_error() {
-        assert_remedy(&report(None, &[]), INSTALL_DRIVER);
-        assert_remedy(&report(None, &[ManifestOutcome::Loaded]), NO_DEVICE);
+        assert_remedy(&report(None, &[]), PLATFORM.install_driver());
+        assert_remedy(&report(None, &[ManifestOutcome::Loaded]), PLATFORM.no_device());
         assert_remedy(&report(None, &[fails(&not_found("libX11.so.6"))]), "the package that has libX11.so.6");
         assert_remedy(
             &report(None, &[fails(&not_found("/d/libtoy.so"))]),
             "install the driver of /d/toy.json",
         );
+        assert_remedy(&report(None, &[fails(APPLE)]), "the package that has @rpath/libMoltenVK.dylib");
+        assert_remedy(&report(None, &[fails(WINDOWS_126)]), "or one that the library needs, is missing");
         assert_remedy(&report(None, &[fails("/d/libtoy.so: invalid ELF header")]), "install the driver of");
         let shortage = fails("/d/libtoy.so: failed to map segment from shared object");
         assert_remedy(&report(None, &[shortage.clone(), shortage]), RAISE_LIMITS);
@@ -213,7 +245,7 @@ mod tests {
         report.searched = vec![SearchedPath { path: "/x".into(), variable: Some("VK_DRIVER_FILES") }];
         assert_remedy(&report, "unset it");
         report.searched[0].variable = Some("VK_ADD_DRIVER_FILES");
-        assert_remedy(&report, INSTALL_DRIVER);
+        assert_remedy(&report, PLATFORM.install_driver());
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub struct DriverReport {
 pub enum LoaderReport {
     /// The loader was opened.
     Opened {
-        /// Its file, or the name that was opened where the file is unknown.
+        /// File of the loader, or the name that was opened where the file is unknown.
         path: PathBuf,
         /// Vulkan version of the loader: major, minor, patch.
         version: (u32, u32, u32),
@@ -122,6 +122,11 @@ impl DriverReport {
             || self.manifests.iter().any(|manifest| manifest.outcome == ManifestOutcome::Loaded)
     }
 
+    /// True if the loader's own folders were searched: on Windows and Android the report cannot know of all drivers.
+    fn knows_installed_drivers(&self) -> bool {
+        self.searched.iter().any(|searched| searched.variable.is_none())
+    }
+
     /// True if a manifest cannot be read.
     pub(crate) fn has_unread_manifest(&self) -> bool {
         self.manifests.iter().any(|manifest| matches!(manifest.outcome, ManifestOutcome::NotRead { .. }))
@@ -152,6 +157,7 @@ impl VulkanReport {
     #[must_use]
     pub fn summary(&self) -> String {
         let DriverReport { loader, failure, manifests, .. } = &self.drivers;
+        let none_installed = manifests.is_empty() && self.drivers.knows_installed_drivers();
         if let LoaderReport::NotOpened { path, .. } = loader {
             return format!("the Vulkan loader {} cannot be opened", path.display());
         }
@@ -163,7 +169,7 @@ impl VulkanReport {
         let reasons: Vec<_> = broken.chain(devices).collect();
         match (reasons.is_empty(), failure) {
             (false, _) => reasons.join("; "),
-            (true, _) if manifests.is_empty() => "no Vulkan driver is installed".to_owned(),
+            (true, _) if none_installed => "no Vulkan driver is installed".to_owned(),
             (true, Some(failure)) => failure.clone(),
             (true, None) => "the drivers offer no device".to_owned(),
         }

@@ -23,9 +23,15 @@ impl fmt::Display for VulkanReport {
 /// Writes lines and remedies: one below the other in the alternate form, else in one line.
 fn write_lines(out: &mut fmt::Formatter<'_>, mut lines: Vec<String>, remedies: Vec<String>) -> fmt::Result {
     lines.extend(remedies.into_iter().map(|remedy| format!("remedy: {remedy}")));
-    // Errors of the dynamic linker may have several lines.
-    let lines = lines.iter().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "));
+    let lines = lines.iter().map(|line| one_line(line));
     out.write_str(&lines.collect::<Vec<_>>().join(if out.alternate() { "\n" } else { "; " }))
+}
+
+/// Joins the lines of a text, as errors of the dynamic linker may have several. The spaces within a line stay, as paths may
+/// have them.
+fn one_line(text: &str) -> String {
+    let lines = text.split(['\n', '\r']).map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join(" ")
 }
 
 /// Writes the text of [`Error::NoDevice`](super::Error::NoDevice) behind its headline.
@@ -52,7 +58,7 @@ pub(super) fn no_device_text(
                 .to_owned(),
         ),
     }
-    parts.join("; ").split_whitespace().collect::<Vec<_>>().join(" ")
+    parts.iter().map(|part| one_line(part)).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]
@@ -123,6 +129,15 @@ mod tests {
     }
 
     #[test]
+    fn paths_keep_their_spaces() {
+        let mut report = report(true, vec![nvidia(ManifestOutcome::Loaded)]);
+        report.manifests[0].path = "/my  drivers/a.json".into();
+        assert!(report.to_string().contains("manifest /my  drivers/a.json names"), "{report}");
+        let text = no_device_text(Some("'a  b' names\r\n no device"), &[], Some(&report));
+        assert_eq!(text, "'a  b' names no device");
+    }
+
+    #[test]
     fn search_without_a_result_is_told() {
         let text = report(true, Vec::new()).to_string();
         assert!(text.contains("no driver manifest in /etc/vulkan/icd.d, VK_DRIVER_FILES=/a.json"), "{text}");
@@ -149,6 +164,22 @@ mod tests {
         assert_eq!(summary(loaded(), Vec::new()), "the drivers offer no device");
         let failed = DriverReport { failure: Some("vkCreateInstance failed".to_owned()), ..loaded() };
         assert_eq!(summary(failed, Vec::new()), "vkCreateInstance failed");
+    }
+
+    /// As on Windows and Android, where the report searches the variables only.
+    #[test]
+    fn summary_does_not_claim_to_know_all_drivers() {
+        let summary = |drivers| VulkanReport { drivers, devices: Vec::new() }.summary();
+        let failure = Some("vkCreateInstance: ERROR_INCOMPATIBLE_DRIVER".to_owned());
+        let variable = report(true, Vec::new()).searched.pop().unwrap();
+        for searched in [Vec::new(), vec![variable]] {
+            let unknown = DriverReport { searched, ..report(true, Vec::new()) };
+            assert_eq!(summary(unknown.clone()), "the drivers offer no device");
+            assert_eq!(
+                summary(DriverReport { failure: failure.clone(), ..unknown }),
+                failure.clone().unwrap()
+            );
+        }
     }
 
     #[test]

@@ -1,12 +1,17 @@
 //! The error type of the library.
 
+pub(crate) mod causes;
 pub(crate) mod device_candidate;
 pub(crate) mod device_fault;
 pub(crate) mod device_loss;
 mod driver_remedies;
 pub(crate) mod driver_report;
 mod driver_report_text;
+pub(crate) mod layout_difference;
+pub(crate) mod limit_origin;
+mod platform_remedies;
 
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -17,13 +22,17 @@ use device_candidate::DeviceCandidate;
 use device_loss::DeviceLossReport;
 use driver_report::DriverReport;
 use driver_report_text::no_device_text;
+use layout_difference::{LayoutDifference, differences_text};
+use limit_origin::LimitOrigin;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Errors of the library, in three groups by remedy:
-/// * mistakes of the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
+/// * mistakes of the caller: [`StaleHandle`](Error::StaleHandle), [`ForeignHandle`](Error::ForeignHandle),
+///   [`InvalidUsage`](Error::InvalidUsage),
 ///   [`WrongQueue`](Error::WrongQueue), [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants),
+///   [`LayoutMismatch`](Error::LayoutMismatch), [`ShaderRecord`](Error::ShaderRecord),
 ///   [`Serialized`](Error::Serialized), [`OverBudget`](Error::OverBudget),
 ///   [`UploadTooLarge`](Error::UploadTooLarge);
 /// * missing support by the device or its driver: [`NoVulkan`](Error::NoVulkan),
@@ -31,8 +40,10 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 ///   [`LimitExceeded`](Error::LimitExceeded);
 /// * failures at run time: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory),
 ///   [`OutOfHostMemory`](Error::OutOfHostMemory), [`File`](Error::File), [`DeviceLost`](Error::DeviceLost),
-///   [`Vulkan`](Error::Vulkan).
-#[derive(Debug, Clone, thiserror::Error)]
+///   [`Vulkan`](Error::Vulkan); [`Creation`](Error::Creation) adds the name of an object to one of these.
+///
+/// `Debug` has the text of `Display`, as programs whose `main` returns an error print it by `Debug`.
+#[derive(Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The Vulkan loader could not be opened, is older than Vulkan 1.3, or finds no driver or no device. The text ends
@@ -57,15 +68,15 @@ pub enum Error {
         drivers: Option<Arc<DriverReport>>,
     },
     /// The device, its driver or a layer lacks a feature that a call needs.
-    #[error("{what} is not supported: {why}")]
+    #[error("not supported: {what}: {why}")]
     Unsupported {
         /// The feature, extension, format or layer.
         what: String,
         /// The reason, and the remedy.
         why: String,
     },
-    /// A size or count exceeds a limit of the device.
-    #[error("{object}: {what} is {requested}, the device takes at most {limit}")]
+    /// A size or count exceeds a limit.
+    #[error("{object}: {what} is {requested}, {}", origin.clause(*limit))]
     LimitExceeded {
         /// Debug name of the object.
         object: String,
@@ -73,12 +84,28 @@ pub enum Error {
         what: &'static str,
         /// The requested value.
         requested: u64,
-        /// The device's limit.
+        /// The limit.
         limit: u64,
+        /// The party that sets the limit.
+        origin: LimitOrigin,
     },
-    /// The object of the handle was destroyed, or belongs to another context.
-    #[error("stale {kind} handle: the object was destroyed or belongs to another context")]
+    /// The object of the handle was destroyed.
+    #[error(
+        "stale {kind} handle: {} was destroyed; keep its holder while the handle is in use",
+        stale_object(kind, name)
+    )]
     StaleHandle {
+        /// Kind of the object.
+        kind: &'static str,
+        /// Debug name of the object, at most 64 bytes of it. `None` if it is not kept any more, as 64 other objects of
+        /// this kind were destroyed since.
+        name: Option<String>,
+    },
+    /// The object of the handle belongs to another context.
+    #[error(
+        "foreign {kind} handle: the object belongs to another context; use the handle with the context that made it"
+    )]
+    ForeignHandle {
         /// Kind of the object.
         kind: &'static str,
     },
@@ -123,6 +150,40 @@ pub enum Error {
         /// Number of bytes pushed.
         size: u32,
     },
+    /// A Rust struct and the block of a shader that reads its bytes have different members.
+    #[error(
+        "pipeline '{pipeline}': the struct {struct_name} differs from the {block} of shader '{shader}': {}",
+        differences_text(differences)
+    )]
+    LayoutMismatch {
+        /// Debug name of the pipeline or library.
+        pipeline: String,
+        /// Debug name of the shader module.
+        shader: String,
+        /// Kind and name of the block.
+        block: String,
+        /// Name of the Rust struct.
+        struct_name: &'static str,
+        /// The differences, at least one.
+        differences: Vec<LayoutDifference>,
+    },
+    /// A shader reads more bytes of its record than the record has.
+    #[error(
+        "pipeline '{pipeline}': the record of {group} has {size} bytes, but shader '{shader}' reads {expected} bytes; make \
+         the Rust struct match the shader's block"
+    )]
+    ShaderRecord {
+        /// Debug name of the pipeline or library.
+        pipeline: String,
+        /// The shader or hit group that has the record: its kind, and its number in the list of the description.
+        group: String,
+        /// Debug name of the shader module.
+        shader: String,
+        /// Number of bytes that the shader declares.
+        expected: u64,
+        /// Number of bytes of the record.
+        size: u64,
+    },
     /// A shader did not compile, or its SPIR-V cannot be used.
     #[error("shader '{name}': {log}")]
     Shader {
@@ -131,7 +192,7 @@ pub enum Error {
         /// Output of the compiler, with the line numbers of the caller's source.
         log: String,
     },
-    /// A file could not be written.
+    /// A file could not be read or written.
     #[error("file '{}': {message}", path.display())]
     File {
         /// The file.
@@ -195,6 +256,14 @@ pub enum Error {
         /// context's submissions and waits has the report of the first.
         report: Arc<DeviceLossReport>,
     },
+    /// The creation of an object failed with an error that does not name the object.
+    #[error("{object}: {source}")]
+    Creation {
+        /// Debug name of the object.
+        object: String,
+        /// The error.
+        source: Box<Self>,
+    },
     /// Any other error of the driver.
     #[error("{call} failed: {result}")]
     Vulkan {
@@ -224,6 +293,19 @@ impl Error {
         Self::DeviceLost { report: Arc::new(DeviceLossReport { call, ..DeviceLossReport::default() }) }
     }
 
+    /// Adds the name of the object whose creation failed, if the error has no name of its own.
+    pub(crate) fn with_object(self, object: &str) -> Self {
+        match self {
+            Self::OutOfDeviceMemory { bytes: 0, .. } => {
+                Self::OutOfDeviceMemory { object: object.to_owned(), bytes: 0 }
+            }
+            Self::Vulkan { .. } | Self::OutOfHostMemory { .. } | Self::StaleHandle { .. } => {
+                Self::Creation { object: object.to_owned(), source: Box::new(self) }
+            }
+            named => named,
+        }
+    }
+
     /// Returns the error for a mistake of the caller about `object`.
     pub(crate) fn usage(object: impl Into<String>, message: impl Into<String>) -> Self {
         Self::InvalidUsage { object: object.into(), message: message.into() }
@@ -235,10 +317,110 @@ impl Error {
     }
 }
 
-/// Returns [`Error::LimitExceeded`] if `requested` exceeds `limit`.
+impl fmt::Debug for Error {
+    /// Formats the error like `Display`.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, out)
+    }
+}
+
+fn stale_object(kind: &str, name: &Option<String>) -> String {
+    match name {
+        Some(name) => format!("'{name}'"),
+        None => format!("the {kind}"),
+    }
+}
+
+/// Returns [`Error::LimitExceeded`] if `requested` exceeds the device's `limit`.
 pub(crate) fn check_limit(object: &str, what: &'static str, requested: u64, limit: u64) -> Result<()> {
+    check_limit_of(LimitOrigin::Device, object, what, requested, limit)
+}
+
+/// As [`check_limit`], for a limit that `origin` sets.
+pub(crate) fn check_limit_of(
+    origin: LimitOrigin,
+    object: &str,
+    what: &'static str,
+    requested: u64,
+    limit: u64,
+) -> Result<()> {
     if requested <= limit {
         return Ok(());
     }
-    Err(Error::LimitExceeded { object: object.to_owned(), what, requested, limit })
+    Err(Error::LimitExceeded { object: object.to_owned(), what, requested, limit, origin })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn exceeded(origin: LimitOrigin, what: &'static str) -> String {
+        check_limit_of(origin, "scene", what, 3, 1).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn debug_reads_like_display_without_escapes() {
+        let log = "line 11: 'x' : undeclared identifier\nline 12: \"y\"".to_owned();
+        let error = Error::Shader { name: "light.rgen".to_owned(), log };
+        let text = "shader 'light.rgen': line 11: 'x' : undeclared identifier\nline 12: \"y\"";
+        assert_eq!(format!("{error:?}"), text);
+        assert_eq!(format!("{error:#?}"), text);
+        let boxed: Box<dyn std::error::Error> = Box::new(error);
+        assert_eq!(format!("Error: {boxed:?}"), format!("Error: {text}"));
+    }
+
+    #[test]
+    fn limits_name_the_party_that_sets_them() {
+        let start = "scene: instance count is 3, ";
+        for (origin, clause) in [
+            (LimitOrigin::Device, "the device takes at most 1"),
+            (LimitOrigin::Library, "the library takes at most 1"),
+            (LimitOrigin::Vulkan, "Vulkan takes at most 1"),
+            (
+                LimitOrigin::TlasCapacity,
+                "the TLAS was created for at most 1; create it with a larger TlasDesc::capacity",
+            ),
+            (LimitOrigin::Descriptors, "the context has descriptors for at most 1; destroy some"),
+        ] {
+            assert_eq!(exceeded(origin, "instance count"), format!("{start}{clause}"));
+        }
+        assert!(check_limit("scene", "instance count", 1, 1).is_ok());
+    }
+
+    #[test]
+    fn lacking_features_are_told_in_any_number() {
+        let text =
+            Error::unsupported("ray queries, which shader 's' uses", "the device 'd' has none").to_string();
+        assert_eq!(text, "not supported: ray queries, which shader 's' uses: the device 'd' has none");
+    }
+
+    #[test]
+    fn stale_and_foreign_handles_have_texts_of_their_own() {
+        let stale = |name: Option<&str>| {
+            Error::StaleHandle { kind: "buffer", name: name.map(str::to_owned) }.to_string()
+        };
+        let end = "was destroyed; keep its holder while the handle is in use";
+        assert_eq!(stale(Some("vertices")), format!("stale buffer handle: 'vertices' {end}"));
+        assert_eq!(stale(None), format!("stale buffer handle: the buffer {end}"));
+        assert_eq!(
+            Error::ForeignHandle { kind: "buffer" }.to_string(),
+            "foreign buffer handle: the object belongs to another context; use the handle with the context that made it"
+        );
+    }
+
+    #[test]
+    fn errors_without_a_name_get_that_of_the_object() {
+        let text = |error: Error| error.with_object("water").to_string();
+        let failed = Error::vulkan("vkCreateGraphicsPipelines");
+        assert_eq!(
+            text(failed(vk::Result::ERROR_UNKNOWN)),
+            format!("water: vkCreateGraphicsPipelines failed: {}", vk::Result::ERROR_UNKNOWN)
+        );
+        let memory = Error::vulkan("vkCreateGraphicsPipelines")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        assert!(text(memory).contains("'water'"));
+        assert!(text(Error::OutOfHostMemory { call: "vkCreateShaderModule" }).starts_with("water: out of"));
+        assert_eq!(text(Error::usage("grass", "is green")), "grass: is green", "it has a name");
+        let lost = Error::device_lost("vkQueueSubmit2");
+        assert!(matches!(lost.with_object("water"), Error::DeviceLost { .. }));
+    }
 }

@@ -19,7 +19,7 @@ pub struct CalibratedTimestamps {
     /// programs.
     pub host: Duration,
     /// The clock that `host` is a time of: `CLOCK_MONOTONIC` on Linux and Android, the performance counter on Windows,
-    /// the clock that Metal samples on Apple's systems.
+    /// `mach_continuous_time` on Apple's systems.
     pub clock: HostClock,
     /// Maximum time between the two readings.
     pub deviation: Duration,

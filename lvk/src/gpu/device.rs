@@ -15,7 +15,7 @@ use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
 use super::caps::optional_features::OptionalFeature;
 use super::caps::portability::{PortabilityNeed, first_missing};
-use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
+use super::caps::queues::{QueueLocation, QueueRequest, Queues};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
 use super::checkpoints::Checkpoints;
@@ -31,10 +31,10 @@ use super::start::select::{Candidate, NoMatch, choose};
 use super::start::surface::SurfaceProbe;
 use super::start::user_extensions::UserExtensions;
 use super::start::window::{WindowExtensions, WindowRef};
+use super::timestamp_scale::TimestampScale;
 use crate::error::device_candidate::DeviceCandidate;
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
-use crate::queue::Queue;
 
 /// Requirements of the caller for a device.
 #[derive(Debug, Clone, Copy)]
@@ -137,31 +137,27 @@ impl Gpu {
     ///
     /// # Safety
     /// The requirements of [`Context::from_raw`](crate::Context::from_raw).
-    pub(crate) unsafe fn from_raw(
-        raw: RawContext<'_>,
-        pipeline: FeatureRequest,
-        query: RayQueryRequest,
-        debug_names: Option<bool>,
-        checkpoints: bool,
-        queues: QueueRequest,
-    ) -> Result<Self> {
+    pub(crate) unsafe fn from_raw(raw: RawContext<'_>, request: &DeviceRequest<'_>) -> Result<Self> {
         let mut chosen = raw.physical()?;
-        chosen.capabilities.checkpoints &= checkpoints;
-        use_single_queue(&mut chosen, queues);
+        chosen.capabilities.checkpoints &= request.checkpoints;
+        use_single_queue(&mut chosen, request.queues);
         let mut caps = chosen.capabilities.clone();
-        caps.choose_ray_tracing(pipeline, query);
+        caps.choose_ray_tracing(request.pipeline, request.query);
         let given = raw.queues();
-        let instance = Instance::external(raw.entry, raw.instance, raw.instance_extensions);
-        let features = enabled_features(&instance, &chosen, &caps);
+        let instance = Instance::external(raw.entry.clone(), raw.instance.clone(), raw.instance_extensions);
+        if let Some(window) = request.window {
+            raw.check_window(&instance, window, &chosen)?;
+        }
+        let features = enabled_features(&chosen, &caps, false);
         let made = DeviceParts {
             memory: DeviceMemory::new(&instance.raw, &raw.device, chosen.raw)?,
             device: raw.device,
             caps,
             features,
-            queues: Queues::new(given, queues),
+            queues: Queues::new(given, request.queues),
             is_external: true,
         };
-        Ok(Self::from_parts(instance, chosen.raw, made, debug_names))
+        Ok(Self::from_parts(instance, chosen.raw, made, request.debug_names))
     }
 
     fn from_parts(
@@ -264,10 +260,13 @@ impl Gpu {
     #[cfg(feature = "window")]
     pub(crate) fn window_functions(&self) -> Result<&super::start::surface::WindowFunctions> {
         self.windows.as_ref().ok_or_else(|| {
-            Error::unsupported(
-                "a swapchain",
-                "the context was made without a window; set ContextDesc::window",
-            )
+            let why = if self.is_external {
+                "the engine's device has none on; they need VK_KHR_surface and the extension of the window system in \
+                 RawContext::instance_extensions, and VK_KHR_swapchain in device_extensions and features"
+            } else {
+                "the context was made without a window; set ContextDesc::window"
+            };
+            Error::unsupported("a swapchain", why)
         })
     }
 
@@ -318,25 +317,9 @@ impl Gpu {
         check_limit(name, "count of views, up to the highest bit", views, self.caps.limits.max_views.into())
     }
 
-    /// Converts timestamp ticks to milliseconds since an arbitrary start.
-    pub(crate) fn milliseconds(&self, ticks: u64) -> f64 {
-        let limits = &self.caps.limits;
-        let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
-        (ticks & mask) as f64 * f64::from(limits.timestamp_period_ns) * 1e-6
-    }
-
-    /// Returns the ticks from `earlier` to `later`, which may come from different queues. The counter may
-    /// wrap once in between.
-    pub(crate) fn ticks_since(&self, earlier: u64, later: u64) -> u64 {
-        let bits = Queue::ALL.map(|queue| self.caps.queue(queue).timestamp_bits);
-        later.wrapping_sub(earlier) & shared_timestamp_bits(bits)
-    }
-
-    /// Returns the ticks from `earlier` to `later`, which may come from different queues. `None` if `later`
-    /// is not later.
-    pub(crate) fn ticks_until(&self, earlier: u64, later: u64) -> Option<u64> {
-        let (ticks, back) = (self.ticks_since(earlier, later), self.ticks_since(later, earlier));
-        (ticks > 0 && ticks <= back).then_some(ticks)
+    /// Returns the scale of the device's timestamps.
+    pub(crate) fn timestamps(&self) -> TimestampScale {
+        TimestampScale::new(&self.caps)
     }
 
     pub(crate) fn physical(&self) -> vk::PhysicalDevice {
@@ -393,14 +376,14 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
 }
 
 /// Uses one Vulkan queue for all queues if requested.
-fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
+pub(super) fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
     if request == QueueRequest::Shared {
         device.set_queues([device.queue_locations[0]; 3]);
     }
 }
 
 /// Returns the properties of the device that the selection depends on, with the profile applied.
-fn candidate(index: usize, device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
+pub(super) fn candidate(index: usize, device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
     let found = device.capabilities.clone();
     if let Some(profile) = request.profile {
         profile.apply(&mut device.capabilities);
@@ -476,7 +459,7 @@ fn create(
     caps: &Capabilities,
     extra: &UserExtensions<'_>,
 ) -> Result<(ash::Device, Features), vk::Result> {
-    let features = enabled_features(instance, chosen, caps);
+    let features = enabled_features(chosen, caps, instance.gpu_assisted);
     let extensions = device_extensions(&features, caps, extra);
     let mut chain = features;
     let mut all = vk::PhysicalDeviceFeatures2::default().features(chain.core);
@@ -499,7 +482,7 @@ fn create(
 }
 
 /// Returns one create info per queue family, with enough queues to include the highest index in use.
-fn queue_infos<'a>(
+pub(super) fn queue_infos<'a>(
     queue_locations: &[QueueLocation; 3],
     priorities: &'a [f32; 3],
 ) -> Vec<vk::DeviceQueueCreateInfo<'a>> {
@@ -517,24 +500,25 @@ fn queue_infos<'a>(
 
 /// Returns the features to enable. `robustBufferAccess` is left out for GPU-assisted validation, which finds no
 /// out-of-bounds access if the driver makes it harmless.
-fn enabled_features(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
+pub(super) fn enabled_features(chosen: &PhysicalDevice, caps: &Capabilities, gpu_assisted: bool) -> Features {
     let mut features = Features::supported_subset(&chosen.features, caps.optional);
     features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
     features.ext.position_fetch.ray_tracing_position_fetch &= vk::Bool32::from(caps.position_fetch);
     features.limit_mesh_shaders(caps.mesh_shader);
-    if instance.gpu_assisted {
+    if gpu_assisted {
         features.core.robust_buffer_access = vk::FALSE;
     }
     features
 }
 
 /// Returns the extensions to enable, without duplicates.
-fn device_extensions<'a>(
+pub(super) fn device_extensions<'a>(
     features: &Features,
     caps: &Capabilities,
     extra: &UserExtensions<'a>,
 ) -> Vec<&'a CStr> {
-    let libraries = caps.pipeline_libraries.then_some(ash::khr::pipeline_library::NAME);
+    let links = caps.pipeline_libraries || caps.has(OptionalFeature::GraphicsPipelineLibrary);
+    let libraries = links.then_some(ash::khr::pipeline_library::NAME);
     let checkpoints = caps.checkpoints.then_some(ash::nv::device_diagnostic_checkpoints::NAME);
     let subset = caps.portability_subset.then_some(ash::khr::portability_subset::NAME);
     let own = features.extensions().chain(caps.optional.extensions()).chain(libraries).chain(subset);

@@ -16,8 +16,8 @@ pub enum HostClock {
     /// and Android.
     Monotonic,
     /// `CLOCK_MONOTONIC_RAW` (`VK_TIME_DOMAIN_CLOCK_MONOTONIC_RAW_KHR`), which no time service adjusts. MoltenVK calls
-    /// its only host clock so: the one that Metal samples. [`Instant`](std::time::Instant) counts another clock: on
-    /// macOS and iOS it is `CLOCK_UPTIME_RAW`, which stops while the machine sleeps.
+    /// its only host clock so: the nanoseconds of `mach_continuous_time`, which counts while the machine sleeps.
+    /// [`Instant`](std::time::Instant) counts another clock: on macOS and iOS it is `CLOCK_UPTIME_RAW`, which does not.
     MonotonicRaw,
     /// `QueryPerformanceCounter` (`VK_TIME_DOMAIN_QUERY_PERFORMANCE_COUNTER_KHR`): the clock of
     /// [`Instant`](std::time::Instant) on Windows.

@@ -10,6 +10,8 @@ pub(crate) mod memory;
 pub(crate) mod object_memory;
 pub(crate) mod object_names;
 pub(crate) mod queries;
+pub(crate) mod requirements;
 pub(crate) mod start;
+pub(crate) mod timestamp_scale;
 
 pub(crate) use device::Gpu;

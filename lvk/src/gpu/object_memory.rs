@@ -68,6 +68,10 @@ impl Gpu {
     /// Frees memory.
     pub(crate) fn free(&self, memory: ObjectMemory) {
         self.heap_use.remove(&memory);
+        if memory.is_unmanaged() {
+            // SAFETY: the object that was bound to the memory is destroyed.
+            return unsafe { self.device.free_memory(memory.raw, None) };
+        }
         let freed = self.memory().as_mut().map_or(Ok(()), |all| all.free(memory));
         if let Err(error) = freed {
             log::error!("freeing device memory failed: {error}");
@@ -87,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lazy_memory_is_found_among_the_kinds_that_will_do() {
+    fn lazy_memory_is_chosen_among_the_valid_types() {
         let kind = |property_flags| vk::MemoryType { property_flags, heap_index: 0 };
         let (plain, lazy) = (
             kind(vk::MemoryPropertyFlags::DEVICE_LOCAL),

@@ -10,7 +10,7 @@ use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::{ComputePipeline, PipelineBase, PipelineLayout, ShaderModule};
-use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
+use crate::shader::{CompileFiles, ShaderModuleDesc, ShaderSource, ShaderStage};
 
 /// Invocations of a workgroup of the kernels that prepare inputs.
 pub(crate) const GROUP_SIZE: u32 = 64;
@@ -195,9 +195,10 @@ impl Kernel {
             debug_name: self.name(),
             ..Default::default()
         };
-        let module = ShaderModule::new(gpu, &desc, None, None, layout.push_constant_bytes)?;
+        let module =
+            ShaderModule::new(gpu, &desc, CompileFiles::default(), None, layout.push_constant_bytes)?;
         let desc = ComputePipelineDesc { debug_name: self.name(), ..Default::default() };
-        ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache }, &desc, &module)
+        ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache, max_threads: 1 }, &desc, &module)
     }
 }
 
@@ -238,7 +239,7 @@ mod tests {
             debug_name: path.to_str().unwrap(),
             ..Default::default()
         };
-        let words = crate::shader::compile(&desc, &Default::default(), None)
+        let words = crate::shader::compile(&desc, &Default::default(), CompileFiles::default())
             .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let bytes: &[u8] = bytemuck::cast_slice(&words);
         if std::env::var("LVK_UPDATE_KERNELS").is_ok() {

@@ -8,7 +8,7 @@
 //! already exist, or by a query to the driver. Their initialisation therefore takes no lock except that of
 //! [`Rank::ValidationMessages`], and this must stay so.
 
-#![expect(clippy::disallowed_types, reason = "everybody else is to use these")]
+#![expect(clippy::disallowed_types, reason = "other modules must use these")]
 
 mod held;
 mod rank;

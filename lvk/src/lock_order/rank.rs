@@ -54,6 +54,9 @@ pub(crate) enum Rank {
     PipelineCacheFile,
     /// The folder of compiled shaders.
     ShaderCacheFolder,
+    /// Times of the files that shaders were read from.
+    #[cfg_attr(not(feature = "glsl"), allow(dead_code, reason = "only GLSL is read from files"))]
+    ShaderFiles,
     /// Measurements of the profiler.
     Profiler,
     /// Unused recording states of command buffers.
@@ -64,6 +67,12 @@ pub(crate) enum Rank {
     SlotOwners,
     /// Work shared between threads.
     SharedWork,
+    /// Jobs that wait for a thread of the background.
+    BackgroundJobs,
+    /// The result of a pipeline that is compiled in the background.
+    PendingPipeline,
+    /// Parts that graphics pipelines are linked from.
+    GraphicsParts,
     /// A queue of the device.
     Queue,
     /// Device memory.
@@ -78,7 +87,7 @@ pub(crate) enum Rank {
 #[cfg(debug_assertions)]
 impl Rank {
     /// All ranks, in their order.
-    pub(super) const ALL: [Self; 31] = [
+    pub(super) const ALL: [Self; 35] = [
         Self::Swapchain,
         Self::Compactions,
         Self::Pending,
@@ -101,11 +110,15 @@ impl Rank {
         Self::Kernels,
         Self::PipelineCacheFile,
         Self::ShaderCacheFolder,
+        Self::ShaderFiles,
         Self::Profiler,
         Self::RecordingStates,
         Self::ImageLimitCache,
         Self::SlotOwners,
         Self::SharedWork,
+        Self::BackgroundJobs,
+        Self::PendingPipeline,
+        Self::GraphicsParts,
         Self::Queue,
         Self::Memory,
         Self::DeviceLifetime,

@@ -227,7 +227,7 @@ fn lists() -> impl Strategy<Value = Vec<Vec<LockStep>>> {
 proptest! {
     /// Any schedule of threads whose every step passes the check runs to its end.
     #[test]
-    fn what_the_check_allows_never_stands_still(
+    fn orders_that_the_check_allows_never_deadlock(
         lists in lists(),
         schedule in prop::collection::vec(any::<prop::sample::Index>(), 0..60)
     ) {

@@ -42,3 +42,9 @@ pub mod windows {}
 
 #[doc = include_str!("parity.md")]
 pub mod parity {}
+
+#[doc = include_str!("from_lightweightvk.md")]
+pub mod from_lightweightvk {}
+
+#[doc = include_str!("from_wgpu.md")]
+pub mod from_wgpu {}

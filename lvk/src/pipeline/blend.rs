@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_factor_takes_is_known_wherever_it_stands() {
+    fn inputs_of_a_factor_are_known_in_every_position() {
         let sum = BlendComponent::sum;
         let (one, second, constant) = (BlendFactor::One, BlendFactor::Src1Alpha, BlendFactor::ConstantColor);
         assert!(!Blend::ALPHA.is_dual_source() && !Blend::ADDITIVE.uses_constants());

@@ -121,7 +121,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_sealed_is_found_again(body in prop::collection::vec(any::<u8>(), 0..300)) {
+        fn sealed_data_is_read_again(body in prop::collection::vec(any::<u8>(), 0..300)) {
             let data = data_of(&OWNER, &body);
             let file = encode_file(&OWNER, &data);
             prop_assert_eq!(decode_file(&OWNER, &file), Ok(&data[..]));
@@ -138,7 +138,7 @@ mod tests {
         }
 
         #[test]
-        fn cut_off_and_lengthened_files_are_seen(
+        fn truncated_and_lengthened_files_are_noticed(
             body in prop::collection::vec(any::<u8>(), 0..100),
             more in prop::collection::vec(any::<u8>(), 1..50), cut in any::<prop::sample::Index>()
         ) {

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::block_layout::{BlockLayout, check_layouts};
 use super::pipeline_layout::PipelineBase;
 use super::shader_module::ShaderModule;
 use super::stage::{Specialization, SpecializationConstant, stage_info};
+use super::subgroup_size::SubgroupRequest;
 use super::workgroup_memory::{WorkgroupMemoryLimits, check_workgroup_memory};
 use super::workgroup_size::{WorkgroupLimits, check_workgroup_size};
 use crate::cpu_scope::cpu_scope;
@@ -22,13 +24,31 @@ pub struct ComputePipelineDesc<'a> {
     pub module: Option<ShaderModuleHandle>,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
+    /// Invocations of each subgroup (`VkPipelineShaderStageRequiredSubgroupSizeCreateInfo`): a power of two within
+    /// [`Limits::subgroup`](crate::Limits::subgroup). `None` leaves the size to the device. Needs
+    /// [`OptionalFeature::SubgroupSizeControl`](crate::OptionalFeature::SubgroupSizeControl).
+    pub required_subgroup_size: Option<u32>,
+    /// True if all invocations of every subgroup are active when it starts
+    /// (`VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT`). The size of the workgroup along x is then a
+    /// multiple of `required_subgroup_size`, or of the largest subgroup size without it. Needs
+    /// [`OptionalFeature::ComputeFullSubgroups`](crate::OptionalFeature::ComputeFullSubgroups).
+    pub full_subgroups: bool,
+    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
 
 impl Default for ComputePipelineDesc<'_> {
     fn default() -> Self {
-        Self { module: None, specialization: &[], debug_name: "compute pipeline" }
+        Self {
+            module: None,
+            specialization: &[],
+            required_subgroup_size: None,
+            full_subgroups: false,
+            layouts: &[],
+            debug_name: "compute pipeline",
+        }
     }
 }
 
@@ -51,21 +71,28 @@ impl ComputePipeline {
         cpu_scope!("create compute pipeline");
         module.check_stage(ShaderStage::Compute)?;
         let name = desc.debug_name;
+        check_layouts(name, desc.layouts, std::iter::once(module))?;
         let limits = &gpu.caps.limits;
         let largest = WorkgroupLimits {
             size: limits.max_workgroup_size,
             invocations: limits.max_workgroup_invocations,
         };
-        check_workgroup_size(name, module, desc.specialization, &largest)?;
+        let workgroup = check_workgroup_size(name, module, desc.specialization, &largest)?;
+        let subgroups = SubgroupRequest { size: desc.required_subgroup_size, full: desc.full_subgroups };
+        subgroups.check(gpu, name, workgroup)?;
         let shared = limits.max_shared_bytes;
         let most = WorkgroupMemoryLimits { shared, payload: 0, together: shared };
         check_workgroup_memory(name, module, desc.specialization, &most)?;
         let constants = Specialization::new(name, desc.specialization, std::iter::once(module))?;
         let constants = constants.info();
-        let info = vk::ComputePipelineCreateInfo::default()
-            .layout(base.layout)
-            .stage(stage_info(module, &constants));
-        // SAFETY: the module and the layout are alive and fit each other.
+        let mut required = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
+            .required_subgroup_size(desc.required_subgroup_size.unwrap_or_default());
+        let mut stage = stage_info(module, &constants).flags(subgroups.flags());
+        if desc.required_subgroup_size.is_some() {
+            stage = stage.push_next(&mut required);
+        }
+        let info = vk::ComputePipelineCreateInfo::default().layout(base.layout).stage(stage);
+        // SAFETY: the module and the layout are alive and fit each other, and the device takes the subgroups.
         let made = unsafe { gpu.device.create_compute_pipelines(base.cache, &[info], None) };
         let raw = made.map_err(|(_, result)| Error::vulkan("vkCreateComputePipelines")(result))?[0];
         gpu.name(raw, name);

@@ -5,19 +5,20 @@ use std::thread;
 use ash::khr::deferred_host_operations::Device;
 use ash::vk;
 
+use super::pipeline_layout::PipelineBase;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::start::driver_workarounds::with_shared_device_lock;
-use crate::parallel::{core_count, run_on_threads};
+use crate::parallel::run_on_threads;
 
-/// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`). The number of threads is limited by the driver and by the
-/// cores of the machine.
+/// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`). The number of threads is limited by the driver and by
+/// `base.max_threads`.
 ///
 /// # Safety
-/// `info` is valid for the device, and `cache` is a cache of the device or null.
+/// `info` is valid for the device, and `base` holds objects of the device.
 pub(crate) unsafe fn compile(
     gpu: &Gpu,
-    cache: vk::PipelineCache,
+    base: PipelineBase,
     info: &vk::RayTracingPipelineCreateInfoKHR<'_>,
 ) -> Result<vk::Pipeline> {
     // NVIDIA's driver 580 crashes after a deferred creation that compiles no shader and only links libraries.
@@ -29,9 +30,9 @@ pub(crate) unsafe fn compile(
     // SAFETY: the caller guarantees that the description is valid. The description and `raw` do not move until the
     // driver is done with them, since `finish` returns no sooner.
     let mut start =
-        || unsafe { create(ext.device(), deferred, cache, 1, info, std::ptr::null(), &raw mut raw) };
+        || unsafe { create(ext.device(), deferred, base.cache, 1, info, std::ptr::null(), &raw mut raw) };
     let result = with_shared_device_lock(gpu.caps.driver_id, || match (start(), &operation) {
-        (vk::Result::OPERATION_DEFERRED_KHR, Some(operation)) => operation.finish(),
+        (vk::Result::OPERATION_DEFERRED_KHR, Some(operation)) => operation.finish(base.max_threads),
         (vk::Result::OPERATION_NOT_DEFERRED_KHR, _) => vk::Result::SUCCESS,
         (result, _) => result,
     });
@@ -54,8 +55,8 @@ impl DeferredOperation {
         Ok(Self { raw, ext })
     }
 
-    /// Executes the deferred work and returns its result.
-    fn finish(&self) -> vk::Result {
+    /// Executes the deferred work on at most `max_threads` threads, and returns its result.
+    fn finish(&self, max_threads: usize) -> vk::Result {
         // SAFETY: the operation is alive until `self` is dropped.
         let useful = unsafe { self.ext.get_deferred_operation_max_concurrency(self.raw) };
         let join = || {
@@ -66,7 +67,7 @@ impl DeferredOperation {
             // SAFETY: as above.
             result_code(unsafe { self.ext.get_deferred_operation_result(self.raw) })
         };
-        join_with_threads(core_count().min(useful as usize), &join, &result)
+        join_with_threads(max_threads.min(useful as usize), &join, &result)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use super::block_layout::check_layouts;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
 use super::local_read::check_inputs;
 use super::portability::check_strides;
@@ -10,7 +11,8 @@ use super::render_modules::RenderModules;
 use super::state_check::check_state;
 use super::workgroup_memory::{WorkgroupMemoryLimits, check_workgroup_memory};
 use super::workgroup_size::{WorkgroupLimits, check_workgroup_size};
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit, check_limit_of};
 use crate::format::Format;
 use crate::gpu::Gpu;
 use crate::gpu::caps::mesh_limits::MeshLimits;
@@ -43,7 +45,7 @@ pub(super) fn check_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<(
         _ => {
             let lacking = desc.mesh.is_some() && !gpu.caps.mesh_shader;
             return if lacking {
-                Err(gpu.unsupported(&format!("pipeline '{name}': mesh shaders")))
+                Err(gpu.unsupported(&format!("mesh shaders, of which pipeline '{name}' has one")))
             } else {
                 check_optional_stages(gpu, desc)
             };
@@ -83,6 +85,7 @@ pub(super) fn check_modules(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &
     for (module, stage) in stages {
         module.as_ref().map_or(Ok(()), |module| module.check_stage(stage))?;
     }
+    check_layouts(name, desc.layouts, modules.iter())?;
     let targets = desc.color.len() as u64;
     check_limit(name, "colour target count", targets, gpu.caps.limits.max_color_targets.into())?;
     desc.color.iter().try_for_each(|target| check_color(gpu, name, target))?;
@@ -223,8 +226,20 @@ fn check_vertex_formats(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> 
 
 fn check_vertex_input(name: &str, desc: &RenderPipelineDesc<'_>) -> Result<()> {
     const MAX: u64 = 16;
-    check_limit(name, "vertex binding count", desc.vertex_bindings.len() as u64, MAX)?;
-    check_limit(name, "vertex attribute count", desc.vertex_attributes.len() as u64, MAX)?;
+    check_limit_of(
+        LimitOrigin::Library,
+        name,
+        "vertex binding count",
+        desc.vertex_bindings.len() as u64,
+        MAX,
+    )?;
+    check_limit_of(
+        LimitOrigin::Library,
+        name,
+        "vertex attribute count",
+        desc.vertex_attributes.len() as u64,
+        MAX,
+    )?;
     for attribute in desc.vertex_attributes {
         let Some(binding) = desc.vertex_bindings.get(attribute.binding as usize) else {
             let message =
@@ -236,9 +251,15 @@ fn check_vertex_input(name: &str, desc: &RenderPipelineDesc<'_>) -> Result<()> {
             let message = format!("vertex attribute {} ends beyond the stride", attribute.location);
             return Err(Error::usage(name, message));
         }
-        check_limit(name, "vertex attribute location", attribute.location.into(), MAX - 1)?;
+        check_limit_of(
+            LimitOrigin::Library,
+            name,
+            "vertex attribute location",
+            attribute.location.into(),
+            MAX - 1,
+        )?;
     }
-    desc.vertex_bindings
-        .iter()
-        .try_for_each(|binding| check_limit(name, "vertex stride in bytes", binding.stride.into(), 2048))
+    desc.vertex_bindings.iter().try_for_each(|binding| {
+        check_limit_of(LimitOrigin::Library, name, "vertex stride in bytes", binding.stride.into(), 2048)
+    })
 }

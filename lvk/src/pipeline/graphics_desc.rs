@@ -1,6 +1,7 @@
 //! Descriptions of graphics pipelines.
 
 use super::blend::{Blend, ColorWriteMask};
+use super::block_layout::BlockLayout;
 use super::depth_stencil::{DepthTest, StencilTest};
 use super::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
 use super::rendering_formats::RenderingFormats;
@@ -62,7 +63,7 @@ impl From<Format> for ColorTarget {
 }
 
 /// Describes a graphics pipeline.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderPipelineDesc<'a> {
     /// The vertex shader; `None` in pipelines with a mesh shader.
     pub vertex: Option<ShaderModuleHandle>,
@@ -124,8 +125,18 @@ pub struct RenderPipelineDesc<'a> {
     /// [`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate) do not take pipelines with `None`. Needs
     /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
     pub shading_rate: Option<ShadingRate>,
+    /// True to link the pipeline from parts that the context shares among pipelines (`VK_EXT_graphics_pipeline_library`):
+    /// vertex input, shaders before rasterisation, fragment shader, output. Only parts that no live pipeline has are
+    /// compiled. Draws give the same pixels, but may be slower than with a pipeline that is compiled as a whole.
+    ///
+    /// The whole pipeline is compiled without
+    /// [`OptionalFeature::GraphicsPipelineLibrary`](crate::OptionalFeature::GraphicsPipelineLibrary), without a fragment
+    /// shader, with a shading rate, and with a fragment shader that reads targets of its pass.
+    pub fast_link: bool,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
+    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
@@ -165,7 +176,9 @@ impl Default for RenderPipelineDesc<'_> {
             sample_shading: 0.0,
             view_mask: 0,
             shading_rate: None,
+            fast_link: false,
             specialization: &[],
+            layouts: &[],
             debug_name: "render pipeline",
         }
     }

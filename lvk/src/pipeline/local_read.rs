@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_pipeline_lacks_is_said() {
+    fn the_error_names_missing_inputs_of_a_pipeline() {
         let lacks = |targets: &InputTargets<'_>, input| {
             targets.check_read(&read(input, NumericFormat::Float)).unwrap_err()
         };

@@ -1,6 +1,7 @@
 //! Shader modules and pipelines.
 
 pub(crate) mod blend;
+pub(crate) mod block_layout;
 pub(crate) mod cache;
 pub(crate) mod cache_file;
 pub(crate) mod compute;
@@ -8,9 +9,14 @@ mod deferred_operation;
 pub(crate) mod depth_stencil;
 pub(crate) mod graphics;
 mod graphics_check;
+mod graphics_create;
 pub(crate) mod graphics_desc;
+mod graphics_parts;
 pub(crate) mod local_read;
+pub(crate) mod owned_desc;
+mod pass_state;
 pub(crate) mod pipeline_layout;
+mod pipeline_part;
 mod portability;
 pub(crate) mod rasterization;
 mod rasterization_state;
@@ -25,14 +31,18 @@ mod sbt;
 mod sbt_order;
 mod shader_groups;
 pub(crate) mod shader_module;
+pub(crate) mod shader_record;
 pub(crate) mod stage;
 mod state_check;
+mod subgroup_size;
 mod workgroup_memory;
 mod workgroup_size;
 
 pub(crate) use cache::PipelineCache;
 pub(crate) use compute::ComputePipeline;
-pub(crate) use graphics::{FrontEnd, PassState, RenderPipeline};
+pub(crate) use graphics::{FrontEnd, RenderPipeline};
+pub(crate) use graphics_parts::GraphicsParts;
+pub(crate) use pass_state::PassState;
 pub(crate) use pipeline_layout::{PipelineBase, PipelineLayout};
 pub(crate) use ray_tracing::RayTracingPipeline;
 pub(crate) use ray_tracing_library::RayTracingLibrary;

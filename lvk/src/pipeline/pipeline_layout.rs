@@ -17,6 +17,8 @@ pub(crate) struct PipelineBase {
     pub(crate) layout: vk::PipelineLayout,
     /// The pipeline cache; null if the context has none.
     pub(crate) cache: vk::PipelineCache,
+    /// Most threads that one creation uses, the calling thread included.
+    pub(crate) max_threads: usize,
 }
 
 /// The layout, destroyed on drop.

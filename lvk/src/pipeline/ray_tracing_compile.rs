@@ -66,7 +66,7 @@ pub(super) fn compile_groups(
     }
     // SAFETY: modules, layout and libraries are alive, the recursion depth is within the limit, and the libraries were
     // created with the same layout and agree on the interface.
-    unsafe { compile(gpu, base.cache, &info) }
+    unsafe { compile(gpu, base, &info) }
 }
 
 /// Returns a stage that is part of no group, for lavapipe. It passes push constants only to pipelines that have a ray

@@ -1,5 +1,7 @@
 //! Descriptions of ray tracing pipelines and of their hit groups.
 
+use super::block_layout::BlockLayout;
+use super::shader_record::ShaderRecord;
 use super::stage::SpecializationConstant;
 use crate::handle::{RayTracingLibraryHandle, ShaderModuleHandle};
 
@@ -13,16 +15,8 @@ pub struct HitGroup<'a> {
     pub any_hit: Option<ShaderModuleHandle>,
     /// Shader that decides whether a ray hits the object inside an AABB.
     pub intersection: Option<ShaderModuleHandle>,
-    /// Bytes that the group's shaders read through `shaderRecordEXT`; see [`record_bytes`].
-    pub record: &'a [u8],
-}
-
-/// Returns the bytes of a shader record. Shaders read them as a block `layout(shaderRecordEXT, scalar) buffer`.
-///
-/// The struct must have the layout of the block: `#[repr(C)]` and `scalar` agree if every member is aligned to its
-/// largest scalar.
-pub fn record_bytes<T: bytemuck::NoUninit>(record: &T) -> &[u8] {
-    bytemuck::bytes_of(record)
+    /// Bytes that the group's shaders read through `shaderRecordEXT`.
+    pub record: ShaderRecord<'a>,
 }
 
 /// Describes a ray tracing pipeline. The order of the lists is the order of the shader binding table.
@@ -39,13 +33,13 @@ pub struct RayTracingPipelineDesc<'a> {
     pub hit_groups: &'a [HitGroup<'a>],
     /// Callable shaders, by the index of `executeCallableEXT`.
     pub callable: &'a [ShaderModuleHandle],
-    /// Bytes that the ray generation shaders read through `shaderRecordEXT`, in the order of `ray_gen`; see
-    /// [`record_bytes`]. Shaders beyond the end of the list have no record.
-    pub ray_gen_records: &'a [&'a [u8]],
+    /// Bytes that the ray generation shaders read through `shaderRecordEXT`, in the order of `ray_gen`. Shaders beyond
+    /// the end of the list have no record.
+    pub ray_gen_records: &'a [ShaderRecord<'a>],
     /// Records of the miss shaders, in the order of `miss`; see `ray_gen_records`.
-    pub miss_records: &'a [&'a [u8]],
+    pub miss_records: &'a [ShaderRecord<'a>],
     /// Records of the callable shaders, in the order of `callable`; see `ray_gen_records`.
-    pub callable_records: &'a [&'a [u8]],
+    pub callable_records: &'a [ShaderRecord<'a>],
     /// Libraries whose shaders are linked into the pipeline. They may be destroyed before the pipeline.
     pub libraries: &'a [RayTracingLibraryHandle],
     /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays.
@@ -60,6 +54,9 @@ pub struct RayTracingPipelineDesc<'a> {
     pub max_hit_attribute_bytes: u32,
     /// Values of specialization constants of the pipeline's own shaders.
     pub specialization: &'a [SpecializationConstant],
+    /// Rust structs for the blocks of the pipeline's own shaders, compared with them at creation. Records have their
+    /// layouts with them ([`ShaderRecord::new`]).
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
@@ -80,6 +77,7 @@ impl Default for RayTracingPipelineDesc<'_> {
             max_payload_bytes: 64,
             max_hit_attribute_bytes: 8,
             specialization: &[],
+            layouts: &[],
             debug_name: "ray tracing pipeline",
         }
     }

@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::block_layout::BlockLayout;
 use super::pipeline_layout::PipelineBase;
 use super::ray_tracing_compile::{LinkedLibraries, check_interface, compile_groups};
 use super::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
 use super::shader_groups::{CompiledGroups, ShaderGroups};
 use super::shader_module::{ModuleLookup, ShaderModule};
+use super::shader_record::ShaderRecord;
 use super::stage::SpecializationConstant;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -31,11 +33,11 @@ pub struct RayTracingLibraryDesc<'a> {
     /// Callable shaders.
     pub callable: &'a [ShaderModuleHandle],
     /// See [`RayTracingPipelineDesc::ray_gen_records`].
-    pub ray_gen_records: &'a [&'a [u8]],
+    pub ray_gen_records: &'a [ShaderRecord<'a>],
     /// See [`RayTracingPipelineDesc::miss_records`].
-    pub miss_records: &'a [&'a [u8]],
+    pub miss_records: &'a [ShaderRecord<'a>],
     /// See [`RayTracingPipelineDesc::callable_records`].
-    pub callable_records: &'a [&'a [u8]],
+    pub callable_records: &'a [ShaderRecord<'a>],
     /// See [`RayTracingPipelineDesc::max_recursion`].
     pub max_recursion: u32,
     /// See [`RayTracingPipelineDesc::max_payload_bytes`].
@@ -44,6 +46,8 @@ pub struct RayTracingLibraryDesc<'a> {
     pub max_hit_attribute_bytes: u32,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
+    /// See [`RayTracingPipelineDesc::layouts`].
+    pub layouts: &'a [BlockLayout],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
@@ -63,6 +67,7 @@ impl Default for RayTracingLibraryDesc<'_> {
             max_payload_bytes: pipeline.max_payload_bytes,
             max_hit_attribute_bytes: pipeline.max_hit_attribute_bytes,
             specialization: &[],
+            layouts: &[],
             debug_name: "ray tracing library",
         }
     }
@@ -83,6 +88,7 @@ impl<'a> RayTracingLibraryDesc<'a> {
             max_payload_bytes: self.max_payload_bytes,
             max_hit_attribute_bytes: self.max_hit_attribute_bytes,
             specialization: self.specialization,
+            layouts: self.layouts,
             debug_name: self.debug_name,
             ..Default::default()
         }
@@ -138,7 +144,7 @@ impl RayTracingLibrary {
         let name = desc.debug_name;
         gpu.ray_tracing_functions()?;
         if !gpu.caps.pipeline_libraries {
-            return Err(gpu.unsupported(&format!("ray tracing library '{name}': pipeline libraries")));
+            return Err(gpu.unsupported(&format!("pipeline libraries, of which '{name}' is one")));
         }
         let desc = &desc.as_pipeline();
         check_interface(gpu, desc)?;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::graphics_desc::RenderPipelineDesc;
+use super::pipeline_part::Part;
 use super::shader_module::{ModuleLookup, ShaderModule};
 use crate::barrier::Stages;
 use crate::error::Result;
@@ -32,6 +33,20 @@ impl RenderModules {
             geometry: find(desc.geometry)?,
             fragment: find(desc.fragment)?,
         })
+    }
+
+    /// Returns the modules of a part of the pipeline.
+    pub(super) fn of_part(&self, part: Part) -> Self {
+        let if_in = |of, module: &Option<Arc<ShaderModule>>| module.clone().filter(|_| part == of);
+        Self {
+            vertex: if_in(Part::PreRaster, &self.vertex),
+            task: if_in(Part::PreRaster, &self.task),
+            mesh: if_in(Part::PreRaster, &self.mesh),
+            tess_control: if_in(Part::PreRaster, &self.tess_control),
+            tess_eval: if_in(Part::PreRaster, &self.tess_eval),
+            geometry: if_in(Part::PreRaster, &self.geometry),
+            fragment: if_in(Part::Fragment, &self.fragment),
+        }
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &ShaderModule> + Clone {

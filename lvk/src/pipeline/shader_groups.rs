@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::block_layout::check_layouts;
 use super::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
 use super::sbt_order::PerRegion;
 use super::shader_module::{ModuleLookup, ShaderModule};
+use super::shader_record::ShaderRecord;
 use crate::error::{Error, Result};
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
@@ -62,7 +64,8 @@ impl ShaderGroups {
         }
         let bytes = groups.modules.iter().map(|module| module.reflection.push_constant_bytes);
         groups.list.push_constant_bytes = bytes.max().unwrap_or(0);
-        groups.list.records = collect_records(desc)?;
+        check_layouts(desc.debug_name, desc.layouts, groups.modules.iter().map(|module| &**module))?;
+        groups.list.records = collect_records(desc, find)?;
         Ok(groups)
     }
 
@@ -144,24 +147,34 @@ fn group_info(kind: vk::RayTracingShaderGroupTypeKHR) -> vk::RayTracingShaderGro
         .intersection_shader(vk::SHADER_UNUSED_KHR)
 }
 
-fn collect_records(desc: &RayTracingPipelineDesc<'_>) -> Result<PerRegion<Vec<Box<[u8]>>>> {
-    let name = desc.debug_name;
+/// Checks the records of all groups, and returns their bytes.
+fn collect_records(
+    desc: &RayTracingPipelineDesc<'_>,
+    find: ModuleLookup<'_>,
+) -> Result<PerRegion<Vec<Box<[u8]>>>> {
+    let general = |kind: &str, shaders: &[ShaderModuleHandle], records: &[ShaderRecord<'_>]| {
+        if records.len() > shaders.len() {
+            let (records, shaders) = (records.len(), shaders.len());
+            let message = format!("{records} records for {shaders} {kind} shaders; give each at most one");
+            return Err(Error::usage(desc.debug_name, message));
+        }
+        let given = records.iter().copied().chain(std::iter::repeat(ShaderRecord::default()));
+        let record = |(index, (shader, record)): (usize, (&ShaderModuleHandle, ShaderRecord<'_>))| {
+            record.check(desc.debug_name, &format!("{kind} shader {index}"), &[find(*shader)?])?;
+            Ok(record.bytes().into())
+        };
+        shaders.iter().zip(given).enumerate().map(record).collect()
+    };
+    let hit_group = |(index, group): (usize, &HitGroup<'_>)| {
+        let shaders = [group.closest_hit, group.any_hit, group.intersection];
+        let modules = shaders.into_iter().flatten().map(find).collect::<Result<Vec<_>>>()?;
+        group.record.check(desc.debug_name, &format!("hit group {index}"), &modules)?;
+        Ok(group.record.bytes().into())
+    };
     Ok(PerRegion {
-        ray_gen: pad_records(name, "ray generation", desc.ray_gen.len(), desc.ray_gen_records)?,
-        miss: pad_records(name, "miss", desc.miss.len(), desc.miss_records)?,
-        hit: desc.hit_groups.iter().map(|group| group.record.into()).collect(),
-        callable: pad_records(name, "callable", desc.callable.len(), desc.callable_records)?,
+        ray_gen: general("ray generation", desc.ray_gen, desc.ray_gen_records)?,
+        miss: general("miss", desc.miss, desc.miss_records)?,
+        hit: desc.hit_groups.iter().enumerate().map(hit_group).collect::<Result<_>>()?,
+        callable: general("callable", desc.callable, desc.callable_records)?,
     })
-}
-
-/// Returns one record for each shader. Missing records are empty.
-fn pad_records(pipeline: &str, kind: &str, shaders: usize, records: &[&[u8]]) -> Result<Vec<Box<[u8]>>> {
-    if records.len() > shaders {
-        let message =
-            format!("{} records for {shaders} {kind} shaders; give each at most one", records.len());
-        return Err(Error::usage(pipeline, message));
-    }
-    let mut all: Vec<Box<[u8]>> = records.iter().map(|record| (*record).into()).collect();
-    all.resize_with(shaders, Box::default);
-    Ok(all)
 }

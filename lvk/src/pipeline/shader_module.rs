@@ -6,11 +6,12 @@ use ash::vk;
 
 use crate::bindless::Bindless;
 use crate::bindless::index_checks::CheckPlan;
+use crate::error::limit_origin::LimitOrigin;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::spirv::reflect::reflect;
-use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};
+use crate::shader::{CompileFiles, CompileOptions, Reflection, ShaderModuleDesc, ShaderStage};
 use crate::shader::{check_capabilities, check_stage, compile, with_checked_indices};
 
 /// Finds the module of a handle.
@@ -30,12 +31,12 @@ impl ShaderModule {
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         desc: &ShaderModuleDesc<'_>,
-        cache: Option<&ShaderCache>,
+        files: CompileFiles<'_>,
         bindless: Option<&Bindless>,
         max_push_bytes: u32,
     ) -> Result<Self> {
         check_stage(desc.debug_name, desc.stage, &gpu.features)?;
-        let words = compile(desc, &CompileOptions::from_capabilities(&gpu.caps), cache)?;
+        let words = compile(desc, &CompileOptions::from_capabilities(&gpu.caps), files)?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
         let extra = &gpu.extra_capabilities;
@@ -45,11 +46,13 @@ impl ShaderModule {
             check_limit(desc.debug_name, what, u64::from(last.input.index()) + 1, limit.into())?;
         }
         if reflection.push_constant_bytes > max_push_bytes {
+            let is_own = max_push_bytes < gpu.caps.limits.max_push_constant_bytes;
             return Err(Error::LimitExceeded {
                 object: desc.debug_name.to_owned(),
                 what: "push constants in bytes",
                 requested: reflection.push_constant_bytes.into(),
                 limit: max_push_bytes.into(),
+                origin: if is_own { LimitOrigin::Library } else { LimitOrigin::Device },
             });
         }
         let words = match bindless.and_then(|bindless| bindless.check_plan(desc.debug_name)) {
@@ -103,7 +106,7 @@ fn with_index_checks(gpu: &Gpu, desc: &ShaderModuleDesc<'_>, words: Vec<u32>, pl
 
 fn check_features(gpu: &Gpu, name: &str, reflection: &Reflection) -> Result<()> {
     if reflection.ray_query && !gpu.caps.ray_query {
-        return Err(gpu.unsupported(&format!("shader '{name}' uses ray queries: they")));
+        return Err(gpu.unsupported(&format!("ray queries, which shader '{name}' uses")));
     }
     if reflection.ray_query && reflection.hardware_ray_query != gpu.caps.hardware_ray_query() {
         let traversal_by = if reflection.hardware_ray_query { "the device" } else { "the library itself" };
@@ -114,9 +117,7 @@ fn check_features(gpu: &Gpu, name: &str, reflection: &Reflection) -> Result<()> 
         return Err(Error::usage(name, message));
     }
     if reflection.ray_tracing && !gpu.caps.ray_tracing_pipeline {
-        return Err(
-            gpu.unsupported(&format!("shader '{name}' is of a ray tracing stage: ray tracing pipelines"))
-        );
+        return Err(gpu.unsupported(&format!("ray tracing pipelines, which shader '{name}' is for")));
     }
     Ok(())
 }

@@ -12,23 +12,26 @@ pub(super) struct WorkgroupLimits {
     pub(super) invocations: u32,
 }
 
-/// Fails if a workgroup of `module` is empty or larger than `limits`.
+/// Returns the size of a workgroup of `module` along each axis. Fails if it is empty or larger than `limits`.
 pub(super) fn check_workgroup_size(
     pipeline: &str,
     module: &ShaderModule,
     specialization: &[SpecializationConstant],
     limits: &WorkgroupLimits,
-) -> Result<()> {
+) -> Result<[u32; 3]> {
     let mut invocations = 1_u64;
-    for axis in 0..3 {
+    let mut workgroup = module.reflection.local_size;
+    for (axis, side) in workgroup.iter_mut().enumerate() {
         let id = module.reflection.local_size_ids[axis];
         let given = specialization.iter().find(|constant| Some(constant.id) == id);
-        let size = given.map_or(module.reflection.local_size[axis], |constant| constant.value.bits() as u32);
+        let size = given.map_or(*side, |constant| constant.value.bits() as u32);
         if size == 0 {
             return Err(Error::usage(pipeline, "a workgroup needs at least one invocation along each axis"));
         }
         check_limit(pipeline, "workgroup size along an axis", size.into(), limits.size[axis].into())?;
         invocations = invocations.saturating_mul(size.into());
+        *side = size;
     }
-    check_limit(pipeline, "invocations of a workgroup", invocations, limits.invocations.into())
+    check_limit(pipeline, "invocations of a workgroup", invocations, limits.invocations.into())?;
+    Ok(workgroup)
 }

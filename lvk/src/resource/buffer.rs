@@ -10,7 +10,11 @@ use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::{Mapping, MemoryKind, ObjectMemory};
+#[cfg(unix)]
+use crate::gpu::memory::external::{DedicatedTo, MemoryFdType};
 use crate::lock_order::{Mutex, Rank};
+#[cfg(unix)]
+use crate::resource::sharing::Sharing;
 
 bitflags! {
     /// Allowed uses of a buffer (`VkBufferUsageFlags`). Copies and access by address are always allowed.
@@ -68,6 +72,9 @@ pub(crate) struct Buffer {
     allocation: Option<ObjectMemory>,
     /// True if the buffer was created outside of the library, which then does not destroy it.
     is_external: bool,
+    /// Type of the file descriptors that share the memory, if it is shared.
+    #[cfg(unix)]
+    shared_as: Option<MemoryFdType>,
     /// Held while the host copies to or from the mapping, so that threads do not race for the same bytes.
     copying: Mutex<()>,
     gpu: Arc<Gpu>,
@@ -100,19 +107,63 @@ impl Buffer {
     const GAP_BYTES: u64 = 4096;
 
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &BufferDesc<'_>, internal: InternalUsage) -> Result<Self> {
+        let mut buffer = Self::without_memory(gpu, desc, internal.raw, None)?;
+        let mut requirements = buffer.memory_requirements();
+        requirements.alignment = requirements.alignment.max(Self::ALIGNMENT).max(internal.alignment);
+        if gpu.instance.gpu_assisted {
+            requirements.size += Self::GAP_BYTES;
+        }
+        buffer.bind_memory(gpu.allocate(&buffer.name, requirements, desc.memory, true)?)?;
+        gpu.name(buffer.raw, desc.debug_name);
+        Ok(buffer)
+    }
+
+    /// Creates a buffer whose memory is shared by a file descriptor.
+    #[cfg(unix)]
+    pub(crate) fn with_shared_memory(
+        gpu: &Arc<Gpu>,
+        desc: &BufferDesc<'_>,
+        sharing: Sharing,
+    ) -> Result<Self> {
+        let name = desc.debug_name;
+        let fd_type = sharing.fd_type();
+        gpu.require_memory_fd(fd_type, &format!("buffer '{name}' with shared memory"))?;
+        if desc.memory != MemoryKind::Device {
+            return Err(Error::usage(name, "shared memory is MemoryKind::Device; copy to and from it"));
+        }
+        check_shareable(gpu, desc, &sharing)?;
+        let mut external = vk::ExternalMemoryBufferCreateInfo::default().handle_types(fd_type.raw());
+        let mut buffer = Self::without_memory(gpu, desc, vk::BufferUsageFlags::empty(), Some(&mut external))?;
+        let (requirements, owner) = (buffer.memory_requirements(), DedicatedTo::Buffer(buffer.raw));
+        buffer.bind_memory(sharing.memory(gpu, name, requirements, owner)?)?;
+        buffer.shared_as = Some(fd_type);
+        gpu.name(buffer.raw, name);
+        Ok(buffer)
+    }
+
+    /// Creates a buffer without memory.
+    fn without_memory(
+        gpu: &Arc<Gpu>,
+        desc: &BufferDesc<'_>,
+        internal: vk::BufferUsageFlags,
+        external: Option<&mut vk::ExternalMemoryBufferCreateInfo<'_>>,
+    ) -> Result<Self> {
         let name = desc.debug_name;
         let size = check_size(gpu, desc)?;
-        let usage = raw_usage(gpu, desc.usage, name)? | internal.raw;
+        let usage = raw_usage(gpu, desc.usage, name)? | internal;
         // Kernels read 16-bit indices as whole 32-bit words.
         let mut info = vk::BufferCreateInfo::default().size(size.next_multiple_of(4)).usage(usage);
         let families = gpu.queues.families();
         if families.len() > 1 {
             info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
         }
+        if let Some(external) = external {
+            info = info.push_next(external);
+        }
         // SAFETY: the description is valid: the size is checked, the usage belongs to enabled features.
         let raw =
             unsafe { gpu.device.create_buffer(&info, None) }.map_err(Error::vulkan("vkCreateBuffer"))?;
-        let mut buffer = Self {
+        Ok(Self {
             raw,
             id: ResourceId::next(),
             size_bytes: size,
@@ -122,12 +173,16 @@ impl Buffer {
             name: name.to_owned(),
             allocation: None,
             is_external: false,
+            #[cfg(unix)]
+            shared_as: None,
             copying: Mutex::new(Rank::BufferBytes, ()),
             gpu: Arc::clone(gpu),
-        };
-        buffer.bind_memory(internal.alignment)?;
-        gpu.name(raw, name);
-        Ok(buffer)
+        })
+    }
+
+    fn memory_requirements(&self) -> vk::MemoryRequirements {
+        // SAFETY: the buffer was created by this device.
+        unsafe { self.gpu.device.get_buffer_memory_requirements(self.raw) }
     }
 
     /// Wraps a buffer that was created outside of the library.
@@ -154,23 +209,19 @@ impl Buffer {
             name: name.to_owned(),
             allocation: None,
             is_external: true,
+            #[cfg(unix)]
+            shared_as: None,
             copying: Mutex::new(Rank::BufferBytes, ()),
             gpu: Arc::clone(gpu),
         }
     }
 
-    fn bind_memory(&mut self, alignment: u64) -> Result<()> {
+    /// Binds memory that was allocated for the buffer's requirements, and takes the address.
+    fn bind_memory(&mut self, memory: ObjectMemory) -> Result<()> {
         let device = &self.gpu.device;
-        // SAFETY: the buffer was created by this device.
-        let mut requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
-        requirements.alignment = requirements.alignment.max(Self::ALIGNMENT).max(alignment);
-        if self.gpu.instance.gpu_assisted {
-            requirements.size += Self::GAP_BYTES;
-        }
-        let allocation = self.gpu.allocate(&self.name, requirements, self.memory, true)?;
-        // SAFETY: the allocation was made for this buffer's requirements and is bound once.
-        let bound = unsafe { device.bind_buffer_memory(self.raw, allocation.raw, allocation.offset) };
-        self.allocation = Some(allocation);
+        // SAFETY: the memory was allocated for this buffer's requirements and is bound once.
+        let bound = unsafe { device.bind_buffer_memory(self.raw, memory.raw, memory.offset) };
+        self.allocation = Some(memory);
         bound.map_err(Error::vulkan("vkBindBufferMemory"))?;
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
         // SAFETY: the buffer has memory and the device-address usage.
@@ -178,15 +229,20 @@ impl Buffer {
         Ok(())
     }
 
+    /// Returns the memory and the type of its file descriptors, if the memory is shared.
+    #[cfg(unix)]
+    pub(crate) fn shared_memory(&self) -> Option<(&ObjectMemory, MemoryFdType)> {
+        self.allocation.as_ref().zip(self.shared_as)
+    }
+
     /// Fails unless `offset..offset + size` lies inside the buffer.
     pub(crate) fn check_range(&self, offset: u64, size: u64) -> Result<()> {
         if offset.checked_add(size).is_some_and(|end| end <= self.size_bytes) {
             return Ok(());
         }
-        Err(Error::usage(
-            &self.name,
-            format!("bytes {offset}..{offset}+{size} are outside of the buffer's {} bytes", self.size_bytes),
-        ))
+        let message =
+            format!("{size} bytes at byte {offset} are outside of the buffer's {} bytes", self.size_bytes);
+        Err(Error::usage(&self.name, message))
     }
 
     /// Fails unless the buffer was created with `usage`.
@@ -286,7 +342,9 @@ fn check_size(gpu: &Gpu, desc: &BufferDesc<'_>) -> Result<u64> {
 
 fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsageFlags> {
     if usage.contains(BufferUsage::ACCEL_INPUT) && !gpu.has_acceleration_structures() {
-        return Err(gpu.unsupported(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
+        return Err(
+            gpu.unsupported(&format!("acceleration structures, which buffer '{name}' is for (ACCEL_INPUT)"))
+        );
     }
     // The library's own builders read inputs like any other shader.
     let accel_input = match gpu.accel {
@@ -304,4 +362,20 @@ fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsag
         | vk::BufferUsageFlags::TRANSFER_DST
         | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
     Ok(pairs.iter().filter(|(bit, _)| usage.contains(*bit)).fold(always, |all, (_, raw)| all | *raw))
+}
+
+/// Fails unless the driver shares the memory of such buffers.
+#[cfg(unix)]
+fn check_shareable(gpu: &Gpu, desc: &BufferDesc<'_>, sharing: &Sharing) -> Result<()> {
+    let usage = raw_usage(gpu, desc.usage, desc.debug_name)?;
+    let info =
+        vk::PhysicalDeviceExternalBufferInfo::default().usage(usage).handle_type(sharing.fd_type().raw());
+    let mut found = vk::ExternalBufferProperties::default();
+    // SAFETY: the physical device belongs to the instance, and the handle type to an enabled extension.
+    unsafe {
+        let instance = &gpu.instance.raw;
+        instance.get_physical_device_external_buffer_properties(gpu.physical(), &info, &mut found);
+    }
+    let found = found.external_memory_properties.external_memory_features;
+    sharing.check(&format!("buffer '{}' with shared memory", desc.debug_name), found)
 }

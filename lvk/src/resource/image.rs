@@ -9,12 +9,18 @@ use ash::vk;
 use super::host_copy;
 use super::image_check::{ImagePlan, check_image};
 use super::image_usage::usage_from_features;
+#[cfg(unix)]
+use super::sharing::{Sharing, check_shared_texture, external_features, plane_layouts, shareable_modifiers};
 use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
 use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
+#[cfg(unix)]
+use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::gpu::memory::allocator::{MemoryKind, ObjectMemory};
+#[cfg(unix)]
+use crate::gpu::memory::external::{DedicatedTo, MemoryFd, MemoryFdType};
 use crate::handle::{Handle, TextureHandle};
 
 /// An image with memory, destroyed on drop. The tracker identifies it by `id`, no matter which texture is used.
@@ -46,6 +52,9 @@ pub(crate) struct Image {
     pub(crate) host_filled: bool,
     /// True if the image was created outside of the library, which then does not destroy it.
     is_external: bool,
+    /// Type of the file descriptors that share the memory, if it is shared.
+    #[cfg(unix)]
+    shared_as: Option<MemoryFdType>,
     /// External owner of the image, if it must be kept alive.
     owner: Option<Arc<dyn Any + Send + Sync>>,
     gpu: Arc<Gpu>,
@@ -104,6 +113,51 @@ impl Image {
         Ok(image)
     }
 
+    /// Creates an image for one texture, whose memory is shared by a file descriptor.
+    #[cfg(unix)]
+    pub(crate) fn with_shared_memory(
+        gpu: &Arc<Gpu>,
+        desc: &TextureDesc<'_>,
+        sharing: Sharing,
+    ) -> Result<Self> {
+        let name = desc.debug_name;
+        let fd_type = sharing.fd_type();
+        gpu.require_memory_fd(fd_type, &format!("texture '{name}' with shared memory"))?;
+        check_shared_texture(desc, &sharing)?;
+        let plan = check_image(gpu, desc)?;
+        let raw = match fd_type {
+            MemoryFdType::DmaBuf => create_in_dma_buf(gpu, desc, &plan, &sharing)?,
+            MemoryFdType::Opaque => create_opaque(gpu, desc, &plan, &sharing)?,
+        };
+        let mut image = Self::from_raw(gpu, desc, &plan, raw, false);
+        image.shared_as = Some(fd_type);
+        // SAFETY: the image was created by this device.
+        let requirements = unsafe { gpu.device.get_image_memory_requirements(raw) };
+        image.bind_to(Memory::Managed(sharing.memory(
+            gpu,
+            name,
+            requirements,
+            DedicatedTo::Image(raw),
+        )?))?;
+        gpu.name(raw, name);
+        Ok(image)
+    }
+
+    /// True if the image was created with `VK_SHARING_MODE_CONCURRENT`.
+    #[cfg(unix)]
+    pub(crate) fn is_concurrent(&self) -> bool {
+        !self.is_external && self.gpu.queues.families().len() > 1 && self.usage == TextureUsage::SAMPLED
+    }
+
+    /// Returns the memory and the type of its file descriptors, if the memory is shared.
+    #[cfg(unix)]
+    pub(crate) fn shared_memory(&self) -> Option<(&ObjectMemory, MemoryFdType)> {
+        match (&self.memory, self.shared_as) {
+            (Some(Memory::Managed(memory)), Some(fd_type)) => Some((memory, fd_type)),
+            _ => None,
+        }
+    }
+
     /// Wraps an image that was created outside of the library, for one texture. The image must match the description.
     pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image) -> Result<Self> {
         Ok(Self::from_raw(gpu, desc, &check_image(gpu, desc)?, raw, true))
@@ -134,6 +188,8 @@ impl Image {
             is_exclusive: !is_external && gpu.queues.has_several_domains() && !is_shared(desc),
             host_filled: false,
             is_external,
+            #[cfg(unix)]
+            shared_as: None,
             owner: None,
             gpu: Arc::clone(gpu),
         }
@@ -160,13 +216,18 @@ impl Image {
             Some(memory) => Memory::Lazy(memory),
             None => Memory::Managed(self.gpu.allocate(name, requirements, MemoryKind::Device, false)?),
         };
+        self.bind_to(memory)
+    }
+
+    /// Binds memory that was allocated for the image's requirements.
+    fn bind_to(&mut self, memory: Memory) -> Result<()> {
         let (raw, offset) = match &memory {
             Memory::Managed(memory) => (memory.raw, memory.offset),
             Memory::Lazy(memory) => (*memory, 0),
         };
         self.memory = Some(memory);
         // SAFETY: the memory was allocated for this image's requirements and is bound once.
-        let bound = unsafe { device.bind_image_memory(self.raw, raw, offset) };
+        let bound = unsafe { self.gpu.device.bind_image_memory(self.raw, raw, offset) };
         bound.map_err(Error::vulkan("vkBindImageMemory"))
     }
 
@@ -175,7 +236,7 @@ impl Image {
         let more = |count: u32| (count > 0).then_some(count + 1);
         match self.handles.fetch_update(Ordering::AcqRel, Ordering::Acquire, more) {
             Ok(_) => Ok(()),
-            Err(_) => Err(Error::StaleHandle { kind: TextureHandle::KIND }),
+            Err(_) => Err(Error::StaleHandle { kind: TextureHandle::KIND, name: None }),
         }
     }
 
@@ -232,6 +293,74 @@ impl Drop for Image {
             None => {}
         }
     }
+}
+
+/// Creates an image in opaque shared memory.
+#[cfg(unix)]
+fn create_opaque(
+    gpu: &Gpu,
+    desc: &TextureDesc<'_>,
+    plan: &ImagePlan,
+    sharing: &Sharing,
+) -> Result<vk::Image> {
+    let formats: Vec<_> = [desc.format].iter().chain(desc.view_formats).map(|f| f.raw()).collect();
+    let mut list = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
+    let mut info = plan.info(desc);
+    let object = format!("texture '{}' with shared memory", desc.debug_name);
+    sharing.check(&object, external_features(gpu, &info, sharing.fd_type(), None))?;
+    if !desc.view_formats.is_empty() {
+        info = info.push_next(&mut list);
+    }
+    create_shared(gpu, desc, info, sharing)
+}
+
+/// Creates an image in a dma-buf, with the layout of its exporter or with one that the driver chooses.
+#[cfg(unix)]
+fn create_in_dma_buf(
+    gpu: &Gpu,
+    desc: &TextureDesc<'_>,
+    plan: &ImagePlan,
+    sharing: &Sharing,
+) -> Result<vk::Image> {
+    let object = format!("texture '{}' in a dma-buf", desc.debug_name);
+    gpu.require(OptionalFeature::DrmFormatModifier, &object)?;
+    let info = plan.info(desc);
+    let modifiers = shareable_modifiers(gpu, &info, sharing);
+    if modifiers.is_empty() {
+        let why = "the driver shares no such image; choose another format, usage or DRM layout";
+        return Err(Error::unsupported(object, why));
+    }
+    let info = info.tiling(vk::ImageTiling::DRM_FORMAT_MODIFIER_EXT);
+    let planes = match sharing {
+        Sharing::Import(MemoryFd { drm_layout: Some(layout), .. }) => plane_layouts(layout),
+        _ => Vec::new(),
+    };
+    if planes.is_empty() {
+        let mut list =
+            vk::ImageDrmFormatModifierListCreateInfoEXT::default().drm_format_modifiers(&modifiers);
+        return create_shared(gpu, desc, info.push_next(&mut list), sharing);
+    }
+    let mut explicit = vk::ImageDrmFormatModifierExplicitCreateInfoEXT::default()
+        .drm_format_modifier(modifiers[0])
+        .plane_layouts(&planes);
+    create_shared(gpu, desc, info.push_next(&mut explicit), sharing)
+}
+
+#[cfg(unix)]
+fn create_shared(
+    gpu: &Gpu,
+    desc: &TextureDesc<'_>,
+    info: vk::ImageCreateInfo<'_>,
+    sharing: &Sharing,
+) -> Result<vk::Image> {
+    let mut external = vk::ExternalMemoryImageCreateInfo::default().handle_types(sharing.fd_type().raw());
+    let mut info = info.push_next(&mut external);
+    let families = gpu.queues.families();
+    if families.len() > 1 && is_shared(desc) {
+        info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
+    }
+    // SAFETY: the description is checked against the limits of its format, and the driver shares such images.
+    unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage"))
 }
 
 /// True if all queues may use the image without an ownership transfer. An image that is only copied and sampled loses

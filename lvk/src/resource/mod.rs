@@ -11,6 +11,8 @@ pub(crate) mod query_pool;
 pub(crate) mod query_reset_state;
 pub(crate) mod region;
 pub(crate) mod sampler;
+#[cfg(unix)]
+pub(crate) mod sharing;
 pub(crate) mod swizzle;
 pub(crate) mod texture;
 pub(crate) mod texture_desc;

@@ -7,7 +7,8 @@ use bytemuck::{Pod, Zeroable};
 
 use super::query_reset_state::QueryResetState;
 use crate::barrier::ResourceId;
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit_of};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::lock_order::{Guard, Mutex, Rank};
@@ -178,7 +179,13 @@ impl QueryPool {
         if desc.count == 0 {
             return Err(Error::usage(desc.debug_name, "a query pool needs at least one query"));
         }
-        check_limit(desc.debug_name, "query count", desc.count.into(), Self::MAX_COUNT.into())?;
+        check_limit_of(
+            LimitOrigin::Library,
+            desc.debug_name,
+            "query count",
+            desc.count.into(),
+            Self::MAX_COUNT.into(),
+        )?;
         Self::with_type(gpu, desc, desc.kind.raw())
     }
 
@@ -210,7 +217,8 @@ impl QueryPool {
         if first.checked_add(count).is_some_and(|end| end <= self.count) {
             return Ok(());
         }
-        let message = format!("queries {first}..{first}+{count} are outside of the pool's {}", self.count);
+        let message =
+            format!("{count} queries from {first} on are outside of the pool's {} queries", self.count);
         Err(Error::usage(&self.name, message))
     }
 
@@ -244,7 +252,8 @@ impl QueryPool {
     /// Returns milliseconds of each timestamp since an arbitrary start; `None` for timestamps that are not written yet.
     pub(crate) fn milliseconds(&self, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
         self.check_kind(self.kind == QueryKind::Timestamps, "times come from a pool of timestamps")?;
-        let milliseconds = |ticks: u64| self.gpu.milliseconds(ticks);
+        let timestamps = self.gpu.timestamps();
+        let milliseconds = |ticks: u64| timestamps.milliseconds(ticks);
         Ok(self.values(first, count)?.into_iter().map(|ticks| ticks.map(milliseconds)).collect())
     }
 

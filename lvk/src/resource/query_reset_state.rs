@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_outside_of_the_pool_is_never_ready() {
+    fn queries_outside_of_the_pool_are_never_ready() {
         let mut marks = QueryResetState::new(2);
         marks.write(7);
         assert!(marks.is_ready(1) && !marks.is_ready(2));

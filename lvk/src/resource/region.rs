@@ -243,7 +243,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_resolved_lies_inside_in_whole_blocks((bounds, format) in bounds(), region in region()) {
+        fn resolved_regions_lie_inside_in_whole_blocks((bounds, format) in bounds(), region in region()) {
             let part = format.copy_aspect(Aspect::Main).unwrap();
             let Ok(found) = bounds.resolve(&region, part) else { return Ok(()) };
             let whole = bounds.mip_extent(region.mip);

@@ -288,9 +288,11 @@ fn check_sampler(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
     ];
     match needed.into_iter().find(|(needs, feature)| *needs && !gpu.caps.has(*feature)) {
         None => Ok(()),
-        Some((_, feature)) => {
-            Err(gpu.unsupported(&format!("sampler '{}': {}", desc.debug_name, feature.vulkan_name())))
-        }
+        Some((_, feature)) => Err(gpu.unsupported(&format!(
+            "{}, which sampler '{}' needs",
+            feature.vulkan_name(),
+            desc.debug_name
+        ))),
     }
 }
 

@@ -9,6 +9,8 @@ use super::image_check::check_cube_arrays;
 use super::image_usage::raw_usage;
 use super::portability::view_needs;
 use super::region::{Region, TextureBounds, TextureRange, TextureRegion};
+#[cfg(unix)]
+use super::sharing::Sharing;
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
 use super::view::{TextureViewDesc, ViewCache, ViewInfo, raw_kind};
@@ -59,6 +61,17 @@ impl Texture {
     /// Creates a texture of an image that was created outside of the library. The image must match the description.
     pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image, slot: u32) -> Result<Self> {
         Ok(Self::from_image(gpu, desc, Image::import(gpu, desc, raw)?, slot))
+    }
+
+    /// Creates a texture with an image of its own, whose memory is shared by a file descriptor.
+    #[cfg(unix)]
+    pub(crate) fn with_shared_memory(
+        gpu: &Arc<Gpu>,
+        desc: &TextureDesc<'_>,
+        sharing: Sharing,
+        slot: u32,
+    ) -> Result<Self> {
+        Ok(Self::from_image(gpu, desc, Image::with_shared_memory(gpu, desc, sharing)?, slot))
     }
 
     /// Creates a texture of an image, which must match the description.
@@ -336,7 +349,12 @@ impl Texture {
         if bytes == expected {
             return Ok(region);
         }
-        let message = format!("{bytes} bytes were given for texels of {expected} bytes");
+        let [width, height, depth] = region.extent;
+        let (layers, format) = (region.layers, self.format);
+        let message = format!(
+            "{bytes} bytes were given, but the region takes {expected} bytes: {width} x {height} x {depth} texels of \
+             {format:?} in {layers} layer(s); give the bytes of all texels, tightly packed"
+        );
         Err(Error::usage(&self.name, message))
     }
 

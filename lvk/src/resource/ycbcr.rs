@@ -34,7 +34,7 @@ pub enum YuvRange {
 
 /// Position of a colour difference between the two texels of an axis that share it (`VkChromaLocation`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum ChromaSite {
+pub enum ChromaLocation {
     /// At the first texel.
     #[default]
     Cosited,
@@ -52,7 +52,7 @@ pub struct YuvConversion {
     /// Range of the numbers between black and white.
     pub range: YuvRange,
     /// Position of colour differences along x and y.
-    pub chroma: [ChromaSite; 2],
+    pub chroma: [ChromaLocation; 2],
     /// Interpolation of texels and colour differences. Addresses beyond the edge are clamped to the edge.
     pub filter: Filter,
 }
@@ -68,7 +68,7 @@ impl YuvConversion {
 
     /// Returns the conversion of a format by BT.709 with the narrow range.
     pub const fn new(format: Format) -> Self {
-        let chroma = [ChromaSite::Cosited; 2];
+        let chroma = [ChromaLocation::Cosited; 2];
         Self { format, model: YuvModel::Bt709, range: YuvRange::Narrow, chroma, filter: Filter::Linear }
     }
 
@@ -84,8 +84,8 @@ impl YuvConversion {
                 YuvRange::Narrow => vk::SamplerYcbcrRange::ITU_NARROW,
                 YuvRange::Full => vk::SamplerYcbcrRange::ITU_FULL,
             })
-            .x_chroma_offset(raw_site(self.chroma[0]))
-            .y_chroma_offset(raw_site(self.chroma[1]))
+            .x_chroma_offset(raw_chroma_location(self.chroma[0]))
+            .y_chroma_offset(raw_chroma_location(self.chroma[1]))
             .chroma_filter(self.filter.raw())
     }
 
@@ -98,14 +98,14 @@ impl YuvConversion {
             Some("the format is not in Y'CbCr")
         } else if !features.contains(Features::SAMPLED_IMAGE) {
             Some("the device cannot sample the format")
-        } else if self.chroma.contains(&ChromaSite::Cosited)
+        } else if self.chroma.contains(&ChromaLocation::Cosited)
             && !features.contains(Features::COSITED_CHROMA_SAMPLES)
         {
-            Some("the device does not support cosited colour differences; use ChromaSite::Midpoint")
-        } else if self.chroma.contains(&ChromaSite::Midpoint)
+            Some("the device does not support cosited colour differences; use ChromaLocation::Midpoint")
+        } else if self.chroma.contains(&ChromaLocation::Midpoint)
             && !features.contains(Features::MIDPOINT_CHROMA_SAMPLES)
         {
-            Some("the device does not support colour differences at midpoints; use ChromaSite::Cosited")
+            Some("the device does not support colour differences at midpoints; use ChromaLocation::Cosited")
         } else if self.filter == Filter::Linear && !features.contains(linear) {
             Some("the device does not interpolate the format; use Filter::Nearest")
         } else {
@@ -130,7 +130,7 @@ impl YuvSampler {
             return Ok(Err(lack));
         }
         let device = &gpu.device;
-        // SAFETY: the device has the format with this filter and these sites, and the feature is on.
+        // SAFETY: the device has the format with this filter and these chroma locations, and the feature is on.
         let conversion = unsafe { device.create_sampler_ycbcr_conversion(&desc.info(), None) }
             .map_err(Error::vulkan("vkCreateSamplerYcbcrConversion"))?;
         let descriptors = descriptor_count(gpu, desc.format);
@@ -180,10 +180,10 @@ fn descriptor_count(gpu: &Gpu, format: Format) -> u32 {
     if asked.is_ok() { yuv.combined_image_sampler_descriptor_count.max(1) } else { 3 }
 }
 
-fn raw_site(site: ChromaSite) -> vk::ChromaLocation {
-    match site {
-        ChromaSite::Cosited => vk::ChromaLocation::COSITED_EVEN,
-        ChromaSite::Midpoint => vk::ChromaLocation::MIDPOINT,
+fn raw_chroma_location(location: ChromaLocation) -> vk::ChromaLocation {
+    match location {
+        ChromaLocation::Cosited => vk::ChromaLocation::COSITED_EVEN,
+        ChromaLocation::Midpoint => vk::ChromaLocation::MIDPOINT,
     }
 }
 
@@ -192,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_conversion_lacks_is_named() {
+    fn the_error_names_missing_features_of_a_conversion() {
         use vk::FormatFeatureFlags as F;
         let linear = F::SAMPLED_IMAGE_FILTER_LINEAR | F::SAMPLED_IMAGE_YCBCR_CONVERSION_LINEAR_FILTER;
         let plain = YuvConversion::new(Format::Nv12);
@@ -203,7 +203,8 @@ mod tests {
         assert!(lack(plain, F::SAMPLED_IMAGE | F::COSITED_CHROMA_SAMPLES).contains("Nearest"));
         let nearest = YuvConversion { filter: Filter::Nearest, ..plain };
         assert_eq!(lack(nearest, F::SAMPLED_IMAGE | F::COSITED_CHROMA_SAMPLES), "nothing");
-        let midpoint = YuvConversion { chroma: [ChromaSite::Cosited, ChromaSite::Midpoint], ..nearest };
+        let midpoint =
+            YuvConversion { chroma: [ChromaLocation::Cosited, ChromaLocation::Midpoint], ..nearest };
         assert!(lack(midpoint, F::SAMPLED_IMAGE | F::COSITED_CHROMA_SAMPLES).contains("Cosited"));
         assert!(
             lack(YuvConversion { format: Format::R8Unorm, ..plain }, F::SAMPLED_IMAGE).contains("Y'CbCr")

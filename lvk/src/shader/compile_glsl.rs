@@ -2,7 +2,7 @@
 
 use super::ShaderModuleDesc;
 use super::compile::compile;
-use super::options::CompileOptions;
+use super::options::{CompileFiles, CompileOptions};
 use super::spirv::reflect::reflect;
 use crate::error::Result;
 use crate::gpu::caps::capabilities::Capabilities;
@@ -20,7 +20,7 @@ use crate::gpu::caps::capabilities::Capabilities;
 /// [`Error::Shader`](crate::Error::Shader) with the compiler's text, or if the module declares resources outside the
 /// bindless set.
 pub fn compile_glsl(desc: &ShaderModuleDesc<'_>, capabilities: &Capabilities) -> Result<Vec<u32>> {
-    let words = compile(desc, &CompileOptions::from_capabilities(capabilities), None)?;
+    let words = compile(desc, &CompileOptions::from_capabilities(capabilities), CompileFiles::default())?;
     reflect(desc.debug_name, desc.stage, &words)?;
     Ok(words)
 }
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_device_can_do_decides_what_the_text_may_use() {
+    fn capabilities_of_the_device_decide_the_extensions_of_the_text() {
         let text = "layout(local_size_x = 1) in; layout(push_constant) uniform Push { uint image; };
             void main() { imageStore(kImages2D[image], ivec2(0), imageLoad(kImages2D[image], ivec2(1))); }";
         let capable = Capabilities { formatless_storage_read: true, ..Capabilities::default() };

@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_without_errors_is_shown_whole() {
+    fn a_log_without_errors_is_printed_whole() {
         assert_eq!(errors("odd\n", Vec::new()), "the compiler failed: odd");
     }
 }

@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_used_for_longest_goes_first_and_foreign_files_stay() {
+    fn least_recently_used_files_go_first_and_foreign_files_stay() {
         let folder = std::env::temp_dir().join(format!("lvk-shaders-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         std::fs::write(folder.join("mine.spirv"), vec![0; 1 << 16]).unwrap();

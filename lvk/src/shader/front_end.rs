@@ -8,21 +8,21 @@ use glslang::{Compiler, CompilerOptions, ShaderInput, ShaderMessage, SpirvVersio
 
 use super::disk_file::{CachedModule, Fingerprint};
 use super::include::Includes;
-use super::options::{CompileOptions, compile_error};
+use super::options::{CompileFiles, CompileOptions, compile_error};
 use super::sanitize::{self, SourceError};
 use super::spirv::debug_source::embed_source;
-use super::spirv::passes::fold_sampled_image::fold_sampled_images;
+use super::spirv::passes::merge_sampled_image::merge_sampled_images;
 use super::spirv::passes::strip_unused_bindings::strip_unused_bindings;
-use super::{ShaderCache, ShaderModuleDesc, ShaderStage, diagnostics, preamble};
+use super::{ShaderModuleDesc, ShaderStage, diagnostics, preamble};
 use crate::cpu_scope::cpu_scope;
 use crate::error::Result;
 
-/// Returns the words of `text`, from `cache` if it has them.
+/// Returns the words of `text`, from the cache if it has them.
 pub(super) fn compile_cached(
     desc: &ShaderModuleDesc<'_>,
     text: &str,
     options: &CompileOptions,
-    cache: Option<&ShaderCache>,
+    files: CompileFiles<'_>,
 ) -> Result<Vec<u32>> {
     cpu_scope!("compile GLSL");
     let name = desc.debug_name;
@@ -31,14 +31,14 @@ pub(super) fn compile_cached(
         sanitize::to_ascii(text).and_then(|text| sanitize::without_version(&text)).map_err(complain)?;
     check_defines(desc)?;
     let preamble = preamble::preamble(desc.stage, options, desc.defines);
-    let Some(cache) = cache else { return Ok(translate(desc, &preamble, &text)?.words) };
+    let includes = || Includes::new(desc.includes, desc.include_dirs, files.on_search);
+    let Some(cache) = files.cache else { return Ok(translate(desc, &preamble, &text, includes())?.words) };
     let key = fingerprint(desc, &preamble, &text);
-    let found =
-        cache.load(key, |included| Includes::new(desc.includes, desc.include_dirs).finds_unchanged(included));
+    let found = cache.load(key, |included| includes().finds_unchanged(included));
     if let Some(words) = found {
         return Ok(words);
     }
-    let entry = translate(desc, &preamble, &text)?;
+    let entry = translate(desc, &preamble, &text, includes())?;
     cache.store(key, &entry);
     Ok(entry.words)
 }
@@ -54,11 +54,15 @@ fn fingerprint(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Finge
 }
 
 /// Compiles `text`, and returns the words with the includes.
-fn translate(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Result<CachedModule> {
+fn translate(
+    desc: &ShaderModuleDesc<'_>,
+    preamble: &str,
+    text: &str,
+    mut includes: Includes<'_>,
+) -> Result<CachedModule> {
     let name = desc.debug_name;
-    let mut includes = Includes::new(desc.includes, desc.include_dirs);
     let words = match to_spirv(name, desc.stage, format!("{preamble}{text}"), &mut includes) {
-        Ok(words) => fold_sampled_images(strip_unused_bindings(words)),
+        Ok(words) => merge_sampled_images(strip_unused_bindings(words)),
         Err(error) => {
             return Err(compile_error(
                 name,

@@ -25,6 +25,8 @@ pub(super) struct Includes<'a> {
     texts: Vec<(String, String)>,
     /// Depth and name of the directive that failed last, if it has quotes.
     refused: Option<(usize, String)>,
+    /// Called with each path at which an include is searched, before the search.
+    on_search: Option<&'a dyn Fn(&Path)>,
 }
 
 /// The source of an included text; equal for equal files.
@@ -36,7 +38,11 @@ enum IncludeOrigin {
 }
 
 impl<'a> Includes<'a> {
-    pub(super) fn new(listed: &'a [(&'a str, &'a str)], dirs: &'a [&'a Path]) -> Self {
+    pub(super) fn new(
+        listed: &'a [(&'a str, &'a str)],
+        dirs: &'a [&'a Path],
+        on_search: Option<&'a dyn Fn(&Path)>,
+    ) -> Self {
         Self {
             listed,
             dirs,
@@ -46,6 +52,7 @@ impl<'a> Includes<'a> {
             included: Vec::new(),
             texts: Vec::new(),
             refused: None,
+            on_search,
         }
     }
 
@@ -105,6 +112,7 @@ impl<'a> Includes<'a> {
         };
         for dir in beside.into_iter().chain(self.dirs.iter().copied()) {
             let path = dir.join(name);
+            self.on_search.iter().for_each(|on_search| on_search(&path));
             if path.is_file() {
                 return read_text(&path).map(|text| (IncludeOrigin::File(canonicalize(path)), text));
             }

@@ -13,11 +13,13 @@ mod disk_file;
 mod front_end;
 #[cfg(feature = "glsl")]
 mod include;
+pub(crate) mod layout_comparison;
 mod options;
 #[cfg(feature = "glsl")]
 mod preamble;
 #[cfg(feature = "glsl")]
 mod sanitize;
+pub(crate) mod shader_layout;
 pub(crate) mod spirv;
 mod stage;
 
@@ -26,7 +28,7 @@ pub(crate) use compile::compile;
 pub use compile_glsl::compile_glsl;
 pub(crate) use disk_cache::ShaderCache;
 pub use disk_cache::ShaderCacheStats;
-pub(crate) use options::CompileOptions;
+pub(crate) use options::{CompileFiles, CompileOptions};
 pub(crate) use spirv::capabilities::{check_capabilities, check_stage};
 pub(crate) use spirv::hit_builtins::find_raw_hit_builtin;
 pub(crate) use spirv::input_attachments::InputRead;

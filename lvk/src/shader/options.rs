@@ -1,5 +1,9 @@
 //! Inputs of a compilation beside the source, and its error.
 
+#[cfg(feature = "glsl")]
+use std::path::Path;
+
+use super::ShaderCache;
 use crate::error::Error;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::ray_query_path::RayQueryPath;
@@ -36,6 +40,28 @@ impl CompileOptions {
             helpers_lose_arrays: device.helpers_lose_arrays,
             is_cpu: device.is_cpu,
             gathers_pairs: device.is_cpu && device.shader_int64,
+        }
+    }
+}
+
+/// Files that a compilation reads and writes; the default are includes only.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct CompileFiles<'a> {
+    /// The cache of compiled modules.
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only what is compiled is kept"))]
+    pub(crate) cache: Option<&'a ShaderCache>,
+    /// Called with each path at which an include is searched, before the search.
+    #[cfg(feature = "glsl")]
+    pub(crate) on_search: Option<&'a dyn Fn(&Path)>,
+}
+
+impl<'a> CompileFiles<'a> {
+    /// Returns the files of a compilation with this cache.
+    pub(crate) fn with_cache(cache: Option<&'a ShaderCache>) -> Self {
+        Self {
+            cache,
+            #[cfg(feature = "glsl")]
+            on_search: None,
         }
     }
 }

@@ -76,7 +76,7 @@ pub(crate) struct BlobHeader {
     /// Reference to a node or a leaf, or [`NONE`].
     pub(crate) root: u32,
     pub(crate) primitive_count: u32,
-    /// This offset and the next three count blocks.
+    /// Offset of the nodes; this offset and the next three count blocks.
     pub(crate) nodes: u32,
     pub(crate) primitives: u32,
     pub(crate) vertices: u32,

@@ -350,7 +350,7 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
         #[test]
-        fn what_the_cpu_builds_is_sound_and_has_every_primitive_once(
+        fn blobs_of_the_cpu_are_valid_and_have_every_primitive_once(
             corners in prop::collection::vec(prop::array::uniform3(-9.0_f32..9.0), 0..300), quality in quality()
         ) {
             let mesh = mesh(&corners);

@@ -291,16 +291,6 @@ fn stage_names(stages: Stages) -> vk::PipelineStageFlags2 {
     vk::PipelineStageFlags2::from_raw(combine_flags(&STAGE_NAMES, stages.bits().into()))
 }
 
-/// Returns the layout for a Vulkan layout. Fails for layouts that an imported image cannot have.
-pub(crate) fn layout_from_vulkan(raw: vk::ImageLayout) -> Result<Layout, String> {
-    use Layout::{ColorTarget, DepthTarget, General, ShaderRead, TransferDst, TransferSrc, Undefined};
-    let all = [Undefined, General, ShaderRead, ColorTarget, DepthTarget, TransferSrc, TransferDst];
-    all.into_iter().find(|known| vulkan_layout(*known) == raw).ok_or_else(|| {
-        let names: Vec<_> = all.into_iter().map(|known| format!("{:?}", vulkan_layout(known))).collect();
-        format!("the layout {raw:?} cannot be exchanged; take one of {}", names.join(", "))
-    })
-}
-
 /// Returns the Vulkan form of a layout.
 pub(crate) fn vulkan_layout(layout: Layout) -> vk::ImageLayout {
     match layout {
@@ -314,6 +304,8 @@ pub(crate) fn vulkan_layout(layout: Layout) -> vk::ImageLayout {
         Layout::Present => vk::ImageLayout::PRESENT_SRC_KHR,
         Layout::LocalRead => vk::ImageLayout::RENDERING_LOCAL_READ_KHR,
         Layout::ShadingRate => vk::ImageLayout::FRAGMENT_SHADING_RATE_ATTACHMENT_OPTIMAL_KHR,
+        Layout::ExternalShaderRead => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+        Layout::ExternalDepthRead => vk::ImageLayout::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
     }
 }
 
@@ -348,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_stages_that_are_off_would_do_goes_with_them() {
+    fn accesses_of_disabled_stages_are_dropped_with_them() {
         let build = Stages::ACCEL_BUILD;
         let read = Access::SHADER_READ | Access::TRANSFER_READ;
         assert_eq!(

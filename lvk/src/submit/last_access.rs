@@ -23,7 +23,7 @@ pub(crate) struct TimelineVector(PerQueue<u64>);
 /// Access of a command buffer to a resource, as other queues see it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum QueueAccess {
-    /// May run concurrently with other reads.
+    /// A read, which may run concurrently with other reads.
     Read,
     /// Changes contents, layout or owner.
     Write,

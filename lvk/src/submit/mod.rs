@@ -4,6 +4,7 @@ mod batches;
 pub(crate) mod command_pool;
 pub(crate) mod deferred_free;
 pub(crate) mod emit_barriers;
+pub(crate) mod exchanged_layout;
 pub(crate) mod input_attachment_sets;
 pub(crate) mod label_trail;
 pub(crate) mod last_access;

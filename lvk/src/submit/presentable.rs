@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_retired_image_leaves_the_semaphore_that_nobody_waited_for() {
+    fn a_retired_image_leaves_the_semaphore_without_a_wait() {
         let (id, semaphore) = (ResourceId(1), vk::Semaphore::from_raw(7));
         let mut images = presentables(id);
         images.acquire(id, semaphore);

@@ -243,14 +243,15 @@ impl ProfilerState {
         let Some(&begin) = ticks.first() else { return };
         let frame = if let ProfilePart::Frame(number) = part { Some(number) } else { None };
         let fresh = || (part, begin, GpuProfile { frame, ..Default::default() });
+        let timestamps = gpu.timestamps();
         let (_, first, profile) = self.open.get_or_insert_with(fresh);
         // Another queue began earlier than all command buffers added so far.
-        if let Some(earlier) = gpu.ticks_until(begin, *first) {
-            profile.delay(gpu.milliseconds(earlier));
+        if let Some(earlier) = timestamps.ticks_until(begin, *first) {
+            profile.delay(timestamps.milliseconds(earlier));
             *first = begin;
         }
-        let ms: Vec<f64> =
-            ticks.iter().map(|tick| gpu.milliseconds(gpu.ticks_since(*first, *tick))).collect();
+        let ms_since_first = |tick: &u64| timestamps.milliseconds(timestamps.ticks_since(*first, *tick));
+        let ms: Vec<f64> = ticks.iter().map(ms_since_first).collect();
         if let Some(root) = scope_tree(stamps, &ms) {
             profile.ms = profile.ms.max(root.start_ms + root.ms);
             profile.scopes.extend(root.children);

@@ -296,7 +296,7 @@ fn compute_waits_for_what_it_reads_and_not_for_the_latest_of_graphics() {
 }
 
 #[test]
-fn what_is_only_read_is_read_side_by_side() {
+fn reads_run_side_by_side() {
     let (write, read) = (Use::transfer_write(), Use::transfer_read());
     let readers = |queue_index| (queue_index, buffer_op(0, read));
     let mut order = vec![(2, Vec::new()), (0, buffer_op(0, write)), readers(1), readers(2), readers(0)];
@@ -327,7 +327,7 @@ fn images_of_one_domain_move_once_and_keep_their_layout() {
 }
 
 #[test]
-fn what_everybody_relies_on_is_waited_for_where_shaders_run() {
+fn every_queue_waits_once_for_the_prelude() {
     let queue_caps_of =
         |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
     let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);
@@ -366,7 +366,7 @@ fn references_are_waited_for_without_barriers() {
 }
 
 #[test]
-fn what_others_wrote_or_will_write_is_waited_for_as_if_it_were_written() {
+fn external_reads_and_writes_order_later_submissions() {
     let queue_caps_of =
         |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
     let (id, all) = (ResourceId(3), ONE);
@@ -433,7 +433,7 @@ fn deferred_objects_wait_for_every_busy_queue_and_for_nothing_before() {
 
 /// A value whose submission failed is never signalled, so no work waits for it.
 #[test]
-fn what_no_queue_got_is_not_among_what_comes() {
+fn refused_submissions_are_not_among_the_last_values() {
     let queue_caps_of =
         |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
     let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_balanced_is_no_tree() {
+    fn unbalanced_scopes_are_no_tree() {
         for text in ["", "root", "root a )", ")"] {
             assert_eq!(scope_tree(&stamps(text), &[0.0; 3]), None, "{text}");
         }

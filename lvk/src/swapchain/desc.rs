@@ -83,9 +83,9 @@ impl ColorSpace {
 pub struct HdrMetadata {
     /// CIE 1931 chromaticities of red, green and blue of the mastering display.
     pub primaries: [[f32; 2]; 3],
-    /// CIE 1931 chromaticity of its white point.
+    /// CIE 1931 chromaticity of the white point of the mastering display.
     pub white_point: [f32; 2],
-    /// Its minimum and maximum luminance, in cd/m².
+    /// Minimum and maximum luminance of the mastering display, in cd/m².
     pub luminance: [f32; 2],
     /// Maximum luminance of any pixel of all images, in cd/m².
     pub max_content_light_level: f32,

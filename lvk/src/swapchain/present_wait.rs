@@ -33,7 +33,7 @@ mod tests {
     use crate::error::Error;
 
     #[test]
-    fn a_present_that_never_ends_is_given_up_and_the_others_are_asked() {
+    fn a_present_that_never_ends_times_out_and_the_others_are_polled() {
         let mut asked = Vec::new();
         let given_up = wait_for_all(0..5, |present, timeout_ns| {
             asked.push((present, timeout_ns));

@@ -21,6 +21,11 @@ pub fn null_command_context(desc: &ContextDesc<'_>) -> Result<Context> {
     with_null_commands(|| Context::new(desc))
 }
 
+/// Returns the number of live parts that graphics pipelines are linked from.
+pub fn graphics_part_count(ctx: &Context) -> usize {
+    ctx.device_state().graphics_parts.count()
+}
+
 /// Runs `make`. Submissions and allocations can fail for the context that it creates, as long as this thread uses it.
 pub fn with_fault_injection<T>(make: impl FnOnce() -> T) -> T {
     fault_injection::with_failing_device(make)

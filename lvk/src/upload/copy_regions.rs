@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_become_one_piece_and_others_do_not() {
+    fn adjacent_regions_become_one_and_others_do_not() {
         let mut pieces = CopyRegions::default();
         for number in 0..1000 {
             pieces.add(CopyRegion { target: 64 * number, bytes: 64, page: 0, source: 128 + 64 * number });

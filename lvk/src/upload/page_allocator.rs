@@ -205,85 +205,122 @@ mod tests {
         by: Option<u64>,
     }
 
-    fn forget(sizes: &mut BTreeMap<usize, u64>, gone: impl IntoIterator<Item = usize>) {
-        gone.into_iter().for_each(|page| assert!(sizes.remove(&page).is_some(), "a page gone twice"));
+    /// An allocator, and the ranges that its users hold.
+    struct Model {
+        pages: PageAllocator,
+        sizes: BTreeMap<usize, u64>,
+        taken: Vec<AllocatedRange>,
+        /// Ranges of pages that are not created yet. They are not used until then.
+        unmade: Vec<AllocatedRange>,
+    }
+
+    impl Model {
+        fn new(pages: PageAllocator) -> Self {
+            Self { pages, sizes: BTreeMap::new(), taken: Vec::new(), unmade: Vec::new() }
+        }
+
+        fn forget(&mut self, gone: impl IntoIterator<Item = usize>) {
+            gone.into_iter()
+                .for_each(|page| assert!(self.sizes.remove(&page).is_some(), "a page gone twice"));
+        }
+
+        fn apply(&mut self, op: PageOp) {
+            match op {
+                PageOp::Take { bytes, align } => self.allocate(bytes, 1 << align),
+                PageOp::Hold { which, sequence } => self.mark_used(&which, sequence),
+                PageOp::GiveBack(which) => self.release_one(&which),
+                PageOp::Made { which, succeeds } => self.end_creation(&which, succeeds),
+                PageOp::Release(sequence) => self.release(sequence),
+            }
+            assert_eq!(self.pages.total_bytes(), self.sizes.values().sum::<u64>());
+            assert!(self.taken.iter().all(|taken| self.sizes.contains_key(&taken.place.page)));
+        }
+
+        fn allocate(&mut self, bytes: u64, align: u64) {
+            let (place, list) = match self.pages.allocate(bytes, align) {
+                PageAllocation::Existing(place) => (place, &mut self.taken),
+                PageAllocation::NewPage(place, size) => {
+                    assert!(self.sizes.insert(place.page, size).is_none(), "two pages of one number");
+                    (place, &mut self.unmade)
+                }
+            };
+            assert_eq!(place.offset % align, 0);
+            assert!(place.offset + bytes <= self.sizes[&place.page]);
+            let apart = |other: &AllocatedRange| {
+                other.place.page != place.page
+                    || other.place.offset + other.bytes <= place.offset
+                    || place.offset + bytes <= other.place.offset
+            };
+            assert!(list.iter().all(apart));
+            list.push(AllocatedRange { place, bytes, by: None });
+            let is_unmade =
+                |used: &AllocatedRange| self.unmade.iter().any(|page| page.place.page == used.place.page);
+            assert!(!self.taken.iter().any(is_unmade), "a page is used before it is made");
+        }
+
+        fn mark_used(&mut self, which: &prop::sample::Index, sequence: u64) {
+            let mut free: Vec<_> = self.taken.iter_mut().filter(|taken| taken.by.is_none()).collect();
+            if !free.is_empty() {
+                let place = which.index(free.len());
+                free[place].by = Some(sequence);
+                self.pages.mark_used(free[place].place.page, 1, sequence);
+            }
+        }
+
+        fn release_one(&mut self, which: &prop::sample::Index) {
+            let free: Vec<_> =
+                (0..self.taken.len()).filter(|place| self.taken[*place].by.is_none()).collect();
+            if !free.is_empty() {
+                let gone = self.taken.remove(*which.get(&free));
+                let page = self.pages.release_ranges(gone.place.page, 1);
+                self.forget(page);
+            }
+        }
+
+        fn end_creation(&mut self, which: &prop::sample::Index, succeeds: bool) {
+            if !self.unmade.is_empty() {
+                let page = self.unmade.swap_remove(which.index(self.unmade.len()));
+                if succeeds {
+                    self.pages.page_created(page.place.page);
+                    self.taken.push(page);
+                } else {
+                    self.pages.remove_page(page.place.page);
+                    self.forget([page.place.page]);
+                }
+            }
+        }
+
+        fn release(&mut self, sequence: u64) {
+            self.taken.retain(|taken| taken.by != Some(sequence));
+            let gone = self.pages.release(sequence);
+            self.forget(gone);
+        }
+
+        /// Releases everything, and returns the bytes that the allocator keeps.
+        fn release_all(mut self) -> u64 {
+            for page in std::mem::take(&mut self.unmade) {
+                self.pages.remove_page(page.place.page);
+                self.forget([page.place.page]);
+            }
+            (0..4).for_each(|sequence| {
+                let gone = self.pages.release(sequence);
+                self.forget(gone);
+            });
+            for left in std::mem::take(&mut self.taken).iter().filter(|taken| taken.by.is_none()) {
+                let gone = self.pages.release_ranges(left.place.page, 1);
+                self.forget(gone);
+            }
+            self.pages.total_bytes()
+        }
     }
 
     proptest! {
         #[test]
-        fn places_are_aligned_inside_and_apart_until_they_are_given_back(ops in prop::collection::vec(page_op(), 0..120)) {
-            let mut pages = PageAllocator::new(100, 250);
-            let mut sizes: BTreeMap<usize, u64> = BTreeMap::new();
-            let mut taken: Vec<AllocatedRange> = Vec::new();
-            // Ranges of pages that are not created yet. They are not used until then.
-            let mut unmade: Vec<AllocatedRange> = Vec::new();
-            for op in ops {
-                match op {
-                    PageOp::Take { bytes, align } => {
-                        let align = 1_u64 << align;
-                        let (place, list) = match pages.allocate(bytes, align) {
-                            PageAllocation::Existing(place) => (place, &mut taken),
-                            PageAllocation::NewPage(place, size) => {
-                                prop_assert!(sizes.insert(place.page, size).is_none(), "two pages of one number");
-                                (place, &mut unmade)
-                            }
-                        };
-                        prop_assert_eq!(place.offset % align, 0);
-                        prop_assert!(place.offset + bytes <= sizes[&place.page]);
-                        let apart = |other: &AllocatedRange| {
-                            other.place.page != place.page
-                                || other.place.offset + other.bytes <= place.offset
-                                || place.offset + bytes <= other.place.offset
-                        };
-                        prop_assert!(list.iter().all(apart));
-                        list.push(AllocatedRange { place, bytes, by: None });
-                        let is_unmade = |used: &AllocatedRange| unmade.iter().any(|page| page.place.page == used.place.page);
-                        prop_assert!(!taken.iter().any(is_unmade), "a page is used before it is made");
-                    }
-                    PageOp::Hold { which, sequence } => {
-                        let mut free: Vec<_> = taken.iter_mut().filter(|taken| taken.by.is_none()).collect();
-                        if !free.is_empty() {
-                            let place = which.index(free.len());
-                            free[place].by = Some(sequence);
-                            pages.mark_used(free[place].place.page, 1, sequence);
-                        }
-                    }
-                    PageOp::GiveBack(which) => {
-                        let free: Vec<_> = (0..taken.len()).filter(|place| taken[*place].by.is_none()).collect();
-                        if !free.is_empty() {
-                            let gone = taken.remove(*which.get(&free));
-                            forget(&mut sizes, pages.release_ranges(gone.place.page, 1));
-                        }
-                    }
-                    PageOp::Made { which, succeeds } => {
-                        if !unmade.is_empty() {
-                            let page = unmade.swap_remove(which.index(unmade.len()));
-                            if succeeds {
-                                pages.page_created(page.place.page);
-                                taken.push(page);
-                            } else {
-                                pages.remove_page(page.place.page);
-                                forget(&mut sizes, [page.place.page]);
-                            }
-                        }
-                    }
-                    PageOp::Release(sequence) => {
-                        taken.retain(|taken| taken.by != Some(sequence));
-                        forget(&mut sizes, pages.release(sequence));
-                    }
-                }
-                prop_assert_eq!(pages.total_bytes(), sizes.values().sum::<u64>());
-                prop_assert!(taken.iter().all(|taken| sizes.contains_key(&taken.place.page)));
-            }
-            for page in unmade {
-                pages.remove_page(page.place.page);
-                forget(&mut sizes, [page.place.page]);
-            }
-            (0..4).for_each(|sequence| forget(&mut sizes, pages.release(sequence)));
-            for left in taken.iter().filter(|taken| taken.by.is_none()) {
-                forget(&mut sizes, pages.release_ranges(left.place.page, 1));
-            }
-            prop_assert!(pages.total_bytes() <= 250, "{} bytes are kept", pages.total_bytes());
+        fn ranges_are_aligned_inside_and_apart_until_they_are_released(ops in prop::collection::vec(page_op(), 0..120)) {
+            let mut model = Model::new(PageAllocator::new(100, 250));
+            ops.into_iter().for_each(|op| model.apply(op));
+            let bytes = model.release_all();
+            prop_assert!(bytes <= 250, "{bytes} bytes are kept");
         }
 
         /// Repeated filling and clearing takes no more pages than two rounds need.

@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_that_cannot_be_made_is_forgotten_and_takes_nobody_elses() {
+    fn a_page_that_cannot_be_created_is_forgotten_and_other_pages_stay() {
         let set = StagingPool::new(100, 0);
         let refused = set.allocate(60, 1, Some(1), |_| {
             set.allocate(60, 1, Some(2), Ok)?;

@@ -29,7 +29,7 @@ pub(super) fn measure(setup: &Setup, args: &BatchArgs) -> Result<Table, BenchErr
         format_grouped(u64::from(triangles))
     );
     let mut table =
-        Table::new(setup.headline(&ctx, &what), &["builds, until the GPU is done", "time", "per mesh"]);
+        Table::new(setup.title(&ctx, &what), &["builds, until the GPU is done", "time", "per mesh"]);
     let budget = add_comparison_rows(&ctx, meshes, triangles, runs, &mut table)?;
     drop(ctx);
     add_small_budget_rows(setup, meshes, triangles, runs, budget, &mut table)?;

@@ -22,8 +22,8 @@ pub(super) fn measure(setup: &Setup, args: &MeshArgs) -> Result<Table, BenchErro
     let default_triangles = setup.default_for(&ctx, DefaultBy { quick: 2000, cpu: 100_000, gpu: 1_000_000 });
     let runs = setup.runs(&ctx, DefaultBy { quick: 1, cpu: 5, gpu: 40 });
     let mesh = Mesh::new(args, 1, default_triangles)?;
-    let headline = setup.headline(&ctx, &format!("compaction: {}", mesh.describe()));
-    let mut table = Table::new(headline, &["", "lvk", "hand-written", "ratio"]);
+    let title = setup.title(&ctx, &format!("compaction: {}", mesh.describe()));
+    let mut table = Table::new(title, &["", "lvk", "hand-written", "ratio"]);
     let bench = CompactionBench::new(&ctx, &mesh, runs)?;
     ctx.wait(ctx.flush()?)?;
     let fast_trace = bench.build(BuildFlags::FAST_TRACE, "build, fast trace", &mut table)?;

@@ -50,7 +50,7 @@ impl Mesh {
         }
     }
 
-    /// Returns the name and triangle count for headlines.
+    /// Returns the name and triangle count for titles.
     pub(super) fn describe(&self) -> String {
         format!("{}, {} triangles", self.name, super::table::format_grouped(self.triangles.len() as u64))
     }

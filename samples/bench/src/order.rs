@@ -11,7 +11,7 @@ use crate::mesh::{BuiltMesh, Mesh, MeshBuffers};
 use crate::morton::morton_order;
 use crate::setup::{DefaultBy, Setup, path_name, ray_paths};
 use crate::table::{Table, format_ms, format_ratio};
-use crate::tracer::{RayKind, TracedImage, Tracer};
+use crate::tracer::{MeshTracer, RayKind, TracedImage};
 use lvk_samples::hybrid::RayPath;
 
 /// Compares rays per second for the same triangles in three orders.
@@ -22,9 +22,9 @@ pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchErr
     let runs = setup.runs(&ctx, DefaultBy { quick: 1, cpu: 7, gpu: 60 });
     let mesh = Mesh::new(&args.mesh, args.camera, default_triangles)?;
     let size = setup.image_size(&ctx, &args.image);
-    let headline = setup.headline(&ctx, &format!("order: {}, {}x{}", mesh.describe(), size[0], size[1]));
+    let title = setup.title(&ctx, &format!("order: {}, {}x{}", mesh.describe(), size[0], size[1]));
     let columns = ["", "given order", "Morton", "spatial", "Morton speed-up", "spatial speed-up"];
-    let mut table = Table::new(headline, &columns);
+    let mut table = Table::new(title, &columns);
     let orders = create_orders(&ctx, &mesh, size)?;
     let [given, morton, spatial] = &orders;
     table.add_row("sorting on the CPU by the benchmark", [String::new(), format_ms(morton.sorting)]);
@@ -94,7 +94,7 @@ fn add_comparison_rows(
     runs: u32,
     table: &mut Table,
 ) -> Result<(), BenchError> {
-    let tracer = Tracer::new(ctx, path)?;
+    let tracer = MeshTracer::new(ctx, path)?;
     let stopwatch = Stopwatch::new(ctx)?;
     for rays in RayKind::BOTH {
         let samples: [Vec<_>; 3] =

@@ -17,7 +17,7 @@ use crate::mesh::{BuiltMesh, Mesh, MeshBuffers};
 use crate::pipelines::stages;
 use crate::setup::{DefaultBy, Setup};
 use crate::table::{Table, format_ms, format_ratio};
-use crate::tracer::{RayKind, TracedImage, Tracer};
+use crate::tracer::{MeshTracer, RayKind, TracedImage};
 use lvk_samples::shaders::bench::BUILT_IN_NUMBERS;
 
 /// Compares frames of primary rays.
@@ -28,7 +28,7 @@ pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchErr
     let mesh = Mesh::new(&args.mesh, args.camera, default_triangles)?;
     let size = setup.image_size(&ctx, &args.image);
     let what = format!("overhead: {}, {}x{} primary rays by pipeline", mesh.describe(), size[0], size[1]);
-    let mut table = Table::new(setup.headline(&ctx, &what), &["", "lvk", "hand-written", "ratio"]);
+    let mut table = Table::new(setup.title(&ctx, &what), &["", "lvk", "hand-written", "ratio"]);
     if ctx.capabilities().ray_tracing_pipeline {
         add_comparison_rows(&ctx, &mesh, size, runs, &mut table)?;
     } else {
@@ -54,7 +54,7 @@ fn add_comparison_rows(
     let scene = BuiltMesh::new(ctx, MeshBuffers::new(ctx, mesh)?, PrimitiveOrder::Given)?;
     let image = TracedImage::new(ctx, mesh, size, scene.tlas.index())?;
     let raw_image = TracedImage::new(ctx, mesh, size, scene.tlas.index())?;
-    let tracer = Tracer::from_spirv(ctx, &stages, &words)?;
+    let tracer = MeshTracer::from_spirv(ctx, &stages, &words)?;
     let raw = RawScene::new(ctx, mesh)?;
     let raw_tracer = RawTracing::new(&raw.device, &words, raw.tlas.raw, scene.tlas.index())?;
     let stopwatch = Stopwatch::new(ctx)?;

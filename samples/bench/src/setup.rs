@@ -148,8 +148,8 @@ impl Setup {
         self.quick || self.sink.is_some()
     }
 
-    /// Returns the headline of a table about `what`, with device and driver.
-    pub(super) fn headline(&self, ctx: &Context, what: &str) -> String {
+    /// Returns the title of a table about `what`, with device and driver.
+    pub(super) fn title(&self, ctx: &Context, what: &str) -> String {
         let caps = ctx.capabilities();
         let (major, minor, patch) = caps.api_version;
         let driver = format!("{} {}", caps.driver_name, caps.driver_info);

@@ -8,7 +8,7 @@ use crate::measure::{Stopwatch, interleave, median_of};
 use crate::mesh::{BuiltMesh, Mesh, MeshBuffers};
 use crate::setup::{DefaultBy, Setup, path_name, ray_paths};
 use crate::table::{Table, format_ms, format_ratio};
-use crate::tracer::{RayKind, TracedImage, Tracer};
+use crate::tracer::{MeshTracer, RayKind, TracedImage};
 use lvk_samples::hybrid::RayPath;
 
 /// Compares traces of the whole mesh and of the mesh split by a device profile with few primitives per BLAS.
@@ -19,14 +19,14 @@ pub(super) fn measure(setup: &Setup, args: &SplitArgs) -> Result<Table, BenchErr
     let runs = setup.runs(&ctx, DefaultBy { quick: 1, cpu: 21, gpu: 60 });
     let mesh = Mesh::new(&args.trace.mesh, args.trace.camera, default_triangles)?;
     let size = setup.image_size(&ctx, &args.trace.image);
-    let headline = setup.headline(&ctx, &format!("split: {}, {}x{}", mesh.describe(), size[0], size[1]));
+    let title = setup.title(&ctx, &format!("split: {}, {}x{}", mesh.describe(), size[0], size[1]));
     let most = (mesh.triangles.len() as u64 / u64::from(args.parts)).max(1);
     let cases = [ctx, setup.open_limited(most)?];
     let [whole, split] = cases.map(|ctx| SplitCase::new(ctx, &mesh, size));
     let cases = [whole?, split?];
     let parts = cases[1].ctx.accel_struct_info(*cases[1].scene.blas)?.parts;
     let split_head = format!("{parts} parts");
-    let mut table = Table::new(headline, &["GPU time", "whole", &split_head, "ratio"]);
+    let mut table = Table::new(title, &["GPU time", "whole", &split_head, "ratio"]);
     for path in paths {
         add_comparison_rows(&cases, path, runs, &mut table)?;
     }
@@ -59,7 +59,7 @@ fn add_comparison_rows(
     runs: u32,
     table: &mut Table,
 ) -> Result<(), BenchError> {
-    let tracers = [Tracer::new(&cases[0].ctx, path)?, Tracer::new(&cases[1].ctx, path)?];
+    let tracers = [MeshTracer::new(&cases[0].ctx, path)?, MeshTracer::new(&cases[1].ctx, path)?];
     for rays in RayKind::BOTH {
         let samples: [Vec<_>; 2] = interleave(runs, |which| {
             let case = &cases[which];

@@ -1,19 +1,19 @@
-//! A Markdown table with a headline and notes.
+//! A Markdown table with a title and notes.
 
 use std::fmt;
 
-/// A Markdown table with a headline above and notes below. Columns after the first are right-aligned.
+/// A Markdown table with a title above and notes below. Columns after the first are right-aligned.
 pub(super) struct Table {
-    headline: String,
+    title: String,
     rows: Vec<Vec<String>>,
     notes: Vec<String>,
 }
 
 impl Table {
     /// Creates an empty table with these column heads.
-    pub(super) fn new(headline: String, columns: &[&str]) -> Self {
+    pub(super) fn new(title: String, columns: &[&str]) -> Self {
         let head = columns.iter().map(|head| (*head).to_owned()).collect();
-        Self { headline, rows: vec![head], notes: Vec::new() }
+        Self { title, rows: vec![head], notes: Vec::new() }
     }
 
     /// Adds a row. Missing cells stay empty.
@@ -41,7 +41,7 @@ impl Table {
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}\n", self.headline)?;
+        writeln!(f, "{}\n", self.title)?;
         let widths: Vec<usize> = (0..self.rows[0].len()).map(|column| self.width(column)).collect();
         for (number, row) in self.rows.iter().enumerate() {
             for (column, &width) in widths.iter().enumerate() {

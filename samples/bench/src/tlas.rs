@@ -39,7 +39,7 @@ pub(super) fn measure(setup: &Setup, args: &TlasArgs) -> Result<Table, BenchErro
         "ratio of sums",
         "ratio until done",
     ];
-    let mut table = Table::new(setup.headline(&ctx, "tlas: updates"), &columns);
+    let mut table = Table::new(setup.title(&ctx, "tlas: updates"), &columns);
     for count in counts {
         let bench = TlasBench::new(&ctx, *count)?;
         bench.add_rebuild_rows(runs, &mut table)?;

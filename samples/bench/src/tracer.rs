@@ -74,7 +74,7 @@ pub(super) struct TracedImage {
 }
 
 /// The pipelines of one ray tracing path.
-pub(super) struct Tracer {
+pub(super) struct MeshTracer {
     pipelines: Pipelines,
 }
 
@@ -149,7 +149,7 @@ impl View {
     }
 }
 
-impl Tracer {
+impl MeshTracer {
     pub(super) fn new(ctx: &Context, path: RayPath) -> lvk::Result<Self> {
         let pipelines = match path {
             RayPath::Pipeline => {

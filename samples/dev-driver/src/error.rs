@@ -63,7 +63,7 @@ pub enum DriverError {
     Variable {
         /// Name of the variable.
         name: &'static str,
-        /// Its value.
+        /// Value of the variable.
         value: String,
         /// The accepted values.
         expected: &'static str,

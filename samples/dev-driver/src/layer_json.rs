@@ -4,6 +4,7 @@ use std::ffi::{CStr, c_char};
 use std::path::Path;
 
 use ash::vk;
+use lvk::with_causes;
 
 use crate::error::DownloadError;
 
@@ -17,12 +18,13 @@ pub(super) fn describe(library: &Path, library_path: &str) -> Result<String, Dow
     let unusable =
         |reason: String| DownloadError::Content { reason: format!("{}: {reason}", library.display()) };
     // SAFETY: the file comes from a verified package; the initialisers of a Vulkan layer have no preconditions.
-    let handle = unsafe { libloading::Library::new(library) }.map_err(|error| unusable(error.to_string()))?;
-    let layers = layers(&handle).map_err(|error| unusable(error.to_string()))?;
+    let handle =
+        unsafe { libloading::Library::new(library) }.map_err(|error| unusable(with_causes(&error)))?;
+    let layers = layers(&handle).map_err(|error| unusable(with_causes(&error)))?;
     let layer = layers.iter().find(|layer| layer.layer_name_as_c_str() == Ok(LAYER_NAME));
     let layer = layer
         .ok_or_else(|| unusable("the library does not contain VK_LAYER_KHRONOS_validation".to_owned()))?;
-    let extensions = extensions(&handle).map_err(|error| unusable(error.to_string()))?;
+    let extensions = extensions(&handle).map_err(|error| unusable(with_causes(&error)))?;
     let named = |name: &CStr| name.to_string_lossy().into_owned();
     let instance: Vec<_> = extensions
         .iter()

@@ -32,11 +32,11 @@ pub(super) const LAYER: &str = "lib/libVkLayer_khronos_validation.so";
 pub(super) const LAYER_FOLDER: &str = "explicit_layer.d";
 /// SwiftShader, a driver without ray tracing, inside [`Component::Validation`].
 pub(super) const SWIFTSHADER: &str = "lib/libvk_swiftshader.so";
-/// Its driver manifest inside [`Component::Validation`].
+/// SwiftShader's driver manifest inside [`Component::Validation`].
 pub(super) const SWIFTSHADER_JSON: &str = "icd.d/swiftshader_icd.json";
 /// The driver inside [`Component::Radv`].
 pub(super) const RADV: &str = "lib/libvulkan_radeon.so";
-/// Its driver manifest inside [`Component::Radv`].
+/// RADV's driver manifest inside [`Component::Radv`].
 pub(super) const RADV_JSON: &str = "icd.d/radeon_icd.json";
 
 /// The X server inside [`Component::Display`].

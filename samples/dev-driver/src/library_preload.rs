@@ -5,6 +5,7 @@ use std::mem::forget;
 use std::path::Path;
 
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+use lvk::with_causes;
 
 use crate::error::DriverError;
 
@@ -38,7 +39,7 @@ fn is_open(soname: &OsStr) -> bool {
 }
 
 fn broken(path: &Path, error: &libloading::Error) -> DriverError {
-    DriverError::Broken { path: path.to_path_buf(), reason: error.to_string() }
+    DriverError::Broken { path: path.to_path_buf(), reason: with_causes(error) }
 }
 
 #[cfg(test)]

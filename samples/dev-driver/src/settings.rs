@@ -40,11 +40,11 @@ impl DriverPreference {
 /// The environment variables that concern drivers, read once.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
-    /// From `LVK_DRIVER`.
+    /// The preferred driver: `LVK_DRIVER`.
     pub(super) preference: DriverPreference,
     /// True on the platform of the downloadable packages.
     pub(super) has_packages: bool,
-    /// From `LVK_NO_DOWNLOAD`.
+    /// True unless `LVK_NO_DOWNLOAD` forbids downloads.
     pub(super) download_allowed: bool,
     /// Folders for downloaded drivers, the preferred one first.
     pub(super) folders: Vec<PathBuf>,

@@ -1,7 +1,7 @@
 //! Queries the capabilities of the system's Vulkan installation.
 
 use ash::{Entry, Instance, vk};
-use lvk::{Context, VulkanReport};
+use lvk::{Context, VulkanReport, with_causes};
 
 use crate::layer_json::LAYER_NAME;
 
@@ -15,10 +15,10 @@ pub(super) struct SystemVulkan {
 }
 
 impl SystemVulkan {
-    /// Opens the loader that the dynamic linker finds. Returns the linker's message on failure.
+    /// Opens the loader that the dynamic linker finds. Returns the linker's message, with its cause, on failure.
     pub(super) fn open() -> Result<Self, String> {
         // SAFETY: the system's loader is trusted like every system library, and has no preconditions.
-        let entry = unsafe { Entry::load() }.map_err(|error| error.to_string())?;
+        let entry = unsafe { Entry::load() }.map_err(|error| with_causes(&error))?;
         Ok(Self { entry })
     }
 

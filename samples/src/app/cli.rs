@@ -22,7 +22,7 @@ use super::ray_args::RayTracing;
 use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
-use super::sequence::{RenderJob, RenderReport, render_frames};
+use super::sequence::{RenderReport, RenderRequest, render_frames};
 use super::{library_warnings, png, print_line, window};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::rtx::RtxConfig;
@@ -66,7 +66,7 @@ pub fn command<S: SampleInfo>() -> clap::Command {
     let lines = S::EXAMPLES.lines().filter_map(|line| line.split_once('|'));
     let mut examples: String = lines.map(|(args, meaning)| example(args, meaning)).collect();
     if !S::ROUND.is_empty() {
-        let meaning = format!("{}; ranges can be shared among machines", S::ROUND);
+        let meaning = format!("{}; several machines can share a range", S::ROUND);
         examples += &example("--frames 0..240 --out dir/frame_####.png", &meaning);
     }
     let command = CommandLine::<S::Args>::command().name(S::NAME).about(S::ABOUT);
@@ -255,7 +255,7 @@ fn attempt<S: Sample>(
         return show(event_loop, name, args, make);
     }
     let out = args.out_or(name);
-    let mut job = RenderJob {
+    let mut request = RenderRequest {
         frames: args.frames.clone().unwrap_or(Frames::Still(GPU_FRAMES)),
         warm_up: WARM_UP_FRAMES,
         frames_per_round: args.round,
@@ -263,7 +263,7 @@ fn attempt<S: Sample>(
         out: FrameName::new(&out),
         resume: args.resume,
     };
-    job.check()?;
+    request.check()?;
     let sink = ValidationSink::default();
     let mut setup = SampleSetup::new(name, args, &sink);
     let ReadySample { mut sample, summary } = make(&mut setup)?;
@@ -271,11 +271,15 @@ fn attempt<S: Sample>(
     drop(setup);
     print_line(&summary);
     if context.capabilities().is_cpu {
-        job.warm_up = 0;
-        job.frames = args.frames.clone().unwrap_or(Frames::Still(1));
+        request.warm_up = 0;
+        request.frames = args.frames.clone().unwrap_or(Frames::Still(1));
     }
-    let played =
-        render_frames(&mut Headless::new(&mut sample), &job, &mut Progress::visible(), &Interrupt::listen());
+    let played = render_frames(
+        &mut Headless::new(&mut sample),
+        &request,
+        &mut Progress::visible(),
+        &Interrupt::listen(),
+    );
     let remark = sample.remark();
     drop(sample);
     context.wait_idle()?;
@@ -283,7 +287,7 @@ fn attempt<S: Sample>(
     if args.validate.is_some() {
         device::report_validation(&sink)?;
     }
-    print_line(&closing_lines(&job, &played?, remark));
+    print_line(&closing_lines(&request, &played?, remark));
     Ok(())
 }
 
@@ -307,11 +311,11 @@ fn show<S: Sample>(
     args.validate.map_or(Ok(()), |_| device::report_validation(&sink))
 }
 
-fn closing_lines(job: &RenderJob, played: &RenderReport, remark: Option<String>) -> String {
+fn closing_lines(request: &RenderRequest, played: &RenderReport, remark: Option<String>) -> String {
     let RenderReport { timings, written, skipped } = played;
     let remark = remark.map_or_else(String::new, |remark| format!("\n{remark}"));
-    let out = job.out.path().display();
-    match (&job.frames, skipped) {
+    let out = request.out.path().display();
+    match (&request.frames, skipped) {
         (Frames::Still(_), _) => format!("{timings}{remark}\nwrote {out}"),
         (Frames::Sequence(_), 0) => format!("{timings}{remark}\nwrote {written} frames to {out}"),
         _ => format!("{timings}{remark}\nwrote {written} frames to {out}; {skipped} were there"),

@@ -28,7 +28,7 @@ pub struct DeviceNeeds {
 }
 
 impl DeviceNeeds {
-    /// Of a sample that traces rays.
+    /// Returns the needs of a sample that traces rays.
     #[must_use]
     pub fn tracing(wish: RayTracing) -> Self {
         Self { rays: Some(wish), ..Self::default() }

@@ -19,13 +19,13 @@ const LONGEST_STEP: f32 = 0.1;
 /// The current input of the user for the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Steering {
-    /// To the right, up and forward, -1 to 1 each.
+    /// Movement to the right, up and forward, -1 to 1 each.
     pub direction: [f32; 3],
-    /// To the right and down, in radians.
+    /// Rotation to the right and down, in radians.
     pub turn: [f32; 2],
     /// Steps of speed, faster above 0.
     pub faster: f32,
-    /// In a hurry.
+    /// True for fast movement.
     pub hurry: bool,
 }
 

@@ -21,7 +21,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// The sample's own.
-pub fn render<S: Sample>(sample: &mut S, after_step: &mut dyn FnMut(u64)) -> Result<Rendered, S::Error> {
+pub fn render<S: Sample>(sample: &mut S, after_step: &mut dyn FnMut(u64)) -> Result<Rendered, RunError> {
     let mut frame = Frame::waited(sample.context(), after_step)?;
     let picture = sample.record(&mut frame)?;
     let times = frame.finish()?;
@@ -34,7 +34,7 @@ pub fn render<S: Sample>(sample: &mut S, after_step: &mut dyn FnMut(u64)) -> Res
 ///
 /// # Errors
 /// The sample's own.
-pub fn picture<S: Sample>(sample: &mut S) -> Result<Vec<u8>, S::Error> {
+pub fn picture<S: Sample>(sample: &mut S) -> Result<Vec<u8>, RunError> {
     let picture = render(sample, &mut |_| {})?.picture;
     Ok(sample.context().download_texture(picture, &TextureRegion::default())?)
 }
@@ -53,8 +53,8 @@ impl<'a, S: Sample> Headless<'a, S> {
 }
 
 impl<S: Sample> FrameSource for Headless<'_, S> {
-    fn update(&mut self, time: FrameTime) -> Result<(), RunError> {
-        self.sample.update(time).map_err(Into::into)
+    fn update(&mut self, time: FrameTime) {
+        self.sample.update(time);
     }
 
     fn steps_per_frame(&self) -> u64 {
@@ -62,7 +62,7 @@ impl<S: Sample> FrameSource for Headless<'_, S> {
     }
 
     fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RunError> {
-        let Rendered { picture, times } = render(self.sample, after_step).map_err(Into::into)?;
+        let Rendered { picture, times } = render(self.sample, after_step)?;
         self.picture = Some(picture);
         Ok(times)
     }

@@ -8,7 +8,7 @@ use lvk::GpuProfile;
 /// has no timestamps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PassTimes {
-    /// In the order of the steps.
+    /// Profiles in the order of the steps.
     pub steps: Vec<Arc<GpuProfile>>,
 }
 

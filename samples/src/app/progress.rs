@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_shown_before_the_patience_is_over() {
+    fn nothing_is_printed_before_the_delay_is_over() {
         let mut progress = progress(Duration::from_secs(3600));
         progress.stage("a", 10);
         progress.set(5);
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_stage_is_shown_when_it_takes_long_and_again_after_a_pause() {
+    fn a_long_silent_stage_is_printed_and_again_after_a_pause() {
         let mut progress = progress(Duration::from_millis(10));
         for stage in ["textures", "pipelines"] {
             progress.stage(stage, 0);
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_is_told_can_stop_the_work() {
+    fn the_callback_can_stop_the_work() {
         let status = Status::default();
         let mut progress = Progress::hidden().with_status(&status);
         progress.stage("a", 10);
@@ -294,11 +294,11 @@ mod tests {
         assert_eq!(progress.go_on(), Ok(()));
         status.stop();
         assert_eq!(progress.go_on(), Err(Stopped));
-        assert_eq!(Progress::hidden().go_on(), Ok(()), "that nobody can stop");
+        assert_eq!(Progress::hidden().go_on(), Ok(()), "progress without an interrupt");
     }
 
     #[test]
-    fn progress_that_nobody_sees_has_no_thread() {
+    fn hidden_progress_has_no_thread() {
         let mut progress = Progress::hidden();
         progress.stage("a", 10);
         progress.set(5);

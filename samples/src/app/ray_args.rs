@@ -13,12 +13,12 @@ pub struct RayArgs {
 /// The ray tracing path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RayTracing {
-    /// A ray tracing pipeline where the device has one, else ray queries; on a CPU ray queries in software, the fastest.
+    /// A ray tracing pipeline if the device supports it, else ray queries; on a CPU software ray queries, the fastest.
     Auto,
-    /// A ray tracing pipeline with shader binding table.
+    /// A ray tracing pipeline with a shader binding table.
     Pipeline,
-    /// Ray queries of the device in a compute shader; on devices that have none, see `software`.
+    /// Ray queries of the device in a compute shader; on devices without them, as `software`.
     Query,
-    /// Ray queries that the library walks in the shader itself, on any device.
+    /// Software ray queries of the library, on any device.
     Software,
 }

@@ -11,21 +11,21 @@ use super::frames::Frames;
 /// Largest width and height of a picture, in pixels.
 pub const MAX_SIZE: u32 = 16_384;
 
-/// Frames, pictures and device: what all samples share.
+/// Arguments that all samples share: frames, pictures and device.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct RunArgs {
-    /// A number: render the first frame so often and time it [default: 60, or 1 on a driver that runs on the CPU].
-    /// A range as 0..240, without its end: render each frame once as a picture of its own
+    /// A number: render the first frame that many times and time it [default: 60, or 1 on a driver that runs on the CPU].
+    /// A range as 0..240, without its end: render each frame once as its own picture
     #[arg(long, value_name = "N|FIRST..END", help_heading = "Frames")]
     pub frames: Option<Frames>,
 
-    /// Frames until the animation has come round and repeats itself, at 30 a second
+    /// Frames until the animation repeats, at 30 per second
     #[arg(long, value_name = "N", default_value_t = 240)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=i64::from(Frames::MAX_COUNT)))]
     #[arg(help_heading = "Frames")]
     pub round: u32,
 
-    /// Leave out the frames of a sequence whose pictures are there
+    /// Leave out the frames of a sequence whose pictures exist
     #[arg(long, requires = "frames", help_heading = "Frames")]
     pub resume: bool,
 
@@ -44,13 +44,13 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub out: Option<PathBuf>,
 
-    /// Show the sample in a window, where mouse and keys move the camera, in place of writing pictures; with --frames N for
-    /// so many frames, each a 30th of a second of the animation however long it takes (none while Space lets that stand); with
-    /// --out the last one of them is written as the window shows it
+    /// Show the sample in a window instead of writing pictures; mouse and keys move the camera. With --frames N the window
+    /// closes after N frames, each a 30th of a second of the animation however long it takes (none while Space pauses it). With
+    /// --out the last frame is written as the window shows it
     #[arg(long, conflicts_with = "resume", help_heading = "Window")]
     pub window: bool,
 
-    /// Take the shaders from a folder like `shaders`, and compile them again whenever one changes
+    /// Read shaders from a folder like `shaders`, and compile them again when one changes
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "shaders")]
     #[arg(requires = "window", help_heading = "Window")]
     pub hot_reload: Option<PathBuf>,
@@ -60,7 +60,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "NUMBER|NAME", help_heading = "Device")]
     pub device: Option<String>,
 
-    /// Rehearse another device on this one: without what it lacks, and within its limits
+    /// Emulate a device profile on this device: disable missing features and clamp limits
     #[arg(
         long,
         value_name = "NAME",
@@ -69,16 +69,16 @@ pub struct RunArgs {
     )]
     pub profile: Option<DeviceProfile>,
 
-    /// Keep nothing for the next start, and take nothing from the last one: compiled shaders, pipelines, trees of rays in
-    /// software and acceleration structures, which otherwise are in the folder of LVK_CACHE or in lvk in the user's folder for caches
+    /// Use no caches of compiled shaders, pipelines, software BVHs and acceleration structures. They are otherwise in the folder
+    /// of LVK_CACHE, or in lvk in the user's folder for caches
     #[arg(long, help_heading = "Device")]
     pub no_cache: bool,
 
-    /// Folder of what is kept for the next start, in place of the folders that --no-cache names
+    /// Folder of the caches, instead of the folders that --no-cache names
     #[arg(long, value_name = "FOLDER", conflicts_with = "no_cache", help_heading = "Device")]
     pub cache: Option<PathBuf>,
 
-    /// Print the devices and what they can do, and exit
+    /// Print the devices and their ray tracing support, and exit
     #[arg(long, help_heading = "Device")]
     pub list_devices: bool,
 
@@ -97,7 +97,7 @@ impl RunArgs {
         self.out.clone().unwrap_or_else(|| Path::new(&file).to_owned())
     }
 
-    /// Width and height of the pictures.
+    /// Returns the width and height of the pictures.
     #[must_use]
     pub fn extent(&self) -> [u32; 2] {
         [self.width, self.height]
@@ -109,6 +109,6 @@ impl RunArgs {
 pub enum ValidationArg {
     /// Correct use and synchronisation.
     Core,
-    /// The same, and what shaders do on the device; slow.
+    /// As `core`, and accesses of shaders on the device; slow.
     Gpu,
 }

@@ -36,7 +36,7 @@ pub enum RunError {
     /// The picture could not be written.
     #[error(transparent)]
     Png(#[from] PngError),
-    /// There is no driver.
+    /// No usable Vulkan driver.
     #[error(transparent)]
     Driver(#[from] DriverError),
     /// A range of frames needs a name for each.
@@ -54,13 +54,13 @@ pub enum RunError {
     /// A window shows its frames as they come.
     #[error("--frames with --window is a number of frames to show, as --frames 100, and no range")]
     SequenceInWindow,
-    /// There is no folder of shaders.
+    /// The folder of shaders does not exist.
     #[error("--hot-reload {}: no such folder; name one like 'shaders' of the project", folder.display())]
     NoShaders {
         /// The folder as given.
         folder: std::path::PathBuf,
     },
-    /// There is no window to be had.
+    /// No window can be opened.
     #[error("no window can be opened: {reason}; without --window the sample writes its picture")]
     NoWindow {
         /// Error of the window system.
@@ -106,7 +106,7 @@ impl RunError {
         Self::Device(Box::new(error))
     }
 
-    /// There is no window to be had.
+    /// No window can be opened.
     pub(super) fn window(error: &dyn std::error::Error) -> Self {
         Self::NoWindow { reason: error.to_string() }
     }

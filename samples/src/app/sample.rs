@@ -13,18 +13,15 @@
 //!
 //! ```ignore
 //! impl Sample for Cloud {
-//!     type Error = SampleError;
-//!
 //!     fn context(&self) -> &Context {
 //!         &self.ctx
 //!     }
 //!
-//!     fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+//!     fn update(&mut self, time: FrameTime) {
 //!         self.constants.phase = time.phase();
-//!         Ok(())
 //!     }
 //!
-//!     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+//!     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
 //!         let constants = frame.cmd.upload(&self.constants)?;
 //!         frame.pass("cloud", |cmd| self.draw(cmd, constants))?;
 //!         Ok(self.target.image())
@@ -87,25 +84,19 @@ impl FrameTime {
 
 /// A sample, ready to render.
 pub trait Sample {
-    /// Errors of rendering.
-    type Error: From<lvk::Error> + Into<RunError>;
-
     /// The device.
     fn context(&self) -> &Context;
 
-    /// Puts everything that moves where it is at `moment`, whatever was shown before, the camera included.
-    ///
-    /// # Errors
-    /// The sample's own.
-    fn update(&mut self, time: FrameTime) -> Result<(), Self::Error>;
+    /// Moves everything, the camera included, to its place at a frame time, whatever frame came before.
+    fn update(&mut self, time: FrameTime);
 
     /// Records a frame, and returns the texture of its image: red, green, blue and alpha of each pixel, 8 bits each, sRGB. It
     /// can be sampled, which gives the numbers as they are encoded: its format is `Rgba8Unorm`, or it is a view of that format.
     /// It holds the frame until the next one is recorded.
     ///
     /// # Errors
-    /// The sample's own.
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, Self::Error>;
+    /// Errors of the sample.
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError>;
 
     /// Number of steps into which [`record`](Self::record) splits a frame.
     fn steps_per_frame(&self) -> u64 {
@@ -116,8 +107,8 @@ pub trait Sample {
     /// in windows.
     ///
     /// # Errors
-    /// The sample's own.
-    fn after_frame(&mut self) -> Result<(), Self::Error> {
+    /// Errors of the sample.
+    fn after_frame(&mut self) -> Result<(), RunError> {
         Ok(())
     }
 
@@ -129,8 +120,8 @@ pub trait Sample {
     /// Resizes the images to `extent` pixels. Images of samples without this method are stretched.
     ///
     /// # Errors
-    /// The sample's own. It must still be able to render, with the old extent.
-    fn resize(&mut self, _extent: [u32; 2]) -> Result<(), Self::Error> {
+    /// Errors of the sample. It must still be able to render, with the old extent.
+    fn resize(&mut self, _extent: [u32; 2]) -> Result<(), RunError> {
         Ok(())
     }
 
@@ -167,7 +158,7 @@ pub trait Sample {
     ///
     /// # Errors
     /// Errors of loading.
-    fn is_loading(&mut self) -> Result<bool, Self::Error> {
+    fn is_loading(&mut self) -> Result<bool, RunError> {
         Ok(false)
     }
 
@@ -177,8 +168,8 @@ pub trait Sample {
     /// Recreates all pipelines from changed shaders.
     ///
     /// # Errors
-    /// The sample's own. It must still be able to render, by the old pipelines.
-    fn reload(&mut self) -> Result<(), Self::Error> {
+    /// Errors of the sample. It must still be able to render, by the old pipelines.
+    fn reload(&mut self) -> Result<(), RunError> {
         Ok(())
     }
 }
@@ -199,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_moments_by_the_clock() {
+    fn the_clock_gives_each_frame_its_frame_time() {
         for (milliseconds, frame) in [(0, 0), (1000, 30), (2500, 75), (9000, 270)] {
             let (by_clock, by_frame) =
                 (FrameTime::from_millis(milliseconds, 240), FrameTime::from_frame(frame, 240));

@@ -47,17 +47,17 @@ pub struct CameraArgs {
     pub number: u32,
 }
 
-/// The question for scenes.
+/// The option that lists scenes.
 #[derive(Debug, Clone, PartialEq, Eq, Args)]
 pub struct ListArgs {
-    /// Print the scenes that --scene knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
+    /// Print the scenes that --scene accepts by name, and exit; searches FOLDER, by default the folder in LVK_SCENES
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "")]
     #[arg(value_parser = clap::value_parser!(OsString), help_heading = "Scene")]
     pub list_scenes: Option<OsString>,
 }
 
 impl SceneArgs {
-    /// Loads the scene, or makes the courtyard.
+    /// Loads the scene, or generates the courtyard.
     ///
     /// # Errors
     /// [`SceneError`].
@@ -65,7 +65,7 @@ impl SceneArgs {
         self.load_with(progress, false)
     }
 
-    /// The same, where OBJ files have their normal maps.
+    /// Loads the scene like [`load`](Self::load), with the normal maps of OBJ files.
     ///
     /// # Errors
     /// [`SceneError`].
@@ -108,7 +108,7 @@ impl SceneArgs {
 }
 
 impl CameraArgs {
-    /// Place of the camera among the scene's five, 0 to 4.
+    /// Returns the index of the camera among the scene's five, 0 to 4.
     #[must_use]
     pub fn index(&self) -> usize {
         self.number.clamp(1, 5) as usize - 1
@@ -116,20 +116,20 @@ impl CameraArgs {
 }
 
 impl ListArgs {
-    /// What `--list-scenes` prints, where it was given.
+    /// Returns the text of `--list-scenes`, if the option was given.
     #[must_use]
     pub fn listing(&self) -> Option<String> {
         self.list_scenes.as_ref().map(|folder| scene_list::listing(Some(Path::new(folder))))
     }
 
-    /// The same after the line of a scene that is the sample's default.
+    /// Returns the text of `--list-scenes` after the line of the sample's default scene.
     pub(crate) fn listing_after(&self, default: &str) -> Option<String> {
         let others = self.listing()?.replace("; the default", "");
         Some(format!("{default}; the default\n{others}"))
     }
 }
 
-/// For samples that trace rays and show one scene made by code.
+/// Arguments of samples that trace rays in one generated scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct BuiltInSceneRayArgs {
     /// The built-in scene
@@ -141,7 +141,7 @@ pub struct BuiltInSceneRayArgs {
     pub tracing: RayArgs,
 }
 
-/// For samples that show one scene made by code.
+/// Arguments of samples that render one generated scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct BuiltInSceneArgs {
     /// Print the scene that the sample shows, and exit
@@ -150,7 +150,7 @@ pub struct BuiltInSceneArgs {
 }
 
 impl BuiltInSceneArgs {
-    /// What `--list-scenes` prints, where it was given, for a scene that is called `name`.
+    /// Returns the text of `--list-scenes`, if the option was given, for a scene that is called `name`.
     #[must_use]
     pub fn listing(&self, name: &str, what: &str) -> Option<String> {
         self.list_scenes.then(|| format!("{name}  built in: {what}; the only one"))

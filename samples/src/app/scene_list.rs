@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scenes_are_found_by_folder_and_by_name() {
+    fn scenes_are_listed_by_folder_and_by_name() {
         let folder = tempfile::tempdir().unwrap();
         let deep = folder.path().join("kitchen/kitchen");
         std::fs::create_dir_all(&deep).unwrap();

@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_are_found_in_every_format_that_windows_of_samples_have() {
+    fn channels_are_read_in_every_window_format_of_the_samples() {
         for format in [Format::Rgba8Unorm, Format::Rgba8Srgb] {
             assert_eq!(Texels::from_format(format).unwrap().rgba([1, 2, 3, 4]), [1, 2, 3, 255]);
         }

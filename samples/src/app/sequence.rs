@@ -15,10 +15,7 @@ use super::timings::Timings;
 /// A source of frames: [`Headless`](super::headless::Headless) is one for samples.
 pub trait FrameSource {
     /// Moves the animation to `time`.
-    ///
-    /// # Errors
-    /// Its own.
-    fn update(&mut self, time: FrameTime) -> Result<(), RunError>;
+    fn update(&mut self, time: FrameTime);
 
     /// Into how many steps a frame is cut, for the progress bar.
     fn steps_per_frame(&self) -> u64;
@@ -38,7 +35,7 @@ pub trait FrameSource {
 
 /// The frames to render and the images to write.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RenderJob {
+pub struct RenderRequest {
     /// The frames.
     pub frames: Frames,
     /// Frames that are rendered first and not timed, so that clocks are up.
@@ -53,7 +50,7 @@ pub struct RenderJob {
     pub resume: bool,
 }
 
-/// The result of a job.
+/// The result of a request.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RenderReport {
     /// GPU times of the passes.
@@ -64,7 +61,7 @@ pub struct RenderReport {
     pub skipped: u32,
 }
 
-impl RenderJob {
+impl RenderRequest {
     /// Checks that the frames can be written, without leaving anything behind but the folder of a sequence, which is made.
     ///
     /// # Errors
@@ -93,52 +90,52 @@ impl RenderJob {
     }
 }
 
-/// Renders what `job` asks for. Frame N of a sequence depends on N alone, whatever range it is in. After `interrupt` was
+/// Renders what `request` asks for. Frame N of a sequence depends on N alone, whatever range it is in. After `interrupt` was
 /// raised, the frame under way is the last.
 ///
 /// # Errors
 /// [`RunError::Interrupted`], [`RunError::Png`] and those of the source.
 pub fn render_frames(
     source: &mut impl FrameSource,
-    job: &RenderJob,
+    request: &RenderRequest,
     progress: &mut Progress,
     interrupt: &Interrupt,
 ) -> Result<RenderReport, RunError> {
-    match &job.frames {
-        Frames::Still(count) => still(source, job, *count, progress, interrupt),
-        Frames::Sequence(range) => sequence(source, job, range.clone(), progress, interrupt),
+    match &request.frames {
+        Frames::Still(count) => still(source, request, *count, progress, interrupt),
+        Frames::Sequence(range) => sequence(source, request, range.clone(), progress, interrupt),
     }
 }
 
 fn still(
     source: &mut impl FrameSource,
-    job: &RenderJob,
+    request: &RenderRequest,
     count: u32,
     progress: &mut Progress,
     interrupt: &Interrupt,
 ) -> Result<RenderReport, RunError> {
     let steps = source.steps_per_frame();
-    let all = u64::from(job.warm_up) + u64::from(count);
+    let all = u64::from(request.warm_up) + u64::from(count);
     progress.stage("rendering", all * steps);
     let mut timings = Timings::new();
-    source.update(job.frame_time(0))?;
+    source.update(request.frame_time(0));
     for round in 0..all {
         if interrupt.is_raised() {
-            let done = round.saturating_sub(u64::from(job.warm_up)) as u32;
+            let done = round.saturating_sub(u64::from(request.warm_up)) as u32;
             return Err(RunError::Interrupted { done, count, hint: "" });
         }
         let times = source.render(&mut |step| progress.set(round * steps + step))?;
-        if let Some(counted) = round.checked_sub(u64::from(job.warm_up)) {
+        if let Some(counted) = round.checked_sub(u64::from(request.warm_up)) {
             times.passes().for_each(|(pass, milliseconds)| timings.push(counted, pass, milliseconds));
         }
     }
-    write(source, job, 0)?;
+    write(source, request, 0)?;
     Ok(RenderReport { timings, written: 1, skipped: 0 })
 }
 
 fn sequence(
     source: &mut impl FrameSource,
-    job: &RenderJob,
+    request: &RenderRequest,
     range: std::ops::Range<u32>,
     progress: &mut Progress,
     interrupt: &Interrupt,
@@ -153,23 +150,23 @@ fn sequence(
             return Err(RunError::Interrupted { done, count, hint });
         }
         let before = u64::from(done) * steps;
-        if job.resume && job.out.path_for(frame).is_file() {
+        if request.resume && request.out.path_for(frame).is_file() {
             played.skipped += 1;
             progress.set(before + steps);
             continue;
         }
-        source.update(job.frame_time(frame))?;
+        source.update(request.frame_time(frame));
         let times = source.render(&mut |step| progress.set(before + step))?;
         times.passes().for_each(|(pass, milliseconds)| played.timings.push(frame.into(), pass, milliseconds));
-        write(source, job, frame)?;
+        write(source, request, frame)?;
         played.written += 1;
     }
     Ok(played)
 }
 
-fn write(source: &impl FrameSource, job: &RenderJob, frame: u32) -> Result<(), RunError> {
+fn write(source: &impl FrameSource, request: &RenderRequest, frame: u32) -> Result<(), RunError> {
     let picture = source.picture()?;
-    Ok(png::write(&job.out.path_for(frame), job.size[0], job.size[1], &picture)?)
+    Ok(png::write(&request.out.path_for(frame), request.size[0], request.size[1], &picture)?)
 }
 
 fn make_folder(picture: &Path) -> Result<(), RunError> {
@@ -197,16 +194,15 @@ mod tests {
             Self { frame: 0, rendered: Vec::new(), raise_in, interrupt: Interrupt::without_handlers() }
         }
 
-        fn render_frames(&mut self, job: &RenderJob) -> Result<RenderReport, RunError> {
+        fn render_frames(&mut self, request: &RenderRequest) -> Result<RenderReport, RunError> {
             let interrupt = self.interrupt.clone();
-            render_frames(self, job, &mut Progress::hidden(), &interrupt)
+            render_frames(self, request, &mut Progress::hidden(), &interrupt)
         }
     }
 
     impl FrameSource for Counter {
-        fn update(&mut self, time: FrameTime) -> Result<(), RunError> {
+        fn update(&mut self, time: FrameTime) {
             self.frame = time.frame;
-            Ok(())
         }
 
         fn steps_per_frame(&self) -> u64 {
@@ -227,8 +223,8 @@ mod tests {
         }
     }
 
-    fn job(folder: &Path, frames: &str) -> RenderJob {
-        RenderJob {
+    fn request(folder: &Path, frames: &str) -> RenderRequest {
+        RenderRequest {
             frames: frames.parse().unwrap(),
             warm_up: 2,
             frames_per_round: 10,
@@ -249,27 +245,27 @@ mod tests {
     #[test]
     fn a_sequence_is_a_picture_for_each_frame() {
         let folder = tempfile::tempdir().unwrap();
-        let job = job(folder.path(), "8..11");
-        job.check().unwrap();
-        let played = Counter::new(99).render_frames(&job).unwrap();
+        let request = request(folder.path(), "8..11");
+        request.check().unwrap();
+        let played = Counter::new(99).render_frames(&request).unwrap();
         assert_eq!((played.written, played.skipped), (3, 0));
         assert_eq!(names(folder.path()), ["frame_08.png", "frame_09.png", "frame_10.png"]);
-        let picture = image::open(job.out.path_for(9)).unwrap().into_rgba8();
+        let picture = image::open(request.out.path_for(9)).unwrap().into_rgba8();
         assert_eq!(picture.as_raw(), &[9, 0, 0, 255]);
     }
 
     #[test]
     fn an_interrupted_sequence_keeps_its_frames_and_can_be_resumed() {
         let folder = tempfile::tempdir().unwrap();
-        let mut job = job(folder.path(), "0..6");
-        job.check().unwrap();
-        let error = Counter::new(2).render_frames(&job).unwrap_err();
+        let mut request = request(folder.path(), "0..6");
+        request.check().unwrap();
+        let error = Counter::new(2).render_frames(&request).unwrap_err();
         assert!(matches!(error, RunError::Interrupted { done: 3, count: 6, .. }), "{error}");
         assert_eq!((error.status(), names(folder.path()).len()), (130, 3));
-        std::fs::remove_file(job.out.path_for(1)).unwrap();
-        job.resume = true;
+        std::fs::remove_file(request.out.path_for(1)).unwrap();
+        request.resume = true;
         let mut counter = Counter::new(99);
-        let played = counter.render_frames(&job).unwrap();
+        let played = counter.render_frames(&request).unwrap();
         assert_eq!((played.written, played.skipped), (4, 2));
         assert_eq!(counter.rendered, [1, 3, 4, 5]);
     }
@@ -278,23 +274,23 @@ mod tests {
     fn a_still_is_one_picture_of_frame_0_and_its_warm_up_does_not_count() {
         let folder = tempfile::tempdir().unwrap();
         let out = FrameName::new(&folder.path().join("a.png"));
-        let job = RenderJob { out, ..job(folder.path(), "4") };
-        job.check().unwrap();
+        let request = RenderRequest { out, ..request(folder.path(), "4") };
+        request.check().unwrap();
         let mut counter = Counter::new(99);
-        let played = counter.render_frames(&job).unwrap();
+        let played = counter.render_frames(&request).unwrap();
         assert_eq!((counter.rendered.len(), played.written), (6, 1));
-        assert!(job.out.path_for(0).is_file());
+        assert!(request.out.path_for(0).is_file());
     }
 
     #[test]
     fn names_must_fit_the_frames() {
         let folder = tempfile::tempdir().unwrap();
-        let still = job(folder.path(), "4");
+        let still = request(folder.path(), "4");
         assert!(matches!(still.check(), Err(RunError::NoSequence { .. })));
         let plain = FrameName::new(&folder.path().join("a.png"));
-        let unnumbered = RenderJob { out: plain.clone(), ..job(folder.path(), "0..4") };
+        let unnumbered = RenderRequest { out: plain.clone(), ..request(folder.path(), "0..4") };
         assert!(matches!(unnumbered.check(), Err(RunError::NoNumber { .. })));
-        let resumed = RenderJob { out: plain, resume: true, ..still };
+        let resumed = RenderRequest { out: plain, resume: true, ..still };
         assert!(matches!(resumed.check(), Err(RunError::NothingToResume)));
         assert!(!folder.path().join("made").exists(), "nothing is left behind");
     }

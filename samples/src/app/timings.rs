@@ -11,11 +11,11 @@ pub struct Timings {
 #[derive(Debug, Clone, PartialEq)]
 struct Pass {
     name: String,
-    samples: Vec<Sample>,
+    samples: Vec<PassSample>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Sample {
+struct PassSample {
     frame: u64,
     milliseconds: f64,
 }
@@ -50,7 +50,7 @@ impl Timings {
         let samples = &mut self.passes[index].samples;
         match samples.iter_mut().rev().find(|sample| sample.frame == frame) {
             Some(sample) => sample.milliseconds += milliseconds,
-            None => samples.push(Sample { frame, milliseconds }),
+            None => samples.push(PassSample { frame, milliseconds }),
         }
     }
 

@@ -7,9 +7,9 @@ use lvk::{Context, OptionalFeature};
 /// The path of surface data to the lighting shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Passes {
-    /// In one pass, whose shaders read its own targets
+    /// One pass, whose shaders read the pass's own targets
     One,
-    /// As textures, which earlier passes have drawn
+    /// Several passes; later ones sample the targets of earlier ones as textures
     Several,
 }
 

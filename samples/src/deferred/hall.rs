@@ -37,7 +37,7 @@ enum Made {
     Clay,
 }
 
-/// In the order of [`Made`].
+/// Materials in the order of [`Made`].
 pub(super) const MATERIALS: [Material; 6] = [
     Material { albedo: [0.34, 0.33, 0.32], roughness: 0.34, metalness: 0.0, tiles: 1.5 },
     Material { albedo: [0.62, 0.57, 0.5], roughness: 0.62, metalness: 0.0, tiles: 0.0 },
@@ -47,7 +47,7 @@ pub(super) const MATERIALS: [Material; 6] = [
     Material { albedo: [0.55, 0.2, 0.12], roughness: 0.7, metalness: 0.0, tiles: 0.0 },
 ];
 
-/// From one column to the next along the hall.
+/// Distance from one column to the next along the hall.
 const STRIDE: f32 = 4.0;
 /// Columns of a row.
 const COLUMNS: u8 = 9;
@@ -157,7 +157,7 @@ fn column() -> Mesh {
     Mesh::default().lathe(&profile, 32)
 }
 
-/// Of this height.
+/// Returns a jar of this height.
 fn jar(height: f32) -> Mesh {
     let outline = [
         [0.16, 0.0],

@@ -10,7 +10,7 @@ use crate::app::value_parsers::whole;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Picture")]
 pub struct DeferredArgs {
-    /// Transfer of surfaces to the lighting [default: one, where the device can]
+    /// Transfer of surfaces to the lighting [default: one, if the device supports it]
     #[arg(long, value_enum, value_name = "PASSES")]
     pub passes: Option<Passes>,
 
@@ -26,12 +26,12 @@ pub struct DeferredArgs {
 
 impl SampleInfo for Deferred {
     const NAME: &'static str = "deferred";
-    const ABOUT: &'static str = "Lights a hall by hundreds of small lights, deferred and in one pass where the device can, and writes pictures as PNG";
+    const ABOUT: &'static str = "Lights a hall by hundreds of small lights, deferred and in one pass if the device supports it, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, in one pass where the best device can
+        | a picture, in one pass if the device supports it
         --passes several --validate | the same picture by textures, with validation
-        --lights 4096 --view normals | what the lights look at
-        --window --hot-reload | in a window, with switches for all of it
+        --lights 4096 --view normals | the normals that the lighting reads
+        --window --hot-reload | in a window, with a panel for all options
     ";
     type Args = DeferredArgs;
     type Sample = Self;

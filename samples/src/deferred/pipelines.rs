@@ -10,14 +10,14 @@ use crate::pipelines::{SamplePipeline, SampleStage, shader};
 
 /// The sample's folder of `shaders/`.
 const SAMPLE: &str = "deferred";
-/// Of the targets: colour and roughness, normal and metalness, light, and the picture.
+/// Formats of the targets: colour and roughness, normal and metalness, light, and the picture.
 pub(super) const COLORS: [Format; 4] =
     [Format::Rgba8Unorm, Format::Rgba16Float, Format::Rgba16Float, Format::Rgba8Unorm];
 /// Reversed: 1 near, 0 far away.
 pub(super) const DEPTH: Format = Format::D32Float;
-/// Of shaders that read the targets of their own pass.
+/// Macros of shaders that read the targets of their own pass.
 const ONE_PASS: &[(&str, &str)] = &[("ONE_PASS", "1")];
-/// The same of the shine around lights.
+/// Macros of the shine around lights.
 const GLOW: &[(&str, &str)] = &[("GLOW", "1")];
 
 /// The draws of a frame, in order.
@@ -33,7 +33,7 @@ pub(super) enum Draw {
     Lights,
     /// The shine around them.
     Glow,
-    /// From light to the picture.
+    /// The pass from light to the picture.
     Resolve,
 }
 

@@ -1,5 +1,6 @@
 //! Renders the sample at a frame time.
 
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
@@ -207,19 +208,16 @@ impl Deferred {
 }
 
 impl Sample for Deferred {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.phase = time.phase();
         self.camera = camera(self.phase);
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let passes = Passes::choose(self.config.passes, &self.ctx)?;
         if passes != self.resources.passes {
             self.resources = PassResources::new(&self.ctx, passes, self.config.extent)?;
@@ -236,7 +234,7 @@ impl Sample for Deferred {
         Ok(self.resources.targets.picture())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.resources.targets = Targets::new(&self.ctx, self.resources.passes, extent)?;
         self.config.extent = extent;
         Ok(())
@@ -267,7 +265,7 @@ impl Sample for Deferred {
         ui.add(egui::Slider::new(&mut self.exposure, 0.1..=8.0).logarithmic(true).text("exposure"));
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.resources.pipelines = Pipelines::new(&self.ctx, self.resources.passes)?;
         Ok(())
     }

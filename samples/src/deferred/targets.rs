@@ -14,7 +14,7 @@ const NAMES: [&str; 4] = ["albedo and roughness", "normal and metalness", "light
 
 /// The targets. In one pass all but the picture come and go with it.
 pub(super) struct Targets {
-    /// In the order of [`COLORS`].
+    /// Targets in the order of [`COLORS`].
     pub(super) colors: [Holder<TextureHandle>; 4],
     pub(super) depth: Holder<TextureHandle>,
     one_pass: bool,

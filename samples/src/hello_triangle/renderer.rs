@@ -1,10 +1,14 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use crate::pipelines::shader;
 use crate::raster::RasterPipeline;
-use lvk::{Context, Dependencies, Holder, RenderPipelineHandle, TextureHandle};
+use bytemuck::{Pod, Zeroable};
+use lvk::{
+    BlockLayout, Context, Dependencies, Holder, RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
+};
 
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
@@ -14,6 +18,16 @@ pub(super) const TRIANGLE: RasterPipeline = RasterPipeline::flat(
     "hello_triangle: triangle",
     &[shader!("hello_triangle", "triangle.vert"), shader!("hello_triangle", "triangle.frag")],
 );
+
+lvk::shader_struct! {
+    /// `Push` in the shaders.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    struct Push {
+        turn: f32,
+        aspect: f32,
+    }
+}
 
 /// Draws the triangle.
 pub struct HelloTriangle {
@@ -33,7 +47,7 @@ impl HelloTriangle {
         Ok(Self {
             ctx: ctx.clone(),
             target: RenderTarget::flat(ctx, extent)?,
-            pipeline: TRIANGLE.create(ctx)?,
+            pipeline: pipeline(ctx)?,
             backdrop: [0.012, 0.014, 0.022],
             turn: 0.0,
         })
@@ -41,27 +55,24 @@ impl HelloTriangle {
 }
 
 impl Sample for HelloTriangle {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.turn = time.phase();
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let nothing = Dependencies::default();
         let mut pass = self.target.begin(&mut frame.cmd, "triangle", self.backdrop, &nothing)?;
         pass.bind_render_pipeline(*self.pipeline)?;
-        pass.push_constants(&[self.turn, self.target.aspect()])?;
+        pass.push_constants(&Push { turn: self.turn, aspect: self.target.aspect() })?;
         pass.draw(0..3, 0..1)?;
         Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::flat(&self.ctx, extent)?;
         Ok(())
     }
@@ -71,8 +82,13 @@ impl Sample for HelloTriangle {
         ui.color_edit_button_rgb(&mut self.backdrop);
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
-        self.pipeline = TRIANGLE.create(&self.ctx)?;
+    fn reload(&mut self) -> Result<(), RunError> {
+        self.pipeline = pipeline(&self.ctx)?;
         Ok(())
     }
+}
+
+fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    let layouts = &[BlockLayout::push_constants::<Push>()];
+    TRIANGLE.create_with(ctx, &RenderPipelineDesc { layouts, ..RenderPipelineDesc::default() })
 }

@@ -19,11 +19,11 @@ pub struct HybridArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
 
-    /// Method that finds the visible surfaces [default: hybrid, or standalone on a device that cannot]
+    /// Method that finds the visible surfaces [default: hybrid if the device supports it, else standalone]
     #[arg(long, value_enum)]
     pub method: Option<MethodArg>,
 
-    /// Data that the hybrid method's geometry pass leaves for the rays
+    /// Data that the hybrid method's geometry pass writes for the rays
     #[arg(long, value_enum, default_value_t = GBufferArg::Visibility)]
     pub gbuffer: GBufferArg,
 
@@ -31,11 +31,11 @@ pub struct HybridArgs {
     #[arg(long, value_enum, default_value_t = RasterArg::Auto)]
     pub raster: RasterArg,
 
-    /// Most pixels of a triangle that one thread of the compute rasteriser takes on, for tuning
+    /// Maximum pixels of a triangle that one thread of the compute rasteriser draws, for tuning
     #[arg(long, value_name = "PIXELS", hide = true)]
     pub small_triangle: Option<u32>,
 
-    /// Most pixels of a triangle that some threads take on together, for tuning
+    /// Maximum pixels of a triangle that several threads draw together, for tuning
     #[arg(long, value_name = "PIXELS", hide = true)]
     pub medium_triangle: Option<u32>,
 
@@ -43,11 +43,11 @@ pub struct HybridArgs {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(0..=MAX_DEPTH))]
     pub depth: u32,
 
-    /// Time at which the rays of mirrors and glass are traced; the image is the same
+    /// Launch that traces the rays of mirrors and glass; the picture is the same
     #[arg(long, value_enum, default_value_t = BouncesArg::Auto)]
     pub bounces: BouncesArg,
 
-    /// Views of each pixel, 1 to 256, whose average smooths edges; each costs as much as the first
+    /// Samples per pixel, 1 to 256, averaged for antialiasing; each costs as much as the first
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=MAX_SAMPLES))]
     pub samples: u32,
 
@@ -63,13 +63,13 @@ pub struct HybridArgs {
 /// The method that finds the visible surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// Everything by rays, from the camera on.
+    /// Trace everything, from the camera on.
     Standalone,
-    /// Rasterise first; rays only for shadows, mirrors and glass.
+    /// Rasterise visible surfaces; trace shadows, mirrors and glass.
     Hybrid,
 }
 
-/// The data that the geometry pass leaves for the rays.
+/// The data that the geometry pass writes for the rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum GBufferArg {
     /// Position, normals, albedo and triangle, as in the paper.
@@ -81,33 +81,33 @@ pub enum GBufferArg {
 /// The rasteriser of visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RasterArg {
-    /// By compute where the device can, as its picture is exactly that of rays; says how long each took in a few frames.
+    /// Compute shaders if the device supports them, else the hardware rasteriser; prints the time of each over a few frames.
     Auto,
-    /// By compute shaders with 64-bit atomics.
+    /// Compute shaders with 64-bit atomics; the picture is exactly that of rays.
     Compute,
-    /// By the device's rasteriser, after culling in compute shaders; where it is in doubt rays decide, but it misses what
-    /// shows through gaps narrower than a pixel.
+    /// The hardware rasteriser, after culling in compute shaders; rays decide at edges. Surfaces behind gaps narrower than
+    /// a pixel are missing.
     Hardware,
 }
 
-/// The time at which rays of mirrors and glass are traced.
+/// The launch that traces the rays of mirrors and glass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BouncesArg {
-    /// The best for the device and the method.
+    /// The fastest for the device and the method.
     Auto,
-    /// At once, by the thread of the pixel.
+    /// The thread of the pixel traces them at once.
     Inline,
-    /// In a launch of their own, of just the pixels that have some.
+    /// A second launch traces them, for only the pixels that have such rays.
     Queued,
-    /// At once, but pixels that have some are launched before the others; for the hybrid method.
+    /// As `inline`, but pixels that have such rays are launched before the others; hybrid method only.
     First,
 }
 
 /// The motion of the lamp in a sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Lamp {
-    /// It stays where it is.
+    /// The lamp stands still.
     Still,
-    /// It goes round once in a small level circle, through its own place in frame 0.
+    /// The lamp moves once round a small horizontal circle; frame 0 has the scene's position.
     Circle,
 }

@@ -10,7 +10,7 @@ use lvk::{
 };
 
 use super::config::RasterTuning;
-use super::frame::{Push, VisibilityAddresses};
+use super::frame::{LAYOUTS, Push, VisibilityAddresses};
 use super::shader_module::module;
 use crate::app::array_buffer::buffer;
 
@@ -136,7 +136,13 @@ fn pipeline(
     specialization: &[SpecializationConstant],
 ) -> lvk::Result<Holder<ComputePipelineHandle>> {
     let (shader, debug_name) = (module(ctx, stage, &[])?, stage.name);
-    ctx.create_compute_pipeline(&ComputePipelineDesc { module: Some(*shader), specialization, debug_name })
+    ctx.create_compute_pipeline(&ComputePipelineDesc {
+        module: Some(*shader),
+        specialization,
+        layouts: LAYOUTS,
+        debug_name,
+        ..ComputePipelineDesc::default()
+    })
 }
 
 /// A list with room for items of `bytes` in all.

@@ -71,11 +71,11 @@ impl Default for RasterTuning {
 /// The time at which rays of mirrors and glass are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bounces {
-    /// At once, by the thread of the pixel.
+    /// The thread of the pixel traces them at once.
     Inline,
-    /// In a launch of their own, of just the pixels that have some: the same picture.
+    /// A launch of their own, of only the pixels that have such rays: the same picture.
     Queued,
-    /// At once, but pixels with such rays are launched first, since theirs take longest: the same picture. Only where
+    /// The thread of the pixel, as for `Inline`, but pixels with such rays are launched first: the same picture. Only where
     /// visible triangles are known before any ray: by the hybrid method from [`Geometry::Visibility`].
     First,
 }

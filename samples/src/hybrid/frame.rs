@@ -2,43 +2,50 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use lvk::BlockLayout;
 
 use crate::scene::{Ambient, DirectionalLight, GpuCamera, Scene};
 
 /// A scene's largest coordinate over the extent that rounding errors near the origin are measured by.
 const OFFSET_SHARE: f32 = 8.0;
 
-/// Addresses of a scene's arrays (`Scene` in `shaders/common/scene_buffers.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct SceneAddresses {
-    pub(super) positions: u64,
-    pub(super) normals: u64,
-    pub(super) texcoords: u64,
-    pub(super) triangles: u64,
-    pub(super) triangle_infos: u64,
-    pub(super) materials: u64,
+lvk::shader_struct! {
+    /// Addresses of a scene's arrays (`Scene` in `shaders/common/scene_buffers.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct SceneAddresses {
+        pub(super) positions: u64,
+        pub(super) normals: u64,
+        pub(super) texcoords: u64,
+        pub(super) triangles: u64,
+        pub(super) triangle_infos: u64,
+        pub(super) materials: u64,
+    }
 }
 
-/// A light (`Light` in `shaders/common/scene_buffers.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct GpuLight {
-    position: [f32; 3],
-    is_distant: f32,
-    color: [f32; 3],
-    reach: f32,
+lvk::shader_struct! {
+    /// A light (`Light` in `shaders/common/scene_buffers.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct GpuLight {
+        position: [f32; 3],
+        is_distant: f32,
+        color: [f32; 3],
+        reach: f32,
+    }
 }
 
-/// Lights and the like, which do not change with the camera.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Lighting {
-    lights: [GpuLight; 2],
-    ambient_above: [f32; 3],
-    light_count: u32,
-    ambient_below: [f32; 3],
-    offset_extent: f32,
+lvk::shader_struct! {
+    /// Lights and the like, which do not change with the camera.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Lighting {
+        lights: [GpuLight; 2],
+        ambient_above: [f32; 3],
+        light_count: u32,
+        ambient_below: [f32; 3],
+        offset_extent: f32,
+    }
 }
 
 impl Lighting {
@@ -78,7 +85,7 @@ impl Lighting {
         self.light_count
     }
 
-    /// With no more than the first `count` of them.
+    /// Keeps no more than the first `count` lights.
     pub(crate) fn with_lights(self, count: u32) -> Self {
         Self { light_count: self.light_count.min(count), ..self }
     }
@@ -89,84 +96,100 @@ impl Lighting {
     }
 }
 
-/// The members of `Frame` that samples share which trace rays in a lit scene (`shaders/common/scene_frame.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct SceneFrame {
-    pub(crate) camera: GpuCamera,
-    pub(crate) scene: SceneAddresses,
-    pub(crate) lighting: Lighting,
-    pub(crate) tlas: u32,
-    pub(crate) sky: u32,
-    pub(crate) surface_sampler: u32,
-    pub(crate) sky_sampler: u32,
+lvk::shader_struct! {
+    /// The members of `Frame` that samples share which trace rays in a lit scene (`shaders/common/scene_frame.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct SceneFrame {
+        pub(crate) camera: GpuCamera,
+        pub(crate) scene: SceneAddresses,
+        pub(crate) lighting: Lighting,
+        pub(crate) tlas: u32,
+        pub(crate) sky: u32,
+        pub(crate) surface_sampler: u32,
+        pub(crate) sky_sampler: u32,
+    }
 }
 
-/// Bindless indices (the tail of `Frame` in `shaders/hybrid/frame.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Indices {
-    pub(super) tlas: u32,
-    pub(super) sky: u32,
-    pub(super) surface_sampler: u32,
-    pub(super) sky_sampler: u32,
-    pub(super) output: u32,
-    pub(super) gbuffer_position: u32,
-    pub(super) gbuffer_surface: u32,
-    pub(super) gbuffer_albedo: u32,
+lvk::shader_struct! {
+    /// Bindless indices (the tail of `Frame` in `shaders/hybrid/frame.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct Indices {
+        pub(super) tlas: u32,
+        pub(super) sky: u32,
+        pub(super) surface_sampler: u32,
+        pub(super) sky_sampler: u32,
+        pub(super) output as output_image: u32,
+        pub(super) gbuffer_position: u32,
+        pub(super) gbuffer_surface: u32,
+        pub(super) gbuffer_albedo: u32,
+    }
 }
 
-/// Addresses and indices of the visibility pass (`Visibility` in `shaders/hybrid/visibility.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct VisibilityAddresses {
-    pub(super) words: u64,
-    pub(super) set_triangles: u64,
-    pub(super) tiles: u64,
-    pub(super) survivor_bits: u64,
-    pub(super) survivor_counts: u64,
-    pub(super) survivor_indices: u64,
-    pub(super) survivors: u64,
-    pub(super) draw: u64,
-    pub(super) image: u32,
-    pub(super) triangle_count: u32,
-    pub(super) set_capacity: u32,
-    pub(super) tile_capacity: u32,
+lvk::shader_struct! {
+    /// Addresses and indices of the visibility pass (`Visibility` in `shaders/hybrid/visibility.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct VisibilityAddresses {
+        pub(super) words: u64,
+        pub(super) set_triangles: u64,
+        pub(super) tiles: u64,
+        pub(super) survivor_bits: u64,
+        pub(super) survivor_counts: u64,
+        pub(super) survivor_indices: u64,
+        pub(super) survivors: u64,
+        pub(super) draw: u64,
+        pub(super) image: u32,
+        pub(super) triangle_count: u32,
+        pub(super) set_capacity: u32,
+        pub(super) tile_capacity: u32,
+    }
 }
 
-/// Addresses of the queue of mirrors and glass (`ReflectivePixels` in `shaders/hybrid/reflective_pixels.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct ReflectivePixelAddresses {
-    pub(super) head: u64,
-    pub(super) pixels: u64,
+lvk::shader_struct! {
+    /// Addresses of the queue of mirrors and glass (`ReflectivePixels` in `shaders/hybrid/reflective_pixels.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct ReflectivePixelAddresses {
+        pub(super) head: u64,
+        pub(super) pixels: u64,
+    }
 }
 
-/// The whole block (`Frame` in `shaders/hybrid/frame.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct FrameConstants {
-    pub(super) camera: GpuCamera,
-    pub(super) scene: SceneAddresses,
-    pub(super) lighting: Lighting,
-    pub(super) indices: Indices,
-    pub(super) visibility: VisibilityAddresses,
-    pub(super) bounces: ReflectivePixelAddresses,
-    pub(super) order: u64,
-    pub(super) sums: u64,
-    pub(super) sample_number: u32,
-    pub(super) sample_count: u32,
-    pub(super) padding: [u32; 2],
+lvk::shader_struct! {
+    /// The whole block (`Frame` in `shaders/hybrid/frame.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct FrameConstants {
+        pub(super) camera: GpuCamera,
+        pub(super) scene: SceneAddresses,
+        pub(super) lighting: Lighting,
+        pub(super) indices: Indices,
+        pub(super) visibility: VisibilityAddresses,
+        pub(super) bounces: ReflectivePixelAddresses,
+        pub(super) order: u64,
+        pub(super) sums: u64,
+        pub(super) sample_number: u32,
+        pub(super) sample_count: u32,
+        pub(super) padding: [u32; 2],
+    }
 }
 
-/// The push constants: where the block is, and which rows of the image, or pixels in their order, to render.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Push {
-    pub(super) frame: u64,
-    pub(super) first: u32,
-    pub(super) end: u32,
+lvk::shader_struct! {
+    /// The push constants: where the block is, and which rows of the image, or pixels in their order, to render.
+    #[derive(Debug, Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct Push {
+        pub(super) frame: u64,
+        pub(super) first: u32,
+        pub(super) end: u32,
+    }
 }
+
+/// The layouts of both, for every pipeline of the sample.
+pub(super) const LAYOUTS: &[BlockLayout] =
+    &[BlockLayout::push_constants::<Push>(), BlockLayout::buffer_reference::<FrameConstants>("Frame")];
 
 /// Distance of the near plane in scene units: small against the scene, but not so small that depth suffers.
 pub(crate) fn near_plane(scene: &Scene) -> f32 {
@@ -180,19 +203,4 @@ fn offset_extent(scene: &Scene) -> f32 {
     let (low, high) = scene.bounds();
     let largest = low.iter().chain(&high).fold(0.0_f32, |largest, c| largest.max(c.abs()));
     largest / OFFSET_SHARE
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_layout_is_the_shaders_scalar_one() {
-        assert_eq!(std::mem::offset_of!(FrameConstants, lighting), 144);
-        assert_eq!(std::mem::offset_of!(FrameConstants, indices), 240);
-        assert_eq!(std::mem::offset_of!(FrameConstants, visibility), 272);
-        assert_eq!(std::mem::offset_of!(FrameConstants, bounces), 352);
-        assert_eq!(std::mem::offset_of!(FrameConstants, sample_number), 384);
-        assert_eq!(size_of::<Push>(), 16);
-    }
 }

@@ -13,8 +13,8 @@ pub struct FrameTimings {
     pub geometry_ms: f64,
     /// The ray pass, all launch_tiles together.
     pub rays_ms: f64,
-    /// From the begin of the first pass to the end of the last, so that what lies between counts too; where the frame is cut
-    /// into steps, without what lies between those.
+    /// Time from the begin of the first pass to the end of the last, with the gaps between passes. If the frame is cut
+    /// into steps, gaps between steps do not count.
     pub span_ms: f64,
 }
 

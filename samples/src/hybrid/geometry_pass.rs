@@ -8,7 +8,7 @@ use lvk::{
     RenderPipelineDesc, RenderPipelineHandle, TextureDesc, TextureHandle, TextureUsage,
 };
 
-use super::frame::{Indices, Push};
+use super::frame::{Indices, LAYOUTS, Push};
 use super::gpu_scene::GpuScene;
 use super::shader_module::module;
 
@@ -97,6 +97,7 @@ impl GeometryPass {
             cull: CullMode::None,
             color: &color,
             depth: Some(DepthTest { format: GBuffer::DEPTH, compare: CompareOp::Greater, write: true }),
+            layouts: LAYOUTS,
             debug_name: "geometry pass",
             ..RenderPipelineDesc::default()
         })?;

@@ -41,9 +41,9 @@ pub(crate) struct GpuScene {
 /// Places of hit groups in the pipelines that trace the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct HitGroups {
-    /// Of opaque triangles.
+    /// Hit group of opaque triangles.
     pub(crate) opaque: u32,
-    /// Of those that light passes through.
+    /// Hit group of triangles that light passes through.
     pub(crate) refractive: u32,
 }
 

@@ -11,7 +11,7 @@ use lvk::{
 };
 
 use super::compute_raster::groups_for;
-use super::frame::{Push, VisibilityAddresses};
+use super::frame::{LAYOUTS, Push, VisibilityAddresses};
 use super::geometry_pass::NO_TRIANGLE;
 use super::shader_module::module;
 
@@ -154,6 +154,7 @@ fn compute(ctx: &Context, stage: &SampleStage) -> lvk::Result<Holder<ComputePipe
     let shader = module(ctx, stage, &[])?;
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module: Some(*shader),
+        layouts: LAYOUTS,
         debug_name: stage.name,
         ..ComputePipelineDesc::default()
     })
@@ -172,6 +173,7 @@ fn draw(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
             compare: CompareOp::GreaterOrEqual,
             write: true,
         }),
+        layouts: LAYOUTS,
         debug_name: "visibility pass",
         ..RenderPipelineDesc::default()
     })

@@ -19,23 +19,23 @@ impl SampleInfo for HybridSequence {
     const NAME: &'static str = "hybrid";
     const ABOUT: &'static str =
         "Renders a scene with ray traced shadows, reflections and refractions, and writes pictures as PNG";
-    const DETAILS: &'static str = "Without --scene it shows a courtyard made by code, so that `cargo run --release` alone gives a picture.";
+    const DETAILS: &'static str = "Without --scene the sample renders a generated courtyard.";
     const EXAMPLES: &'static str = "
-        | the courtyard, by the best path of the best device
+        | the courtyard, on the most capable device and its fastest path
         --scene kitchen.obj --camera 3 --out k3.png | an OBJ through its third camera
-        --samples 16 --out smooth.png | with smooth edges
+        --samples 16 --out smooth.png | 16 samples per pixel
         --method standalone --rt query --frames 1 | everything ray traced in a compute shader, once
-        --device 1 --validate | on the second device, with validation
-        --profile mali-g715 | as on a phone: ray queries, split meshes
-        --frames 100 | one picture, and how long its passes take over 100 frames
-        --frames 0..240 --out dir/frame_####.png | 8 seconds through all five cameras, which repeat without a seam
-        --frames 120..240 --out dir/frame_####.png | their second half, on another machine: the same pictures
-        --frames 0..240 --out dir/frame_####.png --resume | what is missing of them
+        --device 1 --validate | the second device, with validation
+        --profile mali-g715 | emulates a phone: ray queries, split meshes
+        --frames 100 | one picture, and the times of its passes over 100 frames
+        --frames 0..240 --out dir/frame_####.png | 8 seconds through all five cameras, a seamless loop
+        --frames 120..240 --out dir/frame_####.png | the second half, on another machine: the same pictures
+        --frames 0..240 --out dir/frame_####.png --resume | only the missing pictures
     ";
     const ROUND: &'static str = "";
     const NOTES: &'static str = "\
-Frame N of a sequence depends on N alone, so any number of processes may share one. Ctrl-C ends after the frame under way;
-pictures get their names when they are complete. A film of them: ffmpeg -framerate 30 -i dir/frame_%04d.png film.mp4";
+Frame N of a sequence depends on N alone, so several processes may share a sequence. Ctrl-C stops after the current frame;
+a picture gets its name when it is complete. A video of the pictures: ffmpeg -framerate 30 -i dir/frame_%04d.png film.mp4";
     type Args = HybridArgs;
     type Sample = Self;
 

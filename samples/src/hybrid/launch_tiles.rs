@@ -20,7 +20,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_short_image_is_one_band() {
+    fn a_short_image_is_one_tile() {
         for rows in [5, 64, u32::MAX] {
             let all = launch_tiles(5, rows);
             assert_eq!((all.len(), all[0].clone()), (1, 0..5));
@@ -29,7 +29,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn bands_cover_every_row_once(height in 0_u32..5000, rows in 0_u32..400) {
+        fn tiles_cover_every_line_once(height in 0_u32..5000, rows in 0_u32..400) {
             let all = launch_tiles(height, rows);
             let covered: Vec<u32> = all.iter().cloned().flatten().collect();
             prop_assert_eq!(covered, (0..height).collect::<Vec<_>>());

@@ -24,15 +24,15 @@ pub(super) const CLOSEST_RCHIT: SampleStage = shader!("hybrid", "closest.rchit")
 /// Names and values of macros.
 type Defines = &'static [(&'static str, &'static str)];
 
-/// Of ray stages that start from the paper's G-buffer.
+/// Macros of ray stages that start from the paper's G-buffer.
 pub(super) const WITH_GBUFFER: Defines = &[("HYBRID_GBUFFER", "1")];
-/// Of ray stages that start from the visible triangles.
+/// Macros of ray stages that start from the visible triangles.
 pub(super) const WITH_VISIBILITY: Defines = &[("HYBRID_VISIBILITY", "1")];
-/// Of the ray stage that queues mirrors and glass.
+/// Macros of the ray stage that queues mirrors and glass.
 pub(super) const WITH_QUEUE: Defines = &[("HYBRID_QUEUE", "1")];
-/// Of ray stages that take pixels in their order.
+/// Macros of ray stages that take pixels in sorted order.
 pub(super) const WITH_VISIBILITY_AND_ORDER: Defines = &[("HYBRID_VISIBILITY", "1"), ("HYBRID_ORDERED", "1")];
-/// Of the ray stage that queues mirrors and glass, from the visible triangles.
+/// Macros of the ray stage that queues mirrors and glass, from the visible triangles.
 const WITH_VISIBILITY_AND_QUEUE: Defines = &[("HYBRID_VISIBILITY", "1"), ("HYBRID_QUEUE", "1")];
 
 /// Returns every pipeline of the sample.

@@ -5,7 +5,7 @@ use lvk::{
     BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Holder,
 };
 
-use super::frame::Push;
+use super::frame::{LAYOUTS, Push};
 use super::ray_pass::GeometryLeft;
 use super::shader_module::module;
 use crate::app::array_buffer::buffer;
@@ -31,6 +31,7 @@ impl PixelOrder {
         Ok(Self {
             pipeline: ctx.create_compute_pipeline(&ComputePipelineDesc {
                 module: Some(*shader),
+                layouts: LAYOUTS,
                 debug_name: "order of pixels",
                 ..ComputePipelineDesc::default()
             })?,

@@ -12,7 +12,7 @@ use lvk::{
 use super::accumulation::Accumulation;
 use super::compute_raster::groups_for;
 use super::config::{Bounces, Geometry, HybridConfig, Method, RayPath};
-use super::frame::{Push, ReflectivePixelAddresses};
+use super::frame::{LAYOUTS, Push, ReflectivePixelAddresses};
 use super::reflective_pixels::ReflectivePixels;
 use super::shader_module::module;
 
@@ -160,7 +160,9 @@ impl Stages {
         ctx.create_compute_pipeline(&ComputePipelineDesc {
             module: Some(*shader),
             specialization: &self.specialization,
+            layouts: LAYOUTS,
             debug_name: stage.name,
+            ..ComputePipelineDesc::default()
         })
     }
 }
@@ -179,6 +181,7 @@ fn tracing_pipeline(ctx: &Context, stages: &Stages) -> lvk::Result<Holder<RayTra
         hit_groups: &[HitGroup { closest_hit: Some(*closest_hit), ..HitGroup::default() }],
         max_recursion: 1,
         specialization: &stages.specialization,
+        layouts: LAYOUTS,
         debug_name: "ray pass",
         ..RayTracingPipelineDesc::default()
     })

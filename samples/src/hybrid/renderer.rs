@@ -1,4 +1,4 @@
-//! The sample as a type: give it a scene and a camera, get a picture.
+//! The sample as a type: a renderer of a scene and a camera.
 
 use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, CommandBuffer, Context, TextureHandle, TextureRegion};
@@ -163,7 +163,7 @@ impl HybridRenderer {
     }
 
     /// Number of launches of a frame, over all samples.
-    pub fn band_count(&self) -> u64 {
+    pub fn tile_count(&self) -> u64 {
         self.passes.launch_tiles.len() as u64 * u64::from(self.config.samples)
     }
 
@@ -177,8 +177,8 @@ impl HybridRenderer {
         self.scene.blas_count()
     }
 
-    /// Of how many parts these consist: more than there are structures where the device, or the profile, sets limits
-    /// that the scene exceeds.
+    /// Returns the number of parts of the BLASes. It is larger than their number where limits of the device or the profile
+    /// are below the scene's size.
     pub fn blas_part_count(&self) -> u32 {
         self.scene.blas_part_count
     }

@@ -1,6 +1,6 @@
 //! The sample as an animation: a tour through the scene's cameras, and a lamp that may move.
 
-use crate::app::sample_error::SampleError;
+use crate::app::run_error::RunError;
 use glam::Vec3;
 use lvk::{Context, TextureHandle};
 
@@ -71,33 +71,30 @@ impl HybridSequence {
 }
 
 impl Sample for HybridSequence {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         self.renderer.context()
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.camera = self.path.at(time.phase());
         if self.lamp_moves {
             self.renderer.move_lamp(self.lamp.at(time.phase()));
         }
-        Ok(())
     }
 
     fn steps_per_frame(&self) -> u64 {
-        self.renderer.band_count()
+        self.renderer.tile_count()
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         if let Some(config) = self.wanted.changed_from(*self.renderer.config()) {
             let done = self.renderer.change(&config);
             self.wanted.finish(done, *self.renderer.config());
         }
-        self.renderer.record(frame, &self.camera)
+        Ok(self.renderer.record(frame, &self.camera)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.renderer.resize(extent)?;
         [self.wanted.config.width, self.wanted.config.height] = extent;
         Ok(())
@@ -119,8 +116,8 @@ impl Sample for HybridSequence {
         ui.label(&self.scene);
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
-        self.renderer.reload()
+    fn reload(&mut self) -> Result<(), RunError> {
+        Ok(self.renderer.reload()?)
     }
 }
 

@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn more_textures_than_the_device_has_room_for_are_refused() {
+    fn more_textures_than_slots_are_refused() {
         let mut scene = scene(vec![texture(1, 1); 5]);
         assert_eq!(textures_needed(&scene), OWN_TEXTURES + 5);
         assert!(fit_textures(&mut scene, &limits(16, OWN_TEXTURES + 5)).unwrap().is_empty());

@@ -113,7 +113,7 @@ impl GpuMotion {
         }
     }
 
-    /// Of all spheres: balls first, then glass.
+    /// Returns the data of all spheres: balls first, then glass.
     pub(super) fn of_scene(scene: &OitScene) -> Vec<Self> {
         let balls = scene.balls.iter().map(|ball| Self::new(&ball.motion, ball.radius, ball.albedo));
         let glass =

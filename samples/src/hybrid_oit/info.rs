@@ -9,33 +9,33 @@ use crate::app::scene_args::BuiltInSceneRayArgs;
 use crate::app::value_parsers::whole;
 use crate::hybrid::RayPath;
 
-/// Time in seconds at which the built-in animation begins: one that shows every colour of shadow.
+/// Frame time in seconds at which the built-in animation begins: its picture has every colour of shadow.
 const FIRST_SECONDS: f64 = 1.9;
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct HybridOitArgs {
-    /// Samples a pixel along each side, 1 to 4: they smooth edges
+    /// Samples along each side of a pixel, 1 to 4, for antialiasing
     #[arg(long, value_name = "N", default_value_t = 2)]
     #[arg(value_parser = whole(1..=HybridOitConfig::MAX_SUPERSAMPLING))]
     pub supersampling: u32,
 
-    /// Shadow rays a sample, 1 to 64; a single one gives hard shadows
+    /// Shadow rays per sample, 1 to 64; 1 gives hard shadows
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(1..=HybridOitConfig::MAX_SHADOW_RAYS))]
     pub shadow_rays: u32,
 
-    /// Nodes in the pool of the transparency lists; glass that finds none is left out and counted
-    /// [default: two a sample]
+    /// Nodes in the pool of the transparency lists; glass without a free node is left out and counted
+    /// [default: two per sample]
     #[arg(long, value_name = "N")]
     pub nodes: Option<u32>,
 
-    /// Moment of the animation that frame 0 shows, in seconds
+    /// Frame time of frame 0 in the animation, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = FIRST_SECONDS, value_parser = seconds)]
     #[arg(allow_negative_numbers = true, help_heading = "Frames")]
     pub time: f64,
 
-    /// The built-in scene, and by what rays are traced
+    /// The built-in scene and the ray tracing path
     #[command(flatten)]
     pub common: BuiltInSceneRayArgs,
 }
@@ -44,12 +44,12 @@ impl SampleInfo for HybridOit {
     const NAME: &'static str = "hybrid_oit";
     const ABOUT: &'static str = "Renders blocks and drifting spheres of tinted glass, by the rasteriser with order-independent transparency and with ray traced coloured shadows, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, by the best path of the best device
-        --supersampling 4 --shadow-rays 16 | a smoother one
-        --rt query --validate | shadows by ray queries, under validation
-        --time 5.5 | another moment
-        --nodes 100000 | too few nodes: see what is lost
-        --profile mali-g715 | as on a phone: ray queries
+        | a picture, on the most capable device and its fastest path
+        --supersampling 4 --shadow-rays 16 | more samples and softer shadows
+        --rt query --validate | shadows by ray queries, with validation
+        --time 5.5 | another frame time
+        --nodes 100000 | too few nodes: some glass is missing
+        --profile mali-g715 | emulates a phone: ray queries
     ";
     type Args = HybridOitArgs;
     type Sample = HybridOitSequence;

@@ -45,7 +45,7 @@ pub struct Ball {
     pub radius: f32,
     /// Linear albedo of red, green and blue, 0 to 1.
     pub albedo: Vec3,
-    /// Its motion.
+    /// Motion of the sphere.
     pub motion: Motion,
 }
 
@@ -56,7 +56,7 @@ pub struct Glass {
     pub radius: f32,
     /// Transmittance along a whole diameter for red, green and blue, above 0 to 1.
     pub tint: Vec3,
-    /// Its motion.
+    /// Motion of the sphere.
     pub motion: Motion,
 }
 

@@ -1,6 +1,6 @@
 //! The sample as an animation.
 
-use crate::app::sample_error::SampleError;
+use crate::app::run_error::RunError;
 use egui::Slider;
 use lvk::{Context, TextureHandle};
 
@@ -20,7 +20,7 @@ pub struct HybridOitSequence {
     gone: f64,
     /// The camera of the scene.
     camera: Camera,
-    /// Of the frame that asked for most.
+    /// Node use of the frame that asked for most.
     nodes: NodeUse,
     wanted: PendingSettings<HybridOitConfig>,
 }
@@ -50,34 +50,31 @@ impl HybridOitSequence {
 }
 
 impl Sample for HybridOitSequence {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         self.sample.context()
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.gone = PERIOD_SECONDS * f64::from(time.phase());
         self.pose();
         self.sample.set_camera(&self.camera);
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         if let Some(config) = self.wanted.changed_from(*self.sample.config()) {
             let done = self.sample.change(&config);
             self.wanted.finish(done, *self.sample.config());
         }
-        self.sample.record(frame)
+        Ok(self.sample.record(frame)?)
     }
 
-    fn after_frame(&mut self) -> Result<(), SampleError> {
+    fn after_frame(&mut self) -> Result<(), RunError> {
         let nodes = self.sample.node_use()?;
         self.nodes = if nodes.asked >= self.nodes.asked { nodes } else { self.nodes };
         Ok(())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.sample.resize(extent)?;
         [self.wanted.config.width, self.wanted.config.height] = extent;
         Ok(())
@@ -100,8 +97,8 @@ impl Sample for HybridOitSequence {
         }
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
-        self.sample.reload()
+    fn reload(&mut self) -> Result<(), RunError> {
+        Ok(self.sample.reload()?)
     }
 
     fn remark(&self) -> Option<String> {

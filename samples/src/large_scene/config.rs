@@ -47,7 +47,7 @@ impl LargeSceneConfig {
         Self { rtx, depth: 3, samples: 4, show: Show::Picture, compact: true, cache: None }
     }
 
-    /// With numbers within their bounds.
+    /// Clamps the numbers to their bounds.
     pub(super) fn clamped(self) -> Self {
         let samples = self.samples.clamp(1, Self::MAX_SAMPLES);
         Self { depth: self.depth.min(Self::MAX_DEPTH), samples, ..self }
@@ -58,7 +58,7 @@ impl Show {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Picture, Self::Instances, Self::Triangles];
 
-    /// Its number in `shaders/large_scene/frame.glsl`.
+    /// Returns the number of the mode in `shaders/large_scene/frame.glsl`.
     pub(super) fn number(self) -> u32 {
         self as u32
     }

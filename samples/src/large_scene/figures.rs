@@ -26,15 +26,15 @@ pub struct Figures {
 pub struct StructureFigures {
     /// The scene it is of.
     pub name: String,
-    /// Its triangles.
+    /// Number of triangles.
     pub triangles: u64,
     /// Parts that the library made of it; 1 if it was not split.
     pub parts: u32,
-    /// Bytes when it was built, tables included. Of one from a file, those of the file's.
+    /// Bytes after the build, tables included; for a structure from a file, those of the original build.
     pub built_bytes: u64,
     /// Bytes now, tables included.
     pub bytes: u64,
-    /// Its origin.
+    /// Origin of the structure.
     pub origin: Origin,
 }
 
@@ -43,9 +43,9 @@ pub struct StructureFigures {
 pub enum Origin {
     /// A file of an earlier start.
     Loaded,
-    /// It was built, as there was no file.
+    /// Built, because no file existed.
     Built,
-    /// It was built, as its file was damaged or of no use.
+    /// Built, because the file was damaged or did not match.
     Rebuilt,
 }
 
@@ -71,7 +71,7 @@ impl Figures {
 
     /// Names and values, a line each.
     #[must_use]
-    pub fn rows(&self) -> Vec<(&'static str, String)> {
+    pub fn entries(&self) -> Vec<(&'static str, String)> {
         let [built, now] = self.structure_bytes();
         let (structures, parts) = (self.structures.len(), self.parts());
         let saved = 100.0 * (1.0 - now as f64 / built.max(1) as f64);
@@ -103,7 +103,7 @@ impl Figures {
 
 impl fmt::Display for Figures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rows = self.rows();
+        let rows = self.entries();
         for (index, (name, value)) in rows.iter().enumerate() {
             let end = if index + 1 < rows.len() { "\n" } else { "" };
             write!(f, "{name:<9} {value}{end}")?;

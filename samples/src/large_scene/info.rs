@@ -36,7 +36,7 @@ pub struct LargeSceneArgs {
     #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000), help_heading = "Scene")]
     pub copies: Option<u32>,
 
-    /// Triangles of the valley's ground and kinds of trees, before any is repeated
+    /// Triangles of the valley's ground and kinds of trees, each counted once
     #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = whole(1_000..=100_000_000))]
     #[arg(help_heading = "Scene")]
     pub triangles: u32,
@@ -62,7 +62,7 @@ pub struct LargeSceneArgs {
     #[arg(help_heading = "Rendering")]
     pub depth: u32,
 
-    /// Rays of each pixel, 1 to 256, whose average smooths edges
+    /// Samples per pixel, 1 to 256, averaged for antialiasing
     #[arg(long, value_name = "N", default_value_t = 4)]
     #[arg(value_parser = whole(1..=LargeSceneConfig::MAX_SAMPLES), help_heading = "Rendering")]
     pub samples: u32,
@@ -106,16 +106,16 @@ impl SampleInfo for LargeScene {
     const NAME: &'static str = "large_scene";
     const ABOUT: &'static str = "Renders millions of triangles by rays, and writes pictures as PNG";
     const DETAILS: &'static str = "\
-Without --scene and --archive it shows a wooded valley made by code. Split and compacted structures are kept in the folder of \
-caches, so that the next start builds none.";
+Without --scene and --archive the sample renders a generated wooded valley. The folder of caches keeps split and compacted \
+structures, so that the next start builds none.";
     const EXAMPLES: &'static str = "
         | the valley: two million triangles, 180 million with all trees
-        --triangles 20000000 --copies 5000 | a larger one
+        --triangles 20000000 --copies 5000 | a larger valley
         --layout combined --copies 20 | every tree's triangles in one mesh
         --archive dir | all OBJ files below dir, four of each, along streets
-        --scene kitchen --scene bunny.obj | two of them
-        --profile mali-g715 | as on a phone: ray queries, meshes split into many parts
-        --show instances --window | which instance is where, in a window
+        --scene kitchen --scene bunny.obj | two OBJ files
+        --profile mali-g715 | emulates a phone: ray queries, meshes split into many parts
+        --show instances --window | a colour for each instance, in a window
     ";
     const ROUND: &'static str = "";
     type Args = LargeSceneArgs;
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_add_up_and_numbers_follow_what_is_shown() {
+    fn scenes_add_up_and_copies_have_defaults() {
         let parsed = |line| parse_line::<LargeScene>(line).unwrap().sample;
         let args = parsed("--scene a.obj --scene b --archive");
         assert_eq!(args.scenes, [Path::new("a.obj"), Path::new("b")]);

@@ -1,4 +1,4 @@
-//! From the command line to the sample: files or code, the world, the device's arrays and structures.
+//! Loading of the sample: files or code, the world, the arrays and structures on the device.
 
 use std::path::PathBuf;
 

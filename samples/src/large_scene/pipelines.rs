@@ -1,5 +1,8 @@
 //! The sample's pipelines as data, with the texts that their stages use.
 
+use lvk::BlockLayout;
+
+use super::renderer::FrameConstants;
 use crate::pipelines::shader;
 use crate::rtx::RayStages;
 
@@ -13,4 +16,5 @@ pub(super) const RAYS: RayStages = RayStages {
     hits: &[shader!("large_scene", "nearest.rchit")],
     max_recursion: 1,
     query: shader!("large_scene", "picture.comp"),
+    layouts: &[BlockLayout::buffer_reference::<FrameConstants>("Frame")],
 };

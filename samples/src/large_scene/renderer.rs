@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{CommandBuffer, Context, TextureHandle};
@@ -32,17 +33,19 @@ pub struct LargeScene {
     near_plane: f32,
 }
 
-/// `Frame` in `shaders/large_scene/frame.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct FrameConstants {
-    scene: SceneFrame,
-    places: u64,
-    firsts: u64,
-    image: u32,
-    depth: u32,
-    samples: u32,
-    show: u32,
+lvk::shader_struct! {
+    /// `Frame` in `shaders/large_scene/frame.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct FrameConstants {
+        scene as scene_frame: SceneFrame,
+        places: u64,
+        firsts: u64,
+        image: u32,
+        depth: u32,
+        samples: u32,
+        show: u32,
+    }
 }
 
 impl LargeScene {
@@ -121,23 +124,20 @@ impl LargeScene {
 }
 
 impl Sample for LargeScene {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.tour.go_to(time.phase());
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let push = self.upload_frame(&mut frame.cmd)?;
         Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = self.config.rtx.resize(&self.ctx, extent)?;
         Ok(())
     }
@@ -158,7 +158,7 @@ impl Sample for LargeScene {
         show_figures(ui, &self.world.figures);
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.tracer = Tracer::new(&self.ctx, self.config.rtx.path, &RAYS)?;
         Ok(())
     }
@@ -166,7 +166,7 @@ impl Sample for LargeScene {
 
 fn show_figures(ui: &mut egui::Ui, figures: &Figures) {
     egui::CollapsingHeader::new("Memory").default_open(true).show(ui, |ui| {
-        for (name, value) in figures.rows() {
+        for (name, value) in figures.entries() {
             ui.label(format!("{name} {value}"));
         }
     });

@@ -45,14 +45,14 @@ fn place(plot: usize, copy: usize, [columns, rows]: [usize; 2]) -> Affine3A {
 
 /// The scene on the middle of a plot, opened above where it is a room.
 fn fitted_scene(mut scene: Scene) -> Scene {
-    let is_room = scene.is_room();
-    if is_room {
+    let is_interior = scene.is_interior();
+    if is_interior {
         open(&mut scene);
     }
     let (low, high) = scene.bounds();
     let (low, high) = (Vec3::from(low), Vec3::from(high));
     let size = high - low;
-    let side = if is_room { PLOT } else { OBJECT_SHARE * PLOT };
+    let side = if is_interior { PLOT } else { OBJECT_SHARE * PLOT };
     let scale = side / size.x.max(size.z).max(0.8 * size.y).max(f32::MIN_POSITIVE);
     let foot = Vec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
     for position in &mut scene.positions {
@@ -106,7 +106,7 @@ fn ground(half: Vec2) -> Scene {
     }
 }
 
-/// From above a corner, along a street, and above the middle.
+/// Returns cameras above a corner, along a street, and above the middle.
 fn cameras(half: Vec2) -> [Camera; 5] {
     let far = 0.5 * (half.x + half.y) + 1.0;
     let at = |x: f32, y: f32, z: f32| [x, y, z];

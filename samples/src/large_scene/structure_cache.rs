@@ -39,7 +39,7 @@ impl StructureKey {
 }
 
 impl StructureCache {
-    /// In this folder, which need not exist.
+    /// Creates a cache in a folder, which need not exist.
     pub(super) fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned() }
     }
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_is_read_and_replaced() {
+    fn stored_files_are_read_and_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let cache = StructureCache::new(&folder.path().join("made"));
         let key = StructureKey(7);

@@ -105,7 +105,7 @@ impl Plan<'_> {
         BuildFlags::FAST_TRACE | compaction
     }
 
-    /// Of the files, where there are any.
+    /// Returns the keys of the cache files; none without a cache.
     fn keys(&self) -> Vec<StructureKey> {
         let key = |piece| StructureKey::from_piece(self.world, piece, self.ctx.capabilities(), self.flags());
         self.cache.iter().flat_map(|_| self.world.pieces.iter().map(key)).collect()

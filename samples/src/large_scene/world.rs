@@ -40,7 +40,7 @@ pub struct Piece {
 pub struct Instance {
     /// Index of the piece.
     pub piece: usize,
-    /// From the piece's to the world's coordinates: turned, moved, and scaled alike in all directions.
+    /// Transform from piece to world coordinates: rotation, translation and uniform scale.
     pub place: Affine3A,
 }
 

@@ -9,7 +9,7 @@ use crate::app::sample_info::prelude::*;
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct MeshShadersArgs {
-    /// Draw meshlets that cannot be seen, too; the picture is the same
+    /// Draw invisible meshlets too; the picture is the same
     #[arg(long, help_heading = "Rendering")]
     pub no_culling: bool,
 }
@@ -19,9 +19,9 @@ impl SampleInfo for MeshShaders {
     const ABOUT: &'static str =
         "Draws a knot of meshlets by task and mesh shaders, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, by the best device
-        --window | in a window; hold the culling there, and look at it from elsewhere
-        --no-culling --frames 100 | what culling saves
+        | a picture, on the most capable device
+        --window | in a window; freeze the culling there and move the camera
+        --no-culling --frames 100 | the time without culling
         --validate | with validation
     ";
     type Args = MeshShadersArgs;

@@ -17,7 +17,7 @@ const WIDEST_CONE: f32 = 0.1;
 pub struct Meshlet {
     /// Middle of a sphere around all corners.
     pub middle: [f32; 3],
-    /// Its radius.
+    /// Radius of that sphere.
     pub radius: f32,
     /// Axis of a cone around the normals of all triangles.
     pub axis: [f32; 3],
@@ -203,7 +203,7 @@ mod tests {
         }
 
         #[test]
-        fn what_a_cone_calls_hidden_shows_no_front((points, triangles) in soup(), eye in prop::array::uniform3(-3.0_f32..3.0)) {
+        fn a_cone_hides_only_back_faces((points, triangles) in soup(), eye in prop::array::uniform3(-3.0_f32..3.0)) {
             let (cut, eye) = (Meshlets::build(&points, &triangles), Vec3::from(eye));
             for meshlet in &cut.meshlets {
                 let seen = Vec3::from(meshlet.middle) - eye;

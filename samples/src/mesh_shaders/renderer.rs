@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
@@ -144,19 +145,16 @@ impl MeshShaders {
 }
 
 impl Sample for MeshShaders {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.constants.phase = time.phase();
         self.camera = camera(time.phase());
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let constants = self.upload(&mut frame.cmd)?;
         self.counter.begin(&self.ctx, &mut frame.cmd)?;
         let counts = Dependencies { buffers: &[*self.counter.buffer], ..Dependencies::default() };
@@ -167,7 +165,7 @@ impl Sample for MeshShaders {
         Ok(self.target.image())
     }
 
-    fn after_frame(&mut self) -> Result<(), SampleError> {
+    fn after_frame(&mut self) -> Result<(), RunError> {
         Ok(self.counter.read(&self.ctx)?)
     }
 
@@ -175,7 +173,7 @@ impl Sample for MeshShaders {
         Some(format!("culling   {}", self.culling_text()))
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         Ok(())
     }
@@ -195,7 +193,7 @@ impl Sample for MeshShaders {
         ui.add(egui::Slider::new(&mut self.constants.apart, 0.0..=0.6).text("apart"));
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.pipeline = pipeline(&self.ctx)?;
         Ok(())
     }

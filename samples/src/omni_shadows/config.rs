@@ -6,7 +6,7 @@ use lvk::{Context, OptionalFeature};
 
 /// The number of passes that draw the faces of the cube map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Faces {
+pub enum ShadowFaces {
     /// All at once where the device can, else one after the other.
     Auto,
     /// All at once, by multiview.
@@ -18,7 +18,7 @@ pub enum Faces {
 /// The filter of the shadow, in the order of `shaders/omni_shadows/frame.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ShadowFilter {
-    /// There is none.
+    /// No shadow.
     Off,
     /// One comparison.
     Hard,
@@ -36,7 +36,7 @@ pub struct OmniShadowsConfig {
     /// Texels on an edge of the cube map, 16 to [`OmniShadowsConfig::MAX_SHADOW_SIZE`].
     pub shadow_size: u32,
     /// The number of passes that draw its faces.
-    pub faces: Faces,
+    pub faces: ShadowFaces,
     /// The filter of the shadow.
     pub filter: ShadowFilter,
     /// Radius of the lamp in metres, which soft shadows follow from: 0 to 0.1.
@@ -57,7 +57,7 @@ impl OmniShadowsConfig {
         Self {
             extent,
             shadow_size: 1024,
-            faces: Faces::Auto,
+            faces: ShadowFaces::Auto,
             filter: ShadowFilter::Soft,
             lamp_radius: 0.012,
             haze: 0.005,
@@ -65,7 +65,7 @@ impl OmniShadowsConfig {
         }
     }
 
-    /// With every number in its range.
+    /// Clamps every number to its range.
     pub(super) fn clamped(self) -> Self {
         let within = |value: f32, most| if value.is_nan() { 0.0 } else { value.clamp(0.0, most) };
         Self {
@@ -77,7 +77,7 @@ impl OmniShadowsConfig {
     }
 }
 
-impl Faces {
+impl ShadowFaces {
     /// True if the device can draw all at once.
     pub(super) fn can_be_one_pass(ctx: &Context) -> bool {
         let capabilities = ctx.capabilities();

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::config::{Faces, OmniShadowsConfig, ShadowFilter};
+use super::config::{OmniShadowsConfig, ShadowFaces, ShadowFilter};
 use super::{OmniShadows, pipelines};
 use crate::app::sample_info::prelude::*;
 use crate::app::value_parsers::{up_to, whole};
@@ -12,8 +12,8 @@ use crate::app::value_parsers::{up_to, whole};
 #[command(next_help_heading = "Rendering")]
 pub struct OmniShadowsArgs {
     /// Method of drawing the six faces of the shadow's cube map
-    #[arg(long, value_enum, default_value_t = Faces::Auto)]
-    pub faces: Faces,
+    #[arg(long, value_enum, default_value_t = ShadowFaces::Auto)]
+    pub faces: ShadowFaces,
 
     /// Filter of the shadow
     #[arg(long, value_enum, default_value_t = ShadowFilter::Soft)]
@@ -24,7 +24,7 @@ pub struct OmniShadowsArgs {
     #[arg(value_parser = whole(16..=OmniShadowsConfig::MAX_SHADOW_SIZE))]
     pub shadow_size: u32,
 
-    /// Radius of the lamp in metres, 0 to 0.1: the larger, the softer
+    /// Radius of the lamp in metres, 0 to 0.1; a larger lamp has softer shadows
     #[arg(long, value_name = "METRES", default_value_t = 0.012, value_parser = up_to(0.1))]
     pub lamp_radius: f32,
 
@@ -50,9 +50,9 @@ impl SampleInfo for OmniShadows {
     const ABOUT: &'static str =
         "Rasterises a lamp in a lattice and the shadows all around it, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, by the best device
-        --window | in a window with switches for all of the above
-        --faces single --filter hard | the cube map face by face, compared with once a pixel
+        | a picture, on the most capable device
+        --window | in a window, with a panel for all options
+        --faces single --filter hard | the cube map face by face, one comparison per pixel
         --lamp-radius 0.05 --haze 0 | a larger lamp in clear air
     ";
     type Args = OmniShadowsArgs;

@@ -14,6 +14,6 @@ mod renderer;
 mod scene_pass;
 mod shadow_cube;
 
-pub use config::{Faces, OmniShadowsConfig, ShadowFilter};
+pub use config::{OmniShadowsConfig, ShadowFaces, ShadowFilter};
 pub use info::OmniShadowsArgs;
 pub use renderer::OmniShadows;

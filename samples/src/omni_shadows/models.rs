@@ -1,4 +1,4 @@
-//! The room, what stands and hangs in it, and where everything is at a moment.
+//! The interior, its furniture, and the place of everything at a frame time.
 
 use std::f32::consts::TAU;
 use std::ops::Range;
@@ -162,7 +162,7 @@ pub(super) fn camera(phase: f32) -> Camera {
     Camera::looking_at(eye, [-0.1, 1.95, -1.2], 62.0)
 }
 
-/// From the hook downwards.
+/// Returns the transform of things that hang from the hook.
 fn hanging(phase: f32) -> Affine3A {
     let (sine, cosine) = (TAU * phase).sin_cos();
     let swing = Quat::from_rotation_z(SWING * sine) * Quat::from_rotation_x(0.4 * SWING * cosine);
@@ -236,7 +236,7 @@ fn ring() -> Mesh {
     })
 }
 
-/// From the hook to the lattice, a thin rod with a plate at its upper end.
+/// Returns the rod from the hook to the lattice, with a plate at its upper end.
 fn chain() -> Mesh {
     let end = LATTICE - CHAIN;
     Mesh::default().lathe(
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_comes_too_close_to_the_lamp_and_all_stays_in_the_room() {
+    fn objects_keep_away_from_the_lamp_and_inside_the_walls() {
         for phase in [0.0, 0.2, 0.4, 0.6, 0.8] {
             let [casters, _] = Models::new().triangles(phase);
             for at in casters.into_iter().flatten().map(Vec3::from) {

@@ -8,7 +8,7 @@ use crate::raster::RasterPipeline;
 
 /// Folder of the texts in `shaders/`.
 const SAMPLE: &str = "omni_shadows";
-/// Of the cube map.
+/// Format of the cube map.
 pub(super) const CUBE: Format = Format::D32Float;
 /// A bit for each face of it.
 pub(super) const ALL_FACES: u32 = 0b11_1111;

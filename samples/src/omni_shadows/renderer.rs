@@ -1,11 +1,12 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use bytemuck::Zeroable;
 use lvk::{BufferHandle, BufferUsage, CommandBuffer, Context, Holder, SamplerHandle, TextureHandle};
 
-use super::config::{Faces, OmniShadowsConfig, ShadowFilter};
+use super::config::{OmniShadowsConfig, ShadowFaces, ShadowFilter};
 use super::frame::FrameConstants;
 use super::models::{self, Draw, Models};
 use super::scene_pass::ScenePass;
@@ -133,18 +134,15 @@ impl OmniShadows {
 }
 
 impl Sample for OmniShadows {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.show(time.phase());
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         self.apply()?;
         let constants = self.upload(&mut frame.cmd)?;
         let Self { target, cube, cube_pass, scene_pass, draws, config, .. } = &*self;
@@ -154,7 +152,7 @@ impl Sample for OmniShadows {
         Ok(target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
@@ -166,11 +164,11 @@ impl Sample for OmniShadows {
 
     fn panel(&mut self, ui: &mut egui::Ui) {
         let mut is_multiview = self.is_multiview();
-        let can = Faces::can_be_one_pass(&self.ctx);
+        let can = ShadowFaces::can_be_one_pass(&self.ctx);
         let config = &mut self.config;
         let switch = egui::Checkbox::new(&mut is_multiview, "six faces in one pass");
         if ui.add_enabled(can, switch).changed() {
-            config.faces = if is_multiview { Faces::Multiview } else { Faces::Single };
+            config.faces = if is_multiview { ShadowFaces::Multiview } else { ShadowFaces::Single };
         }
         let sizes = egui::ComboBox::from_label("texels on an edge");
         sizes.selected_text(config.shadow_size.to_string()).show_ui(ui, |ui| {
@@ -188,7 +186,7 @@ impl Sample for OmniShadows {
         ui.checkbox(&mut config.shows_cube, "cube map");
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         let scene_pass = ScenePass::new(&self.ctx)?;
         self.cube_pass = CubePass::new(&self.ctx, self.cube_pass.is_multiview())?;
         self.scene_pass = scene_pass;

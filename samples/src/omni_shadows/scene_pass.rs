@@ -10,7 +10,7 @@ use super::frame::Push;
 use super::models::Draw;
 use super::pipelines::{SURFACES, UNFOLDED};
 
-/// Its pipelines.
+/// Pipelines of the pass that draws the scene.
 pub(super) struct ScenePass {
     surfaces: Holder<RenderPipelineHandle>,
     unfolded: Holder<RenderPipelineHandle>,

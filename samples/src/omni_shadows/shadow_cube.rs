@@ -19,7 +19,7 @@ pub(super) struct ShadowCube {
 }
 
 impl ShadowCube {
-    /// With faces of `size` texels a side.
+    /// Creates a cube map with faces of `size` texels a side.
     pub(super) fn new(ctx: &Context, size: u32) -> lvk::Result<Self> {
         let texture = ctx.create_texture(&TextureDesc {
             kind: TextureKind::Cube,

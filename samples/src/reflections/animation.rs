@@ -157,7 +157,7 @@ impl AnimationPasses {
         Ok(Self { skin, turn, serpent, leaves, skin_mode: mode(update) })
     }
 
-    /// Has the serpent's structure follow its skin so from now on.
+    /// Sets the build mode of the serpent's structure.
     pub(super) fn set_skin_update(&mut self, update: SkinUpdate) {
         self.skin_mode = mode(update);
     }

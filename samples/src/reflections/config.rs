@@ -11,7 +11,7 @@ pub enum SkinUpdate {
     /// The structure of the first frame is refitted.
     #[default]
     Refit,
-    /// It is built anew in every frame, to compare with.
+    /// The structure is built anew in every frame, for comparison.
     Rebuild,
 }
 

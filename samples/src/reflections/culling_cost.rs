@@ -19,9 +19,9 @@ pub struct RayCost {
 /// work on the device disturbs less than a mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CullingCost {
-    /// With the instances that the configuration keeps.
+    /// Cost with the instances that the configuration keeps.
     pub culled: RayCost,
-    /// With all instances.
+    /// Cost with all instances.
     pub whole: RayCost,
 }
 

@@ -61,7 +61,7 @@ struct GpuInstance {
 pub(super) struct Draw {
     /// A place in the table of geometries.
     pub(super) geometry: u32,
-    /// Of the buffer of indices.
+    /// Range in the buffer of indices.
     pub(super) indices: Range<u32>,
     /// Places in the table of instances.
     pub(super) instances: Range<u32>,
@@ -140,7 +140,7 @@ impl GeometryArena {
         ])
     }
 
-    /// From the vertices of a model to the model.
+    /// Returns the mapping from the vertices of a model to the model.
     pub(super) fn grid(&self, model: usize) -> Grid {
         self.models[model].grid
     }

@@ -20,20 +20,20 @@ const CPU_ROUNDS: u32 = 3;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct ReflectionsArgs {
-    /// Samples of each pixel, 1 to 256: they smooth edges, soft shadows and glossy reflections
+    /// Samples per pixel, 1 to 256, for antialiasing, soft shadows and glossy reflections
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole(1..=ReflectionsConfig::MAX_SAMPLES))]
     pub samples: u32,
 
-    /// Leave instances out of the acceleration structure that are seen under less than so many radians; 0 keeps all
+    /// Angular size in radians below which instances are left out of the acceleration structure; 0 keeps all
     #[arg(long, value_name = "RADIANS", default_value_t = ReflectionsConfig::DEFAULT_MIN_ANGLE)]
     #[arg(value_parser = up_to(std::f32::consts::PI))]
     pub min_angle: f32,
 
-    /// Also measure the frame without leaving instances out, and say what that saves
+    /// Also measure the frame with all instances, and print the difference
     #[arg(long)]
     pub compare_culling: bool,
 
-    /// The built-in scene, and by what rays are traced
+    /// The built-in scene and the ray tracing path
     #[command(flatten)]
     pub common: BuiltInSceneRayArgs,
 }
@@ -42,11 +42,11 @@ impl SampleInfo for Reflections {
     const NAME: &'static str = "reflections";
     const ABOUT: &'static str = "Renders a hall with polished floors, water, glass, a serpent and drifting leaves, all of them reflected by ray tracing over a rasterised picture, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, by the best path of the best device
-        --samples 16 --out hall.png | a smoother one
-        --compare-culling | what leaving small instances out saves, in milliseconds
-        --rt query --validate | by ray queries in compute shaders, with validation
-        --profile mali-g715 | as on a phone: ray queries, split meshes
+        | a picture, on the most capable device and its fastest path
+        --samples 16 --out hall.png | 16 samples per pixel
+        --compare-culling | the time that culling small instances saves, in milliseconds
+        --rt query --validate | ray queries in compute shaders, with validation
+        --profile mali-g715 | emulates a phone: ray queries, split meshes
     ";
     type Args = ReflectionsArgs;
     type Sample = Self;

@@ -19,7 +19,7 @@ pub(super) struct PackedVertex {
     texcoord: [u16; 2],
 }
 
-/// From coordinates -1 to 1 back to those of the model. It goes into the transform of every instance.
+/// Mapping from coordinates -1 to 1 back to those of the model. The transform of every instance contains it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Grid {
     centre: Vec3,

@@ -2,7 +2,7 @@
 
 /// Rays of a mirror go this far, in scene units: beyond the scene.
 pub const FAR: f32 = 200.0;
-/// From this roughness on no ray is traced: the lobe shows no more than the ambient light does.
+/// Roughness from which no ray is traced: the lobe shows no more than the ambient light does.
 pub const ROUGHEST_TRACED: f32 = 0.7;
 /// Below this roughness a surface is a mirror, whose rays go all the way.
 const MIRROR_ROUGHNESS: f32 = 0.08;

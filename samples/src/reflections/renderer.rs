@@ -1,5 +1,6 @@
 //! Renders the sample at a frame time.
 
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use lvk::{
     AddressMode, CommandBuffer, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
@@ -208,19 +209,16 @@ impl Reflections {
 }
 
 impl Sample for Reflections {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.show(time.phase());
-        Ok(())
     }
 
     /// A step for each sample.
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         if let Some(config) = self.wanted.changed_from(self.config) {
             let done = self.change(config);
             self.wanted.finish(done, self.config);
@@ -238,7 +236,7 @@ impl Sample for Reflections {
         self.config.samples.into()
     }
 
-    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), RunError> {
         self.change(ReflectionsConfig { width, height, ..self.config })?;
         (self.wanted.config.width, self.wanted.config.height) = (width, height);
         Ok(())
@@ -261,7 +259,7 @@ impl Sample for Reflections {
         ui.label(format!("rays meet {kept} of {total} instances"));
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         let (raster, images) = (RasterPasses::new(&self.ctx)?, ImagePasses::new(&self.ctx)?);
         let rays = RayPasses::new(&self.ctx, self.config.path)?;
         self.moving_passes.reload(&self.ctx)?;

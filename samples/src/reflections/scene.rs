@@ -23,7 +23,7 @@ pub(super) struct Material {
     pub(super) texture: Option<(usize, f32)>,
     /// 1 for opaque surfaces.
     pub(super) opacity: f32,
-    /// Of a body of water, per unit of length; 0 for what has no depth.
+    /// Extinction of a body of water per unit of length; 0 for surfaces.
     pub(super) density: f32,
 }
 
@@ -48,10 +48,10 @@ pub(super) struct Placed {
 /// A lamp, or the sun where the radius is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Light {
-    /// In scene units; of the sun the unit vector towards it.
+    /// Position in scene units; for the sun the unit vector towards it.
     pub(super) position: [f32; 3],
     pub(super) radius: f32,
-    /// Irradiance over pi; of a lamp at one unit of distance.
+    /// Irradiance over pi; for a lamp at one unit of distance.
     pub(super) color: [f32; 3],
     /// Sine of half the angle that the sun covers.
     pub(super) spread: f32,
@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_walk_ends_where_it_began() {
+    fn the_camera_path_ends_where_it_began() {
         let eye = |phase| Vec3::from(camera(phase).eye);
         let step = eye(0.0).distance(eye(1.0 / 240.0));
         assert!(eye(1.0).distance(eye(0.0)) < 1e-3);

@@ -10,7 +10,7 @@ use crate::shapes::Mesh;
 
 /// Bones of the chain, from the neck to the tip of the tail.
 const BONE_COUNT: usize = 40;
-/// From bone to bone, in scene units.
+/// Distance from bone to bone, in scene units.
 const BONE_LENGTH: f32 = 0.22;
 /// Length of the body.
 const LENGTH: f32 = BONE_LENGTH * (BONE_COUNT - 1) as f32;

@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn what_harmonics_can_say_comes_back() {
+    fn harmonics_reproduce_low_frequencies() {
         let radiance = |d: Vec3| Vec3::splat(1.0 + 0.5 * d.y - 0.25 * d.x * d.z);
         let harmonics = project(radiance);
         for d in [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.48, 0.6, 0.64)] {

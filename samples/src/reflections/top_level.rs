@@ -20,9 +20,9 @@ const LEAF_HIT_GROUP: u32 = 1;
 /// Number of instances in a frame's TLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InstanceCount {
-    /// In the structure.
+    /// Instances in the structure.
     pub kept: u32,
-    /// In the world.
+    /// Instances in the world.
     pub total: u32,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct TopLevel {
 
 struct Candidate {
     instance: TlasInstance,
-    /// In the space of the instance: all vertices are between -1 and 1.
+    /// Bounds in the space of the instance: all vertices are between -1 and 1.
     bounds: (Vec3, Vec3),
 }
 

@@ -25,7 +25,7 @@ impl SortBounds {
         }
     }
 
-    /// True if this layer can lie before `other` for someone at `eye`. It cannot where the plane of one of them parts
+    /// True if this layer can lie before `other` as seen from `eye`. It cannot where the plane of one of them parts
     /// them in the other order.
     fn can_hide(&self, other: &Self, eye: Vec3) -> bool {
         let is_beyond = other.sides(self.corners, eye).all(|side| side <= EPSILON);
@@ -40,7 +40,7 @@ impl SortBounds {
     }
 }
 
-/// Of surfaces that touch.
+/// Tolerance for surfaces that touch.
 const EPSILON: f32 = 1e-4;
 
 /// Numbers of the layers, farthest first as seen from `eye`: none can hide one that comes after it. So the order is
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn panes_in_a_row_come_in_their_order_from_either_end() {
+    fn panes_in_a_line_are_sorted_from_either_end() {
         let panes = [pane([0.0, 0.0, -6.0]), pane([0.2, 0.0, -2.0]), pane([0.0, 0.1, -4.0])];
         assert_eq!(farthest_first(&panes, Vec3::ZERO), [0, 2, 1]);
         assert_eq!(farthest_first(&panes, Vec3::new(0.0, 0.0, -9.0)), [1, 2, 0]);

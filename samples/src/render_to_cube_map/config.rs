@@ -8,7 +8,7 @@ use super::info::FacesArg;
 
 /// The number of passes that draw the faces of the cube map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Faces {
+pub enum CubeMapFaces {
     /// A pass for each.
     SixPasses,
     /// All in one pass, with a view for each (`VK_KHR_multiview`): draws are recorded once, and the device repeats them.
@@ -21,7 +21,7 @@ pub struct RenderToCubeMapConfig {
     /// Width and height of the picture in pixels.
     pub extent: [u32; 2],
     /// The number of passes that draw the faces.
-    pub faces: Faces,
+    pub faces: CubeMapFaces,
     /// Side of a face in pixels, 1 to [`MAX_FACE_SIZE`](Self::MAX_FACE_SIZE).
     pub face_size: u32,
     /// Roughness of the drop, 0 to 1: the share of the mips that is skipped.
@@ -34,12 +34,12 @@ impl RenderToCubeMapConfig {
 
     /// As usual but for the size of the picture and the way that faces are drawn.
     #[must_use]
-    pub fn new(extent: [u32; 2], faces: Faces) -> Self {
+    pub fn new(extent: [u32; 2], faces: CubeMapFaces) -> Self {
         Self { extent, faces, face_size: 512, roughness: 0.0 }
     }
 }
 
-impl Faces {
+impl CubeMapFaces {
     /// The choice of the command line.
     pub(super) fn from_args(wish: FacesArg, capabilities: &Capabilities) -> Self {
         match wish {

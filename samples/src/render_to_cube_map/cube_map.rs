@@ -6,9 +6,9 @@ use lvk::{
     SamplerDesc, SamplerHandle, TextureDesc, TextureHandle, TextureKind, TextureMemory, TextureUsage,
 };
 
-use super::config::Faces;
+use super::config::CubeMapFaces;
 
-/// Faces of a cube.
+/// CubeMapFaces of a cube.
 pub(super) const FACES: u32 = 6;
 /// A bit for each.
 pub(super) const ALL_FACES: u32 = (1 << FACES) - 1;
@@ -26,7 +26,7 @@ pub(super) struct CubeMap {
 }
 
 impl CubeMap {
-    /// With faces of `size` pixels a side, and all mips.
+    /// Creates a cube map with faces of `size` pixels a side, and all mips.
     pub(super) fn new(ctx: &Context, size: u32) -> lvk::Result<Self> {
         let color = TextureDesc {
             kind: TextureKind::Cube,
@@ -59,12 +59,12 @@ impl CubeMap {
     pub(super) fn record(
         &self,
         cmd: &mut CommandBuffer,
-        faces: Faces,
+        faces: CubeMapFaces,
         draw: impl Fn(&mut RenderPass<'_>, u32) -> lvk::Result<()>,
     ) -> lvk::Result<()> {
         match faces {
-            Faces::OnePass => draw(&mut self.begin(cmd, "all faces", 0, ALL_FACES)?, 0)?,
-            Faces::SixPasses => {
+            CubeMapFaces::OnePass => draw(&mut self.begin(cmd, "all faces", 0, ALL_FACES)?, 0)?,
+            CubeMapFaces::SixPasses => {
                 for (face, name) in (0..).zip(NAMES) {
                     draw(&mut self.begin(cmd, name, face, 0)?, face)?;
                 }

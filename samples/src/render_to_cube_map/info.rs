@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-use super::config::{Faces, RenderToCubeMapConfig};
+use super::config::{CubeMapFaces, RenderToCubeMapConfig};
 use super::{RenderToCubeMap, pipelines};
 use crate::app::sample_info::prelude::*;
 use crate::app::value_parsers::{up_to, whole};
@@ -28,11 +28,11 @@ pub struct RenderToCubeMapArgs {
 /// The method of drawing the faces of the cube map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FacesArg {
-    /// In one pass where the device has six views at once.
+    /// One pass if the device has six views at once, else six passes.
     Auto,
-    /// A pass for each.
+    /// A pass for each face.
     SixPasses,
-    /// All in one pass, with a view for each.
+    /// One pass, with a view for each face.
     OnePass,
 }
 
@@ -40,10 +40,10 @@ impl SampleInfo for RenderToCubeMap {
     const NAME: &'static str = "render_to_cube_map";
     const ABOUT: &'static str = "Draws the surroundings of a drop into a cube map, which the drop mirrors, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, by the best device
-        --window | in a window, with a switch from six passes to one
+        | a picture, on the most capable device
+        --window | in a window, with a panel for all options
         --faces six-passes --validate | a pass for each face, with validation
-        --roughness 0.6 | as if the drop were of brushed metal
+        --roughness 0.6 | a drop of brushed metal
     ";
     type Args = RenderToCubeMapArgs;
     type Sample = Self;
@@ -54,7 +54,7 @@ impl SampleInfo for RenderToCubeMap {
 
     fn open(args: &RenderToCubeMapArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Self>, RunError> {
         let context = setup.device(&DeviceNeeds::default())?;
-        let faces = Faces::from_args(args.faces, context.capabilities());
+        let faces = CubeMapFaces::from_args(args.faces, context.capabilities());
         let config = RenderToCubeMapConfig {
             face_size: args.face_size,
             roughness: args.roughness,
@@ -62,8 +62,8 @@ impl SampleInfo for RenderToCubeMap {
         };
         let sample = Self::new(&context, &config)?;
         let by = match faces {
-            Faces::SixPasses => "six passes",
-            Faces::OnePass => "one pass of six views",
+            CubeMapFaces::SixPasses => "six passes",
+            CubeMapFaces::OnePass => "one pass of six views",
         };
         let (count, size) = (sample.blocks().len() - 1, config.face_size);
         let scene =

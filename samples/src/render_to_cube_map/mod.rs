@@ -10,7 +10,7 @@ mod pipelines;
 mod renderer;
 mod surroundings;
 
-pub use config::{Faces, RenderToCubeMapConfig};
+pub use config::{CubeMapFaces, RenderToCubeMapConfig};
 pub use info::RenderToCubeMapArgs;
 pub use renderer::RenderToCubeMap;
 pub use surroundings::Block;

@@ -20,15 +20,15 @@ const FARTHEST: DepthTest =
     DepthTest { compare: CompareOp::GreaterOrEqual, write: false, ..RenderTarget::NEAREST };
 
 /// Pipelines of what stands around the drop, for one kind of target.
-pub(super) struct Surroundings {
+pub(super) struct SurroundingsDesc {
     /// Winding of faces that are seen: faces of cubes are mirrored.
     pub(super) front: FrontFace,
     pub(super) blocks: RasterPipeline,
     pub(super) sky: RasterPipeline,
 }
 
-/// In the picture.
-pub(super) const IN_PICTURE: Surroundings = Surroundings {
+/// Pipelines of the surroundings in the picture.
+pub(super) const IN_PICTURE: SurroundingsDesc = SurroundingsDesc {
     front: FrontFace::CounterClockwise,
     blocks: RasterPipeline::with_depth(
         SAMPLE,
@@ -44,8 +44,8 @@ pub(super) const IN_PICTURE: Surroundings = Surroundings {
         )
     },
 };
-/// On one face.
-pub(super) const ON_FACE: Surroundings = Surroundings {
+/// Pipelines of the surroundings on one face.
+pub(super) const ON_FACE: SurroundingsDesc = SurroundingsDesc {
     front: FrontFace::Clockwise,
     blocks: on_faces(
         "render_to_cube_map: blocks on a face",
@@ -55,8 +55,8 @@ pub(super) const ON_FACE: Surroundings = Surroundings {
     ),
     sky: on_faces("render_to_cube_map: sky on a face", &[SKY_VERTEX, SKY_FRAGMENT], FARTHEST, 0),
 };
-/// On all faces at once.
-pub(super) const ON_ALL_FACES: Surroundings = Surroundings {
+/// Pipelines of the surroundings on all faces at once.
+pub(super) const ON_ALL_FACES: SurroundingsDesc = SurroundingsDesc {
     front: FrontFace::Clockwise,
     blocks: on_faces(
         "render_to_cube_map: blocks on all faces",
@@ -80,7 +80,7 @@ pub(super) const DROP: RasterPipeline = RasterPipeline::with_depth(
 /// Returns every pipeline of the sample.
 pub(super) fn pipelines() -> Vec<SamplePipeline> {
     let surroundings = [IN_PICTURE, ON_FACE, ON_ALL_FACES];
-    let all = surroundings.iter().flat_map(|Surroundings { blocks, sky, .. }| [blocks, sky]);
+    let all = surroundings.iter().flat_map(|SurroundingsDesc { blocks, sky, .. }| [blocks, sky]);
     all.chain([&DROP]).map(RasterPipeline::data).collect()
 }
 

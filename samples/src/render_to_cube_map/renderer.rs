@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -8,7 +9,7 @@ use lvk::{
     RenderPipelineHandle, TextureHandle,
 };
 
-use super::config::{Faces, RenderToCubeMapConfig, has_six_views};
+use super::config::{CubeMapFaces, RenderToCubeMapConfig, has_six_views};
 use super::cube_map::{CubeMap, FACES};
 use super::pipelines::{self, IN_PICTURE, ON_ALL_FACES, ON_FACE};
 use super::surroundings::{Block, DROP, blocks, camera};
@@ -39,14 +40,14 @@ pub struct RenderToCubeMap {
 
 /// All of them; none for six views where the device has none.
 struct Pipelines {
-    in_picture: Surroundings,
-    on_face: Surroundings,
-    on_all_faces: Option<Surroundings>,
+    in_picture: SurroundingsPipelines,
+    on_face: SurroundingsPipelines,
+    on_all_faces: Option<SurroundingsPipelines>,
     drop: Holder<RenderPipelineHandle>,
 }
 
 /// Pipelines of the surroundings, for one kind of target.
-struct Surroundings {
+struct SurroundingsPipelines {
     blocks: Holder<RenderPipelineHandle>,
     sky: Holder<RenderPipelineHandle>,
 }
@@ -95,7 +96,7 @@ impl RenderToCubeMap {
         })
     }
 
-    /// The floor and the blocks, as they are at the moment.
+    /// Returns the floor and the blocks at the current frame time.
     #[must_use]
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
@@ -130,7 +131,7 @@ impl RenderToCubeMap {
     }
 
     /// Draws what stands around the drop.
-    fn draw(&self, pass: &mut RenderPass<'_>, by: &Surroundings, push: &Push) -> lvk::Result<()> {
+    fn draw(&self, pass: &mut RenderPass<'_>, by: &SurroundingsPipelines, push: &Push) -> lvk::Result<()> {
         pass.bind_render_pipeline(*by.blocks)?;
         pass.push_constants(push)?;
         pass.draw(0..BLOCK_CORNERS, 0..self.blocks.len() as u32)?;
@@ -140,20 +141,17 @@ impl RenderToCubeMap {
 }
 
 impl Sample for RenderToCubeMap {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.phase = time.phase();
         self.blocks = blocks(self.phase);
         self.camera = camera(self.phase);
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let push = Push { frame: self.upload(&mut frame.cmd)?, view: PICTURE, padding: 0 };
         let (faces, on_faces) = self.pipelines.faces(self.config.faces);
         frame.pass("cube map", |cmd| {
@@ -167,7 +165,7 @@ impl Sample for RenderToCubeMap {
         Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
@@ -179,15 +177,15 @@ impl Sample for RenderToCubeMap {
 
     fn panel(&mut self, ui: &mut egui::Ui) {
         let RenderToCubeMapConfig { faces, roughness, .. } = &mut self.config;
-        ui.radio_value(faces, Faces::SixPasses, "six passes");
+        ui.radio_value(faces, CubeMapFaces::SixPasses, "six passes");
         ui.add_enabled_ui(self.pipelines.on_all_faces.is_some(), |ui| {
-            ui.radio_value(faces, Faces::OnePass, "one pass of six views");
+            ui.radio_value(faces, CubeMapFaces::OnePass, "one pass of six views");
         });
         ui.add(egui::Slider::new(roughness, 0.0..=1.0).text("roughness"));
         ui.add(egui::Slider::new(&mut self.waves, 0.0..=0.3).text("waves"));
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.pipelines = Pipelines::new(&self.ctx)?;
         Ok(())
     }
@@ -198,24 +196,26 @@ impl Pipelines {
         let has_six_views = has_six_views(ctx.capabilities());
         let culled = RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() };
         Ok(Self {
-            in_picture: Surroundings::new(ctx, &IN_PICTURE)?,
-            on_face: Surroundings::new(ctx, &ON_FACE)?,
-            on_all_faces: has_six_views.then(|| Surroundings::new(ctx, &ON_ALL_FACES)).transpose()?,
+            in_picture: SurroundingsPipelines::new(ctx, &IN_PICTURE)?,
+            on_face: SurroundingsPipelines::new(ctx, &ON_FACE)?,
+            on_all_faces: has_six_views
+                .then(|| SurroundingsPipelines::new(ctx, &ON_ALL_FACES))
+                .transpose()?,
             drop: pipelines::DROP.create_with(ctx, &culled)?,
         })
     }
 
     /// Returns `wish` where the device supports it, else six passes, with the pipelines.
-    fn faces(&self, wish: Faces) -> (Faces, &Surroundings) {
+    fn faces(&self, wish: CubeMapFaces) -> (CubeMapFaces, &SurroundingsPipelines) {
         match (wish, &self.on_all_faces) {
-            (Faces::OnePass, Some(all)) => (Faces::OnePass, all),
-            _ => (Faces::SixPasses, &self.on_face),
+            (CubeMapFaces::OnePass, Some(all)) => (CubeMapFaces::OnePass, all),
+            _ => (CubeMapFaces::SixPasses, &self.on_face),
         }
     }
 }
 
-impl Surroundings {
-    fn new(ctx: &Context, of: &pipelines::Surroundings) -> lvk::Result<Self> {
+impl SurroundingsPipelines {
+    fn new(ctx: &Context, of: &pipelines::SurroundingsDesc) -> lvk::Result<Self> {
         let state = RenderPipelineDesc {
             cull: CullMode::Back,
             front_face: of.front,

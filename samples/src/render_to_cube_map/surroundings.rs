@@ -11,11 +11,11 @@ use crate::scene::Camera;
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Block {
-    /// Its middle.
+    /// Middle of the block.
     pub middle: [f32; 3],
     /// 1 for squares of two colours in place of its own.
     pub is_floor: u32,
-    /// Half of its width, height and depth.
+    /// Half of the width, height and depth.
     pub half_size: [f32; 3],
     /// Radians about its upright axis.
     pub turn: f32,

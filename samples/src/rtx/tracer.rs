@@ -2,8 +2,8 @@
 
 use bytemuck::NoUninit;
 use lvk::{
-    CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup, Holder,
-    RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, ShaderStage, TextureHandle,
+    BlockLayout, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
+    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, ShaderStage, TextureHandle,
 };
 
 use crate::app::frame::Frame;
@@ -28,6 +28,8 @@ pub(crate) struct RayStages {
     pub(crate) max_recursion: u32,
     /// The compute stage, of work groups of 8 x 8 pixels.
     pub(crate) query: SampleStage,
+    /// Structs that the stages read.
+    pub(crate) layouts: &'static [BlockLayout],
 }
 
 /// One of the two.
@@ -49,7 +51,7 @@ impl Tracer {
     pub(crate) fn new(ctx: &Context, path: RayPath, stages: &RayStages) -> lvk::Result<Self> {
         Ok(match path {
             RayPath::Pipeline => Self::Pipeline(ray_tracing_pipeline(ctx, stages)?),
-            RayPath::Query => Self::Query(compute_pipeline(ctx, stages.sample, stages.query)?),
+            RayPath::Query => Self::Query(query_pipeline(ctx, stages.sample, stages.query, stages.layouts)?),
         })
     }
 
@@ -100,10 +102,20 @@ pub(crate) fn compute_pipeline(
     sample: &str,
     stage: SampleStage,
 ) -> lvk::Result<Holder<ComputePipelineHandle>> {
+    query_pipeline(ctx, sample, stage, &[])
+}
+
+fn query_pipeline(
+    ctx: &Context,
+    sample: &str,
+    stage: SampleStage,
+    layouts: &[BlockLayout],
+) -> lvk::Result<Holder<ComputePipelineHandle>> {
     debug_assert_eq!(stage.stage, ShaderStage::Compute);
     let module = stage.create(ctx, sample)?;
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module: Some(*module),
+        layouts,
         debug_name: stage.name,
         ..ComputePipelineDesc::default()
     })
@@ -123,6 +135,7 @@ fn ray_tracing_pipeline(ctx: &Context, stages: &RayStages) -> lvk::Result<Holder
         miss: &handles(&misses),
         hit_groups: &hit_groups,
         max_recursion: stages.max_recursion,
+        layouts: stages.layouts,
         debug_name: stages.names[0],
         ..RayTracingPipelineDesc::default()
     })

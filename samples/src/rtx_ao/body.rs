@@ -16,7 +16,7 @@ use crate::scene::{Material, Scene};
 #[repr(C)]
 pub(super) struct BodyConstants {
     rows: [f32; 12],
-    /// Of positions, normals, texture coordinates, triangles and paints.
+    /// Addresses of positions, normals, texture coordinates, triangles and paints.
     addresses: [u64; 5],
 }
 

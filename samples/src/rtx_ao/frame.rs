@@ -40,7 +40,7 @@ pub(super) struct Lighting {
     ambient_below: [f32; 3],
 }
 
-/// Of the targets, as textures; those that a path does not draw are 0.
+/// Descriptor slots of the targets as textures; 0 for targets that a path does not draw.
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct TargetIndices {

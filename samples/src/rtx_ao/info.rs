@@ -17,7 +17,7 @@ const TOWN_RADIUS: f32 = 1.8;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct RtxAoArgs {
-    /// Passes that a frame adds to the picture, 1 to 4096: noise falls with each
+    /// Passes that a frame adds to the picture, 1 to 4096; each reduces noise
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = whole(1..=RtxAoConfig::MAX_PASSES))]
     pub passes: u32,
 
@@ -52,13 +52,13 @@ impl SampleInfo for RtxAo {
     const NAME: &'static str = "rtx_ao";
     const ABOUT: &'static str = "Renders a rasterised scene with ray traced sunlight and ambient occlusion, and writes pictures as PNG";
     const DETAILS: &'static str =
-        "Without --scene it shows a town of paper made by code, around a carousel that turns.";
+        "Without --scene the sample renders a generated town of paper around a turning carousel.";
     const EXAMPLES: &'static str = "
-        | a picture, by the best path of the best device
-        --passes 256 | a cleaner one
-        --frames 20 | the same passes added up over twenty frames, each of them timed
+        | a picture, on the most capable device and its fastest path
+        --passes 256 | less noise
+        --frames 20 | passes added up over twenty frames, each timed
         --scene courtyard --camera 2 | the scene of the hybrid sample
-        --rt query --validate | by ray queries in the fragment shader, with validation
+        --rt query --validate | ray queries in the fragment shader, with validation
     ";
     type Args = RtxAoArgs;
     type Sample = Self;

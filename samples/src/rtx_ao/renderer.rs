@@ -1,6 +1,7 @@
-//! The sample as a type: say the view, get a picture that each call improves.
+//! The sample as a type: a renderer of a scene and a view, whose picture improves with each call.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use glam::{Affine3A, Vec3};
 use lvk::{
@@ -199,18 +200,15 @@ impl RtxAo {
 }
 
 impl Sample for RtxAo {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
     /// Begins anew even where nothing moved, so that a frame does not depend on those before.
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         let phase = time.phase();
         self.show(&View { camera: self.path.at(phase), turns: phase });
         self.passes = 0;
-        Ok(())
     }
 
     fn steps_per_frame(&self) -> u64 {
@@ -222,7 +220,7 @@ impl Sample for RtxAo {
         true
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         for pass in 0..self.config.passes {
             if pass > 0 {
                 frame.next_step()?;
@@ -232,7 +230,7 @@ impl Sample for RtxAo {
         Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         let targets = Targets::new(&self.ctx, self.config.rtx.path, extent)?;
         let sums = Cache::sums(&self.ctx, extent)?;
         self.target = self.config.rtx.resize(&self.ctx, extent)?;
@@ -258,7 +256,7 @@ impl Sample for RtxAo {
         ui.label(format!("{} passes in the picture", self.passes));
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         let path = self.config.rtx.path;
         let (raster, rays) = (Raster::new(&self.ctx, path)?, light_rays(&self.ctx, path)?);
         self.cache.pipeline = Cache::pipeline(&self.ctx)?;

@@ -6,7 +6,7 @@ use super::frame::TargetIndices;
 use crate::hybrid::RayPath;
 
 pub(super) const ALBEDO: Format = Format::Rgba16Float;
-/// Of light, position and normals.
+/// Format of light, position and normals.
 pub(super) const NUMBERS: Format = Format::Rgba32Float;
 pub(super) const DEPTH: Format = Format::D32Float;
 

@@ -5,9 +5,9 @@
 
 mod info;
 mod instances;
+mod panel;
 mod pipelines;
 mod renderer;
-mod switches;
 
+pub use panel::{RtxHelloSettings, TlasUpdate};
 pub use renderer::RtxHello;
-pub use switches::{Following, RtxHelloSwitches};

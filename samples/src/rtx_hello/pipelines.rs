@@ -1,5 +1,8 @@
 //! The sample's pipelines as data, with the texts that its stages use.
 
+use lvk::BlockLayout;
+
+use super::renderer::Push;
 use crate::pipelines::{SamplePipeline, shader};
 use crate::rtx::RayStages;
 
@@ -11,6 +14,7 @@ pub(super) const RAYS: RayStages = RayStages {
     hits: &[shader!("rtx_hello", "hello.rchit")],
     max_recursion: 1,
     query: shader!("rtx_hello", "hello.comp"),
+    layouts: &[BlockLayout::push_constants::<Push>()],
 };
 
 /// Returns every pipeline of the sample.

@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -9,8 +10,8 @@ use lvk::{
 };
 
 use super::instances::{CORNERS, groups, places};
+use super::panel::RtxHelloSettings;
 use super::pipelines::RAYS;
-use super::switches::RtxHelloSwitches;
 use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
@@ -28,19 +29,21 @@ pub struct RtxHello {
     tracer: Tracer,
     tlas: Holder<AccelStructHandle>,
     blas: Holder<AccelStructHandle>,
-    switches: RtxHelloSwitches,
+    settings: RtxHelloSettings,
     phase: f32,
     camera: Camera,
     _vertices: Holder<BufferHandle>,
 }
 
-/// `Push` in `shaders/rtx_hello/view.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Push {
-    camera: GpuCamera,
-    tlas: u32,
-    image: u32,
+lvk::shader_struct! {
+    /// `Push` in `shaders/rtx_hello/view.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct Push {
+        camera: GpuCamera,
+        tlas: u32,
+        image: u32,
+    }
 }
 
 impl RtxHello {
@@ -55,9 +58,9 @@ impl RtxHello {
             geometries: &[BlasGeometry::Triangles(Triangles::packed(*vertices, 3))],
             ..BlasDesc::default()
         })?;
-        let switches = RtxHelloSwitches::default();
+        let settings = RtxHelloSettings::default();
         let tlas = ctx.create_tlas(&TlasDesc {
-            instances: &instances(*blas, 0.0, &switches),
+            instances: &instances(*blas, 0.0, &settings),
             flags: BuildFlags::ALLOW_UPDATE,
             ..TlasDesc::default()
         })?;
@@ -69,7 +72,7 @@ impl RtxHello {
             tracer,
             tlas,
             blas,
-            switches,
+            settings,
             phase: 0.0,
             camera: camera(),
             _vertices: vertices,
@@ -82,34 +85,31 @@ impl RtxHello {
     }
 
     /// Settings of the panel, which take effect with the next frame.
-    pub fn switches(&mut self) -> &mut RtxHelloSwitches {
-        &mut self.switches
+    pub fn settings(&mut self) -> &mut RtxHelloSettings {
+        &mut self.settings
     }
 }
 
 impl Sample for RtxHello {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.phase = time.phase();
         self.camera = camera();
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let [width, height] = self.config.extent();
         let camera = GpuCamera::new(&self.camera, width, height, 0.0);
         let push = Push { camera, tlas: self.tlas.index(), image: self.target.image_index() };
-        let instances = instances(*self.blas, self.phase, &self.switches);
-        frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &instances, self.switches.mode()))?;
+        let instances = instances(*self.blas, self.phase, &self.settings);
+        frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &instances, self.settings.mode()))?;
         Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = self.config.resize(&self.ctx, extent)?;
         Ok(())
     }
@@ -119,10 +119,10 @@ impl Sample for RtxHello {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        self.switches.show(ui);
+        self.settings.show(ui);
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
         Ok(())
     }
@@ -133,10 +133,10 @@ fn camera() -> Camera {
     Camera::looking_at([0.0, 0.0, 3.2], [0.0; 3], 2.0 * HALF_HEIGHT.atan().to_degrees())
 }
 
-fn instances(blas: AccelStructHandle, phase: f32, switches: &RtxHelloSwitches) -> Vec<TlasInstance> {
+fn instances(blas: AccelStructHandle, phase: f32, settings: &RtxHelloSettings) -> Vec<TlasInstance> {
     let instance = |(place, group)| TlasInstance {
         transform: transform_rows(&place),
-        mask: switches.mask(group),
+        mask: settings.mask(group),
         ..TlasInstance::new(blas)
     };
     places(phase).into_iter().zip(groups()).map(instance).collect()

@@ -31,8 +31,8 @@ impl RtxPipelineConfig {
         Self { rtx, depth: 4 }
     }
 
-    /// With a path and a depth that the device has: pipelines that cannot even trace a shadow ray from a hit shader leave it
-    /// to queries, where there are any.
+    /// Returns a path and a depth that the device supports. Pipelines that cannot trace a shadow ray from a hit shader leave it
+    /// to queries, if the device has them.
     pub(super) fn valid_for(self, capabilities: &Capabilities) -> Self {
         let levels = capabilities.limits.max_ray_recursion;
         let depth = self.depth.min(Self::MAX_DEPTH);

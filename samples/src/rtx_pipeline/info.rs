@@ -12,7 +12,7 @@ use crate::rtx::RtxConfig;
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct RtxPipelineArgs {
-    /// Maximum number of reflections and refractions of a ray, 0 to 16; pipelines of some devices cannot trace so deep
+    /// Maximum number of reflections and refractions of a ray, 0 to 16; pipelines of some devices allow less
     #[arg(long, value_name = "N", default_value_t = 4)]
     #[arg(value_parser = whole(0..=RtxPipelineConfig::MAX_DEPTH), help_heading = "Rendering")]
     pub depth: u32,
@@ -29,13 +29,13 @@ pub struct RtxPipelineArgs {
 impl SampleInfo for RtxPipeline {
     const NAME: &'static str = "rtx_pipeline";
     const ABOUT: &'static str = "Renders a textured scene by a ray tracing pipeline whose hit shaders trace on, and writes pictures as PNG";
-    const DETAILS: &'static str = "Without --scene it shows a courtyard made by code.";
+    const DETAILS: &'static str = "Without --scene the sample renders a generated courtyard.";
     const EXAMPLES: &'static str = "
-        | the courtyard, by the best path of the best device
-        --rt pipeline --depth 0 | shadows alone
+        | the courtyard, on the most capable device and its fastest path
+        --rt pipeline --depth 0 | shadows only
         --scene kitchen.obj --camera 3 | an OBJ through its third camera
-        --rt query --validate | by ray queries in a compute shader, with validation
-        --profile mali-g715 | as on a phone: ray queries, split meshes
+        --rt query --validate | ray queries in a compute shader, with validation
+        --profile mali-g715 | emulates a phone: ray queries, split meshes
     ";
     const ROUND: &'static str = "one round through all cameras";
     type Args = RtxPipelineArgs;

@@ -6,11 +6,11 @@
 
 mod config;
 mod info;
+mod panel;
 mod pipelines;
 mod renderer;
-mod switches;
 
 pub use config::RtxPipelineConfig;
 pub use info::RtxPipelineArgs;
+pub use panel::RtxPipelineSettings;
 pub use renderer::RtxPipeline;
-pub use switches::RtxPipelineSwitches;

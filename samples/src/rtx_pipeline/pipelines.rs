@@ -1,6 +1,9 @@
 //! The sample's pipelines as data, with the texts that their stages use.
 
+use lvk::BlockLayout;
+
 use super::RtxPipelineConfig;
+use super::renderer::FrameConstants;
 use crate::pipelines::{SamplePipeline, shader};
 use crate::rtx::RayStages;
 
@@ -15,6 +18,7 @@ pub(super) const RAYS: RayStages = RayStages {
     hits: &[shader!("rtx_pipeline", "solid.rchit"), shader!("rtx_pipeline", "glass.rchit")],
     max_recursion: RtxPipelineConfig::MAX_RECURSION,
     query: shader!("rtx_pipeline", "picture.comp"),
+    layouts: &[BlockLayout::buffer_reference::<FrameConstants>("Frame")],
 };
 
 /// Returns every pipeline of the sample.

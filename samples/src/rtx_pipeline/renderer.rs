@@ -1,13 +1,14 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{Context, TextureHandle};
 
 use super::config::RtxPipelineConfig;
+use super::panel::RtxPipelineSettings;
 use super::pipelines::RAYS;
-use super::switches::RtxPipelineSwitches;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneFrame, near_plane};
@@ -26,18 +27,20 @@ pub struct RtxPipeline {
     tracer: Tracer,
     constants: FrameConstants,
     lighting: Lighting,
-    switches: RtxPipelineSwitches,
+    settings: RtxPipelineSettings,
     tour: CameraTour,
     near_plane: f32,
 }
 
-/// `Frame` in `shaders/rtx_pipeline/frame.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct FrameConstants {
-    scene: SceneFrame,
-    image: u32,
-    depth: u32,
+lvk::shader_struct! {
+    /// `Frame` in `shaders/rtx_pipeline/frame.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct FrameConstants {
+        scene as scene_frame: SceneFrame,
+        image: u32,
+        depth: u32,
+    }
 }
 
 impl RtxPipeline {
@@ -51,7 +54,7 @@ impl RtxPipeline {
         let target = config.rtx.create_target(ctx)?;
         let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
         let lighting = Lighting::new(scene);
-        let switches = RtxPipelineSwitches { depth: config.depth, lights: lighting.light_count() };
+        let settings = RtxPipelineSettings { depth: config.depth, lights: lighting.light_count() };
         let constants = FrameConstants {
             scene: SceneFrame {
                 camera: GpuCamera::zeroed(),
@@ -75,7 +78,7 @@ impl RtxPipeline {
             config,
             constants,
             lighting,
-            switches,
+            settings,
         })
     }
 
@@ -97,13 +100,13 @@ impl RtxPipeline {
     }
 
     /// Settings of the panel, which take effect with the next frame.
-    pub fn switches(&mut self) -> &mut RtxPipelineSwitches {
-        &mut self.switches
+    pub fn settings(&mut self) -> &mut RtxPipelineSettings {
+        &mut self.settings
     }
 
     /// The initial and largest values of the settings.
-    fn all_switches(&self) -> RtxPipelineSwitches {
-        RtxPipelineSwitches { depth: self.config.depth, lights: self.lighting.light_count() }
+    fn default_settings(&self) -> RtxPipelineSettings {
+        RtxPipelineSettings { depth: self.config.depth, lights: self.lighting.light_count() }
     }
 
     /// Parts that the library made of the bottom-level structures, which are two at most.
@@ -113,27 +116,24 @@ impl RtxPipeline {
 }
 
 impl Sample for RtxPipeline {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.tour.go_to(time.phase());
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let [width, height] = self.config.rtx.extent();
-        self.constants.depth = self.switches.depth.min(self.config.depth);
-        self.constants.scene.lighting = self.lighting.with_lights(self.switches.lights);
+        self.constants.depth = self.settings.depth.min(self.config.depth);
+        self.constants.scene.lighting = self.lighting.with_lights(self.settings.lights);
         self.constants.scene.camera = GpuCamera::new(&self.tour.camera, width, height, self.near_plane);
         let push = frame.cmd.upload(&self.constants)?;
         Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = self.config.rtx.resize(&self.ctx, extent)?;
         self.constants.image = self.target.image_index();
         Ok(())
@@ -144,12 +144,12 @@ impl Sample for RtxPipeline {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        let most = self.all_switches();
-        self.switches.show(ui, &most);
+        let most = self.default_settings();
+        self.settings.show(ui, &most);
         ui.label(format!("{} triangles", self.triangle_count()));
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.tracer = tracer(&self.ctx, &self.config)?;
         Ok(())
     }

@@ -6,9 +6,9 @@
 
 mod info;
 mod models;
+mod panel;
 mod pipelines;
 mod renderer;
-mod switches;
 
+pub use panel::RtxTexturesSettings;
 pub use renderer::RtxTextures;
-pub use switches::RtxTexturesSwitches;

@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 
 /// Half a side of the ground.
 const GROUND: f32 = 300.0;
-/// From the middle of a ring to the middle of its tube, and the radius of that.
+/// Distance from the middle of a ring to the middle of the tube, and the radius of the tube.
 const RING: [f32; 2] = [0.36, 0.15];
 
 /// `Vertex` in `shaders/rtx_textures/frame.glsl`.
@@ -51,7 +51,7 @@ impl Models {
         });
     }
 
-    /// With corners at distances of 1 from the middle along each axis.
+    /// Adds a crate, whose corners are 1 from the middle along each axis.
     fn add_crate(&mut self) {
         for side in 0..6 {
             let normal = if side < 3 { Vec3::AXES[side] } else { -Vec3::AXES[side - 3] };

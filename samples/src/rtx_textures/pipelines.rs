@@ -1,5 +1,8 @@
 //! The sample's pipelines as data, with the texts that their stages use.
 
+use lvk::BlockLayout;
+
+use super::renderer::FrameConstants;
 use crate::pipelines::{SamplePipeline, SampleStage, shader};
 use crate::rtx::RayStages;
 
@@ -13,6 +16,7 @@ pub(super) const RAYS: RayStages = RayStages {
     hits: &[shader!("rtx_textures", "painted.rchit"), shader!("rtx_textures", "glazed.rchit")],
     max_recursion: 1,
     query: shader!("rtx_textures", "textures.comp"),
+    layouts: &[BlockLayout::buffer_reference::<FrameConstants>("Frame")],
 };
 
 /// Returns every pipeline of the sample.

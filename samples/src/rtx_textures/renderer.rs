@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
@@ -12,8 +13,8 @@ use lvk::{
 };
 
 use super::models::{Models, Vertex};
+use super::panel::RtxTexturesSettings;
 use super::pipelines::{INSTANCES, RAYS};
-use super::switches::RtxTexturesSwitches;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
@@ -25,7 +26,7 @@ use crate::scene::{Camera, GpuCamera, painted_textures};
 pub(super) const TEXTURES: usize = 6;
 /// Things in a row and in a column (`kColumns` in `shaders/rtx_textures/instances.comp.glsl`).
 const COLUMNS: u32 = 13;
-/// They and the ground.
+/// Number of instances: the things and the ground.
 pub(super) const INSTANCE_COUNT: u32 = COLUMNS * COLUMNS + 1;
 /// Bytes of an instance.
 const RECORD_BYTES: u64 = 64;
@@ -46,7 +47,7 @@ pub struct RtxTextures {
     camera: Camera,
     textures: [u32; TEXTURES],
     samplers: [Holder<SamplerHandle>; 2],
-    switches: RtxTexturesSwitches,
+    settings: RtxTexturesSettings,
     _held: Held,
 }
 
@@ -57,21 +58,23 @@ struct Held {
     _textures: Vec<Holder<TextureHandle>>,
 }
 
-/// `Frame` in `shaders/rtx_textures/frame.glsl`.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct FrameConstants {
-    camera: GpuCamera,
-    vertices: u64,
-    triangles: u64,
-    records: u64,
-    textures: [u32; TEXTURES],
-    first_triangle: [u32; 3],
-    tlas: u32,
-    image: u32,
-    sampler: u32,
-    count: u32,
-    phase: f32,
+lvk::shader_struct! {
+    /// `Frame` in `shaders/rtx_textures/frame.glsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(super) struct FrameConstants {
+        camera: GpuCamera,
+        vertices: u64,
+        triangles: u64,
+        records: u64,
+        textures: [u32; TEXTURES],
+        first_triangle: [u32; 3],
+        tlas: u32,
+        image: u32,
+        sampler as smp: u32,
+        count: u32,
+        phase: f32,
+    }
 }
 
 impl RtxTextures {
@@ -119,7 +122,7 @@ impl RtxTextures {
             camera: camera(0.0),
             textures: std::array::from_fn(|number| textures[number % textures.len()].index()),
             samplers: [sampler(ctx, Filter::Nearest)?, sampler(ctx, Filter::Linear)?],
-            switches: RtxTexturesSwitches::default(),
+            settings: RtxTexturesSettings::default(),
             _held: Held { _blas: blas, _buffers: [vertices, triangles], _textures: textures },
         })
     }
@@ -130,21 +133,21 @@ impl RtxTextures {
         self.camera = camera(phase);
     }
 
-    /// Instances that the compute shader writes where the switches take none away.
+    /// Instances that the compute shader writes where the settings take none away.
     pub fn instance_count(&self) -> u32 {
         INSTANCE_COUNT
     }
 
     /// Settings of the panel, which take effect with the next frame.
-    pub fn switches(&mut self) -> &mut RtxTexturesSwitches {
-        &mut self.switches
+    pub fn settings(&mut self) -> &mut RtxTexturesSettings {
+        &mut self.settings
     }
 
-    fn apply_switches(&mut self) {
-        let switches = &self.switches;
-        self.constants.count = switches.instance_count();
-        self.constants.textures = switches.ordered(&self.textures);
-        self.constants.sampler = self.samplers[usize::from(switches.is_filtered)].index();
+    fn apply_settings(&mut self) {
+        let settings = &self.settings;
+        self.constants.count = settings.instance_count();
+        self.constants.textures = settings.ordered(&self.textures);
+        self.constants.sampler = self.samplers[usize::from(settings.is_filtered)].index();
     }
 
     /// Textures that they show.
@@ -167,20 +170,17 @@ impl RtxTextures {
 }
 
 impl Sample for RtxTextures {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.show(time.phase());
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let [width, height] = self.config.extent();
-        self.apply_switches();
+        self.apply_settings();
         self.constants.camera = GpuCamera::new(&self.camera, width, height, 0.1);
         let constants = frame.cmd.upload(&self.constants)?;
         frame.pass("instances", |cmd| self.write_instances(cmd, constants))?;
@@ -188,7 +188,7 @@ impl Sample for RtxTextures {
         Ok(self.tracer.record_image(frame, &self.target, &constants)?)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = self.config.resize(&self.ctx, extent)?;
         self.constants.image = self.target.image_index();
         Ok(())
@@ -199,10 +199,10 @@ impl Sample for RtxTextures {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        self.switches.show(ui);
+        self.settings.show(ui);
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         let writer = compute_pipeline(&self.ctx, RAYS.sample, INSTANCES)?;
         self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
         self.writer = writer;

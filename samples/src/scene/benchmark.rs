@@ -31,7 +31,7 @@ const KNOWN: [(&str, usize, f32); 3] =
     [("living_room", 601_209, 1.0), ("conference", 331_179, 0.003), ("kitchen", 1_021_815, 1.0)];
 
 /// Scale, light and cameras of a benchmark scene.
-pub(super) struct Benchmark {
+pub(super) struct BenchmarkScene {
     /// Factor from file units to metres.
     pub scale: f32,
     /// Light and cameras, in metres.
@@ -40,12 +40,12 @@ pub(super) struct Benchmark {
 
 /// The benchmark scene whose file has the stem `name` and about `triangle_count` triangles (5 % more or less:
 /// exporters differ). Another file of that name is no benchmark scene.
-pub(super) fn find(name: &str, triangle_count: usize) -> Option<Benchmark> {
+pub(super) fn find(name: &str, triangle_count: usize) -> Option<BenchmarkScene> {
     let (_, _, scale) = KNOWN.into_iter().find(|&(known, count, _)| {
         known == name && triangle_count.abs_diff(count).saturating_mul(20) <= count
     })?;
     let mut all = camera_file::parse(Path::new("built-in"), VIEWS).ok()?.into_iter();
-    all.find(|views| views.name == name).map(|views| Benchmark { scale, views })
+    all.find(|views| views.name == name).map(|views| BenchmarkScene { scale, views })
 }
 
 #[cfg(test)]

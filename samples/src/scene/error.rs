@@ -8,7 +8,7 @@ pub enum SceneError {
     /// The load was cancelled.
     #[error(transparent)]
     Stopped(#[from] crate::app::loading::Stopped),
-    /// There is no such file.
+    /// The file does not exist.
     #[error("no such file: {}", path.display())]
     NotFound {
         /// The path as given.
@@ -62,7 +62,7 @@ pub enum SceneError {
         /// Number in the file.
         count: usize,
     },
-    /// There is nothing to draw.
+    /// The scene has nothing to draw.
     #[error("{} has no triangle with an area ({degenerate} without); nothing to draw", path.display())]
     Empty {
         /// The path as given.

@@ -15,7 +15,7 @@ const WALL_DEPTH: f32 = 0.06;
 
 /// Light and five cameras for a mesh about which nothing is known.
 pub(super) fn views(mesh: &Mesh) -> Views {
-    let inside = is_room(&mesh.positions, &mesh.triangles).then(|| interior::views(mesh)).flatten();
+    let inside = is_interior(&mesh.positions, &mesh.triangles).then(|| interior::views(mesh)).flatten();
     inside.unwrap_or_else(|| around(mesh))
 }
 
@@ -59,7 +59,7 @@ fn bits(i: u32) -> [bool; 3] {
 
 /// True if the mesh surrounds its middle: at least four sides of the bounding box are covered by surfaces, and
 /// these do not all face outwards as those of a solid block do.
-pub(super) fn is_room(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> bool {
+pub(super) fn is_interior(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> bool {
     let (low, high) = bounds_of(positions);
     let size = Vec3::from(high) - Vec3::from(low);
     let (mut covered, mut outward, mut within) = ([0.0f32; 6], 0.0, 0.0);
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_block_is_seen_whole_from_outside() {
         let block = hollow(false, false);
-        assert!(!is_room(&block.positions, &block.triangles));
+        assert!(!is_interior(&block.positions, &block.triangles));
         let views = views(&block);
         assert_eq!(views.cameras.len(), 5);
         for camera in &views.cameras {
@@ -138,10 +138,10 @@ mod tests {
     }
 
     #[test]
-    fn a_room_is_seen_from_inside() {
+    fn an_interior_is_seen_from_inside() {
         for open in [false, true] {
             let room = hollow(true, open);
-            assert!(is_room(&room.positions, &room.triangles));
+            assert!(is_interior(&room.positions, &room.triangles));
             let views = views(&room);
             assert_eq!(views.cameras.len(), 5);
             let inside = |p: [f32; 3]| p.iter().all(|x| x.abs() < 1.0);

@@ -5,21 +5,23 @@ use glam::Vec3;
 
 use super::Camera;
 
-/// Bytes by which the shaders know a camera (`shaders/common/camera.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct GpuCamera {
-    eye: [f32; 3],
-    near_plane: f32,
-    forward: [f32; 3],
-    pixel_spread: f32,
-    right: [f32; 3],
-    width: u32,
-    down: [f32; 3],
-    height: u32,
-    clip_right: [f32; 3],
-    clip_down: [f32; 3],
-    shift: [f32; 2],
+lvk::shader_struct! {
+    /// Bytes by which the shaders know a camera (`shaders/common/camera.glsl`).
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuCamera {
+        eye: [f32; 3],
+        near_plane: f32,
+        forward: [f32; 3],
+        pixel_spread: f32,
+        right: [f32; 3],
+        width: u32,
+        down: [f32; 3],
+        height: u32,
+        clip_right: [f32; 3],
+        clip_down: [f32; 3],
+        shift: [f32; 2],
+    }
 }
 
 impl GpuCamera {

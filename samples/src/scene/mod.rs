@@ -173,8 +173,8 @@ impl Scene {
     }
 
     /// True if it surrounds its middle, as rooms do.
-    pub(crate) fn is_room(&self) -> bool {
-        framing::is_room(&self.positions, &self.triangles)
+    pub(crate) fn is_interior(&self) -> bool {
+        framing::is_interior(&self.positions, &self.triangles)
     }
 
     /// Smallest box around all positions, as (minimum, maximum) in scene units.

@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn the_image_name_is_found_behind_options() {
+    fn the_image_name_follows_the_options() {
         for (text, name) in [
             ("wood.png", "wood.png"),
             ("-s 2 2 1 my wood.png", "my wood.png"),
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_named_and_stood_in_for() {
+    fn missing_materials_are_named_and_replaced() {
         let (found, warnings) =
             materials("newmtl m\nmap_Kd maps\\absent.png\nnewmtl other\nmap_Kd maps/absent.png\n");
         assert_eq!(found[0].albedo_texture, Some(0));

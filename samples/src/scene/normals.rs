@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gentle_fold_is_smooth_even_between_split_vertices() {
+    fn a_gentle_bend_is_smooth_even_between_split_vertices() {
         let positions = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [-1.0, -0.2, 0.0], [1.0, -0.2, 0.0]];
         let doubled = [positions[0], positions[1], positions[2], positions[0], positions[1], positions[3]];
         let mut fold = mesh(&doubled, &[[0, 2, 1], [3, 4, 5]]);

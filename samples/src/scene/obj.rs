@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_drawn_is_refused() {
+    fn scenes_that_cannot_be_drawn_are_refused() {
         let missing = load(Path::new("/nowhere/a.obj"), &ObjOptions::default(), &mut Progress::hidden());
         assert!(matches!(missing, Err(SceneError::NotFound { .. })));
         let flat = load_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", &[]);

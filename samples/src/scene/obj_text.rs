@@ -439,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_mesh_is_refused() {
+    fn text_without_a_mesh_is_refused() {
         assert!(matches!(cleaned(b"\x89PNG\r\n\x1a\n\0\0"), Err(SceneError::NotObj { .. })));
         assert!(matches!(cleaned(b"hello world\n"), Err(SceneError::NotObj { .. })));
         assert!(matches!(cleaned(b""), Err(SceneError::NotObj { .. })));
@@ -494,7 +494,7 @@ mod tests {
         }
 
         #[test]
-        fn what_passes_is_accepted_by_the_parser(lines in proptest::collection::vec(
+        fn the_parser_accepts_checked_text(lines in proptest::collection::vec(
             prop_oneof![
                 "v( -?[0-9]{1,3}(\\.[0-9])?){3,5}", "vt( [0-9]){0,3}", "vn( [0-9]){0,3}",
                 "f( -?[0-9]{1,2}(/[0-9]?(/-?[0-9]?)?)?){0,5}", "usemtl [a-c]?", "o", "\\PC{0,20}",

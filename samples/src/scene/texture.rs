@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn images_are_found_by_foreign_paths_and_capitals() {
+    fn images_are_opened_by_foreign_paths_and_capitals() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("textures")).unwrap();
         std::fs::write(folder.path().join("textures/Wood.PNG"), b"").unwrap();

@@ -13,7 +13,7 @@ pub struct Draw {
     pub triangle_count: u32,
     /// Lowest corner of the box around them.
     pub low: [f32; 3],
-    /// Its highest corner.
+    /// Highest corner of the box.
     pub high: [f32; 3],
 }
 

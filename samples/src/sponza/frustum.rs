@@ -18,7 +18,7 @@ impl Frustum {
     /// Everything.
     pub const ALL: Self = Self { planes: [NO_PLANE; 6] };
 
-    /// Of a camera that has no far plane, for pictures `aspect` times as wide as high.
+    /// Returns the frustum of a camera without a far plane, for pictures `aspect` times as wide as high.
     #[must_use]
     pub fn of_camera(camera: &Camera, aspect: f32, near: f32) -> Self {
         let [right, up, forward] = camera.frame().map(Vec3::from);
@@ -41,8 +41,8 @@ impl Frustum {
         }
     }
 
-    /// Of a view whose clip coordinates are rows of an affine matrix: x and y from -1 to 1, z from 0 to 1.
-    pub(super) fn of_rows([x, y, z]: [[f32; 4]; 3]) -> Self {
+    /// Returns the frustum of a view whose clip coordinates are rows of an affine matrix: x and y from -1 to 1, z from 0 to 1.
+    pub(super) fn from_clip_matrix([x, y, z]: [[f32; 4]; 3]) -> Self {
         let planes =
             [(x, 1.0, 1.0), (x, -1.0, 1.0), (y, 1.0, 1.0), (y, -1.0, 1.0), (z, 1.0, 0.0), (z, -1.0, 1.0)];
         let plane = |(row, sign, offset): ([f32; 4], f32, f32)| {
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_behind_or_beside_is_not_seen() {
+    fn boxes_behind_or_beside_are_outside() {
         let frustum = Frustum::of_camera(&camera(), ASPECT, 0.1);
         let [right, up, forward] = camera().frame().map(Vec3::from);
         let seen = |offset: Vec3| {

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct SponzaArgs {
-    /// Samples a pixel, 1 or 4
+    /// Samples per pixel, 1 or 4
     #[arg(
         long,
         value_name = "N",
@@ -22,15 +22,15 @@ pub struct SponzaArgs {
     )]
     pub msaa: u32,
 
-    /// Draw everything, seen or not; the picture is the same
+    /// Draw everything, visible or not; the picture is the same
     #[arg(long)]
     pub no_culling: bool,
 
-    /// Method of drawing the objects left after culling [default: counted where the device can]
+    /// Method of drawing the objects left after culling [default: counted, if the device supports it]
     #[arg(long, value_enum)]
     pub draws: Option<DrawPath>,
 
-    /// Most triangles of a draw, 1 to 1000000
+    /// Maximum triangles of a draw, 1 to 1000000
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = whole(1..=1_000_000))]
     pub draw_triangles: u32,
 
@@ -39,11 +39,11 @@ pub struct SponzaArgs {
     #[arg(value_parser = whole(16..=SponzaConfig::MAX_SHADOW_SIZE))]
     pub shadow_size: u32,
 
-    /// Texels to each side that shadows are filtered over, 0 to 4
+    /// Radius of the shadow filter in texels, 0 to 4
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = whole(0..=SponzaConfig::MAX_FILTER))]
     pub filter: u32,
 
-    /// Leave normal maps (`norm`, `map_bump`) out
+    /// Ignore normal maps (`norm`, `map_bump`)
     #[arg(long)]
     pub no_normal_maps: bool,
 
@@ -83,12 +83,12 @@ impl SampleInfo for Sponza {
     const NAME: &'static str = "sponza";
     const ABOUT: &'static str =
         "Rasterises a large textured scene with shadows, culled on the GPU, and writes pictures as PNG";
-    const DETAILS: &'static str = "Without --scene it shows a columned atrium made by code.";
+    const DETAILS: &'static str = "Without --scene the sample renders a generated atrium with columns.";
     const EXAMPLES: &'static str = "
-        | the atrium, by the best device
+        | the atrium, on the most capable device
         --scene crytek_sponza.obj --camera 2 | an OBJ through its second camera
-        --msaa 1 --filter 0 --no-culling | the plainest picture
-        --window --hot-reload | in a window, whose shaders can be changed meanwhile
+        --msaa 1 --filter 0 --no-culling | one sample, hard shadows, everything drawn
+        --window --hot-reload | in a window, with hot reload of shaders
     ";
     const ROUND: &'static str = "one round through all cameras";
     type Args = SponzaArgs;

@@ -28,7 +28,7 @@ pub(super) const SHADOW: RasterPipeline = RasterPipeline {
     samples: 1,
     view_mask: 0,
 };
-/// Of four samples a pixel.
+/// Pipeline of the surfaces, of four samples a pixel.
 pub(super) const SURFACES: RasterPipeline =
     RasterPipeline::with_depth(SAMPLE, "sponza: surfaces", &SURFACE_STAGES);
 /// The sky where no surface hides it, of four samples a pixel.

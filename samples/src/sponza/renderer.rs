@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use glam::{Quat, Vec3};
 use lvk::{
@@ -134,7 +135,7 @@ impl Sponza {
             return [Frustum::ALL; 2];
         }
         let seen = || Frustum::of_camera(&self.tour.camera, self.target.aspect(), self.near_plane);
-        [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
+        [self.kept.unwrap_or_else(seen), Frustum::from_clip_matrix(self.sun_view().rows)]
     }
 
     /// Returns the number of draws of the camera and of the sun after culling in the last frame. Waits for the frame.
@@ -239,18 +240,15 @@ impl Sponza {
 }
 
 impl Sample for Sponza {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.tour.go_to(time.phase());
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         let address = self.upload_frame(&mut frame.cmd)?;
         frame.pass("culling", |cmd| self.culling.record(cmd, address))?;
         self.shadow.record(&mut frame.cmd, &self.culling, self.path_of_draws, address)?;
@@ -258,7 +256,7 @@ impl Sample for Sponza {
         Ok(self.target.image())
     }
 
-    fn after_frame(&mut self) -> Result<(), SampleError> {
+    fn after_frame(&mut self) -> Result<(), RunError> {
         self.draw_counts.counts = Some(self.counts()?);
         Ok(())
     }
@@ -267,7 +265,7 @@ impl Sample for Sponza {
         self.draw_counts.counts.map(|counts| format!("culling   {}", self.draw_counts_text(counts)))
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::with_samples(&self.ctx, extent, self.config.samples)?;
         self.config.extent = extent;
         Ok(())
@@ -302,7 +300,7 @@ impl Sample for Sponza {
         }
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         let samples = self.config.samples;
         let (surfaces, sky) = (pipeline(&self.ctx, &SURFACES, samples)?, pipeline(&self.ctx, &SKY, samples)?);
         let (culling, shadow) = (Culling::pipeline(&self.ctx)?, Shadow::pipeline(&self.ctx)?);

@@ -11,7 +11,7 @@ use crate::scene::PAINTED;
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct TriplanarArgs {
-    /// Textures to unload, with commas between them: a placeholder is shown in their place
+    /// Textures to unload, separated by commas; frames show a placeholder instead
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     #[arg(value_parser = PossibleValuesParser::new(PAINTED.map(|painted| painted.name)))]
     #[arg(help_heading = "Rendering")]
@@ -30,9 +30,9 @@ impl SampleInfo for Triplanar {
     const ABOUT: &'static str =
         "Draws bodies without texture coordinates, by textures along three axes, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, by the best device
-        --window | in a window, where textures come and go
-        --unload brick,leaves --validate | what a placeholder looks like, with validation
+        | a picture, on the most capable device
+        --window | in a window, where textures load and unload
+        --unload brick,leaves --validate | two placeholders, with validation
     ";
     type Args = TriplanarArgs;
     type Sample = Self;

@@ -11,7 +11,7 @@ use crate::scene::PAINTED;
 /// A request for a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct LoadRequest {
-    /// Its number in [`PAINTED`].
+    /// Number of the texture in [`PAINTED`].
     pub(super) number: usize,
     /// Distinguishes requests for the same texture.
     pub(super) ticket: u64,

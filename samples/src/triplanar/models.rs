@@ -78,7 +78,7 @@ impl Models {
     }
 }
 
-/// From pole to pole, with a radius of 1.
+/// Returns a point of the unit sphere; `v` runs from pole to pole.
 fn on_ball(u: f32, v: f32) -> Vec3 {
     let ((sine, cosine), (ring, height)) = ((TAU * u).sin_cos(), (PI * v).sin_cos());
     Vec3::new(ring * cosine, -height, ring * sine)

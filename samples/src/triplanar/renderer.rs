@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
@@ -107,7 +108,7 @@ impl Triplanar {
         self.textures.unload(number);
     }
 
-    /// Has a texture made again that is away; frames show the placeholder until it is there.
+    /// Loads an unloaded texture again; frames show the placeholder until the texture is loaded.
     pub fn load(&mut self, number: usize) {
         self.textures.load(number);
     }
@@ -150,19 +151,16 @@ impl Triplanar {
 }
 
 impl Sample for Triplanar {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.constants.phase = time.phase();
         self.camera = camera(time.phase());
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         self.take_turns();
         self.textures.take_in()?;
         let constants = self.upload(&mut frame.cmd)?;
@@ -177,7 +175,7 @@ impl Sample for Triplanar {
         Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         Ok(())
     }
@@ -204,7 +202,7 @@ impl Sample for Triplanar {
         self.constants.by_angles = by_angles.into();
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         self.pipeline = pipeline(&self.ctx)?;
         Ok(())
     }

@@ -11,11 +11,11 @@ pub(super) const COUNT: usize = PAINTED.len();
 /// The state of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Residency {
-    /// It is shown.
+    /// Loaded; frames show the texture.
     Resident,
-    /// It is being made, and the placeholder shown.
+    /// Being loaded; frames show the placeholder.
     Loading,
-    /// It is not, and the placeholder shown.
+    /// Not loaded; frames show the placeholder.
     Unloaded,
 }
 
@@ -29,13 +29,13 @@ pub(super) struct Streamed {
 
 enum Slot {
     Resident(Holder<TextureHandle>),
-    /// With the ticket of the request.
+    /// Being loaded, with the ticket of the request.
     Loading(u64),
     Unloaded,
 }
 
 impl Streamed {
-    /// With no texture but the placeholder.
+    /// Creates the slots with no texture but the placeholder.
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
         let slots = [const { Slot::Unloaded }; COUNT];
         Ok(Self { loader: Loader::new(ctx)?, placeholder: placeholder(ctx)?, slots, tickets: 0 })
@@ -65,7 +65,7 @@ impl Streamed {
         }
     }
 
-    /// Has a texture made that is away; some later frame shows it.
+    /// Requests an unloaded texture; a later frame shows it.
     pub(super) fn load(&mut self, number: usize) {
         if let Some(slot @ Slot::Unloaded) = self.slots.get_mut(number) {
             self.tickets += 1;

@@ -19,11 +19,11 @@ pub enum YuvFormat {
 /// The matrix between Y'CbCr and colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum YuvModel {
-    /// Of standard definition.
+    /// Matrix of standard definition.
     Bt601,
-    /// Of high definition.
+    /// Matrix of high definition.
     Bt709,
-    /// Of ultra high definition.
+    /// Matrix of ultra high definition.
     Bt2020,
 }
 
@@ -56,7 +56,7 @@ pub struct YuvConfig {
     /// Pixels in a row, and rows, of what is rendered.
     pub extent: [u32; 2],
     /// Those of the moving picture: even, 2 to 4096.
-    pub film: [u32; 2],
+    pub video_size: [u32; 2],
     /// The memory layout of its planes; `None` for the first that the device supports.
     pub format: Option<YuvFormat>,
     /// The matrix.
@@ -72,12 +72,12 @@ impl YuvConfig {
     #[must_use]
     pub fn new(extent: [u32; 2]) -> Self {
         let (model, range) = (YuvModel::Bt709, YuvRange::Narrow);
-        Self { extent, film: [640, 360], format: None, model, range, shows_planes: false }
+        Self { extent, video_size: [640, 360], format: None, model, range, shows_planes: false }
     }
 
-    /// With every number in its range.
+    /// Clamps every number to its range.
     pub(super) fn clamped(self) -> Self {
-        Self { film: self.film.map(|side| side.clamp(2, 4096) & !1), ..self }
+        Self { video_size: self.video_size.map(|side| side.clamp(2, 4096) & !1), ..self }
     }
 }
 
@@ -155,9 +155,9 @@ mod tests {
     }
 
     #[test]
-    fn sizes_of_films_are_even() {
-        let film = |film| YuvConfig { film, ..YuvConfig::new([8, 8]) }.clamped().film;
-        assert_eq!(film([0, 7]), [2, 6]);
-        assert_eq!(film([u32::MAX, 360]), [4096, 360]);
+    fn sizes_of_videos_are_even() {
+        let video_size = |video_size| YuvConfig { video_size, ..YuvConfig::new([8, 8]) }.clamped().video_size;
+        assert_eq!(video_size([0, 7]), [2, 6]);
+        assert_eq!(video_size([u32::MAX, 360]), [4096, 360]);
     }
 }

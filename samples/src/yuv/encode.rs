@@ -1,16 +1,21 @@
-//! From colours to planes of Y'CbCr.
+//! Encoder from colours to planes of Y'CbCr.
 
 use glam::Vec3;
 
 use super::config::{YuvFormat, YuvModel, YuvRange};
-use super::film::Film;
+use super::synthetic_video::SyntheticVideo;
 
 /// The planes of a picture, one after the other, as they lie in memory.
-pub(super) fn planes(film: &Film, format: YuvFormat, model: YuvModel, range: YuvRange) -> Vec<Vec<u8>> {
-    let [width, height] = film.size;
+pub(super) fn planes(
+    video: &SyntheticVideo,
+    format: YuvFormat,
+    model: YuvModel,
+    range: YuvRange,
+) -> Vec<Vec<u8>> {
+    let [width, height] = video.size;
     let pixels = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
-    let all: Vec<Vec3> = pixels.map(|(column, row)| differences(film.color(column, row), model)).collect();
-    let halved = halve(&all, film.size);
+    let all: Vec<Vec3> = pixels.map(|(column, row)| differences(video.color(column, row), model)).collect();
+    let halved = halve(&all, video.size);
     let luma = all.iter().map(|pixel| code(pixel.x, Channel::Luma, format, range)).collect();
     let chroma = |pixel: &Vec3, axis: usize| code(pixel[axis], Channel::Difference, format, range);
     let codes: Vec<Vec<u16>> = if format.has_two_planes() {
@@ -97,9 +102,9 @@ mod tests {
 
     #[test]
     fn planes_have_their_sizes() {
-        let film = Film { size: [8, 6], phase: 0.0 };
+        let video = SyntheticVideo { size: [8, 6], phase: 0.0 };
         let sizes = |format| {
-            let planes = planes(&film, format, YuvModel::Bt601, YuvRange::Full);
+            let planes = planes(&video, format, YuvModel::Bt601, YuvRange::Full);
             planes.iter().map(Vec::len).collect::<Vec<_>>()
         };
         assert_eq!(sizes(YuvFormat::Nv12), [48, 24]);

@@ -11,7 +11,7 @@ use crate::app::sample_info::prelude::*;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Rendering")]
 pub struct YuvArgs {
-    /// Plane layout of the moving image [default: the first that the device has]
+    /// Plane layout of the moving image [default: the first that the device supports]
     #[arg(long, value_enum)]
     pub format: Option<YuvFormat>,
 
@@ -40,9 +40,9 @@ impl SampleInfo for Yuv {
     const NAME: &'static str = "yuv";
     const ABOUT: &'static str = "Shows a moving picture in Y'CbCr, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
-        | a picture, in the first format that the device has
-        --window | in a window, where N goes on to the next format
-        --format p010 --model bt2020 --show-planes | ten bits, as of ultra high definition, and the planes beside it
+        | a picture, in the first format that the device supports
+        --window | in a window, where N selects the next format
+        --format p010 --model bt2020 --show-planes | ten bits, as in ultra high definition, with its planes
     ";
     type Args = YuvArgs;
     type Sample = Self;
@@ -55,7 +55,7 @@ impl SampleInfo for Yuv {
         let context = setup.device(&DeviceNeeds { yuv: &CONVERSIONS, ..DeviceNeeds::default() })?;
         let config = args.config(setup.extent());
         let sample = Self::new(&context, &config)?;
-        let (format, [width, height]) = (sample.format(), config.film);
+        let (format, [width, height]) = (sample.format(), config.video_size);
         let (model, range, all) = (config.model, config.range, sample.formats());
         let scene = format!(
             "a moving picture of {width}x{height} as {format:?}, {model:?}, {range:?} range; the device has {all:?}"

@@ -6,13 +6,13 @@
 
 mod config;
 mod encode;
-mod film;
 mod info;
 mod pipelines;
 mod renderer;
+mod synthetic_video;
 mod video_texture;
 
 pub use config::{CONVERSIONS, YuvConfig, YuvFormat, YuvModel, YuvRange};
-pub use film::Film;
 pub use info::YuvArgs;
 pub use renderer::Yuv;
+pub use synthetic_video::SyntheticVideo;

@@ -1,6 +1,7 @@
 //! Renders the sample at a frame time.
 
 use crate::app::render_target::RenderTarget;
+use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -33,7 +34,7 @@ pub struct Yuv {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Push {
-    /// Of the whole target, the part that the picture covers.
+    /// Fraction of the target that the picture covers.
     covered: [f32; 2],
     /// Textures of Y, Cb and Cr, and the channels that hold them.
     planes: [u32; 3],
@@ -95,8 +96,8 @@ impl Yuv {
     }
 
     fn push(&self) -> Push {
-        let film = self.config.film;
-        let relative = film[0] as f32 / film[1] as f32 / self.target.aspect();
+        let video_size = self.config.video_size;
+        let relative = video_size[0] as f32 / video_size[1] as f32 / self.target.aspect();
         let planes = &self.video.planes;
         let [y, cb] = [planes[0].index(), planes[1].index()];
         let (cr, channel) = planes.get(2).map_or((cb, 1), |plane| (plane.index(), 0));
@@ -110,18 +111,15 @@ impl Yuv {
 }
 
 impl Sample for Yuv {
-    type Error = SampleError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
+    fn update(&mut self, time: FrameTime) {
         self.phase = time.phase();
-        Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         self.apply()?;
         self.video.upload(&self.ctx, self.phase)?;
         let sampled = [*self.video.texture];
@@ -137,7 +135,7 @@ impl Sample for Yuv {
         Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         self.target = RenderTarget::flat(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
@@ -173,7 +171,7 @@ impl Sample for Yuv {
         ui.label("N is the next format");
     }
 
-    fn reload(&mut self) -> Result<(), SampleError> {
+    fn reload(&mut self) -> Result<(), RunError> {
         let planes = planes(&self.ctx)?;
         self.video.reload(&self.ctx)?;
         self.planes = planes;
@@ -182,7 +180,7 @@ impl Sample for Yuv {
 }
 
 fn video_format(config: &YuvConfig, format: YuvFormat) -> VideoFormat {
-    VideoFormat { format, model: config.model, range: config.range, size: config.film }
+    VideoFormat { format, model: config.model, range: config.range, size: config.video_size }
 }
 
 fn planes(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {

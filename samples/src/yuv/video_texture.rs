@@ -7,8 +7,8 @@ use lvk::{
 
 use super::config::{YuvFormat, YuvModel, YuvRange, conversion};
 use super::encode;
-use super::film::Film;
 use super::pipelines::PICTURE;
+use super::synthetic_video::SyntheticVideo;
 
 /// The format of a video texture and its conversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,9 +23,9 @@ pub(super) struct VideoFormat {
 pub(super) struct VideoTexture {
     pub(super) video_format: VideoFormat,
     pub(super) texture: Holder<TextureHandle>,
-    /// Its planes, as textures of one or two channels.
+    /// Planes of the texture, as textures of one or two channels.
     pub(super) planes: Vec<Holder<TextureHandle>>,
-    /// For this texture alone: shaders know it by a constant.
+    /// Pipeline for this texture alone: shaders know the texture by a constant.
     pub(super) pipeline: Holder<RenderPipelineHandle>,
 }
 
@@ -56,7 +56,7 @@ impl VideoTexture {
     /// The planes at `phase`, as bytes.
     pub(super) fn encode(&self, phase: f32) -> Vec<Vec<u8>> {
         let VideoFormat { format, model, range, size } = self.video_format;
-        encode::planes(&Film { size, phase }, format, model, range)
+        encode::planes(&SyntheticVideo { size, phase }, format, model, range)
     }
 
     /// Uploads the planes at `phase`.

@@ -23,7 +23,7 @@ use super::mistakes::{
 };
 
 const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
-/// Of an image and itself.
+/// Tolerance between an image and itself.
 const THE_SAME: Tolerance = Tolerance { psnr: f64::INFINITY, ssim: 0.9999, differing_share: 0.0, flip: 0.0 };
 
 /// Name of the broken part, its mistakes, and the configuration whose image must change.

@@ -93,7 +93,7 @@ mistakes! {
     LAMP_HARD:
         "omni_shadows/shadow.glsl": "no comparison": "return compareAlong(smp," => "return 1.0 + 0.0 * compareAlong(smp,";
 
-    FILM:
+    VIDEO:
         "yuv/picture.frag.glsl": "not decoded": "decodeSrgb(clamp(" => "(clamp(";
         "yuv/picture.frag.glsl": "upside down": "picture, place)" => "picture, vec2(place.x, 1.0 - place.y))";
         "yuv/picture.vert.glsl": "too large": "(2.0 * place - 1.0) * covered" => "(2.0 * place - 1.0)";
@@ -117,16 +117,16 @@ mistakes! {
         "sponza/surface.vert.glsl": "textures not laid out": "outTexcoord = " => "outTexcoord = 0.0 * ";
     ATRIUM_PADDED:
         "sponza/cull.comp.glsl": "nothing is left": "at[number] = draw;" => "at[number] = uvec4(0u);";
-    /// Of the board with a hole.
+    /// Mistakes in a scene of a board with a hole.
     BOARD:
         "sponza/mask.glsl": "no holes": "alpha < 0.5" => "alpha < -1.0";
         "sponza/shadow.frag.glsl": "holes cast shadows": "if (isHole(" => "if (false && isHole(";
-    /// Of tilted tiles.
+    /// Mistakes in a scene of tilted tiles.
     TILES:
         "sponza/normal_mapping.glsl": "no relief": "kNoTexture || frame.hasRelief == 0u" => "0u || true";
         "sponza/normal_mapping.glsl": "upside down": "found.y * upwards" => "-found.y * upwards";
         "sponza/normal_mapping.glsl": "turned by neighbours": "sign(dot(right, acrossDown))" => "-1.0 * sign(dot(right, acrossDown))";
-    /// Of things with highlights and a mirror.
+    /// Mistakes in a scene of things with highlights and a mirror.
     STILL_LIFE:
         "sponza/surface.frag.glsl": "no highlights": "phong(albedo, material.specular," => "phong(albedo, vec3(0.0),";
         "sponza/surface.frag.glsl": "no mirror": "material.reflectivity)" => "0.0)";
@@ -158,7 +158,7 @@ mistakes! {
         "rtx_ao/surface.vert.glsl": "normals at rest": "outNormal = toWorld(" => "outNormal = vec3(";
         "rtx_ao/accumulate.comp.glsl": "the last pass alone": "sum += frame.sums" => "sum += 0.0 * frame.sums";
         "rtx_ao/accumulate.comp.glsl": "even ambient light": "light.z)" => "0.5)";
-    /// Seen from where there is some.
+    /// Mistakes in views that show some sky.
     TOWN_SKY:
         "rtx_ao/accumulate.comp.glsl": "no sky": "vec4(skyRadiance(" => "vec4(0.0 * skyRadiance(";
     TOWN_QUERY:
@@ -213,7 +213,7 @@ mistakes! {
         "large_scene/open.rmiss.glsl": "no light arrives": "occluded = 0u" => "occluded = 1u";
         "large_scene/picture.rgen.glsl": "no shadows": "return occluded != 0u" => "return false";
         "large_scene/picture.glsl": "one place in a pixel": "= 2.0 * shift" => "= 0.0 * shift";
-    /// Of large things, one of which is turned.
+    /// Mistakes in a scene of large things, one of which is turned.
     STREET:
         "large_scene/picture.glsl": "normals not turned": "point.normal = turn *" => "point.normal =";
         "large_scene/picture.glsl": "places not turned": "turn * (point.position * scale)" => "(point.position * scale)";

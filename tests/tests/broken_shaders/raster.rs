@@ -7,7 +7,7 @@ use lvk_samples::deferred::{Deferred, DeferredConfig, Passes};
 use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::omni_shadows::{self, OmniShadows, OmniShadowsConfig, ShadowFilter};
-use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
+use lvk_samples::render_to_cube_map::{CubeMapFaces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_samples::scene::Scene;
 use lvk_samples::sponza::{DrawPath, Sponza, SponzaConfig};
 use lvk_samples::triplanar::Triplanar;
@@ -22,11 +22,11 @@ use lvk_tests::scene_shadow_mask::shadow_mask_scene;
 use lvk_tests::{device, device_with};
 
 use super::mistakes::{
-    ATRIUM, ATRIUM_PADDED, BOARD, BODIES, CUBE_MAP, CUBE_MAP_FACES, FILM, HALL, HALL_ONE, HALL_SEVERAL, LAMP,
-    LAMP_FACES, LAMP_HARD, MESHLETS, STILL_LIFE, STILL_LIFE_BY_LAMP, TILES, TRIANGLE,
+    ATRIUM, ATRIUM_PADDED, BOARD, BODIES, CUBE_MAP, CUBE_MAP_FACES, HALL, HALL_ONE, HALL_SEVERAL, LAMP,
+    LAMP_FACES, LAMP_HARD, MESHLETS, STILL_LIFE, STILL_LIFE_BY_LAMP, TILES, TRIANGLE, VIDEO,
 };
 
-/// A moment at which everything has moved.
+/// A frame time at which everything has moved.
 const FRAME: u32 = 20;
 
 /// Breaks each shader, and takes an image of a sample made anew.
@@ -36,7 +36,7 @@ fn check<S: Sample>(shaders: &BrokenShaders, by: &str, mistakes: &[Mistake], mak
     shaders.assert_each_changes_image(by, &expected, &Tolerance::ACROSS_DRIVERS, mistakes, image);
 }
 
-fn cube_map(ctx: &Context, faces: Faces) -> RenderToCubeMap {
+fn cube_map(ctx: &Context, faces: CubeMapFaces) -> RenderToCubeMap {
     let config = RenderToCubeMapConfig { face_size: 64, ..RenderToCubeMapConfig::new(SIZE, faces) };
     RenderToCubeMap::new(ctx, &config).unwrap()
 }
@@ -60,9 +60,9 @@ fn samples_that_rasterise_notice() {
     BrokenShaders::in_subprocess(samples_that_rasterise_notice, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "hello_triangle", TRIANGLE, || HelloTriangle::new(&ctx, SIZE).unwrap());
-        check(shaders, "six faces", CUBE_MAP, || cube_map(&ctx, Faces::SixPasses));
+        check(shaders, "six faces", CUBE_MAP, || cube_map(&ctx, CubeMapFaces::SixPasses));
         if has(&ctx, OptionalFeature::Multiview) {
-            check(shaders, "faces at once", CUBE_MAP_FACES, || cube_map(&ctx, Faces::OnePass));
+            check(shaders, "faces at once", CUBE_MAP_FACES, || cube_map(&ctx, CubeMapFaces::OnePass));
         }
         if ctx.capabilities().mesh_shader {
             check(shaders, "mesh_shaders", MESHLETS, || MeshShaders::new(&ctx, SIZE, true).unwrap());
@@ -92,10 +92,10 @@ fn omni_shadows_notices() {
         let Some(ctx) = device() else { return };
         let usual = OmniShadowsConfig { shows_cube: true, ..OmniShadowsConfig::new(SIZE) };
         if has(&ctx, OptionalFeature::Multiview) {
-            let at_once = OmniShadowsConfig { faces: omni_shadows::Faces::Multiview, ..usual };
+            let at_once = OmniShadowsConfig { faces: omni_shadows::ShadowFaces::Multiview, ..usual };
             check(shaders, "a lamp", LAMP, || lamp(&ctx, at_once));
         }
-        let single = OmniShadowsConfig { faces: omni_shadows::Faces::Single, ..usual };
+        let single = OmniShadowsConfig { faces: omni_shadows::ShadowFaces::Single, ..usual };
         check(shaders, "face by face", LAMP_FACES, || lamp(&ctx, single));
         let hard = OmniShadowsConfig { filter: ShadowFilter::Hard, ..single };
         check(shaders, "one comparison", LAMP_HARD, || lamp(&ctx, hard));
@@ -107,8 +107,8 @@ fn omni_shadows_notices() {
 fn yuv_notices() {
     BrokenShaders::in_subprocess(yuv_notices, |shaders| {
         let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
-        let config = YuvConfig { film: [96, 64], shows_planes: true, ..YuvConfig::new(SIZE) };
-        check(shaders, "yuv", FILM, || Yuv::new(&ctx, &config).unwrap());
+        let config = YuvConfig { video_size: [96, 64], shows_planes: true, ..YuvConfig::new(SIZE) };
+        check(shaders, "yuv", VIDEO, || Yuv::new(&ctx, &config).unwrap());
     });
 }
 

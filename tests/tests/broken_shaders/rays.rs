@@ -25,7 +25,7 @@ use super::mistakes::{
     VALLEY_QUERY, WAVES, WAVES_QUERY,
 };
 
-/// A moment at which everything has moved.
+/// A frame time at which everything has moved.
 const FRAME: u32 = 20;
 
 /// Breaks each shader of a path, and takes an image, of a sample made anew.

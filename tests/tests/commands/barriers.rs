@@ -145,7 +145,7 @@ fn draws_take_everything_from_a_dispatch_they_declare() {
 }
 
 #[test]
-fn what_a_copy_wrote_is_read_by_draws_without_being_declared() {
+fn draws_read_copied_data_without_declaring_it() {
     let Some(ctx) = device() else { return };
     let corners = [[-1.0_f32, -1.0], [3.0, -1.0], [-1.0, 3.0]];
     let source = BufferDesc {

@@ -62,9 +62,9 @@ fn no_wait_hangs_on_a_submission_that_failed() {
     });
 }
 
-/// With several queues an upload goes out by itself, and the command buffer behind it fails.
+/// Several queues: an upload is submitted by itself, and the command buffer behind it fails.
 #[test]
-fn what_went_out_before_the_failure_is_kept_until_it_is_done() {
+fn submissions_before_the_failure_are_kept_until_they_are_done() {
     each(|ctx| {
         ctx.set_profiling(true).unwrap();
         let words = words_buffer(ctx, &[7; 1 << 20]);

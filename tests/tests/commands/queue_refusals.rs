@@ -72,7 +72,7 @@ fn check_foreign(ctx: &Context, words: &Holder<BufferHandle>) {
             size_bytes: 256,
             usage: BufferUsage::STORAGE,
             concurrent,
-            debug_name: "somebody else's",
+            debug_name: "another application's",
         };
         // SAFETY: the buffer is this context's own, outlives the handle, and is not used otherwise meanwhile.
         unsafe { ctx.import_buffer(&import) }.unwrap()
@@ -86,7 +86,7 @@ fn check_foreign(ctx: &Context, words: &Holder<BufferHandle>) {
             if concurrent {
                 answer.unwrap();
             } else {
-                usage_error(answer, "somebody else's: images of windows, and what was imported");
+                usage_error(answer, "another application's: images of windows, and what was imported");
             }
             ctx.wait_idle().unwrap();
         }

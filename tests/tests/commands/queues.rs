@@ -163,7 +163,7 @@ fn layers_in_different_layouts_move_together() {
 
 /// Textures and buffers that the transfer queue brings are there for who names them, or names the submission.
 #[test]
-fn what_the_transfer_queue_brings_is_named_or_waited_for() {
+fn data_of_the_transfer_queue_is_named_or_waited_for() {
     for_each_queue_request(|ctx| {
         let fetch = Evaluator::new(ctx, "textureBindlessFetch2D(a, ivec2(i % 8, i / 8), 0)");
         for named in [true, false] {
@@ -313,14 +313,14 @@ fn check_structures(ctx: &TestDevice) -> lvk::Result<()> {
                 ctx.submit(cmd)?;
                 scene.models[0][0].mesh = deformed(&mesh, amount);
             }
-            let job = tracer.job(&rays)?;
+            let trace_buffers = tracer.buffers(&rays)?;
             let mut cmd = ctx.acquire_command_buffer_on(tracing)?;
-            tracer.record(&mut cmd, &tlas, &job, How::default())?;
+            tracer.record(&mut cmd, &tlas, &trace_buffers, How::default())?;
             ctx.submit(cmd)?;
-            jobs.push((job, scene.clone()));
+            traces.push((trace_buffers, scene.clone()));
         }
-        for (number, (job, scene)) in jobs.iter().enumerate() {
-            let (records, reference) = (tracer.read(job)?, scene.reference());
+        for (number, (trace_buffers, scene)) in traces.iter().enumerate() {
+            let (records, reference) = (tracer.read(trace_buffers)?, scene.reference());
             let agreement = HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff));
             agreement.assert(&format!("round {number} by {method:?}"));
         }
@@ -411,7 +411,7 @@ fn threads_submit_to_several_queues_at_once() {
 /// An object that one queue still uses stays alive although another queue is idle, and every object is freed in the
 /// end.
 #[test]
-fn what_is_destroyed_lives_until_every_queue_is_done() {
+fn destroyed_objects_live_until_every_queue_is_done() {
     for_each_queue_request(|ctx| {
         let pipeline = step_pipeline(ctx);
         for number in 0..20 {

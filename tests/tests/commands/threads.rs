@@ -360,7 +360,7 @@ fn expect_stale<T: std::fmt::Debug>(found: lvk::Result<T>) {
 }
 
 #[test]
-fn what_another_thread_destroys_as_a_read_begins_is_not_read() {
+fn a_read_fails_if_another_thread_destroys_the_object_first() {
     let Some(ctx) = device() else { return };
     let buffer = || {
         let buffer = words_buffer(&ctx, &[7; 64]);

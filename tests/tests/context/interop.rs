@@ -5,11 +5,13 @@
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
 
+use lvk::ash::vk::Handle;
 use lvk::ash::{self, vk};
 use lvk::{
-    BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies, Error, FeatureSet, Format,
-    ImportedBuffer, ImportedTexture, OptionalFeature, RawContext, RawSignal, RawWait, RenderPassDesc,
-    RenderPipelineDesc, ShaderStage, TextureDesc, TextureUsage,
+    BufferHandle, BufferUsage, ColorAttachment, CommandBuffer, ComputePipelineHandle, Context, ContextDesc,
+    Dependencies, Error, FeatureSet, Format, Holder, ImportedBuffer, ImportedTexture, OptionalFeature,
+    RawContext, RawSignal, RawWait, RenderPassDesc, RenderPipelineDesc, ShaderStage, TextureDesc,
+    TextureHandle, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::vulkan;
@@ -46,7 +48,7 @@ struct Engine {
     device: ash::Device,
     queue: vk::Queue,
     pool: vk::CommandPool,
-    /// Its device has the extension and the feature on.
+    /// True if the extension and the feature are on.
     local_read: bool,
 }
 
@@ -129,7 +131,10 @@ impl Engine {
             device_extensions: &[],
             features: FeatureSet::NONE.with(OptionalFeature::FullDrawIndex),
             ray_tracing_pipeline: false,
+            trace_rays_indirect: false,
+            primitive_culling: false,
             ray_query: false,
+            position_fetch: false,
             mesh_shader: false,
             queue: self.queue,
             queue_family: 0,
@@ -337,6 +342,84 @@ const ADD_ONE: &str = "
         words.at[i] = textureBindlessFetchU2D(texture, ivec2(i % 4, i / 4), 0).x + 1 + i;
     }";
 
+/// Imports the engine's image and buffer.
+fn import_both(
+    ctx: &Context,
+    image: vk::Image,
+    buffer: vk::Buffer,
+) -> (Holder<TextureHandle>, Holder<BufferHandle>) {
+    let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+    let texture = ImportedTexture { image, desc: texture_desc(), layout, concurrent: false };
+    let words = ImportedBuffer {
+        buffer,
+        size_bytes: BYTES,
+        usage: BufferUsage::STORAGE,
+        concurrent: false,
+        debug_name: "the engine's buffer",
+    };
+    // SAFETY: the handles are as described and live on.
+    unsafe { (ctx.import_texture(&texture).unwrap(), ctx.import_buffer(&words).unwrap()) }
+}
+
+/// Records a dispatch that reads the texture and writes the words, and the release of the texture to the engine.
+fn add_one_and_release(
+    ctx: &Context,
+    pipeline: ComputePipelineHandle,
+    texture: TextureHandle,
+    words: BufferHandle,
+) -> CommandBuffer {
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.bind_compute_pipeline(pipeline).unwrap();
+    let address = ctx.buffer_address(words).unwrap();
+    cmd.push_constants(&[address as u32, (address >> 32) as u32, texture.index()]).unwrap();
+    let uses = Dependencies { buffers: &[words], sampled_images: &[texture], ..Default::default() };
+    cmd.dispatch([1, 1, 1], &uses).unwrap();
+    cmd.release_texture(texture, vk::ImageLayout::TRANSFER_SRC_OPTIMAL).unwrap();
+    cmd
+}
+
+impl Engine {
+    /// Records the copy of an image that the library has released.
+    fn copy(&self, commands: vk::CommandBuffer, image: vk::Image, copy: vk::Buffer) {
+        let region = vk::BufferImageCopy::default()
+            .image_subresource(vk::ImageSubresourceLayers {
+                aspect_mask: vk::ImageAspectFlags::COLOR,
+                layer_count: 1,
+                ..Default::default()
+            })
+            .image_extent(vk::Extent3D { width: SIDE, height: SIDE, depth: 1 });
+        let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        // SAFETY: the image was released in that layout.
+        unsafe { self.device.cmd_copy_image_to_buffer(commands, image, source, copy, &[region]) };
+    }
+
+    /// Waits until the timelines reach these values.
+    fn wait(&self, timelines: &[(vk::Semaphore, u64)]) {
+        let (semaphores, values): (Vec<_>, Vec<_>) = timelines.iter().copied().unzip();
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphores are alive, and signals of these values are under way.
+        unsafe { self.device.wait_semaphores(&info, u64::MAX).unwrap() };
+    }
+
+    /// Destroys objects of the engine, which live as long as its device, after all work is done.
+    fn destroy(
+        &self,
+        semaphores: &[vk::Semaphore],
+        image: vk::Image,
+        buffers: &[vk::Buffer],
+        memory: &[vk::DeviceMemory],
+    ) {
+        // SAFETY: the engine's own, once each.
+        unsafe {
+            self.device.device_wait_idle().unwrap();
+            semaphores.iter().for_each(|semaphore| self.device.destroy_semaphore(*semaphore, None));
+            self.device.destroy_image(image, None);
+            buffers.iter().for_each(|buffer| self.device.destroy_buffer(*buffer, None));
+            memory.iter().for_each(|memory| self.device.free_memory(*memory, None));
+        }
+    }
+}
+
 /// The engine clears, the library reads and writes, the engine copies, clears again and gives back, twice.
 fn exchange() {
     let Some(engine) = Engine::new() else { return };
@@ -347,23 +430,9 @@ fn exchange() {
     {
         let ctx = engine.context();
         assert!(ctx.capabilities().has(OptionalFeature::FullDrawIndex));
-        assert!(!ctx.capabilities().has(OptionalFeature::CubeArrays), "nobody said that it is on");
-        // SAFETY: the handles are as described and live on.
-        let (texture, words) = unsafe {
-            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-            let texture = ctx
-                .import_texture(&ImportedTexture { image, desc: texture_desc(), layout, concurrent: false })
-                .unwrap();
-            let usage = BufferUsage::STORAGE;
-            let import = ImportedBuffer {
-                buffer,
-                size_bytes: BYTES,
-                usage,
-                concurrent: false,
-                debug_name: "the engine's buffer",
-            };
-            (texture, ctx.import_buffer(&import).unwrap())
-        };
+        let has_cube_arrays = ctx.capabilities().has(OptionalFeature::CubeArrays);
+        assert!(!has_cube_arrays, "the engine did not list it as enabled");
+        let (texture, words) = import_both(&ctx, image, buffer);
         let pipeline = compute_pipeline(&ctx, ADD_ONE);
         for (round, word) in [(1, 100), (2, 7000)] {
             ctx.with_raw_queue(|queue| {
@@ -373,40 +442,16 @@ fn exchange() {
                 // SAFETY: the clear leaves it so.
                 unsafe { ctx.acquire_texture(*texture, vk::ImageLayout::TRANSFER_DST_OPTIMAL).unwrap() };
             }
-            let mut cmd = ctx.acquire_command_buffer().unwrap();
-            cmd.bind_compute_pipeline(*pipeline).unwrap();
-            let address = ctx.buffer_address(*words).unwrap();
-            cmd.push_constants(&[address as u32, (address >> 32) as u32, texture.index()]).unwrap();
-            let uses = Dependencies { buffers: &[*words], sampled_images: &[*texture], ..Default::default() };
-            cmd.dispatch([1, 1, 1], &uses).unwrap();
-            cmd.release_texture(*texture, vk::ImageLayout::TRANSFER_SRC_OPTIMAL).unwrap();
+            let cmd = add_one_and_release(&ctx, *pipeline, *texture, *words);
             let wait = RawWait { semaphore: binary, value: 0, stages: ALL };
             let signal = RawSignal { semaphore: timeline, value: 10 * round };
             // SAFETY: the binary semaphore has its signal under way, and the timeline rises.
             let handle = unsafe { ctx.submit_with(cmd, &[wait], &[signal]).unwrap() };
             ctx.with_raw_queue(|queue| {
-                engine.submit(queue, &[(timeline, 10 * round)], &[(timeline, 10 * round + 1)], |commands| {
-                    let region = vk::BufferImageCopy::default()
-                        .image_subresource(vk::ImageSubresourceLayers {
-                            aspect_mask: vk::ImageAspectFlags::COLOR,
-                            layer_count: 1,
-                            ..Default::default()
-                        })
-                        .image_extent(vk::Extent3D { width: SIDE, height: SIDE, depth: 1 });
-                    let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-                    // SAFETY: the image was handed over in that layout.
-                    unsafe {
-                        engine.device.cmd_copy_image_to_buffer(commands, image, source, copy, &[region])
-                    };
-                });
+                let (waits, signals) = ([(timeline, 10 * round)], [(timeline, 10 * round + 1)]);
+                engine.submit(queue, &waits, &signals, |commands| engine.copy(commands, image, copy));
             });
-            // SAFETY: both timelines reach these values.
-            unsafe {
-                let (semaphores, values) =
-                    ([timeline, ctx.raw_timeline()], [10 * round + 1, handle.raw_value()]);
-                let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-                engine.device.wait_semaphores(&info, u64::MAX).unwrap();
-            }
+            engine.wait(&[(timeline, 10 * round + 1), (ctx.raw_timeline(), handle.raw_value())]);
             assert!(ctx.is_done(handle).unwrap());
             assert_eq!(engine.words(copy_memory), [word; 16]);
             assert_eq!(engine.words(buffer_memory), (0..16).map(|i| word + 1 + i).collect::<Vec<_>>());
@@ -414,25 +459,13 @@ fn exchange() {
             ctx.download_buffer(*words, 0, bytemuck::cast_slice_mut(&mut read)).unwrap();
             assert_eq!(read[3], word + 4);
         }
-        let refused = {
-            let mut cmd = ctx.acquire_command_buffer().unwrap();
-            cmd.release_texture(*texture, vk::ImageLayout::UNDEFINED)
-        };
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        let refused = cmd.release_texture(*texture, vk::ImageLayout::UNDEFINED);
         assert!(matches!(refused, Err(Error::InvalidUsage { .. })));
     }
     // The context is gone, and all of this is alive still.
     engine.submit(engine.queue, &[], &[(timeline, 30)], |commands| engine.clear(commands, image, 1));
-    // SAFETY: the engine's own, once each.
-    unsafe {
-        engine.device.device_wait_idle().unwrap();
-        engine.device.destroy_semaphore(binary, None);
-        engine.device.destroy_semaphore(timeline, None);
-        engine.device.destroy_image(image, None);
-        [buffer, copy].into_iter().for_each(|buffer| engine.device.destroy_buffer(buffer, None));
-        [image_memory, buffer_memory, copy_memory]
-            .into_iter()
-            .for_each(|memory| engine.device.free_memory(memory, None));
-    }
+    engine.destroy(&[binary, timeline], image, &[buffer, copy], &[image_memory, buffer_memory, copy_memory]);
 }
 
 /// Features of the engine's device are used if the description lists them, and refused if not.
@@ -443,7 +476,7 @@ fn local_reads() {
     let unsaid = engine.context();
     assert!(
         matches!(unsaid.create_texture(&read), Err(Error::Unsupported { .. })),
-        "nobody said that it is on"
+        "the engine did not list it as enabled"
     );
     drop(unsaid);
     if !engine.local_read {
@@ -485,22 +518,30 @@ fn local_reads() {
 
 fn refusals() {
     let Some(engine) = Engine::new() else { return };
-    let refuse = |raw: RawContext<'_>, words: &str| {
+    let refuse = |raw: RawContext<'_>, field: &str, words: &str| {
         // SAFETY: what is wrong is found before anything is made.
         match unsafe { Context::from_raw(raw, &ContextDesc::default()) } {
             Err(Error::InvalidUsage { object, message }) => {
-                assert!(object == "from_raw" && message.contains(words), "{object}: {message}");
+                assert_eq!(object, format!("RawContext::{field}"), "{message}");
+                assert!(message.contains(words), "{message}");
             }
             other => unreachable!("{words}: {other:?}"),
         }
     };
-    refuse(RawContext { queue_family: 77, ..engine.raw() }, "no queue family 77");
-    refuse(RawContext { compute_queue: Some((engine.queue, 78)), ..engine.raw() }, "no queue family 78");
-    refuse(RawContext { transfer_queue: Some((engine.queue, 79)), ..engine.raw() }, "no queue family 79");
-    refuse(RawContext { mesh_shader: true, ..engine.raw() }, "VK_EXT_mesh_shader is not among");
-    refuse(RawContext { ray_query: true, ..engine.raw() }, "is not among device_extensions");
+    refuse(RawContext { queue_family: 77, ..engine.raw() }, "queue_family", "no queue family 77");
+    let other = Some((vk::Queue::from_raw(8), 78));
+    refuse(RawContext { compute_queue: other, ..engine.raw() }, "compute_queue", "no queue family 78");
+    refuse(RawContext { transfer_queue: other, ..engine.raw() }, "transfer_queue", "no queue family 78");
+    refuse(RawContext { queue: vk::Queue::null(), ..engine.raw() }, "queue", "null");
+    let stranger = vk::PhysicalDevice::from_raw(8);
+    refuse(RawContext { physical_device: stranger, ..engine.raw() }, "physical_device", "does not list");
+    let mesh = RawContext { mesh_shader: true, ..engine.raw() };
+    refuse(mesh, "device_extensions", "VK_EXT_mesh_shader is missing; `mesh_shader`");
+    let query = RawContext { ray_query: true, ..engine.raw() };
+    refuse(query, "device_extensions", "VK_KHR_acceleration_structure is missing; `ray_query`");
     let astc = FeatureSet::NONE.with(OptionalFeature::TextureCompressionAstcHdr);
-    refuse(RawContext { features: astc, ..engine.raw() }, "textureCompressionASTC_HDR cannot be on");
+    let astc = RawContext { features: astc, ..engine.raw() };
+    refuse(astc, "features", "textureCompressionASTC_HDR cannot be on");
 
     let ctx = engine.context();
     let (image, memory) = engine.image();

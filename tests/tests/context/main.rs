@@ -1,6 +1,11 @@
 //! Contexts: creation, devices, profiles, and interoperation with other engines.
 
+mod exchanged_layouts;
+mod external_memory;
+#[cfg(target_os = "linux")]
+mod guest_windows;
 mod interop;
 mod no_ray_tracing;
 mod profiles;
+mod requirements;
 mod start;

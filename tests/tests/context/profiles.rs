@@ -74,7 +74,7 @@ fn the_device_is_made_without_what_is_hidden() {
 }
 
 #[test]
-fn what_a_profile_hides_cannot_be_required() {
+fn a_hidden_feature_cannot_be_required() {
     let Some(ctx) = without_software(|_| ()) else { return };
     let real: Capabilities = ctx.capabilities().clone();
     for (profile, pipeline, query, had, lack) in [
@@ -163,7 +163,7 @@ fn a_profile_limits_top_levels() {
         let Some(ctx) = under(&profile) else { return };
         match (ctx.create_tlas(&desc), what) {
             (Ok(_), None) => {}
-            (Err(Error::LimitExceeded { object, what: found, requested, limit }), Some(what)) => {
+            (Err(Error::LimitExceeded { object, what: found, requested, limit, .. }), Some(what)) => {
                 assert!(
                     object == "the world" && found.contains(what) && requested > limit,
                     "{object}: {found}"

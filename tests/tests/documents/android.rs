@@ -36,5 +36,8 @@ fn the_manifest_is_that_of_the_table() {
     }
     let library = table_value(&cargo, "name").replace('-', "_");
     assert!(manifest.contains(&format!("android:value=\"{library}\"")), "{library}");
-    assert!(document.contains(&format!("lib{library}.so")) && document.contains(&format!("{library}.apk")));
+    assert!(
+        document.contains(&format!("lib{library}.so"))
+            && document.contains(&format!("/{}.apk", table_value(table, "apk_name")))
+    );
 }

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_of_three_files_is_found_whole() {
+    fn a_circle_of_three_files_is_reported_whole() {
         let files = [
             ("a.rs", "use crate::b::B;"),
             ("b.rs", "fn f() { crate::c::f() }"),
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_beyond_one_folder_is_found_with_the_parent() {
+    fn a_circle_beyond_one_folder_is_reported_with_the_parent() {
         let files = [
             ("a/mod.rs", "mod b; use b::B; pub struct A;"),
             ("a/b.rs", "use super::A; use crate::d::D;"),

@@ -42,7 +42,7 @@ fn every_row_names_its_tests_and_the_page_of_its_reasons() {
 }
 
 #[test]
-fn rows_that_lack_a_test_or_a_page_are_noticed() {
+fn entries_without_a_test_or_a_page_are_noticed() {
     let test = "t: documents/features";
     for (held_by, left_out) in [
         ("-", "-"),

@@ -1,4 +1,5 @@
-//! Names in the code use the words of the glossary in `CONTRIBUTING.md`, not those that its third column rules out.
+//! Names in the code, those of tests included, use the words of the glossary in `CONTRIBUTING.md`, not those that its
+//! third column rules out.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::BTreeSet;
@@ -15,6 +16,8 @@ const GLSL_FOLDERS: [&str; 2] = ["lvk/src", "shaders"];
 const BARE_NAMES: &str = "Never a function's whole name:";
 /// The kind of a function that only its own file calls: it may be named by any word but a bare one.
 const PRIVATE_FN: &str = "private fn";
+const TEST_FN: &str = "test fn";
+const FIRST_WORDS: &str = "Never the first word of a test's name:";
 const KEPT: &str = "kept: ";
 const MOST_KEPT: usize = 12;
 
@@ -24,6 +27,8 @@ struct Glossary {
     /// Each as lower-case words that follow each other in a name.
     private: Vec<Vec<String>>,
     bare: BTreeSet<String>,
+    /// Words that begin no name of a test.
+    first: BTreeSet<String>,
     kept: BTreeSet<String>,
 }
 
@@ -33,6 +38,8 @@ impl Glossary {
         for line in section(text, "Glossary")? {
             if let Some(names) = line.strip_prefix(BARE_NAMES) {
                 glossary.bare.extend(code_words(names).map(str::to_owned));
+            } else if let Some(names) = line.strip_prefix(FIRST_WORDS) {
+                glossary.first.extend(code_words(names).map(str::to_owned));
             } else if let Some(rest) = line.trim_start_matches("- ").strip_prefix(KEPT) {
                 let name = code_words(rest).next().ok_or(format!("no name in backticks: {line:?}"))?;
                 let reason = rest.split_once("`: ").map_or("", |(_, reason)| reason);
@@ -48,6 +55,9 @@ impl Glossary {
             _ if glossary.private.is_empty() => Err("the glossary rules out no word".to_owned()),
             _ if glossary.bare.is_empty() => {
                 Err(format!("the glossary has no line that begins with {BARE_NAMES:?}"))
+            }
+            _ if glossary.first.is_empty() => {
+                Err(format!("the glossary has no line that begins with {FIRST_WORDS:?}"))
             }
             _ if glossary.kept.len() > MOST_KEPT => {
                 Err(format!("{} kept names of {MOST_KEPT}", glossary.kept.len()))
@@ -65,6 +75,9 @@ impl Glossary {
             return None;
         }
         let parts = words(&name.text);
+        if let Some(first) = parts.first().filter(|word| name.kind == TEST_FN && self.first.contains(*word)) {
+            return Some(format!("{}: {} {} begins with {first:?}", name.place, name.kind, name.text));
+        }
         let is_in = |private: &&Vec<String>| {
             parts.windows(private.len()).any(|part| part.iter().zip(*private).all(is_same_or_plural))
         };
@@ -147,6 +160,7 @@ fn names(file: &str, text: &str) -> Vec<Name> {
         if keyword.kind == Kind::Word && declares(keyword.text) && name.kind == Kind::Word && !has_file {
             let place = format!("{file}:{}", name.line);
             let kind = match keyword.text {
+                "fn" if is_test(&tokens[..at]) => TEST_FN,
                 "fn" if !is_public(&tokens[..at]) && !is_method_of(&traits, &tokens, at) => PRIVATE_FN,
                 kind => kind,
             };
@@ -154,6 +168,18 @@ fn names(file: &str, text: &str) -> Vec<Name> {
         }
     }
     found
+}
+
+/// True if the attributes in front of a declaration have `#[test]`.
+fn is_test(mut before: &[Token<'_>]) -> bool {
+    while before.last().is_some_and(|token| token.is_mark("]")) {
+        let open = before.iter().rposition(|token| token.is_mark("#")).unwrap_or(0);
+        if before[open..].get(2).is_some_and(|token| token.is_word("test")) && before.len() == open + 4 {
+            return true;
+        }
+        before = &before[..open];
+    }
+    false
 }
 
 /// True if a declaration behind these tokens is `pub`, as far as the crate or all over.
@@ -187,7 +213,7 @@ fn is_method_of(bodies: &[Range<usize>], tokens: &[Token<'_>], at: usize) -> boo
 }
 
 /// Returns the files below a folder of the project with this ending, by path below the project.
-fn files(folder: &str, ending: &str) -> Vec<(String, String)> {
+pub fn files(folder: &str, ending: &str) -> Vec<(String, String)> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(project().join(folder)).unwrap() {
         let entry = entry.unwrap();
@@ -223,6 +249,7 @@ mod tests {
 | BLAS | a level | `shown` |
 
 Never a function's whole name: `of`, `tell`.
+Never the first word of a test's name: `what`
 - kept: `lane_width`: the width of a SIMD lane
 # Next
 | a | b | `fine` |";
@@ -246,7 +273,7 @@ Never a function's whole name: `of`, `tell`.
     }
 
     #[test]
-    fn private_words_are_found_in_modules_types_and_functions() {
+    fn private_words_are_noticed_in_modules_types_and_functions() {
         assert_eq!(complaints("a/lanes.rs", ""), ["a/lanes: module lanes has the word \"lane\""]);
         assert_eq!(complaints("shown/mod.rs", "").len(), 1);
         for (text, word) in [
@@ -268,6 +295,20 @@ Never a function's whole name: `of`, `tell`.
     }
 
     #[test]
+    fn names_of_tests_are_checked() {
+        let tests = "#[test]\n#[ignore = \"slow\"]\nfn shown_is_read() {}\n#[test] fn what_is_read() {}";
+        let expected = [
+            "a.rs:3: test fn shown_is_read has the word \"shown\"",
+            "a.rs:4: test fn what_is_read begins with \"what\"",
+        ];
+        assert_eq!(complaints("a.rs", tests), expected);
+        assert_eq!(
+            complaints("a.rs", "#[cfg(test)] fn shown() {} fn what_is_read() {}"),
+            Vec::<String>::new()
+        );
+    }
+
+    #[test]
     fn names_of_glsl_files_are_checked_without_their_folders() {
         let found = complaints("lanes/shown.comp.glsl", "void of() {}");
         assert_eq!(found, ["lanes/shown.comp.glsl: GLSL file shown.comp has the word \"shown\""]);
@@ -286,7 +327,7 @@ Never a function's whole name: `of`, `tell`.
     fn sections_that_cannot_hold_anything_are_refused() {
         let without = |part: &str| Glossary::parse(&SECTION.replace(part, "")).unwrap_err();
         assert!(Glossary::parse("").unwrap_err().contains("Glossary"));
-        assert!(without(BARE_NAMES).contains("begins with"));
+        assert!(without(BARE_NAMES).contains("begins with") && without(FIRST_WORDS).contains("begins with"));
         assert!(without(": the width of a SIMD lane").contains("no reason"));
         assert!(Glossary::parse("# Glossary\nNever a function's whole name: `of`").is_err());
         let unneeded = Glossary::parse(SECTION).unwrap().complaints(&[]);

@@ -3,12 +3,16 @@
 mod android;
 mod circles;
 mod contributing;
+mod docstrings;
+mod examples;
 mod features;
 mod glossary;
 mod held_by;
 mod layers;
 mod map;
+mod package;
 mod parity;
+mod porting;
 mod programs;
 mod readme;
 mod rust_modules;

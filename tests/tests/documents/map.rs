@@ -81,7 +81,7 @@ fn the_map_lists_every_folder() {
 
 /// Prints the folders that the map has to list, with `-- --nocapture`.
 #[test]
-fn the_folders_of_the_repository_are_found() {
+fn the_folders_of_the_repository_are_listed() {
     let files = files();
     let needed = folders(files.iter().map(String::as_str));
     for folder in ["lvk/src", "lvk/src/gpu", "samples/src", "shaders/common", "tests/src", "tests/tests"] {

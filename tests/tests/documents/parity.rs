@@ -8,7 +8,7 @@ use crate::held_by::{self, cells};
 
 const PAGE: &str = include_str!("../../../lvk/src/manual/parity.md");
 
-/// What LightweightVK was found to have, area by area, each by words that its row begins with or has inside.
+/// Features of LightweightVK by area. Each is given by words that stand in its row.
 const FEATURES: [(&str, &[&str]); 20] = [
     (
         "Shape of the interface",
@@ -287,7 +287,7 @@ fn every_area_and_every_weak_spot_is_there_once() {
 }
 
 #[test]
-fn no_feature_that_was_found_is_forgotten() {
+fn every_known_feature_is_in_the_table() {
     let rows = rows(PAGE).unwrap();
     let is_there =
         |area: &str, words: &str| rows.iter().any(|row| row.area == area && row.feature.contains(words));
@@ -297,7 +297,7 @@ fn no_feature_that_was_found_is_forgotten() {
 }
 
 #[test]
-fn rows_that_promise_without_holding_are_noticed() {
+fn entries_without_a_valid_test_are_noticed() {
     let row = |here, held_by| Row { area: "", feature: "x", here, held_by };
     for (here, held_by) in [
         ("the same", "-"),
@@ -312,6 +312,6 @@ fn rows_that_promise_without_holding_are_noticed() {
         assert!(complaint(&row(here, held_by)).is_some(), "{here} {held_by}");
     }
     assert_eq!(complaint(&row("the same", "t: documents/parity; s: windows; u: barrier/batch")), None);
-    assert_eq!(complaint(&row("Left out: as long as nobody has a device that could", "-")), None);
+    assert_eq!(complaint(&row("Left out: as long as no device could", "-")), None);
     assert!(rows("| a | b |").is_err() && rows("| a | b | c | d |").is_err());
 }

@@ -162,7 +162,7 @@ fn tree_of_the_cpu(
     Ok((words, buffers, geometries))
 }
 
-/// With leaves that share vertices, and others.
+/// Cases: leaves that share vertices, and others.
 #[test]
 fn trees_of_the_cpu_follow_moved_triangles() {
     let profile = DeviceProfile::no_ray_tracing();

@@ -128,7 +128,7 @@ fn points_are_pixels_as_the_screen_has_them() {
 }
 
 #[test]
-fn what_is_translucent_lets_the_ground_through() {
+fn translucent_shapes_let_the_ground_through() {
     let Some(ctx) = device() else { return };
     let color = Color32::from_rgba_premultiplied(60, 0, 90, 128);
     let picture = Easel::new(&ctx, Format::Rgba8Unorm).paint(&[], |painter| {

@@ -116,7 +116,7 @@ fn a_dispatch_decides_how_many_draws_there_are() {
     }
 }
 
-/// In one command buffer the pass has to be told, and says so.
+/// The pass must declare a count that the same command buffer wrote; its error says so.
 #[test]
 fn a_number_written_in_the_same_command_buffer_is_declared() {
     let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::DrawIndirectCount)) else { return };
@@ -204,6 +204,7 @@ fn pipelines_made_at_once_are_those_made_one_by_one() {
             module: (number != 7).then_some(*compute),
             specialization,
             debug_name: "one of many",
+            ..Default::default()
         })
         .collect();
     let made = ctx.create_compute_pipelines(&descs);

@@ -405,7 +405,7 @@ fn stencil_is_read() {
 
 /// A pass reads what another command wrote before it, and a depth target that it only tests against.
 #[test]
-fn what_is_loaded_is_read() {
+fn shaders_read_loaded_contents() {
     let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let read = "
         LVK_INPUT(0, subpassInput, gLoaded);

@@ -280,7 +280,7 @@ fn integers_are_resolved_to_one_of_their_samples() {
 }
 
 #[test]
-fn what_cannot_be_resolved_is_refused() {
+fn textures_that_cannot_be_resolved_are_refused() {
     let Some(ctx) = device() else { return };
     let (four, depth_four) = (many(&ctx, Format::R32Float, [2, 2]), many(&ctx, Format::D32Float, [2, 2]));
     let (one, other) = (target(&ctx, Format::R32Float, [2, 2]), target(&ctx, Format::Rgba8Unorm, [2, 2]));

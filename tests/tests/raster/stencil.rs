@@ -260,7 +260,7 @@ fn a_pass_replaces_the_depth_test_until_the_next_pipeline() {
 }
 
 #[test]
-fn what_does_not_go_together_is_refused() {
+fn contradictory_state_is_refused() {
     let Some(ctx) = device() else { return };
     let stages = [(ShaderStage::Vertex, COVER), (ShaderStage::Fragment, PAINT)];
     let stencil = Some(both(StencilFace { pass: StencilOp::Replace, ..KEEP }));

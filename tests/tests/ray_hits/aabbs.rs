@@ -25,7 +25,7 @@ const FAR: u32 = 2;
 const NEAR: [u32; 2] = [126, 127];
 /// AABBs of a geometry.
 const COUNT: u32 = 24;
-/// Of every sphere, in object space.
+/// Radius of every sphere, in object space.
 const RADIUS: f32 = 0.9;
 
 fn devices() -> Vec<TestDevice> {

@@ -177,7 +177,7 @@ type Folded = fn(f32) -> bool;
 
 /// The number of primitives stays, but which of them have an area changes from build to build.
 #[test]
-fn triangles_fold_up_and_unfold() -> Result<()> {
+fn triangles_become_degenerate_and_recover() -> Result<()> {
     for ctx in devices() {
         let check = HitCheck::new(&ctx)?;
         let mut scene = RayScene::single(Mesh::torus(8).unshared(), Layout::Unshared);

@@ -114,7 +114,7 @@ fn check_all(ctx: &Context, tracer: &RayTracer, shape: Shape, by: &str) -> Resul
 }
 
 #[test]
-fn what_stays_is_hit_while_neighbours_move_far_out() -> Result<()> {
+fn resting_triangles_are_hit_while_neighbours_move_far_out() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
     let (plain, opaque) = (RayTracer::new(&ctx, Method::Query)?, RayTracer::for_opaque_triangles(&ctx)?);
     for shape in [Shape::Triangles, Shape::Quads] {

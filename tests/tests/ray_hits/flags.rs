@@ -126,7 +126,7 @@ fn flags_of_ray_instance_and_geometry_decide_together() -> Result<()> {
 
 /// An end of the ray and a flag of each kind, so that no flag undoes what another one says about the range.
 #[test]
-fn what_is_culled_ends_no_ray() -> Result<()> {
+fn culled_triangles_end_no_ray() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let square = |z: f32| Mesh {
         positions: vec![[-4.0, -4.0, z], [4.0, -4.0, z], [4.0, 4.0, z], [-4.0, 4.0, z]],

@@ -67,7 +67,7 @@ fn upload(ctx: &Context, part: &Part, buffers: &PartBuffers) -> Result<()> {
     ctx.upload_buffer(**buffer, MATRIX_OFFSET, bytemuck::bytes_of(&transform_rows(matrix)))
 }
 
-/// Has the acceleration structures follow the scene.
+/// Uploads the vertices of the scene and updates the acceleration structures.
 fn follow(ctx: &Context, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) -> Result<()> {
     let parts = scene.models.iter().flatten();
     parts.zip(&gpu.buffers).try_for_each(|(part, buffers)| upload(ctx, part, buffers))?;
@@ -96,7 +96,7 @@ fn all_triangles_follow_their_vertices() -> Result<()> {
     Ok(())
 }
 
-/// By the library alone: drivers need not take numbers that are none in a refit.
+/// Software only: drivers need not accept NaN in a refit.
 #[test]
 fn a_lost_vertex_takes_its_triangles_and_comes_back() -> Result<()> {
     let profile = DeviceProfile::no_ray_tracing();

@@ -134,13 +134,15 @@ fn instances_written_by_a_dispatch_are_traced_in_the_same_submission() -> Result
             let reference = scene.reference();
             let rays = rays_for(&reference);
             for (method, tracer) in check.tracers() {
-                let job = tracer.job(&rays)?;
+                let trace_buffers = tracer.buffers(&rays)?;
                 let mut cmd = ctx.acquire_command_buffer()?;
                 writer.update(&mut cmd, &gpu, count, turn, mode)?;
-                tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
+                tracer.record(&mut cmd, &gpu.tlas, &trace_buffers, How::default())?;
                 ctx.submit(cmd)?;
-                HitComparison::of_triangles(&rays, &tracer.read(&job)?, |ray| reference.closest(ray, 0xff))
-                    .assert(&format!("{count} written, {mode:?}, {flags:?}, {parts} parts, by {method:?}"));
+                HitComparison::of_triangles(&rays, &tracer.read(&trace_buffers)?, |ray| {
+                    reference.closest(ray, 0xff)
+                })
+                .assert(&format!("{count} written, {mode:?}, {flags:?}, {parts} parts, by {method:?}"));
             }
         }
     }
@@ -161,16 +163,18 @@ fn every_frame_in_flight_has_records_of_its_own() -> Result<()> {
                 let (count, turn) = (7 + number, number as f32 * 0.4);
                 let reference = scene(&models(), count, turn).reference();
                 let rays = rays_for(&reference);
-                let job = tracer.job(&rays)?;
+                let trace_buffers = tracer.buffers(&rays)?;
                 let mut cmd = ctx.acquire_command_buffer()?;
                 writer.update(&mut cmd, &gpu, count, turn, BuildMode::Rebuild)?;
-                tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
+                tracer.record(&mut cmd, &gpu.tlas, &trace_buffers, How::default())?;
                 ctx.submit(cmd)?;
-                frames.push((job, rays, reference));
+                frames.push((trace_buffers, rays, reference));
             }
-            for (number, (job, rays, reference)) in frames.iter().enumerate() {
-                HitComparison::of_triangles(rays, &tracer.read(job)?, |ray| reference.closest(ray, 0xff))
-                    .assert(&format!("frame {number}, {flags:?}, {parts} parts, by {method:?}"));
+            for (number, (trace_buffers, rays, reference)) in frames.iter().enumerate() {
+                HitComparison::of_triangles(rays, &tracer.read(trace_buffers)?, |ray| {
+                    reference.closest(ray, 0xff)
+                })
+                .assert(&format!("frame {number}, {flags:?}, {parts} parts, by {method:?}"));
             }
         }
     }

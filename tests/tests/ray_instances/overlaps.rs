@@ -11,7 +11,7 @@ use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{CULL_BACK, CULL_OPAQUE, How};
 use lvk_tests::rays::random_rays;
 
-/// Of meshes with room inside of them or between their parts, so that AABBs say little about what lies in them.
+/// Models of meshes with gaps inside or between their parts, so that AABBs say little about their contents.
 fn models() -> Vec<Vec<Part>> {
     let apart = |mesh: Mesh, to: [f32; 3], flags| Part {
         flags,

@@ -216,7 +216,7 @@ fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
 
 /// Ignored candidates in front of opaque ones: those are hit as if nothing stood before them.
 #[test]
-fn what_is_ignored_hides_nothing() -> Result<()> {
+fn ignored_hits_hide_nothing() -> Result<()> {
     for_each_case([GeometryFlags::empty(), GeometryFlags::OPAQUE], |case| {
         let method = case.method;
         let how = How::default();

@@ -2,7 +2,7 @@
 
 use lvk::{
     BufferDesc, BufferUsage, Context, Dependencies, Error, FeatureRequest, HitGroup, Holder,
-    RayTracingLibraryDesc, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage,
+    RayTracingLibraryDesc, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderRecord, ShaderStage,
     SpecializationConstant, SpecializationValue, record_bytes,
 };
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
@@ -124,12 +124,12 @@ fn every_kind_of_shader_reads_its_own_record() -> Result<()> {
     let tags: Vec<Tag> = (0..20).map(Tag::new).collect();
     let record = |number: usize| record_bytes(&tags[number]);
     // Longer than the shader reads: the longest decides the stride.
-    let long = [record(2), &[0xee; 77][..]].concat();
+    let long = [record(2).bytes(), &[0xee; 77][..]].concat();
     let group = |record| HitGroup { closest_hit: Some(*hit), record, ..Default::default() };
     let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &[*ray_gen; 2],
         miss: &[*miss, *miss, *plain_miss],
-        hit_groups: &[group(record(1)), group(&long), group(record(3))],
+        hit_groups: &[group(record(1)), group(ShaderRecord::from_bytes(&long)), group(record(3))],
         callable: &[*callable; 2],
         ray_gen_records: &[record(11), record(12)],
         miss_records: &[record(4), record(5)],
@@ -154,8 +154,8 @@ fn records_too_many_or_too_long_are_refused() -> Result<()> {
     let callable = answering(&ctx, ShaderStage::Callable, "", "1u")?;
     let limits = &ctx.capabilities().limits;
     let long = vec![0; (limits.sbt_max_stride - limits.sbt_handle_bytes + 1) as usize];
-    let fits = &long[1..];
-    let none: [&[u8]; 3] = [&[]; 3];
+    let fits = ShaderRecord::from_bytes(&long[1..]);
+    let none = [ShaderRecord::default(); 3];
     let good = RayTracingPipelineDesc {
         ray_gen: &[*ray_gen],
         miss: &[*miss],
@@ -171,7 +171,7 @@ fn records_too_many_or_too_long_are_refused() -> Result<()> {
     ] {
         usage(words, create(desc));
     }
-    let records: [&[u8]; 1] = [&long];
+    let records = [ShaderRecord::from_bytes(&long)];
     for (region, desc) in [
         ("ray generation shader record", RayTracingPipelineDesc { ray_gen_records: &records, ..good }),
         ("miss shader record", RayTracingPipelineDesc { miss_records: &records, ..good }),
@@ -332,7 +332,7 @@ fn indirect_traces_that_cannot_run_are_refused() -> Result<()> {
     usage("ray generation shader 1 does not exist", cmd.trace_rays_indirect(1, *arguments, 0, &none));
     let gone = *buffer(BufferUsage::INDIRECT)?;
     let stale = cmd.trace_rays_indirect(0, gone, 0, &none);
-    assert!(matches!(stale, Err(Error::StaleHandle { kind: "buffer" })), "{stale:?}");
+    assert!(matches!(stale, Err(Error::StaleHandle { kind: "buffer", .. })), "{stale:?}");
     ctx.submit(cmd)?;
     Ok(())
 }
@@ -533,7 +533,7 @@ fn libraries_that_do_not_fit_are_refused() -> Result<()> {
     );
     drop(library);
     let stale = pipeline(linked);
-    assert!(matches!(stale, Err(Error::StaleHandle { kind: "ray tracing library" })), "{stale:?}");
+    assert!(matches!(stale, Err(Error::StaleHandle { kind: "ray tracing library", .. })), "{stale:?}");
     Ok(())
 }
 

@@ -3,8 +3,8 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    BlasDesc, Context, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage,
-    TlasDesc,
+    BlasDesc, Context, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderRecord,
+    ShaderStage, TlasDesc,
 };
 use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
@@ -122,7 +122,7 @@ fn instance_ray_and_geometry_choose_the_hit_group() -> Result<()> {
     let groups: Vec<_> = (0..7)
         .map(|group| HitGroup {
             closest_hit: Some([*plain, *adding][group % 2]),
-            record: &records[group],
+            record: ShaderRecord::from_bytes(&records[group]),
             ..Default::default()
         })
         .collect();

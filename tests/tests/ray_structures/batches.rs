@@ -382,7 +382,7 @@ fn statistics_name_every_accel_struct() -> Result<()> {
     assert!(of_ring.structure_bytes > 0 && of_ring.table_bytes >= of_map && of_top.structure_bytes > 0);
     assert!(memory.structure_bytes >= of_ring.structure_bytes + of_top.structure_bytes);
     drop(ring);
-    assert_eq!(ctx.accel_memory().structures.len(), 1, "a structure without a handle is nobody's");
+    assert_eq!(ctx.accel_memory().structures.len(), 1, "a structure without a handle is not listed");
     ctx.wait_idle()?;
     assert_eq!(ctx.accel_memory().structure_bytes, memory.structure_bytes, "but the world still shows it");
     Ok(())

@@ -13,7 +13,7 @@ use lvk_tests::{device, device_with};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
-/// So small that what the GPU builds of it has no room where the CPU's tree is.
+/// A scene so small that the structure of a GPU build does not fit in the memory of the CPU's tree.
 fn ring() -> RayScene {
     RayScene::single(Mesh::torus(4), Layout::Indexed16)
 }

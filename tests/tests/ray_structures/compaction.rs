@@ -199,7 +199,7 @@ fn an_update_that_is_overtaken_by_compaction_is_mended() -> Result<()> {
     wait_for_compaction(&ctx)?;
     check.scene("later", &gpu.tlas, &scene)?;
     wait_for_compaction(&ctx)?;
-    assert_eq!(memory(&ctx), (all_before - saved, own_before - saved), "nobody holds the old ones");
+    assert_eq!(memory(&ctx), (all_before - saved, own_before - saved), "the old structures are freed");
     Ok(())
 }
 
@@ -373,7 +373,7 @@ fn asking_twice_is_asking_once_and_wrong_questions_are_refused() -> Result<()> {
     HitCheck::new(&ctx)?.scene("asked often", &gpu.tlas, &scene)
 }
 
-/// In every state of the compaction.
+/// Cases: every state of the compaction.
 #[test]
 fn accel_structs_may_be_destroyed_meanwhile() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
@@ -419,7 +419,7 @@ fn unreferenced_accel_structs_may_be_destroyed_meanwhile() -> Result<()> {
     Ok(())
 }
 
-/// In every state of the compaction, with work that was never submitted.
+/// Cases: every state of the compaction, with work that was never submitted.
 #[test]
 fn a_context_may_go_meanwhile() -> Result<()> {
     for steps in 0..4 {

@@ -81,7 +81,7 @@ fn compaction_fails_where_the_budget_has_no_memory_for_copies() -> Result<()> {
 
 /// Memory suffices for the smallest copy only. Freed memory is used for more copies, and the rest fails alone.
 #[test]
-fn what_fits_is_compacted_whatever_becomes_of_the_rest() -> Result<()> {
+fn structures_that_fit_are_compacted_whatever_becomes_of_the_rest() -> Result<()> {
     let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
     let smallest = sizes.iter().map(|(_, after)| *after).min().unwrap_or(0);
     let Some(ctx) = without_software(|desc| desc.accel_budget_bytes = needed + smallest) else {
@@ -140,7 +140,7 @@ fn copies_wait_for_the_memory_of_other_copies() -> Result<()> {
 
 /// A copy that waits for room does not keep what was destroyed.
 #[test]
-fn what_waits_for_memory_may_be_destroyed() -> Result<()> {
+fn structures_that_wait_for_memory_may_be_destroyed() -> Result<()> {
     let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
     let Some(ctx) = without_software(|desc| desc.accel_budget_bytes = needed + 256) else {
         return Ok(());

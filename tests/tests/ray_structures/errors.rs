@@ -4,8 +4,8 @@ use lvk::glam::{Affine3A, Vec3};
 use lvk::{
     Aabbs, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags,
     BuildMode, CommandBuffer, Context, Dependencies, Error, GeometryFlags, HitGroup, Holder, IndexFormat,
-    Indices, InstanceFlags, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage, TlasDesc,
-    TlasInstance, Triangles,
+    Indices, InstanceFlags, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderRecord, ShaderStage,
+    TlasDesc, TlasInstance, Triangles,
 };
 use lvk_tests::device;
 use lvk_tests::hit_comparison::HitComparison;
@@ -198,7 +198,8 @@ fn refits_that_are_not_possible_are_refused() -> Result<()> {
         intact.refuse("so rebuild", |cmd| cmd.update_tlas(*updatable, &other, BuildMode::Refit))?;
     }
     for mode in [BuildMode::Refit, BuildMode::Rebuild] {
-        let words = "of six: instance count is 7";
+        let words = "of six: instance count is 7, the TLAS was created for at most 6; create it with a larger \
+                     TlasDesc::capacity";
         intact.refuse(words, |cmd| cmd.update_tlas(*updatable, &[one; 7], mode))?;
     }
     intact.refuse("instance count is 2", |cmd| cmd.update_tlas(tlas, &[one; 2], BuildMode::Rebuild))?;
@@ -320,7 +321,7 @@ fn pipelines_without_sense_are_refused() -> Result<()> {
     let long = vec![0; limits.sbt_max_stride as usize];
     let any_hit = [HitGroup { any_hit: Some(hit), ..Default::default() }];
     let intersection = [HitGroup { intersection: Some(hit), ..Default::default() }];
-    let too_long = [HitGroup { record: &long, ..groups[0] }];
+    let too_long = [HitGroup { record: ShaderRecord::from_bytes(&long), ..groups[0] }];
     let cases = [
         ("at least one ray generation shader", RayTracingPipelineDesc { ray_gen: &[], ..good }),
         ("recursion depth", RayTracingPipelineDesc { max_recursion: limits.max_ray_recursion + 1, ..good }),

@@ -19,7 +19,7 @@ use lvk_tests::{TestDevice, device, device_with};
 const MOVING: BuildFlags =
     BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE).union(BuildFlags::ALLOW_COMPACTION);
 
-/// Of an acceleration structure of the devices that split.
+/// Primitive limit of a BLAS on devices that split.
 const MOST_PRIMITIVES: u64 = 60;
 
 /// Creates a context that splits BLASes of more primitives.
@@ -106,7 +106,7 @@ fn reason(result: Result<Holder<AccelStructHandle>>) -> String {
 
 /// Whole, in another order, split; compacted or not; and what was loaded, once more.
 #[test]
-fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
+fn loaded_structures_are_hit_like_built_ones() -> Result<()> {
     for (split, order) in
         [(false, PrimitiveOrder::Given), (false, PrimitiveOrder::Spatial), (true, PrimitiveOrder::Auto)]
     {
@@ -150,7 +150,7 @@ fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
 
 /// A refit reads the buffers of the description; so does a rebuild, where there is room for one.
 #[test]
-fn what_is_loaded_moves_on() -> Result<()> {
+fn loaded_structures_can_be_refitted() -> Result<()> {
     for ctx in whole_and_split(MOST_PRIMITIVES) {
         let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
         let mut mine = Mine::new(&ctx)?;
@@ -181,7 +181,7 @@ fn what_is_loaded_moves_on() -> Result<()> {
 
 /// Nothing was submitted in between: the question comes behind the loading.
 #[test]
-fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
+fn loaded_structures_may_be_compacted_at_once() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mine = Mine::new(&ctx)?;
     let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
@@ -197,7 +197,7 @@ fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
 
 /// An acceleration structure from a larger allocation is loaded into what its bytes say: no more may be built in it than fits.
 #[test]
-fn what_was_compacted_before_it_was_saved_is_refitted() -> Result<()> {
+fn structures_compacted_before_they_were_saved_are_refitted() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     let mut mine = Mine::new(&ctx)?;

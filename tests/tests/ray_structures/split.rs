@@ -4,8 +4,8 @@
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, DeviceProfile, GeometryFlags,
-    GeometryTransform, HitGroup, InstanceFlags, PrimitiveOrder, RayTracingPipelineDesc, Result, ShaderStage,
-    TlasDesc,
+    GeometryTransform, HitGroup, InstanceFlags, PrimitiveOrder, RayTracingPipelineDesc, Result, ShaderRecord,
+    ShaderStage, TlasDesc,
 };
 use lvk_tests::accel_backend::{builds_device_accel_structs, expect_parts};
 use lvk_tests::hit_check::{HitCheck, rays_for, same_hits};
@@ -198,7 +198,7 @@ fn parts_keep_hit_groups() -> Result<()> {
     let hit = shader(&ctx, ShaderStage::ClosestHit, TAGGED_HIT)?;
     let records: Vec<_> = (0..13_u32).map(|group| (100 + group).to_ne_bytes()).collect();
     let group = |record| HitGroup { closest_hit: Some(*hit), record, ..Default::default() };
-    let groups: Vec<_> = records.iter().map(|record| group(&record[..])).collect();
+    let groups: Vec<_> = records.iter().map(|record| group(ShaderRecord::from_bytes(record))).collect();
     let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &[*ray_gen],
         miss: &[*miss],

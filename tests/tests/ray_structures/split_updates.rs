@@ -65,16 +65,18 @@ fn a_refit_follows_vertices_written_by_a_dispatch() -> Result<()> {
             scene.models[0][0].mesh = deformed(&mesh, amount);
             let reference = scene.reference();
             let rays = rays_for(&reference);
-            let job = tracer.job(&rays)?;
+            let trace_buffers = tracer.buffers(&rays)?;
             let mut cmd = ctx.acquire_command_buffer()?;
             deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
             cmd.build_blas(&[*gpu.models[0]], mode)?;
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
-            tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
+            tracer.record(&mut cmd, &gpu.tlas, &trace_buffers, How::default())?;
             ctx.submit(cmd)?;
-            lvk_tests::hit_comparison::HitComparison::of_triangles(&rays, &tracer.read(&job)?, |ray| {
-                reference.closest(ray, 0xff)
-            })
+            lvk_tests::hit_comparison::HitComparison::of_triangles(
+                &rays,
+                &tracer.read(&trace_buffers)?,
+                |ray| reference.closest(ray, 0xff),
+            )
             .assert(&format!("{mode:?} after {amount}, {method:?}"));
         }
     }
@@ -101,7 +103,7 @@ fn a_rebuild_follows_other_indices() -> Result<()> {
             bytemuck::cast_slice(indices)
         };
         let buffer = gpu.buffers[0].indices.as_ref();
-        ctx.upload_buffer(**buffer.ok_or(Error::StaleHandle { kind: "buffer" })?, 0, bytes)?;
+        ctx.upload_buffer(**buffer.ok_or(Error::StaleHandle { kind: "buffer", name: None })?, 0, bytes)?;
         let mut cmd = ctx.acquire_command_buffer()?;
         cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
@@ -349,7 +351,7 @@ fn a_triangle_that_does_not_fit_is_an_error() -> Result<()> {
             assert_eq!(made?.len(), 2);
             continue;
         }
-        let Err(Error::LimitExceeded { object, what, requested, limit }) = &made else {
+        let Err(Error::LimitExceeded { object, what, requested, limit, .. }) = &made else {
             unreachable!("{:?}", made.map(|made| made.len()))
         };
         assert!(object == "huge" && requested > limit, "{object}: {what} {requested} {limit}");

@@ -13,7 +13,7 @@ use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{
     GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes,
 };
-use lvk_tests::ray_tracer::{How, Job, Method, RayTracer, for_each_method};
+use lvk_tests::ray_tracer::{How, Method, RayTracer, TraceBuffers, for_each_method};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 
@@ -98,7 +98,7 @@ fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
         let upload = |turn| spiral(8, turn).upload_with(ctx, UPDATABLE, UPDATABLE, 0);
         let all = [0.0, 0.3, 0.6].into_iter().map(upload).collect::<Result<Vec<_>>>()?;
         let rays = rays();
-        let jobs = all.iter().map(|_| tracer.job(&rays)).collect::<Result<Vec<_>>>()?;
+        let trace_buffers_of_all = all.iter().map(|_| tracer.buffers(&rays)).collect::<Result<Vec<_>>>()?;
         let shown = instances(&spiral(8, 0.0).placed, &all[0].models);
         for round in [1.0, 2.0] {
             let scene = |number: usize, step: f32| spiral(8, round + number as f32 * 0.5 + step);
@@ -109,16 +109,16 @@ fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
             let mut cmd = ctx.acquire_command_buffer()?;
             (0..3).try_for_each(|number| refit(&mut cmd, number, 0.1))?;
             refit(&mut cmd, 0, 0.2)?;
-            tracer.record(&mut cmd, &all[0].tlas, &jobs[0], How::default())?;
+            tracer.record(&mut cmd, &all[0].tlas, &trace_buffers_of_all[0], How::default())?;
             refit(&mut cmd, 1, 0.2)?;
             cmd.build_blas(&[*all[2].models[0]], BuildMode::Refit)?;
             refit(&mut cmd, 2, 0.2)?;
-            tracer.record(&mut cmd, &all[1].tlas, &jobs[1], How::default())?;
-            tracer.record(&mut cmd, &all[2].tlas, &jobs[2], How::default())?;
+            tracer.record(&mut cmd, &all[1].tlas, &trace_buffers_of_all[1], How::default())?;
+            tracer.record(&mut cmd, &all[2].tlas, &trace_buffers_of_all[2], How::default())?;
             ctx.submit(cmd)?;
-            for (number, job) in jobs.iter().enumerate() {
+            for (number, trace_buffers) in trace_buffers_of_all.iter().enumerate() {
                 let what = format!("structure {number} in round {round} by {method:?}");
-                agree(&what, &rays, &tracer.read(job)?, &scene(number, 0.2));
+                agree(&what, &rays, &tracer.read(trace_buffers)?, &scene(number, 0.2));
             }
         }
         // The same acceleration structures shown by another one, and then no longer there.
@@ -156,7 +156,13 @@ impl DeformingMesh {
     }
 
     /// Deforms, builds and traces in one submission.
-    fn submit(&mut self, ctx: &Context, job: &Job, amount: f32, mode: BuildMode) -> Result<()> {
+    fn submit(
+        &mut self,
+        ctx: &Context,
+        trace_buffers: &TraceBuffers,
+        amount: f32,
+        mode: BuildMode,
+    ) -> Result<()> {
         let Self { deformer, tracer, scene, gpu, .. } = self;
         let mesh = &mut scene.models[0][0].mesh;
         let mut cmd = ctx.acquire_command_buffer()?;
@@ -164,7 +170,7 @@ impl DeformingMesh {
         *mesh = deformed(mesh, amount);
         cmd.build_blas(&[*gpu.models[0]], mode)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
-        tracer.record(&mut cmd, &gpu.tlas, job, How::default())?;
+        tracer.record(&mut cmd, &gpu.tlas, trace_buffers, How::default())?;
         ctx.submit(cmd)?;
         Ok(())
     }
@@ -175,11 +181,11 @@ fn an_accel_struct_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()>
     let Some(ctx) = device() else { return Ok(()) };
     for method in Method::available(&ctx) {
         let mut all = DeformingMesh::new(&ctx, method)?;
-        let job = all.tracer.job(&all.rays)?;
+        let trace_buffers = all.tracer.buffers(&all.rays)?;
         for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.4, BuildMode::Rebuild)] {
-            all.submit(&ctx, &job, amount, mode)?;
+            all.submit(&ctx, &trace_buffers, amount, mode)?;
             let what = format!("deformed by {amount}, {method:?}");
-            agree(&what, &all.rays, &all.tracer.read(&job)?, &all.scene);
+            agree(&what, &all.rays, &all.tracer.read(&trace_buffers)?, &all.scene);
         }
     }
     Ok(())
@@ -214,15 +220,15 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
             ctx.next_frame()?;
             let (amount, mode) =
                 if number % 3 == 2 { (-0.35, BuildMode::Rebuild) } else { (0.2, BuildMode::Refit) };
-            let job = all.tracer.job(&all.rays)?;
+            let trace_buffers = all.tracer.buffers(&all.rays)?;
             all.scene.placed[0].transform = Affine3A::from_rotation_z(number as f32);
             all.scene.placed[0].custom_index = number;
-            all.submit(&ctx, &job, amount, mode)?;
-            frames.push((job, all.scene.clone()));
+            all.submit(&ctx, &trace_buffers, amount, mode)?;
+            frames.push((trace_buffers, all.scene.clone()));
         }
-        for (number, (job, scene)) in frames.iter().enumerate() {
+        for (number, (trace_buffers, scene)) in frames.iter().enumerate() {
             let what = format!("frame {number} by {method:?}");
-            agree(&what, &all.rays, &all.tracer.read(job)?, scene);
+            agree(&what, &all.rays, &all.tracer.read(trace_buffers)?, scene);
         }
     }
     Ok(())
@@ -244,7 +250,7 @@ fn a_destroyed_blas_is_referenced_until_the_next_update() -> Result<()> {
 
 /// An update of a dropped command buffer has no effect, and the BLASes of the TLAS stay alive.
 #[test]
-fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
+fn a_cancelled_command_buffer_changes_nothing() -> Result<()> {
     for_each_method(|ctx, method, tracer| {
         let scene = deformable();
         let mut gpu = scene.upload_with(ctx, BuildFlags::default(), UPDATABLE, 4)?;
@@ -294,7 +300,7 @@ fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
 /// A rebuild reads the indices again and a refit does not, where the library has put the triangles into an order: so
 /// empty triangles tell the two apart.
 #[test]
-fn builds_given_up_do_not_count_as_wear() -> Result<()> {
+fn cancelled_builds_do_not_count_as_wear() -> Result<()> {
     let Some(ctx) =
         device().filter(|ctx| requires_device_accel_structs(ctx, "indices that a refit does not read"))
     else {
@@ -350,7 +356,7 @@ fn builds_given_up_do_not_count_as_wear() -> Result<()> {
 /// The first rebuild gives a software BVH another tree, so its bytes tell a rebuild from a refit. Refits of unmoved
 /// vertices change nothing but AABBs, and these by the first refit alone.
 #[test]
-fn builds_of_software_given_up_do_not_count_as_wear() -> Result<()> {
+fn cancelled_software_builds_do_not_count_as_wear() -> Result<()> {
     let Some(ctx) = software_alone(|_| ()) else { return Ok(()) };
     let gpu = deformable().upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
     let blas = *gpu.models[0];

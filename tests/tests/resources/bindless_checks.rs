@@ -172,7 +172,7 @@ fn trace(ctx: &Context, pipeline: ComputePipelineHandle, tlas: u32) -> f32 {
     f32::from_bits(read_words(ctx, *result, 1)[0])
 }
 
-/// By the device's own queries and by the library's.
+/// Cases: the device's own queries and the library's.
 #[test]
 fn ray_queries_check_their_accel_structs() {
     for query in [RayQueryRequest::HardwareIfPresent, RayQueryRequest::Software] {

@@ -14,55 +14,73 @@ use lvk_tests::compute::{
 };
 use lvk_tests::{TestDevice, device, device_with};
 
-fn stale<T: Debug>(result: lvk::Result<T>, expected: &str) {
-    match result {
-        Err(Error::StaleHandle { kind }) => assert_eq!(kind, expected),
-        other => unreachable!("expected a stale {expected}, not {other:?}"),
+/// The reason why a handle has no object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Refusal {
+    Stale,
+    Foreign,
+}
+
+impl Refusal {
+    #[track_caller]
+    fn expect<T: Debug>(self, result: lvk::Result<T>, expected: &str) {
+        let (refusal, kind) = match result {
+            Err(Error::StaleHandle { kind, name: Some(_) }) => (Self::Stale, kind),
+            Err(Error::ForeignHandle { kind }) => (Self::Foreign, kind),
+            other => unreachable!("expected a {self:?} {expected}, not {other:?}"),
+        };
+        assert_eq!((refusal, kind), (self, expected));
     }
 }
 
 /// Every call that takes a handle, with one of each kind that is not `ctx`'s or not alive.
-fn expect_all_stale(ctx: &Context, made: &Objects) {
+fn expect_all_refused(ctx: &Context, made: &Objects, refusal: Refusal) {
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let Objects { buffer, texture, module, pipeline, pool, .. } = made;
     let good = words_buffer(ctx, &[0; 4]);
-    stale(ctx.buffer_address(*buffer), "buffer");
-    stale(ctx.upload_buffer(*buffer, 0, &[0]), "buffer");
-    stale(ctx.download_buffer(*buffer, 0, &mut [0]), "buffer");
-    stale(cmd.copy_buffer(*buffer, 0, *good, 0, 4), "buffer");
-    stale(cmd.copy_buffer(*good, 0, *buffer, 0, 4), "buffer");
-    stale(cmd.fill_buffer(*buffer, 0, 4, 0), "buffer");
+    refusal.expect(ctx.buffer_address(*buffer), "buffer");
+    refusal.expect(ctx.upload_buffer(*buffer, 0, &[0]), "buffer");
+    refusal.expect(ctx.download_buffer(*buffer, 0, &mut [0]), "buffer");
+    refusal.expect(cmd.copy_buffer(*buffer, 0, *good, 0, 4), "buffer");
+    refusal.expect(cmd.copy_buffer(*good, 0, *buffer, 0, 4), "buffer");
+    refusal.expect(cmd.fill_buffer(*buffer, 0, 4, 0), "buffer");
     let whole = TextureRegion::default();
-    stale(ctx.upload_texture(*texture, &whole, &[0; 4]), "texture");
-    stale(ctx.download_texture(*texture, &whole), "texture");
-    stale(cmd.copy_texture_to_buffer(*texture, &whole, *good, 0), "texture");
-    stale(cmd.clear_texture(*texture, ClearValue::Color([0.0; 4]), &TextureRange::default()), "texture");
-    stale(cmd.generate_mipmaps(*texture), "texture");
+    refusal.expect(ctx.upload_texture(*texture, &whole, &[0; 4]), "texture");
+    refusal.expect(ctx.download_texture(*texture, &whole), "texture");
+    refusal.expect(cmd.copy_texture_to_buffer(*texture, &whole, *good, 0), "texture");
+    refusal.expect(
+        cmd.clear_texture(*texture, ClearValue::Color([0.0; 4]), &TextureRange::default()),
+        "texture",
+    );
+    refusal.expect(cmd.generate_mipmaps(*texture), "texture");
     let color = [lvk::ColorAttachment::clear(*texture, [0.0; 4])];
-    stale(cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).map(drop), "texture");
-    stale(cmd.bind_compute_pipeline(*pipeline), "compute pipeline");
+    refusal.expect(
+        cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).map(drop),
+        "texture",
+    );
+    refusal.expect(cmd.bind_compute_pipeline(*pipeline), "compute pipeline");
     let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    stale(ctx.create_compute_pipeline(&desc), "shader module");
+    refusal.expect(ctx.create_compute_pipeline(&desc), "shader module");
     let desc = RenderPipelineDesc { vertex: Some(*module), ..Default::default() };
-    stale(ctx.create_render_pipeline(&desc), "shader module");
-    stale(cmd.write_timestamp(*pool, 0), "query pool");
-    stale(cmd.reset_queries(*pool, 0..1), "query pool");
-    stale(ctx.timestamps_ms(*pool, 0, 1), "query pool");
+    refusal.expect(ctx.create_render_pipeline(&desc), "shader module");
+    refusal.expect(cmd.write_timestamp(*pool, 0), "query pool");
+    refusal.expect(cmd.reset_queries(*pool, 0..1), "query pool");
+    refusal.expect(ctx.timestamps_ms(*pool, 0, 1), "query pool");
     let nothing = compute_pipeline(ctx, "layout(local_size_x = 1) in; void main() {}");
     cmd.bind_compute_pipeline(*nothing).unwrap();
     for dependencies in [
         Dependencies { buffers: &[*good, *buffer], ..Default::default() },
         Dependencies { read_buffers: &[*buffer], ..Default::default() },
     ] {
-        stale(cmd.dispatch([1, 1, 1], &dependencies), "buffer");
+        refusal.expect(cmd.dispatch([1, 1, 1], &dependencies), "buffer");
     }
     for dependencies in [
         Dependencies { sampled_images: &[*texture], ..Default::default() },
         Dependencies { storage_images: &[*texture], ..Default::default() },
     ] {
-        stale(cmd.dispatch([1, 1, 1], &dependencies), "texture");
+        refusal.expect(cmd.dispatch([1, 1, 1], &dependencies), "texture");
     }
-    stale(cmd.dispatch_indirect(*buffer, 0, &Dependencies::default()), "buffer");
+    refusal.expect(cmd.dispatch_indirect(*buffer, 0, &Dependencies::default()), "buffer");
     ctx.submit(cmd).unwrap();
 }
 
@@ -106,26 +124,48 @@ fn destroyed_objects_leave_stale_handles() {
     let made = objects(&ctx);
     assert_eq!(read_words(&ctx, made.buffer, 3), [1, 2, 3]);
     destroy(&ctx, &made);
-    expect_all_stale(&ctx, &made);
+    expect_all_refused(&ctx, &made, Refusal::Stale);
     destroy(&ctx, &made);
     let news = objects(&ctx);
     destroy(&ctx, &made);
     assert_eq!(read_words(&ctx, news.buffer, 3), [1, 2, 3], "the old handle must not destroy its successor");
-    expect_all_stale(&ctx, &made);
+    expect_all_refused(&ctx, &made, Refusal::Stale);
     destroy(&ctx, &news);
 }
 
 #[test]
-fn handles_of_another_context_are_stale() {
+fn handles_of_another_context_are_foreign() {
     let (Some(ctx), Some(other)) = (device(), device()) else { return };
     let made = objects(&ctx);
     let theirs = objects(&other);
-    expect_all_stale(&ctx, &theirs);
+    expect_all_refused(&ctx, &theirs, Refusal::Foreign);
     destroy(&ctx, &theirs);
     assert_eq!(read_words(&other, theirs.buffer, 3), [1, 2, 3]);
     assert_eq!(read_words(&ctx, made.buffer, 3), [1, 2, 3]);
     destroy(&ctx, &made);
     destroy(&other, &theirs);
+}
+
+#[test]
+fn errors_of_handles_name_the_object_or_the_other_context() {
+    let (Some(ctx), Some(other)) = (device(), device()) else { return };
+    let desc = BufferDesc { size_bytes: 16, debug_name: "positions", ..Default::default() };
+    let (ours, theirs) = (ctx.create_buffer(&desc).unwrap(), other.create_buffer(&desc).unwrap());
+    let foreign = ctx.buffer_address(*theirs).unwrap_err();
+    assert_eq!(
+        foreign.to_string(),
+        "foreign buffer handle: the object belongs to another context; use the handle with the context that made it"
+    );
+    let handle = *ours;
+    drop(ours);
+    // Another object takes the place of the destroyed one.
+    let named = BufferDesc { debug_name: "colours", ..desc };
+    let next = ctx.create_buffer(&named).unwrap();
+    let stale = ctx.buffer_address(handle).unwrap_err();
+    let text = "stale buffer handle: 'positions' was destroyed; keep its holder while the handle is in use";
+    assert_eq!(stale.to_string(), text);
+    assert_eq!(format!("{stale:?}"), text);
+    assert!(ctx.buffer_address(*next).is_ok());
 }
 
 #[test]
@@ -148,7 +188,7 @@ fn a_released_object_outlives_its_holder() {
     assert_eq!(kept, copy);
     assert_eq!(read_words(&ctx, kept, 1), [5]);
     ctx.destroy(kept);
-    stale(ctx.buffer_address(kept), "buffer");
+    Refusal::Stale.expect(ctx.buffer_address(kept), "buffer");
 }
 
 fn drop_and_expect_stale<H: Destroy>(ctx: &Context, holder: Holder<H>, check: impl FnOnce(&Context, H)) {
@@ -161,12 +201,16 @@ fn drop_and_expect_stale<H: Destroy>(ctx: &Context, holder: Holder<H>, check: im
 fn dropping_a_holder_destroys() {
     let Some(ctx) = device() else { return };
     drop_and_expect_stale(&ctx, words_buffer(&ctx, &[1]), |ctx, handle| {
-        stale(ctx.buffer_address(handle), "buffer")
+        Refusal::Stale.expect(ctx.buffer_address(handle), "buffer")
     });
     let texture = ctx.create_texture(&TextureDesc::default()).unwrap();
-    drop_and_expect_stale(&ctx, texture, |ctx, handle| stale(ctx.raw_image(handle), "texture"));
+    drop_and_expect_stale(&ctx, texture, |ctx, handle| {
+        Refusal::Stale.expect(ctx.raw_image(handle), "texture")
+    });
     let sampler = ctx.create_sampler(&SamplerDesc::default()).unwrap();
-    drop_and_expect_stale(&ctx, sampler, |ctx, handle| stale(ctx.raw_sampler(handle), "sampler"));
+    drop_and_expect_stale(&ctx, sampler, |ctx, handle| {
+        Refusal::Stale.expect(ctx.raw_sampler(handle), "sampler")
+    });
 }
 
 #[test]
@@ -289,7 +333,7 @@ fn a_context_ends_well_with_released_objects_and_uploads_that_never_ran() {
 }
 
 #[test]
-fn what_is_alive_is_listed_and_reported_by_name() {
+fn live_objects_are_listed_and_reported_by_name() {
     lvk_tests::warnings::capture_warnings();
     let Some(ctx) = device() else { return };
     assert_eq!(ctx.live_objects(), []);

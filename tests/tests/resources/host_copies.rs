@@ -162,7 +162,7 @@ fn every_queue_takes_them_over() {
     });
 }
 
-/// They can be uploaded to, copied from and sampled again like all others.
+/// Textures written by host copies can be uploaded to, copied from and sampled like all others.
 #[test]
 fn such_textures_are_like_any_texture_afterwards() {
     let Some(pair) = both() else { return };

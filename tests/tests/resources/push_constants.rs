@@ -199,6 +199,7 @@ fn unknown_and_wide_specialization_constants_are_errors() {
             module: Some(*module),
             specialization: &specialization,
             debug_name: "odd one",
+            ..Default::default()
         };
         match ctx.create_compute_pipeline(&desc) {
             Err(Error::InvalidUsage { object, message }) => {

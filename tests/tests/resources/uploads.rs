@@ -155,7 +155,7 @@ fn an_upload_reaches_what_was_recorded_before_and_destroyed_since() {
 }
 
 #[test]
-fn what_is_destroyed_after_an_upload_does_not_wait_for_a_submission() {
+fn objects_destroyed_after_an_upload_do_not_wait_for_a_submission() {
     let Some(ctx) = device() else { return };
     ctx.wait_idle().unwrap();
     let kept = words_buffer(&ctx, &[1; 64]);
@@ -229,7 +229,7 @@ fn bytes_are_read_later_as_they_were_when_they_were_asked_for() {
 }
 
 #[test]
-fn readbacks_of_nothing_and_given_up_ones_are_harmless() {
+fn empty_and_cancelled_readbacks_are_harmless() {
     let Some(ctx) = device() else { return };
     let buffer = words_buffer(&ctx, &[3; 16]);
     let nothing = ctx.read_buffer_later(*buffer, 64..64).unwrap();
@@ -250,6 +250,8 @@ fn uploads_and_readbacks_outside_of_an_object_are_errors() {
         Err(Error::InvalidUsage { .. }) => {}
         other => unreachable!("{other:?}"),
     };
+    let reversed = ctx.read_buffer_later(*buffer, Range { start: 8, end: 4 }).unwrap_err();
+    assert_eq!(reversed.to_string(), "words: the range 8..4 of bytes ends before it begins");
     usage(ctx.read_buffer_later(*buffer, Range { start: 8, end: 4 }));
     usage(ctx.read_buffer_later(*buffer, 0..65));
     usage(ctx.read_buffer_later(*buffer, 65..65));

@@ -18,7 +18,7 @@ use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, World};
 use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::omni_shadows::{OmniShadows, OmniShadowsConfig};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
-use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
+use lvk_samples::render_to_cube_map::{CubeMapFaces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig};
 use lvk_samples::rtx_hello::RtxHello;
@@ -45,8 +45,8 @@ fn frame_time(frame: u32) -> FrameTime {
 /// Renders a sample at some times, and waits for each frame.
 fn one_by_one<S: Sample>(sample: &mut S) -> Vec<Vec<u8>> {
     let mut at = |frame| {
-        sample.update(frame_time(frame)).map_err(Into::into).unwrap();
-        headless::picture(sample).map_err(Into::into).unwrap()
+        sample.update(frame_time(frame));
+        headless::picture(sample).unwrap()
     };
     FRAMES.map(&mut at).to_vec()
 }
@@ -56,12 +56,12 @@ fn at_once<S: Sample>(sample: &mut S, size: [u32; 2]) -> Vec<Vec<u8>> {
     let ctx = sample.context().clone();
     let kept = FRAMES.map(|frame| {
         let copy = texture(&ctx, size);
-        sample.update(frame_time(frame)).map_err(Into::into).unwrap();
+        sample.update(frame_time(frame));
         let mut frame = Frame::free(&ctx).unwrap();
-        let image = sample.record(&mut frame).map_err(Into::into).unwrap();
+        let image = sample.record(&mut frame).unwrap();
         let region = TextureRegion::default();
         frame.cmd.copy_texture(image, &region, *copy, &region).unwrap();
-        assert!(frame.finish().unwrap().is_empty(), "nobody waited");
+        assert!(frame.finish().unwrap().is_empty(), "no readback is pending");
         copy
     });
     kept.map(|copy| ctx.download_texture(*copy, &TextureRegion::default()).unwrap()).to_vec()
@@ -87,10 +87,10 @@ fn check<S: Sample>(seen: Seen, make: impl Fn([u32; 2]) -> S) {
     assert!(expected[0] != expected[1], "nothing moves");
     assert!(at_once(&mut sample, SIZE) == expected, "a frame depends on the ones under way");
 
-    sample.resize(OTHER_SIZE).map_err(Into::into).unwrap();
+    sample.resize(OTHER_SIZE).unwrap();
     assert!(one_by_one(&mut sample) == one_by_one(&mut make(OTHER_SIZE)), "another size");
     assert!(sample.resize([0, 9]).is_err() && sample.resize([9, 1 << 20]).is_err());
-    sample.resize(SIZE).map_err(Into::into).unwrap();
+    sample.resize(SIZE).unwrap();
     check_reload(&mut sample, &expected);
     check_view(&mut sample, seen, &expected[0]);
     check_panel(&mut sample, &expected[0]);
@@ -98,19 +98,19 @@ fn check<S: Sample>(seen: Seen, make: impl Fn([u32; 2]) -> S) {
 
 /// Renders `sample` at the first of the times.
 fn first<S: Sample>(sample: &mut S) -> Vec<u8> {
-    sample.update(frame_time(FRAMES[0])).map_err(Into::into).unwrap();
-    headless::picture(sample).map_err(Into::into).unwrap()
+    sample.update(frame_time(FRAMES[0]));
+    headless::picture(sample).unwrap()
 }
 
 fn check_reload<S: Sample>(sample: &mut S, expected: &[Vec<u8>]) {
     let wrong = changed_shaders("noSuchValue + ");
-    let told = shader_folder::with(wrong.path(), || sample.reload()).map_err(Into::into).unwrap_err();
+    let told = shader_folder::with(wrong.path(), || sample.reload()).unwrap_err();
     assert!(told.to_string().contains("noSuchValue"), "{told}");
     assert!(first(sample) == expected[0], "the old pipelines stay");
     let inverted = changed_shaders("1.0 - ");
-    shader_folder::with(inverted.path(), || sample.reload()).map_err(Into::into).unwrap();
+    shader_folder::with(inverted.path(), || sample.reload()).unwrap();
     assert!(first(sample) != expected[0], "the new shaders are not in use");
-    sample.reload().map_err(Into::into).unwrap();
+    sample.reload().unwrap();
     assert!(one_by_one(sample) == expected, "back again, by new pipelines");
 }
 
@@ -146,13 +146,13 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
 }
 
 fn check_view<S: Sample>(sample: &mut S, seen: Seen, expected: &[u8]) {
-    sample.update(frame_time(FRAMES[0])).map_err(Into::into).unwrap();
+    sample.update(frame_time(FRAMES[0]));
     assert!(sample.view().is_some() == (seen == Seen::FromAnywhere), "has it a camera?");
     let Some(view) = sample.view() else { return };
     sample.set_view(&Camera { vertical_fov_degrees: 0.5 * view.vertical_fov_degrees, ..view });
-    assert!(headless::picture(sample).map_err(Into::into).unwrap() != expected, "another view");
+    assert!(headless::picture(sample).unwrap() != expected, "another view");
     sample.set_view(&view);
-    assert!(headless::picture(sample).map_err(Into::into).unwrap() == expected, "the first view again");
+    assert!(headless::picture(sample).unwrap() == expected, "the first view again");
 }
 
 fn check_panel<S: Sample>(sample: &mut S, expected: &[u8]) {
@@ -162,7 +162,7 @@ fn check_panel<S: Sample>(sample: &mut S, expected: &[u8]) {
             egui::Window::new("panel").show(ui, |ui| sample.panel(ui));
         });
     }
-    assert!(first(sample) == expected, "a panel changes what nobody has touched");
+    assert!(first(sample) == expected, "a panel changes settings without input");
 }
 
 fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {
@@ -187,8 +187,10 @@ fn hello_triangle_goes_by_frames() {
 fn render_to_cube_map_goes_by_frames() {
     let Some(ctx) = device() else { return };
     check(Seen::FromAnywhere, |extent| {
-        let config =
-            RenderToCubeMapConfig { face_size: 32, ..RenderToCubeMapConfig::new(extent, Faces::SixPasses) };
+        let config = RenderToCubeMapConfig {
+            face_size: 32,
+            ..RenderToCubeMapConfig::new(extent, CubeMapFaces::SixPasses)
+        };
         RenderToCubeMap::new(&ctx, &config).unwrap()
     });
 }
@@ -216,7 +218,7 @@ fn mesh_shaders_goes_by_frames() {
 fn yuv_goes_by_frames() {
     let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
     check(Seen::Flat, |extent| {
-        Yuv::new(&ctx, &YuvConfig { film: [80, 48], ..YuvConfig::new(extent) }).unwrap()
+        Yuv::new(&ctx, &YuvConfig { video_size: [80, 48], ..YuvConfig::new(extent) }).unwrap()
     });
 }
 

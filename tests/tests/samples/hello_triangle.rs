@@ -14,9 +14,9 @@ use lvk_tests::raster_sample::{
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// On SwiftShader: the same but for the rounding of colours and the places of samples in a pixel.
+/// Tolerance on SwiftShader, which rounds colours differently and has other sample positions.
 const OTHER_DRIVER: Tolerance = Tolerance { psnr: 40.0, ssim: 0.99, differing_share: 0.05, flip: 0.01 };
-/// Of the corners, in linear light.
+/// Colours of the corners, in linear light.
 const COLORS: [Vec3; 3] = [Vec3::new(0.9, 0.02, 0.08), Vec3::new(0.0, 0.62, 0.2), Vec3::new(0.03, 0.12, 1.0)];
 const BACKDROP: Vec3 = Vec3::new(0.012, 0.014, 0.022);
 

@@ -22,9 +22,9 @@ const SMALL: [u32; 2] = [99, 55];
 /// this one, and shadows alone and one bounce have one test each.
 const DEPTH: u32 = 4;
 
-/// Of the same method by pipeline and by query.
+/// Tolerance between pipeline and query of one method.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
-/// Of rasterised and traced first hits: the compute rasteriser leaves to rays what rounding decides.
+/// Tolerance between rasterised and traced first hits: the compute rasteriser leaves to rays what rounding decides.
 const SAME_VIEW: Tolerance = Tolerance { psnr: 60.0, ssim: 0.999, differing_share: 2e-4, flip: 1e-3 };
 const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
 

@@ -18,11 +18,11 @@ use lvk_tests::{device, device_with};
 const SIZE: [u32; 2] = [163, 91];
 const TIME_SECONDS: f64 = 1.9;
 
-/// Of the same image by pipeline and by query.
+/// Tolerance between pipeline and query.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
-/// Of the same lists sorted by the device and by the host.
+/// Tolerance between lists sorted by the device and by the host.
 const SAME_GLASS: Tolerance = Tolerance { psnr: 60.0, ssim: 0.999, differing_share: 2e-4, flip: 0.01 };
-/// Of an image and the same one on a lesser device.
+/// Tolerance between a device and one with fewer features.
 const SAME_DEVICE: Tolerance = Tolerance { psnr: 60.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
 

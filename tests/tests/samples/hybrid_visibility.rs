@@ -12,11 +12,11 @@ use lvk_tests::scene_obj::obj_scene;
 
 const SIZE: [u32; 2] = [163, 91];
 
-/// By the compute rasteriser, which leaves to rays what rounding decides: no pixel in ten thousand.
+/// Tolerance of the compute rasteriser, which leaves to rays what rounding decides: no pixel in ten thousand.
 const SAME_PIXELS: Tolerance = Tolerance { psnr: 60.0, ssim: 0.9999, differing_share: 1e-4, flip: 1e-3 };
-/// By the device's rasteriser, which leaves to rays what its grid decides.
+/// Tolerance of the device's rasteriser, which leaves to rays what its grid decides.
 const SAME_EDGES: Tolerance = Tolerance { psnr: 60.0, ssim: 0.999, differing_share: 2e-4, flip: 1e-3 };
-/// By the paper's geometry pass, which has the edges of the device's rasteriser.
+/// Tolerance of the paper's geometry pass, which has the edges of the device's rasteriser.
 const SAME_VIEW: Tolerance = Tolerance { psnr: 40.0, ssim: 0.995, differing_share: 3e-3, flip: 0.01 };
 
 const COMPUTE: Geometry = Geometry::Visibility(Some(Raster::Compute));

@@ -25,7 +25,7 @@ use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{device, device_with};
 
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 0.01, flip: 2e-3 };
-/// On SwiftShader: its textures are filtered with fewer bits.
+/// Tolerance on SwiftShader, which filters textures with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 40.0, ssim: 0.99, differing_share: 0.4, flip: 0.05 };
 
 fn config(path: RayPath) -> LargeSceneConfig {

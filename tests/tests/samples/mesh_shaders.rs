@@ -91,7 +91,7 @@ fn by_vertex_shader(ctx: &Context, sample: &MeshShaders) -> RgbaImage {
 }
 
 #[test]
-fn what_is_left_out_is_not_missed() {
+fn culled_meshlets_do_not_change_the_image() {
     let Some(ctx) = mesh_device() else { return };
     let (mut all, mut some) = (knot(&ctx, false), knot(&ctx, true));
     let count = all.meshlets().meshlets.len() as u32;
@@ -103,9 +103,9 @@ fn what_is_left_out_is_not_missed() {
     }
 }
 
-/// From within the knot, from beside it, and with it behind the camera.
+/// Cases: cameras within the knot, beside it, and in front of it.
 #[test]
-fn what_lies_outside_the_image_is_left_out() {
+fn meshlets_outside_the_image_are_culled() {
     let Some(ctx) = mesh_device() else { return };
     let (mut all, mut some) = (knot(&ctx, false), knot(&ctx, true));
     let count = all.meshlets().meshlets.len() as u32;
@@ -117,7 +117,7 @@ fn what_lies_outside_the_image_is_left_out() {
         (behind, 0),
     ] {
         let [whole, culled] = [&mut all, &mut some].map(|sample| {
-            sample.update(FrameTime::from_frame(10, ROUND)).unwrap();
+            sample.update(FrameTime::from_frame(10, ROUND));
             sample.set_view(&view);
             headless::picture(sample).unwrap()
         });

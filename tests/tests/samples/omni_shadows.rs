@@ -10,7 +10,7 @@ use lvk::{
 };
 use lvk_samples::app::sample::Sample;
 use lvk_samples::app::sample_error::SampleError;
-use lvk_samples::omni_shadows::{Faces, OmniShadows, OmniShadowsConfig, ShadowFilter};
+use lvk_samples::omni_shadows::{OmniShadows, OmniShadowsConfig, ShadowFaces, ShadowFilter};
 use lvk_samples::scene::Camera;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
 use lvk_tests::raster_sample::{
@@ -21,7 +21,7 @@ use lvk_tests::rays::Ray;
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// On SwiftShader: its samples lie elsewhere in a pixel, and its comparisons are filtered with fewer bits.
+/// Tolerance on SwiftShader, which has other sample positions and filters comparisons with fewer bits.
 const OTHER_DRIVER: Tolerance = Tolerance { psnr: 36.0, ssim: 0.98, differing_share: 0.4, flip: 0.04 };
 
 fn usual() -> OmniShadowsConfig {
@@ -37,10 +37,10 @@ fn one_pass_and_six_give_the_same_image() {
     let Some(ctx) = device() else { return };
     let image = |faces| {
         let mut sample = lamp(&ctx, &OmniShadowsConfig { faces, shows_cube: true, ..usual() });
-        assert_eq!(sample.is_multiview(), faces == Faces::Multiview);
+        assert_eq!(sample.is_multiview(), faces == ShadowFaces::Multiview);
         image_of(&mut sample, 21)
     };
-    assert!(image(Faces::Multiview) == image(Faces::Single));
+    assert!(image(ShadowFaces::Multiview) == image(ShadowFaces::Single));
 }
 
 #[test]
@@ -48,7 +48,8 @@ fn devices_without_multiview_draw_face_by_face() {
     let Some(ctx) = device() else { return };
     let profile = DeviceProfile::core_only();
     let Some(bare) = device_with(|desc| desc.profile = Some(&profile)) else { return };
-    let asked = OmniShadows::new(&bare, &OmniShadowsConfig { faces: Faces::Multiview, ..usual() }).err();
+    let asked =
+        OmniShadows::new(&bare, &OmniShadowsConfig { faces: ShadowFaces::Multiview, ..usual() }).err();
     assert!(matches!(asked, Some(SampleError::Missing { .. })), "{asked:?}");
     let mut sample = lamp(&bare, &usual());
     assert!(!sample.is_multiview());
@@ -147,7 +148,7 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
     counts
 }
 
-/// From the middle of the room to all six sides.
+/// Cases: views from the middle of the interior to all six sides.
 #[test]
 fn shadows_are_those_that_rays_find() {
     let Some(ctx) = device() else { return };

@@ -16,8 +16,8 @@ use lvk_tests::scene_obj::obj_scene;
 const SIZE: [u32; 2] = [40, 24];
 
 fn render_image<S: Sample>(sample: &mut S) -> Vec<u8> {
-    sample.update(FrameTime::from_frame(3, 10)).map_err(Into::into).unwrap();
-    headless::picture(sample).map_err(Into::into).unwrap()
+    sample.update(FrameTime::from_frame(3, 10));
+    headless::picture(sample).unwrap()
 }
 
 /// Asks a sample made by the first of `configs` for all others, for the first again, and for `impossible`.

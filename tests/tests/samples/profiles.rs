@@ -15,7 +15,7 @@ use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, World};
 use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::omni_shadows::{OmniShadows, OmniShadowsConfig};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
-use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
+use lvk_samples::render_to_cube_map::{CubeMapFaces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig};
 use lvk_samples::rtx_hello::RtxHello;
@@ -25,6 +25,7 @@ use lvk_samples::scene::Scene;
 use lvk_samples::sponza::{Sponza, SponzaConfig};
 use lvk_samples::triplanar::Triplanar;
 use lvk_samples::yuv::{CONVERSIONS, Yuv, YuvConfig};
+use lvk_tests::accel_backend::builds_device_accel_structs;
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{Tolerance, assert_similar};
 use lvk_tests::scene_obj::obj_scene;
@@ -46,8 +47,8 @@ fn under(profile: Option<&DeviceProfile>) -> Option<TestDevice> {
 }
 
 fn render<S: Sample>(mut sample: S) -> RgbaImage {
-    sample.update(FrameTime::from_frame(3, 10)).map_err(Into::into).unwrap();
-    let pixels = headless::picture(&mut sample).map_err(Into::into).unwrap();
+    sample.update(FrameTime::from_frame(3, 10));
+    let pixels = headless::picture(&mut sample).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).unwrap()
 }
 
@@ -100,8 +101,10 @@ fn samples_that_rasterise_render_under_moltenvk() {
         OmniShadows::new(ctx, &config).unwrap()
     });
     rehearse(&devices, "render_to_cube_map", &SAME_DRAWS, |ctx| {
-        let config =
-            RenderToCubeMapConfig { face_size: 32, ..RenderToCubeMapConfig::new(SIZE, Faces::SixPasses) };
+        let config = RenderToCubeMapConfig {
+            face_size: 32,
+            ..RenderToCubeMapConfig::new(SIZE, CubeMapFaces::SixPasses)
+        };
         RenderToCubeMap::new(ctx, &config).unwrap()
     });
     rehearse(&devices, "sponza", &SAME_DRAWS, |ctx| {
@@ -110,7 +113,7 @@ fn samples_that_rasterise_render_under_moltenvk() {
     });
     rehearse(&devices, "triplanar", &SAME_DRAWS, |ctx| Triplanar::new(ctx, SIZE).unwrap());
     rehearse(&devices, "yuv", &SAME_DRAWS, |ctx| {
-        Yuv::new(ctx, &YuvConfig { film: [80, 48], ..YuvConfig::new(SIZE) }).unwrap()
+        Yuv::new(ctx, &YuvConfig { video_size: [80, 48], ..YuvConfig::new(SIZE) }).unwrap()
     });
     let refused = MeshShaders::new(&devices[0], SIZE, true).err().unwrap().to_string();
     assert!(refused.contains("mesh shaders"), "{refused}");
@@ -148,15 +151,35 @@ fn samples_that_trace_rays_render_under_moltenvk_in_software() {
     rehearse(&devices, "large_scene", &SAME_RAYS, |ctx| large_scene(ctx, &valley()));
 }
 
+/// Bytes of scratch for which the meshes here are large, as those of applications are for 256 MiB.
+const SMALL_SCRATCH: u64 = 2 << 20;
+
 #[test]
 fn hybrid_and_large_scene_render_under_recent_phones() {
     let (scene, world) = (obj_scene(), valley().combined().unwrap());
-    for profile in [DeviceProfile::adreno_840(), DeviceProfile::mali_g720()] {
+    let mali = DeviceProfile { max_accel_scratch_bytes: SMALL_SCRATCH, ..DeviceProfile::mali_g720() };
+    for profile in [DeviceProfile::adreno_840(), mali] {
         let Some(devices) = devices(&profile) else { return };
         let pipelines = devices[1].capabilities().ray_tracing_pipeline && profile.ray_tracing_pipeline;
         assert_eq!(devices[0].capabilities().ray_tracing_pipeline, pipelines);
         rehearse(&devices, &format!("hybrid, {}", profile.name), &SAME_RAYS, |ctx| hybrid(ctx, &scene));
         let what = format!("large_scene, {}", profile.name);
         rehearse(&devices, &what, &SAME_RAYS, |ctx| large_scene(ctx, &world));
+        if builds_device_accel_structs(&devices[0]) {
+            let parts = large_scene(&devices[0], &world).figures().parts();
+            let least = scratch_bytes(&profile, &world).div_ceil(profile.max_accel_scratch_bytes.max(1));
+            assert!(u64::from(parts) >= least, "{}: {parts} parts of {least}", profile.name);
+            assert_eq!(
+                parts > 4,
+                profile.max_accel_scratch_bytes == SMALL_SCRATCH,
+                "{}: {parts}",
+                profile.name
+            );
+        }
     }
+}
+
+/// Scratch that the profile's driver needs for a build of the whole world.
+fn scratch_bytes(profile: &DeviceProfile, world: &World) -> u64 {
+    world.triangle_count() as u64 * profile.scratch_bytes_per_primitive
 }

@@ -5,7 +5,7 @@
 use glam::{Mat3, Vec3};
 use lvk::{Context, DeviceProfile, Error, OptionalFeature, TextureRegion};
 use lvk_samples::app::sample_error::SampleError;
-use lvk_samples::render_to_cube_map::{Block, Faces, RenderToCubeMap, RenderToCubeMapConfig};
+use lvk_samples::render_to_cube_map::{Block, CubeMapFaces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_tests::half::from_half;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
 use lvk_tests::raster::has;
@@ -13,7 +13,7 @@ use lvk_tests::raster_sample::{SIZE, assert_refuses_impossible_sizes, image_of};
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// On SwiftShader: its filters have fewer bits.
+/// Tolerance on SwiftShader, whose filters have fewer bits.
 const OTHER_DRIVER: Tolerance = Tolerance { psnr: 36.0, ssim: 0.98, differing_share: 0.4, flip: 0.03 };
 /// Side of a face.
 const FACE: u32 = 64;
@@ -23,11 +23,11 @@ const TO_SUN: Vec3 = Vec3::new(0.5121, 0.6401, 0.5729);
 const SUN: Vec3 = Vec3::new(2.9, 2.5, 2.0);
 const HORIZON: Vec3 = Vec3::new(1.75, 1.42, 1.2);
 
-fn config(faces: Faces) -> RenderToCubeMapConfig {
+fn config(faces: CubeMapFaces) -> RenderToCubeMapConfig {
     RenderToCubeMapConfig { face_size: FACE, ..RenderToCubeMapConfig::new(SIZE, faces) }
 }
 
-fn sample(ctx: &Context, faces: Faces) -> RenderToCubeMap {
+fn sample(ctx: &Context, faces: CubeMapFaces) -> RenderToCubeMap {
     RenderToCubeMap::new(ctx, &config(faces)).unwrap()
 }
 
@@ -39,7 +39,7 @@ fn faces(ctx: &Context, sample: &RenderToCubeMap, mip: u32) -> Vec<u8> {
 
 /// Both ways, in several frames, with all mips.
 fn assert_one_pass_equals_six(ctx: &Context) {
-    let (mut six, mut one) = (sample(ctx, Faces::SixPasses), sample(ctx, Faces::OnePass));
+    let (mut six, mut one) = (sample(ctx, CubeMapFaces::SixPasses), sample(ctx, CubeMapFaces::OnePass));
     for frame in [0, 40] {
         assert!(image_of(&mut six, frame) == image_of(&mut one, frame), "frame {frame}");
         for mip in 0..=FACE.ilog2() {
@@ -139,7 +139,7 @@ fn one_pass_draws_what_six_draw() {
 #[test]
 fn faces_contain_what_rays_hit() {
     let Some(ctx) = device() else { return };
-    let mut sample = sample(&ctx, Faces::SixPasses);
+    let mut sample = sample(&ctx, CubeMapFaces::SixPasses);
     image_of(&mut sample, 25);
     let [even, right] = compare_with_rays(&faces(&ctx, &sample, 0), sample.blocks());
     assert!(even > 0.5 && right > 0.995, "{even} of the texels are even, {right} of them as traced");
@@ -148,9 +148,9 @@ fn faces_contain_what_rays_hit() {
 #[test]
 fn roughness_blurs_the_mirror_and_nothing_else() {
     let Some(ctx) = device() else { return };
-    let rough = RenderToCubeMapConfig { roughness: 0.7, ..config(Faces::SixPasses) };
+    let rough = RenderToCubeMapConfig { roughness: 0.7, ..config(CubeMapFaces::SixPasses) };
     let mut rough = RenderToCubeMap::new(&ctx, &rough).unwrap();
-    let (rough, clear) = (image_of(&mut rough, 0), image_of(&mut sample(&ctx, Faces::SixPasses), 0));
+    let (rough, clear) = (image_of(&mut rough, 0), image_of(&mut sample(&ctx, CubeMapFaces::SixPasses), 0));
     let [middle, corner] = [[SIZE[0] / 2, SIZE[1] / 2], [3, SIZE[1] - 3]];
     let differ =
         |[x, y]: [u32; 2]| (0..20).any(|step| rough.get_pixel(x, y - step) != clear.get_pixel(x, y - step));
@@ -160,18 +160,21 @@ fn roughness_blurs_the_mirror_and_nothing_else() {
 #[test]
 fn the_drop_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    assert_matches_reference("render_to_cube_map_small", &image_of(&mut sample(&ctx, Faces::SixPasses), 0));
+    assert_matches_reference(
+        "render_to_cube_map_small",
+        &image_of(&mut sample(&ctx, CubeMapFaces::SixPasses), 0),
+    );
 }
 
 #[test]
 fn six_passes_need_no_feature_and_one_pass_says_which() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
-    let refused = RenderToCubeMap::new(&ctx, &config(Faces::OnePass)).err();
+    let refused = RenderToCubeMap::new(&ctx, &config(CubeMapFaces::OnePass)).err();
     let Some(error @ SampleError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
     let text = error.to_string();
     assert!(text.contains("six views") && text.contains("--faces six-passes"), "{text}");
-    let image = image_of(&mut sample(&ctx, Faces::SixPasses), 0);
+    let image = image_of(&mut sample(&ctx, CubeMapFaces::SixPasses), 0);
     assert_similar(
         "cube map without features",
         &image,
@@ -185,7 +188,7 @@ fn another_driver_renders_it_by_both_paths() {
     on_swiftshader(another_driver_renders_it_by_both_paths, || {
         let Some(ctx) = device() else { return };
         assert_one_pass_equals_six(&ctx);
-        let image = image_of(&mut sample(&ctx, Faces::OnePass), 0);
+        let image = image_of(&mut sample(&ctx, CubeMapFaces::OnePass), 0);
         assert_similar(
             "SwiftShader cube map",
             &image,
@@ -199,10 +202,10 @@ fn another_driver_renders_it_by_both_paths() {
 fn impossible_images_and_faces_are_refused() {
     let Some(ctx) = device() else { return };
     assert_refuses_impossible_sizes(|extent| {
-        RenderToCubeMap::new(&ctx, &RenderToCubeMapConfig { extent, ..config(Faces::SixPasses) })
+        RenderToCubeMap::new(&ctx, &RenderToCubeMapConfig { extent, ..config(CubeMapFaces::SixPasses) })
     });
     for face_size in [0, 1 << 20] {
-        let wish = RenderToCubeMapConfig { face_size, ..config(Faces::SixPasses) };
+        let wish = RenderToCubeMapConfig { face_size, ..config(CubeMapFaces::SixPasses) };
         let refused = RenderToCubeMap::new(&ctx, &wish).err();
         let expected = matches!(
             refused,

@@ -4,7 +4,7 @@
 use lvk::Context;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::RtxConfig;
-use lvk_samples::rtx_hello::{Following, RtxHello};
+use lvk_samples::rtx_hello::{RtxHello, TlasUpdate};
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_swiftshader_matches};
@@ -37,20 +37,20 @@ fn a_frame_depends_on_its_time_alone() {
 }
 
 #[test]
-fn switches_of_the_panel_hide_triangles_and_choose_the_update() {
+fn settings_of_the_panel_hide_triangles_and_choose_the_update() {
     let Some(ctx) = device() else { return };
     let mut sample = hello(&ctx, paths(&ctx)[0]);
     let all = image_of(&mut sample, 40);
     let without = [0, 1, 2].map(|group| {
-        sample.switches().is_seen[group] = false;
+        sample.settings().is_seen[group] = false;
         let image = image_of(&mut sample, 40);
-        sample.switches().is_seen[group] = true;
+        sample.settings().is_seen[group] = true;
         image
     });
     assert!(without.iter().all(|image| *image != all), "each hides something");
     assert!(without[0] != without[1] && without[1] != without[2] && without[2] != without[0]);
-    for following in [Following::Refits, Following::Rebuilds, Following::Both] {
-        sample.switches().following = following;
+    for following in [TlasUpdate::Refits, TlasUpdate::Rebuilds, TlasUpdate::Both] {
+        sample.settings().following = following;
         assert_eq!(image_of(&mut sample, 40), all, "{following:?}");
     }
 }

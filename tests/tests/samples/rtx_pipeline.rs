@@ -5,7 +5,7 @@
 use lvk::{Context, DeviceProfile};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::RtxConfig;
-use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSwitches};
+use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSettings};
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{
     Tolerance, assert_matches_reference, assert_similar, assert_swiftshader_matches,
@@ -15,7 +15,7 @@ use lvk_tests::scene_obj::obj_scene;
 use lvk_tests::{device, device_with};
 
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 3e-3, flip: 2e-3 };
-/// On SwiftShader: its textures are filtered with fewer bits.
+/// Tolerance on SwiftShader, which filters textures with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 40.0, ssim: 0.99, differing_share: 0.4, flip: 0.05 };
 
 fn still(ctx: &Context, path: RayPath, depth: u32) -> RtxPipeline {
@@ -44,16 +44,16 @@ fn depth_and_frame_time_count() {
 }
 
 #[test]
-fn switches_of_the_panel_take_depth_and_lights_away() {
+fn settings_of_the_panel_take_depth_and_lights_away() {
     let Some(ctx) = device() else { return };
     for path in paths(&ctx) {
         let mut sample = still(&ctx, path, 3);
-        let (first, all) = (image_of(&mut sample, 0), *sample.switches());
-        *sample.switches() = RtxPipelineSwitches { lights: 0, ..all };
+        let (first, all) = (image_of(&mut sample, 0), *sample.settings());
+        *sample.settings() = RtxPipelineSettings { lights: 0, ..all };
         assert_ne!(image_of(&mut sample, 0), first, "there is light");
-        *sample.switches() = RtxPipelineSwitches { depth: 0, ..all };
+        *sample.settings() = RtxPipelineSettings { depth: 0, ..all };
         assert_eq!(image_of(&mut sample, 0), image_of(&mut still(&ctx, path, 0), 0), "{path:?}");
-        *sample.switches() = RtxPipelineSwitches { depth: u32::MAX, lights: u32::MAX };
+        *sample.settings() = RtxPipelineSettings { depth: u32::MAX, lights: u32::MAX };
         assert_eq!(image_of(&mut sample, 0), first, "no more than there is");
     }
 }

@@ -4,7 +4,7 @@
 use lvk::Context;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::RtxConfig;
-use lvk_samples::rtx_textures::{RtxTextures, RtxTexturesSwitches};
+use lvk_samples::rtx_textures::{RtxTextures, RtxTexturesSettings};
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_swiftshader_matches};
@@ -12,7 +12,7 @@ use lvk_tests::raster_sample::ROUND;
 use lvk_tests::rtx_sample::{SIZE, assert_paths_agree, assert_refuses_impossible_sizes, image_of};
 
 const SAME_RAYS: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
-/// On SwiftShader: its textures are filtered with fewer bits.
+/// Tolerance on SwiftShader, which filters textures with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 42.0, ssim: 0.998, differing_share: 0.35, flip: 0.05 };
 
 fn waves(ctx: &Context, path: RayPath) -> RtxTextures {
@@ -38,26 +38,26 @@ fn a_frame_depends_on_its_time_alone() {
 }
 
 #[test]
-fn switches_of_the_panel_change_the_image_and_back() {
+fn settings_of_the_panel_change_the_image_and_back() {
     let Some(ctx) = device() else { return };
     let mut sample = waves(&ctx, paths(&ctx)[0]);
-    let (first, all) = (image_of(&mut sample, 0), *sample.switches());
+    let (first, all) = (image_of(&mut sample, 0), *sample.settings());
     assert_eq!(all.instances, sample.instance_count());
     for other in [
-        RtxTexturesSwitches { instances: 1, ..all },
-        RtxTexturesSwitches { handed_on: 1, ..all },
-        RtxTexturesSwitches { is_filtered: false, ..all },
+        RtxTexturesSettings { instances: 1, ..all },
+        RtxTexturesSettings { handed_on: 1, ..all },
+        RtxTexturesSettings { is_filtered: false, ..all },
     ] {
-        *sample.switches() = other;
+        *sample.settings() = other;
         assert_ne!(image_of(&mut sample, 0), first, "{other:?}");
     }
     // As many as there are textures hand each one back, and what is beyond the range is the nearest in it.
     let texture_count = sample.texture_count() as u32;
-    *sample.switches() = RtxTexturesSwitches { instances: u32::MAX, handed_on: texture_count, ..all };
+    *sample.settings() = RtxTexturesSettings { instances: u32::MAX, handed_on: texture_count, ..all };
     assert_eq!(image_of(&mut sample, 0), first);
-    sample.switches().instances = 1;
+    sample.settings().instances = 1;
     let ground = image_of(&mut sample, 0);
-    sample.switches().instances = 0;
+    sample.settings().instances = 0;
     assert_eq!(image_of(&mut sample, 0), ground);
 }
 

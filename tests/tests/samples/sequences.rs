@@ -8,7 +8,7 @@ use lvk_samples::app::frame_name::FrameName;
 use lvk_samples::app::headless::Headless;
 use lvk_samples::app::interrupt::Interrupt;
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::sequence::{RenderJob, RenderReport, render_frames};
+use lvk_samples::app::sequence::{RenderReport, RenderRequest, render_frames};
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};
 use lvk_tests::device;
 use lvk_tests::hybrid::{HybridHarness, paths};
@@ -24,7 +24,7 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> RenderReport {
         HybridConfig { path, width: SIZE[0], height: SIZE[1], max_depth: 2, ..HybridConfig::default() };
     let renderer = HybridRenderer::new(ctx, &scene, &config).unwrap();
     let mut sequence = HybridSequence::new(renderer, &scene, 0, true);
-    let job = RenderJob {
+    let request = RenderRequest {
         frames: frames.parse().unwrap(),
         warm_up: 0,
         frames_per_round: 7,
@@ -32,10 +32,10 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> RenderReport {
         out: FrameName::new(&folder.join("frame_##.png")),
         resume: false,
     };
-    job.check().unwrap();
+    request.check().unwrap();
     render_frames(
         &mut Headless::new(&mut sequence),
-        &job,
+        &request,
         &mut Progress::hidden(),
         &Interrupt::without_handlers(),
     )

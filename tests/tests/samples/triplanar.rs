@@ -12,7 +12,7 @@ use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, ima
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// On SwiftShader: its filters have fewer bits, and are not anisotropic in the same way.
+/// Tolerance on SwiftShader, whose filters have fewer bits and another anisotropy.
 const OTHER_DRIVER: Tolerance = Tolerance { psnr: 30.0, ssim: 0.95, differing_share: 0.9, flip: 0.06 };
 
 fn sample(ctx: &Context) -> Triplanar {
@@ -29,7 +29,7 @@ fn all() -> std::ops::Range<usize> {
 
 /// Submits a frame without waiting for it.
 fn send(sample: &mut Triplanar, frame: u32) {
-    sample.update(FrameTime::from_frame(frame, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(frame, ROUND));
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
     sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -78,7 +78,7 @@ fn a_frame_on_its_way_keeps_the_textures_it_samples() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
     let whole = image_of(&mut sample, 0);
-    sample.update(FrameTime::from_frame(0, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(0, ROUND));
     let mut frame = Frame::free(&ctx).unwrap();
     let image = sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -107,7 +107,7 @@ fn only_textured_surfaces_have_the_placeholder() {
 
 /// A texture that has been given up stays away, though its thread has made it.
 #[test]
-fn what_comes_too_late_is_dropped() {
+fn late_textures_are_dropped() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
     let (brick, wood) = (number_of("brick"), number_of("wood"));

@@ -6,7 +6,7 @@ use image::RgbaImage;
 use lvk::{Context, DeviceProfile, Error};
 use lvk_samples::app::sample::Sample;
 use lvk_samples::app::sample_error::SampleError;
-use lvk_samples::yuv::{CONVERSIONS, Film, Yuv, YuvConfig, YuvFormat, YuvModel, YuvRange};
+use lvk_samples::yuv::{CONVERSIONS, SyntheticVideo, Yuv, YuvConfig, YuvFormat, YuvModel, YuvRange};
 use lvk_tests::device::TestDevice;
 use lvk_tests::device_with;
 use lvk_tests::image_comparison::{
@@ -20,7 +20,7 @@ use lvk_tests::subprocess::on_swiftshader;
 /// As computed: but for the weights of colour differences between texels, which drivers round.
 const AS_COMPUTED: Tolerance = Tolerance { psnr: 46.0, ssim: 0.998, differing_share: 0.2, flip: 0.025 };
 /// As it was before it was encoded, when colour differences had the same size as the image.
-const AS_FILMED: Tolerance = Tolerance { psnr: 24.0, ssim: 0.9, differing_share: 1.0, flip: 0.1 };
+const AS_SOURCE: Tolerance = Tolerance { psnr: 24.0, ssim: 0.9, differing_share: 1.0, flip: 0.1 };
 const FRAME: u32 = 30;
 
 fn yuv_device() -> Option<TestDevice> {
@@ -29,7 +29,7 @@ fn yuv_device() -> Option<TestDevice> {
 
 /// A texel for each pixel.
 fn usual() -> YuvConfig {
-    YuvConfig { film: SIZE, ..YuvConfig::new(SIZE) }
+    YuvConfig { video_size: SIZE, ..YuvConfig::new(SIZE) }
 }
 
 fn sample(ctx: &Context, config: &YuvConfig) -> Yuv {
@@ -47,7 +47,7 @@ fn decode_plane(plane: &[u8], format: YuvFormat) -> Vec<f64> {
 /// Returns the colours of the planes: chroma samples are at every second texel of every second row.
 fn computed(planes: &[Vec<u8>], config: &YuvConfig, format: YuvFormat) -> RgbaImage {
     let all: Vec<_> = planes.iter().map(|plane| decode_plane(plane, format)).collect();
-    let [width, height] = config.film.map(|side| side as usize);
+    let [width, height] = config.video_size.map(|side| side as usize);
     let difference = |number: usize, column: usize, row: usize| {
         let at = row.min(height / 2 - 1) * (width / 2) + column.min(width / 2 - 1);
         if all.len() == 2 { all[1][2 * at + number] } else { all[1 + number][at] }
@@ -86,10 +86,10 @@ fn decoded([y, cb, cr]: [f64; 3], config: &YuvConfig, format: YuvFormat) -> [f64
     [r, (y - red * r - blue * b) / (1.0 - red - blue), b]
 }
 
-fn filmed() -> RgbaImage {
-    let film = Film { size: SIZE, phase: FRAME as f32 / ROUND as f32 };
+fn source() -> RgbaImage {
+    let video = SyntheticVideo { size: SIZE, phase: FRAME as f32 / ROUND as f32 };
     RgbaImage::from_fn(SIZE[0], SIZE[1], |x, y| {
-        let [red, green, blue] = (255.0 * film.color(x, y)).to_array().map(|value| value.round() as u8);
+        let [red, green, blue] = (255.0 * video.color(x, y)).to_array().map(|value| value.round() as u8);
         image::Rgba([red, green, blue, 255])
     })
 }
@@ -102,7 +102,7 @@ fn every_format_and_conversion_is_as_computed() {
     for missing in YuvFormat::ALL.iter().filter(|format| !formats.contains(format)) {
         eprintln!("NOT TESTED, the device has no {missing:?}");
     }
-    let filmed = filmed();
+    let source = source();
     for format in formats {
         for model in YuvModel::ALL {
             for range in [YuvRange::Narrow, YuvRange::Full] {
@@ -111,13 +111,13 @@ fn every_format_and_conversion_is_as_computed() {
                 let image = image_of(&mut sample, FRAME);
                 let what = format!("{format:?} {model:?} {range:?}");
                 assert_similar(&what, &image, &computed(&sample.planes(), &config, format), &AS_COMPUTED);
-                assert_similar(&format!("{what} filmed"), &image, &filmed, &AS_FILMED);
+                assert_similar(&format!("{what} source"), &image, &source, &AS_SOURCE);
             }
         }
     }
 }
 
-/// That the comparison above would notice a wrong matrix or range.
+/// Proves that the comparison above notices a wrong matrix or range.
 #[test]
 fn other_conversions_render_other_images() {
     let Some(ctx) = yuv_device() else { return };
@@ -144,14 +144,14 @@ fn the_next_format_follows_and_the_first_comes_again() {
         sample.next();
         let image = image_now(&mut sample);
         assert_eq!(sample.format(), formats[number % formats.len()]);
-        assert_similar("the next format", &image, &filmed(), &AS_FILMED);
+        assert_similar("the next format", &image, &source(), &AS_SOURCE);
     }
     assert!(image_now(&mut sample) == first);
 }
 
 /// Pixels that show planes are grey.
 #[test]
-fn planes_are_shown_as_greys() {
+fn planes_are_drawn_as_greys() {
     let Some(ctx) = yuv_device() else { return };
     let image = image_of(&mut sample(&ctx, &YuvConfig { shows_planes: true, ..usual() }), FRAME);
     write_test_image("yuv planes", &image);

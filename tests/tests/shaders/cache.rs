@@ -219,7 +219,7 @@ fn contexts_side_by_side_share_a_folder() {
 
 /// All modules of the samples, twice; the times go to standard error.
 #[test]
-fn every_module_of_the_samples_is_found_again() {
+fn every_module_of_the_samples_is_cached() {
     let folder = folder();
     let Some(ctx) = start(folder.path()) else { return };
     let make_all = |ctx: &Context| {

@@ -38,7 +38,7 @@ macro_rules! foreign {
     };
 }
 
-/// With formats of the storage image. Slang's image has no format in the shader, DXC's has this one.
+/// Blend shaders with the format of the storage image. Slang's image has no format in the shader, DXC's has this one.
 const BLEND: [(Foreign, Format); 2] =
     [(foreign!("blend.slang"), Format::Rgba8Unorm), (foreign!("blend.hlsl"), Format::Rgba32Float)];
 

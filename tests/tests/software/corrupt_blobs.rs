@@ -74,7 +74,7 @@ impl File {
         self.bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
     }
 
-    /// With a checksum that is right.
+    /// Returns the bytes with a correct checksum.
     fn sealed(mut self) -> Vec<u8> {
         const HEADER_BYTES: usize = 28;
         let step = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01B3);
@@ -523,11 +523,11 @@ fn a_destroyed_tlas_is_never_hit() -> Result<()> {
             let (reference, slot) = (scene.reference(), gpu.tlas.index());
             let rays = rays_for(&reference);
             let trace = || {
-                let job = tracer.job(&rays)?;
+                let trace_buffers = tracer.buffers(&rays)?;
                 let mut cmd = ctx.acquire_command_buffer()?;
-                tracer.record_at(&mut cmd, slot, &job, How::default())?;
+                tracer.record_at(&mut cmd, slot, &trace_buffers, How::default())?;
                 ctx.submit(cmd)?;
-                tracer.read(&job)
+                tracer.read(&trace_buffers)
             };
             let hits = |what: &str| -> Result<()> {
                 HitComparison::of_triangles(&rays, &trace()?, |ray| reference.closest(ray, 0xff))

@@ -327,7 +327,7 @@ fn among_many(count: usize, points: u32) -> Mesh {
 /// Leaves are packed up to 2^21 vertices, and not beyond. Builds of the GPU copy those that no triangle names too, where there
 /// are enough triangles for that; those of the CPU do not.
 #[test]
-fn the_last_of_many_vertices_are_found() -> Result<()> {
+fn the_last_of_many_vertices_are_hit() -> Result<()> {
     let Some(ctx) = software() else { return Ok(()) };
     let tracer = RayTracer::new(&ctx, Method::Query)?;
     let ray =
@@ -467,7 +467,7 @@ fn low_memory_is_low_with_updates_too() -> Result<()> {
         assert!(bytes < 28 * count, "{layout:?}: {bytes} bytes of {count} triangles");
         let mut more = mesh.clone();
         more.positions.resize(mesh.positions.len() + 5_000, [0.5; 3]);
-        assert_eq!(bytes_of(&ctx, &more, layout, small)?, bytes, "{layout:?}, vertices that nobody names");
+        assert_eq!(bytes_of(&ctx, &more, layout, small)?, bytes, "{layout:?}, unused vertices");
     }
     let copies = bytes_of(&ctx, &mesh, Layout::Unshared, BuildFlags::ALLOW_UPDATE)?;
     assert_eq!(bytes_of(&ctx, &mesh, Layout::Unshared, small)?, copies, "nothing is shared");
@@ -493,7 +493,7 @@ fn accel_structs_of_the_gpu_are_small() -> Result<()> {
 
 /// Flags that allow refits, so that re-braiding never opens it.
 #[test]
-fn what_the_cpu_built_is_rebuilt_in_the_same_memory() -> Result<()> {
+fn structures_of_the_cpu_are_rebuilt_in_the_same_memory() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let mesh = Mesh::terrain(90);
     let count = mesh.triangles.len() as u64;

@@ -18,7 +18,7 @@ use lvk_tests::{TestDevice, device_with};
 
 const SIZE: [u32; 2] = [160, 90];
 const DEPTH: u32 = 3;
-/// Of the image of the room of glass that is kept.
+/// Frame time of the reference image of the scene of glass.
 const TIME_SECONDS: f64 = 1.9;
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// The same rays, but filters spread what a ray at an edge finds elsewhere.

@@ -264,7 +264,7 @@ fn srgb_texels_are_linear_in_shaders() {
 }
 
 #[test]
-fn what_a_shader_stores_is_sampled_and_downloaded() {
+fn stored_texels_are_sampled_and_downloaded() {
     let Some(ctx) = device() else { return };
     let usage = TextureUsage::STORAGE | TextureUsage::SAMPLED;
     let desc = TextureDesc { format: Format::Rgba32Float, extent: [4, 4], usage, ..Default::default() };

@@ -78,8 +78,13 @@ fn impossible_regions_are_errors_and_record_nothing() {
             assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{bad:?}: {result:?}");
         }
     }
+    let short = ctx.upload_texture(*texture, &good, &[0; 63]).unwrap_err();
+    assert_eq!(
+        short.to_string(),
+        "texture: 63 bytes were given, but the region takes 64 bytes: 4 x 4 x 1 texels of R32Float in 1 layer(s); give \
+         the bytes of all texels, tightly packed"
+    );
     let results = [
-        ctx.upload_texture(*texture, &good, &[0; 63]),
         cmd.copy_texture_to_buffer(*texture, &good, *buffer, 4),
         cmd.copy_texture_to_buffer(*texture, &region([0, 0], [1, 1]), *buffer, 2),
         cmd.copy_texture(*texture, &good, *other, &good),

@@ -460,7 +460,7 @@ fn textures_with_swizzles_and_row_lengths_are_sampled_as_described() {
 }
 
 #[test]
-fn what_formats_can_is_what_textures_may_be_used_for() {
+fn format_features_decide_the_usages_of_textures() {
     let Some(ctx) = device() else { return };
     for format in Format::ALL.iter().copied() {
         let support = ctx.format_support(format);

@@ -467,7 +467,7 @@ fn passes_clear_several_samples_of_colour_and_depth() {
 }
 
 #[test]
-fn what_several_samples_exclude_is_an_error() {
+fn usages_that_several_samples_exclude_are_errors() {
     let Some(ctx) = device() else { return };
     let samples = 4;
     let plain = multisampled(Format::Rgba8Unorm, samples);

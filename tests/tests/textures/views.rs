@@ -417,7 +417,7 @@ fn a_view_outlives_the_handle_of_its_texture() {
         assert!(first_texel(&ctx, &second).iter().all(|seen| (seen - expected).abs() < 1e-5));
         assert_eq!(ctx.download_texture(*second, &TextureRegion::default()).unwrap(), [51 * round; 4]);
         let stale = ctx.create_texture_view(&TextureViewDesc { texture: Some(handle), ..Default::default() });
-        assert!(matches!(stale, Err(Error::StaleHandle { kind: "texture" })), "{stale:?}");
+        assert!(matches!(stale, Err(Error::StaleHandle { kind: "texture", .. })), "{stale:?}");
         drop((second, other));
     }
 }
@@ -526,7 +526,7 @@ fn impossible_views_are_typed_errors() {
 }
 
 #[test]
-fn what_one_view_writes_is_seen_through_another() {
+fn texels_written_through_one_view_are_read_through_another() {
     let Some(ctx) = device() else { return };
     let base = texture(&ctx, &TextureDesc { usage: SHADERS, mips: 1, ..Default::default() });
     let (written, read) = (one_mip(&ctx, *base, 0), one_mip(&ctx, *base, 0));

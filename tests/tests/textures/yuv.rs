@@ -258,7 +258,7 @@ fn slots_run_out_and_are_freed_and_empty_ones_are_black() {
 }
 
 #[test]
-fn what_textures_in_ycbcr_cannot_be_is_an_error() {
+fn usages_that_ycbcr_textures_exclude_are_errors() {
     let conversions = [YuvConversion::new(Format::Nv12), YuvConversion::new(Format::R8Unorm)];
     let Some(ctx) = device_with(|desc| desc.yuv = &conversions) else { return };
     let data = [0; 48];

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_is_not_set_again() {
+    fn current_state_is_not_set_again() {
         let mut dynamic = DynamicState::default();
         let state = PassState { stencil: true, blend_constants: true, ..Default::default() };
         assert_ne!(dynamic.values_for_pipeline(&state), DynamicValues::default());

@@ -3,6 +3,8 @@
 mod blit;
 mod buffer;
 mod clear;
+#[cfg(unix)]
+mod external;
 mod make_visible;
 mod release_texture;
 mod resolve;

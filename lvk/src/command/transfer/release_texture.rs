@@ -6,7 +6,7 @@ use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
-use crate::submit::emit_barriers::layout_from_vulkan;
+use crate::submit::exchanged_layout::exchanged_layout;
 use crate::submit::last_access::QueueAccess;
 
 impl CommandBuffer {
@@ -15,10 +15,13 @@ impl CommandBuffer {
     /// `UNDEFINED`.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) for any other layout.
+    /// [`InvalidUsage`](Error::InvalidUsage) for any other layout, and for one that the format or the usage of the
+    /// texture rules out.
     pub fn release_texture(&mut self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.shared.store.textures.get(texture)?;
-        let known = layout_from_vulkan(layout).map_err(|why| Error::usage(&texture.name, why))?;
+        let image = &texture.image;
+        let known = exchanged_layout(layout, image.format, image.usage)
+            .map_err(|why| Error::usage(&texture.name, why))?;
         if layout == vk::ImageLayout::UNDEFINED {
             return Err(Error::usage(&texture.name, "a texture cannot be released in the layout UNDEFINED"));
         }

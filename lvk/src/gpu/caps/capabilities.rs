@@ -148,6 +148,9 @@ impl Capabilities {
         if !self.has(OptionalFeature::PipelineShadingRate) {
             self.limits.shading_rate = ShadingRateLimits::default();
         }
+        if !self.has(OptionalFeature::SubgroupSizeControl) {
+            self.limits.subgroup = self.limits.subgroup.without_size_control();
+        }
         if !self.has(OptionalFeature::SamplerLodBias) {
             self.limits.max_lod_bias = 0.0;
         }

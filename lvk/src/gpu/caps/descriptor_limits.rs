@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_without_room_for_a_texture_is_refused() {
+    fn a_device_without_a_slot_for_a_texture_is_refused() {
         let budget = DescriptorBudget { textures: 1, samplers: 1 };
         assert!(budget.texture_count(5).is_err());
         assert!(largest_fitting(9, |_| false).is_err());

@@ -1,5 +1,7 @@
 //! The features of a device that the library enables.
 
+use ash::vk;
+
 use super::features::{FeatureField, Features, NEEDED};
 use super::optional_features::{FeatureSet, OptionalFeature};
 
@@ -18,6 +20,22 @@ impl Features {
         optional.enable(&mut wanted, found);
         wanted
     }
+}
+
+impl Features {
+    /// Enables the features that `other` enables, of all that the library ever enables.
+    pub(crate) fn enable_all(&mut self, other: &Self) {
+        let mut other = *other;
+        for field in every_field().filter(|field| *field(&mut other) == vk::TRUE) {
+            *field(self) = vk::TRUE;
+        }
+    }
+}
+
+/// Returns every feature that the library ever enables.
+pub(crate) fn every_field() -> impl Iterator<Item = FeatureField> {
+    let needed = NEEDED.iter().map(|(field, _)| *field);
+    needed.chain(PROMISED).chain(APART).chain(OptionalFeature::fields())
 }
 
 /// Features that every Vulkan 1.3 device has. Shaders of SPIR-V 1.6 end an invocation by
@@ -49,13 +67,11 @@ const APART: [FeatureField; 9] = [
 
 #[cfg(test)]
 mod tests {
-    use ash::vk;
-
     use super::super::features::missing_required;
     use super::*;
 
     #[test]
-    fn only_what_is_found_is_wanted() {
+    fn only_supported_features_are_enabled() {
         let mut found = Features::default();
         found.core.shader_int64 = vk::TRUE;
         found.core.sparse_binding = vk::TRUE;

@@ -20,6 +20,7 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) border_color: vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'static>,
     pub(crate) host_image_copy: vk::PhysicalDeviceHostImageCopyFeaturesEXT<'static>,
     pub(crate) maintenance5: vk::PhysicalDeviceMaintenance5FeaturesKHR<'static>,
+    pub(crate) graphics_library: vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'static>,
     pub(crate) fault: vk::PhysicalDeviceFaultFeaturesEXT<'static>,
     pub(crate) swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'static>,
     /// All true on devices without `VK_KHR_portability_subset`.
@@ -29,6 +30,10 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) memory_budget: vk::Bool32,
     pub(crate) swapchain: vk::Bool32,
     pub(crate) hdr_metadata: vk::Bool32,
+    pub(crate) external_memory_fd: vk::Bool32,
+    pub(crate) external_memory_dma_buf: vk::Bool32,
+    pub(crate) external_semaphore_fd: vk::Bool32,
+    pub(crate) drm_format_modifier: vk::Bool32,
 }
 
 impl ExtensionFeatures {
@@ -78,6 +83,9 @@ impl ExtensionFeatures {
         if has(ash::khr::maintenance5::NAME) {
             all = all.push_next(&mut self.maintenance5);
         }
+        if has(ash::ext::graphics_pipeline_library::NAME) {
+            all = all.push_next(&mut self.graphics_library);
+        }
         if has(ash::ext::device_fault::NAME) {
             all = all.push_next(&mut self.fault);
         }
@@ -117,5 +125,9 @@ impl ExtensionFeatures {
         self.memory_budget = has(ash::ext::memory_budget::NAME).into();
         self.swapchain = has(ash::khr::swapchain::NAME).into();
         self.hdr_metadata = has(ash::ext::hdr_metadata::NAME).into();
+        self.external_memory_fd = has(ash::khr::external_memory_fd::NAME).into();
+        self.external_memory_dma_buf = has(ash::ext::external_memory_dma_buf::NAME).into();
+        self.external_semaphore_fd = has(ash::khr::external_semaphore_fd::NAME).into();
+        self.drm_format_modifier = has(ash::ext::image_drm_format_modifier::NAME).into();
     }
 }

@@ -81,7 +81,7 @@ impl Features {
     }
 }
 
-pub(super) type FeatureField = fn(&mut Features) -> &mut vk::Bool32;
+pub(crate) type FeatureField = fn(&mut Features) -> &mut vk::Bool32;
 
 /// Features that the library requires.
 #[rustfmt::skip]

@@ -4,8 +4,9 @@ use ash::vk;
 
 use super::descriptor_limits::{DescriptorLimits, ReservedDescriptors};
 use super::mesh_limits::MeshLimits;
-use super::resolve_modes::{DepthResolveLimits, ResolveModes};
+use super::resolve_modes::DepthResolveLimits;
 use super::shading_rate::ShadingRateLimits;
+use super::subgroup_limits::SubgroupLimits;
 
 /// Number of TLAS descriptors that the library requests. Fewer if the device allows fewer.
 const WANTED_TLAS: u32 = 256;
@@ -121,12 +122,14 @@ pub struct Limits {
     pub sbt_base_alignment: u32,
     /// Maximum stride of a shader binding table in bytes (`maxShaderGroupStride`).
     pub sbt_max_stride: u32,
+    /// Limits of subgroups.
+    pub subgroup: SubgroupLimits,
     /// Limits of task and mesh shaders.
     pub mesh: MeshLimits,
 }
 
 impl Limits {
-    /// Converts the limits reported by the device.
+    /// Converts the limits reported by the device. Limits of other structures of properties are left at their defaults.
     pub(crate) fn from_properties(
         plain: &vk::PhysicalDeviceLimits,
         v12: &vk::PhysicalDeviceVulkan12Properties<'_>,
@@ -137,7 +140,6 @@ impl Limits {
         let accel_bytes = max_accel_bytes(v12.driver_id, plain.max_storage_buffer_range, v13.max_buffer_size);
         let mut limits = Self {
             max_lod_bias: plain.max_sampler_lod_bias,
-            max_custom_borders: 0,
             max_texture_1d: plain.max_image_dimension1_d,
             max_texture_2d: plain.max_image_dimension2_d,
             max_texture_3d: plain.max_image_dimension3_d,
@@ -146,7 +148,6 @@ impl Limits {
             color_samples: plain.framebuffer_color_sample_counts.as_raw(),
             depth_samples: plain.framebuffer_depth_sample_counts.as_raw(),
             max_buffer_bytes: v13.max_buffer_size,
-            max_allocation_bytes: 0,
             max_storage_buffer_range: plain.max_storage_buffer_range.into(),
             max_push_constant_bytes: plain.max_push_constants_size,
             max_color_targets: plain.max_color_attachments.min(8),
@@ -156,14 +157,7 @@ impl Limits {
                 .min(10),
             max_target_size: [plain.max_framebuffer_width, plain.max_framebuffer_height],
             max_target_layers: plain.max_framebuffer_layers,
-            max_views: 0,
-            depth_resolve: DepthResolveLimits {
-                depth: ResolveModes::from_bits_truncate(v12.supported_depth_resolve_modes.as_raw()),
-                stencil: ResolveModes::from_bits_truncate(v12.supported_stencil_resolve_modes.as_raw()),
-                one_alone: v12.independent_resolve_none == vk::TRUE,
-                different: v12.independent_resolve == vk::TRUE,
-            },
-            shading_rate: ShadingRateLimits::default(),
+            depth_resolve: DepthResolveLimits::from_properties(v12),
             max_patch_points: plain.max_tessellation_patch_size,
             vertex_stride_alignment: 1,
             line_width: plain.line_width_range,
@@ -175,10 +169,6 @@ impl Limits {
             max_viewport: plain.max_viewport_dimensions,
             viewport_bounds: plain.viewport_bounds_range,
             timestamp_period_ns: plain.timestamp_period,
-            timestamp_bits: 0,
-            max_bindless_textures: 0,
-            max_bindless_samplers: 0,
-            max_bindless_tlas: 0,
             scratch_alignment: accel.min_acceleration_structure_scratch_offset_alignment.max(1),
             max_blas_geometries: accel.max_geometry_count,
             max_blas_primitives: accel.max_primitive_count,
@@ -192,7 +182,7 @@ impl Limits {
             sbt_handle_alignment: pipeline.shader_group_handle_alignment.max(1),
             sbt_base_alignment: pipeline.shader_group_base_alignment.max(1),
             sbt_max_stride: pipeline.max_shader_group_stride,
-            mesh: MeshLimits::default(),
+            ..Self::default()
         };
         size_bindless(&mut limits, v12, accel);
         limits

@@ -16,3 +16,4 @@ pub(crate) mod queues;
 pub(crate) mod ray_query_path;
 pub(crate) mod resolve_modes;
 pub(crate) mod shading_rate;
+pub(crate) mod subgroup_limits;

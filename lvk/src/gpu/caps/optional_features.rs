@@ -5,7 +5,7 @@ use std::fmt;
 
 use ash::vk;
 
-use super::features::Features;
+use super::features::{FeatureField, Features};
 
 /// A feature that some devices have and the library does not need. It is enabled wherever the device has it,
 /// unless a [`DeviceProfile`](crate::DeviceProfile) hides it. [`Capabilities::has`](crate::Capabilities::has)
@@ -166,6 +166,12 @@ pub enum OptionalFeature {
     CalibratedTimestamps,
     /// Budget and use of each memory heap (`VK_EXT_memory_budget`).
     MemoryBudget,
+    /// Graphics pipelines that are linked from parts (`graphicsPipelineLibrary`).
+    GraphicsPipelineLibrary,
+    /// Compute pipelines that choose the size of their subgroups (`subgroupSizeControl`).
+    SubgroupSizeControl,
+    /// Compute pipelines whose subgroups are full (`computeFullSubgroups`).
+    ComputeFullSubgroups,
     /// Fault report of a lost device (`deviceFault`).
     DeviceFault,
     /// Presenting to windows (`VK_KHR_swapchain`).
@@ -207,6 +213,15 @@ pub enum OptionalFeature {
     /// Vertex attributes that end beyond the stride (`vertexAttributeAccessBeyondStride`). The library refuses
     /// them on every device.
     VertexAccessBeyondStride,
+    /// Memory shared by file descriptors (`VK_KHR_external_memory_fd`).
+    ExternalMemoryFd,
+    /// Memory shared as Linux dma-bufs (`VK_EXT_external_memory_dma_buf`).
+    ExternalMemoryDmaBuf,
+    /// Semaphores shared by file descriptors (`VK_KHR_external_semaphore_fd`).
+    ExternalSemaphoreFd,
+    /// Images whose memory layout a DRM format modifier describes (`VK_EXT_image_drm_format_modifier`). Textures in
+    /// dma-bufs need them.
+    DrmFormatModifier,
 }
 
 use OptionalFeature as F;
@@ -221,6 +236,11 @@ impl OptionalFeature {
     /// structure.
     pub fn vulkan_name(self) -> &'static str {
         self.table_row().name
+    }
+
+    /// Returns the members of all optional features.
+    pub(super) fn fields() -> impl Iterator<Item = FeatureField> {
+        ROWS.iter().map(|row| row.field)
     }
 
     fn table_row(self) -> &'static FeatureRow {
@@ -317,7 +337,7 @@ pub(crate) const OF_MESH_SHADERS: [OptionalFeature; 3] =
 pub(crate) const OF_WINDOWS: [OptionalFeature; 3] = [F::Swapchain, F::SwapchainMaintenance1, F::HdrMetadata];
 
 /// Pairs of a feature and the feature that it requires in Vulkan.
-const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 9] = [
+const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 10] = [
     (F::MultiviewGeometry, F::Multiview),
     (F::MultiviewTessellation, F::Multiview),
     (F::MultiviewMesh, F::Multiview),
@@ -327,17 +347,18 @@ const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 9] = [
     (F::SwapchainMaintenance1, F::Swapchain),
     (F::HdrMetadata, F::Swapchain),
     (F::VariablePointers, F::VariablePointersStorageBuffer),
+    (F::ExternalMemoryDmaBuf, F::ExternalMemoryFd),
 ];
 
 struct FeatureRow {
     feature: OptionalFeature,
     name: &'static str,
     extension: Option<&'static CStr>,
-    field: fn(&mut Features) -> &mut vk::Bool32,
+    field: FeatureField,
 }
 
 #[rustfmt::skip]
-const ROWS: [FeatureRow; 94] = [
+const ROWS: [FeatureRow; 101] = [
     FeatureRow { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, field: |f| &mut f.core.full_draw_index_uint32 },
     FeatureRow { feature: F::CubeArrays, name: "imageCubeArray", extension: None, field: |f| &mut f.core.image_cube_array },
     FeatureRow { feature: F::GeometryShader, name: "geometryShader", extension: None, field: |f| &mut f.core.geometry_shader },
@@ -413,6 +434,9 @@ const ROWS: [FeatureRow; 94] = [
     FeatureRow { feature: F::Maintenance5, name: "maintenance5", extension: Some(ash::khr::maintenance5::NAME), field: |f| &mut f.ext.maintenance5.maintenance5 },
     FeatureRow { feature: F::CalibratedTimestamps, name: "VK_KHR_calibrated_timestamps", extension: None, field: |f| &mut f.ext.calibrated_timestamps },
     FeatureRow { feature: F::MemoryBudget, name: "VK_EXT_memory_budget", extension: Some(ash::ext::memory_budget::NAME), field: |f| &mut f.ext.memory_budget },
+    FeatureRow { feature: F::GraphicsPipelineLibrary, name: "graphicsPipelineLibrary", extension: Some(ash::ext::graphics_pipeline_library::NAME), field: |f| &mut f.ext.graphics_library.graphics_pipeline_library },
+    FeatureRow { feature: F::SubgroupSizeControl, name: "subgroupSizeControl", extension: None, field: |f| &mut f.v13.subgroup_size_control },
+    FeatureRow { feature: F::ComputeFullSubgroups, name: "computeFullSubgroups", extension: None, field: |f| &mut f.v13.compute_full_subgroups },
     FeatureRow { feature: F::DeviceFault, name: "deviceFault", extension: Some(ash::ext::device_fault::NAME), field: |f| &mut f.ext.fault.device_fault },
     FeatureRow { feature: F::Swapchain, name: "VK_KHR_swapchain", extension: Some(ash::khr::swapchain::NAME), field: |f| &mut f.ext.swapchain },
     FeatureRow { feature: F::SwapchainMaintenance1, name: "swapchainMaintenance1", extension: Some(ash::ext::swapchain_maintenance1::NAME), field: |f| &mut f.ext.swapchain_maintenance1.swapchain_maintenance1 },
@@ -432,6 +456,10 @@ const ROWS: [FeatureRow; 94] = [
     FeatureRow { feature: F::TessellationPointMode, name: "tessellationPointMode", extension: None, field: |f| &mut f.ext.portability.tessellation_point_mode },
     FeatureRow { feature: F::TriangleFans, name: "triangleFans", extension: None, field: |f| &mut f.ext.portability.triangle_fans },
     FeatureRow { feature: F::VertexAccessBeyondStride, name: "vertexAttributeAccessBeyondStride", extension: None, field: |f| &mut f.ext.portability.vertex_attribute_access_beyond_stride },
+    FeatureRow { feature: F::ExternalMemoryFd, name: "VK_KHR_external_memory_fd", extension: Some(ash::khr::external_memory_fd::NAME), field: |f| &mut f.ext.external_memory_fd },
+    FeatureRow { feature: F::ExternalMemoryDmaBuf, name: "VK_EXT_external_memory_dma_buf", extension: Some(ash::ext::external_memory_dma_buf::NAME), field: |f| &mut f.ext.external_memory_dma_buf },
+    FeatureRow { feature: F::ExternalSemaphoreFd, name: "VK_KHR_external_semaphore_fd", extension: Some(ash::khr::external_semaphore_fd::NAME), field: |f| &mut f.ext.external_semaphore_fd },
+    FeatureRow { feature: F::DrmFormatModifier, name: "VK_EXT_image_drm_format_modifier", extension: Some(ash::ext::image_drm_format_modifier::NAME), field: |f| &mut f.ext.drm_format_modifier },
 ];
 
 #[cfg(test)]
@@ -441,7 +469,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_feature_stands_at_its_own_row() {
+    fn each_feature_is_at_its_own_table_index() {
         for (index, row) in ROWS.iter().enumerate() {
             assert_eq!(row.feature as usize, index, "{}", row.name);
         }
@@ -449,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn each_row_has_a_place_and_a_name_of_its_own() {
+    fn each_table_entry_has_its_own_field_and_name() {
         for row in &ROWS {
             let mut features = Features::default();
             *(row.field)(&mut features) = vk::TRUE;
@@ -482,7 +510,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_on_is_found_and_in_the_set(found in any::<u128>(), set in any::<u128>()) {
+        fn enabled_features_are_in_the_set(found in any::<u128>(), set in any::<u128>()) {
             let (found, set) = (FeatureSet(found), FeatureSet(set));
             let mut device = Features::default();
             for row in found.iter().map(OptionalFeature::table_row) {

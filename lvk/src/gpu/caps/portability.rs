@@ -34,7 +34,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_first_use_without_its_feature_is_found(
+        fn the_first_use_without_its_feature_is_named(
             enabled in prop::collection::vec(any::<bool>(), 15), used in prop::collection::vec(0..15_usize, 0..8)
         ) {
             let features: Vec<_> = FeatureSet::PORTABILITY.iter().collect();

@@ -1,5 +1,6 @@
 //! Modes for resolving multisampled depth and stencil.
 
+use ash::vk;
 use bitflags::bitflags;
 
 /// Mode for resolving the depth or stencil samples of a pixel (`VkResolveModeFlagBits`). Colours are
@@ -57,6 +58,16 @@ pub struct DepthResolveLimits {
 }
 
 impl DepthResolveLimits {
+    /// Converts the limits reported by the device.
+    pub(crate) fn from_properties(v12: &vk::PhysicalDeviceVulkan12Properties<'_>) -> Self {
+        Self {
+            depth: ResolveModes::from_bits_truncate(v12.supported_depth_resolve_modes.as_raw()),
+            stencil: ResolveModes::from_bits_truncate(v12.supported_stencil_resolve_modes.as_raw()),
+            one_alone: v12.independent_resolve_none == vk::TRUE,
+            different: v12.independent_resolve == vk::TRUE,
+        }
+    }
+
     /// True if the device can resolve a depth-stencil target with these modes.
     pub(crate) fn supports(&self, depth: Option<ResolveMode>, stencil: Option<ResolveMode>) -> bool {
         let known = |mode: Option<ResolveMode>, modes: ResolveModes| {
@@ -70,8 +81,6 @@ impl DepthResolveLimits {
 
 #[cfg(test)]
 mod tests {
-    use ash::vk;
-
     use super::*;
 
     #[test]

@@ -55,6 +55,12 @@ enum Source {
     Own(Box<Allocation>),
     /// A slot of the [`SlabPool`] with this index.
     Shared(usize, Slot),
+    /// Memory that the allocator does not know: exported or imported.
+    #[cfg(unix)]
+    Unmanaged {
+        /// Index of the memory type.
+        type_index: u32,
+    },
 }
 
 /// Host address of mapped memory.
@@ -70,6 +76,31 @@ impl ObjectMemory {
     fn dedicated(allocation: Allocation) -> Self {
         let place = MemoryPlacement::from_allocation(&allocation);
         Self::from_placement(place, allocation.size(), Source::Own(Box::new(allocation)))
+    }
+
+    /// Describes memory that the allocator does not know. It is mapped nowhere.
+    #[cfg(unix)]
+    pub(crate) fn unmanaged(
+        raw: vk::DeviceMemory,
+        size: u64,
+        type_index: u32,
+        properties: vk::MemoryPropertyFlags,
+    ) -> Self {
+        Self { raw, offset: 0, size, properties, mapped: None, source: Source::Unmanaged { type_index } }
+    }
+
+    /// Returns the index of the memory type of memory that the allocator does not know.
+    #[cfg(unix)]
+    pub(crate) fn unmanaged_type(&self) -> Option<u32> {
+        if let Source::Unmanaged { type_index } = self.source { Some(type_index) } else { None }
+    }
+
+    /// True if the allocator does not know the memory, which `vkFreeMemory` frees.
+    pub(crate) fn is_unmanaged(&self) -> bool {
+        #[cfg(unix)]
+        return self.unmanaged_type().is_some();
+        #[cfg(not(unix))]
+        return false;
     }
 
     fn from_placement(place: MemoryPlacement, size: u64, source: Source) -> Self {
@@ -236,6 +267,8 @@ impl DeviceMemory {
         let unused = match memory.source {
             Source::Own(allocation) => Some(*allocation),
             Source::Shared(slab_pool, slot) => self.slab_pools[slab_pool].slab.free(slot),
+            #[cfg(unix)]
+            Source::Unmanaged { .. } => None,
         };
         unused.map_or(Ok(()), |allocation| self.allocator.free(allocation))
     }

@@ -2,4 +2,6 @@
 
 pub(crate) mod allocator;
 pub(crate) mod budget;
+#[cfg(unix)]
+pub(crate) mod external;
 pub(crate) mod slab;

@@ -120,12 +120,17 @@ impl DeviceProfile {
 
     /// `mali-g720`: the class of Arm's Mali-G720 and Immortalis-G720.
     ///
-    /// No report of Arm's own driver was at hand. Push constants of 256 bytes, 32 KiB of shared memory, targets of
-    /// 16,384 pixels and the features are those of panvk, Mesa's driver for this architecture
-    /// (`src/panfrost/vulkan/panvk_vX_physical_device.c` of Mesa at 020a6bc28265). Arm's driver may have more
-    /// features. Ray queries without pipelines, the range of 256 MiB, the scratch alignment and the sizes per
-    /// triangle are assumed to be those of [`mali_g715`](Self::mali_g715). Workgroups of 1,024 invocations are
-    /// assumed.
+    /// Sources:
+    /// * ray tracing, on Immortalis-G720 only: Arm's page
+    ///   <https://learn.arm.com/learning-paths/smartphones-and-mobile/ray_tracing/rt02_setup>;
+    /// * 32 KiB of shared memory, with Arm's driver r44p1 on a Mali-G720-Immortalis MC12:
+    ///   <https://github.com/ggml-org/llama.cpp/pull/27163>;
+    /// * push constants of 256 bytes, targets of 16,384 pixels, the features: panvk, Mesa's driver for this architecture,
+    ///   `src/panfrost/vulkan/panvk_vX_physical_device.c` of <https://gitlab.freedesktop.org/mesa/mesa> at
+    ///   020a6bc28265. Arm's driver may have more features.
+    ///
+    /// Not sourced: ray queries without pipelines, the range of 256 MiB, the scratch alignment and the sizes per
+    /// triangle are those of [`mali_g715`](Self::mali_g715); workgroups have 1,024 invocations.
     pub fn mali_g720() -> Self {
         Self {
             name: Cow::Borrowed("mali-g720"),
@@ -154,14 +159,17 @@ impl DeviceProfile {
 
     /// `adreno-840`: Qualcomm Adreno 840 (Snapdragon 8 Elite Gen 5).
     ///
-    /// No report of Qualcomm's own driver was at hand. Most values are those of turnip, Mesa's driver for this GPU:
-    /// the storage range of 2 GiB less 1 byte and 32 KiB of shared memory
-    /// (`src/freedreno/common/freedreno_devices.py` of Mesa at 17ca6174dcc6), push constants of 256 bytes, textures
-    /// of 16,384 texels, workgroups of 1,024 invocations, scratch alignment 128, and the features
-    /// (`src/freedreno/vulkan/tu_device.cc` at 020a6bc28265). Turnip has ray queries only. Ray tracing pipelines
-    /// are there because the notes of a public project report them on an Adreno 840 (phone SM-S948B, Qualcomm's
-    /// driver). Missing mesh shaders and position fetch are assumed. Sizes per triangle are unknown, so those of
-    /// the device itself count.
+    /// Sources:
+    /// * ray queries and ray tracing pipelines, with Qualcomm's driver on the phone SM-S948B:
+    ///   `docs/ANDROID_RT_DEVICE_COMPATIBILITY_RECORD.md` of <https://github.com/Samfa12-tech/The-Horde-RT-demo> at
+    ///   48e88cba3d76. Turnip, Mesa's driver for this GPU, has ray queries only;
+    /// * the storage range of 2 GiB less 1 byte, 32 KiB of shared memory: turnip,
+    ///   `src/freedreno/common/freedreno_devices.py` of <https://gitlab.freedesktop.org/mesa/mesa> at 17ca6174dcc6;
+    /// * push constants of 256 bytes, textures of 16,384 texels, workgroups of 1,024 invocations, scratch alignment
+    ///   128, the features: turnip, `src/freedreno/vulkan/tu_device.cc` at 020a6bc28265.
+    ///
+    /// Not sourced: limits of Qualcomm's own driver. Missing mesh shaders and position fetch are assumed. Sizes per
+    /// triangle are unknown, so those of the device itself count.
     pub fn adreno_840() -> Self {
         Self {
             name: Cow::Borrowed("adreno-840"),

@@ -92,10 +92,16 @@ impl Instance {
             debug_utils: extensions.contains(&ash::ext::debug_utils::NAME),
             validated: false,
             gpu_assisted: false,
-            windows: None,
+            windows: WindowExtensions::enabled(extensions),
             messenger: Messenger::new(ValidationSink::default()),
             is_external: true,
         }
+    }
+
+    /// True if the caller created the instance.
+    #[cfg(feature = "window")]
+    pub(crate) fn is_external(&self) -> bool {
+        self.is_external
     }
 
     /// Returns the messages of the validation layer.
@@ -146,6 +152,27 @@ impl DriverReport {
             Err(error) => Self::query(LoaderReport::not_opened(library, &error), None),
         }
     }
+}
+
+/// Returns the extensions that another engine enables for an instance that presents to `window`, and for names of
+/// objects if `debug_names`.
+pub(crate) fn external_extensions(
+    entry: &ash::Entry,
+    window: Option<WindowRef<'_>>,
+    debug_names: bool,
+) -> Result<Vec<&'static CStr>> {
+    // SAFETY: no preconditions.
+    let list = unsafe { entry.enumerate_instance_extension_properties(None) }
+        .map_err(Error::vulkan("vkEnumerateInstanceExtensionProperties"))?;
+    let has = |name: &CStr| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+    let windows = window.map(|window| WindowExtensions::query(window, &has)).transpose()?;
+    let debug_utils = ash::ext::debug_utils::NAME;
+    if debug_names && !has(debug_utils) {
+        let why = "the Vulkan loader and its drivers do not have it; leave ContextDesc::debug_names at None";
+        return Err(Error::unsupported("the instance extension VK_EXT_debug_utils", why));
+    }
+    let of_windows = windows.iter().flat_map(WindowExtensions::names);
+    Ok(of_windows.chain(debug_names.then_some(debug_utils)).collect())
 }
 
 fn load_entry(library: Option<&Path>) -> Result<ash::Entry, ash::LoadingError> {

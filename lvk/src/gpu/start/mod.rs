@@ -4,6 +4,7 @@ mod built_in_profiles;
 pub(crate) mod driver_workarounds;
 mod drivers;
 pub(crate) mod external;
+pub(crate) mod feature_chain;
 pub(crate) mod instance;
 pub(crate) mod physical_device;
 pub(crate) mod profile;

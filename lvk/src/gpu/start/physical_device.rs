@@ -14,6 +14,7 @@ use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 use crate::gpu::caps::queues::{QueueFamily, QueueLocation, describe_queues, locate_queues, queue_families};
 use crate::gpu::caps::ray_query_path::RayQueryPath;
 use crate::gpu::caps::shading_rate::ShadingRateLimits;
+use crate::gpu::caps::subgroup_limits::SubgroupLimits;
 
 /// One physical device as reported, before a device is selected.
 pub(crate) struct PhysicalDevice {
@@ -189,6 +190,7 @@ impl PhysicalDevice {
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = Limits::from_properties(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::from_properties(&mesh);
+        caps.limits.subgroup = SubgroupLimits::from_properties(&v11, &v13);
         caps.limits.shading_rate = ShadingRateLimits::from_properties(&rates);
         caps.limits.max_allocation_bytes = v11.max_memory_allocation_size;
         caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
@@ -220,7 +222,8 @@ fn query_features(
     found
 }
 
-fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
+/// Returns the extension that reads the clocks of device and host together.
+pub(super) fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
     if has(ash::khr::calibrated_timestamps::NAME) {
         Calibration::Khr
     } else if has(ash::ext::calibrated_timestamps::NAME) {

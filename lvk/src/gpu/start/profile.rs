@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn what_hangs_on_a_hidden_feature_is_hidden_with_it() {
+    fn features_that_need_a_hidden_feature_are_hidden_with_it() {
         let mut capabilities = Capabilities { optional: FeatureSet::ALL, ..device() };
         let hidden = FeatureSet::NONE.with(OptionalFeature::Multiview);
         DeviceProfile { hidden, mesh_shader: false, ..DeviceProfile::default() }.apply(&mut capabilities);

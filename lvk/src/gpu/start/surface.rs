@@ -60,15 +60,17 @@ impl<'a> SurfaceProbe<'a> {
         let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         // SAFETY: the device belongs to the instance.
         let families = unsafe { self.instance.get_physical_device_queue_family_properties(device) };
-        let presents = |family| {
-            // SAFETY: as above, and the surface belongs to the same instance.
-            unsafe { self.functions.get_physical_device_surface_support(device, family, self.raw) }
-                .unwrap_or(false)
-        };
         (0..).zip(&families).find_map(|(index, family)| {
-            let fits = family.queue_flags.contains(needed) && presents(index);
+            let fits = family.queue_flags.contains(needed) && self.presents(device, index);
             fits.then_some(index)
         })
+    }
+
+    /// True if queues of the family can present to this window.
+    pub(crate) fn presents(&self, device: vk::PhysicalDevice, family: u32) -> bool {
+        // SAFETY: device and surface belong to the instance.
+        unsafe { self.functions.get_physical_device_surface_support(device, family, self.raw) }
+            .unwrap_or(false)
     }
 }
 
@@ -83,9 +85,13 @@ impl Drop for SurfaceProbe<'_> {
 pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) -> Result<vk::SurfaceKHR> {
     let (display, window) = (display(window)?, raw_window(window)?);
     let enabled = instance.windows.as_ref().map_or(&[][..], |windows| windows.system());
-    if required_extensions(display)?.iter().any(|name| !enabled.contains(name)) {
-        let why =
-            "the context was made for windows of another window system, or for none; set ContextDesc::window";
+    if let Some(name) = required_extensions(display)?.iter().find(|name| !enabled.contains(name)) {
+        let why = if instance.is_external() {
+            format!("{} is not among RawContext::instance_extensions", name.to_string_lossy())
+        } else {
+            "the context was made for windows of another window system, or for none; set ContextDesc::window"
+                .to_owned()
+        };
         return Err(Error::unsupported("this kind of window", why));
     }
     // SAFETY: the extensions of the window system are enabled, the handles belong together, and the caller

@@ -14,6 +14,10 @@ impl SurfaceProbe {
         match *window {}
     }
 
+    pub(crate) fn presents(&self, _: vk::PhysicalDevice, _: u32) -> bool {
+        match *self {}
+    }
+
     pub(crate) fn queue_family(&self, _: vk::PhysicalDevice) -> Option<u32> {
         match *self {}
     }

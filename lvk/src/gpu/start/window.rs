@@ -52,6 +52,23 @@ impl WindowExtensions {
         })
     }
 
+    /// Returns the extensions among those that another engine has enabled. `None` if these allow no surfaces.
+    pub(super) fn enabled(names: &[&CStr]) -> Option<Self> {
+        let has = |name: &CStr| names.contains(&name);
+        has(ash::khr::surface::NAME).then(|| Self {
+            system: window_system::all().into_iter().filter(|name| has(name)).collect(),
+            maintenance: MAINTENANCE.iter().all(|name| has(name)),
+            color_spaces: has(ash::ext::swapchain_colorspace::NAME),
+        })
+    }
+
+    /// Returns an extension that surfaces of the window need and `enabled` lacks.
+    pub(crate) fn missing(enabled: Option<&Self>, window: WindowRef<'_>) -> Result<Option<&'static CStr>> {
+        let needed = required_extensions(display(window)?)?;
+        let enabled = enabled.map_or(&[][..], Self::system);
+        Ok(needed.into_iter().find(|name| !enabled.contains(name)))
+    }
+
     /// Returns the extensions of the window system.
     pub(super) fn system(&self) -> &[&'static CStr] {
         &self.system

@@ -18,6 +18,15 @@ impl WindowExtensions {
         match *window {}
     }
 
+    /// Returns `None`: without the feature `window` the library creates no surfaces.
+    pub(super) fn enabled(_: &[&CStr]) -> Option<Self> {
+        None
+    }
+
+    pub(crate) fn missing(_: Option<&Self>, window: WindowRef<'_>) -> Result<Option<&'static CStr>> {
+        match *window {}
+    }
+
     pub(crate) fn names(&self) -> Empty<&'static CStr> {
         match *self {}
     }

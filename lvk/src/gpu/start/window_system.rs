@@ -8,6 +8,19 @@ use raw_window_handle::{RawDisplayHandle, RawWindowHandle};
 
 use crate::error::{Error, Result};
 
+/// Returns the instance extensions of all window systems, and the one that they share.
+pub(super) fn all() -> [&'static CStr; 7] {
+    [
+        khr::surface::NAME,
+        khr::xlib_surface::NAME,
+        khr::xcb_surface::NAME,
+        khr::wayland_surface::NAME,
+        khr::win32_surface::NAME,
+        khr::android_surface::NAME,
+        ash::ext::metal_surface::NAME,
+    ]
+}
+
 /// Returns the instance extensions for windows of a display; `None` if Vulkan has no surfaces for its window system.
 pub(super) fn extensions(display: RawDisplayHandle) -> Option<Vec<&'static CStr>> {
     let system = match display {
@@ -131,6 +144,7 @@ mod tests {
             (RawDisplayHandle::UiKit(UiKitDisplayHandle::new()), c"VK_EXT_metal_surface"),
         ] {
             assert_eq!(extensions(display), Some(vec![c"VK_KHR_surface", system]));
+            assert!(all().contains(&system));
         }
         assert_eq!(extensions(RawDisplayHandle::Haiku(HaikuDisplayHandle::new())), None);
     }

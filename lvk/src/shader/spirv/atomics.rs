@@ -118,7 +118,7 @@ fn is_atomic(op: Op) -> bool {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
-    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
+    use crate::shader::{CompileFiles, CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
 
     fn found(body: &str) -> Vec<Atomic> {
         let text = format!(
@@ -134,7 +134,7 @@ mod tests {
             source: ShaderSource::Glsl(&text),
             ..Default::default()
         };
-        find_atomics(&compile(&desc, &CompileOptions::default(), None).unwrap()).unwrap()
+        find_atomics(&compile(&desc, &CompileOptions::default(), CompileFiles::default()).unwrap()).unwrap()
     }
 
     #[test]

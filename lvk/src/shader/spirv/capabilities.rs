@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_caller_allows_is_allowed() {
+    fn capabilities_that_the_caller_allows_are_allowed() {
         let of = module(&[C::Kernel, C::Linkage]);
         let check =
             |extra: &[u32]| check_capabilities("test", ShaderStage::Compute, &of, &all_subgroups(), extra);

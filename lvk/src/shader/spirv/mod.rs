@@ -1,6 +1,7 @@
 //! SPIR-V modules: words, reflection, capabilities, constants, and passes that rewrite modules.
 
 pub(crate) mod atomics;
+pub(crate) mod blocks;
 pub(crate) mod capabilities;
 pub(crate) mod const_eval;
 #[cfg(feature = "glsl")]

@@ -21,6 +21,10 @@ pub(crate) struct ParsedModule {
     pub(crate) entries: Vec<EntryPoint>,
     pub(crate) modes: Vec<Mode>,
     pub(crate) names: HashMap<u32, String>,
+    /// Names of members, by the id of the struct and the index of the member.
+    pub(crate) member_names: HashMap<(u32, u32), String>,
+    /// Structs that buffer references point to, in order, each once.
+    pub(crate) buffer_references: Vec<u32>,
     pub(crate) types: HashMap<u32, Type>,
     pub(crate) constants: HashMap<u32, Constant>,
     /// Values of operations on constants.
@@ -188,6 +192,17 @@ impl ParsedModule {
         self.size(ty, None, MAX_NESTING, &mut known)
     }
 
+    /// Returns the bytes of a member of a struct.
+    pub(crate) fn member_size(&self, ty: u32, index: u32, member: u32) -> Result<u64, String> {
+        self.size(member, self.matrix_layout(ty, index), MAX_NESTING, &mut HashMap::new())
+    }
+
+    /// Returns the matrix stride of a member, and true if the member is row-major.
+    fn matrix_layout(&self, ty: u32, index: u32) -> Option<(u32, bool)> {
+        let get = |decoration| self.member_decoration(ty, index, decoration);
+        get(Decoration::MatrixStride).map(|stride| (stride, get(Decoration::RowMajor).is_some()))
+    }
+
     /// Returns the bytes of a type. `matrix` is the matrix stride of the current member, and true if the member is
     /// row-major.
     fn size(
@@ -255,11 +270,9 @@ impl ParsedModule {
     ) -> Result<u64, String> {
         let mut end = 0;
         for (index, member) in (0..).zip(members) {
-            let get = |decoration| self.member_decoration(ty, index, decoration);
-            let offset = get(Decoration::Offset).ok_or("a member has no offset")?;
-            let matrix =
-                get(Decoration::MatrixStride).map(|stride| (stride, get(Decoration::RowMajor).is_some()));
-            let bytes = self.size(*member, matrix, nesting, known)?;
+            let offset =
+                self.member_decoration(ty, index, Decoration::Offset).ok_or("a member has no offset")?;
+            let bytes = self.size(*member, self.matrix_layout(ty, index), nesting, known)?;
             end = bytes.saturating_add(u64::from(offset)).max(end);
         }
         Ok(end)
@@ -280,6 +293,9 @@ impl ParsedModule {
                 operands: [i.operand(2), i.operand(3), i.operand(4)],
             }),
             Op::Name => _ = self.names.insert(i.operand(0), i.string(1).0),
+            Op::MemberName => {
+                self.member_names.insert((i.operand(0), i.operand(1)), i.string(2).0);
+            }
             Op::Decorate => _ = self.decorations.insert((i.operand(0), i.operand(1)), i.operand(2)),
             Op::MemberDecorate => {
                 let key = (i.operand(0), i.operand(1), i.operand(2));
@@ -350,12 +366,24 @@ impl ParsedModule {
             Op::TypeArray => Type::Array { element: i.operand(1), length: i.operand(2) },
             Op::TypeRuntimeArray => Type::RuntimeArray { element: i.operand(1) },
             Op::TypeStruct => Type::Struct { members: i.operands().get(1..).unwrap_or(&[]).to_vec() },
-            Op::TypePointer => Type::Pointer { target: i.operand(2) },
+            Op::TypePointer => {
+                self.add_buffer_reference(i.operand(1), i.operand(2));
+                Type::Pointer { target: i.operand(2) }
+            }
             Op::TypeImage => parse_image_type(i),
             Op::TypeSampler | Op::TypeSampledImage | Op::TypeAccelerationStructureKHR => Type::Opaque(op),
             _ => return,
         };
         self.types.insert(i.operand(0), ty);
+    }
+
+    /// Records the target of a pointer type if it is the block of a buffer reference.
+    fn add_buffer_reference(&mut self, storage: u32, target: u32) {
+        let is_block = storage == StorageClass::PhysicalStorageBuffer as u32
+            && self.decoration(target, Decoration::Block).is_some();
+        if is_block && !self.buffer_references.contains(&target) {
+            self.buffer_references.push(target);
+        }
     }
 }
 

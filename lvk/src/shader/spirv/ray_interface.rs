@@ -90,11 +90,11 @@ mod tests {
 
     use super::*;
     use crate::shader::spirv::reflect::reflect;
-    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
+    use crate::shader::{CompileFiles, CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
 
     fn sizes(stage: ShaderStage, text: &str) -> RayInterface {
         let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };
-        let words = compile(&desc, &CompileOptions::default(), None).unwrap();
+        let words = compile(&desc, &CompileOptions::default(), CompileFiles::default()).unwrap();
         reflect("shader", stage, &words).unwrap().ray_interface
     }
 

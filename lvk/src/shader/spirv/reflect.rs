@@ -3,6 +3,7 @@
 use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
 use super::atomics::{Atomic, find_atomics};
+use super::blocks::Blocks;
 use super::input_attachments::{InputRead, output_locations, read_input_attachment};
 use super::parsed::{Mode, ParsedModule, Type, Variable};
 use super::ray_interface::RayInterface;
@@ -27,6 +28,8 @@ pub(crate) enum Primitive {
 pub(crate) struct Reflection {
     /// Bytes of push constants: the end of the block's last member, rounded up to 4; 0 without a block.
     pub(crate) push_constant_bytes: u32,
+    /// The blocks whose bytes the application writes.
+    pub(crate) blocks: Blocks,
     /// The module uses ray queries, by the device or by the library.
     pub(crate) ray_query: bool,
     /// The module uses ray queries by the device.
@@ -102,6 +105,7 @@ fn reflect_words(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String
     let software_ray_query = !hardware_ray_query && !ray_tracing && bindings.contains(&layout::TLAS_TABLE);
     Ok(Reflection {
         push_constant_bytes,
+        blocks: Blocks::from_module(&module, entry),
         ray_query: hardware_ray_query || software_ray_query,
         hardware_ray_query,
         ray_tracing,

@@ -181,7 +181,7 @@ fn name_before(text: &str, end: char) -> String {
 }
 
 #[test]
-fn declarations_of_every_kind_are_found() {
+fn declarations_of_every_kind_are_listed() {
     let text = "
         #define TWO(a, \\
             b) a + b

@@ -194,7 +194,7 @@ fn every_typed_declaration_compiles_as_declared() {
                 type_checks()
             );
             let text = shader(stage, &globals, &body);
-            if let Err(error) = compile(&desc(stage, &text), &options(&module), None) {
+            if let Err(error) = compile(&desc(stage, &text), &options(&module), CompileFiles::default()) {
                 panic!("{stage:?}, software {software}: {error}\n{body}");
             }
         }

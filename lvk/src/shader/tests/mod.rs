@@ -8,6 +8,7 @@ mod glsl_names;
 mod interface;
 #[cfg(feature = "software-ray-query")]
 mod interface_page;
+mod layouts;
 mod modules;
 mod preamble;
 mod shared;
@@ -30,7 +31,7 @@ fn desc(stage: ShaderStage, text: &str) -> ShaderModuleDesc<'_> {
 }
 
 fn build(desc: &ShaderModuleDesc<'_>) -> Result<Vec<u32>> {
-    compile(desc, &CompileOptions::default(), None)
+    compile(desc, &CompileOptions::default(), CompileFiles::default())
 }
 
 fn words(stage: ShaderStage, text: &str) -> Vec<u32> {

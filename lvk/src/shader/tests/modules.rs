@@ -62,7 +62,7 @@ fn formatless_reads_follow_the_device() {
         "imageStore(kImages2D[1], ivec2(0), imageLoad(kImages2D[0], ivec2(0)));",
     );
     let read = CompileOptions { formatless_read: true, ..Default::default() };
-    let words = compile(&desc(ShaderStage::Compute, &text), &read, None).unwrap();
+    let words = compile(&desc(ShaderStage::Compute, &text), &read, CompileFiles::default()).unwrap();
     assert!(capabilities(&words).contains(&(Capability::StorageImageReadWithoutFormat as u32)));
     assert!(error(ShaderStage::Compute, &text).contains("writeonly"));
 }

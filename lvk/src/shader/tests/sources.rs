@@ -34,7 +34,7 @@ fn errors_in_included_files_name_file_and_line() {
 }
 
 #[test]
-fn includes_are_found_beside_the_includer_and_in_the_folders() {
+fn includes_come_from_beside_the_includer_and_from_the_folders() {
     let dir = std::env::temp_dir().join(format!("lvk-include-{}", std::process::id()));
     std::fs::create_dir_all(dir.join("sub")).unwrap();
     std::fs::write(dir.join("sub/a.glsl"), "#pragma once\n#include \"b.glsl\"\nint a() { return b(); }\n")

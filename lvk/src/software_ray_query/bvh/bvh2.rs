@@ -7,7 +7,7 @@ use crate::software_ray_query::layout::{
 };
 
 const BINS: usize = 16;
-/// From this depth on, halves have equal primitive counts, so that at most 27 levels follow.
+/// Depth from which halves have equal primitive counts, so that at most 27 levels follow.
 const MEDIAN_SPLIT_DEPTH: usize = MAX_BVH2_DEPTH - 28;
 
 /// A range of the order that becomes a node or a leaf.

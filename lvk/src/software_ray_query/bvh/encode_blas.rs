@@ -208,7 +208,7 @@ mod tests {
         (blob.header().leaf_kind, blob.bytes.len() as f64 / f64::from(blob.header().primitive_count))
     }
 
-    /// Of these, nodes take about 8 bytes, the leaf 12, and the vertices, half as many as triangles, 6.
+    /// Nodes take about 8 of the 28 bytes, the leaf 12, and the vertices, half as many as triangles, 6.
     #[test]
     fn a_triangle_takes_less_than_28_bytes_with_low_memory() {
         let shared = grid(80, 1);
@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(bytes_each(&Mesh { vertices: Vec::new(), ..shared }, SMALL), (kind, bytes), "without");
     }
 
-    /// If a position has a vertex for each of its cells, only leaves that never move share it.
+    /// Only leaves that never move share a position that has a vertex for each of its cells.
     #[test]
     fn leaves_name_vertices_where_copies_take_more() {
         let apart = grid(30, 900);

@@ -19,9 +19,9 @@ use crate::parallel::parallel_for;
 const SHORT_SEARCH_ROUNDS: usize = 2;
 /// Search radius of later rounds to either side.
 const LONG_SEARCH_RADIUS: usize = 14;
-/// If a round pairs less than one in this many nodes, it also pairs direct neighbours.
+/// A round that pairs less than one in this many nodes also pairs direct neighbours.
 const MIN_PAIRED_FRACTION: usize = 32;
-/// With at most this many nodes, rounds pair mutual choices only.
+/// Largest node count at which rounds pair mutual choices only.
 const FINAL_NODE_COUNT: usize = 32;
 
 /// Builds a tree of at least one AABB, with one AABB in each leaf.

@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn only_instances_that_overlap_are_shown_in_parts() {
+    fn only_overlapping_instances_are_divided() {
         let at = |x: f32| Affine3A::from_translation(Vec3::new(x, 0.0, 0.0));
         let apart = placed(&[at(0.0), at(400.0), at(800.0)]).1;
         assert_eq!(rebraid(&apart, 60).len(), 3);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_overlaps_is_found_whatever_the_axis() {
+    fn overlaps_along_every_axis_are_noticed() {
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
             let at = |place: f32| Affine3A::from_translation(axis * place);
             // The BLAS is 300 long, 900 high and 3 deep.
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_room_for_twice_the_instances_where_they_are_few() {
+    fn the_capacity_is_twice_the_instances_if_they_are_few() {
         let rooms = [0, 1, 2, 128, 512, 513, 1024, 10_000, u32::MAX].map(record_capacity);
         assert_eq!(rooms, [0, 1, 18, 256, 1024, 513, 1024, 10_000, u32::MAX]);
     }

@@ -152,7 +152,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_has_no_wide_nodes_stays_whole() {
+    fn a_tree_without_wide_nodes_stays_whole() {
         for count in [0, 1, 3] {
             assert!(structure(&row(count, Vec3::ZERO)).1.parts.is_empty());
         }

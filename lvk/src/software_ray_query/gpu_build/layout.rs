@@ -3,7 +3,8 @@
 use super::geometry::GpuGeometry;
 use super::params::GpuBuildParams;
 use crate::accel::geometry::GeometryFlags;
-use crate::error::{Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Result, check_limit_of};
 use crate::software_ray_query::layout::{BLOCK_BYTES, LeafKind};
 
 /// Bytes of the header of an acceleration structure.
@@ -140,7 +141,7 @@ impl GpuBuildPlan {
 
     fn new(name: &str, shape: &BlasShape) -> Result<Self> {
         let what = if shape.leaf_kind == LeafKind::Instances { "instance count" } else { "primitive count" };
-        check_limit(name, what, shape.primitive_count.into(), MAX_PRIMITIVES)?;
+        check_limit_of(LimitOrigin::Library, name, what, shape.primitive_count.into(), MAX_PRIMITIVES)?;
         let vertex_count = if shape.leaf_kind.has_vertex_indices() { shape.vertex_count } else { 0 };
         let (places, blob_bytes) = blob_offsets(name, shape, vertex_count)?;
         let low_bits = low_bit_mask(shape);
@@ -314,7 +315,13 @@ fn blob_offsets(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blo
         part(u64::from(shape.geometry_count) * GEOMETRY_BYTES, 16),
     ];
     let bytes = layout.end.next_multiple_of(BLOB_ALIGNMENT);
-    check_limit(name, "acceleration structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
+    check_limit_of(
+        LimitOrigin::Library,
+        name,
+        "acceleration structure size in bytes",
+        bytes,
+        u64::from(u32::MAX) * 16,
+    )?;
     let [nodes, primitives, vertices, geometries] = places.map(|place| place as u32);
     Ok((BlobOffsets { nodes, primitives, vertices, geometries }, bytes))
 }
@@ -421,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_numbers_is_refused() {
+    fn counts_that_overflow_offsets_are_refused() {
         let shape = BlasShape { primitive_count: (1 << 27) + 1, ..MESH };
         assert!(GpuBuildPlan::blas("s", &shape).is_err());
         assert!(GpuBuildPlan::blas("s", &BlasShape { primitive_count: 1 << 27, ..shape }).is_ok());
@@ -429,9 +436,9 @@ mod tests {
         assert!(GpuBuildPlan::tlas("s", 0).is_ok());
     }
 
-    /// If wide nodes are built again because they did not fit, the capacity suffices for any count.
+    /// The capacity suffices for any count if wide nodes are built again because they did not fit.
     #[test]
-    fn there_is_room_for_full_nodes_of_any_count() {
+    fn the_capacity_suffices_for_full_nodes_of_any_count() {
         let full = |count: u32| {
             let mut level = count.div_ceil(24);
             let mut all = level;

@@ -337,7 +337,7 @@ mod tests {
         }
 
         #[test]
-        fn even_trees_have_room(count in 4..5000_usize, even in 7..=8_usize, seed: u64) {
+        fn even_trees_fit_the_capacity(count in 4..5000_usize, even in 7..=8_usize, seed: u64) {
             let wide = tree(count, even, 64, seed).collapse();
             prop_assert!(wide.node_count() <= count * 99 / 1000 + 2, "{} of {count}", wide.node_count());
             prop_assert!(min_groups(&wide) >= 2);

@@ -8,13 +8,17 @@ use lvk::{Context, Dependencies};
 
 use super::Workload;
 use super::recording::{Limits, measure_recording};
-use super::row::Row;
+use super::row::OverheadRow;
 use super::scene::{Push, Scene};
 use crate::error::BenchError;
 use crate::hand_written::RawRecorder;
 use crate::measure::elapsed_ms;
 
-pub(super) fn measure(ctx: &Context, silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(
+    ctx: &Context,
+    silent: &Context,
+    workload: Workload,
+) -> Result<Vec<OverheadRow>, BenchError> {
     let count = (workload.draws / 10).max(1);
     let name = format!("dispatch after a storage image barrier, {count} recorded");
     let limits = Limits { ratio: 1.25, library_ns: 25.0 };

@@ -8,13 +8,17 @@ use lvk::ash::vk;
 
 use super::Workload;
 use super::recording::{Limits, measure_recording};
-use super::row::Row;
+use super::row::OverheadRow;
 use super::scene::{Push, Scene};
 use crate::error::BenchError;
 use crate::hand_written::RawRecorder;
 use crate::measure::elapsed_ms;
 
-pub(super) fn measure(ctx: &Context, silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(
+    ctx: &Context,
+    silent: &Context,
+    workload: Workload,
+) -> Result<Vec<OverheadRow>, BenchError> {
     let count = workload.draws;
     let name = format!("push constants + draw, {count} pairs recorded");
     let limits = Limits { ratio: 1.10, library_ns: 7.0 };

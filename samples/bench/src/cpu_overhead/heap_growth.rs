@@ -4,14 +4,14 @@ use lvk::{Context, Dependencies};
 
 use super::Workload;
 use super::allocations::allocation_count;
-use super::row::{Limit, Row};
+use super::row::{Limit, OverheadRow};
 use super::scene::{Push, Scene};
 use super::start::resident_mb;
 use crate::error::BenchError;
 
 const DRAWS: u32 = 100;
 
-pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<OverheadRow>, BenchError> {
     let scene = Scene::new(silent)?;
     let warm_up = (workload.many / 10).max(1);
     frames(silent, &scene, warm_up, DRAWS)?;
@@ -22,12 +22,17 @@ pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Row>, 
     let each = |from: u64, to: u64| (to - from) as f64 / f64::from(workload.many);
     let (full, empty) = (each(before, middle), each(middle, allocation_count()));
     let mut rows = vec![
-        Row::new("heap allocations per draw", (full - empty) / f64::from(DRAWS), "", Limit::AtMost(0.005)),
-        Row::new("heap allocations per frame of one pass and one dispatch", empty, "", Limit::None),
+        OverheadRow::new(
+            "heap allocations per draw",
+            (full - empty) / f64::from(DRAWS),
+            "",
+            Limit::AtMost(0.005),
+        ),
+        OverheadRow::new("heap allocations per frame of one pass and one dispatch", empty, "", Limit::None),
     ];
     let grown = memory.zip(after).map(|(before, after)| after - before);
     let name = format!("resident memory growth over {} frames", workload.many);
-    rows.extend(grown.map(|grown| Row::new(name, grown, "MB", Limit::AtMost(0.5))));
+    rows.extend(grown.map(|grown| OverheadRow::new(name, grown, "MB", Limit::AtMost(0.5))));
     Ok(rows)
 }
 

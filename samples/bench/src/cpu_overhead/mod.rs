@@ -20,7 +20,7 @@ pub use allocations::CountingAllocator;
 use super::error::BenchError;
 use super::setup::{DefaultBy, Setup};
 use super::table::Table;
-use row::Row;
+use row::OverheadRow;
 
 /// Amount of work to measure.
 #[derive(Clone, Copy)]
@@ -51,8 +51,8 @@ pub(super) fn measure(setup: &Setup) -> Result<Table, BenchError> {
     rows.extend(submits::measure(&ctx, workload)?);
     rows.extend(heap_growth::measure(&silent, workload)?);
     let columns = ["", "lvk", "compared with", "ratio", "limit", ""];
-    let mut table = Table::new(setup.headline(&ctx, "core: CPU overhead of the library"), &columns);
-    rows.iter().for_each(|row: &Row| row.print(&mut table));
+    let mut table = Table::new(setup.title(&ctx, "core: CPU overhead of the library"), &columns);
+    rows.iter().for_each(|row: &OverheadRow| row.print(&mut table));
     table
         .add_note(format!("medians of {} interleaved rounds; by hand: the same calls in ash", workload.runs));
     table.add_note("library share of recording: every vkCmd* function is replaced by an empty function");

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use lvk::{BufferDesc, Context, Format, TextureDesc, TextureUsage};
 
-use super::row::{Limit, Row};
+use super::row::{Limit, OverheadRow};
 use super::{Workload, each_ns};
 use crate::error::BenchError;
 use crate::hand_written::{Memory, RawObjects};
@@ -15,7 +15,11 @@ const AT_ONCE: u32 = 1_000;
 const BUFFER_BYTES: u64 = 256;
 const FEW: u32 = 10;
 
-pub(super) fn measure(setup: &Setup, ctx: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(
+    setup: &Setup,
+    ctx: &Context,
+    workload: Workload,
+) -> Result<Vec<OverheadRow>, BenchError> {
     let mut raw = RawObjects::new(ctx)?;
     let buffers = interleave(workload.runs, |which| match memory(which) {
         None => create_and_destroy(ctx, || buffer(ctx).map(drop)),
@@ -30,7 +34,7 @@ pub(super) fn measure(setup: &Setup, ctx: &Context, workload: Workload) -> Resul
     rows.extend(comparison_rows("buffer created + destroyed, with frees", &buffers, 0.6));
     rows.extend(comparison_rows("texture created + destroyed, with frees", &textures, 1.8));
     let name = "1,000 buffers of 256 B created, without a submission";
-    rows.push(Row::new(name, median_of(&thousand, |ms| *ms), "ms", Limit::None));
+    rows.push(OverheadRow::new(name, median_of(&thousand, |ms| *ms), "ms", Limit::None));
     rows.extend(crowded_rows(setup, workload)?);
     Ok(rows)
 }
@@ -42,12 +46,12 @@ fn memory(turn: usize) -> Option<Memory> {
 
 /// Returns the rows of the library, compared with hand-written Vulkan. The third sample uses preallocated memory and so
 /// measures the driver's part.
-fn comparison_rows(name: &str, samples: &[Vec<f64>; 3], limit: f64) -> [Row; 2] {
+fn comparison_rows(name: &str, samples: &[Vec<f64>; 3], limit: f64) -> [OverheadRow; 2] {
     let [ours, by_hand, driver] =
         samples.each_ref().map(|samples| each_ns(median_of(samples, |ms| *ms), AT_ONCE) * 1e-3);
     [
-        Row::new(name, ours, "us", Limit::AtMost(limit)).compared_with(by_hand),
-        Row::new("- library share", ours - driver, "us", Limit::None),
+        OverheadRow::new(name, ours, "us", Limit::AtMost(limit)).compared_with(by_hand),
+        OverheadRow::new("- library share", ours - driver, "us", Limit::None),
     ]
 }
 
@@ -87,7 +91,7 @@ fn many_buffers(ctx: &Context) -> Result<f64, BenchError> {
 }
 
 /// Returns the row of a texture creation with few and with many live textures.
-fn crowded_rows(setup: &Setup, workload: Workload) -> Result<Vec<Row>, BenchError> {
+fn crowded_rows(setup: &Setup, workload: Workload) -> Result<Vec<OverheadRow>, BenchError> {
     let (few, many) =
         (setup.open_for_textures(workload.crowd + 100)?, setup.open_for_textures(workload.crowd + 100)?);
     let crowd = |ctx: &Context, count| (0..count).map(|_| texture(ctx)).collect::<lvk::Result<Vec<_>>>();
@@ -106,5 +110,5 @@ fn crowded_rows(setup: &Setup, workload: Workload) -> Result<Vec<Row>, BenchErro
     drop(held);
     let [ours, reference] = samples.map(|samples| median_of(&samples, |ms| *ms) * 1e3);
     let name = format!("texture created among {}, compared with among {FEW}", workload.crowd);
-    Ok(vec![Row::new(name, ours, "us", Limit::RatioAtMost(1.10)).compared_with(reference)])
+    Ok(vec![OverheadRow::new(name, ours, "us", Limit::RatioAtMost(1.10)).compared_with(reference)])
 }

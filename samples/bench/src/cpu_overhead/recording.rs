@@ -5,7 +5,7 @@ use std::rc::Rc;
 use lvk::Context;
 
 use super::each_ns;
-use super::row::{Limit, Row};
+use super::row::{Limit, OverheadRow};
 use super::scene::Scene;
 use crate::error::BenchError;
 use crate::hand_written::{RawDevice, RawRecorder};
@@ -31,7 +31,7 @@ pub(super) fn measure_recording(
     (runs, count): (u32, u32),
     (ours, by_hand): (Ours, ByHand),
     (name, limits): (String, Limits),
-) -> Result<Vec<Row>, BenchError> {
+) -> Result<Vec<OverheadRow>, BenchError> {
     let (scene, silent_scene) = (Scene::new(ctx)?, Scene::new(silent)?);
     let raw = RawRecorder::new(&RawDevice::new(ctx))?;
     let samples: [Vec<f64>; 3] = interleave(runs, |which| match which {
@@ -42,7 +42,7 @@ pub(super) fn measure_recording(
     let [ours, by_hand, own] = samples.map(|samples| each_ns(median_of(&samples, |ms| *ms), count));
     let limit = Limit::AtMost(limits.library_ns);
     Ok(vec![
-        Row::new(name, ours, "ns", Limit::RatioAtMost(limits.ratio)).compared_with(by_hand),
-        Row::new("- library share", own, "ns", limit),
+        OverheadRow::new(name, ours, "ns", Limit::RatioAtMost(limits.ratio)).compared_with(by_hand),
+        OverheadRow::new("- library share", own, "ns", limit),
     ])
 }

@@ -3,7 +3,7 @@
 use crate::table::Table;
 
 /// One measured figure with a reference figure and a limit.
-pub(super) struct Row {
+pub(super) struct OverheadRow {
     name: String,
     /// The library's figure, in `unit`.
     ours: f64,
@@ -26,7 +26,7 @@ pub(super) enum Limit {
     None,
 }
 
-impl Row {
+impl OverheadRow {
     /// Creates a row without a reference figure.
     pub(super) fn new(name: impl Into<String>, ours: f64, unit: &'static str, limit: Limit) -> Self {
         Self { name: name.into(), ours, reference: None, unit, limit }
@@ -83,7 +83,8 @@ mod tests {
 
     #[test]
     fn a_figure_equal_to_its_limit_is_met() {
-        let row = |ours, reference, limit| Row { reference, ..Row::new("", ours, "ns", limit) };
+        let row =
+            |ours, reference, limit| OverheadRow { reference, ..OverheadRow::new("", ours, "ns", limit) };
         assert_eq!(row(7.0, None, Limit::AtMost(7.0)).is_met(), Some(true));
         assert_eq!(row(7.1, None, Limit::AtMost(7.0)).is_met(), Some(false));
         assert_eq!(row(3.0, Some(2.0), Limit::RatioAtMost(1.25)).is_met(), Some(false));

@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-use super::row::{Limit, Row};
+use super::row::{Limit, OverheadRow};
 use crate::error::BenchError;
 use crate::measure::{elapsed_ms, median_of};
 use crate::setup::Setup;
 
-pub(super) fn measure(setup: &Setup) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(setup: &Setup) -> Result<Vec<OverheadRow>, BenchError> {
     const RUNS: u32 = 9;
     let ctx = setup.open()?;
     ctx.wait_idle()?;
@@ -20,9 +20,10 @@ pub(super) fn measure(setup: &Setup) -> Result<Vec<Row>, BenchError> {
         samples.push(elapsed_ms(start));
         drop(ctx);
     }
-    let created = Row::new("context created", median_of(&samples, |ms| *ms), "ms", Limit::AtMost(60.0));
-    let held =
-        resident.map(|mb| Row::new("resident memory with the first context", mb, "MB", Limit::AtMost(90.0)));
+    let created =
+        OverheadRow::new("context created", median_of(&samples, |ms| *ms), "ms", Limit::AtMost(60.0));
+    let held = resident
+        .map(|mb| OverheadRow::new("resident memory with the first context", mb, "MB", Limit::AtMost(90.0)));
     Ok(std::iter::once(created).chain(held).collect())
 }
 

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use lvk::{BuildFlags, BuildMode, Context, PrimitiveOrder, TlasDesc, TlasInstance};
 
-use super::row::{Limit, Row};
+use super::row::{Limit, OverheadRow};
 use super::{Workload, each_ns};
 use crate::error::BenchError;
 use crate::measure::{elapsed_ms, interleave, median_of};
@@ -16,7 +16,7 @@ const TLAS_COUNT: u32 = 16;
 /// Refits of each TLAS in one command buffer.
 const TURNS: u32 = 64;
 
-pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Row>, BenchError> {
+pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<OverheadRow>, BenchError> {
     if !(silent.capabilities().ray_query || silent.capabilities().ray_tracing_pipeline) {
         return Ok(Vec::new());
     }
@@ -46,7 +46,7 @@ pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Row>, 
     let [once, often] = interleave(workload.runs * 20, |which| record(if which == 0 { 1 } else { TURNS }))?;
     let row = |name: String, samples: &[f64], turns, limit| {
         let ours = each_ns(median_of(samples, |ms| *ms), TLAS_COUNT * turns);
-        Row::new(name, ours, "ns", limit)
+        OverheadRow::new(name, ours, "ns", limit)
     };
     Ok(vec![
         row("TLAS refit recorded, library share".to_owned(), &often, TURNS, Limit::AtMost(50.0)),

@@ -37,7 +37,7 @@ pub(crate) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> 
     let interrupt = Interrupt::listen();
     let mut progress = Progress::visible();
     let mut experiment: Option<Experiment> = None;
-    let mut headline = String::new();
+    let mut title = String::new();
     for file in &files {
         if interrupt.is_raised() {
             break;
@@ -48,7 +48,7 @@ pub(crate) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> 
         progress.pause();
         warn(&scene.warnings);
         warn(&fit_textures(&mut scene, &ctx.capabilities().limits).map_err(super::PaperError::from)?);
-        headline = setup.headline(&ctx, "Stand-alone and hybrid, averages in milliseconds");
+        title = setup.title(&ctx, "Stand-alone and hybrid, averages in milliseconds");
         let experiment = match &mut experiment {
             Some(known) => known,
             none => {
@@ -68,7 +68,7 @@ pub(crate) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> 
     if interrupt.is_raised() {
         return Err(BenchError::Interrupted { done: scenes.len(), of: files.len(), page });
     }
-    let mut table = tables::summary(headline, &scenes, &paths);
+    let mut table = tables::summary(title, &scenes, &paths);
     let seconds = started.elapsed().as_secs();
     table.add_note(format!("took {} min {} s", seconds / 60, seconds % 60));
     table.add_note(format!("all tables, plots and images: {}", page.display()));

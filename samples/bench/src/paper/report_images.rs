@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_has_a_row_for_each_camera() {
+    fn a_sheet_has_a_line_for_each_camera() {
         let folder = tempfile::tempdir().unwrap();
         let images = ReportImages::new(folder.path(), [8, 4]).unwrap();
         let pair = || [vec![7; 128], vec![9; 128]];

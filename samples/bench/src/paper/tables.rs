@@ -156,10 +156,10 @@ pub(super) fn spread(scenes: &[SceneResult], path: TracePath) -> Table {
 }
 
 /// Returns the table of averages for the terminal.
-pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[TracePath]) -> Table {
+pub(super) fn summary(title: String, scenes: &[SceneResult], paths: &[TracePath]) -> Table {
     let theirs = has_published(scenes).then_some("paper: t/T");
     let head: Vec<&str> = ["scene"].into_iter().chain(TIMES).chain(["PSNR dB"]).chain(theirs).collect();
-    let mut table = Table::new(headline, &head);
+    let mut table = Table::new(title, &head);
     for scene in scenes {
         for &path in paths {
             let psnr = mean_metrics(scene, path).psnr;

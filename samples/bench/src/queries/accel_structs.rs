@@ -41,7 +41,7 @@ pub(super) fn table(setup: &Setup, contexts: &Contexts, mesh: &Mesh, runs: u32) 
         table
             .add_row("bytes per triangle, fast trace, compacted", [String::new(), driver.compacted_bytes()?]);
     }
-    cpu_builds::add_rows(setup, &contexts.software, mesh, runs, &mut table)?;
+    cpu_builds::add_cpu_builds(setup, &contexts.software, mesh, runs, &mut table)?;
     add_build_rows(&makers, runs, &mut table)?;
     add_tlas_row(&makers, runs, &mut table)?;
     add_notes(runs, &mut table);

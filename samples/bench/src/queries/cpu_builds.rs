@@ -14,7 +14,7 @@ use crate::table::{Table, format_ms};
 const MAX_RUNS: u32 = 10;
 
 /// Adds the rows of BVH builds by the CPU.
-pub(super) fn add_rows(
+pub(super) fn add_cpu_builds(
     setup: &Setup,
     software: &Context,
     mesh: &Mesh,

@@ -30,9 +30,9 @@ pub(super) fn measure(setup: &Setup, args: &QueriesArgs) -> Result<Vec<Table>, B
     let mesh = Mesh::new(&args.mesh, args.camera.unwrap_or(1), default_triangles)?;
     let cameras = if args.camera.is_some() { vec![mesh.camera] } else { mesh.cameras.to_vec() };
     let what = format!("queries: {}, {}x{}", mesh.describe(), size[0], size[1]);
-    let headline = setup.headline(ctx, &what);
+    let title = setup.title(ctx, &what);
     let plan = TraversalPlan { cameras, size, runs };
-    let mut tables = measure_tracing(&contexts, &mesh, args.instances, &plan, headline)?;
+    let mut tables = measure_tracing(&contexts, &mesh, args.instances, &plan, title)?;
     tables.push(accel_structs::table(setup, &contexts, &mesh, runs)?);
     Ok(tables)
 }
@@ -43,11 +43,11 @@ fn measure_tracing(
     mesh: &Mesh,
     chunk_count: u32,
     plan: &TraversalPlan,
-    headline: String,
+    title: String,
 ) -> Result<Vec<Table>, BenchError> {
     let cases = TracerCases::new(contexts, mesh, chunk_count)?;
     let results = measure_traversal(&cases.all, mesh, plan)?;
-    let mut whole = rates::single_instance_table(headline, &results, plan);
+    let mut whole = rates::single_instance_table(title, &results, plan);
     contexts.unmeasured().into_iter().for_each(|note| whole.add_note(note));
     Ok(vec![whole, rates::chunks_table(cases.chunk_count, &results), hit_agreement::table(&results)])
 }

@@ -17,11 +17,11 @@ const COLUMNS: [&str; 7] = [
 
 /// Returns the table of the mesh as one instance.
 pub(super) fn single_instance_table(
-    headline: String,
+    title: String,
     results: &[TraversalResult],
     plan: &TraversalPlan,
 ) -> Table {
-    let mut table = Table::new(headline, &COLUMNS);
+    let mut table = Table::new(title, &COLUMNS);
     add_rows(&mut table, results, Layout::SingleInstance);
     let (runs, cameras) = (plan.runs, plan.cameras.len());
     let cameras = if cameras == 1 { "one camera".to_owned() } else { format!("{cameras} cameras") };

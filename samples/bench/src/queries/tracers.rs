@@ -9,7 +9,7 @@ use super::mesh_chunks::split_into_chunks;
 use crate::error::BenchError;
 use crate::measure::Stopwatch;
 use crate::mesh::{Mesh, MeshBuffers};
-use crate::tracer::Tracer;
+use crate::tracer::MeshTracer;
 use lvk_samples::hybrid::RayPath;
 
 /// Layout of the traced scene.
@@ -39,7 +39,7 @@ pub(super) struct TracerCase {
     pub(super) backend: Backend,
     pub(super) ctx: Context,
     pub(super) scene: Rc<BuiltScene>,
-    pub(super) tracer: Rc<Tracer>,
+    pub(super) tracer: Rc<MeshTracer>,
     pub(super) stopwatch: Rc<Stopwatch>,
 }
 
@@ -113,7 +113,7 @@ impl BlasSettings {
 /// The tracers and the stopwatch of one context.
 struct ContextTracers {
     ctx: Context,
-    tracers: Vec<(Backend, Rc<Tracer>)>,
+    tracers: Vec<(Backend, Rc<MeshTracer>)>,
     stopwatch: Rc<Stopwatch>,
 }
 
@@ -124,7 +124,7 @@ impl ContextTracers {
         let mut tracers = Vec::new();
         for backend in backends.iter().filter(|backend| has_pipelines || **backend != Backend::Pipeline) {
             let path = if *backend == Backend::Pipeline { RayPath::Pipeline } else { RayPath::Query };
-            tracers.push((*backend, Rc::new(Tracer::new(ctx, path)?)));
+            tracers.push((*backend, Rc::new(MeshTracer::new(ctx, path)?)));
         }
         Ok(Self { ctx: ctx.clone(), tracers, stopwatch: Rc::new(Stopwatch::new(ctx)?) })
     }

@@ -75,13 +75,13 @@ mod tests {
     }
 
     #[test]
-    fn the_index_size_is_found() {
+    fn the_index_size_is_parsed() {
         assert_eq!(downloaded_size("Hit:1\nFetched 9,500 kB in 2s (4,750 kB/s)\n"), Some("9,500 kB"));
         assert_eq!(downloaded_size("Reading package lists..."), None);
     }
 
     #[test]
-    fn the_first_error_is_found() {
+    fn the_first_error_is_parsed() {
         let text = "W: a warning\nE: Unable to locate package x\nE: later\n";
         assert_eq!(first_error(text), "Unable to locate package x");
         assert_eq!(first_error("something\nelse\n\n"), "else");

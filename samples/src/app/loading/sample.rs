@@ -42,17 +42,17 @@ struct UnderWay<S> {
 type Made<S> = Result<ReadySample<S>, RunError>;
 
 impl<S: Sample> Loading<S> {
-    /// One that is there.
+    /// Wraps a sample that is already loaded.
     #[must_use]
     pub fn ready(sample: S) -> Self {
         Self { ctx: sample.context().clone(), state: State::Ready(sample) }
     }
 
-    /// Has `load` make it on a thread of its own. It is to look at [`Progress::go_on`] from time to time; what is said about
-    /// the sample is printed when it is there.
+    /// Runs `load` on a thread of its own. `load` must call [`Progress::go_on`] from time to time. The log lines about
+    /// the sample are printed when it is loaded.
     ///
     /// # Errors
-    /// [`RunError`] where there is no thread or no texture to be had. Those of `load` come from [`Sample::is_loading`].
+    /// [`RunError`] if the thread or the texture cannot be created. Errors of `load` come from [`Sample::is_loading`].
     pub fn start(
         ctx: &Context,
         load: impl FnOnce(&mut Progress) -> Made<S> + Send + 'static,
@@ -99,7 +99,7 @@ impl<S: Sample> UnderWay<S> {
                 Err(error) => return Some(Err(error)),
             };
         if let Some(extent) = self.extent
-            && let Err(error) = sample.resize(extent).map_err(Into::into)
+            && let Err(error) = sample.resize(extent)
         {
             return Some(Err(error));
         }
@@ -120,8 +120,6 @@ impl<S> Drop for UnderWay<S> {
 }
 
 impl<S: Sample> Sample for Loading<S> {
-    type Error = RunError;
-
     fn context(&self) -> &Context {
         &self.ctx
     }
@@ -135,13 +133,15 @@ impl<S: Sample> Sample for Loading<S> {
         Ok(false)
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RunError> {
-        self.sample_mut().map_or(Ok(()), |sample| sample.update(time).map_err(Into::into))
+    fn update(&mut self, time: FrameTime) {
+        if let Some(sample) = self.sample_mut() {
+            sample.update(time);
+        }
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         match &mut self.state {
-            State::Ready(sample) => sample.record(frame).map_err(Into::into),
+            State::Ready(sample) => sample.record(frame),
             State::UnderWay(under_way) => {
                 under_way.frames += 1;
                 Ok(*under_way.background)
@@ -154,7 +154,7 @@ impl<S: Sample> Sample for Loading<S> {
     }
 
     fn after_frame(&mut self) -> Result<(), RunError> {
-        self.sample_mut().map_or(Ok(()), |sample| sample.after_frame().map_err(Into::into))
+        self.sample_mut().map_or(Ok(()), |sample| sample.after_frame())
     }
 
     fn remark(&self) -> Option<String> {
@@ -163,7 +163,7 @@ impl<S: Sample> Sample for Loading<S> {
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
         match &mut self.state {
-            State::Ready(sample) => sample.resize(extent).map_err(Into::into),
+            State::Ready(sample) => sample.resize(extent),
             State::UnderWay(under_way) => {
                 under_way.extent = Some(extent);
                 Ok(())
@@ -207,6 +207,6 @@ impl<S: Sample> Sample for Loading<S> {
     }
 
     fn reload(&mut self) -> Result<(), RunError> {
-        self.sample_mut().map_or(Ok(()), |sample| sample.reload().map_err(Into::into))
+        self.sample_mut().map_or(Ok(()), |sample| sample.reload())
     }
 }

@@ -35,7 +35,7 @@ impl Status {
         *self.lock() = Stage { name: name.to_owned(), done: 0, total };
     }
 
-    /// So many steps of the stage are done.
+    /// Sets the number of finished steps of the stage.
     pub(in crate::app) fn set(&self, done: u64) {
         self.lock().done = done;
     }

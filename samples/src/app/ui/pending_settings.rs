@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_new_is_taken_over_once_and_what_is_refused_is_dropped() {
+    fn new_settings_apply_once_and_refused_ones_are_dropped() {
         let mut wanted = PendingSettings::new(3);
         assert_eq!(wanted.changed_from(3), None);
         wanted.config = 99;

@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_camera_is_not_flown() {
+    fn a_sample_without_a_camera_ignores_input() {
         let mut camera_controller = CameraController::new();
         assert!(!camera_controller.steer(None, &FORWARD, 0.1));
         assert_eq!(camera_controller.camera(), None);

@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn an_animation_that_stands_shows_its_moment_however_that_is_counted() {
+    fn a_paused_animation_keeps_its_frame_time_in_both_clocks() {
         let (all, some) = (after(&[true; 6]), after(&[true, false, false, true, false, true]));
         for (by_frame, six, three) in [(true, 6, 3), (false, 1500, 750)] {
             assert_eq!(all.frame_time(by_frame, 240).frame, six);

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_told_to_fly_without_a_camera() {
+    fn the_help_names_no_camera_keys_without_a_camera() {
         let keys = |has_camera| help(has_camera).iter().map(|(key, _)| *key).collect::<Vec<_>>();
         assert_eq!(keys(true)[..CAMERA_KEYS], ["drag", "W A S D", "Q E", "Shift, wheel", "C"]);
         assert_eq!(keys(false), ["Space", "F1", "F5", "F9", "F12, Esc"]);

@@ -21,7 +21,7 @@ pub(super) struct PresentPass {
 }
 
 impl PresentPass {
-    /// On the window of the context, `extent` pixels large.
+    /// Creates the swapchain of the context's window, `extent` pixels large.
     pub(super) fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
         let swapchain = ctx.create_swapchain(&SwapchainDesc {
             extent,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Rect, ViewportInfo, vec2};
-use lvk::{Context, SubmitHandle, ValidationSink, WindowHandles};
+use lvk::{Context, ShaderFiles, SubmitHandle, ValidationSink, WindowHandles};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, WindowEvent};
@@ -23,7 +23,6 @@ use super::ui_input::{UiInput, notches};
 use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
-use crate::app::hot_reload::ShaderWatch;
 use crate::app::print_line;
 use crate::app::run_args::RunArgs;
 use crate::app::run_error::RunError;
@@ -84,7 +83,7 @@ where
         self.go_on(event_loop, resumed);
     }
 
-    /// On Android the window goes after this call, and comes back before [`resumed`](Self::resumed).
+    /// Suspends the sample: Android takes the window after this call and returns it before [`resumed`](Self::resumed).
     fn suspended(&mut self, event_loop: &ActiveEventLoop) {
         let suspended = self.running.as_mut().map_or(Ok(()), Running::suspend);
         event_loop.set_control_flow(ControlFlow::Wait);
@@ -208,7 +207,7 @@ struct Running<S> {
     ui_input: UiInput,
     resize: ResizeDebounce,
     finger: Finger,
-    watch: Option<ShaderWatch>,
+    shader_files: Option<ShaderFiles>,
     camera_controller: CameraController,
     clock: Clock,
     /// The time that the sample shows.
@@ -245,7 +244,7 @@ impl<S: Sample> Running<S> {
             ui_input: UiInput::default(),
             resize: ResizeDebounce::new([args.width, args.height]),
             finger: Finger::default(),
-            watch: shader_folder::folder().map(|folder| ShaderWatch::new(&folder)),
+            shader_files: shader_folder::watched_files(),
             camera_controller: CameraController::new(),
             clock: Clock::new(Instant::now()),
             at: None,
@@ -342,8 +341,7 @@ impl<S: Sample> Running<S> {
 
     /// Compiles all shaders again. If one is wrong, all old pipelines stay.
     fn reload(&mut self) {
-        let done: Result<(), RunError> = self.sample.reload().map_err(Into::into);
-        self.panel.shader_error = done.err().map(|error| error.to_string());
+        self.panel.shader_error = self.sample.reload().err().map(|error| error.to_string());
         match &self.panel.shader_error {
             Some(error) => eprintln!("error: {error}\nthe shaders from before stay in use"),
             None => eprintln!("shaders compiled anew"),
@@ -358,7 +356,7 @@ impl<S: Sample> Running<S> {
     }
 
     fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
-        if self.sample.is_loading().map_err(Into::into)? {
+        if self.sample.is_loading()? {
             return self.redraw_loading(name);
         }
         self.ctx.next_frame()?;
@@ -367,7 +365,7 @@ impl<S: Sample> Running<S> {
         let Some(image) = self.present_pass.next_image()? else { return Ok(Next::Nap) };
         self.panel.count_frame(seconds);
         let mut frame = Frame::free(&self.ctx)?;
-        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let picture = self.sample.record(&mut frame)?;
         let mut cmd = frame.into_commands();
         let (input, profile) = (self.input(image.extent()), self.ctx.last_profile()?);
         let (_, modes) = self.present_pass.present_modes()?;
@@ -413,7 +411,7 @@ impl<S: Sample> Running<S> {
         // The animation begins with the picture.
         self.clock.tick(Instant::now(), false);
         let mut frame = Frame::free(&self.ctx)?;
-        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let picture = self.sample.record(&mut frame)?;
         let mut cmd = frame.into_commands();
         let input = self.input(image.extent());
         let sample = &mut self.sample;
@@ -430,7 +428,7 @@ impl<S: Sample> Running<S> {
     /// Resizes the sample once the window keeps its size.
     fn follow_size(&mut self) {
         if let Some(size) = self.resize.next(self.size, Instant::now())
-            && let Err(error) = self.sample.resize(size).map_err(Into::into)
+            && let Err(error) = self.sample.resize(size)
         {
             eprintln!("warning: pictures keep their size: {error}");
         }
@@ -439,7 +437,7 @@ impl<S: Sample> Running<S> {
     /// Applies changes of size, shaders, time and camera.
     fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
         self.follow_size();
-        if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {
+        if self.shader_files.as_ref().is_some_and(ShaderFiles::changed) {
             self.reload();
         }
         let steering = self.controls.take_steering();
@@ -447,7 +445,7 @@ impl<S: Sample> Running<S> {
         let time = self.clock.frame_time(args.frames.is_some(), args.round);
         let is_later = self.at != Some(time);
         if is_later {
-            self.sample.update(time).map_err(Into::into)?;
+            self.sample.update(time);
             self.at = Some(time);
         }
         if let (true, Some(camera)) = (is_steered || is_later, self.camera_controller.camera()) {

@@ -20,7 +20,7 @@ const END_BAYS: u32 = 3;
 /// Sides of columns.
 const SIDES: u32 = 60;
 const AISLE: f32 = 2.8;
-/// From one storey to the next, and how many there are.
+/// Height of a storey.
 const STOREY: f32 = 4.62;
 const STOREYS: u32 = 2;
 /// Number of the first cloth among the materials, which lie behind the courtyard's.

@@ -11,7 +11,7 @@ use crate::scene::noise::lattice;
 /// Parameters of a kind of tree. Lengths are shares of a tree's height.
 pub(super) struct Kind {
     name: &'static str,
-    /// In metres, on average.
+    /// Average height in metres.
     pub(super) height: f32,
     crown: Crown,
     /// Radius of the crown.

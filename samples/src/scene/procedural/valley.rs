@@ -120,12 +120,12 @@ fn field(
     let first = mesh.positions.len() as u32;
     // A row has two triangles a cell, which count half when their vertices are there.
     let before = mesh.triangles.len() as u64;
-    let mut tell = |rows: u32| {
+    let mut report = |rows: u32| {
         progress.set(before + u64::from(rows) * u64::from(cells));
         progress.go_on()
     };
     for row in 0..=cells {
-        tell(row)?;
+        report(row)?;
         for column in 0..=cells {
             let (position, normal) = point(at(column as f32), at(row as f32));
             mesh.add_vertex(position.to_array(), normal.to_array(), [0.0; 2]);
@@ -133,7 +133,7 @@ fn field(
     }
     for (row, column) in (0..cells).flat_map(|row| (0..cells).map(move |column| (row, column))) {
         if column == 0 {
-            tell(cells + row)?;
+            report(cells + row)?;
         }
         let near = first + row * (cells + 1) + column;
         let far = near + cells + 1;

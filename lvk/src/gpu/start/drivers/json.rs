@@ -177,7 +177,7 @@ mod tests {
         "ICD": { "library_path": "..\/lib\u002fa \"b\".so", "api_version": "1.4.305" }, "empty": {}, "none": [] }"#;
 
     #[test]
-    fn strings_of_nested_objects_are_found() {
+    fn strings_of_nested_objects_are_read() {
         let json = Json::parse(MANIFEST).unwrap();
         let icd = json.get("ICD").unwrap();
         assert_eq!(icd.get("library_path").unwrap().text(), Some("../lib/a \"b\".so"));

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::json::Json;
 use super::manifest_search::Variables;
+use crate::error::causes::with_causes;
 use crate::error::driver_report::{DriverManifest, ManifestOutcome};
 
 /// Most bytes of a manifest that are read.
@@ -49,7 +50,7 @@ pub(super) fn check_manifest(path: &Path, variables: Variables<'_>, open: OpenLi
 /// Opens a driver's library and closes it. Fails if it is no Vulkan driver.
 pub(super) fn open_library(path: &Path) -> Result<(), String> {
     // SAFETY: the Vulkan loader opens the same library, so its initialisers run in this process anyway.
-    let library = unsafe { libloading::Library::new(path) }.map_err(|error| error.to_string())?;
+    let library = unsafe { libloading::Library::new(path) }.map_err(|error| with_causes(&error))?;
     let entries: [&[u8]; 2] = [b"vk_icdGetInstanceProcAddr\0", b"vkGetInstanceProcAddr\0"];
     // SAFETY: the symbols are only looked up; a pointer of any type fits.
     let has = |name: &&[u8]| unsafe { library.get::<*const u8>(name) }.is_ok();
@@ -127,7 +128,6 @@ fn matches_glob(name: &str, pattern: &str) -> bool {
 }
 
 #[cfg(test)]
-#[cfg(target_os = "linux")]
 mod tests {
     use std::ffi::OsString;
 
@@ -170,7 +170,7 @@ mod tests {
             assert!(manifest.to_string().contains(part), "{manifest}");
         }
         let folder = tempfile::tempdir().unwrap();
-        assert!(not_read(&folder.path().join("absent.json")).contains("No such file"));
+        assert!(not_read(&folder.path().join("absent.json")).contains("(os error 2)"));
         assert_eq!(not_read(folder.path()), "it is not a file");
         std::fs::write(folder.path().join("binary.json"), [0xff, 0xfe]).unwrap();
         assert!(not_read(&folder.path().join("binary.json")).contains("UTF-8"));
@@ -223,8 +223,27 @@ mod tests {
         }
     }
 
+    /// On Windows the cause stands behind the error of the library that opens others, and names no file.
+    #[test]
+    fn library_that_is_absent_has_a_cause() {
+        let error = open_library(Path::new("libnothing-of-this-name.so")).unwrap_err();
+        let cause = if cfg!(windows) { "(os error 126)" } else { "libnothing-of-this-name.so" };
+        assert!(error.contains(cause), "{error}");
+    }
+
+    #[test]
+    fn file_that_is_no_library_has_a_cause() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("libtoy.so");
+        std::fs::write(&path, "text").unwrap();
+        let error = open_library(&path).unwrap_err();
+        let cause = if cfg!(windows) { "(os error " } else { "libtoy.so" };
+        assert!(error.contains(cause), "{error}");
+    }
+
     /// A copy of a library of this process, which is made to need a library that does not exist.
     #[test]
+    #[cfg(target_os = "linux")]
     fn missing_dependency_is_named_by_the_dynamic_linker() {
         let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
         let original = maps.split_whitespace().find(|word| word.ends_with("/libgcc_s.so.1")).unwrap();
@@ -244,6 +263,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(target_os = "linux")]
     fn libraries_that_are_no_drivers_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let text = folder.path().join("libtoy.so");

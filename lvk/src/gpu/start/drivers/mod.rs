@@ -8,6 +8,7 @@ mod manifest_search;
 
 use std::path::{Path, PathBuf};
 
+use crate::error::causes::with_causes;
 use crate::error::driver_report::{DriverReport, LoaderReport};
 use manifest::{check_manifest, open_library};
 use manifest_search::{manifest_files, searched_paths};
@@ -39,7 +40,7 @@ impl LoaderReport {
     pub(crate) fn not_opened(library: Option<&Path>, error: &ash::LoadingError) -> Self {
         Self::NotOpened {
             path: library.unwrap_or(Path::new(LOADER_NAME)).to_owned(),
-            error: error.to_string(),
+            error: with_causes(error),
         }
     }
 
@@ -66,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loader_is_found_among_the_mappings() {
+    fn mappings_name_the_loader() {
         let maps = "7f00-7f01 r-xp 00000000 00:01 12  /usr/lib/libvulkan_lvp.so\n\
                     7f02-7f03 rw-p 00000000 00:00 0\n\
                     7f04-7f05 r--p 00000000 00:01 13  /opt/my libs/libvulkan.so.1.3.239\n";

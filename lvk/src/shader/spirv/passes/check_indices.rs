@@ -238,11 +238,11 @@ mod tests {
     use super::*;
     use crate::bindless::index_checks::{self, WordRange};
     use crate::shader::spirv::reflect::reflect;
-    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
+    use crate::shader::{CompileFiles, CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
 
     fn compiled(stage: ShaderStage, text: &str) -> Vec<u32> {
         let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };
-        compile(&desc, &CompileOptions::default(), None).unwrap()
+        compile(&desc, &CompileOptions::default(), CompileFiles::default()).unwrap()
     }
 
     fn plan() -> CheckPlan {

@@ -2,7 +2,7 @@
 
 pub(crate) mod check_indices;
 #[cfg(feature = "glsl")]
-pub(crate) mod fold_sampled_image;
+pub(crate) mod merge_sampled_image;
 pub(crate) mod strip_primitive_culling;
 pub(crate) mod strip_ray_query;
 #[cfg(feature = "glsl")]

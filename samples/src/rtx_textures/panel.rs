@@ -4,23 +4,23 @@ use super::renderer::{INSTANCE_COUNT, TEXTURES};
 
 /// Settings that can change while the sample runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RtxTexturesSwitches {
+pub struct RtxTexturesSettings {
     /// Instances that the compute shader writes and rays see, from the ground on; at least 1, and no more than
     /// [`instance_count`](super::RtxTextures::instance_count).
     pub instances: u32,
-    /// By how many things each texture is handed on.
+    /// Number of things by which each texture is shifted.
     pub handed_on: u32,
     /// Colours between texels, and not those of the nearest ones.
     pub is_filtered: bool,
 }
 
-impl Default for RtxTexturesSwitches {
+impl Default for RtxTexturesSettings {
     fn default() -> Self {
         Self { instances: INSTANCE_COUNT, handed_on: 0, is_filtered: true }
     }
 }
 
-impl RtxTexturesSwitches {
+impl RtxTexturesSettings {
     /// Number of instances in the next frame.
     pub(super) fn instance_count(&self) -> u32 {
         self.instances.clamp(1, INSTANCE_COUNT)

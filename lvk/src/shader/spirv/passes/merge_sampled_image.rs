@@ -11,7 +11,7 @@ use crate::shader::spirv::words::{HEADER_WORDS, Instruction, instructions};
 ///
 /// The `OpSampledImage` takes the id of its copy, and thereby the decorations. SPIR-V allows only sampling instructions
 /// to use an `OpSampledImage`. SwiftShader reads `NonUniform` only from the `OpSampledImage` itself.
-pub(crate) fn fold_sampled_images(words: Vec<u32>) -> Vec<u32> {
+pub(crate) fn merge_sampled_images(words: Vec<u32>) -> Vec<u32> {
     let Ok(code) = instructions(&words).collect::<Result<Vec<_>, _>>() else {
         return words;
     };

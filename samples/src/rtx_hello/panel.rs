@@ -9,32 +9,32 @@ const MAX_REFITS: u32 = 32;
 
 /// The build mode of the TLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Following {
-    /// By refits, and by a rebuild after some of them.
+pub enum TlasUpdate {
+    /// Refits, and a rebuild after some of them.
     #[default]
     Both,
-    /// By refits alone.
+    /// Refits alone.
     Refits,
-    /// By a rebuild in every frame.
+    /// A rebuild in every frame.
     Rebuilds,
 }
 
 /// Settings that can change while the sample runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RtxHelloSwitches {
+pub struct RtxHelloSettings {
     /// True if rays see the triangle in the middle, the inner ring, and the outer one.
     pub is_seen: [bool; GROUPS],
     /// The build mode of the TLAS.
-    pub following: Following,
+    pub following: TlasUpdate,
 }
 
-impl Default for RtxHelloSwitches {
+impl Default for RtxHelloSettings {
     fn default() -> Self {
-        Self { is_seen: [true; GROUPS], following: Following::default() }
+        Self { is_seen: [true; GROUPS], following: TlasUpdate::default() }
     }
 }
 
-impl RtxHelloSwitches {
+impl RtxHelloSettings {
     /// The mask of instances of a group.
     pub(super) fn mask(&self, group: usize) -> u8 {
         if self.is_seen[group] { 0xff } else { 0 }
@@ -42,9 +42,9 @@ impl RtxHelloSwitches {
 
     pub(super) fn mode(&self) -> BuildMode {
         match self.following {
-            Following::Both => BuildMode::Auto { max_refits: MAX_REFITS },
-            Following::Refits => BuildMode::Refit,
-            Following::Rebuilds => BuildMode::Rebuild,
+            TlasUpdate::Both => BuildMode::Auto { max_refits: MAX_REFITS },
+            TlasUpdate::Refits => BuildMode::Refit,
+            TlasUpdate::Rebuilds => BuildMode::Rebuild,
         }
     }
 
@@ -57,9 +57,9 @@ impl RtxHelloSwitches {
         }
         ui.label("top-level structure");
         ui.horizontal(|ui| {
-            ui.radio_value(&mut self.following, Following::Both, "by policy");
-            ui.radio_value(&mut self.following, Following::Refits, "refitted");
-            ui.radio_value(&mut self.following, Following::Rebuilds, "rebuilt");
+            ui.radio_value(&mut self.following, TlasUpdate::Both, "by policy");
+            ui.radio_value(&mut self.following, TlasUpdate::Refits, "refitted");
+            ui.radio_value(&mut self.following, TlasUpdate::Rebuilds, "rebuilt");
         });
     }
 }

@@ -9,14 +9,14 @@ const DISC: f32 = 0.86;
 
 /// The video at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Film {
+pub struct SyntheticVideo {
     /// Columns and rows.
     pub size: [u32; 2],
     /// Phase of the animation's round, 0 to 1.
     pub phase: f32,
 }
 
-impl Film {
+impl SyntheticVideo {
     /// Red, green and blue of a pixel, encoded, 0 to 1.
     #[must_use]
     pub fn color(&self, column: u32, row: u32) -> Vec3 {
@@ -100,8 +100,8 @@ mod tests {
 
     #[test]
     fn colours_are_in_range_and_most_of_them_are_there() {
-        let film = Film { size: [64, 36], phase: 0.3 };
-        let all: Vec<_> = (0..64 * 36).map(|i| film.color(i % 64, i / 64)).collect();
+        let video = SyntheticVideo { size: [64, 36], phase: 0.3 };
+        let all: Vec<_> = (0..64 * 36).map(|i| video.color(i % 64, i / 64)).collect();
         assert!(all.iter().all(|color| color.min_element() >= 0.0 && color.max_element() <= 1.0));
         for channel in 0..3 {
             let others = [1, 2].map(|step| (channel + step) % 3);
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_round_has_no_seam() {
-        let color = |phase, i: u32| Film { size: [40, 24], phase }.color(i % 40, i / 40);
+        let color = |phase, i: u32| SyntheticVideo { size: [40, 24], phase }.color(i % 40, i / 40);
         let far = (0_u32..40 * 24).filter(|i| color(0.0, *i).distance(color(1.0, *i)) > 0.01).count();
         assert!(far < 5, "{far}");
         assert!((0..40 * 24).any(|i| color(0.0, i).distance(color(0.3, i)) > 0.3));
