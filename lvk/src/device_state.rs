@@ -10,6 +10,7 @@ use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::BlasStructures;
 use crate::accel::blas_refs::{AccelGeneration, BlasRef};
 use crate::accel::compaction::CompactedSizeQuery;
+use crate::accel::micromap::Micromap;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::accel::tlas::TlasContents;
@@ -28,6 +29,7 @@ use crate::pipeline::{
     ComputePipeline, GraphicsParts, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline,
     RenderPipeline,
 };
+use crate::resource::image::Image;
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
 use crate::store::Store;
@@ -99,6 +101,8 @@ pub(crate) enum DeferredObject {
     ComputePipeline(#[expect(dead_code, reason = "held only to be dropped")] Arc<ComputePipeline>),
     RayTracingPipeline(Arc<RayTracingPipeline>),
     QueryPool(Arc<QueryPool>),
+    /// A micromap. Each BLAS whose triangles have it has a reference too.
+    Micromap(Arc<Micromap>),
     AccelStruct(Arc<AccelStruct>),
     #[cfg(feature = "window")]
     Swapchain(
@@ -195,7 +199,7 @@ impl DeviceState {
             DeferredObject::QueryPool(pool) => self.submitter.forget(pool.id),
             DeferredObject::Texture(texture) => {
                 if texture.image.remove_texture() {
-                    self.submitter.forget(texture.image.id);
+                    self.forget_image(&texture.image);
                 }
                 if texture.is_yuv() {
                     self.bindless.free_yuv(texture.slot);
@@ -204,6 +208,11 @@ impl DeviceState {
                 }
             }
             DeferredObject::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),
+            DeferredObject::Micromap(micromap) => {
+                if let Some(unused) = Arc::into_inner(micromap) {
+                    self.submitter.forget(unused.storage.id);
+                }
+            }
             DeferredObject::AccelStruct(object) => self.free_accel_struct(&object),
             DeferredObject::RayTracingPipeline(pipeline) => self.submitter.forget(pipeline.table.id),
             DeferredObject::TlasContents(contents) => self.recycle_instance_source(*contents),
@@ -214,7 +223,7 @@ impl DeviceState {
             }
             DeferredObject::TextureRef(texture) => {
                 if texture.image.remove_texture() {
-                    self.submitter.forget(texture.image.id);
+                    self.forget_image(&texture.image);
                 }
             }
             DeferredObject::RenderPipeline(_)
@@ -226,6 +235,11 @@ impl DeviceState {
             #[cfg(feature = "window")]
             DeferredObject::Swapchain(_) => {}
         }
+    }
+
+    fn forget_image(&self, image: &Image) {
+        self.submitter.forget(image.id);
+        image.transient_place.iter().for_each(|place| self.submitter.forget(place.member().bytes));
     }
 
     /// Removes every object that is still alive, and reports the objects by name.

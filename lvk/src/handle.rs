@@ -63,6 +63,8 @@ handles! {
     RayTracingLibraryHandle, "ray tracing library";
     /// Names a pool of queries.
     QueryPoolHandle, "query pool";
+    /// Names the opacity of the triangles of a geometry.
+    OpacityMicromapHandle, "opacity micromap";
     /// Names a bottom- or top-level acceleration structure.
     AccelStructHandle, "acceleration structure";
 }

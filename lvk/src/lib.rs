@@ -42,6 +42,7 @@
 //! | open a device, query its capabilities | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
 //! | create objects | `Context::create_*`, each with its `*Desc` |
 //! | use part of a texture, or another format of it | [`Context::create_texture_view`], [`TextureViewDesc`] |
+//! | let targets of a frame share memory | [`Context::create_transient_heap`], [`CommandBuffer::begin_transient_step`] |
 //! | pass data of one frame to shaders | [`CommandBuffer::upload`], [`RenderPass::upload`] |
 //! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and similar methods |
 //! | record commands | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
@@ -119,12 +120,15 @@
 //! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
 //!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
 //!
-//! Profilers are not:
+//! Disabled by default are:
 //!
+//! * `glam` adds `transform_rows`, which takes a transform of the crate `glam`, and exports the crate as `lvk::glam`.
+//!   No other item has types of `glam`: transforms are `[f32; 12]` ([`rows_from_columns`]), points and matrices are
+//!   arrays.
 //! * `profiling` opens a scope of the crate [`profiling`](https://docs.rs/profiling) around calls that can take long:
 //!   submissions, waits, presents, acquisitions, creation of pipelines and shaders, uploads and builds. The application
-//!   chooses the profiler by a feature of that crate, or by `puffin`, `tracing` or `tracy` of this one.
-//! * `puffin` and `tracing` send the scopes to the profiler of that name.
+//!   chooses the profiler by a feature of that crate, or by `tracing` or `tracy` of this one.
+//! * `tracing` sends the scopes to subscribers of the crate `tracing`.
 //! * `tracy` sends the scopes to Tracy, and the labels of command buffers as GPU zones: see
 //!   [`manual::measuring`].
 //!
@@ -182,13 +186,17 @@ mod upload;
 pub use test_support::hooks as test_hooks;
 
 pub use ash;
-pub use glam;
+#[cfg(feature = "glam")]
+pub use {accel::instance::transform_rows, glam};
 
 pub use accel::culling::InstanceCulling;
 pub use accel::desc::{BlasDesc, PrimitiveOrder};
 pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
-pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
+pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, rows_from_columns};
+pub use accel::micromap_desc::{
+    OpacityFormat, OpacityMap, OpacityMicromapDesc, OpacityState, TriangleOpacity,
+};
 pub use accel::tlas_desc::TlasDesc;
 pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
@@ -210,6 +218,7 @@ pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::pending_pipeline::PendingPipeline;
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+pub use context::transient_heap::TransientHeap;
 #[doc(hidden)]
 pub use error::causes::with_causes;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
@@ -226,7 +235,7 @@ pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;
 pub use gpu::caps::capabilities::{Capabilities, FeatureRequest};
-pub use gpu::caps::limits::Limits;
+pub use gpu::caps::limits::{Limits, MicromapLimits};
 pub use gpu::caps::mesh_limits::MeshLimits;
 pub use gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 pub use gpu::caps::queues::{QueueInfo, QueueRequest};
@@ -245,8 +254,9 @@ pub use gpu::start::feature_chain::FeatureChain;
 pub use gpu::start::profile::DeviceProfile;
 pub use gpu::start::user_extensions::UserExtensions;
 pub use handle::{
-    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, OpacityMicromapHandle, QueryPoolHandle,
+    RayTracingLibraryHandle, RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle,
+    ShaderModuleHandle, TextureHandle,
 };
 #[cfg(feature = "glsl")]
 pub use hot_reload::{Reloadable, ShaderFiles};
@@ -268,6 +278,7 @@ pub use resource::region::{TextureRange, TextureRegion};
 pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, SamplerDesc, SamplerReductionMode};
 pub use resource::swizzle::{Channel, Swizzle};
 pub use resource::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
+pub use resource::transient_heap::{TransientHeapDesc, TransientHeapMemory, TransientTexture};
 pub use resource::view::TextureViewDesc;
 pub use resource::ycbcr::{ChromaLocation, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]

@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use crate::accel::AccelStruct;
+use crate::accel::micromap::Micromap;
 use crate::handle::{
-    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, OpacityMicromapHandle, QueryPoolHandle,
+    RayTracingLibraryHandle, RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle,
+    ShaderModuleHandle, TextureHandle,
 };
 use crate::pipeline::{ComputePipeline, RayTracingLibrary, RayTracingPipeline, RenderPipeline, ShaderModule};
 use crate::pool::{HandlePool, next_context_mask};
@@ -59,6 +61,7 @@ pools! {
     ray_tracing_pipelines: RayTracingPipelineHandle => RayTracingPipeline;
     ray_tracing_libraries: RayTracingLibraryHandle => RayTracingLibrary;
     query_pools: QueryPoolHandle => QueryPool;
+    micromaps: OpacityMicromapHandle => Micromap;
     accel_structs: AccelStructHandle => AccelStruct;
     #[cfg(feature = "window")]
     swapchains: crate::handle::SwapchainHandle => crate::swapchain::state::Swapchain;

@@ -7,9 +7,12 @@ use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
 use super::flags::{AccelStructSizes, BuildFlags};
-use super::geometry::{BlasGeometry, VulkanGeometry, check_geometries, host_or_device_address};
+use super::geometry::{
+    BlasGeometry, IDENTITY_ROWS, VulkanGeometry, check_geometries, host_or_device_address,
+};
+use super::micromap::{Micromap, OpacityAttachment};
 use super::primitive_map::PrimitiveMap;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
@@ -21,6 +24,8 @@ pub(crate) struct BuildInput {
     flags: BuildFlags,
     geometries: Vec<vk::AccelerationStructureGeometryKHR<'static>>,
     pub(crate) ranges: Vec<vk::AccelerationStructureBuildRangeInfoKHR>,
+    /// The micromaps that `geometries` point to.
+    opacity: Vec<Arc<OpacityAttachment>>,
 }
 
 impl BuildInput {
@@ -44,6 +49,44 @@ impl BuildInput {
             converted.push(geometry.convert(gpu, name, find, matrix)?);
         }
         Ok(Self::new(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &converted))
+    }
+
+    /// Gives the triangles of a geometry their opacity. Fails for AABBs, and unless the micromap has an entry for each
+    /// triangle.
+    pub(crate) fn attach_opacity(
+        &mut self,
+        name: &str,
+        index: usize,
+        micromap: &Arc<Micromap>,
+    ) -> Result<()> {
+        let geometries = self.geometries.len();
+        let (Some(geometry), Some(range)) = (self.geometries.get_mut(index), self.ranges.get(index)) else {
+            let message = format!("opacity is given for geometry {index}, but there are {geometries}");
+            return Err(Error::usage(name, message));
+        };
+        if geometry.geometry_type != vk::GeometryTypeKHR::TRIANGLES {
+            return Err(Error::usage(
+                name,
+                format!("geometry {index} has boxes; only triangles have an opacity"),
+            ));
+        }
+        if micromap.triangle_count != range.primitive_count {
+            let message = format!(
+                "geometry {index} has {} triangles, its micromap '{}' has {}",
+                range.primitive_count, micromap.name, micromap.triangle_count
+            );
+            return Err(Error::usage(name, message));
+        }
+        let attachment = OpacityAttachment::new(micromap);
+        // SAFETY: the type says which field of the union is in use.
+        attachment.attach(unsafe { &mut geometry.geometry.triangles });
+        self.opacity.push(attachment);
+        Ok(())
+    }
+
+    /// Returns the micromaps of the triangles.
+    pub(crate) fn micromaps(&self) -> impl Iterator<Item = &Micromap> {
+        self.opacity.iter().map(|attachment| &*attachment.micromap)
     }
 
     /// Returns the input of a part of the mesh: `counts` primitives of each geometry, read from the inputs gathered for
@@ -87,6 +130,7 @@ impl BuildInput {
             flags,
             geometries: converted.iter().map(|geometry| geometry.raw).collect(),
             ranges: converted.iter().map(range).collect(),
+            opacity: Vec::new(),
         }
     }
 
@@ -227,9 +271,8 @@ pub(crate) const TRANSFORM_BYTES: u64 = 48;
 
 /// The transform matrices given by value, identity for other geometries; `None` if no geometry has one.
 pub(crate) fn transform_matrices(geometries: &[BlasGeometry]) -> Option<Vec<f32>> {
-    const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let any = geometries.iter().any(|geometry| geometry.transform_rows().is_some());
     any.then(|| {
-        geometries.iter().flat_map(|geometry| geometry.transform_rows().unwrap_or(IDENTITY)).collect()
+        geometries.iter().flat_map(|geometry| geometry.transform_rows().unwrap_or(IDENTITY_ROWS)).collect()
     })
 }

@@ -8,9 +8,9 @@ use glam::{Mat4, Vec3, Vec4};
 /// the sphere around an instance's AABB appears from the eye with a threshold, as in Wolfenstein: Youngblood.
 ///
 /// ```
+/// use glam::Vec3;
+/// use glam::camera::rh::{proj::vulkan, view};
 /// use lvk::InstanceCulling;
-/// use lvk::glam::Vec3;
-/// use lvk::glam::camera::rh::{proj::vulkan, view};
 ///
 /// let eye = Vec3::ZERO;
 /// let view = view::look_to_mat4(eye, Vec3::NEG_Z, Vec3::Y);
@@ -18,18 +18,20 @@ use glam::{Mat4, Vec3, Vec4};
 /// let culling = InstanceCulling {
 ///     frustum_margin: 20.0,
 ///     min_angle: 0.002,
-///     ..InstanceCulling::from_view_projection(eye, projection * view)
+///     ..InstanceCulling::from_view_projection(eye, (projection * view).to_cols_array_2d())
 /// };
 /// let boxes = [Vec3::new(0.0, 0.0, -50.0), Vec3::new(0.0, 0.0, 50.0)].map(|center| (center - 1.0, center + 1.0));
 /// assert_eq!(culling.kept(boxes), [0]);
 /// ```
+///
+/// Points are `[f32; 3]`, or anything that converts to it, as the vectors of `glam`, `mint` and `nalgebra` do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InstanceCulling {
     /// Position of the viewer.
-    pub eye: Vec3,
+    pub eye: [f32; 3],
     /// Planes of the frustum: a point `p` is inside if `dot(xyz, p) + w >= 0`. The lengths of the normals do not
     /// matter. A plane with the normal 0 culls nothing.
-    pub planes: [Vec4; 6],
+    pub planes: [[f32; 4]; 6],
     /// Distance by which the planes are moved outwards, in world units; a negative one moves them inwards.
     pub frustum_margin: f32,
     /// Smallest angle under which an instance must appear, in radians, 0 to π; 0 culls nothing.
@@ -39,41 +41,55 @@ pub struct InstanceCulling {
 impl Default for InstanceCulling {
     /// Culls nothing.
     fn default() -> Self {
-        Self { eye: Vec3::ZERO, planes: [Vec4::ZERO; 6], frustum_margin: 0.0, min_angle: 0.0 }
+        Self { eye: [0.0; 3], planes: [[0.0; 4]; 6], frustum_margin: 0.0, min_angle: 0.0 }
     }
 }
 
 impl InstanceCulling {
     /// Creates a selection that culls everything outside the frustum of a matrix from world space to Vulkan's clip
-    /// space. Depth is from 0 to 1 in either direction. The far plane may be infinitely far.
-    pub fn from_view_projection(eye: Vec3, view_projection: Mat4) -> Self {
-        let [x, y, z, w] = [0, 1, 2, 3].map(|row| view_projection.row(row));
-        Self { eye, planes: [w + x, w - x, w + y, w - y, z, w - z], ..Self::default() }
+    /// space. Depth is from 0 to 1 in either direction. The far plane may be infinitely far. The matrix multiplies
+    /// column vectors and is given as its four columns.
+    pub fn from_view_projection(eye: impl Into<[f32; 3]>, view_projection: impl Into<[[f32; 4]; 4]>) -> Self {
+        let matrix = Mat4::from_cols_array_2d(&view_projection.into());
+        let [x, y, z, w] = [0, 1, 2, 3].map(|row| matrix.row(row));
+        let planes = [w + x, w - x, w + y, w - y, z, w - z].map(|plane| plane.to_array());
+        Self { eye: eye.into(), planes, ..Self::default() }
     }
 
     /// True if the AABB from `low` to `high`, in world space, is kept. An AABB that contains the eye is always kept.
     /// So is an invalid one: inverted, or with a NaN coordinate.
-    pub fn keeps(&self, low: Vec3, high: Vec3) -> bool {
+    pub fn keeps(&self, low: impl Into<[f32; 3]>, high: impl Into<[f32; 3]>) -> bool {
+        self.keeps_box(Vec3::from(low.into()), Vec3::from(high.into()))
+    }
+
+    fn keeps_box(&self, low: Vec3, high: Vec3) -> bool {
+        let eye = Vec3::from(self.eye);
         let is_box = low.cmple(high).all();
-        let holds_eye = low.cmple(self.eye).all() && self.eye.cmple(high).all();
+        let holds_eye = low.cmple(eye).all() && eye.cmple(high).all();
         !is_box || holds_eye || (self.touches_frustum(low, high) && self.is_large(low, high))
     }
 
     /// As [`keeps`](Self::keeps), for an AABB in object space. `transform` (3 rows of 4 columns, as in
     /// [`TlasInstance`](crate::TlasInstance)) maps object space to world space.
-    pub fn keeps_instance(&self, low: Vec3, high: Vec3, transform: &[f32; 12]) -> bool {
+    pub fn keeps_instance(
+        &self,
+        low: impl Into<[f32; 3]>,
+        high: impl Into<[f32; 3]>,
+        transform: &[f32; 12],
+    ) -> bool {
+        let (low, high) = (Vec3::from(low.into()), Vec3::from(high.into()));
         let is_box = low.cmple(high).all();
         let (low, high) = transformed_box(low, high, transform);
-        !is_box || self.keeps(low, high)
+        !is_box || self.keeps_box(low, high)
     }
 
     /// Returns the indices of the AABBs `(low, high)`, in world space, that are kept.
-    pub fn kept(&self, boxes: impl IntoIterator<Item = (Vec3, Vec3)>) -> Vec<u32> {
-        (0..).zip(boxes).filter(|(_, (low, high))| self.keeps(*low, *high)).map(|(index, _)| index).collect()
+    pub fn kept<P: Into<[f32; 3]>>(&self, boxes: impl IntoIterator<Item = (P, P)>) -> Vec<u32> {
+        (0..).zip(boxes).filter_map(|(index, (low, high))| self.keeps(low, high).then_some(index)).collect()
     }
 
     fn touches_frustum(&self, low: Vec3, high: Vec3) -> bool {
-        self.planes.iter().all(|plane| {
+        self.planes.map(Vec4::from).iter().all(|plane| {
             let normal = plane.truncate();
             let farthest = Vec3::select(normal.cmpge(Vec3::ZERO), high, low);
             let outside = normal.dot(farthest) + plane.w < -self.frustum_margin * normal.length();
@@ -84,7 +100,7 @@ impl InstanceCulling {
     /// A sphere of radius r at the distance d appears under the angle 2 asin(r / d).
     fn is_large(&self, low: Vec3, high: Vec3) -> bool {
         let radius_squared = low.distance_squared(high) / 4.0;
-        let distance_squared = self.eye.distance_squared((low + high) / 2.0);
+        let distance_squared = Vec3::from(self.eye).distance_squared((low + high) / 2.0);
         let sine = (self.min_angle.clamp(0.0, std::f32::consts::PI) / 2.0).sin();
         let small = radius_squared < distance_squared * sine * sine;
         !small
@@ -124,6 +140,10 @@ mod tests {
         projection * view
     }
 
+    fn from_view_projection(eye: Vec3, matrix: Mat4) -> InstanceCulling {
+        InstanceCulling::from_view_projection(eye, matrix.to_cols_array_2d())
+    }
+
     fn corners(low: Vec3, high: Vec3) -> [Vec3; 8] {
         std::array::from_fn(|corner| {
             let pick = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
@@ -145,7 +165,7 @@ mod tests {
     fn boxes_beyond_each_plane_are_culled_up_to_the_margin() {
         let view = view::look_to_mat4(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y);
         let projection = vulkan::perspective(std::f32::consts::FRAC_PI_2, 1.0, 1.0, 100.0);
-        let culling = InstanceCulling::from_view_projection(Vec3::ZERO, projection * view);
+        let culling = from_view_projection(Vec3::ZERO, projection * view);
         // At the depth of 50 the frustum is 50 high and wide to each side; all planes but two are slanted by 45
         // degrees.
         let slant = 0.5_f32.sqrt();
@@ -176,7 +196,8 @@ mod tests {
         for (half, distance) in [(0.5_f32, 10.0_f32), (3.0, 40.0), (0.01, 1.0)] {
             let center = EYE + Vec3::new(0.6, 0.0, 0.8) * distance;
             let angle = 2.0 * (f64::from(half) * 3_f64.sqrt() / f64::from(distance)).asin() as f32;
-            let culling = |min_angle| InstanceCulling { eye: EYE, min_angle, ..Default::default() };
+            let culling =
+                |min_angle| InstanceCulling { eye: EYE.to_array(), min_angle, ..Default::default() };
             assert!(culling(angle * 0.999).keeps(center - half, center + half));
             assert!(!culling(angle * 1.001).keeps(center - half, center + half));
         }
@@ -185,8 +206,8 @@ mod tests {
     #[test]
     fn a_box_around_the_eye_is_kept() {
         let strict = InstanceCulling {
-            eye: EYE,
-            planes: [Vec4::new(1.0, 0.0, 0.0, -1000.0); 6],
+            eye: EYE.to_array(),
+            planes: [[1.0, 0.0, 0.0, -1000.0]; 6],
             frustum_margin: 0.0,
             min_angle: 3.0,
         };
@@ -197,7 +218,7 @@ mod tests {
     #[test]
     fn boxes_of_nan_are_kept() {
         let strict = InstanceCulling {
-            planes: [Vec4::new(1.0, 0.0, 0.0, -1000.0); 6],
+            planes: [[1.0, 0.0, 0.0, -1000.0]; 6],
             min_angle: 1.0,
             ..InstanceCulling::default()
         };
@@ -212,7 +233,9 @@ mod tests {
         assert!(strict.keeps_instance(high, low, &transform), "inverted");
         transform[6] = f32::NAN;
         assert!(strict.keeps_instance(low, high, &transform));
-        assert!(InstanceCulling { eye: Vec3::NAN, planes: [Vec4::NAN; 6], ..strict }.keeps(low, high));
+        assert!(
+            InstanceCulling { eye: [f32::NAN; 3], planes: [[f32::NAN; 4]; 6], ..strict }.keeps(low, high)
+        );
         let lax = InstanceCulling { frustum_margin: f32::NAN, min_angle: f32::NAN, ..strict };
         assert!(lax.keeps(low, high));
     }
@@ -234,7 +257,7 @@ mod tests {
             let (center, half) = (Vec3::from(center), Vec3::from(half));
             let matrix = view_projection(angle, infinite);
             let culling = InstanceCulling {
-                frustum_margin: margin, ..InstanceCulling::from_view_projection(EYE, matrix)
+                frustum_margin: margin, ..from_view_projection(EYE, matrix)
             };
             let kept = culling.keeps(center - half, center + half);
             if corners(center - half, center + half).iter().any(|&corner| is_inside(matrix, corner)) {
@@ -262,7 +285,7 @@ mod tests {
             let exact = moved.iter().fold((moved[0], moved[0]), |(a, b), p| (a.min(*p), b.max(*p)));
             prop_assert!(exact.0.distance(low) < 1e-3 && exact.1.distance(high) < 1e-3, "no larger than needed");
             let matrix = view_projection(angle, false);
-            let culling = InstanceCulling::from_view_projection(EYE, matrix);
+            let culling = from_view_projection(EYE, matrix);
             if moved.iter().any(|&corner| is_inside(matrix, corner)) {
                 prop_assert!(culling.keeps_instance(-half, half, &transform_rows(&transform)));
             }
@@ -274,7 +297,7 @@ mod tests {
             min_angle in 0.0_f32..0.5,
         ) {
             let culling = InstanceCulling {
-                min_angle, ..InstanceCulling::from_view_projection(EYE, view_projection(0.0, true))
+                min_angle, ..from_view_projection(EYE, view_projection(0.0, true))
             };
             let boxes: Vec<_> = boxes.iter().map(|&(center, half)| (Vec3::from(center) - half, Vec3::from(center) + half)).collect();
             let kept = culling.kept(boxes.iter().copied());
@@ -292,6 +315,11 @@ mod tests {
         };
         let all_outside = |plane: &Vec4| corners(low, high).iter().all(|corner| outside(plane, corner));
         let surrounds = EYE.cmpge(low).all() && EYE.cmple(high).all();
-        surrounds || !culling.planes.iter().any(|plane| plane.xyz() != Vec3::ZERO && all_outside(plane))
+        surrounds
+            || !culling
+                .planes
+                .map(Vec4::from)
+                .iter()
+                .any(|plane| plane.xyz() != Vec3::ZERO && all_outside(plane))
     }
 }

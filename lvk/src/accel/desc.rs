@@ -2,6 +2,7 @@
 
 use super::flags::BuildFlags;
 use super::geometry::BlasGeometry;
+use crate::handle::OpacityMicromapHandle;
 
 /// Order in which the driver's builder gets the primitives of a mesh.
 ///
@@ -29,6 +30,10 @@ pub struct BlasDesc<'a> {
     pub flags: BuildFlags,
     /// Order in which the primitives are built. It is derived from the contents of the buffers at creation.
     pub order: PrimitiveOrder,
+    /// The opacity of the triangles of each geometry, in the order of `geometries`; a shorter list leaves the rest
+    /// without. The micromap has as many triangles as the geometry. The structure is built in the given order, and it
+    /// is not split. Needs [`OptionalFeature::OpacityMicromaps`](crate::OptionalFeature::OpacityMicromaps).
+    pub opacity: &'a [Option<OpacityMicromapHandle>],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
@@ -36,6 +41,6 @@ pub struct BlasDesc<'a> {
 impl Default for BlasDesc<'_> {
     fn default() -> Self {
         let (flags, order) = (BuildFlags::default(), PrimitiveOrder::default());
-        Self { geometries: &[], flags, order, debug_name: "blas" }
+        Self { geometries: &[], flags, order, opacity: &[], debug_name: "blas" }
     }
 }

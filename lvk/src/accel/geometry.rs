@@ -90,7 +90,7 @@ impl Triangles {
 /// A matrix of 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GeometryTransform {
-    /// A matrix by value; see [`transform_rows`](crate::transform_rows).
+    /// A matrix by value; [`rows_from_columns`](crate::rows_from_columns) converts columns.
     Rows([f32; 12]),
     /// 48 bytes in a buffer, read by every build.
     Buffer {
@@ -130,6 +130,9 @@ pub enum BlasGeometry {
     /// Axis-aligned bounding boxes.
     Aabbs(Aabbs),
 }
+
+/// The identity transform, in rows.
+pub(crate) const IDENTITY_ROWS: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// A geometry in Vulkan's form, with its number of primitives.
 #[derive(Clone, Copy)]

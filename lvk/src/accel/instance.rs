@@ -6,6 +6,7 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 
 use super::blas_refs::{BitSet, BlasRef, BlasRefCollector, BlasRefSet, ResolveBlas};
+use super::geometry::IDENTITY_ROWS;
 use crate::error::limit_origin::LimitOrigin;
 use crate::error::{Error, Result, check_limit_of};
 use crate::handle::{AccelStructHandle, BufferHandle};
@@ -36,7 +37,8 @@ bitflags! {
 /// One instance of a BLAS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TlasInstance {
-    /// Object-to-world transform: 3 rows of 4 columns, row by row. See [`transform_rows`].
+    /// Object-to-world transform: 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`). [`rows_from_columns`]
+    /// converts matrices that are stored by columns.
     pub transform: [f32; 12],
     /// The BLAS.
     pub blas: AccelStructHandle,
@@ -54,7 +56,7 @@ impl TlasInstance {
     /// Creates an instance with the identity transform that is visible to every ray.
     pub fn new(blas: AccelStructHandle) -> Self {
         Self {
-            transform: transform_rows(&glam::Affine3A::IDENTITY),
+            transform: IDENTITY_ROWS,
             blas,
             custom_index: 0,
             mask: 0xff,
@@ -64,11 +66,25 @@ impl TlasInstance {
     }
 }
 
-/// Returns the rows of an affine transform in Vulkan's order (`VkTransformMatrixKHR`).
+/// Returns the rows of an affine transform in Vulkan's order (`VkTransformMatrixKHR`), from its columns: the images of
+/// the three axes, and the translation.
+///
+/// The columns are those of `glam`'s `Affine3A::to_cols_array_2d` and of `mint`'s `ColumnMatrix3x4`.
+///
+/// ```
+/// let place = glam::Affine3A::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
+/// let rows = lvk::rows_from_columns(place.to_cols_array_2d());
+/// assert_eq!(rows, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0]);
+/// ```
+pub fn rows_from_columns(columns: impl Into<[[f32; 3]; 4]>) -> [f32; 12] {
+    let columns = columns.into();
+    std::array::from_fn(|at| columns[at % 4][at / 4])
+}
+
+/// Returns the rows of an affine transform of the crate `glam` in Vulkan's order (`VkTransformMatrixKHR`).
+#[cfg(any(feature = "glam", test))]
 pub fn transform_rows(transform: &glam::Affine3A) -> [f32; 12] {
-    let columns = transform.matrix3;
-    let (x, y, z, t) = (columns.x_axis, columns.y_axis, columns.z_axis, transform.translation);
-    [x.x, y.x, z.x, t.x, x.y, y.y, z.y, t.y, x.z, y.z, z.z, t.z]
+    rows_from_columns(transform.to_cols_array_2d())
 }
 
 /// The record that Vulkan reads (`VkAccelerationStructureInstanceKHR`).
@@ -512,7 +528,7 @@ mod tests {
     #[test]
     fn a_transform_has_vulkans_row_order() {
         let transform = glam::Affine3A::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
-        let rows = transform_rows(&transform);
+        let rows = rows_from_columns(transform.to_cols_array_2d());
         assert_eq!(rows, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0]);
     }
 

@@ -12,6 +12,8 @@ pub(crate) mod desc;
 pub(crate) mod flags;
 pub(crate) mod geometry;
 pub(crate) mod instance;
+pub(crate) mod micromap;
+pub(crate) mod micromap_desc;
 pub(crate) mod partition;
 pub(crate) mod primitive_bounds;
 pub(crate) mod primitive_map;

@@ -209,6 +209,11 @@ impl Use {
         Self::new(stages, Access::SHADER_READ.union(Access::SHADER_WRITE), Layout::General)
     }
 
+    /// Any access of the stages to bytes whose earlier contents are lost.
+    pub(crate) fn any_of(stages: Stages) -> Self {
+        Self::new(stages, stages.possible_accesses(), Layout::Undefined)
+    }
+
     /// Index buffer of a draw.
     pub(crate) const fn index() -> Self {
         Self::new(Stages::VERTEX_INPUT, Access::INDEX_READ, Layout::Undefined)

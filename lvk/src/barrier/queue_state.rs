@@ -110,6 +110,7 @@ fn apply_texture(
 fn apply_local(queue: &mut ResourceState, local: &LocalState) -> Option<BarrierScopes> {
     let scopes = match &local.prefix {
         Prefix::Unused => return None,
+        Prefix::Discarded => None,
         Prefix::Write(write) => transition(queue, *write),
         Prefix::Accumulated(writes) => apply_accumulated(queue, writes, local.past_prefix),
         Prefix::Reads(layout, reads) if *layout != queue.layout() => {

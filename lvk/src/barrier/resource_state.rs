@@ -21,7 +21,7 @@ pub(crate) struct BarrierScopes {
 
 /// Stages together with their accesses: one side of a barrier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct BarrierScope {
+pub(crate) struct BarrierScope {
     stages: Stages,
     access: Access,
 }
@@ -39,6 +39,11 @@ impl BarrierScope {
     /// Returns the scope as a use. A barrier affects every access of every stage it names.
     fn as_use(self) -> Use {
         Use { stages: self.stages, access: self.access, layout: Layout::Undefined }
+    }
+
+    /// Returns both scopes as one.
+    pub(super) fn union(self, other: Self) -> Self {
+        Self { stages: self.stages | other.stages, access: self.access | other.access }
     }
 }
 
@@ -199,9 +204,14 @@ impl ResourceState {
         needed.then(|| self.scopes(epoch.before, dst, self.layout))
     }
 
+    /// Adds the accesses of `scope` to the last write, so that later uses wait for them too.
+    pub(super) fn extend_write(&mut self, scope: BarrierScope) {
+        *self = Self { layout: self.layout, write: self.unfinished().union(scope), ..Self::default() };
+    }
+
     /// Returns the scope that a write has to wait for.
     #[inline]
-    fn unfinished(&self) -> BarrierScope {
+    pub(super) fn unfinished(&self) -> BarrierScope {
         if self.readers.is_empty() { self.write } else { self.through_readers(self.readers) }
     }
 

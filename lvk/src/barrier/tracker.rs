@@ -3,7 +3,7 @@
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
-use super::resource_state::{BarrierScopes, ResourceState, accumulate, transition};
+use super::resource_state::{BarrierScope, BarrierScopes, ResourceState, accumulate, transition};
 use super::subresource::{PerSubresource, Subresources, TextureShape};
 
 /// The first uses of a (sub)resource by a command buffer, before a use that must wait for another one in the
@@ -22,12 +22,14 @@ pub(super) enum Prefix {
     Write(Use),
     /// Accumulated writes, which do not wait for each other.
     Accumulated(StageAccess),
+    /// The contents were discarded before the first use, which depends on nothing before the command buffer.
+    Discarded,
 }
 
 impl Prefix {
     fn stages(&self) -> Stages {
         match self {
-            Self::Unused => Stages::empty(),
+            Self::Unused | Self::Discarded => Stages::empty(),
             Self::Reads(_, table) | Self::Accumulated(table) => table.stages(),
             Self::Write(first) => first.stages,
         }
@@ -39,7 +41,7 @@ impl Prefix {
             Self::Unused => None,
             Self::Reads(layout, _) => Some(*layout),
             Self::Write(first) => Some(first.layout),
-            Self::Accumulated(_) => Some(Layout::Undefined),
+            Self::Accumulated(_) | Self::Discarded => Some(Layout::Undefined),
         }
     }
 }
@@ -91,9 +93,15 @@ impl LocalState {
     fn changes(&self, found: Layout) -> bool {
         match self.prefix {
             Prefix::Unused => false,
-            Prefix::Write(_) | Prefix::Accumulated(_) => true,
+            Prefix::Write(_) | Prefix::Accumulated(_) | Prefix::Discarded => true,
             Prefix::Reads(layout, _) => self.past_prefix || layout != found,
         }
+    }
+
+    /// Discards the contents. A barrier or semaphore has made `stages` wait for all earlier uses.
+    fn discarded_before(stages: Stages) -> Self {
+        let state = ResourceState::imported(Layout::Undefined, stages);
+        Self { prefix: Prefix::Discarded, past_prefix: true, state }
     }
 
     fn accumulate(&mut self, write: Use) -> Option<BarrierScopes> {
@@ -213,6 +221,28 @@ impl Tracker {
             Some(scopes) => out.push_memory(&scopes),
             None => use_subresources(id, cells, subresources, next, out),
         }
+    }
+
+    /// Discards the contents of a texture, in every subresource. The caller has recorded a barrier that makes `stages`
+    /// wait for all earlier uses of the texture's memory.
+    pub(crate) fn discard_texture(&mut self, id: ResourceId, shape: TextureShape, stages: Stages) {
+        let state = LocalState::discarded_before(stages);
+        let cells = self.textures.entry(id, || PerSubresource::new(shape, state));
+        *cells = PerSubresource::new(shape, state);
+    }
+
+    /// Returns the accesses to a texture that a write to its memory has to wait for.
+    pub(crate) fn unfinished_texture(&self, id: ResourceId) -> BarrierScope {
+        let Some(cells) = self.textures.get(id) else { return BarrierScope::default() };
+        positions(cells.shape())
+            .map(|(mip, layer)| cells.at(mip, layer).state.unfinished())
+            .fold(BarrierScope::default(), BarrierScope::union)
+    }
+
+    /// Makes the next uses of a buffer, or of bytes that are tracked as one, wait for `scope` too. The command buffer
+    /// has written it before.
+    pub(crate) fn extend_write(&mut self, id: ResourceId, scope: BarrierScope) {
+        self.buffers.entry(id, LocalState::default).state.extend_write(scope);
     }
 
     /// True if [`use_buffer`](Self::use_buffer) would need a barrier, which cannot be recorded inside a

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::subresource_accesses::{SubresourceAccess, SubresourceAccesses};
+use super::transient_steps::TransientSteps;
 use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
@@ -23,6 +24,8 @@ pub(crate) struct CommandAccesses {
     /// Subresources of images, with the indices of their textures in the cache.
     textures: SubresourceAccesses<usize>,
     writers: Vec<(ResourceId, Use)>,
+    /// The steps of transient heaps, which say whether their textures have contents.
+    pub(super) transients: TransientSteps,
     /// Number of cached textures whose images are in the [`Images`] of the command buffer.
     known_images: usize,
 }
@@ -86,9 +89,12 @@ impl CommandAccesses {
         part: Subresources,
         next: Use,
     ) -> Result<()> {
-        let id = cache.object(index).image.id;
+        let image = &cache.object(index).image;
+        if let Some(place) = &image.transient_place {
+            self.transients.check(place, &cache.object(index).name)?;
+        }
         self.textures
-            .add(id, part, next, index)
+            .add(image.id, part, next, index)
             .map_err(|other| access_conflict(cache.object(index), cache.object(other)))
     }
 
@@ -162,6 +168,7 @@ impl CommandAccesses {
     /// Clears everything for the next command buffer.
     pub(super) fn reset(&mut self) {
         self.clear();
+        self.transients.clear();
         self.known_images = 0;
     }
 

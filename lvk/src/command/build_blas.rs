@@ -13,7 +13,7 @@ use crate::accel::blas::{Blas, BlasStructures};
 use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
-use crate::barrier::{ResourceId, Use};
+use crate::barrier::{ResourceId, Stages, Use};
 use crate::cpu_scope::cpu_scope;
 use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
@@ -169,6 +169,9 @@ impl CommandBuffer {
         let group = self.built_group(is_first);
         self.state.accesses.add_id(build.id, write);
         self.state.accesses.add_accumulating(group, write);
+        for micromap in build.input().micromaps() {
+            self.use_buffer(&micromap.storage, Use::accel_read(Stages::ACCEL_BUILD));
+        }
         build.read_buffers.iter().for_each(|buffer| self.use_buffer(buffer, Use::accel_build_input()));
     }
 

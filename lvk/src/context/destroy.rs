@@ -3,8 +3,9 @@
 use super::Context;
 use crate::device_state::{DeferredObject, DeviceState};
 use crate::handle::{
-    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, OpacityMicromapHandle, QueryPoolHandle,
+    RayTracingLibraryHandle, RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle,
+    ShaderModuleHandle, TextureHandle,
 };
 
 /// A handle whose object a context can destroy. All handles implement it.
@@ -41,6 +42,7 @@ destroy! {
     ComputePipelineHandle: compute_pipelines => ComputePipeline;
     RayTracingPipelineHandle: ray_tracing_pipelines => RayTracingPipeline;
     QueryPoolHandle: query_pools => QueryPool;
+    OpacityMicromapHandle: micromaps => Micromap;
     AccelStructHandle: accel_structs => AccelStruct;
 }
 

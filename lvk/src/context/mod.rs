@@ -6,6 +6,7 @@ pub(crate) mod config;
 mod create;
 pub(crate) mod create_accel;
 mod create_in_background;
+mod create_micromap;
 mod create_pipelines;
 mod create_ray_tracing;
 mod create_texture;
@@ -36,6 +37,7 @@ mod requirements;
 pub(crate) mod serialize;
 mod submit;
 mod transfer;
+pub(crate) mod transient_heap;
 #[cfg(feature = "window")]
 mod window;
 

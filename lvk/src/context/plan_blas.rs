@@ -14,9 +14,10 @@ use crate::accel::primitive_map::{PrimitiveMap, encode_table};
 use crate::accel::reorder::{is_reorder_worthwhile, spatial_order};
 use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::device_state::DeviceState;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
+use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
@@ -72,7 +73,7 @@ impl Context {
         let mut plans = Vec::with_capacity(descs.len());
         for (desc, (_, input)) in descs.iter().zip(&converted) {
             let sizes = input.query_sizes(&shared.gpu)?;
-            plans.push((choose_plan(&shared.gpu, desc, &sizes), sizes));
+            plans.push((choose_plan(&shared.gpu, desc, &sizes)?, sizes));
         }
         let is_read = |(_, (plan, _)): &(&BlasDesc<'_>, &(BlasPlan, _))| *plan != BlasPlan::Whole;
         let read: Vec<_> = descs.iter().zip(&plans).filter(is_read).map(|(desc, _)| desc).collect();
@@ -135,7 +136,11 @@ fn check_desc(shared: &DeviceState, desc: &BlasDesc<'_>) -> Result<()> {
 /// Converts the whole mesh. `transforms` is the address of the transform matrices given by value.
 fn build_input(shared: &DeviceState, desc: &BlasDesc<'_>, transforms: Option<u64>) -> Result<BuildInput> {
     let find = |handle| shared.store.buffers.get(handle);
-    BuildInput::from_geometries(&shared.gpu, desc.debug_name, desc.geometries, desc.flags, &find, transforms)
+    let BlasDesc { geometries, flags, debug_name, .. } = *desc;
+    let mut input =
+        BuildInput::from_geometries(&shared.gpu, debug_name, geometries, flags, &find, transforms)?;
+    attach_opacity(shared, desc, &mut input)?;
+    Ok(input)
 }
 
 fn new_transforms(shared: &DeviceState, name: &str, matrices: &[f32]) -> Result<Buffer> {
@@ -166,7 +171,7 @@ pub(crate) fn new_blas_object(
     AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(Arc::new(blas)))
 }
 
-fn choose_plan(gpu: &Gpu, desc: &BlasDesc<'_>, whole: &AccelStructSizes) -> BlasPlan {
+fn choose_plan(gpu: &Gpu, desc: &BlasDesc<'_>, whole: &AccelStructSizes) -> Result<BlasPlan> {
     let primitives: u64 = desc.geometries.iter().map(|geometry| u64::from(geometry.primitive_count())).sum();
     let order = match desc.order {
         PrimitiveOrder::Given => false,
@@ -177,11 +182,38 @@ fn choose_plan(gpu: &Gpu, desc: &BlasDesc<'_>, whole: &AccelStructSizes) -> Blas
     let fits = whole.structure_bytes <= limits.structure_bytes
         && whole.scratch_bytes() <= limits.scratch_bytes
         && primitives <= limits.primitives;
-    match fits {
+    if has_opacity(desc) {
+        let what = || format!("opacity micromaps of BLAS '{}'", desc.debug_name);
+        let too_large = || Error::unsupported(what(), "the mesh exceeds a limit of one structure; divide it");
+        return fits.then_some(BlasPlan::Whole).ok_or_else(too_large);
+    }
+    Ok(match fits {
         false => BlasPlan::Split { order },
         true if order && primitives >= MIN_REORDERED_PRIMITIVES => BlasPlan::Reordered,
         true => BlasPlan::Whole,
+    })
+}
+
+fn has_opacity(desc: &BlasDesc<'_>) -> bool {
+    desc.opacity.iter().any(Option::is_some)
+}
+
+/// Gives triangles the opacity that the description names.
+fn attach_opacity(shared: &DeviceState, desc: &BlasDesc<'_>, input: &mut BuildInput) -> Result<()> {
+    if !has_opacity(desc) {
+        return Ok(());
     }
+    let what = format!("opacity micromaps of BLAS '{}'", desc.debug_name);
+    shared.gpu.require(OptionalFeature::OpacityMicromaps, &what)?;
+    if shared.gpu.caps.software_ray_query() {
+        return Err(Error::unsupported(what, "software ray queries do not read them; leave them out"));
+    }
+    for (index, handle) in desc.opacity.iter().enumerate() {
+        if let Some(handle) = handle {
+            input.attach_opacity(desc.debug_name, index, &shared.store.micromaps.get(*handle)?)?;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the limits of one part. The scratch address is aligned, so up to `scratch_alignment` bytes of the allowed

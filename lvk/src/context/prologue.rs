@@ -101,6 +101,9 @@ impl Context {
         bytes: &[u8],
     ) -> Result<()> {
         cpu_scope!("upload texture");
+        if let Some(place) = &target.image.transient_place {
+            return Err(place.not_begun(&target.name));
+        }
         let region = target.check_upload(region, bytes.len() as u64)?;
         self.upload_region(target, region, bytes)
     }

@@ -52,6 +52,10 @@ impl Context {
     pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
         let object = self.device_state().store.accel_structs.get(handle)?;
         let blas = object.blas()?;
+        if blas.parts.iter().any(|part| part.input.micromaps().next().is_some()) {
+            let message = "a BLAS with opacity micromaps cannot be serialised; build it at each start";
+            return Err(Error::usage(&object.name, message));
+        }
         let body = blas.structures();
         let geometries = blas.geometries.iter().map(file_geometry).collect();
         if self.device_state().gpu.accel.is_none() {
@@ -298,6 +302,9 @@ impl Context {
     fn loaded_inputs(&self, desc: &BlasDesc<'_>, blob: &BlasFile, bytes: &[u64]) -> Result<BlasInputs> {
         let shared = self.device_state();
         let (transforms, whole) = convert_geometries(shared, desc)?;
+        if whole.micromaps().next().is_some() {
+            return Err(rejected_error(desc, "its description has opacity micromaps"));
+        }
         let counts: Vec<_> = desc.geometries.iter().map(BlasGeometry::primitive_count).collect();
         let plans = part_plans_from_file(blob, &counts).ok_or_else(|| {
             rejected_error(desc, "its parts are not those of the mesh, each primitive once")

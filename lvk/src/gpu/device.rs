@@ -70,6 +70,8 @@ pub(crate) struct Gpu {
     pub(crate) queues: Queues,
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
+    /// Functions of opacity micromaps.
+    pub(crate) micromaps: Option<ash::ext::opacity_micromap::Device>,
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
     pub(crate) shading_rates: Option<ShadingRates>,
     pub(crate) local_read: Option<ash::khr::dynamic_rendering_local_read::Device>,
@@ -177,6 +179,9 @@ impl Gpu {
             ray_tracing: caps
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
+            micromaps: caps
+                .has(OptionalFeature::OpacityMicromaps)
+                .then(|| ash::ext::opacity_micromap::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
             shading_rates: caps
                 .has(OptionalFeature::PipelineShadingRate)
@@ -230,6 +235,12 @@ impl Gpu {
     /// Returns the functions of `VK_KHR_acceleration_structure`, or an error that names the missing feature.
     pub(crate) fn accel_functions(&self) -> Result<&ash::khr::acceleration_structure::Device> {
         self.accel.as_ref().ok_or_else(|| self.unsupported("acceleration structures"))
+    }
+
+    /// Returns the functions of opacity micromaps. Fails on devices without them.
+    pub(crate) fn micromap_functions(&self) -> Result<&ash::ext::opacity_micromap::DeviceFn> {
+        let functions = self.micromaps.as_ref().map(ash::ext::opacity_micromap::Device::fp);
+        functions.ok_or_else(|| self.unsupported("opacity micromaps"))
     }
 
     /// True if acceleration structures exist, built by the device or by the library.

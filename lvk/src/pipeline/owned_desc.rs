@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::compute::ComputePipelineDesc;
 use super::block_layout::BlockLayout;
+use super::compute::ComputePipelineDesc;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
 use super::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
 use super::shader_module::{ModuleLookup, ShaderModule};
@@ -309,7 +309,11 @@ mod tests {
         let desc = RayTracingPipelineDesc {
             ray_gen: &[first],
             miss: &[second],
-            hit_groups: &[HitGroup { any_hit: Some(third), record: ShaderRecord::from_bytes(&[7, 8]), ..Default::default() }],
+            hit_groups: &[HitGroup {
+                any_hit: Some(third),
+                record: ShaderRecord::from_bytes(&[7, 8]),
+                ..Default::default()
+            }],
             callable: &[third, first],
             ray_gen_records: &[ShaderRecord::from_bytes(&[1])],
             miss_records: &[ShaderRecord::from_bytes(&[2, 3])],

@@ -54,7 +54,7 @@ pub(super) fn compile_groups(
         .max_pipeline_ray_payload_size(desc.max_payload_bytes)
         .max_pipeline_ray_hit_attribute_size(desc.max_hit_attribute_bytes);
     let mut info = vk::RayTracingPipelineCreateInfoKHR::default()
-        .flags(flags)
+        .flags(flags | micromap_flag(gpu))
         .stages(&stages)
         .groups(&groups.infos)
         .max_pipeline_ray_recursion_depth(desc.max_recursion)
@@ -67,6 +67,14 @@ pub(super) fn compile_groups(
     // SAFETY: modules, layout and libraries are alive, the recursion depth is within the limit, and the libraries were
     // created with the same layout and agree on the interface.
     unsafe { compile(gpu, base, &info) }
+}
+
+/// Returns the flag without which rays of a pipeline may not meet triangles with opacity micromaps.
+fn micromap_flag(gpu: &Gpu) -> vk::PipelineCreateFlags {
+    match gpu.micromaps {
+        Some(_) => vk::PipelineCreateFlags::RAY_TRACING_OPACITY_MICROMAP_EXT,
+        None => vk::PipelineCreateFlags::empty(),
+    }
 }
 
 /// Returns a stage that is part of no group, for lavapipe. It passes push constants only to pipelines that have a ray

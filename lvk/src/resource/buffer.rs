@@ -94,6 +94,11 @@ impl InternalUsage {
     pub(crate) const SOFTWARE_STRUCTURES: Self = Self { alignment: 256, ..Self::NONE };
     pub(crate) const ACCEL_STORAGE: Self =
         Self { raw: vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR, alignment: 256 };
+    /// Usage of the maps and records of an opacity micromap.
+    pub(crate) const MICROMAP_INPUT: Self =
+        Self { raw: vk::BufferUsageFlags::MICROMAP_BUILD_INPUT_READ_ONLY_EXT, alignment: 256 };
+    pub(crate) const MICROMAP_STORAGE: Self =
+        Self { raw: vk::BufferUsageFlags::MICROMAP_STORAGE_EXT, alignment: 256 };
     pub(crate) const SHADER_BINDING_TABLE: Self =
         Self { raw: vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR, alignment: 1 };
 }

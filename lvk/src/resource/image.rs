@@ -12,6 +12,7 @@ use super::image_usage::usage_from_features;
 #[cfg(unix)]
 use super::sharing::{Sharing, check_shared_texture, external_features, plane_layouts, shareable_modifiers};
 use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
+use super::transient_heap::{SharedBlock, TransientPlace};
 use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
 use crate::format::Format;
@@ -45,6 +46,8 @@ pub(crate) struct Image {
     handles: AtomicU32,
     /// True if the image exists only inside of passes.
     pub(crate) transient: bool,
+    /// `Some` for a texture of a transient heap, which shares its memory with other textures.
+    pub(crate) transient_place: Option<TransientPlace>,
     memory: Option<Memory>,
     /// True if one queue family owns the image at a time.
     is_exclusive: bool,
@@ -65,6 +68,8 @@ enum Memory {
     Managed(ObjectMemory),
     /// Lazily allocated memory, which exists only while a pass needs it.
     Lazy(vk::DeviceMemory),
+    /// A part of a block that other images use too, from this offset on.
+    Shared(Arc<SharedBlock>, u64),
 }
 
 /// An image with the properties that barriers and clears need.
@@ -89,6 +94,13 @@ impl BarrierImage {
 impl Image {
     /// Creates an image for one texture.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>) -> Result<Self> {
+        let mut image = Self::without_memory(gpu, desc)?;
+        image.bind_memory(desc.debug_name)?;
+        Ok(image)
+    }
+
+    /// Creates an image for one texture. The caller must bind memory before any other use.
+    pub(crate) fn without_memory(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>) -> Result<Self> {
         let plan = check_image(gpu, desc)?;
         let formats: Vec<_> = [desc.format].iter().chain(desc.view_formats).map(|f| f.raw()).collect();
         let mut list = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
@@ -108,7 +120,6 @@ impl Image {
         let raw = unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage"))?;
         let mut image = Self::from_raw(gpu, desc, &plan, raw, false);
         image.host_filled = host_filled;
-        image.bind_memory(desc.debug_name)?;
         gpu.name(raw, desc.debug_name);
         Ok(image)
     }
@@ -184,6 +195,7 @@ impl Image {
             cube_compatible: plan.flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE),
             handles: AtomicU32::new(1),
             transient: desc.memory == TextureMemory::Transient,
+            transient_place: None,
             memory: None,
             is_exclusive: !is_external && gpu.queues.has_several_domains() && !is_shared(desc),
             host_filled: false,
@@ -207,16 +219,31 @@ impl Image {
         self.owner.is_some()
     }
 
+    /// Binds memory that no other image uses.
     fn bind_memory(&mut self, name: &str) -> Result<()> {
-        let device = &self.gpu.device;
+        let requirements = self.memory_requirements();
+        if self.transient && self.bind_lazy(name, requirements)? {
+            return Ok(());
+        }
+        let memory = self.gpu.allocate(name, requirements, MemoryKind::Device, false)?;
+        self.bind_to(Memory::Managed(memory))
+    }
+
+    /// Binds lazily allocated memory. Returns false if the device has none for the image.
+    pub(super) fn bind_lazy(&mut self, name: &str, requirements: vk::MemoryRequirements) -> Result<bool> {
+        let Some(raw) = self.gpu.allocate_lazy(name, requirements)? else { return Ok(false) };
+        self.bind_to(Memory::Lazy(raw))?;
+        Ok(true)
+    }
+
+    /// Binds a part of a block, from `offset` on. The block has the memory types and the size that the image requires.
+    pub(super) fn bind_shared(&mut self, block: &Arc<SharedBlock>, offset: u64) -> Result<()> {
+        self.bind_to(Memory::Shared(Arc::clone(block), offset))
+    }
+
+    pub(super) fn memory_requirements(&self) -> vk::MemoryRequirements {
         // SAFETY: the image was created by this device.
-        let requirements = unsafe { device.get_image_memory_requirements(self.raw) };
-        let lazy = if self.transient { self.gpu.allocate_lazy(name, requirements)? } else { None };
-        let memory = match lazy {
-            Some(memory) => Memory::Lazy(memory),
-            None => Memory::Managed(self.gpu.allocate(name, requirements, MemoryKind::Device, false)?),
-        };
-        self.bind_to(memory)
+        unsafe { self.gpu.device.get_image_memory_requirements(self.raw) }
     }
 
     /// Binds memory that was allocated for the image's requirements.
@@ -224,6 +251,7 @@ impl Image {
         let (raw, offset) = match &memory {
             Memory::Managed(memory) => (memory.raw, memory.offset),
             Memory::Lazy(memory) => (*memory, 0),
+            Memory::Shared(block, offset) => block.place(*offset),
         };
         self.memory = Some(memory);
         // SAFETY: the memory was allocated for this image's requirements and is bound once.
@@ -290,6 +318,7 @@ impl Drop for Image {
             Some(Memory::Managed(memory)) => self.gpu.free(memory),
             // SAFETY: the image that was bound to the memory is destroyed.
             Some(Memory::Lazy(memory)) => unsafe { self.gpu.device.free_memory(memory, None) },
+            Some(Memory::Shared(block, _)) => drop(block),
             None => {}
         }
     }

@@ -16,6 +16,9 @@ pub(crate) mod sharing;
 pub(crate) mod swizzle;
 pub(crate) mod texture;
 pub(crate) mod texture_desc;
+pub(crate) mod transient_heap;
+pub(crate) mod transient_images;
+mod transient_packing;
 pub(crate) mod view;
 pub(crate) mod ycbcr;
 

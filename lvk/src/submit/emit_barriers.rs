@@ -259,7 +259,8 @@ fn combine_flags<const N: usize>(names: &Names<N>, bits: u32) -> u64 {
 /// Returns the Vulkan flags of stages, without stages whose feature is disabled.
 #[inline]
 pub(super) fn vulkan_stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
-    stage_names(stages - disabled_stages(gpu))
+    let stages = stages - disabled_stages(gpu);
+    stage_names(stages) | micromap_scope(gpu, stages, Access::empty()).0
 }
 
 /// Returns the Vulkan flags of one side of a barrier, without stages and accesses of disabled features.
@@ -268,7 +269,29 @@ fn vulkan_scope(gpu: &Gpu, stages: Stages, access: Access) -> (vk::PipelineStage
     let mut off = Access::empty();
     off.set(Access::ACCEL_READ | Access::ACCEL_WRITE, gpu.accel.is_none());
     let (stages, access) = without_stages(stages, access - off, disabled_stages(gpu));
-    (stage_names(stages), vk::AccessFlags2::from_raw(combine_flags(&ACCESS_NAMES, access.bits())))
+    let (micromap_stages, micromap_access) = micromap_scope(gpu, stages, access);
+    let access = vk::AccessFlags2::from_raw(combine_flags(&ACCESS_NAMES, access.bits()));
+    (stage_names(stages) | micromap_stages, access | micromap_access)
+}
+
+/// Returns the Vulkan flags of builds of opacity micromaps, which are tracked as builds of acceleration structures.
+#[inline]
+fn micromap_scope(gpu: &Gpu, stages: Stages, access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
+    match gpu.micromaps.is_some() && stages.contains(Stages::ACCEL_BUILD) {
+        true => (vk::PipelineStageFlags2::MICROMAP_BUILD_EXT, micromap_access(access)),
+        false => Default::default(),
+    }
+}
+
+fn micromap_access(access: Access) -> vk::AccessFlags2 {
+    let mut raw = vk::AccessFlags2::empty();
+    if access.contains(Access::ACCEL_READ) {
+        raw |= vk::AccessFlags2::MICROMAP_READ_EXT;
+    }
+    if access.contains(Access::ACCEL_WRITE) {
+        raw |= vk::AccessFlags2::MICROMAP_WRITE_EXT;
+    }
+    raw
 }
 
 /// Returns the stages whose feature is disabled.
@@ -337,6 +360,13 @@ mod tests {
         let rates = AccessFlags2::FRAGMENT_SHADING_RATE_ATTACHMENT_READ_KHR;
         assert_eq!(access(Access::SHADING_RATE_READ), rates);
         assert!(access(Access::empty()).is_empty());
+    }
+
+    #[test]
+    fn micromaps_are_read_and_written_where_structures_are() {
+        assert_eq!(micromap_access(Access::SHADER_READ), vk::AccessFlags2::empty());
+        assert_eq!(micromap_access(Access::ACCEL_READ), vk::AccessFlags2::MICROMAP_READ_EXT);
+        assert_eq!(micromap_access(Access::ACCEL_WRITE), vk::AccessFlags2::MICROMAP_WRITE_EXT);
     }
 
     #[test]

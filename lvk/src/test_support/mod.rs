@@ -3,6 +3,8 @@
 
 pub(crate) mod fault_injection;
 pub mod hooks;
+#[cfg(test)]
+pub(crate) mod micromap_functions;
 pub(crate) mod null_commands;
 #[cfg(test)]
 pub(crate) mod scattered_bounds;

@@ -91,7 +91,13 @@ impl MeshBuffers {
         flags: BuildFlags,
         order: PrimitiveOrder,
     ) -> lvk::Result<Holder<AccelStructHandle>> {
-        ctx.create_blas(&BlasDesc { geometries: &[self.geometry()], flags, order, debug_name: "mesh" })
+        ctx.create_blas(&BlasDesc {
+            geometries: &[self.geometry()],
+            flags,
+            order,
+            debug_name: "mesh",
+            ..BlasDesc::default()
+        })
     }
 }
 

@@ -152,6 +152,7 @@ impl AnimationPasses {
             flags: BuildFlags::FAST_BUILD,
             order: PrimitiveOrder::Given,
             debug_name: "leaves",
+            ..BlasDesc::default()
         })?;
         let (skin, turn) = (compute(ctx, SKIN)?, compute(ctx, LEAVES)?);
         Ok(Self { skin, turn, serpent, leaves, skin_mode: mode(update) })

@@ -6,7 +6,7 @@ use super::animation::compute;
 use super::frame::{Push, words};
 use super::pipelines::{COMPOSITE, FILTER, RESOLVE, SMOOTH};
 use super::ray_passes::GROUP;
-use super::targets::Targets;
+use super::targets::{Targets, step};
 
 /// The pipelines.
 pub(super) struct ImagePasses {
@@ -35,18 +35,21 @@ impl ImagePasses {
         frame: u64,
     ) -> lvk::Result<()> {
         let [surface, depth] = targets.opaque();
+        targets.begin(cmd, step::SMOOTH)?;
         let ways = [(&targets.visibility, &targets.smoothed), (&targets.smoothed, &targets.visibility)];
         for (number, (from, to)) in (0..).zip(ways) {
             let arguments = [from.index(), to.index(), number, 0];
             let sampled = [surface, depth, from.handle(), *targets.penumbra];
             run(cmd, targets, *self.smooth, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
         }
+        targets.begin(cmd, step::FILTER)?;
         let ways = [(&targets.reflection, &targets.filtered), (&targets.filtered, &targets.reflection)];
         for (number, (from, to)) in (0..).zip(ways) {
             let arguments = [from.index(), to.index(), number, 0];
             let sampled = [surface, depth, from.handle()];
             run(cmd, targets, *self.filter, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
         }
+        targets.begin(cmd, step::COMPOSITE)?;
         let sampled = [surface, depth, *targets.visibility, *targets.reflection];
         let push = Push { frame, arguments: [0; 4] };
         run(cmd, targets, *self.composite, push, &sampled, &[*targets.composite], &[])
@@ -60,6 +63,7 @@ impl ImagePasses {
         frame: u64,
         count: u32,
     ) -> lvk::Result<()> {
+        targets.begin(cmd, step::RESOLVE)?;
         let [low, high] = words(targets.sums_address);
         let push = Push { frame, arguments: [low, high, count, 0] };
         run(cmd, targets, *self.resolve, push, &[*targets.composite], &[*targets.picture], &[*targets.sums])

@@ -9,7 +9,7 @@ use lvk::{
 use super::frame::Push;
 use super::gpu_scene::Draw;
 use super::pipelines::{BLEND_FRAGMENT, OPAQUE_FRAGMENT, SURFACE_VERTEX, TRANSPARENT_FRAGMENT};
-use super::targets::{COMPOSITE_FORMAT, DEPTH_FORMAT, SURFACE_FORMAT, Targets};
+use super::targets::{COMPOSITE_FORMAT, DEPTH_FORMAT, SURFACE_FORMAT, Targets, step};
 use crate::pipelines::SampleStage;
 
 /// The pipelines of the three passes.
@@ -51,6 +51,7 @@ impl RasterPasses {
         targets: &Targets,
         drawn: Drawn<'_>,
     ) -> lvk::Result<()> {
+        targets.begin(cmd, step::SURFACES)?;
         let written = Dependencies { read_buffers: drawn.written, ..Dependencies::default() };
         let mut pass = begin_surfaces(cmd, targets.opaque(), written, "opaque surfaces")?;
         draw_all(&mut pass, *self.opaque, drawn, drawn.opaque)?;
@@ -68,6 +69,7 @@ impl RasterPasses {
         targets: &Targets,
         drawn: Drawn<'_>,
     ) -> lvk::Result<()> {
+        targets.begin(cmd, step::BLEND)?;
         let read = [*targets.opaque_depth, *targets.glass_depth, *targets.glass_reflection];
         let composite = ColorAttachment {
             load: ColorLoadOp::Load,

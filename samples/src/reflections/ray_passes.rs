@@ -12,7 +12,7 @@ use super::pipelines::{
     CLOSEST_HIT, CLOSEST_MISS, LEAF_ANY_HIT, OPAQUE_QUERY, OPAQUE_RAYS, SHADOW_MISS, TRANSPARENT_QUERY,
     TRANSPARENT_RAYS,
 };
-use super::targets::Targets;
+use super::targets::{Targets, step};
 use crate::hybrid::RayPath;
 
 /// Side of a work group in pixels.
@@ -49,6 +49,13 @@ impl RayPasses {
         written: &[BufferHandle],
         frame: u64,
     ) -> lvk::Result<()> {
+        targets.begin(
+            cmd,
+            match surfaces {
+                Surfaces::Opaque => step::OPAQUE_RAYS,
+                Surfaces::Transparent => step::TRANSPARENT_RAYS,
+            },
+        )?;
         let sampled = match surfaces {
             Surfaces::Opaque => targets.opaque(),
             Surfaces::Transparent => targets.glass(),

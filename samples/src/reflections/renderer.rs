@@ -27,9 +27,10 @@ use crate::app::scene_textures;
 use crate::app::ui::PendingSettings;
 use crate::scene::{Camera, GpuCamera};
 
-/// Names of the build of the top-level structure and of the ray passes.
+/// Names of the build of the top-level structure and of the ray passes. The transparent rays come first: the memory of
+/// their g-buffer then serves the textures of the opaque ones.
 pub(super) const TLAS_BUILD: &str = "TLAS build";
-pub(super) const RAYS: [&str; 2] = ["opaque rays", "transparent rays"];
+pub(super) const RAYS: [&str; 2] = ["transparent rays", "opaque rays"];
 
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
@@ -196,7 +197,7 @@ impl Reflections {
             frame,
         };
         to.pass("g-buffers", |cmd| self.raster.record_surfaces(cmd, &self.targets, drawn))?;
-        for (name, surfaces) in RAYS.into_iter().zip([Surfaces::Opaque, Surfaces::Transparent]) {
+        for (name, surfaces) in RAYS.into_iter().zip([Surfaces::Transparent, Surfaces::Opaque]) {
             let rays = &self.rays;
             to.pass(name, |cmd| rays.record(cmd, surfaces, extent, &self.targets, &written, frame))?;
         }

@@ -93,7 +93,7 @@ impl TopLevel {
     }
 
     fn kept_instances(&self, eye: Vec3, min_angle: f32) -> Vec<TlasInstance> {
-        let culling = InstanceCulling { eye, min_angle, ..InstanceCulling::default() };
+        let culling = InstanceCulling { eye: eye.to_array(), min_angle, ..InstanceCulling::default() };
         let keeps = |candidate: &&Candidate| {
             let (low, high) = candidate.bounds;
             culling.keeps_instance(low, high, &candidate.instance.transform)

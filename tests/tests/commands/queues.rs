@@ -288,7 +288,7 @@ fn check_structures(ctx: &TestDevice) -> lvk::Result<()> {
         let shown = instances(&scene.placed, &models);
         let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, flags, ..Default::default() })?;
         let rays = random_rays(5, 600, Vec3::splat(-1.5), Vec3::splat(1.5));
-        let mut jobs = Vec::new();
+        let mut traces = Vec::new();
         for (number, (building, tracing)) in [
             (None, Queue::Graphics),
             (Some(Queue::Compute), Queue::Graphics),

@@ -365,16 +365,16 @@ fn import_both(
 fn add_one_and_release(
     ctx: &Context,
     pipeline: ComputePipelineHandle,
-    texture: TextureHandle,
+    texture: &Holder<TextureHandle>,
     words: BufferHandle,
 ) -> CommandBuffer {
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.bind_compute_pipeline(pipeline).unwrap();
     let address = ctx.buffer_address(words).unwrap();
     cmd.push_constants(&[address as u32, (address >> 32) as u32, texture.index()]).unwrap();
-    let uses = Dependencies { buffers: &[words], sampled_images: &[texture], ..Default::default() };
+    let uses = Dependencies { buffers: &[words], sampled_images: &[**texture], ..Default::default() };
     cmd.dispatch([1, 1, 1], &uses).unwrap();
-    cmd.release_texture(texture, vk::ImageLayout::TRANSFER_SRC_OPTIMAL).unwrap();
+    cmd.release_texture(**texture, vk::ImageLayout::TRANSFER_SRC_OPTIMAL).unwrap();
     cmd
 }
 
@@ -442,7 +442,7 @@ fn exchange() {
                 // SAFETY: the clear leaves it so.
                 unsafe { ctx.acquire_texture(*texture, vk::ImageLayout::TRANSFER_DST_OPTIMAL).unwrap() };
             }
-            let cmd = add_one_and_release(&ctx, *pipeline, *texture, *words);
+            let cmd = add_one_and_release(&ctx, *pipeline, &texture, *words);
             let wait = RawWait { semaphore: binary, value: 0, stages: ALL };
             let signal = RawSignal { semaphore: timeline, value: 10 * round };
             // SAFETY: the binary semaphore has its signal under way, and the timeline rises.

@@ -42,7 +42,7 @@ impl View {
     fn culling(&self) -> InstanceCulling {
         let view = view::look_to_mat4(self.eye, self.forward, Vec3::Y);
         let projection = vulkan::perspective(FOV, 1.0, NEAR, FAR);
-        InstanceCulling::from_view_projection(self.eye, projection * view)
+        InstanceCulling::from_view_projection(self.eye, (projection * view).to_cols_array_2d())
     }
 
     /// Rays through the pixels of a square image, from the near to the far plane.

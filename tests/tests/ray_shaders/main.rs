@@ -2,6 +2,7 @@
 //! stage.
 
 mod any_hit;
+mod invocation_reorder;
 mod pipelines;
 mod query_getters;
 mod query_stages;

@@ -7,6 +7,7 @@ mod compaction_budgets;
 mod errors;
 mod leaks;
 mod many_geometries;
+mod opacity_micromaps;
 mod out_of_order_tlas_updates;
 mod primitive_order;
 mod serialize;

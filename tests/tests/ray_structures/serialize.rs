@@ -66,7 +66,7 @@ impl Mine {
     }
 
     fn desc(&self, flags: BuildFlags, order: PrimitiveOrder) -> BlasDesc<'_> {
-        BlasDesc { geometries: &self.geometries, flags, order, debug_name: "mine" }
+        BlasDesc { geometries: &self.geometries, flags, order, debug_name: "mine", ..BlasDesc::default() }
     }
 
     fn tlas_of(&self, ctx: &Context, blas: &Holder<AccelStructHandle>) -> Result<Holder<AccelStructHandle>> {

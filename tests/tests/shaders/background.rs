@@ -4,7 +4,7 @@
 use lvk::{
     ColorTarget, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Error, Format, HitGroup,
     Holder, PendingPipeline, RayTracingPipelineDesc, RayTracingPipelineHandle, RenderPipelineDesc,
-    ShaderModuleHandle, ShaderStage, SpecializationConstant, SpecializationValue,
+    ShaderModuleHandle, ShaderRecord, ShaderStage, SpecializationConstant, SpecializationValue,
 };
 use lvk_tests::compute::{compute_pipeline, module, read_words, words_buffer};
 use lvk_tests::device;
@@ -207,11 +207,12 @@ fn start_rays(ctx: &Context, count: usize) -> Vec<PendingPipeline<RayTracingPipe
     let ray_gen = module(ctx, ShaderStage::RayGen, text);
     let hit = module(ctx, ShaderStage::ClosestHit, "void main() {}");
     let start = |_| {
-        let record = RECORD.to_ne_bytes();
+        let bytes = RECORD.to_ne_bytes();
+        let record = ShaderRecord::from_bytes(&bytes);
         let desc = RayTracingPipelineDesc {
             ray_gen: &[*ray_gen],
-            ray_gen_records: &[&record],
-            hit_groups: &[HitGroup { closest_hit: Some(*hit), record: &record, ..Default::default() }],
+            ray_gen_records: &[record],
+            hit_groups: &[HitGroup { closest_hit: Some(*hit), record, ..Default::default() }],
             debug_name: "rays",
             ..Default::default()
         };

@@ -44,6 +44,7 @@ fn pipeline(
         specialization: &[SpecializationConstant { id: 3, value: SpecializationValue::U32(width) }],
         required_subgroup_size,
         full_subgroups,
+        layouts: &[],
         debug_name: "sizes",
     })
 }
@@ -126,7 +127,7 @@ fn wrong_sizes_are_refused_by_name_and_limit() {
         assert!(matches!(&error, Error::InvalidUsage { object, .. } if object == "sizes"), "{size}: {error}");
     }
     match refusal(most, Some(2 * most), false) {
-        Error::LimitExceeded { object, what, requested, limit } => {
+        Error::LimitExceeded { object, what, requested, limit, .. } => {
             assert_eq!((&*object, requested, limit), ("sizes", (2 * most).into(), most.into()));
             assert!(what.contains("maxSubgroupSize"), "{what}");
         }

@@ -5,5 +5,6 @@ mod errors;
 mod formats;
 mod kinds;
 mod samplers;
+mod transient_heaps;
 mod views;
 mod yuv;

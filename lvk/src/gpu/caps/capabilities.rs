@@ -2,8 +2,8 @@
 
 use ash::vk;
 
-use super::limits::Limits;
-use super::optional_features::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
+use super::limits::{Limits, MicromapLimits};
+use super::optional_features::{FeatureSet, OF_MESH_SHADERS, OF_RAY_TRACING_PIPELINES, OptionalFeature};
 use super::queues::QueueInfo;
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::shading_rate::ShadingRateLimits;
@@ -132,6 +132,7 @@ impl Capabilities {
             left = left.without(OF_MESH_SHADERS.into_iter().collect());
         }
         self.optional = left.without_unmet_requirements();
+        self.remove_ray_tracing_features(self.hardware_acceleration_structures());
         self.primitive_id = self.has(OptionalFeature::GeometryShader);
         self.formatless_storage_read = self.has(OptionalFeature::StorageImageReadWithoutFormat);
         self.cube_arrays = self.has(OptionalFeature::CubeArrays);
@@ -169,6 +170,25 @@ impl Capabilities {
             self.ray_query_path = RayQueryPath::None;
         }
         self.position_fetch &= self.ray_tracing_pipeline || self.ray_query;
+        self.remove_ray_tracing_features(self.ray_tracing_pipeline || self.ray_query);
+    }
+
+    /// Removes the optional features of ray tracing pipelines and acceleration structures that are not there.
+    /// `structures` is true if the device builds acceleration structures.
+    fn remove_ray_tracing_features(&mut self, structures: bool) {
+        let mut off = FeatureSet::NONE;
+        if !self.ray_tracing_pipeline {
+            off = OF_RAY_TRACING_PIPELINES.into_iter().collect();
+        }
+        if !structures {
+            off = off.with(OptionalFeature::OpacityMicromaps);
+        }
+        self.optional = self.optional.without(off);
+        if !self.has(OptionalFeature::OpacityMicromaps) {
+            self.limits.micromap = MicromapLimits::default();
+        }
+        let orders = [OptionalFeature::InvocationReorder, OptionalFeature::InvocationReorderNv];
+        self.limits.reorders_invocations &= orders.into_iter().any(|feature| self.has(feature));
     }
 
     /// True if the device itself performs the traversal of ray queries (`VK_KHR_ray_query`).

@@ -4,6 +4,8 @@ use std::ffi::CStr;
 
 use ash::vk;
 
+use super::invocation_reorder::{INVOCATION_REORDER_EXT, InvocationReorderFeatures};
+
 /// Features of extensions. All are false for extensions that the device lacks.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ExtensionFeatures {
@@ -22,6 +24,9 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) maintenance5: vk::PhysicalDeviceMaintenance5FeaturesKHR<'static>,
     pub(crate) graphics_library: vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'static>,
     pub(crate) fault: vk::PhysicalDeviceFaultFeaturesEXT<'static>,
+    pub(crate) invocation_reorder: InvocationReorderFeatures,
+    pub(crate) invocation_reorder_nv: vk::PhysicalDeviceRayTracingInvocationReorderFeaturesNV<'static>,
+    pub(crate) micromaps: vk::PhysicalDeviceOpacityMicromapFeaturesEXT<'static>,
     pub(crate) swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'static>,
     /// All true on devices without `VK_KHR_portability_subset`.
     pub(crate) portability: vk::PhysicalDevicePortabilitySubsetFeaturesKHR<'static>,
@@ -88,6 +93,15 @@ impl ExtensionFeatures {
         }
         if has(ash::ext::device_fault::NAME) {
             all = all.push_next(&mut self.fault);
+        }
+        if has(INVOCATION_REORDER_EXT) {
+            all = all.push_next(&mut self.invocation_reorder);
+        }
+        if has(ash::nv::ray_tracing_invocation_reorder::NAME) {
+            all = all.push_next(&mut self.invocation_reorder_nv);
+        }
+        if has(ash::ext::opacity_micromap::NAME) {
+            all = all.push_next(&mut self.micromaps);
         }
         if has(ash::ext::swapchain_maintenance1::NAME) {
             all = all.push_next(&mut self.swapchain_maintenance1);

@@ -126,6 +126,22 @@ pub struct Limits {
     pub subgroup: SubgroupLimits,
     /// Limits of task and mesh shaders.
     pub mesh: MeshLimits,
+    /// Limits of opacity micromaps; 0 without
+    /// [`OptionalFeature::OpacityMicromaps`](crate::OptionalFeature::OpacityMicromaps).
+    pub micromap: MicromapLimits,
+    /// True if the device reorders invocations where a shader asks for it
+    /// (`rayTracingInvocationReorderReorderingHint`). A device with one of the features may accept the calls and
+    /// ignore them.
+    pub reorders_invocations: bool,
+}
+
+/// Limits of opacity micromaps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MicromapLimits {
+    /// Maximum subdivision level of maps with two states (`maxOpacity2StateSubdivisionLevel`).
+    pub max_two_state_level: u32,
+    /// Maximum subdivision level of maps with four states (`maxOpacity4StateSubdivisionLevel`).
+    pub max_four_state_level: u32,
 }
 
 impl Limits {

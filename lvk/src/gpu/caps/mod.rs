@@ -8,6 +8,7 @@ pub(crate) mod features;
 pub(crate) mod format_features;
 pub(crate) mod host_image_copy;
 pub(crate) mod image_limits;
+pub(crate) mod invocation_reorder;
 pub(crate) mod limits;
 pub(crate) mod mesh_limits;
 pub(crate) mod optional_features;

@@ -6,6 +6,7 @@ use std::fmt;
 use ash::vk;
 
 use super::features::{FeatureField, Features};
+use super::invocation_reorder::INVOCATION_REORDER_EXT;
 
 /// A feature that some devices have and the library does not need. It is enabled wherever the device has it,
 /// unless a [`DeviceProfile`](crate::DeviceProfile) hides it. [`Capabilities::has`](crate::Capabilities::has)
@@ -180,6 +181,16 @@ pub enum OptionalFeature {
     SwapchainMaintenance1,
     /// HDR metadata for the display of a window (`VK_EXT_hdr_metadata`).
     HdrMetadata,
+    /// Invocations of ray tracing shaders that are sorted by their hits, by `GL_EXT_shader_invocation_reorder`
+    /// (`rayTracingInvocationReorder` of `VK_EXT_ray_tracing_invocation_reorder`). Only devices with ray tracing
+    /// pipelines have it.
+    InvocationReorder,
+    /// The same by `GL_NV_shader_invocation_reorder` (`VK_NV_ray_tracing_invocation_reorder`).
+    InvocationReorderNv,
+    /// Opacity micromaps of triangles (`micromap` of `VK_EXT_opacity_micromap`):
+    /// [`Context::create_opacity_micromap`](crate::Context::create_opacity_micromap). Only devices that build
+    /// acceleration structures have it.
+    OpacityMicromaps,
     /// Blend factors of colour that take the alpha of the blend constant (`constantAlphaColorBlendFactors`).
     ConstantAlphaColorBlend,
     /// Vulkan events (`events`). The library itself uses none.
@@ -333,6 +344,10 @@ impl fmt::Debug for FeatureSet {
 pub(crate) const OF_MESH_SHADERS: [OptionalFeature; 3] =
     [F::MultiviewMesh, F::MeshShaderQueries, F::MeshPrimitiveShadingRate];
 
+/// Features of ray tracing pipelines, which have a separate flag.
+pub(crate) const OF_RAY_TRACING_PIPELINES: [OptionalFeature; 2] =
+    [F::InvocationReorder, F::InvocationReorderNv];
+
 /// Features of presentation, available only if the instance has surface extensions.
 pub(crate) const OF_WINDOWS: [OptionalFeature; 3] = [F::Swapchain, F::SwapchainMaintenance1, F::HdrMetadata];
 
@@ -358,7 +373,7 @@ struct FeatureRow {
 }
 
 #[rustfmt::skip]
-const ROWS: [FeatureRow; 101] = [
+const ROWS: [FeatureRow; 104] = [
     FeatureRow { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, field: |f| &mut f.core.full_draw_index_uint32 },
     FeatureRow { feature: F::CubeArrays, name: "imageCubeArray", extension: None, field: |f| &mut f.core.image_cube_array },
     FeatureRow { feature: F::GeometryShader, name: "geometryShader", extension: None, field: |f| &mut f.core.geometry_shader },
@@ -441,6 +456,9 @@ const ROWS: [FeatureRow; 101] = [
     FeatureRow { feature: F::Swapchain, name: "VK_KHR_swapchain", extension: Some(ash::khr::swapchain::NAME), field: |f| &mut f.ext.swapchain },
     FeatureRow { feature: F::SwapchainMaintenance1, name: "swapchainMaintenance1", extension: Some(ash::ext::swapchain_maintenance1::NAME), field: |f| &mut f.ext.swapchain_maintenance1.swapchain_maintenance1 },
     FeatureRow { feature: F::HdrMetadata, name: "VK_EXT_hdr_metadata", extension: Some(ash::ext::hdr_metadata::NAME), field: |f| &mut f.ext.hdr_metadata },
+    FeatureRow { feature: F::InvocationReorder, name: "rayTracingInvocationReorder", extension: Some(INVOCATION_REORDER_EXT), field: |f| &mut f.ext.invocation_reorder.ray_tracing_invocation_reorder },
+    FeatureRow { feature: F::InvocationReorderNv, name: "VK_NV_ray_tracing_invocation_reorder", extension: Some(ash::nv::ray_tracing_invocation_reorder::NAME), field: |f| &mut f.ext.invocation_reorder_nv.ray_tracing_invocation_reorder },
+    FeatureRow { feature: F::OpacityMicromaps, name: "micromap", extension: Some(ash::ext::opacity_micromap::NAME), field: |f| &mut f.ext.micromaps.micromap },
     FeatureRow { feature: F::ConstantAlphaColorBlend, name: "constantAlphaColorBlendFactors", extension: None, field: |f| &mut f.ext.portability.constant_alpha_color_blend_factors },
     FeatureRow { feature: F::Events, name: "events", extension: None, field: |f| &mut f.ext.portability.events },
     FeatureRow { feature: F::ViewFormatReinterpretation, name: "imageViewFormatReinterpretation", extension: None, field: |f| &mut f.ext.portability.image_view_format_reinterpretation },

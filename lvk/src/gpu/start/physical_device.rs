@@ -8,7 +8,8 @@ use crate::error::device_candidate::{DeviceCandidate, DeviceKind};
 use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::features::{Calibration, Features, Subgroups, missing_required};
-use crate::gpu::caps::limits::Limits;
+use crate::gpu::caps::invocation_reorder::InvocationReorderProperties;
+use crate::gpu::caps::limits::{Limits, MicromapLimits};
 use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 use crate::gpu::caps::queues::{QueueFamily, QueueLocation, describe_queues, locate_queues, queue_families};
@@ -149,6 +150,9 @@ impl PhysicalDevice {
         let mut rates = vk::PhysicalDeviceFragmentShadingRatePropertiesKHR::default();
         let mut borders = vk::PhysicalDeviceCustomBorderColorPropertiesEXT::default();
         let mut portability = vk::PhysicalDevicePortabilitySubsetPropertiesKHR::default();
+        let mut reorder = InvocationReorderProperties::default();
+        let mut reorder_nv = vk::PhysicalDeviceRayTracingInvocationReorderPropertiesNV::default();
+        let mut micromap = vk::PhysicalDeviceOpacityMicromapPropertiesEXT::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
         let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
@@ -170,6 +174,15 @@ impl PhysicalDevice {
         }
         if self.capabilities.has(OptionalFeature::CustomBorderColors) {
             all = all.push_next(&mut borders);
+        }
+        if self.capabilities.has(OptionalFeature::InvocationReorder) {
+            all = all.push_next(&mut reorder);
+        }
+        if self.capabilities.has(OptionalFeature::InvocationReorderNv) {
+            all = all.push_next(&mut reorder_nv);
+        }
+        if self.capabilities.has(OptionalFeature::OpacityMicromaps) {
+            all = all.push_next(&mut micromap);
         }
         if self.capabilities.portability_subset {
             all = all.push_next(&mut portability);
@@ -196,6 +209,13 @@ impl PhysicalDevice {
         caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
         caps.limits.vertex_stride_alignment = portability.min_vertex_input_binding_stride_alignment.max(1);
         caps.limits.max_views = v11.max_multiview_view_count;
+        caps.limits.micromap = MicromapLimits {
+            max_two_state_level: micromap.max_opacity2_state_subdivision_level,
+            max_four_state_level: micromap.max_opacity4_state_subdivision_level,
+        };
+        let hint = reorder_nv.ray_tracing_invocation_reorder_reordering_hint;
+        caps.limits.reorders_invocations =
+            reorder.reorders() || hint == vk::RayTracingInvocationReorderModeNV::REORDER;
     }
 }
 

@@ -30,11 +30,14 @@ const FREE: [C; 18] = [
     C::PhysicalStorageBufferAddresses,
 ];
 
+/// The capability `ShaderInvocationReorderEXT`, which the crate `spirv` 0.3 lacks.
+const SHADER_INVOCATION_REORDER_EXT: u32 = 5388;
+
 /// A capability, a function that returns true if it is allowed, and the name of the feature that allows it.
 type CapabilityRow = (C, fn(&Features) -> vk::Bool32, &'static str);
 
 #[rustfmt::skip]
-const BY_FEATURE: [CapabilityRow; 51] = [
+const BY_FEATURE: [CapabilityRow; 53] = [
     (C::Geometry, |f| f.core.geometry_shader, "geometryShader"),
     (C::Tessellation, |f| f.core.tessellation_shader, "tessellationShader"),
     (C::GeometryPointSize, point_size, "shaderTessellationAndGeometryPointSize"),
@@ -75,6 +78,8 @@ const BY_FEATURE: [CapabilityRow; 51] = [
     (C::RayTraversalPrimitiveCullingKHR, |f| f.ext.ray_tracing.ray_traversal_primitive_culling, "rayTraversalPrimitiveCulling"),
     (C::RayTracingPositionFetchKHR, |f| f.ext.position_fetch.ray_tracing_position_fetch, "rayTracingPositionFetch"),
     (C::RayQueryPositionFetchKHR, |f| f.ext.position_fetch.ray_tracing_position_fetch, "rayTracingPositionFetch"),
+    (C::ShaderInvocationReorderNV, |f| f.ext.invocation_reorder_nv.ray_tracing_invocation_reorder, "VK_NV_ray_tracing_invocation_reorder"),
+    (C::RayTracingOpacityMicromapEXT, |f| f.ext.micromaps.micromap, "micromap"),
     (C::MeshShadingEXT, |f| f.ext.mesh.mesh_shader, "meshShader"),
     (C::MinLod, |f| f.core.shader_resource_min_lod, "shaderResourceMinLod"),
     (C::VariablePointers, |f| f.v11.variable_pointers, "variablePointers"),
@@ -135,6 +140,10 @@ fn missing_capability(capability: u32, features: &Features) -> Option<String> {
     let is = |known: C| known as u32 == capability;
     if FREE.into_iter().any(is) || BY_SUBGROUP.iter().any(|row| is(row.0)) {
         return None;
+    }
+    if capability == SHADER_INVOCATION_REORDER_EXT {
+        let allowed = features.ext.invocation_reorder.ray_tracing_invocation_reorder == vk::TRUE;
+        return (!allowed).then(|| feature_message("rayTracingInvocationReorder"));
     }
     match BY_FEATURE.iter().find(|row| is(row.0)) {
         Some((_, allowed, _)) if allowed(features) == vk::TRUE => None,

@@ -170,7 +170,13 @@ impl BuiltScene {
         let geometries: Vec<_> = buffers.iter().map(|buffers| [buffers.geometry()]).collect();
         let descs: Vec<_> = geometries
             .iter()
-            .map(|geometries| BlasDesc { geometries, flags, order, debug_name: "mesh" })
+            .map(|geometries| BlasDesc {
+                geometries,
+                flags,
+                order,
+                debug_name: "mesh",
+                ..BlasDesc::default()
+            })
             .collect();
         let blas = ctx.create_blas_batch(&descs)?;
         let instances: Vec<_> = blas.iter().map(|blas| TlasInstance::new(**blas)).collect();
