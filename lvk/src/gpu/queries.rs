@@ -82,12 +82,7 @@ impl Gpu {
     /// Returns the ticks of the device's clock at this moment; `None` where the device and the host share no clock.
     #[cfg(feature = "tracy")]
     pub(crate) fn device_ticks(&self) -> Option<u64> {
-        let mut now = 0;
-        let read = self.clock_reader.as_ref()?.read(|ticks| {
-            now = ticks;
-            self.milliseconds(ticks)
-        });
-        read.ok().map(|_| now)
+        self.clock_reader.as_ref()?.device_ticks().ok()
     }
 
     /// Queries the fault of a lost device. `None` if the driver does not provide it.

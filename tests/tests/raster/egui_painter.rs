@@ -260,8 +260,8 @@ fn ids_of_no_texture_are_errors_that_name_them() {
     };
     unknown(painter.unregister_texture(id));
     unknown(painter.unregister_texture(egui::TextureId::Managed(0)));
-    let mut mesh = egui::Mesh::with_texture(id);
-    mesh.add_colored_rect(rect([0.0, 0.0], [9.0, 9.0]), Color32::WHITE);
+    let (mut mesh, whole) = (egui::Mesh::with_texture(id), rect([0.0, 0.0], [1.0, 1.0]));
+    mesh.add_rect_with_uv(rect([0.0, 0.0], [9.0, 9.0]), whole, Color32::WHITE);
     let clipped = egui::ClippedPrimitive {
         clip_rect: Rect::EVERYTHING,
         primitive: egui::epaint::Primitive::Mesh(mesh),
