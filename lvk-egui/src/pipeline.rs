@@ -2,8 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    Blend, BlockLayout, ColorTarget, CompareOp, Context, CullMode, DepthTest, Format, Holder, RenderPipelineDesc,
-    RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage,
+    Blend, BlockLayout, ColorTarget, CompareOp, Context, CullMode, DepthTest, Format, Holder,
+    RenderPipelineDesc, RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage,
 };
 
 use crate::error::{Error, Result};

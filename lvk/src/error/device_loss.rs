@@ -41,7 +41,7 @@ pub struct UnfinishedCommands {
     pub value: u64,
     /// Name given by [`CommandBuffer::set_debug_name`](crate::CommandBuffer::set_debug_name); empty without one.
     pub name: String,
-    /// Its labels in recording order, each before its children.
+    /// Labels of the command buffer in recording order, each before its children.
     pub labels: Vec<ReportedLabel>,
 }
 
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn long_lists_are_cut_around_the_label_that_ran() {
+    fn long_lists_keep_the_lines_around_the_label_that_ran() {
         let progress = |place| if place < 100 { LabelProgress::Ended } else { LabelProgress::NotBegun };
         let labels = (0..200).map(|place| label(&format!("l{place}"), 0, progress(place))).collect();
         let mut unfinished = vec![commands(7, "", labels)];

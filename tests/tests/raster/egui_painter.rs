@@ -141,7 +141,7 @@ fn translucent_shapes_let_the_ground_through() {
 }
 
 #[test]
-fn textures_of_the_application_are_shown_by_their_handle() {
+fn textures_of_the_application_are_painted_by_their_handle() {
     let Some(ctx) = device() else { return };
     let pixels: Vec<u8> = (0..8_u8 * 4).flat_map(|i| [8 * i, 255 - 8 * i, i, 255]).collect();
     let (format, data) = (Format::Rgba8Unorm, Some(&pixels[..]));
