@@ -319,8 +319,10 @@ mod tests {
     fn a_geometry_points_to_the_micromap_with_the_counts_of_its_triangles() {
         let plan = plan();
         let raw = attachment(vk::MicromapEXT::from_raw(9), 0x3000, &plan.triangle_counts);
-        let mut triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default();
-        triangles.p_next = std::ptr::from_ref(&raw).cast();
+        let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR {
+            p_next: std::ptr::from_ref(&raw).cast(),
+            ..Default::default()
+        };
         // SAFETY: the chain holds one structure of this type.
         let found =
             unsafe { *triangles.p_next.cast::<vk::AccelerationStructureTrianglesOpacityMicromapEXT<'_>>() };

@@ -52,7 +52,7 @@ fn missing_library(error: &str) -> Option<MissingLibrary<'_>> {
         return Some(MissingLibrary::Unnamed);
     }
     let of_glibc = || Some(error.split_once(": cannot open shared object file: No such file")?.0);
-    let of_musl = || Some(between(error, "Error loading shared library ", ": No such file")?);
+    let of_musl = || between(error, "Error loading shared library ", ": No such file");
     let of_apple = || error.split_once("Library not loaded: ")?.1.lines().next();
     let of_android = || between(error, "library \"", "\" not found");
     let name = of_glibc().or_else(of_musl).or_else(of_apple).or_else(of_android)?.trim();

@@ -181,5 +181,5 @@ fn hybrid_and_large_scene_render_under_recent_phones() {
 
 /// Scratch that the profile's driver needs for a build of the whole world.
 fn scratch_bytes(profile: &DeviceProfile, world: &World) -> u64 {
-    world.triangle_count() as u64 * profile.scratch_bytes_per_primitive
+    world.triangle_count() * profile.scratch_bytes_per_primitive
 }

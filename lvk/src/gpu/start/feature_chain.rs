@@ -8,6 +8,7 @@ use ash::vk::{self, StructureType, TaggedStructure};
 use crate::error::{Error, Result};
 use crate::gpu::caps::extension_features::ExtensionFeatures;
 use crate::gpu::caps::features::{FeatureField, Features};
+use crate::gpu::caps::invocation_reorder::{INVOCATION_REORDER_EXT, InvocationReorderFeatures};
 
 /// The feature structures and extension names that a device needs for a context, as owned memory behind a
 /// `VkDeviceCreateInfo`. [`DeviceRequirements::feature_chain`](crate::DeviceRequirements::feature_chain) creates it.
@@ -275,15 +276,15 @@ unsafe fn replace<T: TaggedStructure>(link: &Link, value: T) {
     }
 }
 
-/// The structures of extensions: the member of [`ExtensionFeatures`], its type and the module of the extension.
+/// The structures of extensions: the member of [`ExtensionFeatures`], its type and the name of the extension.
 macro_rules! extension_structures {
-    ($($member:ident: $type:ident, $vendor:ident::$extension:ident;)+) => {
+    ($($member:ident: $type:ty, $extension:expr;)+) => {
         /// # Safety
         /// The link is valid.
         unsafe fn read_extension(link: &Link, all: &mut ExtensionFeatures) {
             match link.s_type {
                 // SAFETY: by the caller's promise; the type of a structure says what it is.
-                $(<vk::$type<'_>>::STRUCTURE_TYPE => all.$member = unsafe { *link.raw.cast() },)+
+                $(<$type>::STRUCTURE_TYPE => all.$member = unsafe { *link.raw.cast() },)+
                 _ => {}
             }
         }
@@ -293,7 +294,7 @@ macro_rules! extension_structures {
         unsafe fn write_extension(link: &Link, all: &ExtensionFeatures) {
             match link.s_type {
                 // SAFETY: as above.
-                $(<vk::$type<'_>>::STRUCTURE_TYPE => unsafe { replace(link, all.$member) },)+
+                $(<$type>::STRUCTURE_TYPE => unsafe { replace(link, all.$member) },)+
                 _ => {}
             }
         }
@@ -306,8 +307,8 @@ macro_rules! extension_structures {
             names: &[&CStr],
         ) -> Vec<*mut vk::BaseOutStructure<'static>> {
             let mut links = Vec::new();
-            $(if names.contains(&ash::$vendor::$extension::NAME)
-                && !present.contains(&<vk::$type<'_>>::STRUCTURE_TYPE)
+            $(if names.contains(&$extension)
+                && !present.contains(&<$type>::STRUCTURE_TYPE)
             {
                 links.push(store(&mut place.$member, all.ext.$member));
             })+
@@ -317,23 +318,26 @@ macro_rules! extension_structures {
 }
 
 extension_structures! {
-    structures: PhysicalDeviceAccelerationStructureFeaturesKHR, khr::acceleration_structure;
-    ray_tracing: PhysicalDeviceRayTracingPipelineFeaturesKHR, khr::ray_tracing_pipeline;
-    ray_query: PhysicalDeviceRayQueryFeaturesKHR, khr::ray_query;
-    position_fetch: PhysicalDeviceRayTracingPositionFetchFeaturesKHR, khr::ray_tracing_position_fetch;
-    mesh: PhysicalDeviceMeshShaderFeaturesEXT, ext::mesh_shader;
-    float_atomics: PhysicalDeviceShaderAtomicFloatFeaturesEXT, ext::shader_atomic_float;
-    local_read: PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR, khr::dynamic_rendering_local_read;
-    shading_rate: PhysicalDeviceFragmentShadingRateFeaturesKHR, khr::fragment_shading_rate;
-    barycentrics: PhysicalDeviceFragmentShaderBarycentricFeaturesKHR, khr::fragment_shader_barycentric;
-    index_uint8: PhysicalDeviceIndexTypeUint8FeaturesKHR, khr::index_type_uint8;
-    border_color: PhysicalDeviceCustomBorderColorFeaturesEXT, ext::custom_border_color;
-    host_image_copy: PhysicalDeviceHostImageCopyFeaturesEXT, ext::host_image_copy;
-    maintenance5: PhysicalDeviceMaintenance5FeaturesKHR, khr::maintenance5;
-    graphics_library: PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT, ext::graphics_pipeline_library;
-    fault: PhysicalDeviceFaultFeaturesEXT, ext::device_fault;
-    swapchain_maintenance1: PhysicalDeviceSwapchainMaintenance1FeaturesEXT, ext::swapchain_maintenance1;
-    portability: PhysicalDevicePortabilitySubsetFeaturesKHR, khr::portability_subset;
+    structures: vk::PhysicalDeviceAccelerationStructureFeaturesKHR<'_>, ash::khr::acceleration_structure::NAME;
+    ray_tracing: vk::PhysicalDeviceRayTracingPipelineFeaturesKHR<'_>, ash::khr::ray_tracing_pipeline::NAME;
+    ray_query: vk::PhysicalDeviceRayQueryFeaturesKHR<'_>, ash::khr::ray_query::NAME;
+    position_fetch: vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR<'_>, ash::khr::ray_tracing_position_fetch::NAME;
+    mesh: vk::PhysicalDeviceMeshShaderFeaturesEXT<'_>, ash::ext::mesh_shader::NAME;
+    float_atomics: vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>, ash::ext::shader_atomic_float::NAME;
+    local_read: vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR<'_>, ash::khr::dynamic_rendering_local_read::NAME;
+    shading_rate: vk::PhysicalDeviceFragmentShadingRateFeaturesKHR<'_>, ash::khr::fragment_shading_rate::NAME;
+    barycentrics: vk::PhysicalDeviceFragmentShaderBarycentricFeaturesKHR<'_>, ash::khr::fragment_shader_barycentric::NAME;
+    index_uint8: vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>, ash::khr::index_type_uint8::NAME;
+    border_color: vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>, ash::ext::custom_border_color::NAME;
+    host_image_copy: vk::PhysicalDeviceHostImageCopyFeaturesEXT<'_>, ash::ext::host_image_copy::NAME;
+    maintenance5: vk::PhysicalDeviceMaintenance5FeaturesKHR<'_>, ash::khr::maintenance5::NAME;
+    graphics_library: vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>, ash::ext::graphics_pipeline_library::NAME;
+    fault: vk::PhysicalDeviceFaultFeaturesEXT<'_>, ash::ext::device_fault::NAME;
+    invocation_reorder: InvocationReorderFeatures, INVOCATION_REORDER_EXT;
+    invocation_reorder_nv: vk::PhysicalDeviceRayTracingInvocationReorderFeaturesNV<'_>, ash::nv::ray_tracing_invocation_reorder::NAME;
+    micromaps: vk::PhysicalDeviceOpacityMicromapFeaturesEXT<'_>, ash::ext::opacity_micromap::NAME;
+    swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'_>, ash::ext::swapchain_maintenance1::NAME;
+    portability: vk::PhysicalDevicePortabilitySubsetFeaturesKHR<'_>, ash::khr::portability_subset::NAME;
 }
 
 /// The structures of promoted extensions: the version with their features, and these features.

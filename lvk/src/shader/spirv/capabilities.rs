@@ -301,7 +301,7 @@ mod tests {
         for (capability, _, feature) in BY_FEATURE {
             let found = refusal(ShaderStage::Vertex, &module(&[C::Shader, capability]), &all_subgroups());
             let found = found.unwrap_or_else(|| panic!("{capability:?} is allowed"));
-            let start = format!("capability {capability:?} of shader 'test' is not supported");
+            let start = format!("not supported: capability {capability:?} of shader 'test': ");
             assert!(found.starts_with(&start) && found.contains(feature), "{found}");
         }
     }
@@ -351,7 +351,7 @@ mod tests {
     fn an_unknown_number_is_refused_by_its_number() {
         let module = Reflection { capabilities: vec![4_000_000_000], ..Reflection::default() };
         let found = refusal(ShaderStage::Compute, &module, &all_subgroups()).unwrap();
-        assert!(found.starts_with("capability number 4000000000"), "{found}");
+        assert!(found.starts_with("not supported: capability number 4000000000"), "{found}");
     }
 
     #[test]

@@ -32,6 +32,9 @@ fn all_extensions() -> Vec<&'static CStr> {
         khr::maintenance5::NAME,
         ext::graphics_pipeline_library::NAME,
         ext::device_fault::NAME,
+        INVOCATION_REORDER_EXT,
+        ash::nv::ray_tracing_invocation_reorder::NAME,
+        ext::opacity_micromap::NAME,
         ext::swapchain_maintenance1::NAME,
         khr::portability_subset::NAME,
     ]
