@@ -127,10 +127,9 @@
 //!   arrays.
 //! * `profiling` opens a scope of the crate [`profiling`](https://docs.rs/profiling) around calls that can take long:
 //!   submissions, waits, presents, acquisitions, creation of pipelines and shaders, uploads and builds. The application
-//!   chooses the profiler by a feature of that crate, or by `tracing` or `tracy` of this one.
-//! * `tracing` sends the scopes to subscribers of the crate `tracing`.
+//!   chooses the profiler by a feature of that crate, or by `tracy` of this one.
 //! * `tracy` sends the scopes to Tracy, and the labels of command buffers as GPU zones: see
-//!   [`manual::measuring`].
+//!   [`manual::measuring`]. It needs a C++ compiler when the library is built.
 //!
 //! # Targets
 //!
