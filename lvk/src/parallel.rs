@@ -1,13 +1,16 @@
 //! Parallel work on threads. If the system refuses some of the threads, the others do all of the work.
 
 use std::num::NonZero;
+use std::sync::OnceLock;
 use std::thread::{Builder, available_parallelism, scope};
 
 use crate::lock_order::{HeldLocks, Mutex, Rank};
 
-/// Returns the number of threads that is useful for work of any size.
+/// Returns the number of threads that is useful for work of any size. The system is asked once: it reads files for the
+/// answer.
 pub(crate) fn core_count() -> usize {
-    available_parallelism().map_or(1, NonZero::get)
+    static COUNT: OnceLock<usize> = OnceLock::new();
+    *COUNT.get_or_init(|| available_parallelism().map_or(1, NonZero::get))
 }
 
 /// Runs `work` on `threads` threads, including the current one. Fewer if the system refuses some.

@@ -241,7 +241,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn each_state_is_found_where_its_record_says(
+        fn each_state_lies_where_its_record_says(
             maps in prop::collection::vec(map(), 1..6),
             triangles in prop::collection::vec(0..9_usize, 1..20),
         ) {

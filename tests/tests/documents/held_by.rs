@@ -33,7 +33,8 @@ fn files(held_by: &str) -> Result<Vec<String>, String> {
             Some("t: ") => "tests/tests",
             Some("s: ") => "samples/tests",
             Some("u: ") => "lvk/src",
-            _ => return Err(format!("{part:?} begins with none of t:, s: and u:")),
+            Some("w: ") => "samples/wgpu-guest/tests",
+            _ => return Err(format!("{part:?} begins with none of t:, s:, u: and w:")),
         };
         found.extend(part[3..].split(", ").map(|name| format!("{folder}/{name}.rs")));
     }

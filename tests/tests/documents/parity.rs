@@ -311,7 +311,7 @@ fn entries_without_a_valid_test_are_noticed() {
     ] {
         assert!(complaint(&row(here, held_by)).is_some(), "{here} {held_by}");
     }
-    assert_eq!(complaint(&row("the same", "t: documents/parity; s: windows; u: barrier/batch")), None);
-    assert_eq!(complaint(&row("Left out: as long as no device could", "-")), None);
+    assert_eq!(complaint(&row("the same", "t: documents/parity; s: windows/input; u: barrier/batch")), None);
+    assert_eq!(complaint(&row("Left out: as long as no device at hand could hold it", "-")), None);
     assert!(rows("| a | b |").is_err() && rows("| a | b | c | d |").is_err());
 }

@@ -273,9 +273,16 @@ impl Reader {
             segments.push(word.text.to_owned());
             at += 2;
         }
-        self.add(tokens[start].line, segments, None);
+        // An exported macro is named by the crate's root, whichever file defines it.
+        if !is_macro_call(&tokens[at..]) {
+            self.add(tokens[start].line, segments, None);
+        }
         at
     }
+}
+
+fn is_macro_call(rest: &[Token<'_>]) -> bool {
+    matches!(rest, [mark, open, ..] if mark.is_mark("!") && ["(", "[", "{"].iter().any(|text| open.is_mark(text)))
 }
 
 fn is_within_path(tokens: &[Token<'_>], at: usize) -> bool {
@@ -309,6 +316,7 @@ mod tests {
             use ::d::G;
             impl Iterator<Item = u8> + use<'_> for X {}
             fn f() { let x = crate::d::H::new::<u8>(); c::g(); deep::h() }
+            fn made() { crate::exported!(1) }
             macro_rules! m { () => { $crate::e::I } }";
         let files = [
             ("a.rs", a),
