@@ -66,7 +66,8 @@
 //! | submit, wait, pace frames | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
 //! | compute, build and copy while the graphics queue draws | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
-//! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
+//! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`], [`CommandBuffer::push_label`] |
+//! | find out why a device was lost | [`DeviceLossReport`], [`ContextDesc::checkpoints`] |
 //! | use raw Vulkan calls, or another engine's device | [`manual::interop`], [`Context::requirements`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
 //! | port a program | [`manual::from_lightweightvk`], [`manual::from_wgpu`] |
@@ -109,18 +110,26 @@
 //!
 //! # Features
 //!
-//! All features but `glam` are enabled by default. The code and the crates of a disabled feature are not compiled.
+//! The code and the crates of a disabled feature are not compiled. Enabled by default are:
 //!
 //! * `glsl` compiles GLSL at run time. It needs a C++17 compiler when the library is built. Without it, modules take
 //!   only SPIR-V words, and [`ShaderSource::Glsl`] is [`Error::Unsupported`].
 //! * `software-ray-query` contains the library's own BVH builders and traversal, for devices without ray queries.
 //!   Without it, such devices have no ray queries: [`RayQueryRequest::Auto`] selects hardware or nothing,
 //!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
+//! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
+//!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
+//!
+//! Disabled by default are:
+//!
 //! * `glam` adds `transform_rows`, which takes a transform of the crate `glam`, and exports the crate as `lvk::glam`.
 //!   No other item has types of `glam`: transforms are `[f32; 12]` ([`rows_from_columns`]), points and matrices are
 //!   arrays.
-//! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
-//!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
+//! * `profiling` opens a scope of the crate [`profiling`](https://docs.rs/profiling) around calls that can take long:
+//!   submissions, waits, presents, acquisitions, creation of pipelines and shaders, uploads and builds. The application
+//!   chooses the profiler by a feature of that crate, or by `tracy` of this one.
+//! * `tracy` sends the scopes to Tracy, and the labels of command buffers as GPU zones: see
+//!   [`manual::measuring`]. It needs a C++ compiler when the library is built.
 //!
 //! # Targets
 //!
@@ -142,6 +151,7 @@ mod bindless;
 mod cache_file;
 mod command;
 mod context;
+mod cpu_scope;
 mod device_state;
 mod error;
 mod format;
@@ -212,6 +222,9 @@ pub use context::transient_heap::TransientHeap;
 pub use error::causes::with_causes;
 pub use error::device_candidate::{DeviceCandidate, DeviceKind};
 pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
+pub use error::device_loss::{
+    DeviceLossReport, LabelProgress, QueueLossReport, ReportedLabel, UnfinishedCommands,
+};
 pub use error::driver_report::{
     DriverManifest, DriverReport, LoaderReport, ManifestOutcome, SearchedPath, VulkanReport,
 };
@@ -229,6 +242,7 @@ pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
 pub use gpu::caps::subgroup_limits::SubgroupLimits;
+pub use gpu::debug::label::Label;
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
 pub use gpu::host_clock::HostClock;
 pub use gpu::memory::allocator::MemoryKind;

@@ -2,9 +2,9 @@
 
 use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
 
+use crate::catalogue;
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
-use crate::{app, catalogue};
 
 /// The stage whose GLSL is `shaders/<sample>/<name>.glsl`; its name says the kind of the stage, as in `sky.frag`.
 macro_rules! shader {
@@ -129,9 +129,8 @@ impl SamplePipeline {
     }
 }
 
-/// Returns every pipeline of the samples, of `bench` and of the user interface.
+/// Returns every pipeline of the samples and of `bench`.
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
-    let samples = catalogue::SAMPLES.iter().flat_map(|sample| (sample.pipelines)());
-    samples.chain(app::ui::pipelines()).collect()
+    catalogue::SAMPLES.iter().flat_map(|sample| (sample.pipelines)()).collect()
 }

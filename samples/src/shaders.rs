@@ -12,7 +12,6 @@ macro_rules! includes {
 
 /// Names as `#include` writes them, and texts, for every sample.
 pub const INCLUDES: &[(&str, &str)] = includes![
-    "app/ui",
     "bench/view",
     "common/arrays",
     "common/camera",

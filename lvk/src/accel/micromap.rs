@@ -286,7 +286,8 @@ mod tests {
         assert_eq!((input.records, input.indices), (256, 272));
         assert_eq!(input.bytes[..2], [0b0100_1101, 1]);
         assert_eq!(input.bytes[256..272], [0, 0, 0, 0, 1, 0, 2, 0, 1, 0, 0, 0, 0, 0, 1, 0]);
-        let indices: Vec<i32> = bytemuck::pod_collect_to_vec(&input.bytes[272..]);
+        let indices: Vec<i32> =
+            input.bytes[272..].chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
         assert_eq!(indices, [0, -1, 1, 0]);
     }
 

@@ -14,6 +14,7 @@ use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
 use crate::barrier::{ResourceId, Stages, Use};
+use crate::cpu_scope::cpu_scope;
 use crate::device_state::DeferredObject;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
@@ -123,6 +124,7 @@ impl CommandBuffer {
     /// Records builds of parts in batches that share the scratch buffer (`vkCmdBuildAccelerationStructuresKHR`), and
     /// then the builds of the software BVHs.
     pub(crate) fn record_blas_builds(&mut self, plan: BlasBuildPlan) -> Result<()> {
+        cpu_scope!("record BLAS builds");
         let BlasBuildPlan { open, parts, software, is_first } = plan;
         let shared = Arc::clone(&self.shared);
         if shared.gpu.accel.is_some() {

@@ -1,15 +1,27 @@
-//! Labels of a command buffer for debuggers, and the scopes of a profile.
+//! Labels of a command buffer for debuggers and for the report of a lost device, and the scopes of a profile.
 
 use super::CommandBuffer;
 use super::render::pass::RenderPass;
+use crate::gpu::checkpoints::Checkpoint;
+use crate::gpu::debug::label::Label;
 
 impl CommandBuffer {
-    /// Opens a labelled range for debuggers (`vkCmdBeginDebugUtilsLabelEXT`). It is also a scope of
-    /// [`Context::last_profile`](crate::Context::last_profile) if profiling is on. Ranges that are open when the
-    /// command buffer is submitted are closed then.
-    pub fn push_label(&mut self, name: &str) {
-        self.shared.gpu.begin_label(self.raw(), name);
-        self.write_label_timestamp(Some(name));
+    /// Names the command buffer for debuggers and for the [report](crate::DeviceLossReport) of a lost device. A later
+    /// call replaces the name.
+    pub fn set_debug_name(&mut self, name: &str) {
+        self.recording.set_name(&self.shared.gpu, name);
+    }
+
+    /// Opens a labelled range for debuggers (`vkCmdBeginDebugUtilsLabelEXT`): a name, or a [`Label`] with a colour. It
+    /// is also a scope of [`Context::last_profile`](crate::Context::last_profile) if profiling is on, and named in the
+    /// [report](crate::DeviceLossReport) of a lost device. Ranges that are open when the command buffer is submitted
+    /// are closed then.
+    pub fn push_label<'a>(&mut self, label: impl Into<Label<'a>>) {
+        let label = label.into();
+        self.shared.gpu.begin_label(self.raw(), label);
+        let event = self.recording.labels.begin(label.name);
+        self.record_checkpoint(event);
+        self.write_label_timestamp(Some(label.name));
         self.open_labels += 1;
     }
 
@@ -18,9 +30,12 @@ impl CommandBuffer {
         self.pop_labels(self.open_labels.saturating_sub(1));
     }
 
-    /// Inserts a label for debuggers (`vkCmdInsertDebugUtilsLabelEXT`).
-    pub fn insert_label(&mut self, name: &str) {
-        self.shared.gpu.insert_label(self.raw(), name);
+    /// Inserts a label for debuggers (`vkCmdInsertDebugUtilsLabelEXT`): a name, or a [`Label`] with a colour.
+    pub fn insert_label<'a>(&mut self, label: impl Into<Label<'a>>) {
+        let label = label.into();
+        self.shared.gpu.insert_label(self.raw(), label);
+        let event = self.recording.labels.insert(label.name);
+        self.record_checkpoint(event);
     }
 
     /// Closes labels until `left` are open.
@@ -28,7 +43,16 @@ impl CommandBuffer {
         while self.open_labels > left {
             self.write_label_timestamp(None);
             self.shared.gpu.end_label(self.raw());
+            let event = self.recording.labels.end();
+            self.record_checkpoint(event);
             self.open_labels -= 1;
+        }
+    }
+
+    /// Records a label event as a checkpoint, if the context writes checkpoints.
+    fn record_checkpoint(&self, event: usize) {
+        if let Some(checkpoints) = &self.shared.gpu.checkpoints {
+            checkpoints.record(self.raw(), Checkpoint::new(self.recording.sequence, event));
         }
     }
 
@@ -43,8 +67,8 @@ impl CommandBuffer {
 
 impl RenderPass<'_> {
     /// As [`CommandBuffer::push_label`]; closed at the end of the pass at the latest.
-    pub fn push_label(&mut self, name: &str) {
-        self.cmd.push_label(name);
+    pub fn push_label<'a>(&mut self, label: impl Into<Label<'a>>) {
+        self.cmd.push_label(label);
     }
 
     /// As [`CommandBuffer::pop_label`]; does nothing if none was opened in the pass.
@@ -55,7 +79,7 @@ impl RenderPass<'_> {
     }
 
     /// As [`CommandBuffer::insert_label`].
-    pub fn insert_label(&mut self, name: &str) {
-        self.cmd.insert_label(name);
+    pub fn insert_label<'a>(&mut self, label: impl Into<Label<'a>>) {
+        self.cmd.insert_label(label);
     }
 }

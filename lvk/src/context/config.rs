@@ -32,6 +32,11 @@ pub struct ContextDesc<'a> {
     /// (`vkGetPhysicalDeviceToolProperties`). Otherwise names cause no driver calls. The library's own errors and
     /// reports always use the names.
     pub debug_names: Option<bool>,
+    /// Writes the labels of command buffers to the GPU as checkpoints, where the device supports it
+    /// (`VK_NV_device_diagnostic_checkpoints`). The report of a lost device then says which labels had begun and ended
+    /// ([`DeviceLossReport`](crate::DeviceLossReport)). Each begin and end of a label costs a command then. Without it,
+    /// or on other devices, the report lists unfinished submissions with all of their labels.
+    pub checkpoints: bool,
     /// Makes shaders check every index of a bindless array before use. A wrong index is recorded with the name of the
     /// object that it belonged to, for [`Context::index_faults`](crate::Context::index_faults); the access uses the
     /// default descriptor of slot 0. For debugging only: every access costs several memory reads, command buffers no
@@ -118,6 +123,7 @@ impl Default for ContextDesc<'_> {
             validation: ValidationMode::Off,
             validation_sink: None,
             debug_names: None,
+            checkpoints: false,
             check_indices: false,
             ray_tracing_pipeline: FeatureRequest::Optional,
             ray_query: RayQueryRequest::default(),

@@ -19,6 +19,7 @@ use crate::accel::split::PartLimits;
 use crate::accel::tlas::Tlas;
 use crate::accel::tlas_desc::TlasDesc;
 use crate::command::queue_support::{BUILD_ON_QUEUE, needs_compute};
+use crate::cpu_scope::cpu_scope;
 use crate::device_state::DeviceState;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
@@ -56,6 +57,7 @@ impl Context {
     /// [`BufferUsage::ACCEL_INPUT`](crate::BufferUsage::ACCEL_INPUT), and an exhausted
     /// memory budget ([`ContextDesc::accel_budget_bytes`](crate::ContextDesc)).
     pub fn create_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Holder<AccelStructHandle>>> {
+        cpu_scope!("create BLAS");
         let (holders, objects) = self.new_blas_batch(descs)?;
         for (batch, is_last) in self.scratch_batches(&objects)? {
             self.record_in_prologue(|cmd| {

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::Context;
+use crate::cpu_scope::cpu_scope;
 use crate::error::Result;
 use crate::submit::last_access::PerQueue;
 
@@ -51,6 +52,7 @@ impl Context {
     /// buffers for each index is therefore enough. On other queues this holds for [`submit`](Self::submit), but not for
     /// [`submit_in_background`](Self::submit_in_background).
     pub fn next_frame(&self) -> Result<Frame> {
+        cpu_scope!("next frame");
         let submitted = self.device_state().submitter.foreground_values();
         let (frame, wait_for) = {
             let mut frames = self.inner.frames.lock();

@@ -30,6 +30,7 @@ pub(crate) mod plan_blas;
 mod profiling;
 mod prologue;
 mod query_results;
+mod queue_labels;
 pub(crate) mod read_bounds;
 pub(crate) mod readback;
 mod requirements;

@@ -159,6 +159,7 @@ pub(super) fn external_request<'a>(desc: &'a ContextDesc<'_>) -> DeviceRequest<'
         profile: None,
         extra: UserExtensions::default(),
         debug_names: desc.debug_names,
+        checkpoints: desc.checkpoints,
         queues: requested_queues(desc),
         window: desc.window_ref(),
     }

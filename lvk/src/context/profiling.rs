@@ -24,7 +24,9 @@ impl Context {
     /// [`next_frame`](Self::next_frame) was never called. `None` before the first. Does not wait.
     ///
     /// A frame is everything submitted between two calls of [`next_frame`](Self::next_frame), so its times are known
-    /// after the second call at the earliest. Uploads by the library count in the total time and have no scopes.
+    /// after the second call at the earliest. [`wait_idle`](Self::wait_idle) finishes the latest frame without a second
+    /// call: its profile then holds what was submitted so far, and grows if the frame submits more. Uploads by the
+    /// library count in the total time and have no scopes.
     ///
     /// # Errors
     /// Errors of the Vulkan query for the GPU's progress.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::command::CommandBuffer;
+use crate::cpu_scope::cpu_scope;
 use crate::device_state::DeferredObject;
 use crate::error::Result;
 use crate::lock_order::Guard;
@@ -47,7 +48,8 @@ impl Context {
         let cmd = match &mut pending.commands {
             Some(cmd) => cmd,
             none => {
-                let recording = self.device_state().submitter.acquire(Queue::Graphics)?;
+                let mut recording = self.device_state().submitter.acquire(Queue::Graphics)?;
+                recording.labels.set_name("uploads and builds");
                 none.insert(self.new_command_buffer(Queue::Graphics, recording))
             }
         };
@@ -78,6 +80,7 @@ impl Context {
 
     /// Writes bytes of a buffer before the next submission. The bytes are copied before the lock is taken.
     pub(super) fn upload_to_buffer(&self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
+        cpu_scope!("upload buffer");
         // Adjacent uploads are thereby adjacent in staging memory too, and become one copy.
         const ALIGNMENT: u64 = 4;
         target.check_range(offset, bytes.len() as u64)?;
@@ -97,6 +100,7 @@ impl Context {
         region: &TextureRegion,
         bytes: &[u8],
     ) -> Result<()> {
+        cpu_scope!("upload texture");
         if let Some(place) = &target.image.transient_place {
             return Err(place.not_begun(&target.name));
         }

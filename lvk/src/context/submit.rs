@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::Context;
 use crate::command::{CommandBuffer, FinishedRecording};
+use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::queue::Queue;
 use crate::submit::{Recording, Submission, SubmitHandle};
@@ -65,6 +66,7 @@ impl Context {
         cmd: CommandBuffer,
         more: Submission,
     ) -> Result<SubmitHandle> {
+        cpu_scope!("submit");
         self.check_same_context(&cmd)?;
         let queue_index = cmd.queue_index();
         self.advance_compactions();
@@ -166,10 +168,12 @@ impl Context {
         self.device_state().submitter.is_done(submission.value)
     }
 
-    /// Submits pending work, and waits until the GPU is idle.
+    /// Submits pending work, and waits until the GPU is idle. [`last_profile`](Self::last_profile) then covers all of it.
     pub fn wait_idle(&self) -> Result<()> {
         self.flush()?;
-        self.wait_submitted()
+        self.wait_submitted()?;
+        self.device_state().profiler.publish_open();
+        Ok(())
     }
 
     /// Waits for everything submitted so far, on all queues.

@@ -89,7 +89,8 @@ impl Context {
         let SwapchainInner { lifecycle, resources } = &mut *guard;
         self.check_alive(swapchain)?;
         let mut live = LiveBackend { ctx: self, name: &object.name, resources };
-        let Some(acquired) = lifecycle.acquire_image(&object.name, &mut live)? else { return Ok(None) };
+        let acquired = lifecycle.acquire_image(&object.name, &mut live);
+        let Some(acquired) = self.device_state().submitter.explain_loss(acquired)? else { return Ok(None) };
         let image = resources.current.as_ref().and_then(|current| {
             let image = current.images.get(acquired.index as usize)?;
             Some(SwapchainImage {
@@ -146,7 +147,7 @@ impl Context {
         if let Some(semaphore) = resources.signalled.take() {
             resources.recycle_semaphore(semaphore, submission.value);
         }
-        lifecycle.record_present(answer)?;
+        shared.submitter.explain_loss(lifecycle.record_present(answer))?;
         Ok(submission)
     }
 

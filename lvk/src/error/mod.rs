@@ -3,6 +3,7 @@
 pub(crate) mod causes;
 pub(crate) mod device_candidate;
 pub(crate) mod device_fault;
+pub(crate) mod device_loss;
 mod driver_remedies;
 pub(crate) mod driver_report;
 mod driver_report_text;
@@ -18,7 +19,7 @@ use ash::vk;
 
 use crate::queue::Queue;
 use device_candidate::DeviceCandidate;
-use device_fault::DeviceFault;
+use device_loss::DeviceLossReport;
 use driver_report::DriverReport;
 use driver_report_text::no_device_text;
 use layout_difference::{LayoutDifference, differences_text};
@@ -249,12 +250,11 @@ pub enum Error {
         call: &'static str,
     },
     /// The device is lost, and the context cannot be used any more.
-    #[error("the device was lost in {call}{}; create a new context", fault_suffix(fault))]
+    #[error("{report}; create a new context")]
     DeviceLost {
-        /// The Vulkan command that reported the loss.
-        call: &'static str,
-        /// Fault report of the driver, if it provides one and a submission or wait detected the loss.
-        fault: Option<Arc<DeviceFault>>,
+        /// The command that reported the loss, the fault, and what the queues were doing. Every later error of the
+        /// context's submissions and waits has the report of the first.
+        report: Arc<DeviceLossReport>,
     },
     /// The creation of an object failed with an error that does not name the object.
     #[error("{object}: {source}")]
@@ -279,13 +279,18 @@ impl Error {
     /// Converts the result of `call` to an error.
     pub(crate) fn vulkan(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
         move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => Self::DeviceLost { call, fault: None },
+            vk::Result::ERROR_DEVICE_LOST => Self::device_lost(call),
             vk::Result::ERROR_OUT_OF_HOST_MEMORY => Self::OutOfHostMemory { call },
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
                 Self::OutOfDeviceMemory { object: call.to_owned(), bytes: 0 }
             }
             result => Self::Vulkan { call, result },
         }
+    }
+
+    /// Returns the error for the loss of the device in `call`, of which no more is known yet.
+    pub(crate) fn device_lost(call: &'static str) -> Self {
+        Self::DeviceLost { report: Arc::new(DeviceLossReport { call, ..DeviceLossReport::default() }) }
     }
 
     /// Adds the name of the object whose creation failed, if the error has no name of its own.
@@ -324,10 +329,6 @@ fn stale_object(kind: &str, name: &Option<String>) -> String {
         Some(name) => format!("'{name}'"),
         None => format!("the {kind}"),
     }
-}
-
-fn fault_suffix(fault: &Option<Arc<DeviceFault>>) -> String {
-    fault.as_ref().map(|fault| format!(" ({fault})")).unwrap_or_default()
 }
 
 /// Returns [`Error::LimitExceeded`] if `requested` exceeds the device's `limit`.
@@ -419,7 +420,7 @@ mod tests {
         assert!(text(memory).contains("'water'"));
         assert!(text(Error::OutOfHostMemory { call: "vkCreateShaderModule" }).starts_with("water: out of"));
         assert_eq!(text(Error::usage("grass", "is green")), "grass: is green", "it has a name");
-        let lost = Error::DeviceLost { call: "vkQueueSubmit2", fault: None };
+        let lost = Error::device_lost("vkQueueSubmit2");
         assert!(matches!(lost.with_object("water"), Error::DeviceLost { .. }));
     }
 }

@@ -109,6 +109,12 @@ impl ClockReader {
         })
     }
 
+    /// Returns the ticks of the device's clock at this moment.
+    #[cfg(feature = "tracy")]
+    pub(crate) fn device_ticks(&self) -> Result<u64> {
+        Ok(self.read_ticks()?.0)
+    }
+
     /// Returns the ticks of the device, those of the host, and the maximum deviation in nanoseconds.
     fn read_ticks(&self) -> Result<(u64, u64, u64)> {
         let infos = [vk::TimeDomainKHR::DEVICE, self.clock.domain()]

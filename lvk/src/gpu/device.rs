@@ -18,6 +18,7 @@ use super::caps::portability::{PortabilityNeed, first_missing};
 use super::caps::queues::{QueueLocation, QueueRequest, Queues};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
+use super::checkpoints::Checkpoints;
 use super::debug::debugger::has_debugger;
 use super::memory::allocator::DeviceMemory;
 use super::memory::budget::HeapUse;
@@ -49,6 +50,8 @@ pub(crate) struct DeviceRequest<'a> {
     /// True to name objects for debuggers. `None`: name them if the validation layer or a debugger reads the
     /// names.
     pub(crate) debug_names: Option<bool>,
+    /// True to write labels to the GPU as checkpoints, where the device supports it.
+    pub(crate) checkpoints: bool,
     pub(crate) queues: QueueRequest,
     /// A window that the device must be able to present to.
     pub(crate) window: Option<WindowRef<'a>>,
@@ -76,6 +79,8 @@ pub(crate) struct Gpu {
     pub(crate) host_copies: Option<HostImageCopy>,
     /// Reads the clocks of device and host together.
     pub(crate) clock_reader: Option<ClockReader>,
+    /// Writes labels as checkpoints. `None` if the device cannot, or the caller did not request it.
+    pub(crate) checkpoints: Option<Checkpoints>,
     /// Number of live samplers with a custom border colour. Devices allow few of them.
     pub(crate) custom_borders: AtomicU32,
     /// `None` if the context does not present to windows.
@@ -136,6 +141,7 @@ impl Gpu {
     /// The requirements of [`Context::from_raw`](crate::Context::from_raw).
     pub(crate) unsafe fn from_raw(raw: RawContext<'_>, request: &DeviceRequest<'_>) -> Result<Self> {
         let mut chosen = raw.physical()?;
+        chosen.capabilities.checkpoints &= request.checkpoints;
         use_single_queue(&mut chosen, request.queues);
         let mut caps = chosen.capabilities.clone();
         caps.choose_ray_tracing(request.pipeline, request.query);
@@ -184,6 +190,7 @@ impl Gpu {
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_copies,
+            checkpoints: caps.checkpoints.then(|| Checkpoints::new(raw, &device)),
             clock_reader: ClockReader::new(&instance, &device, physical, features.calibration),
             #[cfg(feature = "window")]
             windows: super::start::surface::WindowFunctions::new(&instance, &device, |feature| {
@@ -374,6 +381,7 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
         }
     };
     let mut chosen = devices.swap_remove(index);
+    chosen.capabilities.checkpoints &= request.checkpoints;
     use_single_queue(&mut chosen, request.queues);
     Ok(chosen)
 }
@@ -522,8 +530,10 @@ pub(super) fn device_extensions<'a>(
 ) -> Vec<&'a CStr> {
     let links = caps.pipeline_libraries || caps.has(OptionalFeature::GraphicsPipelineLibrary);
     let libraries = links.then_some(ash::khr::pipeline_library::NAME);
+    let checkpoints = caps.checkpoints.then_some(ash::nv::device_diagnostic_checkpoints::NAME);
     let subset = caps.portability_subset.then_some(ash::khr::portability_subset::NAME);
     let own = features.extensions().chain(caps.optional.extensions()).chain(libraries).chain(subset);
+    let own = own.chain(checkpoints);
     let mut names: Vec<&'a CStr> = own.map(|name| -> &'a CStr { name }).collect();
     names.extend_from_slice(extra.device_extensions());
     names.sort_unstable();

@@ -2,6 +2,7 @@
 
 pub(crate) mod calibrated_timestamps;
 pub(crate) mod caps;
+pub(crate) mod checkpoints;
 pub(crate) mod debug;
 pub(crate) mod device;
 pub(crate) mod host_clock;

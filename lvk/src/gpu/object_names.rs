@@ -1,9 +1,13 @@
-//! Names of a device's objects, and labels in its command buffers, for debuggers.
+//! Names of a device's objects, and labels in its command buffers and on its queues, for debuggers.
+
+use std::sync::atomic::Ordering;
 
 use ash::vk;
 
+use super::debug::label::Label;
 use super::debug::messenger::c_name;
 use super::device::Gpu;
+use crate::queue::Queue;
 
 impl Gpu {
     /// True if a tool reads names and labels.
@@ -21,21 +25,17 @@ impl Gpu {
     }
 
     /// Begins a labelled range in a command buffer.
-    pub(crate) fn begin_label(&self, commands: vk::CommandBuffer, name: &str) {
+    pub(crate) fn begin_label(&self, commands: vk::CommandBuffer, label: Label<'_>) {
         let Some(ext) = &self.debug_utils else { return };
-        let name = c_name(name);
-        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
         // SAFETY: the command buffer is being recorded.
-        unsafe { ext.cmd_begin_debug_utils_label(commands, &label) };
+        unsafe { ext.cmd_begin_debug_utils_label(commands, &label.raw(&label.c_name())) };
     }
 
     /// Inserts a label in a command buffer.
-    pub(crate) fn insert_label(&self, commands: vk::CommandBuffer, name: &str) {
+    pub(crate) fn insert_label(&self, commands: vk::CommandBuffer, label: Label<'_>) {
         let Some(ext) = &self.debug_utils else { return };
-        let name = c_name(name);
-        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
         // SAFETY: the command buffer is being recorded.
-        unsafe { ext.cmd_insert_debug_utils_label(commands, &label) };
+        unsafe { ext.cmd_insert_debug_utils_label(commands, &label.raw(&label.c_name())) };
     }
 
     /// Ends the innermost labelled range.
@@ -43,6 +43,37 @@ impl Gpu {
         if let Some(ext) = &self.debug_utils {
             // SAFETY: the command buffer is being recorded, and the caller balances its labels.
             unsafe { ext.cmd_end_debug_utils_label(commands) };
+        }
+    }
+
+    /// Begins a labelled range of a queue.
+    pub(crate) fn begin_queue_label(&self, queue: Queue, label: Label<'_>) {
+        let Some(ext) = &self.debug_utils else { return };
+        let raw = self.queues.raw(queue.index());
+        self.queues.open_labels(queue).fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the queue belongs to the device and is locked.
+        unsafe { ext.queue_begin_debug_utils_label(*raw, &label.raw(&label.c_name())) };
+    }
+
+    /// Inserts a label between two submissions to a queue.
+    pub(crate) fn insert_queue_label(&self, queue: Queue, label: Label<'_>) {
+        let Some(ext) = &self.debug_utils else { return };
+        let raw = self.queues.raw(queue.index());
+        // SAFETY: as above.
+        unsafe { ext.queue_insert_debug_utils_label(*raw, &label.raw(&label.c_name())) };
+    }
+
+    /// Ends the innermost labelled range of a queue, if one is open.
+    pub(crate) fn end_queue_label(&self, queue: Queue) {
+        let Some(ext) = &self.debug_utils else { return };
+        let raw = self.queues.raw(queue.index());
+        let open = self.queues.open_labels(queue);
+        // The count changes only while the queue is locked.
+        let left = open.load(Ordering::Relaxed).checked_sub(1);
+        if let Some(left) = left {
+            open.store(left, Ordering::Relaxed);
+            // SAFETY: as above, and a range is open.
+            unsafe { ext.queue_end_debug_utils_label(*raw) };
         }
     }
 }

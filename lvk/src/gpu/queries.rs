@@ -1,7 +1,5 @@
 //! Queries to a device: formats, images, shading rates, memory, and the fault of a lost device.
 
-use std::sync::Arc;
-
 use ash::vk;
 
 use super::caps::format_features::format_properties;
@@ -9,9 +7,11 @@ use super::caps::host_image_copy::host_copies_stay_optimal;
 use super::caps::image_limits::ImageLimitsResult;
 use super::caps::optional_features::OptionalFeature;
 use super::caps::shading_rate::{ShadingRate, ShadingRateCombiner, ShadingRateError, check_rate};
+use super::checkpoints::PassedCheckpoints;
 use super::debug::device_fault::query_fault;
 use super::device::Gpu;
 use super::memory::budget::MemoryBudget;
+use crate::error::device_fault::DeviceFault;
 use crate::error::{Error, Result};
 use crate::format::Format;
 
@@ -79,15 +79,21 @@ impl Gpu {
         self.heap_use.query_budget(&self.instance.raw, self.physical(), is_measured)
     }
 
-    /// As [`Error::vulkan`], with the device's fault report if the device is lost.
-    pub(crate) fn vulkan_error(&self, call: &'static str) -> impl FnOnce(vk::Result) -> Error + '_ {
-        move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => {
-                let functions = self.device_fault.as_ref();
-                let fault = functions.and_then(|functions| query_fault(functions, self.device.handle()));
-                Error::DeviceLost { call, fault: fault.map(Arc::new) }
-            }
-            other => Error::vulkan(call)(other),
-        }
+    /// Returns the ticks of the device's clock at this moment; `None` where the device and the host share no clock.
+    #[cfg(feature = "tracy")]
+    pub(crate) fn device_ticks(&self) -> Option<u64> {
+        self.clock_reader.as_ref()?.device_ticks().ok()
+    }
+
+    /// Queries the fault of a lost device. `None` if the driver does not provide it.
+    pub(crate) fn query_fault(&self) -> Option<DeviceFault> {
+        query_fault(self.device_fault.as_ref()?, self.device.handle())
+    }
+
+    /// Returns the checkpoints that a queue of a lost device has passed. `None` if the context writes none, and for
+    /// queues that share a Vulkan queue.
+    pub(crate) fn passed_checkpoints(&self, queue_index: usize) -> Option<PassedCheckpoints> {
+        let checkpoints = self.checkpoints.as_ref().filter(|_| !self.queues.is_emulated())?;
+        Some(checkpoints.passed(*self.queues.raw(queue_index)))
     }
 }

@@ -11,6 +11,7 @@ use super::stage::{Specialization, SpecializationConstant, stage_info};
 use super::subgroup_size::SubgroupRequest;
 use super::workgroup_memory::{WorkgroupMemoryLimits, check_workgroup_memory};
 use super::workgroup_size::{WorkgroupLimits, check_workgroup_size};
+use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
@@ -67,6 +68,7 @@ impl ComputePipeline {
         desc: &ComputePipelineDesc<'_>,
         module: &ShaderModule,
     ) -> Result<Self> {
+        cpu_scope!("create compute pipeline");
         module.check_stage(ShaderStage::Compute)?;
         let name = desc.debug_name;
         check_layouts(name, desc.layouts, std::iter::once(module))?;

@@ -18,6 +18,7 @@ use super::shader_module::ModuleLookup;
 use super::stage::Specialization;
 use crate::barrier::Stages;
 use crate::bindless::input_attachments::InputAttachmentMask;
+use crate::cpu_scope::cpu_scope;
 use crate::error::Result;
 use crate::gpu::Gpu;
 
@@ -62,6 +63,7 @@ impl RenderPipeline {
         find: ModuleLookup<'_>,
         parts: &GraphicsParts,
     ) -> Result<Self> {
+        cpu_scope!("create graphics pipeline");
         check_stages(gpu, desc)?;
         let modules = RenderModules::resolve(desc, find)?;
         check_modules(gpu, desc, &modules)?;

@@ -13,6 +13,7 @@ use super::sbt::{GroupHandles, SbtLimits, SbtPlan, SbtRegion, plan_sbt, sbt_buff
 use super::sbt_order::{PerRegion, sbt_order};
 use super::shader_groups::{CompiledGroups, ShaderGroups};
 use super::shader_module::ModuleLookup;
+use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
@@ -59,6 +60,7 @@ impl RayTracingPipeline {
         find: ModuleLookup<'_>,
         libraries: &[Arc<RayTracingLibrary>],
     ) -> Result<(Self, SbtContents)> {
+        cpu_scope!("create ray tracing pipeline");
         let name = desc.debug_name;
         let ext = gpu.ray_tracing_functions()?;
         check_interface(gpu, desc)?;

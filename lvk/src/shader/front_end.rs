@@ -14,6 +14,7 @@ use super::spirv::debug_source::embed_source;
 use super::spirv::passes::merge_sampled_image::merge_sampled_images;
 use super::spirv::passes::strip_unused_bindings::strip_unused_bindings;
 use super::{ShaderModuleDesc, ShaderStage, diagnostics, preamble};
+use crate::cpu_scope::cpu_scope;
 use crate::error::Result;
 
 /// Returns the words of `text`, from the cache if it has them.
@@ -23,6 +24,7 @@ pub(super) fn compile_cached(
     options: &CompileOptions,
     files: CompileFiles<'_>,
 ) -> Result<Vec<u32>> {
+    cpu_scope!("compile GLSL");
     let name = desc.debug_name;
     let complain = |c: SourceError| compile_error(name, format!("line {}: {}", c.line, c.message));
     let text =

@@ -2,7 +2,8 @@
 
 use ash::vk;
 
-use crate::error::Result;
+use crate::cpu_scope::cpu_scope;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
 /// One or two batches. A batch begins once all of its waits are satisfied, and the last one signals. The lists are
@@ -47,6 +48,7 @@ impl Batches {
 
     /// Submits the batches to a queue.
     pub(super) fn submit(&self, gpu: &Gpu, queue_index: usize) -> Result<()> {
+        cpu_scope!("vkQueueSubmit2");
         let (waits, commands) = self.second.unwrap_or_default();
         let first = vk::SubmitInfo2::default()
             .wait_semaphore_infos(&self.waits[..waits])
@@ -60,6 +62,6 @@ impl Batches {
         let queue = gpu.queues.raw(queue_index);
         // SAFETY: the command buffers are complete and used once; the queue is locked.
         unsafe { gpu.device.queue_submit2(*queue, submits, vk::Fence::null()) }
-            .map_err(gpu.vulkan_error("vkQueueSubmit2"))
+            .map_err(Error::vulkan("vkQueueSubmit2"))
     }
 }

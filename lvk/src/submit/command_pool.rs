@@ -122,6 +122,12 @@ impl CommandRing {
         staged
     }
 
+    /// Returns the submitted command buffers of a queue that are not done when its timeline is at `completed`.
+    pub(crate) fn unfinished(&self, queue_index: usize, completed: u64) -> impl Iterator<Item = &Recording> {
+        let in_flight = self.queues[queue_index].in_flight.iter();
+        in_flight.map(|recording| &**recording).filter(move |recording| recording.value > completed)
+    }
+
     /// Returns the sequence number of the latest command buffer taken.
     pub(crate) fn newest_sequence(&self) -> u64 {
         self.last_sequence

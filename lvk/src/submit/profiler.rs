@@ -24,6 +24,9 @@ pub(crate) struct Scopes {
     query_indices: Vec<usize>,
     /// The first free query.
     next: usize,
+    /// The queue of the command buffer.
+    #[cfg(feature = "tracy")]
+    queue: Queue,
     /// True if a query pool could not be created. The command buffer is not measured then.
     broken: bool,
 }
@@ -46,6 +49,8 @@ struct ProfilerState {
     /// The unfinished profile: its frame or submission, its first tick, and the result so far.
     open: Option<(ProfilePart, u64, GpuProfile)>,
     last: Option<Arc<GpuProfile>>,
+    #[cfg(feature = "tracy")]
+    tracy: super::tracy_zones::TracyZones,
 }
 
 /// Measured command buffers of one submission.
@@ -98,7 +103,11 @@ impl Profiler {
         if !self.on.load(Ordering::Relaxed) || self.gpu.caps.queue(queue).timestamp_bits == 0 {
             return None;
         }
-        let mut scopes = Box::default();
+        let mut scopes = Box::<Scopes>::default();
+        #[cfg(feature = "tracy")]
+        {
+            scopes.queue = queue;
+        }
         self.stamp(&mut scopes, commands, Some(""), 1);
         Some(scopes)
     }
@@ -189,6 +198,14 @@ impl Profiler {
         Ok(())
     }
 
+    /// Makes the unfinished profile the last one if all work submitted for it so far is done. More work of its frame
+    /// completes the profile later.
+    pub(crate) fn publish_open(&self) {
+        if self.busy.load(Ordering::Acquire) {
+            self.lock().publish_open();
+        }
+    }
+
     /// Returns the profile finished last.
     pub(crate) fn last(&self) -> Option<Arc<GpuProfile>> {
         self.lock().last.clone()
@@ -206,6 +223,8 @@ impl ProfilerState {
         }
         for scopes in measured.scopes {
             if let Some(ticks) = scopes.ticks()? {
+                #[cfg(feature = "tracy")]
+                self.tracy.emit(gpu, scopes.queue, &scopes.stamps, &ticks);
                 self.add_command_buffer(gpu, measured.part, &scopes.stamps, &ticks);
             }
             self.spare.extend(scopes.pools);
@@ -250,6 +269,14 @@ impl ProfilerState {
         };
         if !expected {
             self.close_profile();
+        }
+    }
+
+    fn publish_open(&mut self) {
+        if let Some((part, _, profile)) = &self.open
+            && !self.in_flight.iter().any(|measured| measured.part == *part)
+        {
+            self.last = Some(Arc::new(profile.clone()));
         }
     }
 

@@ -1,6 +1,6 @@
 //! Submission: command buffers go to their queues in order, with the barriers between them.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use ash::vk;
 
@@ -14,6 +14,7 @@ use super::queue_sync::{OwnershipRelease, QueueCaps, QueueSync, SubmitPlan, Subm
 use super::recording::{Recording, begin_commands, end_commands};
 use super::timeline::Timeline;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
+use crate::error::device_loss::DeviceLossReport;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock_order::{Guard, Mutex, Rank};
@@ -57,6 +58,8 @@ pub(crate) struct Submitter<T> {
     /// One timeline for each hardware queue: a single one, or one for every queue of the library.
     timelines: Vec<Timeline>,
     inner: Mutex<SubmitterState<T>>,
+    /// The report of the lost device.
+    loss: OnceLock<Arc<DeviceLossReport>>,
     gpu: Arc<Gpu>,
 }
 
@@ -108,7 +111,8 @@ impl<T> Submitter<T> {
             foreground: [0; QUEUE_COUNT],
             broken: None,
         };
-        Ok(Self { timelines, inner: Mutex::new(Rank::Submitter, inner), gpu: Arc::clone(gpu) })
+        let inner = Mutex::new(Rank::Submitter, inner);
+        Ok(Self { timelines, inner, loss: OnceLock::new(), gpu: Arc::clone(gpu) })
     }
 
     /// Starts recording a command buffer.
@@ -292,6 +296,7 @@ impl<T> Submitter<T> {
         let ticket = inner.ring.take_ticket(release.queue_index);
         let sequence = ticket.sequence;
         let mut recording = ticket.begin(&self.gpu).inspect_err(|_| inner.ring.end_recording(sequence))?;
+        recording.labels.set_name("ownership transfer");
         let sent = self.record_transfers(inner, release, recording.commands, images);
         recording.value = if sent.is_ok() { release.value } else { 0 };
         inner.file_recording(recording);
@@ -333,7 +338,9 @@ impl<T> Submitter<T> {
         let timeline =
             vk::SemaphoreSubmitInfo::default().semaphore(self.timelines[queue_index].raw).value(value);
         inner.batches.signal([timeline.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)]);
-        inner.batches.submit(&self.gpu, queue_index)?;
+        if let Err(error) = inner.batches.submit(&self.gpu, queue_index) {
+            return Err(self.explain_loss_locked(&inner.ring, inner.queue_sync.last_values(), error));
+        }
         inner.batches.clear();
         inner.queue_sync.mark_submitted(queue_index, value);
         self.timelines[queue_index].mark_submitted(value);
@@ -355,6 +362,24 @@ impl<T> Submitter<T> {
         self.lock().foreground
     }
 
+    /// Calls `with` with the command buffers and the last value submitted to each queue.
+    pub(super) fn with_ring<R>(&self, with: impl FnOnce(&CommandRing, &PerQueue<u64>) -> R) -> R {
+        let inner = self.lock();
+        with(&inner.ring, inner.queue_sync.last_values())
+    }
+
+    pub(super) fn loss(&self) -> &OnceLock<Arc<DeviceLossReport>> {
+        &self.loss
+    }
+
+    pub(super) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    pub(super) fn timeline_count(&self) -> usize {
+        self.timelines.len()
+    }
+
     /// Returns the number of values used so far.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn value_count(&self) -> u64 {
@@ -373,17 +398,18 @@ impl<T> Submitter<T> {
 
     /// Blocks until the submission of this value is done.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
-        self.timeline(self.queue_of(value)).wait(value)
+        self.explain_loss(self.timeline(self.queue_of(value)).wait(value))
     }
 
     /// Blocks until the submissions of all these values are done.
     pub(crate) fn wait_for_queues(&self, values: &PerQueue<u64>) -> Result<()> {
-        self.timelines.iter().zip(values).try_for_each(|(timeline, value)| timeline.wait(*value))
+        let mut timelines = self.timelines.iter().zip(values);
+        self.explain_loss(timelines.try_for_each(|(timeline, value)| timeline.wait(*value)))
     }
 
     /// Returns true if the submission of this value is done.
     pub(crate) fn is_done(&self, value: u64) -> Result<bool> {
-        Ok(self.timeline(self.queue_of(value)).query_completed()? >= value)
+        Ok(self.explain_loss(self.timeline(self.queue_of(value)).query_completed())? >= value)
     }
 
     /// Returns the value up to which all submissions are done.
@@ -396,7 +422,7 @@ impl<T> Submitter<T> {
     fn completed_values(&self) -> Result<PerQueue<u64>> {
         let mut completed = [0; QUEUE_COUNT];
         for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
-            *completed = timeline.query_completed()?;
+            *completed = self.explain_loss(timeline.query_completed())?;
         }
         Ok(completed)
     }

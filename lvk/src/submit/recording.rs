@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::emit_barriers::Images;
 use super::input_attachment_sets::InputSets;
+use super::label_trail::LabelTrail;
 use super::last_access::{QueueAccess, TimelineVector};
 use crate::barrier::{ResourceId, Tracker};
 use crate::error::{Error, Result};
@@ -22,6 +23,8 @@ pub(crate) struct Recording {
     pub(crate) references: Vec<(ResourceId, QueueAccess)>,
     /// Values of other queues that the caller makes it wait for.
     pub(crate) after: TimelineVector,
+    /// Name and labels, for the report of a lost device.
+    pub(crate) labels: LabelTrail,
     /// Index of its queue.
     pub(crate) queue_index: usize,
     /// Timeline value, once it is submitted; 0 before.
@@ -55,6 +58,7 @@ impl Recording {
             images: Images::default(),
             references: Vec::new(),
             after: TimelineVector::default(),
+            labels: LabelTrail::default(),
             queue_index,
             value: 0,
             is_staged: false,
@@ -81,10 +85,29 @@ impl Recording {
         self.tracker.clear();
         self.images.clear();
         self.references.clear();
+        self.clear_labels(gpu);
         self.inputs.reset();
         // SAFETY: the command buffers of the pool are not in use.
         unsafe { gpu.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
             .map_err(Error::vulkan("vkResetCommandPool"))
+    }
+
+    /// Sets the name in reports and in debuggers, until the command buffer is recorded again.
+    pub(crate) fn set_name(&mut self, gpu: &Gpu, name: &str) {
+        self.labels.set_name(name);
+        gpu.name(self.commands, name);
+    }
+
+    fn clear_labels(&mut self, gpu: &Gpu) {
+        if !self.labels.name().is_empty() {
+            gpu.name(self.commands, "");
+        }
+        self.labels.clear();
+    }
+
+    /// Returns the timeline value of its submission; 0 before it.
+    pub(super) fn value(&self) -> u64 {
+        self.value
     }
 
     /// Returns the key of the staging memory for the command buffer, and marks that memory as in use.

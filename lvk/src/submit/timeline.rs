@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use ash::vk;
 
+use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
@@ -66,9 +67,18 @@ impl Timeline {
         }
         // SAFETY: the semaphore is alive and a timeline.
         let value = unsafe { self.gpu.device.get_semaphore_counter_value(self.raw) }
-            .map_err(self.gpu.vulkan_error("vkGetSemaphoreCounterValue"))?;
+            .map_err(Error::vulkan("vkGetSemaphoreCounterValue"))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(value)
+    }
+
+    /// Returns the value that the GPU of a lost device has reached, as far as it is known. A value beyond `submitted`
+    /// is none: a lost device may report any.
+    pub(crate) fn last_known(&self, submitted: u64) -> u64 {
+        // SAFETY: the semaphore is alive and a timeline. A failure loses only a detail of a report.
+        let value = unsafe { self.gpu.device.get_semaphore_counter_value(self.raw) }.unwrap_or(0);
+        let seen = self.last_seen();
+        if value > submitted { seen } else { value.max(seen) }
     }
 
     /// Blocks until the GPU reaches `value`.
@@ -76,11 +86,12 @@ impl Timeline {
         if self.last_seen() >= value {
             return Ok(());
         }
+        cpu_scope!("vkWaitSemaphores");
         let (semaphores, values) = ([self.raw], [value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore is alive and a timeline; `value` was submitted, so the wait ends.
         unsafe { self.gpu.device.wait_semaphores(&info, u64::MAX) }
-            .map_err(self.gpu.vulkan_error("vkWaitSemaphores"))?;
+            .map_err(Error::vulkan("vkWaitSemaphores"))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(())
     }

@@ -9,6 +9,7 @@ use super::desc::{ColorSpace, HdrMetadata, PresentMode};
 use super::lifecycle::Acquired;
 use super::present_wait::PRESENT_TIMEOUT_NS;
 use super::surface::Surface;
+use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
@@ -89,6 +90,7 @@ impl Chain {
 
     /// Acquires the next image. The presentation engine signals `semaphore` when it has released the image.
     pub(crate) fn acquire(&self, semaphore: vk::Semaphore) -> Result<Acquired, Failure> {
+        cpu_scope!("vkAcquireNextImageKHR");
         let functions = &self.gpu().window_functions()?.swapchain;
         // SAFETY: the swapchain is alive and locked, no other image of it is acquired, and nothing else uses the
         // semaphore.
@@ -105,6 +107,7 @@ impl Chain {
     /// Presents an image. The presentation engine waits for the image's [`PresentSync`]. Returns true if the swapchain
     /// is suboptimal.
     pub(crate) fn present(&self, index: u32, mode: PresentMode, sync: &PresentSync) -> Result<bool, Failure> {
+        cpu_scope!("vkQueuePresentKHR");
         let gpu = self.gpu();
         let functions = gpu.window_functions()?;
         let (chains, indices, waits) = ([self.raw], [index], [sync.drawn]);

@@ -11,6 +11,8 @@ thread_local! {
     static SUBMIT: Cell<Option<vk::PFN_vkQueueSubmit2>> = const { Cell::new(None) };
     /// Submissions of this thread before the one that fails.
     static SUBMITS_LEFT: Cell<Option<u32>> = const { Cell::new(None) };
+    /// The result of that submission.
+    static FAILURE: Cell<vk::Result> = const { Cell::new(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) };
     static ALLOCATE: Cell<Option<vk::PFN_vkAllocateMemory>> = const { Cell::new(None) };
     static IS_OUT_OF_MEMORY: Cell<bool> = const { Cell::new(false) };
 }
@@ -24,9 +26,10 @@ pub(crate) fn with_failing_device<T>(make: impl FnOnce() -> T) -> T {
     made
 }
 
-/// Makes one submission of this thread fail, after `submissions` that succeed.
-pub(crate) fn fail_after(submissions: u32) {
+/// Makes one submission of this thread fail with `failure`, after `submissions` that succeed.
+pub(crate) fn fail_after(submissions: u32, failure: vk::Result) {
     SUBMITS_LEFT.set(Some(submissions));
+    FAILURE.set(failure);
 }
 
 /// Makes all allocations of device memory by this thread fail, or succeed again.
@@ -96,6 +99,6 @@ unsafe extern "system" fn submit(
     match SUBMIT.get() {
         // SAFETY: the caller upholds the contract of `vkQueueSubmit2`.
         Some(real) if submits_left != Some(0) => unsafe { real(queue, count, infos, fence) },
-        _ => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+        _ => FAILURE.get(),
     }
 }

@@ -2,6 +2,8 @@
 
 #![allow(missing_docs, reason = "only tests see it")]
 
+use ash::vk;
+
 use crate::context::Context;
 use crate::context::config::ContextDesc;
 use crate::error::Result;
@@ -32,7 +34,13 @@ pub fn with_fault_injection<T>(make: impl FnOnce() -> T) -> T {
 /// Makes one submission of this thread fail, after `submissions` queue submissions that succeed. The context must be
 /// created by [`with_fault_injection`].
 pub fn fail_submission_after(submissions: u32) {
-    fault_injection::fail_after(submissions);
+    fault_injection::fail_after(submissions, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+}
+
+/// As [`fail_submission_after`], but the submission reports that the device is lost. It is not: the GPU runs what was
+/// submitted before.
+pub fn lose_device_after(submissions: u32) {
+    fault_injection::fail_after(submissions, vk::Result::ERROR_DEVICE_LOST);
 }
 
 /// Makes all allocations of device memory by this thread fail, or succeed again. The context must be created by

@@ -11,7 +11,6 @@ pub mod frame;
 pub mod frame_name;
 pub mod frames;
 pub mod headless;
-pub mod hot_reload;
 pub mod interrupt;
 pub(crate) mod library_warnings;
 pub mod loading;

@@ -128,6 +128,15 @@ impl RunError {
     }
 }
 
+impl From<lvk_egui::Error> for RunError {
+    fn from(error: lvk_egui::Error) -> Self {
+        match error {
+            lvk_egui::Error::Lvk(error) => error.into(),
+            error => Self::device(error),
+        }
+    }
+}
+
 impl From<lvk::Error> for RunError {
     fn from(error: lvk::Error) -> Self {
         match error {

@@ -1,6 +1,7 @@
 //! Command buffers and queues: order, barriers, threads and measurements.
 
 mod barriers;
+mod device_loss;
 mod profiler;
 mod queries;
 mod queue_failures;

@@ -162,6 +162,39 @@ fn frames_in_flight_keep_their_scopes_apart() {
     assert_eq!(ctx.last_profile().unwrap().unwrap().frame, Some(199));
 }
 
+/// The frame needs no successor, and work that it submits after a wait is added to its profile.
+#[test]
+fn a_wait_for_the_gpu_finishes_the_last_frame() {
+    let Some(ctx) = device() else { return };
+    ctx.set_profiling(true).unwrap();
+    let submit = |name: &str| {
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        scoped(&mut cmd, name, |_| {});
+        ctx.submit(cmd).unwrap();
+    };
+    let expect = |number: u64, expected: &str| {
+        let profile = ctx.last_profile().unwrap().unwrap();
+        assert_eq!(profile.frame, Some(number));
+        check(&profile, expected);
+    };
+    for number in 0..10 {
+        ctx.next_frame().unwrap();
+        submit(&format!("f{number}"));
+    }
+    ctx.wait_idle().unwrap();
+    expect(9, "f9");
+    submit("after the wait");
+    ctx.wait_idle().unwrap();
+    expect(9, "f9 after the wait");
+    ctx.wait_idle().unwrap();
+    expect(9, "f9 after the wait");
+    ctx.next_frame().unwrap();
+    expect(9, "f9 after the wait");
+    ctx.next_frame().unwrap();
+    ctx.wait_idle().unwrap();
+    expect(9, "f9 after the wait");
+}
+
 #[test]
 fn threads_are_profiled_side_by_side() {
     let Some(ctx) = device() else { return };

@@ -2,6 +2,7 @@
 
 mod blending;
 mod draws;
+mod egui_painter;
 mod errors;
 mod fast_link;
 mod indirect_count;

@@ -23,5 +23,4 @@ mod rtx_textures;
 mod sequences;
 mod sponza;
 mod triplanar;
-mod ui_painter;
 mod yuv;

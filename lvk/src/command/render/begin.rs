@@ -11,6 +11,7 @@ use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::command::dependencies::Dependencies;
 use crate::error::{Error, Result};
+use crate::gpu::debug::label::Label;
 use crate::resource::buffer::BufferUsage;
 
 /// Uses of buffers by draws, with the usage that allows each.
@@ -45,7 +46,7 @@ impl CommandBuffer {
         };
         self.bind_inputs(&targets)?;
         if !desc.debug_name.is_empty() {
-            self.push_label(desc.debug_name);
+            self.push_label(Label { name: desc.debug_name, color: desc.debug_color });
         }
         self.record_begin(&targets);
         Ok(RenderPass::new(self, targets, !desc.debug_name.is_empty()))

@@ -202,4 +202,6 @@ pub struct RenderPassDesc<'a> {
     pub dependencies: Dependencies<'a>,
     /// Name of the pass in debuggers; empty for none.
     pub debug_name: &'a str,
+    /// Colour of the pass in debuggers, as [`Label::color`](crate::Label::color).
+    pub debug_color: [f32; 4],
 }

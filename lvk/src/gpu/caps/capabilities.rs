@@ -86,6 +86,11 @@ pub struct Capabilities {
     pub precise_occlusion: bool,
     /// Queries may count the work of pipeline stages (`pipelineStatisticsQuery`).
     pub pipeline_statistics: bool,
+    /// Labels of command buffers are written to the GPU as checkpoints, for the report of a lost device
+    /// (`VK_NV_device_diagnostic_checkpoints`). It is enabled if
+    /// [`ContextDesc::checkpoints`](crate::ContextDesc::checkpoints) requests it. In
+    /// [`Context::devices`](crate::Context::devices) it is true if the device supports it.
+    pub checkpoints: bool,
     /// The clocks of device and host can be read together (`VK_KHR_calibrated_timestamps` or
     /// `VK_EXT_calibrated_timestamps`): see [`Context::calibrated_timestamps`](crate::Context::calibrated_timestamps).
     pub calibrated_timestamps: bool,

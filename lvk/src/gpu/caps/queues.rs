@@ -1,5 +1,7 @@
 //! The Vulkan queues behind the three queues of the library.
 
+use std::sync::atomic::AtomicU32;
+
 use ash::vk;
 
 use crate::lock_order::{Guard, Mutex, Rank};
@@ -117,6 +119,8 @@ pub(crate) fn describe_queues(families: &[QueueFamily], locations: &[QueueLocati
 /// separate queue has the index of its position in [`Queue::ALL`]; every other queue shares index 0.
 pub(crate) struct Queues {
     raw: Vec<Mutex<vk::Queue>>,
+    /// Open labels of each of `raw`. They change only while their queue is locked.
+    open_labels: Vec<AtomicU32>,
     /// Index into `raw` for each queue.
     raw_index: [usize; 3],
     families: [u32; 3],
@@ -146,8 +150,9 @@ impl Queues {
         let mut distinct = families.to_vec();
         distinct.sort_unstable();
         distinct.dedup();
+        let open_labels = queues.iter().map(|_| AtomicU32::new(0)).collect();
         let raw = queues.into_iter().map(|queue| Mutex::new(Rank::Queue, queue)).collect();
-        Self { raw, raw_index, families, is_separate, is_emulated, distinct }
+        Self { raw, open_labels, raw_index, families, is_separate, is_emulated, distinct }
     }
 
     /// Returns the queue index of a queue.
@@ -168,6 +173,16 @@ impl Queues {
     /// Returns the family of a queue index.
     pub(crate) fn family(&self, queue_index: usize) -> u32 {
         self.families[queue_index]
+    }
+
+    /// Returns the number of open labels of the Vulkan queue behind a queue.
+    pub(crate) fn open_labels(&self, queue: Queue) -> &AtomicU32 {
+        &self.open_labels[self.raw_index[queue.index()]]
+    }
+
+    /// True if queues of their own share one Vulkan queue, as tests request it.
+    pub(crate) fn is_emulated(&self) -> bool {
+        self.is_emulated
     }
 
     /// Returns all families in use, without duplicates.

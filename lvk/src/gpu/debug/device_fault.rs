@@ -105,6 +105,7 @@ mod tests {
 
     use super::*;
     use crate::error::Error;
+    use crate::error::device_loss::DeviceLossReport;
 
     fn chars<const N: usize>(text: &str) -> [c_char; N] {
         let mut all = [0; N];
@@ -160,13 +161,14 @@ mod tests {
         let at = FaultAddress { kind: FaultKind::FaultingInstruction, address: 0x77, range: 0x77..0x78 };
         assert_eq!(fault.addresses, [read, at]);
         assert_eq!(fault.vendor, [VendorFault { description: "unit 7".to_owned(), code: 0xab, data: 3 }]);
-        let error = Error::DeviceLost { call: "vkQueueSubmit2", fault: Some(Arc::new(fault)) }.to_string();
+        let report = DeviceLossReport { call: "vkQueueSubmit2", fault: Some(fault), queues: Vec::new() };
+        let error = Error::DeviceLost { report: Arc::new(report) }.to_string();
         assert_eq!(
             error,
             "the device was lost in vkQueueSubmit2 (page fault; InvalidRead at 0x12000 to 0x12fff; FaultingInstruction \
              at 0x77 to 0x77; unit 7 (code 0xab, data 0x3)); create a new context"
         );
-        let error = Error::DeviceLost { call: "vkQueueSubmit2", fault: None }.to_string();
+        let error = Error::device_lost("vkQueueSubmit2").to_string();
         assert_eq!(error, "the device was lost in vkQueueSubmit2; create a new context");
     }
 

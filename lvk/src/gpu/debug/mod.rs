@@ -1,5 +1,6 @@
-//! Debugging: messages of the validation layer, object names, device faults.
+//! Debugging: messages of the validation layer, labels, device faults.
 
 pub(crate) mod debugger;
 pub(crate) mod device_fault;
+pub(crate) mod label;
 pub(crate) mod messenger;

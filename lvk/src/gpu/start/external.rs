@@ -82,6 +82,7 @@ impl RawContext<'_> {
         caps.trace_rays_indirect &= self.trace_rays_indirect;
         caps.position_fetch &= self.position_fetch;
         caps.pipeline_libraries &= self.has_extension(ash::khr::pipeline_library::NAME);
+        caps.checkpoints &= self.has_extension(ash::nv::device_diagnostic_checkpoints::NAME);
         caps.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
         caps.remove_features(undeclared(self.features, caps.portability_subset));
         let windows = WindowExtensions::enabled(self.instance_extensions);

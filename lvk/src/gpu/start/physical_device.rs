@@ -120,9 +120,10 @@ impl PhysicalDevice {
         found.limit_ray_tracing(usable, usable);
         found.limit_mesh_shaders(true);
         let pipeline_library = self.has_extension(ash::khr::pipeline_library::NAME);
+        let checkpoints = self.has_extension(ash::nv::device_diagnostic_checkpoints::NAME);
         let portability_subset = self.has_extension(ash::khr::portability_subset::NAME);
         let caps = &mut self.capabilities;
-        caps.portability_subset = portability_subset;
+        (caps.portability_subset, caps.checkpoints) = (portability_subset, checkpoints);
         let ray_tracing = &found.ext.ray_tracing;
         caps.ray_tracing_pipeline = ray_tracing.ray_tracing_pipeline == vk::TRUE;
         caps.trace_rays_indirect = ray_tracing.ray_tracing_pipeline_trace_rays_indirect == vk::TRUE;

@@ -4,11 +4,13 @@ use super::bvh2;
 use super::bvh8;
 use super::nodes::{Bvh, BvhNodes};
 use crate::accel::primitive_bounds::Bounds;
+use crate::cpu_scope::cpu_scope;
 use crate::software_ray_query::layout::{NONE, leaf};
 
 impl Bvh {
     /// Builds the tree of a BLAS: wide, except for meshes that wide nodes do not suit.
     pub(crate) fn build(bounds: &[Bounds]) -> Self {
+        cpu_scope!("build BVH on the CPU");
         const ONE_LEAF: usize = 3;
         match bounds.len() {
             0 => Self { nodes: BvhNodes::Wide(Vec::new()), root: NONE, order: Vec::new() },

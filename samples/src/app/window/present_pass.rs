@@ -2,23 +2,22 @@
 
 use std::sync::Arc;
 
-use egui::{Color32, LayerId, Rect, pos2};
+use egui::{Color32, LayerId, Rect, TextureId, pos2};
 use lvk::{
     ColorAttachment, ColorSpace, CommandBuffer, Context, Dependencies, Holder, PresentMode, RenderPassDesc,
-    SwapchainDesc, SwapchainHandle, SwapchainImage, TextureHandle, TextureUsage, TextureViewDesc,
-    WindowHandles,
+    SwapchainDesc, SwapchainHandle, SwapchainImage, TextureHandle, WindowHandles,
 };
-
-use crate::app::ui::Painter;
+use lvk_egui::{Painter, Screen, UserTexture};
 
 /// A swapchain and what is painted on it.
 pub(super) struct PresentPass {
     ctx: Context,
     swapchain: Holder<SwapchainHandle>,
-    painter: Painter,
+    /// `None` until the format of the first image is known.
+    painter: Option<Painter>,
     ui: egui::Context,
-    /// The picture as shaders read it, and the texture of the sample that it is.
-    shown: Option<(TextureHandle, Holder<TextureHandle>)>,
+    /// The texture of the sample that is shown, and its id for egui.
+    shown: Option<(TextureHandle, TextureId)>,
 }
 
 impl PresentPass {
@@ -30,9 +29,9 @@ impl PresentPass {
             color_spaces: &[ColorSpace::SrgbEncoded, ColorSpace::Srgb],
             ..SwapchainDesc::default()
         })?;
-        let (painter, ui) = (Painter::new(ctx)?, egui::Context::default());
+        let ui = egui::Context::default();
         ui.options_mut(|options| options.zoom_with_keyboard = false);
-        Ok(Self { ctx: ctx.clone(), swapchain, painter, ui, shown: None })
+        Ok(Self { ctx: ctx.clone(), swapchain, painter: None, ui, shown: None })
     }
 
     /// The egui context.
@@ -64,11 +63,6 @@ impl PresentPass {
         self.ctx.resume_swapchain(*self.swapchain, window, extent)
     }
 
-    /// The painter of the panel.
-    pub(super) fn painter(&mut self) -> &mut Painter {
-        &mut self.painter
-    }
-
     /// Acquires the next swapchain image; `None` while nothing can be presented.
     pub(super) fn next_image(&self) -> lvk::Result<Option<SwapchainImage>> {
         self.ctx.next_image(*self.swapchain)
@@ -82,8 +76,13 @@ impl PresentPass {
         picture: TextureHandle,
         input: egui::RawInput,
         mut panel: impl FnMut(&egui::Context),
-    ) -> lvk::Result<()> {
-        let texture = self.texture_of(picture)?;
+    ) -> lvk_egui::Result<()> {
+        let painter = match &mut self.painter {
+            Some(painter) => painter,
+            none => none.insert(Painter::new(&self.ctx, image.format())?),
+        };
+        painter.set_target(image.format())?;
+        let texture = texture_of(&mut self.shown, painter, picture)?;
         let output = self.ui.run(input, |ui| {
             let corners = Rect { min: pos2(0.0, 0.0), max: pos2(1.0, 1.0) };
             ui.layer_painter(LayerId::background()).image(
@@ -94,30 +93,33 @@ impl PresentPass {
             );
             panel(ui);
         });
-        self.painter.prepare(image.format())?;
-        self.painter.upload(&self.ui, output, image.extent())?;
+        let pixels_per_point = output.pixels_per_point;
+        let primitives = self.ui.tessellate(output.shapes, pixels_per_point);
+        let screen = Screen { size_px: image.extent(), pixels_per_point };
+        painter.update(&primitives, &output.textures_delta, screen)?;
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &[ColorAttachment::clear(image.texture(), [0.0, 0.0, 0.0, 1.0])],
             dependencies: Dependencies { sampled_images: &[picture], ..Dependencies::default() },
             debug_name: "window",
             ..RenderPassDesc::default()
         })?;
-        self.painter.record(&mut pass)
+        painter.record(&mut pass)
     }
+}
 
-    /// The egui id of the image. The view of the image keeps its bindless index while the image is displayed.
-    fn texture_of(&mut self, picture: TextureHandle) -> lvk::Result<egui::TextureId> {
-        let view = TextureViewDesc {
-            texture: Some(picture),
-            usage: Some(TextureUsage::SAMPLED),
-            debug_name: "shown picture",
-            ..TextureViewDesc::default()
-        };
-        let view = match self.shown.take() {
-            Some((known, view)) if known == picture => view,
-            _ => self.ctx.create_texture_view(&view)?,
-        };
-        let (_, view) = self.shown.insert((picture, view));
-        Ok(Painter::texture_id(view))
+/// Returns the egui id of the picture, which keeps it while it is displayed.
+fn texture_of(
+    shown: &mut Option<(TextureHandle, TextureId)>,
+    painter: &mut Painter,
+    picture: TextureHandle,
+) -> lvk_egui::Result<TextureId> {
+    match *shown {
+        Some((known, id)) if known == picture => return Ok(id),
+        Some((_, id)) => painter.unregister_texture(id)?,
+        None => {}
     }
+    *shown = None;
+    let id = painter.register_texture(picture, &UserTexture::default())?;
+    *shown = Some((picture, id));
+    Ok(id)
 }

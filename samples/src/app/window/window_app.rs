@@ -23,7 +23,6 @@ use super::ui_input::{UiInput, notches};
 use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
-use crate::app::hot_reload::reload;
 use crate::app::print_line;
 use crate::app::run_args::RunArgs;
 use crate::app::run_error::RunError;
@@ -342,8 +341,7 @@ impl<S: Sample> Running<S> {
 
     /// Compiles all shaders again. If one is wrong, all old pipelines stay.
     fn reload(&mut self) {
-        let done = reload(&mut self.sample, self.present_pass.painter());
-        self.panel.shader_error = done.err().map(|error| error.to_string());
+        self.panel.shader_error = self.sample.reload().err().map(|error| error.to_string());
         match &self.panel.shader_error {
             Some(error) => eprintln!("error: {error}\nthe shaders from before stay in use"),
             None => eprintln!("shaders compiled anew"),

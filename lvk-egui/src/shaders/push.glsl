@@ -1,6 +1,6 @@
-// The push constants of the user interface.
+// The push constants of an interface.
 
-// Corners as egui has them: place in points, place in the texture, colour multiplied with its alpha, sRGB.
+// Vertices as egui has them: position in points, position in the texture, colour multiplied with its alpha, sRGB.
 struct UiVertex {
     vec2 position;
     vec2 uv;
@@ -14,5 +14,5 @@ layout(push_constant, scalar) uniform Push {
     vec2 clipPerPoint;
     uint tex;
     uint smp;
-    uint linearTarget; // 1 where the target encodes linear light by itself
+    uint flags; // 1: the target holds linear light; 2: the texels are linear light
 };
