@@ -120,6 +120,12 @@ impl Engine {
         }
     }
 
+    fn has_extension(&self, name: &CStr) -> bool {
+        // SAFETY: the physical device belongs to the instance.
+        let all = unsafe { self.instance.enumerate_device_extension_properties(self.physical) }.unwrap();
+        all.iter().any(|known| known.extension_name_as_c_str() == Ok(name))
+    }
+
     fn raw(&self) -> RawContext<'_> {
         const DEBUG: [&CStr; 1] = [ash::ext::debug_utils::NAME];
         RawContext {
@@ -538,7 +544,10 @@ fn refusals() {
     let mesh = RawContext { mesh_shader: true, ..engine.raw() };
     refuse(mesh, "device_extensions", "VK_EXT_mesh_shader is missing; `mesh_shader`");
     let query = RawContext { ray_query: true, ..engine.raw() };
-    refuse(query, "device_extensions", "VK_KHR_acceleration_structure is missing; `ray_query`");
+    match engine.has_extension(ash::khr::ray_query::NAME) {
+        true => refuse(query, "device_extensions", "VK_KHR_acceleration_structure is missing; `ray_query`"),
+        false => refuse(query, "ray_query", "the device does not have the feature"),
+    }
     let astc = FeatureSet::NONE.with(OptionalFeature::TextureCompressionAstcHdr);
     let astc = RawContext { features: astc, ..engine.raw() };
     refuse(astc, "features", "textureCompressionASTC_HDR cannot be on");
