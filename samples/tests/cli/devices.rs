@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::program::{
@@ -84,7 +84,7 @@ fn the_reason_for_the_software_driver_is_one_line_and_the_list_has_the_rest() {
             .env_remove("LVK_DRIVER")
             .env_remove("VK_ICD_FILENAMES")
             .env("LD_LIBRARY_PATH", desk.input.path());
-        let Output { stdout, stderr, .. } = command.output().unwrap();
+        let std::process::Output { stdout, stderr, .. } = command.output().unwrap();
         (String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
     };
     let note = "lvk: a software driver is used, because the Vulkan loader libvulkan.so.1 cannot be opened\n";

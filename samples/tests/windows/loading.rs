@@ -115,7 +115,7 @@ fn shaders_are_compiled_as_they_change_and_wrong_ones_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let shaders = folder.path().join("shaders");
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders");
-    for part in ["app", "rtx_hello", "common"] {
+    for part in ["rtx_hello", "common"] {
         fs::create_dir_all(shaders.join(part)).unwrap();
         for entry in fs::read_dir(source.join(part)).unwrap() {
             let path = entry.unwrap().path();
