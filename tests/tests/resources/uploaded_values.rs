@@ -43,12 +43,15 @@ impl Copier {
     }
 }
 
-/// Frames that are submitted without a wait on any queue: each reads its own values, and the memory does not grow.
+/// Frames that are submitted without a wait on any queue: each reads its own values, and the memory does not grow. How
+/// much of it is used at once depends on how far the device lags behind; all frames together upload four times the bound.
 #[test]
 fn each_frame_in_flight_reads_its_own_values_and_memory_does_not_grow() {
     const FRAMES: u32 = 300;
+    const STAGING_BYTES: u64 = 1 << 20;
     for queues in REQUESTS {
-        let Some(ctx) = device_with(|desc| (desc.queues, desc.staging_bytes) = (queues, 1 << 20)) else {
+        let Some(ctx) = device_with(|desc| (desc.queues, desc.staging_bytes) = (queues, STAGING_BYTES))
+        else {
             return;
         };
         let (copier, target) = (Copier::new(&ctx), words_buffer(&ctx, &[0; 3 * FRAMES as usize]));
@@ -68,8 +71,9 @@ fn each_frame_in_flight_reads_its_own_values_and_memory_does_not_grow() {
             ctx.wait_idle().unwrap();
             sizes
         };
-        let size = run(FRAMES)[FRAMES as usize - 1];
-        assert!(run(FRAMES).into_iter().all(|later| later == size), "the first frames take all the memory");
+        let most = [run(FRAMES), run(FRAMES)].concat().into_iter().max().unwrap();
+        eprintln!("{queues:?}: at most {most} bytes");
+        assert!(most <= STAGING_BYTES, "{most} bytes of staging memory");
         let words = read_words(&ctx, *target, 3 * FRAMES as usize);
         for (frame, words) in (0..).zip(words.chunks_exact(3)) {
             assert_eq!(words, [frame, frame, 1_001], "{queues:?}");
