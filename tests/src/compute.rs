@@ -50,6 +50,19 @@ pub fn read_words(ctx: &Context, buffer: BufferHandle, count: usize) -> Vec<u32>
     words
 }
 
+/// Runs one workgroup of a pipeline whose push constants are the address of `words`, and returns the words.
+pub fn run_on_words(ctx: &Context, pipeline: ComputePipelineHandle, words: &[u32]) -> Vec<u32> {
+    let buffer = words_buffer(ctx, words);
+    let mut cmd = ctx.acquire_command_buffer().expect("a command buffer can be had");
+    let address = buffer.address().expect("the buffer is alive");
+    cmd.bind_compute_pipeline(pipeline).expect("the pipeline is alive");
+    cmd.push_constants(&address).expect("the push constants fit");
+    let uses = Dependencies { buffers: &[*buffer], ..Default::default() };
+    cmd.dispatch([1, 1, 1], &uses).expect("the dispatch is taken");
+    ctx.submit(cmd).expect("the commands are taken");
+    read_words(ctx, *buffer, words.len())
+}
+
 /// A pipeline that writes one `vec4` for each invocation `i` to the address in its push constants.
 ///
 /// `expression` may use `i` and the words `a`, `b` and `c`.

@@ -6,7 +6,7 @@ use lvk::{
     Holder, PendingPipeline, RayTracingPipelineDesc, RayTracingPipelineHandle, RenderPipelineDesc,
     ShaderModuleHandle, ShaderRecord, ShaderStage, SpecializationConstant, SpecializationValue,
 };
-use lvk_tests::compute::{compute_pipeline, module, read_words, words_buffer};
+use lvk_tests::compute::{compute_pipeline, module, read_words, run_on_words, words_buffer};
 use lvk_tests::device;
 use lvk_tests::warnings::{capture_warnings, take_warnings};
 
@@ -48,14 +48,7 @@ fn start_wrong(ctx: &Context, debug_name: &str) -> PendingPipeline<ComputePipeli
 }
 
 fn written(ctx: &Context, pipeline: ComputePipelineHandle) -> u32 {
-    let words = words_buffer(ctx, &[0]);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    cmd.bind_compute_pipeline(pipeline).unwrap();
-    cmd.push_constants(&words.address().unwrap()).unwrap();
-    let buffers = &[*words];
-    cmd.dispatch([1, 1, 1], &Dependencies { buffers, ..Default::default() }).unwrap();
-    ctx.submit(cmd).unwrap();
-    read_words(ctx, *words, 1)[0]
+    run_on_words(ctx, pipeline, &[0])[0]
 }
 
 #[test]

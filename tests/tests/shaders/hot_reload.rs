@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use lvk::{
-    ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Error, Holder, Reloadable,
-    ShaderFiles, ShaderModuleDesc, ShaderStage,
+    ComputePipelineDesc, ComputePipelineHandle, Context, Error, Holder, Reloadable, ShaderFiles,
+    ShaderModuleDesc, ShaderStage,
 };
-use lvk_tests::compute::{read_words, words_buffer};
+use lvk_tests::compute::run_on_words;
 use lvk_tests::{device, device_with};
 use tempfile::TempDir;
 
@@ -60,14 +60,7 @@ fn compute(ctx: &Context, files: &ShaderFiles, path: &Path) -> lvk::Result<Holde
 
 /// Returns the word that the pipeline writes.
 fn written(ctx: &Context, pipeline: ComputePipelineHandle) -> u32 {
-    let words = words_buffer(ctx, &[0]);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    cmd.bind_compute_pipeline(pipeline).unwrap();
-    cmd.push_constants(&words.address().unwrap()).unwrap();
-    let buffers = &[*words];
-    cmd.dispatch([1, 1, 1], &Dependencies { buffers, ..Default::default() }).unwrap();
-    ctx.submit(cmd).unwrap();
-    read_words(ctx, *words, 1)[0]
+    run_on_words(ctx, pipeline, &[0])[0]
 }
 
 #[test]

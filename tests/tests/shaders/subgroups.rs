@@ -3,10 +3,10 @@
 
 use lvk::ash::vk::ShaderStageFlags;
 use lvk::{
-    ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, DeviceProfile, Error, FeatureSet,
-    Holder, OptionalFeature, ShaderStage, SpecializationConstant, SpecializationValue,
+    ComputePipelineDesc, ComputePipelineHandle, Context, DeviceProfile, Error, FeatureSet, Holder,
+    OptionalFeature, ShaderStage, SpecializationConstant, SpecializationValue,
 };
-use lvk_tests::compute::{module, read_words, words_buffer};
+use lvk_tests::compute::{module, run_on_words};
 use lvk_tests::{device, without_software};
 
 /// Each workgroup writes its subgroup size, its count of subgroups, and the invocations of its fullest and emptiest
@@ -51,14 +51,7 @@ fn pipeline(
 
 /// Returns the subgroup size, the count of subgroups, and the invocations of the fullest and emptiest subgroup.
 fn sizes(ctx: &Context, pipeline: ComputePipelineHandle) -> [u32; 4] {
-    let words = words_buffer(ctx, &[0; 4]);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    cmd.bind_compute_pipeline(pipeline).unwrap();
-    cmd.push_constants(&words.address().unwrap()).unwrap();
-    let buffers = &[*words];
-    cmd.dispatch([1, 1, 1], &Dependencies { buffers, ..Default::default() }).unwrap();
-    ctx.submit(cmd).unwrap();
-    read_words(ctx, *words, 4).try_into().unwrap()
+    run_on_words(ctx, pipeline, &[0; 4]).try_into().unwrap()
 }
 
 /// True if compute pipelines of the device may require a size. Prints a line if not.
