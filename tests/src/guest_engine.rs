@@ -15,7 +15,7 @@ type Messages = Mutex<Vec<String>>;
 /// An instance and a device with the requirements of a context and nothing else. Its drop fails the test on any message
 /// of the validation layer.
 pub struct GuestEngine {
-    /// What the device was created with.
+    /// The requirements that the device was created with.
     pub requirements: DeviceRequirements<'static>,
     /// The device.
     pub device: ash::Device,

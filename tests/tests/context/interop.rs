@@ -2,8 +2,7 @@
 //! the library destroys nothing that it does not own.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use std::ffi::{CStr, c_void};
-use std::sync::Mutex;
+use std::ffi::CStr;
 
 use lvk::ash::vk::Handle;
 use lvk::ash::{self, vk};
@@ -14,7 +13,7 @@ use lvk::{
     TextureHandle, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
-use lvk_tests::device::vulkan;
+use lvk_tests::guest_engine::GuestInstance;
 use lvk_tests::raster::{pixels, run_pass, staged_pipeline};
 
 const SIDE: u32 = 4;
@@ -22,73 +21,25 @@ const BYTES: u64 = (SIDE * SIDE * 4) as u64;
 const LOCAL_READ: [&CStr; 1] = [ash::khr::dynamic_rendering_local_read::NAME];
 const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
 
-/// Messages of the validation layer in this process.
-static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-unsafe extern "system" fn on_message(
-    _: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _: vk::DebugUtilsMessageTypeFlagsEXT,
-    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
-    _: *mut c_void,
-) -> vk::Bool32 {
-    // SAFETY: Vulkan gives a valid structure with a text.
-    let text = unsafe { CStr::from_ptr((*data).p_message) }.to_string_lossy().into_owned();
-    if !text.contains("vkGetDeviceProcAddr") && !text.contains("Setting") {
-        MESSAGES.lock().unwrap().push(text);
-    }
-    vk::FALSE
-}
-
 /// An engine that knows nothing of the library.
 struct Engine {
-    entry: ash::Entry,
-    instance: ash::Instance,
-    messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     physical: vk::PhysicalDevice,
     device: ash::Device,
     queue: vk::Queue,
     pool: vk::CommandPool,
     /// True if the extension and the feature are on.
     local_read: bool,
+    /// Declared last, so that it is destroyed after the device.
+    instance: GuestInstance,
 }
 
 impl Engine {
     /// `None`, loudly, without a driver.
     fn new() -> Option<Self> {
-        let library = vulkan()?;
+        let instance = GuestInstance::new(&ContextDesc::default())?;
+        let (raw, physical) = (&instance.raw, instance.physical_device());
         // SAFETY: plain Vulkan by the book, as the layer confirms.
         unsafe {
-            let entry = match library {
-                Some(path) => ash::Entry::load_from(path).unwrap(),
-                None => ash::Entry::load().unwrap(),
-            };
-            let validated = std::env::var("LVK_TEST_VALIDATION").as_deref() != Ok("off");
-            let layers = [c"VK_LAYER_KHRONOS_validation".as_ptr()];
-            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
-            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-            let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-            let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-            let mut info = vk::InstanceCreateInfo::default().application_info(&application);
-            if validated {
-                info = info
-                    .enabled_layer_names(&layers)
-                    .enabled_extension_names(&extensions)
-                    .push_next(&mut features);
-            }
-            let instance = entry.create_instance(&info, None).unwrap();
-            let messenger = validated.then(|| {
-                let ext = ash::ext::debug_utils::Instance::new(&entry, &instance);
-                let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
-                    .message_severity(
-                        vk::DebugUtilsMessageSeverityFlagsEXT::ERROR
-                            | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
-                    )
-                    .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
-                    .pfn_user_callback(Some(on_message));
-                let raw = ext.create_debug_utils_messenger(&info, None).unwrap();
-                (ext, raw)
-            });
-            let physical = instance.enumerate_physical_devices().unwrap()[0];
             let mut v11 = vk::PhysicalDeviceVulkan11Features::default();
             let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
             let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
@@ -96,10 +47,10 @@ impl Engine {
                 .push_next(&mut v11)
                 .push_next(&mut v12)
                 .push_next(&mut v13);
-            instance.get_physical_device_features2(physical, &mut all);
+            raw.get_physical_device_features2(physical, &mut all);
             // Not every device has it together with descriptors that are updated after they are bound.
             all.features.robust_buffer_access = vk::FALSE;
-            let there = instance.enumerate_device_extension_properties(physical).unwrap();
+            let there = raw.enumerate_device_extension_properties(physical).unwrap();
             let local_read = there.iter().any(|known| known.extension_name_as_c_str() == Ok(LOCAL_READ[0]));
             let extensions = if local_read { &LOCAL_READ[..] } else { &[] };
             let extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
@@ -113,25 +64,24 @@ impl Engine {
             if local_read {
                 info = info.push_next(&mut reads);
             }
-            let device = instance.create_device(physical, &info, None).unwrap();
+            let device = raw.create_device(physical, &info, None).unwrap();
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
-            Some(Self { entry, instance, messenger, physical, device, queue, pool, local_read })
+            Some(Self { physical, device, queue, pool, local_read, instance })
         }
     }
 
     fn has_extension(&self, name: &CStr) -> bool {
         // SAFETY: the physical device belongs to the instance.
-        let all = unsafe { self.instance.enumerate_device_extension_properties(self.physical) }.unwrap();
+        let all = unsafe { self.instance.raw.enumerate_device_extension_properties(self.physical) }.unwrap();
         all.iter().any(|known| known.extension_name_as_c_str() == Ok(name))
     }
 
     fn raw(&self) -> RawContext<'_> {
-        const DEBUG: [&CStr; 1] = [ash::ext::debug_utils::NAME];
         RawContext {
-            entry: self.entry.clone(),
-            instance: self.instance.clone(),
-            instance_extensions: if self.messenger.is_some() { &DEBUG } else { &[] },
+            entry: self.instance.entry.clone(),
+            instance: self.instance.raw.clone(),
+            instance_extensions: self.instance.extensions,
             physical_device: self.physical,
             device: self.device.clone(),
             device_extensions: &[],
@@ -162,7 +112,7 @@ impl Engine {
     ) -> vk::DeviceMemory {
         // SAFETY: as above.
         unsafe {
-            let types = self.instance.get_physical_device_memory_properties(self.physical);
+            let types = self.instance.raw.get_physical_device_memory_properties(self.physical);
             let fits = |index: &u32| {
                 needed.memory_type_bits & 1 << index != 0
                     && types.memory_types[*index as usize].property_flags.contains(wish)
@@ -316,14 +266,6 @@ impl Drop for Engine {
         unsafe {
             self.device.destroy_command_pool(self.pool, None);
             self.device.destroy_device(None);
-            if let Some((ext, raw)) = self.messenger.take() {
-                ext.destroy_debug_utils_messenger(raw, None);
-            }
-            self.instance.destroy_instance(None);
-        }
-        let messages = std::mem::take(&mut *MESSAGES.lock().unwrap());
-        if !std::thread::panicking() {
-            assert_eq!(messages, [""; 0]);
         }
     }
 }
@@ -427,7 +369,8 @@ impl Engine {
 }
 
 /// The engine clears, the library reads and writes, the engine copies, clears again and gives back, twice.
-fn exchange() {
+#[test]
+fn images_buffers_and_semaphores_are_exported_and_imported() {
     let Some(engine) = Engine::new() else { return };
     let ((image, image_memory), (buffer, buffer_memory), (copy, copy_memory)) =
         (engine.image(), engine.buffer(), engine.buffer());
@@ -475,7 +418,8 @@ fn exchange() {
 }
 
 /// Features of the engine's device are used if the description lists them, and refused if not.
-fn local_reads() {
+#[test]
+fn targets_are_read_in_their_own_pass_on_another_engines_device() {
     let Some(engine) = Engine::new() else { return };
     let usage = TextureUsage::TARGET | TextureUsage::INPUT;
     let read = TextureDesc { format: Format::Rgba32Float, extent: [SIDE, SIDE], usage, ..Default::default() };
@@ -522,7 +466,8 @@ fn local_reads() {
     }
 }
 
-fn refusals() {
+#[test]
+fn wrong_descriptions_are_refused() {
     let Some(engine) = Engine::new() else { return };
     let refuse = |raw: RawContext<'_>, field: &str, words: &str| {
         // SAFETY: what is wrong is found before anything is made.
@@ -585,12 +530,4 @@ fn refusals() {
         engine.device.destroy_image(image, None);
         engine.device.free_memory(memory, None);
     }
-}
-
-/// One after the other, as the messages of the layer are those of the process.
-#[test]
-fn images_buffers_and_semaphores_are_exported_and_imported_and_wrong_descriptions_are_refused() {
-    exchange();
-    local_reads();
-    refusals();
 }
