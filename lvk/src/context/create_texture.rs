@@ -22,9 +22,18 @@ impl Context {
     }
 
     fn new_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
+        self.add_texture(desc, |slot| Texture::new(&self.device_state().gpu, desc, slot))
+    }
+
+    /// Adds the texture that `make` creates for a slot, with its default views.
+    pub(super) fn add_texture(
+        &self,
+        desc: &TextureDesc<'_>,
+        make: impl FnOnce(u32) -> Result<Texture>,
+    ) -> Result<Holder<TextureHandle>> {
         let shared = self.device_state();
         let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
-        let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
+        let made = make(slot).and_then(|texture| {
             check_data_size(desc, texture.mips())?;
             let views = default_views(&texture)?;
             Ok((texture, views))

@@ -2,7 +2,6 @@
 
 use super::Context;
 use super::create::NO_SLOT;
-use super::create_texture::{check_data_size, default_views};
 use super::holder::Holder;
 use crate::error::{Error, Result};
 use crate::gpu::memory::external::{MemoryFd, MemoryFdType};
@@ -135,15 +134,8 @@ impl Context {
     }
 
     fn new_shared_texture(&self, desc: &TextureDesc<'_>, sharing: Sharing) -> Result<Holder<TextureHandle>> {
-        let shared = self.device_state();
-        let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
-        let made = Texture::with_shared_memory(&shared.gpu, desc, sharing, slot).and_then(|texture| {
-            check_data_size(desc, texture.mips())?;
-            default_views(&texture).map(|views| (texture, views))
-        });
-        let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
-        shared.bindless.set_texture(slot, views);
-        Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
+        let gpu = &self.device_state().gpu;
+        self.add_texture(desc, |slot| Texture::with_shared_memory(gpu, desc, sharing, slot))
     }
 }
 

@@ -102,16 +102,13 @@ impl Context {
         }
         let layout = exchanged_layout(import.layout, desc.format, desc.usage)
             .map_err(|why| Error::usage(desc.debug_name, why))?;
-        let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
-        let made = Texture::import(&shared.gpu, desc, import.image, slot)
-            .and_then(|texture| super::create_texture::default_views(&texture).map(|views| (texture, views)));
-        let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
-        shared.submitter.import_texture(texture.image.id, texture.image.shape, layout);
+        let holder = self.add_texture(desc, |slot| Texture::import(&shared.gpu, desc, import.image, slot))?;
+        let image = &shared.store.textures.get(holder.handle())?.image;
+        shared.submitter.import_texture(image.id, image.shape, layout);
         if !import.concurrent {
-            shared.submitter.restrict_to_graphics(texture.image.id, desc.debug_name);
+            shared.submitter.restrict_to_graphics(image.id, desc.debug_name);
         }
-        shared.bindless.set_texture(slot, views);
-        Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
+        Ok(holder)
     }
 
     /// Imports an external buffer. The caller keeps ownership of the buffer and of its host mapping, if there is one.

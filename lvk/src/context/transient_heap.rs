@@ -3,14 +3,11 @@
 use std::sync::Arc;
 
 use super::Context;
-use super::create_texture::default_views;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
 use crate::resource::Texture;
-use crate::resource::image::Image;
-use crate::resource::texture_desc::TextureDesc;
 use crate::resource::transient_heap::{TransientHeapDesc, TransientHeapMemory, TransientPlan};
 use crate::resource::transient_images::create_images;
 
@@ -55,18 +52,12 @@ impl Context {
             .textures
             .iter()
             .zip(images)
-            .map(|(texture, image)| self.new_transient_texture(&texture.desc, image))
+            .map(|(texture, image)| {
+                let (gpu, desc) = (&self.device_state().gpu, &texture.desc);
+                self.add_texture(desc, |slot| Ok(Texture::from_image(gpu, desc, image, slot)))
+            })
             .collect::<Result<_>>()?;
         Ok(TransientHeap { ctx: self.clone(), textures, plan, memory })
-    }
-
-    fn new_transient_texture(&self, desc: &TextureDesc<'_>, image: Image) -> Result<Holder<TextureHandle>> {
-        let shared = self.device_state();
-        let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
-        let texture = Texture::from_image(&shared.gpu, desc, image, slot);
-        let views = default_views(&texture).inspect_err(|_| shared.bindless.free_texture(slot))?;
-        shared.bindless.set_texture(slot, views);
-        Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
     }
 }
 
