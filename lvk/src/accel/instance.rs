@@ -364,13 +364,7 @@ impl InstancePlan {
         } else {
             refers.iter().map(|place| u64::from(spans[*place as usize][1])).sum()
         };
-        check_limit_of(
-            LimitOrigin::Vulkan,
-            name,
-            "number of instances, parts of split meshes included",
-            built,
-            u32::MAX.into(),
-        )?;
+        check_built_count(name, built)?;
         Ok(Self { blas_refs, ref_indices: refers, built_count: built as u32 })
     }
 
@@ -464,13 +458,7 @@ impl InstanceSource {
     /// Number of instances for Vulkan.
     pub(crate) fn built_count(&self, name: &str) -> Result<u32> {
         let count = u64::from(self.count) * u64::from(self.copies);
-        check_limit_of(
-            LimitOrigin::Vulkan,
-            name,
-            "number of instances, parts of split meshes included",
-            count,
-            u32::MAX.into(),
-        )?;
+        check_built_count(name, count)?;
         Ok(count as u32)
     }
 }
@@ -495,6 +483,12 @@ impl BlasIndexing {
             }
         }
     }
+}
+
+/// Fails if Vulkan cannot count the instances, with one for each further part of a split mesh.
+fn check_built_count(name: &str, count: u64) -> Result<()> {
+    let what = "number of instances, parts of split meshes included";
+    check_limit_of(LimitOrigin::Vulkan, name, what, count, u32::MAX.into())
 }
 
 #[cfg(test)]

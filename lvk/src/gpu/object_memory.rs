@@ -49,9 +49,7 @@ impl Gpu {
         name: &str,
         requirements: vk::MemoryRequirements,
     ) -> Result<Option<vk::DeviceMemory>> {
-        // SAFETY: the physical device belongs to the instance.
-        let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) };
-        let Some(kind) = lazy_type(memory.memory_types_as_slice(), requirements.memory_type_bits) else {
+        let Some(kind) = lazy_type(&self.memory_types(), requirements.memory_type_bits) else {
             return Ok(None);
         };
         let info =
@@ -63,6 +61,13 @@ impl Gpu {
             }
             other => Error::vulkan("vkAllocateMemory")(other),
         })
+    }
+
+    /// Returns the memory types of the device (`vkGetPhysicalDeviceMemoryProperties`).
+    pub(super) fn memory_types(&self) -> Vec<vk::MemoryType> {
+        // SAFETY: the physical device belongs to the instance.
+        let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) };
+        memory.memory_types_as_slice().to_vec()
     }
 
     /// Frees memory.

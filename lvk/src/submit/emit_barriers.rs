@@ -109,6 +109,26 @@ pub(crate) enum Side {
     Acquire,
 }
 
+/// Stages and accesses of one side of an ownership transfer.
+pub(crate) struct TransferScope {
+    pub(crate) src_stages: vk::PipelineStageFlags2,
+    pub(crate) src_access: vk::AccessFlags2,
+    pub(crate) dst_stages: vk::PipelineStageFlags2,
+    pub(crate) dst_access: vk::AccessFlags2,
+}
+
+impl Side {
+    /// Returns the stages and accesses that the barrier of this side orders.
+    pub(crate) fn scope(self) -> TransferScope {
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let (src_access, dst_stages, dst_access) = match self {
+            Self::Release => (Access::MEMORY_WRITE, Stage::NONE, Access::NONE),
+            Self::Acquire => (Access::NONE, Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE),
+        };
+        TransferScope { src_stages: Stage::ALL_COMMANDS, src_access, dst_stages, dst_access }
+    }
+}
+
 /// Records one side of queue family ownership transfers. Layouts do not change; a semaphore orders the two sides.
 pub(crate) fn emit_ownership_transfers(
     gpu: &Gpu,
@@ -117,20 +137,16 @@ pub(crate) fn emit_ownership_transfers(
     images: &Images,
     side: Side,
 ) {
-    use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
-    let (src_access, dst_stages, dst_access) = match side {
-        Side::Release => (Access::MEMORY_WRITE, Stage::NONE, Access::NONE),
-        Side::Acquire => (Access::NONE, Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE),
-    };
+    let scope = side.scope();
     let barrier = |transfer: &OwnershipTransfer| {
         let image = images.get(&transfer.id)?;
         let families = [transfer.from, transfer.to].map(|queue_index| gpu.queues.family(queue_index));
         let [from, to] = if families[0] == families[1] { [vk::QUEUE_FAMILY_IGNORED; 2] } else { families };
         let barrier = vk::ImageMemoryBarrier2::default()
-            .src_stage_mask(Stage::ALL_COMMANDS)
-            .src_access_mask(src_access)
-            .dst_stage_mask(dst_stages)
-            .dst_access_mask(dst_access)
+            .src_stage_mask(scope.src_stages)
+            .src_access_mask(scope.src_access)
+            .dst_stage_mask(scope.dst_stages)
+            .dst_access_mask(scope.dst_access)
             .old_layout(vulkan_layout(transfer.layout))
             .new_layout(vulkan_layout(transfer.layout))
             .src_queue_family_index(from)

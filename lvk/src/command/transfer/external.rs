@@ -6,15 +6,9 @@ use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
+use crate::submit::emit_barriers::Side;
 use crate::submit::exchanged_layout::exchanged_layout;
 use crate::submit::last_access::QueueAccess;
-
-/// Side of an exchange.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Release,
-    Acquire,
-}
 
 impl CommandBuffer {
     /// Releases a buffer in shared memory to other devices, processes and APIs, after everything recorded so far
@@ -108,7 +102,7 @@ impl CommandBuffer {
         let texture = self.shared.store.textures.get(texture)?;
         let image = &texture.image;
         let [from, to] = self.families(side, image.is_concurrent());
-        let scope = Scope::from_side(side);
+        let scope = side.scope();
         let barrier = [vk::ImageMemoryBarrier2::default()
             .src_stage_mask(scope.src_stages)
             .src_access_mask(scope.src_access)
@@ -136,7 +130,7 @@ impl CommandBuffer {
         // The other side may write the buffer, so the exchange waits for reads on other queues.
         self.reference_resource(buffer.id, QueueAccess::Write);
         let [from, to] = self.families(side, self.shared.gpu.queues.families().len() > 1);
-        let scope = Scope::from_side(side);
+        let scope = side.scope();
         let barrier = [vk::BufferMemoryBarrier2::default()
             .src_stage_mask(scope.src_stages)
             .src_access_mask(scope.src_access)
@@ -165,26 +159,5 @@ impl CommandBuffer {
     fn record_exchange(&mut self, info: &vk::DependencyInfo<'_>) {
         // SAFETY: the barriers before have ended any pass, and the object is alive.
         unsafe { self.shared.gpu.device.cmd_pipeline_barrier2(self.recording.commands, info) };
-    }
-}
-
-/// Stages and accesses of one side of an exchange.
-struct Scope {
-    src_stages: vk::PipelineStageFlags2,
-    src_access: vk::AccessFlags2,
-    dst_stages: vk::PipelineStageFlags2,
-    dst_access: vk::AccessFlags2,
-}
-
-impl Scope {
-    /// A release ends with the earlier work, an acquisition begins before the later work.
-    fn from_side(side: Side) -> Self {
-        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
-        let all = Access::MEMORY_READ | Access::MEMORY_WRITE;
-        let (src_access, dst_stages, dst_access) = match side {
-            Side::Release => (Access::MEMORY_WRITE, Stage::NONE, Access::NONE),
-            Side::Acquire => (Access::NONE, Stage::ALL_COMMANDS, all),
-        };
-        Self { src_stages: Stage::ALL_COMMANDS, src_access, dst_stages, dst_access }
     }
 }

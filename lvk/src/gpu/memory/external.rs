@@ -227,12 +227,6 @@ impl Gpu {
         // SAFETY: Vulkan gives the caller a new file descriptor.
         Ok(unsafe { OwnedFd::from_raw_fd(fd) })
     }
-
-    fn memory_types(&self) -> Vec<vk::MemoryType> {
-        // SAFETY: the physical device belongs to the instance.
-        let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) };
-        memory.memory_types_as_slice().to_vec()
-    }
 }
 
 /// Returns the memory type to import with, or an error that names the object.
