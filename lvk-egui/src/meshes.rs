@@ -9,7 +9,7 @@ use egui::{PaintCallback, Rect, TextureId};
 use crate::callback::Callback;
 use crate::error::{Error, Result};
 
-/// What to draw in a frame. Its memory is reused.
+/// The vertices, indices and draws of a frame. Their memory is reused.
 #[derive(Default)]
 pub(crate) struct FrameMeshes {
     pub(crate) vertices: Vec<Vertex>,

@@ -48,7 +48,7 @@ pub(crate) const LINEAR_TARGET: u32 = 1;
 /// The texels of the texture are linear light.
 pub(crate) const LINEAR_TEXELS: u32 = 2;
 
-/// How a target holds the colours that are written to it.
+/// The encoding of colours in a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TargetEncoding {
     /// As numbers from 0 to 1, which are taken as encoded sRGB.

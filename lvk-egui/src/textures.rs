@@ -11,7 +11,7 @@ use lvk::{
 
 use crate::error::{Error, Result};
 
-/// How the texels of a texture encode colours.
+/// The encoding of colours in the texels of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum TexelEncoding {
     /// Shaders read encoded sRGB, as from `Rgba8Unorm` textures that hold a picture.

@@ -10,7 +10,7 @@ const SHADER: &str = r"
     void main() { result.value[gl_LocalInvocationIndex] = 7 * gl_LocalInvocationIndex; }";
 const COUNT: usize = 8;
 
-/// What an engine made on its device: a buffer that it reads, and a timeline semaphore.
+/// Objects of an engine on its device: a buffer that the engine reads, and a timeline semaphore.
 struct Engine {
     device: ash::Device,
     buffer: vk::Buffer,

@@ -21,7 +21,7 @@ const FRAGMENT: &str = r"
     layout(location = 0) out vec4 color;
     void main() { color = vec4(shade, 1); }";
 
-/// What is drawn, and the window it is drawn to.
+/// The window, with the objects that draw to it.
 struct Renderer {
     window: Arc<Window>,
     ctx: Context,

@@ -1,4 +1,4 @@
-//! What an instance and a device of another engine need for a context.
+//! Requirements of a context on the instance and the device of another engine.
 
 use std::ffi::CStr;
 

@@ -5,7 +5,7 @@ use std::fmt;
 use super::device_fault::DeviceFault;
 use crate::queue::Queue;
 
-/// What is known about the loss of a device: which submissions were unfinished, and under which labels they ran.
+/// The report of a lost device: its fault, the unfinished submissions, and the labels under which they ran.
 ///
 /// `{}` writes one line, as in [`Error::DeviceLost`](crate::Error::DeviceLost). `{:#}` writes every unfinished
 /// submission and its labels, with a line for each.
@@ -52,11 +52,11 @@ pub struct ReportedLabel {
     pub name: String,
     /// Number of labels around it.
     pub depth: u32,
-    /// How far the GPU had come.
+    /// The progress of the GPU.
     pub progress: LabelProgress,
 }
 
-/// How far the GPU had come in the commands of a label.
+/// The progress of the GPU in the commands of a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum LabelProgress {
