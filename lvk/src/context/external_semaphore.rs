@@ -40,7 +40,8 @@ impl SemaphoreFdType {
     }
 }
 
-/// A semaphore that is shared by file descriptors, destroyed on drop. Drop it when every submission that uses it is done.
+/// A semaphore that is shared by file descriptors, destroyed on drop. Drop it after [`Context::wait_idle`], when every
+/// submission that uses it is done.
 pub struct SharedSemaphore {
     raw: vk::Semaphore,
     kind: SemaphoreKind,

@@ -160,6 +160,8 @@ impl Context {
     /// # Safety
     /// The semaphores belong to this device. A binary semaphore to wait for has a pending signal and no other waiter. A
     /// binary semaphore to signal is unsignalled. Timeline values rise, and the values to wait for will be signalled.
+    /// The semaphores live until [`wait_idle`](Self::wait_idle) returns: some drivers use them a moment longer than the
+    /// submission runs.
     ///
     /// # Errors
     /// As [`submit`](Self::submit).

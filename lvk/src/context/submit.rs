@@ -169,9 +169,11 @@ impl Context {
     }
 
     /// Submits pending work, and waits until the GPU is idle. [`last_profile`](Self::last_profile) then covers all of it.
+    /// The driver then uses none of the semaphores of [`submit_with`](Self::submit_with).
     pub fn wait_idle(&self) -> Result<()> {
         self.flush()?;
         self.wait_submitted()?;
+        self.device_state().submitter.wait_for_semaphores()?;
         self.device_state().profiler.publish_open();
         Ok(())
     }

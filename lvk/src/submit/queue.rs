@@ -1,5 +1,6 @@
 //! Submission: command buffers go to their queues in order, with the barriers between them.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use ash::vk;
@@ -58,6 +59,8 @@ pub(crate) struct Submitter<T> {
     /// One timeline for each hardware queue: a single one, or one for every queue of the library.
     timelines: Vec<Timeline>,
     inner: Mutex<SubmitterState<T>>,
+    /// True once a submission has used external semaphores.
+    uses_external_semaphores: AtomicBool,
     /// The report of the lost device.
     loss: OnceLock<Arc<DeviceLossReport>>,
     gpu: Arc<Gpu>,
@@ -112,7 +115,8 @@ impl<T> Submitter<T> {
             broken: None,
         };
         let inner = Mutex::new(Rank::Submitter, inner);
-        Ok(Self { timelines, inner, loss: OnceLock::new(), gpu: Arc::clone(gpu) })
+        let uses_external_semaphores = AtomicBool::new(false);
+        Ok(Self { timelines, inner, uses_external_semaphores, loss: OnceLock::new(), gpu: Arc::clone(gpu) })
     }
 
     /// Starts recording a command buffer.
@@ -193,6 +197,9 @@ impl<T> Submitter<T> {
     ) -> (SubmitValues, Result<()>) {
         let mut guard = self.lock();
         let inner = &mut *guard;
+        if submission.exchanges {
+            self.uses_external_semaphores.store(true, Ordering::Relaxed);
+        }
         let sent = match inner.broken.clone() {
             Some(error) => Err(error),
             None => self.submit_all(inner, &mut submission, prepare),
@@ -405,6 +412,15 @@ impl<T> Submitter<T> {
     pub(crate) fn wait_for_queues(&self, values: &PerQueue<u64>) -> Result<()> {
         let mut timelines = self.timelines.iter().zip(values);
         self.explain_loss(timelines.try_for_each(|(timeline, value)| timeline.wait(*value)))
+    }
+
+    /// Waits until the driver no longer uses the external semaphores of submissions that are done. Mesa's queue thread
+    /// uses the semaphores that a submission waited for after the submission has signalled its own.
+    pub(crate) fn wait_for_semaphores(&self) -> Result<()> {
+        if self.uses_external_semaphores.load(Ordering::Relaxed) {
+            self.explain_loss(self.gpu.queues.wait_idle(&self.gpu.device))?;
+        }
+        Ok(())
     }
 
     /// Returns true if the submission of this value is done.

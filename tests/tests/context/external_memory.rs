@@ -180,11 +180,11 @@ fn two_contexts_share_a_semaphore() {
         let wait =
             RawWait { semaphore: imported.raw(), value: 7, stages: vk::PipelineStageFlags2::ALL_COMMANDS };
         // SAFETY: the signal is submitted before the wait, and both semaphores outlive the work.
-        let done = unsafe {
+        unsafe {
             exporter.submit_with(exporter.acquire_command_buffer().unwrap(), &[], &[signal]).unwrap();
-            importer.submit_with(importer.acquire_command_buffer().unwrap(), &[wait], &[]).unwrap()
-        };
-        importer.wait(done).unwrap();
+            importer.submit_with(importer.acquire_command_buffer().unwrap(), &[wait], &[]).unwrap();
+        }
+        importer.wait_idle().unwrap();
         exporter.wait_idle().unwrap();
     }
 }

@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicU32;
 
 use ash::vk;
 
+use crate::error::{Error, Result};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
 
@@ -168,6 +169,14 @@ impl Queues {
     /// Locks the Vulkan queue of a queue index, which only one thread may use at a time.
     pub(crate) fn raw(&self, queue_index: usize) -> Guard<'_, vk::Queue> {
         self.raw[self.raw_index[queue_index]].lock()
+    }
+
+    /// Waits until each Vulkan queue is idle (`vkQueueWaitIdle`).
+    pub(crate) fn wait_idle(&self, device: &ash::Device) -> Result<()> {
+        self.raw.iter().try_for_each(|queue| {
+            // SAFETY: the queue is locked.
+            unsafe { device.queue_wait_idle(*queue.lock()) }.map_err(Error::vulkan("vkQueueWaitIdle"))
+        })
     }
 
     /// Returns the family of a queue index.
