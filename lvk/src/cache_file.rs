@@ -1,12 +1,20 @@
-//! Cache files: whole-file reads, atomic replacement, and checksums.
+//! Cache files: whole-file reads, atomic replacement, removal of what a killed process left, and checksums.
 
+use std::ffi::OsStr;
 use std::fs::File;
+use std::hash::{BuildHasher, RandomState};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, SystemTime};
 
 /// Maximum size of a cache in bytes. A larger one is treated as damaged.
 pub(crate) const MAX_BYTES: u64 = 1 << 30;
+/// Age from which a temporary file is a leftover of a process that was killed. A write takes seconds.
+const LEFTOVER_AGE: Duration = Duration::from_secs(3600);
+/// Extension of temporary files.
+const TEMPORARY: &str = ".tmp";
 
 /// Returns the 64-bit FNV-1a hash. It detects damage, but not tampering.
 pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
@@ -30,7 +38,7 @@ pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let temporary = temporary_name(path)?;
     let written = write_temporary(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
     if written.is_err() {
-        // The first error is reported; a leftover file is harmless.
+        // The first error is reported; `remove_leftovers` removes the file later.
         let _ = std::fs::remove_file(&temporary);
     }
     written
@@ -42,15 +50,39 @@ fn write_temporary(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Returns a name in the same folder that no other context uses.
+/// Returns a name in the same folder that no other context uses, in no process: containers that share a folder may have
+/// equal process numbers, so a random number takes their place.
 fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
+    static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
     let Some(name) = path.file_name() else {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
     };
     let mut name = name.to_owned();
-    name.push(format!(".{}-{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
+    name.push(format!(".{:016x}-{}{TEMPORARY}", *PROCESS, COUNT.fetch_add(1, Ordering::Relaxed)));
     Ok(path.with_file_name(name))
+}
+
+/// True if `name` is that of a temporary file of a cache file whose name passes `is_cache`.
+pub(crate) fn is_temporary(name: &OsStr, is_cache: impl Fn(&str) -> bool) -> bool {
+    let Some(name) = name.to_str().and_then(|name| name.strip_suffix(TEMPORARY)) else { return false };
+    let Some((cache, unique)) = name.rsplit_once('.') else { return false };
+    let is_unique = unique.bytes().all(|byte| byte.is_ascii_hexdigit() || byte == b'-');
+    is_unique && unique.contains('-') && is_cache(cache)
+}
+
+/// Removes temporary files that killed processes left in a folder, of cache files whose name passes `is_cache`. Files of
+/// the last hour stay, since another process may be writing them. Errors are ignored: the next start tries again.
+pub(crate) fn remove_leftovers(folder: &Path, is_cache: impl Fn(&str) -> bool) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    let now = SystemTime::now();
+    for entry in entries.flatten().filter(|entry| is_temporary(&entry.file_name(), &is_cache)) {
+        let written = entry.metadata().and_then(|data| data.modified());
+        let age = written.ok().and_then(|written| now.duration_since(written).ok());
+        if age.is_some_and(|age| age > LEFTOVER_AGE) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// Returns a checksum, computed eight bytes at a time. It detects damage and different contents, but not
@@ -64,4 +96,48 @@ pub(crate) fn fingerprint(bytes: &[u8], seed: u64) -> u64 {
     let (words, rest) = bytes.as_chunks::<8>();
     let all = words.iter().fold(seed ^ bytes.len() as u64, |sum, word| mix(sum, u64::from_le_bytes(*word)));
     rest.iter().fold(all, |sum, byte| mix(sum, u64::from(*byte)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn temporary_files_are_told_from_others() {
+        let of = |name: &str| is_temporary(OsStr::new(name), |cache| cache == "a.bin");
+        for name in ["a.bin.12-3.tmp", "a.bin.00ff00ff00ff00ff-0.tmp"] {
+            assert!(of(name), "{name}");
+        }
+        for name in ["a.bin", "a.bin.tmp", "a.bin.12.tmp", "b.bin.12-3.tmp", "a.bin.my-notes.tmp", ".tmp", ""]
+        {
+            assert!(!of(name), "{name}");
+        }
+        let made = temporary_name(Path::new("folder/a.bin")).unwrap();
+        assert!(of(made.file_name().unwrap().to_str().unwrap()), "{}", made.display());
+        assert_ne!(made, temporary_name(Path::new("folder/a.bin")).unwrap());
+    }
+
+    #[test]
+    fn only_old_leftovers_of_the_cache_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let create = |name: &str, seconds: u64| {
+            let file = File::create(folder.path().join(name)).unwrap();
+            file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
+        };
+        create("a.bin", 9000);
+        create("a.bin.12-3.tmp", 9000);
+        create("a.bin.12-4.tmp", 60);
+        create("b.bin.12-3.tmp", 9000);
+        remove_leftovers(folder.path(), |cache| cache == "a.bin");
+        assert_eq!(names(folder.path()), ["a.bin", "a.bin.12-4.tmp", "b.bin.12-3.tmp"]);
+        remove_leftovers(&folder.path().join("absent"), |_| true);
+    }
 }

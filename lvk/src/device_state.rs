@@ -189,7 +189,7 @@ impl DeviceState {
     pub(crate) fn release_finished(&self, finished: Finished<DeferredObject>) -> Result<()> {
         finished.staged.into_iter().for_each(|sequence| self.staging.release(sequence));
         finished.deferred.into_iter().for_each(|deferred| self.free_now(deferred));
-        self.profiler.collect(finished.passed)
+        self.submitter.explain_loss(self.profiler.collect(finished.passed))
     }
 
     /// Drops an object that the GPU is done with, and frees its slot.
@@ -339,7 +339,11 @@ impl DeviceState {
 impl Drop for DeviceState {
     fn drop(&mut self) {
         // SAFETY: no command buffer is being recorded or submitted: each holds a reference to `self`.
-        if let Err(result) = unsafe { self.gpu.device.device_wait_idle() } {
+        let idle = unsafe { self.gpu.device.device_wait_idle() };
+        // The caller has the report of a loss.
+        if let Err(result) = idle
+            && self.submitter.loss().get().is_none()
+        {
             log::error!("vkDeviceWaitIdle returned {result} at the end of a context");
         }
         drop(self.submitter.drain());

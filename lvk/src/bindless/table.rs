@@ -432,7 +432,7 @@ fn create_layout(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> Res
     // SAFETY: the counts, including all other descriptors of `DescriptorCounts`, are within the descriptor limits, and
     // the device supports the layout.
     with_layout_info(counts, yuv, |info| unsafe { gpu.device.create_descriptor_set_layout(info, None) })
-        .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))
+        .map_err(Error::creating("vkCreateDescriptorSetLayout", "bindless layout"))
 }
 
 /// Calls `then` with the description of the layout.
@@ -502,7 +502,7 @@ fn create_set(
         .pool_sizes(&sizes);
     // SAFETY: the description is valid.
     let pool = unsafe { gpu.device.create_descriptor_pool(&info, None) }
-        .map_err(Error::vulkan("vkCreateDescriptorPool"))?;
+        .map_err(Error::creating("vkCreateDescriptorPool", "bindless pool"))?;
     let layouts = [layout];
     let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
     // SAFETY: the pool is new and has room for this one set.
@@ -516,7 +516,7 @@ fn create_set(
         Err(result) => {
             // SAFETY: nothing was allocated from the pool.
             unsafe { gpu.device.destroy_descriptor_pool(pool, None) };
-            Err(Error::vulkan("vkAllocateDescriptorSets")(result))
+            Err(Error::creating("vkAllocateDescriptorSets", "bindless set")(result))
         }
     }
 }

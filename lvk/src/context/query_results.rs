@@ -15,7 +15,8 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of another kind.
     pub fn timestamps_ms(&self, pool: QueryPoolHandle, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
-        self.device_state().store.query_pools.get(pool)?.milliseconds(first, count)
+        let state = self.device_state();
+        state.submitter.explain_loss(state.store.query_pools.get(pool)?.milliseconds(first, count))
     }
 
     /// Reads the results of `out.len()` queries from `first` on: ticks of
@@ -26,9 +27,10 @@ impl Context {
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of pipeline
     /// statistics.
     pub fn read_queries(&self, pool: QueryPoolHandle, first: u32, out: &mut [Option<u64>]) -> Result<()> {
-        let pool = self.device_state().store.query_pools.get(pool)?;
+        let state = self.device_state();
+        let pool = state.store.query_pools.get(pool)?;
         pool.check_kind(pool.kind.statistics().is_empty(), "read them with Context::statistics")?;
-        pool.read(first, out)
+        state.submitter.explain_loss(pool.read(first, out))
     }
 
     /// Returns the pipeline statistics between begin and end of a query. `None` if the GPU has not reached the end or
@@ -37,7 +39,8 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, and for pools of another kind.
     pub fn statistics(&self, pool: QueryPoolHandle, query: u32) -> Result<Option<PipelineStatistics>> {
-        self.device_state().store.query_pools.get(pool)?.statistics(query)
+        let state = self.device_state();
+        state.submitter.explain_loss(state.store.query_pools.get(pool)?.statistics(query))
     }
 
     /// Reads the clocks of GPU and host at one moment (`vkGetCalibratedTimestampsKHR`), so that GPU timestamps can be

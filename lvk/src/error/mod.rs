@@ -236,12 +236,14 @@ pub enum Error {
         limit: u64,
     },
     /// Device memory is exhausted.
-    #[error("out of device memory while creating '{object}' ({bytes} bytes)")]
+    #[error("out of device memory in {call}{}", memory_request(object.as_deref(), *bytes))]
     OutOfDeviceMemory {
-        /// Debug name of the object.
-        object: String,
-        /// Requested bytes.
-        bytes: u64,
+        /// The Vulkan command that failed.
+        call: &'static str,
+        /// Debug name of the object that was being created. `None` if none was.
+        object: Option<String>,
+        /// Requested bytes, if the command allocates memory.
+        bytes: Option<u64>,
     },
     /// Host memory is exhausted.
     #[error("out of host memory in {call}")]
@@ -282,9 +284,24 @@ impl Error {
             vk::Result::ERROR_DEVICE_LOST => Self::device_lost(call),
             vk::Result::ERROR_OUT_OF_HOST_MEMORY => Self::OutOfHostMemory { call },
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
-                Self::OutOfDeviceMemory { object: call.to_owned(), bytes: 0 }
+                Self::OutOfDeviceMemory { call, object: None, bytes: None }
             }
             result => Self::Vulkan { call, result },
+        }
+    }
+
+    /// Converts the result of `call`, which creates `object`, to an error.
+    pub(crate) fn creating(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> Self {
+        move |result| Self::vulkan(call)(result).with_object(object)
+    }
+
+    /// Converts the result of `vkAllocateMemory` for `object` to an error.
+    pub(crate) fn allocating(object: &str, bytes: u64) -> impl FnOnce(vk::Result) -> Self {
+        move |result| match Self::creating("vkAllocateMemory", object)(result) {
+            Self::OutOfDeviceMemory { call, object, .. } => {
+                Self::OutOfDeviceMemory { call, object, bytes: Some(bytes) }
+            }
+            other => other,
         }
     }
 
@@ -296,8 +313,8 @@ impl Error {
     /// Adds the name of the object whose creation failed, if the error has no name of its own.
     pub(crate) fn with_object(self, object: &str) -> Self {
         match self {
-            Self::OutOfDeviceMemory { bytes: 0, .. } => {
-                Self::OutOfDeviceMemory { object: object.to_owned(), bytes: 0 }
+            Self::OutOfDeviceMemory { call, object: None, bytes } => {
+                Self::OutOfDeviceMemory { call, object: Some(object.to_owned()), bytes }
             }
             Self::Vulkan { .. } | Self::OutOfHostMemory { .. } | Self::StaleHandle { .. } => {
                 Self::Creation { object: object.to_owned(), source: Box::new(self) }
@@ -322,6 +339,12 @@ impl fmt::Debug for Error {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, out)
     }
+}
+
+fn memory_request(object: Option<&str>, bytes: Option<u64>) -> String {
+    let object = object.map(|object| format!(" for '{object}'")).unwrap_or_default();
+    let bytes = bytes.map(|bytes| format!(" ({bytes} bytes)")).unwrap_or_default();
+    object + &bytes
 }
 
 fn stale_object(kind: &str, name: &Option<String>) -> String {
@@ -417,7 +440,7 @@ mod tests {
             format!("water: vkCreateGraphicsPipelines failed: {}", vk::Result::ERROR_UNKNOWN)
         );
         let memory = Error::vulkan("vkCreateGraphicsPipelines")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
-        assert!(text(memory).contains("'water'"));
+        assert_eq!(text(memory), "out of device memory in vkCreateGraphicsPipelines for 'water'");
         assert!(text(Error::OutOfHostMemory { call: "vkCreateShaderModule" }).starts_with("water: out of"));
         assert_eq!(text(Error::usage("grass", "is green")), "grass: is green", "it has a name");
         let lost = Error::device_lost("vkQueueSubmit2");

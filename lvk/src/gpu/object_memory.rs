@@ -19,17 +19,13 @@ impl Gpu {
         let bytes = requirements.size;
         let limit = self.caps.limits.max_allocation_bytes;
         check_limit(name, "memory of one object in bytes", bytes, limit)?;
-        let out_of_memory = || Error::OutOfDeviceMemory { object: name.to_owned(), bytes };
         let mut memory = self.memory();
-        let memory = memory.as_mut().ok_or_else(out_of_memory)?;
+        let memory =
+            memory.as_mut().ok_or_else(|| allocation_error(name, bytes, AllocationError::OutOfMemory))?;
         let kept_name = if self.names_objects() { name } else { "" };
-        let allocated =
-            memory.allocate(kept_name, requirements, kind, linear).map_err(|error| match error {
-                AllocationError::OutOfMemory => out_of_memory(),
-                other => {
-                    Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string())
-                }
-            })?;
+        let allocated = memory
+            .allocate(kept_name, requirements, kind, linear)
+            .map_err(|error| allocation_error(name, bytes, error))?;
         self.heap_use.add(&allocated);
         self.name_block(&allocated, name);
         Ok(allocated)
@@ -55,12 +51,9 @@ impl Gpu {
         let info =
             vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(kind);
         // SAFETY: the memory type is one of the device's.
-        unsafe { self.device.allocate_memory(&info, None) }.map(Some).map_err(|result| match result {
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
-                Error::OutOfDeviceMemory { object: name.to_owned(), bytes: requirements.size }
-            }
-            other => Error::vulkan("vkAllocateMemory")(other),
-        })
+        unsafe { self.device.allocate_memory(&info, None) }
+            .map(Some)
+            .map_err(Error::allocating(name, requirements.size))
     }
 
     /// Returns the memory types of the device (`vkGetPhysicalDeviceMemoryProperties`).
@@ -91,6 +84,24 @@ fn lazy_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
     (0..).zip(types).find(|(index, kind)| bits >> index & 1 == 1 && lazy(kind)).map(|(index, _)| index)
 }
 
+/// Returns the error of an allocation of `bytes` bytes for `name`. The allocator's texts hold the driver's errors.
+fn allocation_error(name: &str, bytes: u64, error: AllocationError) -> Error {
+    use vk::Result as Code;
+    match error {
+        AllocationError::OutOfMemory => Error::allocating(name, bytes)(Code::ERROR_OUT_OF_DEVICE_MEMORY),
+        AllocationError::FailedToMap(_) => {
+            Error::creating("vkMapMemory", name)(Code::ERROR_OUT_OF_HOST_MEMORY)
+        }
+        AllocationError::Internal(text) if text.contains("OUT_OF_HOST_MEMORY") => {
+            Error::allocating(name, bytes)(Code::ERROR_OUT_OF_HOST_MEMORY)
+        }
+        AllocationError::Internal(text) if text.contains("vkAllocateMemory") => {
+            Error::allocating(name, bytes)(Code::ERROR_UNKNOWN)
+        }
+        other => Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -106,5 +117,28 @@ mod tests {
         assert_eq!(lazy_type(&[plain, lazy, lazy], 0b101), Some(2));
         assert_eq!(lazy_type(&[plain, lazy], 0b01), None);
         assert_eq!(lazy_type(&[], u32::MAX), None);
+    }
+
+    #[test]
+    fn shortages_are_told_apart_from_missing_support() {
+        let text = |error| allocation_error("sky", 400, error).to_string();
+        assert_eq!(
+            text(AllocationError::OutOfMemory),
+            "out of device memory in vkAllocateMemory for 'sky' (400 bytes)"
+        );
+        assert_eq!(
+            text(AllocationError::FailedToMap(String::new())),
+            "sky: out of host memory in vkMapMemory"
+        );
+        let of_driver =
+            |code: &str| AllocationError::Internal(format!("Unexpected error in vkAllocateMemory: {code}"));
+        assert_eq!(
+            text(of_driver("ERROR_OUT_OF_HOST_MEMORY")),
+            "sky: out of host memory in vkAllocateMemory"
+        );
+        assert!(text(of_driver("ERROR_TOO_MANY_OBJECTS")).starts_with("sky: vkAllocateMemory failed"));
+        assert!(
+            text(AllocationError::NoCompatibleMemoryTypeFound).starts_with("not supported: memory for 'sky'")
+        );
     }
 }

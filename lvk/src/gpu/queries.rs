@@ -4,7 +4,6 @@ use ash::vk;
 
 use super::caps::format_features::format_properties;
 use super::caps::host_image_copy::host_copies_stay_optimal;
-use super::caps::image_limits::ImageLimitsResult;
 use super::caps::optional_features::OptionalFeature;
 use super::caps::shading_rate::{ShadingRate, ShadingRateCombiner, ShadingRateError, check_rate};
 use super::checkpoints::PassedCheckpoints;
@@ -27,9 +26,16 @@ impl Gpu {
         format_properties(&self.instance.raw, self.physical(), format).buffer_features
     }
 
-    /// Returns the limits of an image of this description, or the driver's error.
-    pub(crate) fn image_limits(&self, info: &vk::ImageCreateInfo<'_>) -> ImageLimitsResult {
-        self.image_limits.image_limits(&self.instance.raw, self.physical(), info)
+    /// Returns the limits of an image of this description. `None` if the driver does not support it.
+    pub(crate) fn image_limits(
+        &self,
+        info: &vk::ImageCreateInfo<'_>,
+    ) -> Result<Option<vk::ImageFormatProperties>> {
+        match self.image_limits.image_limits(&self.instance.raw, self.physical(), info) {
+            Ok(limits) => Ok(Some(limits)),
+            Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED) => Ok(None),
+            Err(shortage) => Err(Error::vulkan("vkGetPhysicalDeviceImageFormatProperties")(shortage)),
+        }
     }
 
     /// Returns the sample counts that a plain render target of `format` may have. Empty if the format cannot
@@ -38,13 +44,13 @@ impl Gpu {
         &self,
         format: vk::Format,
         usage: vk::ImageUsageFlags,
-    ) -> vk::SampleCountFlags {
+    ) -> Result<vk::SampleCountFlags> {
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(format)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(usage);
-        self.image_limits(&info).map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts)
+        Ok(self.image_limits(&info)?.map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts))
     }
 
     /// True if the host can write images of this description without making sampling on the device slower.

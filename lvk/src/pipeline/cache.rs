@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::cache_file::{CacheOwner, decode_file, encode_file};
-use crate::cache_file::{MAX_BYTES, checksum, read_file, replace_file};
+use crate::cache_file::{MAX_BYTES, checksum, read_file, remove_leftovers, replace_file};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
@@ -29,6 +29,8 @@ impl PipelineCache {
     /// to the `log` crate.
     pub(crate) fn new(gpu: &Arc<Gpu>, path: &Path) -> Result<Self> {
         let owner = cache_owner(gpu);
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        remove_leftovers(folder.unwrap_or(Path::new(".")), |cache| path.file_name() == Some(cache.as_ref()));
         let file = read_if_present(path);
         let data = file.as_deref().and_then(|file| match decode_file(&owner, file) {
             Ok(data) => Some(data),

@@ -69,7 +69,8 @@ impl GraphicsParts {
         let info = vk::GraphicsPipelineCreateInfo::default().layout(base.layout).push_next(&mut libraries);
         // SAFETY: the parts are alive, complete each other, and have the same layout, views and samples.
         let made = unsafe { gpu.device.create_graphics_pipelines(base.cache, &[info], None) };
-        let linked = made.map_err(|(_, result)| Error::vulkan("vkCreateGraphicsPipelines")(result))?[0];
+        let linked = made
+            .map_err(|(_, result)| Error::creating("vkCreateGraphicsPipelines", desc.debug_name)(result))?[0];
         Ok((linked, parts))
     }
 

@@ -58,5 +58,7 @@ fn samples(gpu: &Gpu, format: Format) -> u32 {
         .format(format.raw())
         .tiling(vk::ImageTiling::OPTIMAL)
         .usage(raw_usage(TextureUsage::TARGET, format));
-    gpu.image_limits(&info).map_or(0, |limits| limits.sample_counts.as_raw())
+    // Lack of memory is no answer; the next query may have one.
+    let limits = gpu.image_limits(&info).ok().flatten();
+    limits.map_or(0, |limits| limits.sample_counts.as_raw())
 }

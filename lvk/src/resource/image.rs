@@ -117,7 +117,8 @@ impl Image {
             info.usage |= vk::ImageUsageFlags::HOST_TRANSFER_EXT;
         }
         // SAFETY: the description is checked against the limits of its format.
-        let raw = unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage"))?;
+        let raw = unsafe { gpu.device.create_image(&info, None) }
+            .map_err(Error::creating("vkCreateImage", desc.debug_name))?;
         let mut image = Self::from_raw(gpu, desc, &plan, raw, false);
         image.host_filled = host_filled;
         gpu.name(raw, desc.debug_name);
@@ -144,12 +145,8 @@ impl Image {
         image.shared_as = Some(fd_type);
         // SAFETY: the image was created by this device.
         let requirements = unsafe { gpu.device.get_image_memory_requirements(raw) };
-        image.bind_to(Memory::Managed(sharing.memory(
-            gpu,
-            name,
-            requirements,
-            DedicatedTo::Image(raw),
-        )?))?;
+        let memory = sharing.memory(gpu, name, requirements, DedicatedTo::Image(raw))?;
+        image.bind_to(Memory::Managed(memory), name)?;
         gpu.name(raw, name);
         Ok(image)
     }
@@ -226,19 +223,19 @@ impl Image {
             return Ok(());
         }
         let memory = self.gpu.allocate(name, requirements, MemoryKind::Device, false)?;
-        self.bind_to(Memory::Managed(memory))
+        self.bind_to(Memory::Managed(memory), name)
     }
 
     /// Binds lazily allocated memory. Returns false if the device has none for the image.
     pub(super) fn bind_lazy(&mut self, name: &str, requirements: vk::MemoryRequirements) -> Result<bool> {
         let Some(raw) = self.gpu.allocate_lazy(name, requirements)? else { return Ok(false) };
-        self.bind_to(Memory::Lazy(raw))?;
+        self.bind_to(Memory::Lazy(raw), name)?;
         Ok(true)
     }
 
     /// Binds a part of a block, from `offset` on. The block has the memory types and the size that the image requires.
-    pub(super) fn bind_shared(&mut self, block: &Arc<SharedBlock>, offset: u64) -> Result<()> {
-        self.bind_to(Memory::Shared(Arc::clone(block), offset))
+    pub(super) fn bind_shared(&mut self, block: &Arc<SharedBlock>, offset: u64, name: &str) -> Result<()> {
+        self.bind_to(Memory::Shared(Arc::clone(block), offset), name)
     }
 
     pub(super) fn memory_requirements(&self) -> vk::MemoryRequirements {
@@ -247,7 +244,7 @@ impl Image {
     }
 
     /// Binds memory that was allocated for the image's requirements.
-    fn bind_to(&mut self, memory: Memory) -> Result<()> {
+    fn bind_to(&mut self, memory: Memory, name: &str) -> Result<()> {
         let (raw, offset) = match &memory {
             Memory::Managed(memory) => (memory.raw, memory.offset),
             Memory::Lazy(memory) => (*memory, 0),
@@ -256,7 +253,7 @@ impl Image {
         self.memory = Some(memory);
         // SAFETY: the memory was allocated for this image's requirements and is bound once.
         let bound = unsafe { self.gpu.device.bind_image_memory(self.raw, raw, offset) };
-        bound.map_err(Error::vulkan("vkBindImageMemory"))
+        bound.map_err(Error::creating("vkBindImageMemory", name))
     }
 
     /// Adds a texture of the image. Fails if the last texture is already destroyed.
@@ -389,7 +386,7 @@ fn create_shared(
         info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
     }
     // SAFETY: the description is checked against the limits of its format, and the driver shares such images.
-    unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage"))
+    unsafe { gpu.device.create_image(&info, None) }.map_err(Error::creating("vkCreateImage", desc.debug_name))
 }
 
 /// True if all queues may use the image without an ownership transfer. An image that is only copied and sampled loses

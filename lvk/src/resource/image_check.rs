@@ -23,7 +23,7 @@ pub(crate) fn check_image(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<ImagePlan
     let mips = check_shape(gpu, desc)?;
     check_view_formats(desc)?;
     gpu.require_portable(&format!("texture '{}'", desc.debug_name), texture_needs(desc))?;
-    let plan = ImagePlan { mips, flags: flags(gpu, desc, mips) };
+    let plan = ImagePlan { mips, flags: flags(gpu, desc, mips)? };
     check_format(gpu, desc, &plan.info(desc))?;
     Ok(plan)
 }
@@ -214,7 +214,7 @@ fn check_view_formats(desc: &TextureDesc<'_>) -> Result<()> {
 }
 
 /// Returns the creation flags. Views of other formats and kinds must be allowed when the image is created.
-fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
+fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> Result<vk::ImageCreateFlags> {
     use vk::ImageCreateFlags as Flags;
     let formats = match desc.view_formats {
         // Views can be created of its planes.
@@ -223,7 +223,7 @@ fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
         _ => Flags::MUTABLE_FORMAT | Flags::EXTENDED_USAGE,
     };
     let cube = formats | Flags::CUBE_COMPATIBLE;
-    match desc.kind {
+    Ok(match desc.kind {
         TextureKind::Cube | TextureKind::CubeArray { .. } => cube,
         // Passes draw to slices through 2D views.
         TextureKind::D3 { .. } if desc.usage.contains(TextureUsage::TARGET) => {
@@ -233,12 +233,13 @@ fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
             if layers >= 6 && desc.extent[0] == desc.extent[1] && desc.samples == 1 =>
         {
             let small = desc.extent[0] <= gpu.caps.limits.max_texture_cube;
-            let allowed = gpu.image_limits(&image_info(desc, mips).flags(cube));
-            let allowed = allowed.is_ok_and(|limits| limits.max_array_layers >= layers);
+            let limits = gpu.image_limits(&image_info(desc, mips).flags(cube));
+            let limits = limits.map_err(|error| error.with_object(desc.debug_name))?;
+            let allowed = limits.is_some_and(|limits| limits.max_array_layers >= layers);
             if small && allowed { cube } else { formats }
         }
         TextureKind::D1 | TextureKind::D2 | TextureKind::D2Array { .. } | TextureKind::D3 { .. } => formats,
-    }
+    })
 }
 
 fn image_info(desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateInfo<'static> {
@@ -279,7 +280,7 @@ fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_
     if gpu.format_features(desc.format).is_empty() {
         return Err(refused());
     }
-    let limits = gpu.image_limits(info).map_err(|_| refused())?;
+    let limits = gpu.image_limits(info).map_err(|error| error.with_object(name))?.ok_or_else(refused)?;
     let formats = [desc.format].into_iter().chain(desc.view_formats.iter().copied());
     let usages: TextureUsage =
         formats.map(|format| usage_from_features(gpu.format_features(format))).collect();

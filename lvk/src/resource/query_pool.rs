@@ -197,7 +197,7 @@ impl QueryPool {
         }
         // SAFETY: the description is valid.
         let raw = unsafe { gpu.device.create_query_pool(&info, None) }
-            .map_err(Error::vulkan("vkCreateQueryPool"))?;
+            .map_err(Error::creating("vkCreateQueryPool", desc.debug_name))?;
         // SAFETY: `hostQueryReset` is on and no command uses the new pool.
         unsafe { gpu.device.reset_query_pool(raw, 0, desc.count) };
         gpu.name(raw, desc.debug_name);

@@ -77,7 +77,7 @@ fn bind_group(
     let needs = vk::MemoryRequirements { size: packing.bytes, alignment, memory_type_bits };
     let block = SharedBlock::new(gpu, desc.debug_name, needs)?;
     for (&index, offset) in group.iter().zip(&packing.offsets) {
-        images[index].bind_shared(&block, *offset)?;
+        images[index].bind_shared(&block, *offset, desc.textures[index].desc.debug_name)?;
     }
     for (&index, near) in group.iter().zip(packing.sharers(&items)) {
         sharers[index] = near.into_iter().map(|position| group[position]).collect();

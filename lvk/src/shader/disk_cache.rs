@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
 use super::disk_file::{CachedModule, Fingerprint, Included, decode_file, encode_file};
-use crate::cache_file::{read_file, replace_file};
+use crate::cache_file::{is_temporary, read_file, remove_leftovers, replace_file};
 use crate::lock_order::{Mutex, Rank};
 
 /// Maximum size of a cache folder in bytes. If a folder exceeds it, the least recently used files are removed until the
@@ -39,6 +39,7 @@ pub(crate) struct ShaderCache {
 impl ShaderCache {
     /// Creates a cache in `folder`, which need not exist.
     pub(crate) fn new(folder: &Path) -> Self {
+        remove_leftovers(folder, is_module_name);
         Self {
             folder: folder.to_owned(),
             most_bytes: MAX_BYTES,
@@ -135,10 +136,14 @@ fn cache_files(folder: &Path) -> Vec<CacheFile> {
 
 /// True if the name is that of a compiled shader, or of a temporary file that a crash left behind.
 fn is_ours(name: &std::ffi::OsStr) -> bool {
-    let parts = name.to_str().and_then(|name| name.split_at_checked(KEY_DIGITS));
-    parts.is_some_and(|(key, rest)| {
-        let is_key = key.bytes().all(|byte| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte));
-        is_key && (rest == EXTENSION || rest.starts_with(EXTENSION) && rest.ends_with(".tmp"))
+    name.to_str().is_some_and(is_module_name) || is_temporary(name, is_module_name)
+}
+
+/// True if the name is that of a compiled shader.
+fn is_module_name(name: &str) -> bool {
+    name.strip_suffix(EXTENSION).is_some_and(|key| {
+        key.len() == KEY_DIGITS
+            && key.bytes().all(|byte| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte))
     })
 }
 

@@ -7,9 +7,10 @@ use super::bvh::primitives::{Mesh, MeshPrimitives};
 use super::bvh::settings::BvhSettings;
 use super::expected_mesh::ExpectedMesh;
 use super::validate_blob;
-use crate::cache_file::{fingerprint, read_file, replace_file};
+use crate::cache_file::{fingerprint, read_file, remove_leftovers, replace_file};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
+const EXTENSION: &str = ".tree";
 /// Version of the builders and of the BLAS format.
 const VERSION: u32 = 5;
 /// Bytes of the header: magic, version, a reserved word, and length and checksum of the BLAS.
@@ -46,6 +47,7 @@ impl BvhKey {
 impl BvhCache {
     /// Creates a cache in `folder`, which need not exist.
     pub(crate) fn new(folder: &Path) -> Self {
+        remove_leftovers(folder, |cache| cache.ends_with(EXTENSION));
         Self { folder: folder.to_owned() }
     }
 
@@ -57,7 +59,7 @@ impl BvhCache {
         expected: &ExpectedMesh,
         build: impl FnOnce() -> BlasBlob,
     ) -> BlasBlob {
-        let path = self.folder.join(format!("{:016x}{:016x}.tree", key.0[0], key.0[1]));
+        let path = self.folder.join(format!("{:016x}{:016x}{EXTENSION}", key.0[0], key.0[1]));
         match read_file(&path, HEADER_BYTES as u64 + expected.max_blob_bytes()) {
             Ok(file) => match decode_file(&file, expected) {
                 Ok(blob) => return blob,

@@ -375,7 +375,7 @@ impl<T> Submitter<T> {
         with(&inner.ring, inner.queue_sync.last_values())
     }
 
-    pub(super) fn loss(&self) -> &OnceLock<Arc<DeviceLossReport>> {
+    pub(crate) fn loss(&self) -> &OnceLock<Arc<DeviceLossReport>> {
         &self.loss
     }
 

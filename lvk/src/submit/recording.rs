@@ -46,7 +46,7 @@ impl Recording {
             .queue_family_index(gpu.queues.family(queue_index));
         // SAFETY: the queue family is the device's own.
         let pool = unsafe { gpu.device.create_command_pool(&info, None) }
-            .map_err(Error::vulkan("vkCreateCommandPool"))?;
+            .map_err(Error::creating("vkCreateCommandPool", "command pool"))?;
         gpu.name(pool, "command pool");
         // SAFETY: where there is no command buffer, the pool is unused.
         let commands =
@@ -154,7 +154,7 @@ fn allocate(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
         .command_buffer_count(1);
     // SAFETY: the pool is alive, and no other thread uses it.
     let made = unsafe { gpu.device.allocate_command_buffers(&info) };
-    made.map(|buffers| buffers[0]).map_err(Error::vulkan("vkAllocateCommandBuffers"))
+    made.map(|buffers| buffers[0]).map_err(Error::creating("vkAllocateCommandBuffers", "command buffer"))
 }
 
 pub(super) fn begin_commands(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {

@@ -44,7 +44,7 @@ impl Timeline {
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: the feature `timelineSemaphore` is enabled.
         let raw = unsafe { gpu.device.create_semaphore(&info, None) }
-            .map_err(Error::vulkan("vkCreateSemaphore"))?;
+            .map_err(Error::creating("vkCreateSemaphore", name))?;
         gpu.name(raw, name);
         Ok(Self { raw, seen: AtomicU64::new(0), sent: AtomicU64::new(0), gpu: Arc::clone(gpu) })
     }

@@ -168,7 +168,7 @@ impl PresentSync {
         if gpu.window_functions()?.maintenance.is_some() {
             // SAFETY: no preconditions.
             let fence = unsafe { gpu.device.create_fence(&vk::FenceCreateInfo::default(), None) };
-            sync.present_fence = Some(fence.map_err(Error::vulkan("vkCreateFence"))?);
+            sync.present_fence = Some(fence.map_err(Error::creating("vkCreateFence", name))?);
         }
         Ok(sync)
     }
@@ -222,7 +222,7 @@ impl Drop for PresentSync {
 pub(crate) fn new_semaphore(gpu: &Gpu, name: &str) -> Result<vk::Semaphore> {
     // SAFETY: no preconditions.
     let raw = unsafe { gpu.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }
-        .map_err(Error::vulkan("vkCreateSemaphore"))?;
+        .map_err(Error::creating("vkCreateSemaphore", name))?;
     gpu.name(raw, name);
     Ok(raw)
 }

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     fn no_memory() -> Error {
-        Error::OutOfDeviceMemory { object: "staging".to_owned(), bytes: 100 }
+        Error::allocating("staging", 100)(ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)
     }
 
     #[test]

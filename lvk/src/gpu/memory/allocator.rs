@@ -282,13 +282,28 @@ fn allocate_dedicated(
     memory: MemoryKind,
     linear: bool,
 ) -> Allocated<Allocation> {
-    allocator.allocate(&AllocationCreateDesc {
+    let made = allocator.allocate(&AllocationCreateDesc {
         name,
         requirements,
         location: memory.location(),
         linear,
         allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-    })
+    })?;
+    if made.mapped_ptr().is_some_and(|start| !is_mapping(start.addr().get(), made.offset(), made.size())) {
+        allocator.free(made)?;
+        return Err(AllocationError::FailedToMap("the driver returned no address".to_owned()));
+    }
+    Ok(made)
+}
+
+/// True if `start` can be the host address of `size` bytes at `offset` of mapped memory. lavapipe returns success with
+/// the address of a failed `mmap`, which is -1. Vulkan maps memory at multiples of `minMemoryMapAlignment`, at least 64.
+fn is_mapping(start: usize, offset: u64, size: u64) -> bool {
+    const LEAST_ALIGNMENT: u64 = 64;
+    let start = start as u64;
+    start.wrapping_sub(offset).is_multiple_of(LEAST_ALIGNMENT)
+        && start >= offset
+        && start.checked_add(size).is_some()
 }
 
 #[cfg(test)]
@@ -296,6 +311,16 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn the_address_of_a_failed_mapping_is_refused() {
+        let failed = usize::MAX;
+        for offset in [0, 64, 100, 1 << 20] {
+            assert!(is_mapping(0x7f00_0000_0000 + offset as usize, offset, 4096), "{offset}");
+            assert!(!is_mapping(failed.wrapping_add(offset as usize), offset, 4096), "{offset}");
+        }
+        assert!(!is_mapping(usize::MAX - 63, 0, 4096), "the end is no address");
+    }
 
     proptest! {
         /// Slots of an aligned block are aligned, and each is large enough for its object.

@@ -198,13 +198,10 @@ impl Gpu {
         let info = info.push_next(&mut dedicated).push_next(&mut flags);
         // SAFETY: the memory type is one of the device's that suit the object, and the chain is valid.
         let raw = unsafe { self.device.allocate_memory(&info, None) }.map_err(|result| match result {
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
-                Error::OutOfDeviceMemory { object: name.to_owned(), bytes }
-            }
             vk::Result::ERROR_INVALID_EXTERNAL_HANDLE => {
                 Error::usage(name, "the file descriptor is no memory of its type that this device can import")
             }
-            other => Error::vulkan("vkAllocateMemory")(other),
+            other => Error::allocating(name, bytes)(other),
         })?;
         let properties = self.memory_types().get(index as usize).map(|kind| kind.property_flags);
         let memory = ObjectMemory::unmanaged(raw, bytes, index, properties.unwrap_or_default());
@@ -223,7 +220,8 @@ impl Gpu {
         let functions = self.require_memory_fd(fd_type, &format!("the export of the memory of '{name}'"))?;
         let info = vk::MemoryGetFdInfoKHR::default().memory(memory.raw).handle_type(fd_type.raw());
         // SAFETY: the memory was allocated for export as this type.
-        let fd = unsafe { functions.get_memory_fd(&info) }.map_err(Error::vulkan("vkGetMemoryFdKHR"))?;
+        let fd =
+            unsafe { functions.get_memory_fd(&info) }.map_err(Error::creating("vkGetMemoryFdKHR", name))?;
         // SAFETY: Vulkan gives the caller a new file descriptor.
         Ok(unsafe { OwnedFd::from_raw_fd(fd) })
     }
