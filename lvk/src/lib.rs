@@ -97,6 +97,14 @@
 //!   2D texture.
 //! * Bytes that shaders read by address. [`BlockLayout`] compares the layout of a struct with that of the block, but not
 //!   whether the address leads to such a struct.
+//! * The hit groups of instances. A ray that hits an instance whose
+//!   [`hit_group_offset`](TlasInstance::hit_group_offset), with the offset of the trace, is beyond the hit groups of the
+//!   pipeline reads beyond the shader binding table. A TLAS can serve several pipelines, and the mask of a trace can
+//!   leave instances out.
+//! * The depth of recursion. A hit or miss shader that traces a ray deeper than
+//!   [`max_recursion`](RayTracingPipelineDesc::max_recursion) is undefined behaviour. Such a shader may count the depth
+//!   itself, so its presence is no error.
+//! * The usage of imported images and buffers, which Vulkan does not tell.
 //! * Vertices. Indices and draws may read beyond the end of a vertex buffer.
 //! * Workgroup memory with unresolved array lengths. The library checks declared shared variables and task payloads
 //!   against the limits of their stage, with the constants of each pipeline. It resolves only array lengths that use

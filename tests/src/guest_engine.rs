@@ -91,6 +91,13 @@ impl GuestInstance {
     }
 }
 
+impl GuestInstance {
+    /// Takes the messages that a test provoked on purpose.
+    pub fn take_messages(&self) -> Vec<String> {
+        std::mem::take(&mut *self.messages.lock().unwrap())
+    }
+}
+
 impl Drop for GuestInstance {
     fn drop(&mut self) {
         // SAFETY: devices and surfaces are gone.

@@ -46,7 +46,8 @@ pub struct TlasInstance {
     pub custom_index: u32,
     /// Rays hit the instance only if this mask and their cull mask have a bit in common.
     pub mask: u8,
-    /// Added to the hit group index of a ray tracing pipeline; 24 bits.
+    /// Added to the hit group index of a ray tracing pipeline; 24 bits. The library does not check that the pipeline
+    /// has the hit group: reads beyond the shader binding table are undefined behaviour.
     pub hit_group_offset: u32,
     /// Ray behaviour of the instance.
     pub flags: InstanceFlags,

@@ -20,7 +20,8 @@ pub struct ImportedTexture<'a> {
     /// The image, bound to memory.
     pub image: vk::Image,
     /// The creation parameters of the image: kind, format, extent, mips (0 for all), samples, usage and view formats.
-    /// `data` and `generate_mips` are ignored.
+    /// `data` and `generate_mips` are ignored. Copies, clears, uploads and downloads need `TRANSFER_SRC` or `TRANSFER_DST`
+    /// in the usage of the image, which the library cannot check.
     pub desc: TextureDesc<'a>,
     /// Layout of the whole image when the context first uses it: `UNDEFINED`, `GENERAL`, `READ_ONLY_OPTIMAL`,
     /// `SHADER_READ_ONLY_OPTIMAL`, `DEPTH_STENCIL_READ_ONLY_OPTIMAL`, `COLOR_ATTACHMENT_OPTIMAL`,

@@ -92,7 +92,8 @@ impl Context {
         self.device_state().gpu.memory_budget()
     }
 
-    /// Returns the messages of the validation layer so far.
+    /// Returns the messages of the validation layer so far. On an engine's device, they arrive only if
+    /// [`ContextDesc::validation`](super::ContextDesc::validation) asked for them.
     pub fn validation(&self) -> &ValidationSink {
         self.device_state().gpu.instance.sink()
     }

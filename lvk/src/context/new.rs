@@ -159,6 +159,8 @@ pub(super) fn external_request<'a>(desc: &'a ContextDesc<'_>) -> DeviceRequest<'
         profile: None,
         extra: UserExtensions::default(),
         debug_names: desc.debug_names,
+        validation: desc.validation,
+        validation_sink: desc.validation_sink.as_ref(),
         checkpoints: desc.checkpoints,
         queues: requested_queues(desc),
         window: desc.window_ref(),

@@ -20,6 +20,7 @@ use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
 use super::checkpoints::Checkpoints;
 use super::debug::debugger::has_debugger;
+use super::debug::messenger::{ValidationMode, ValidationSink};
 use super::memory::allocator::DeviceMemory;
 use super::memory::budget::HeapUse;
 use super::start::driver_workarounds::with_exclusive_device_lock;
@@ -50,6 +51,9 @@ pub(crate) struct DeviceRequest<'a> {
     /// True to name objects for debuggers. `None`: name them if the validation layer or a debugger reads the
     /// names.
     pub(crate) debug_names: Option<bool>,
+    /// The validation layer and the receiver of its messages, on the instance of another engine.
+    pub(crate) validation: ValidationMode,
+    pub(crate) validation_sink: Option<&'a ValidationSink>,
     /// True to write labels to the GPU as checkpoints, where the device supports it.
     pub(crate) checkpoints: bool,
     pub(crate) queues: QueueRequest,
@@ -146,7 +150,14 @@ impl Gpu {
         let mut caps = chosen.capabilities.clone();
         caps.choose_ray_tracing(request.pipeline, request.query);
         let given = raw.queues();
-        let instance = Instance::external(raw.entry.clone(), raw.instance.clone(), raw.instance_extensions);
+        if request.query.prefers_hardware() && !raw.ray_query {
+            caps.ray_query_reason = "the engine's device has no ray queries enabled";
+        }
+        let mut instance =
+            Instance::external(raw.entry.clone(), raw.instance.clone(), raw.instance_extensions);
+        if request.validation != ValidationMode::Off {
+            instance.listen(request.validation_sink.cloned().unwrap_or_default())?;
+        }
         if let Some(window) = request.window {
             raw.check_window(&instance, window, &chosen)?;
         }

@@ -42,7 +42,8 @@ pub struct RayTracingPipelineDesc<'a> {
     pub callable_records: &'a [ShaderRecord<'a>],
     /// Libraries whose shaders are linked into the pipeline. They may be destroyed before the pipeline.
     pub libraries: &'a [RayTracingLibraryHandle],
-    /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays.
+    /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays. Deeper traces are undefined behaviour,
+    /// which the library does not check.
     pub max_recursion: u32,
     /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others.
     pub max_callable_depth: u32,

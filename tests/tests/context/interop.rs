@@ -10,7 +10,7 @@ use lvk::{
     BufferHandle, BufferUsage, ColorAttachment, CommandBuffer, ComputePipelineHandle, Context, ContextDesc,
     Dependencies, Error, FeatureSet, Format, Holder, ImportedBuffer, ImportedTexture, OptionalFeature,
     RawContext, RawSignal, RawWait, RenderPassDesc, RenderPipelineDesc, ShaderStage, TextureDesc,
-    TextureHandle, TextureUsage,
+    TextureHandle, TextureUsage, ValidationMode, ValidationSink,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::guest_engine::GuestInstance;
@@ -464,6 +464,47 @@ fn targets_are_read_in_their_own_pass_on_another_engines_device() {
         let (x, y) = (at as u32 % SIDE, at as u32 / SIDE);
         assert_eq!(*pixel, [2.0 * x as f32 + 1.0, 2.0 * y as f32 + 1.0, 6.0, 8.0]);
     }
+}
+
+/// A context receives the messages of the engine's layer if it asks for them.
+#[test]
+fn a_guest_receives_the_messages_of_the_layer() {
+    let Some(engine) = Engine::new() else { return };
+    if !engine.raw().instance_extensions.contains(&ash::ext::debug_utils::NAME) {
+        return eprintln!("NOT TESTED without the validation layer");
+    }
+    let sink = ValidationSink::default();
+    let validation_sink = Some(sink.clone());
+    let desc =
+        ContextDesc { validation: ValidationMode::Standard, validation_sink, ..ContextDesc::default() };
+    // SAFETY: as of `Engine::context`.
+    let (ctx, silent) = unsafe { (Context::from_raw(engine.raw(), &desc).unwrap(), engine.context()) };
+    let ext = ash::ext::debug_utils::Instance::new(&engine.instance.entry, &engine.instance.raw);
+    let data = vk::DebugUtilsMessengerCallbackDataEXT::default().message(c"spoken by the engine");
+    let (severity, kind) =
+        (vk::DebugUtilsMessageSeverityFlagsEXT::ERROR, vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION);
+    // SAFETY: the instance has the extension on, and the text lives during the call.
+    unsafe { ext.submit_debug_utils_message(severity, kind, &data) };
+    let texts: Vec<_> = ctx.validation().messages().into_iter().map(|message| message.text).collect();
+    assert_eq!(texts, ["spoken by the engine"]);
+    assert_eq!(engine.instance.take_messages(), texts, "the engine's own messenger stays");
+    assert!(silent.validation().is_empty(), "it did not ask for messages");
+    drop(ctx);
+    assert_eq!(sink.take().len(), 1);
+    // SAFETY: an error comes before anything is made.
+    let unlisted =
+        unsafe { Context::from_raw(RawContext { instance_extensions: &[], ..engine.raw() }, &desc) };
+    let Err(Error::InvalidUsage { object, message }) = unlisted else { unreachable!("{unlisted:?}") };
+    assert_eq!(object, "RawContext::instance_extensions");
+    assert!(message.contains("VK_EXT_debug_utils"), "{message}");
+}
+
+/// The engine's device has no ray queries enabled, even if the driver has them.
+#[test]
+fn the_reason_for_the_ray_query_path_is_the_engines_device() {
+    let Some(engine) = Engine::new() else { return };
+    let reason = engine.context().capabilities().ray_query_reason;
+    assert_eq!(reason, "the engine's device has no ray queries enabled");
 }
 
 #[test]

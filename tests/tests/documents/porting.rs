@@ -71,3 +71,18 @@ fn most_documentation_tests_run() {
     }
     assert!(run + compiled >= 60 && run > compiled, "{run} run, {compiled} only compile");
 }
+
+/// The page on interoperation shows the lines of the sample, which is compiled and tested.
+#[test]
+fn the_code_for_wgpu_is_that_of_the_sample() {
+    let read = |path: &str| std::fs::read_to_string(project().join(path)).unwrap();
+    let page = read("lvk/src/manual/interop.md");
+    let sample = read("samples/wgpu-guest/src/device.rs");
+    let (_, code) = page.split_once("```rust,ignore\n").unwrap();
+    let (code, _) = code.split_once("\n```").unwrap();
+    let mut lines = sample.lines().map(str::trim);
+    for line in code.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        assert!(lines.any(|other| other == line), "the sample has no line '{line}' at this place");
+    }
+    assert!(code.lines().count() > 30);
+}

@@ -98,6 +98,21 @@ impl Instance {
         }
     }
 
+    /// Receives the messages of the validation layer that the caller of [`external`](Self::external) turned on.
+    pub(crate) fn listen(&mut self, sink: ValidationSink) -> Result<()> {
+        if !self.debug_utils {
+            let why = "ContextDesc::validation needs VK_EXT_debug_utils, which is not listed; enable and list it, or \
+                       leave the messages to the engine";
+            return Err(Error::usage("RawContext::instance_extensions", why));
+        }
+        self.messenger = Messenger::new(sink);
+        self.messenger
+            .install(&self.entry, &self.raw)
+            .map_err(Error::vulkan("vkCreateDebugUtilsMessengerEXT"))?;
+        self.validated = true;
+        Ok(())
+    }
+
     /// True if the caller created the instance.
     #[cfg(feature = "window")]
     pub(crate) fn is_external(&self) -> bool {
