@@ -95,6 +95,8 @@
 //!   causes undefined behaviour on the GPU, as in every bindless design. [`ContextDesc::check_indices`] finds wrong
 //!   indices. Slot 0 of each array and every free slot hold a visible default descriptor. Among the textures, it is a
 //!   2D texture.
+//! * Dependencies. [`ContextDesc::check_indices`] finds textures that a command does not declare. Nothing finds such
+//!   buffers.
 //! * Bytes that shaders read by address. [`BlockLayout`] compares the layout of a struct with that of the block, but not
 //!   whether the address leads to such a struct.
 //! * The hit groups of instances. A ray that hits an instance whose

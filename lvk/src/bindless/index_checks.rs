@@ -6,9 +6,15 @@
 //!
 //! Every command buffer first writes its own number into a word before those of the slots. Therefore commands recorded
 //! while the owner was alive may still access it, and later commands may not.
+//!
+//! A second word for each slot of a texture holds the number of the last command that declared the texture in its
+//! dependencies, and whether a command has written the texture since it was last readable everywhere. Every command first
+//! writes its number and the words of its textures. A shader that accesses a written texture of another command's number
+//! lacks a declaration, and so does a shader that writes one.
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use ash::vk;
 
@@ -41,14 +47,18 @@ pub enum SlotState {
     Freed,
     /// The owner lacks the usage that this array needs: a texture without `SAMPLED` or `STORAGE`.
     OtherUsage,
+    /// The owner is alive, but the command does not list it in its [`Dependencies`](crate::Dependencies), although the
+    /// shader writes it, or an earlier command wrote it. The access is a hazard, perhaps in a wrong layout.
+    Undeclared,
 }
 
-/// Accesses of one shader with the same wrong index.
+/// Accesses of one shader with the same wrong index, or to the same undeclared texture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct IndexFault {
     /// The array.
     pub array: BindlessArray,
-    /// The index. The shader used index 0, the default descriptor, instead.
+    /// The index. The shader used index 0, the default descriptor, instead, except for
+    /// [`Undeclared`](SlotState::Undeclared).
     pub index: u32,
     /// State of the slot.
     pub state: SlotState,
@@ -68,6 +78,8 @@ impl BindlessArray {
 /// Positions in the buffer, in words. `shader/glsl/checked_index.glsl` has the same numbers.
 const CURRENT: u32 = 0;
 const LOST: usize = 1;
+/// The number of the current command.
+const COMMAND: u32 = 2;
 const ENTRIES: u32 = 16;
 pub(crate) const ENTRY_COUNT: u32 = 4096;
 const ENTRY_WORDS: u32 = 8;
@@ -90,12 +102,39 @@ pub(crate) struct CheckPlan {
     pub(crate) shader: u32,
     /// Word ranges in the order of [`BindlessArray::ALL`].
     pub(crate) arrays: [WordRange; 4],
+    /// Position of the declarations of textures.
+    pub(crate) declarations: u32,
+}
+
+impl CheckPlan {
+    /// Returns the position of the declarations of an array; 0 for arrays without.
+    pub(crate) fn declarations_of(&self, array: usize) -> u32 {
+        let is_texture = matches!(
+            BindlessArray::ALL.get(array),
+            Some(BindlessArray::Textures | BindlessArray::StorageImages)
+        );
+        if is_texture { self.declarations } else { 0 }
+    }
+}
+
+/// Access of a command to the texture of a slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SlotAccess {
+    pub(crate) slot: u32,
+    /// The dependencies of the command list the texture.
+    pub(crate) is_declared: bool,
+    /// Later commands need a declaration.
+    pub(crate) is_written: bool,
 }
 
 /// The buffer of the index checks, and the current and former owners of each slot.
 pub(crate) struct IndexChecks {
     pub(crate) buffer: Arc<Buffer>,
     arrays: [WordRange; 4],
+    /// Position of the declarations of textures.
+    declarations: u32,
+    /// Number of the last command.
+    commands: AtomicU32,
     known: Mutex<SlotOwners>,
 }
 
@@ -114,6 +153,8 @@ impl IndexChecks {
             first += count;
             WordRange { first: first - count, count }
         });
+        let declarations = first;
+        first += counts[BindlessArray::Textures as usize];
         let desc = BufferDesc {
             size_bytes: u64::from(first) * 4,
             memory: MemoryKind::HostVisible,
@@ -122,7 +163,8 @@ impl IndexChecks {
         };
         let buffer = Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?);
         buffer.fill_with(|bytes| bytes.fill(0));
-        let checks = Self { buffer, arrays, known: Mutex::new(Rank::SlotOwners, SlotOwners::default()) };
+        let known = Mutex::new(Rank::SlotOwners, SlotOwners::default());
+        let checks = Self { buffer, arrays, declarations, commands: AtomicU32::new(0), known };
         BindlessArray::ALL.into_iter().for_each(|array| checks.write(array, 0, ALIVE));
         Ok(checks)
     }
@@ -135,6 +177,7 @@ impl IndexChecks {
             address: self.buffer.address,
             shader: known.shaders.len() as u32 - 1,
             arrays: self.arrays,
+            declarations: self.declarations,
         }
     }
 
@@ -142,6 +185,11 @@ impl IndexChecks {
     pub(super) fn reserve(&self, arrays: &[BindlessArray], slot: u32, name: &str) {
         let mut known = self.lock();
         arrays.iter().for_each(|array| _ = known.owners.insert((*array, slot), name.to_owned()));
+        drop(known);
+        let is_texture = arrays.contains(&BindlessArray::Textures);
+        if is_texture && slot < self.arrays[BindlessArray::Textures as usize].count {
+            self.buffer.write(u64::from(self.declarations + slot) * 4, &0_u32.to_ne_bytes());
+        }
     }
 
     /// Marks the owner of a slot as accessible.
@@ -163,16 +211,35 @@ impl IndexChecks {
 
     /// Records the number of the command buffer at its begin, after all earlier commands.
     pub(crate) fn record_begin(&self, gpu: &Gpu, commands: vk::CommandBuffer, sequence: u64) {
-        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
-        let all = (Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE);
-        let transfer = (Stage::ALL_TRANSFER, Access::TRANSFER_READ | Access::TRANSFER_WRITE);
-        barrier(gpu, commands, all, transfer);
-        let number = (sequence as u32).to_le_bytes();
+        barrier(gpu, commands, ALL, TRANSFER);
+        self.record_word(gpu, commands, CURRENT, sequence as u32);
+        barrier(gpu, commands, TRANSFER, ALL);
+    }
+
+    /// Records the accesses of the next command to textures, after all earlier commands.
+    pub(crate) fn record_accesses(&self, gpu: &Gpu, commands: vk::CommandBuffer, accesses: &[SlotAccess]) {
+        // The lowest bit of a declaration tells whether the texture is written.
+        let command = (self.commands.fetch_add(1, Ordering::Relaxed) + 1) & (u32::MAX >> 1);
+        barrier(gpu, commands, ALL, TRANSFER);
+        self.record_word(gpu, commands, COMMAND, command);
+        for access in accesses {
+            let number = if access.is_declared { command } else { 0 };
+            let word = number << 1 | u32::from(access.is_written);
+            self.record_word(gpu, commands, self.declarations + access.slot, word);
+        }
+        barrier(gpu, commands, TRANSFER, ALL);
+    }
+
+    fn record_word(&self, gpu: &Gpu, commands: vk::CommandBuffer, position: u32, word: u32) {
         // SAFETY: the command buffer is being recorded outside of a pass; the buffer lives as long as the context.
         unsafe {
-            gpu.device.cmd_update_buffer(commands, self.buffer.raw, u64::from(CURRENT) * 4, &number);
+            gpu.device.cmd_update_buffer(
+                commands,
+                self.buffer.raw,
+                u64::from(position) * 4,
+                &word.to_ne_bytes(),
+            );
         }
-        barrier(gpu, commands, transfer, all);
     }
 
     /// Returns the faults in a copy of the buffer's first [`fault_bytes`](Self::fault_bytes), sorted by array, index
@@ -205,6 +272,7 @@ impl IndexChecks {
         let state = match word {
             FREE if object.is_some() => SlotState::OtherUsage,
             FREE => SlotState::NeverCreated,
+            ALIVE => SlotState::Undeclared,
             _ => SlotState::Freed,
         };
         let shader = known.shaders.get(shader as usize).cloned().unwrap_or_default();
@@ -234,6 +302,19 @@ impl IndexChecks {
 }
 
 type SyncScope = (vk::PipelineStageFlags2, vk::AccessFlags2);
+
+const ALL: SyncScope = (
+    vk::PipelineStageFlags2::ALL_COMMANDS,
+    vk::AccessFlags2::from_raw(
+        vk::AccessFlags2::MEMORY_READ.as_raw() | vk::AccessFlags2::MEMORY_WRITE.as_raw(),
+    ),
+);
+const TRANSFER: SyncScope = (
+    vk::PipelineStageFlags2::ALL_TRANSFER,
+    vk::AccessFlags2::from_raw(
+        vk::AccessFlags2::TRANSFER_READ.as_raw() | vk::AccessFlags2::TRANSFER_WRITE.as_raw(),
+    ),
+);
 
 /// Records a barrier for the buffer. The trackers do not know the buffer, since shaders access it in every command.
 fn barrier(gpu: &Gpu, commands: vk::CommandBuffer, from: SyncScope, to: SyncScope) {

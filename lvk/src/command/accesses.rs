@@ -98,6 +98,14 @@ impl CommandAccesses {
             .map_err(|other| access_conflict(cache.object(index), cache.object(other)))
     }
 
+    /// Returns the textures, their subresources and their uses.
+    pub(super) fn textures<'a>(
+        &'a self,
+        cache: &'a TextureCache,
+    ) -> impl Iterator<Item = (&'a Texture, Subresources, Use)> {
+        self.textures.iter().map(|used| (&**cache.object(used.owner), used.part, used.next))
+    }
+
     /// True if the command needs a barrier after earlier commands of the same command buffer.
     pub(crate) fn needs_barriers(&self, tracker: &Tracker) -> bool {
         let buffer = |(id, next): &(ResourceId, Use)| tracker.needs_barrier_buffer(*id, *next);

@@ -84,11 +84,14 @@ impl CommandBuffer {
         part: impl Fn(&Texture) -> Subresources,
     ) -> Result<()> {
         let pool = &self.shared.store.textures;
-        let RecordingState { accesses, texture_cache: found, .. } = &mut **self.state;
+        let RecordingState { accesses, texture_cache: found, declared, .. } = &mut **self.state;
         for handle in handles {
             let row = found.index_of_handle(pool, *handle)?;
             let texture = found.object(row);
             texture.check_usage(usage)?;
+            if self.shared.bindless.checks.is_some() {
+                declared.push((texture.slot, next.is_write()));
+            }
             accesses.add_texture(found, row, part(texture), next)?;
         }
         Ok(())
@@ -110,6 +113,7 @@ impl CommandBuffer {
     #[inline(never)]
     pub(crate) fn flush_barriers(&mut self) {
         self.end_rendering();
+        self.record_declarations();
         let Recording { commands, tracker, images, .. } = &mut **self.recording;
         let RecordingState {
             accesses, texture_cache: found_textures, barriers, last_barrier, build_run, ..
@@ -134,6 +138,7 @@ impl CommandBuffer {
             }
             Err(error) => {
                 self.state.accesses.clear();
+                self.state.declared.clear();
                 Err(error)
             }
         }

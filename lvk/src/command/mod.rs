@@ -8,6 +8,7 @@ mod build_micromap;
 mod build_tlas;
 pub(crate) mod compute;
 mod copy_accel;
+mod declared_accesses;
 pub(crate) mod dependencies;
 mod instance_kernel;
 mod kernel_dispatch;

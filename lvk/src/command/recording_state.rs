@@ -28,6 +28,9 @@ pub(crate) struct RecordingState {
     pub(super) buffer_cache: HandleCache<BufferHandle, Buffer>,
     pub(super) texture_cache: HandleCache<TextureHandle, Texture>,
     pub(crate) accesses: CommandAccesses,
+    /// Slots of the textures in the dependencies of the next command, and whether it writes them. Empty unless indices
+    /// are checked.
+    pub(super) declared: Vec<(u32, bool)>,
     pub(super) barriers: Barriers,
     pub(super) last_barrier: LastBarrier,
     pub(super) sets_bound: Vec<vk::PipelineBindPoint>,
@@ -68,6 +71,7 @@ impl RecordingState {
             buffer_cache,
             texture_cache,
             accesses,
+            declared,
             barriers,
             // The translation of a barrier is the same for every command buffer.
             last_barrier: _,
@@ -88,6 +92,7 @@ impl RecordingState {
         buffer_cache.clear();
         texture_cache.clear();
         accesses.reset();
+        declared.clear();
         barriers.clear();
         sets_bound.clear();
         push_constants.clear();

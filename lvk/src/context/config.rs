@@ -39,9 +39,9 @@ pub struct ContextDesc<'a> {
     pub checkpoints: bool,
     /// Makes shaders check every index of a bindless array before use. A wrong index is recorded with the name of the
     /// object that it belonged to, for [`Context::index_faults`](crate::Context::index_faults); the access uses the
-    /// default descriptor of slot 0. For debugging only: every access costs several memory reads, command buffers no
-    /// longer overlap, and pipelines are compiled again in every run. See the manual's page on
-    /// [debugging](crate::manual::debugging).
+    /// default descriptor of slot 0. A texture that lacks a declaration in [`Dependencies`](crate::Dependencies) is
+    /// recorded too. For debugging only: every access costs several memory reads, commands no longer overlap, and
+    /// pipelines are compiled again in every run. See the manual's page on [debugging](crate::manual::debugging).
     pub check_indices: bool,
     /// Request for ray tracing pipelines.
     pub ray_tracing_pipeline: FeatureRequest,

@@ -256,6 +256,11 @@ impl Image {
         bound.map_err(Error::creating("vkBindImageMemory", name))
     }
 
+    /// True if several textures show the image.
+    pub(crate) fn has_views(&self) -> bool {
+        self.handles.load(Ordering::Relaxed) > 1
+    }
+
     /// Adds a texture of the image. Fails if the last texture is already destroyed.
     pub(crate) fn add_texture(&self) -> Result<()> {
         let more = |count: u32| (count > 0).then_some(count + 1);

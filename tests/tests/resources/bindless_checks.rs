@@ -6,7 +6,7 @@ use lvk::{
     ColorAttachment, ColorTarget, ComputePipelineHandle, Context, Dependencies, Error, Format, HitGroup,
     Holder, IndexFault, RayQueryRequest, RayTracingPipelineDesc, RenderPassDesc, RenderPipelineDesc,
     SamplerDesc, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage, SlotState, TextureDesc,
-    TextureHandle, TextureUsage, TlasDesc, TlasInstance, Triangles,
+    TextureHandle, TextureRegion, TextureUsage, TextureViewDesc, TlasDesc, TlasInstance, Triangles,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::pipelines;
@@ -127,6 +127,84 @@ fn samplers_storage_images_and_usages_are_distinguished() {
         fault(BindlessArray::StorageImages, texture, OtherUsage, Some("sampled only"), 2),
     ];
     assert_eq!(ctx.index_faults().unwrap(), expected);
+}
+
+/// Creates a texture of 2x2 floats that shaders store to, copy and sample.
+fn stored(ctx: &Context, name: &str) -> Holder<TextureHandle> {
+    ctx.create_texture(&TextureDesc {
+        format: Format::R32Float,
+        extent: [2, 2],
+        usage: TextureUsage::STORAGE | TextureUsage::SAMPLED | TextureUsage::TARGET,
+        data: Some(bytemuck::cast_slice(&[4.0_f32; 4])),
+        debug_name: name,
+        ..Default::default()
+    })
+    .unwrap()
+}
+
+/// A write needs a declaration, and so does each read of what an earlier command wrote. Undeclared accesses still happen.
+#[test]
+fn textures_that_a_command_does_not_declare_are_reported() {
+    let Some(ctx) = checking() else { return };
+    let image = stored(&ctx, "canvas");
+    let index = image.index();
+    let fetch = Evaluator::new(&ctx, FETCH);
+    let load = Evaluator::new(&ctx, "imageLoad(kImages2D[a], ivec2(0))");
+    let store = Evaluator::new(&ctx, "vec4(1.0); imageStore(kImages2D[a], ivec2(i, 0), vec4(9.0))");
+    let none = Dependencies::default();
+    let (storing, sampling) = (
+        Dependencies { storage_images: &[*image], ..none },
+        Dependencies { sampled_images: &[*image], ..none },
+    );
+    let run = |evaluator: &Evaluator, uses| evaluator.run(&ctx, [index, 0, 0], 1, uses)[0][0];
+    let faults = || ctx.index_faults().unwrap();
+    // Only uploaded: readable everywhere.
+    assert_eq!(run(&fetch, &none), 4.0);
+    // Declared accesses, in any order.
+    run(&store, &storing);
+    assert_eq!(run(&load, &storing), 9.0);
+    assert_eq!(run(&fetch, &sampling), 9.0);
+    assert_eq!(run(&fetch, &none), 9.0, "the declared read made it readable");
+    assert_eq!(faults(), []);
+
+    use SlotState::Undeclared;
+    let expect = |array, count| fault(array, index, Undeclared, Some("canvas"), count);
+    run(&store, &storing);
+    run(&fetch, &none);
+    assert_eq!(faults(), [expect(BindlessArray::Textures, 1)], "a read of a written texture");
+    run(&fetch, &sampling);
+    run(&store, &none);
+    let [_, write] = &faults()[..] else { unreachable!("{:?}", faults()) };
+    assert_eq!(*write, expect(BindlessArray::StorageImages, 1), "a write");
+}
+
+/// Attachments are written by their pass, copies make their target readable, and all textures of an image count.
+#[test]
+fn declarations_follow_passes_copies_and_views() {
+    let Some(ctx) = checking() else { return };
+    let image = stored(&ctx, "canvas");
+    let view =
+        ctx.create_texture_view(&TextureViewDesc { texture: Some(*image), ..Default::default() }).unwrap();
+    let fetch = Evaluator::new(&ctx, FETCH);
+    let none = Dependencies::default();
+    let read = |index, uses: &Dependencies<'_>| fetch.run(&ctx, [index, 0, 0], 1, uses)[0][0];
+    let clear = || {
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        let color = [ColorAttachment::clear(*image, [7.0; 4])];
+        drop(cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap());
+        ctx.submit(cmd).unwrap();
+    };
+    clear();
+    read(view.index(), &Dependencies { sampled_images: &[*view], ..none });
+    assert_eq!(ctx.index_faults().unwrap(), []);
+    clear();
+    read(view.index(), &none);
+    let [found] = &ctx.index_faults().unwrap()[..] else { unreachable!("one fault is expected") };
+    assert_eq!((found.state, found.index), (SlotState::Undeclared, view.index()));
+    // A copy leaves its target readable.
+    ctx.upload_texture(*image, &TextureRegion::default(), bytemuck::cast_slice(&[5.0_f32; 4])).unwrap();
+    assert_eq!(read(image.index(), &none), 5.0);
+    assert_eq!(ctx.index_faults().unwrap().len(), 1);
 }
 
 /// A triangle across the ray along z.

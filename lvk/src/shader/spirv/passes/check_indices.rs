@@ -90,8 +90,10 @@ struct Checker<'a> {
     imported: &'a LinkedFunction,
     address: u32,
     shader: u32,
-    /// For each array: its number, the position of its first word, and its length.
-    arrays: Vec<[u32; 3]>,
+    /// For each array: its number, the position of its first word, its length, and the position of its declarations.
+    arrays: Vec<[u32; 4]>,
+    /// The constants 0 and 1.
+    no_yes: [u32; 2],
     /// Bits of integer types.
     integers: HashMap<u32, u32>,
     /// Types of constants and of the values so far.
@@ -120,15 +122,19 @@ impl<'a> Checker<'a> {
         let arrays = (0..).zip(plan.arrays);
         let arrays = arrays
             .map(|(number, range)| {
-                [number, range.first, range.count].map(|value| sections.add_constant(word, value))
+                let declarations = plan.declarations_of(number as usize);
+                [number, range.first, range.count, declarations]
+                    .map(|value| sections.add_constant(word, value))
             })
             .collect();
+        let no_yes = [0, 1].map(|value| sections.add_constant(word, value));
         let mut checker = Self {
             sections,
             imported,
             address,
             shader,
             arrays,
+            no_yes,
             integers: HashMap::new(),
             types: HashMap::new(),
             type_ids: HashSet::new(),
@@ -166,6 +172,7 @@ impl<'a> Checker<'a> {
         body: &[u32],
     ) -> Result<Vec<u32>, String> {
         let body = [&self.sections.header, body].concat();
+        let written = find_written_accesses(&body)?;
         let mut out = Vec::with_capacity(body.len());
         for instruction in instructions(&body) {
             let instruction = instruction?;
@@ -176,7 +183,7 @@ impl<'a> Checker<'a> {
             let index = array.map(|(_, position)| 3 + position);
             match (array, index.filter(|index| *index < instruction.operands().len())) {
                 (Some((array, _)), Some(index)) => {
-                    let checked = self.emit_check_call(&mut out, *array, &instruction, index)?;
+                    let checked = self.emit_check_call(&mut out, *array, &instruction, index, &written)?;
                     let at = out.len();
                     out.extend(instruction.words);
                     out[at + 1 + index] = checked;
@@ -194,6 +201,7 @@ impl<'a> Checker<'a> {
         array: BindlessArray,
         access: &Instruction<'_>,
         index: usize,
+        written: &HashSet<u32>,
     ) -> Result<u32, String> {
         let (word, result) = (self.imported.word, self.imported.result);
         let index = access.operand(index);
@@ -210,9 +218,11 @@ impl<'a> Checker<'a> {
             }
         };
         let checked = self.sections.new_id();
-        let [number, first, count] = self.arrays[array as usize];
-        let call =
-            [result, checked, self.imported.function, self.address, self.shader, number, first, count, plain];
+        let [number, first, count, declarations] = self.arrays[array as usize];
+        let writes = self.no_yes[usize::from(written.contains(&access.operand(1)))];
+        let (function, address, shader) = (self.imported.function, self.address, self.shader);
+        let arguments = [address, shader, number, first, count, declarations, writes, plain];
+        let call = [&[result, checked, function][..], &arguments].concat();
         push_instruction(out, Op::FunctionCall, &call);
         if marked {
             push_instruction(
@@ -223,6 +233,21 @@ impl<'a> Checker<'a> {
         }
         Ok(checked)
     }
+}
+
+/// Returns the accesses whose images are written, or changed by atomic operations.
+fn find_written_accesses(body: &[u32]) -> Result<HashSet<u32>, String> {
+    let (mut loaded_from, mut written) = (HashMap::new(), HashSet::new());
+    for instruction in instructions(body) {
+        let instruction = instruction?;
+        match instruction.op {
+            Some(Op::Load) => _ = loaded_from.insert(instruction.operand(1), instruction.operand(2)),
+            Some(Op::ImageWrite) => written.extend(loaded_from.get(&instruction.operand(0))),
+            Some(Op::ImageTexelPointer) => _ = written.insert(instruction.operand(2)),
+            _ => {}
+        }
+    }
+    Ok(written)
 }
 
 /// True for types. Their first operand is their own id.
@@ -247,21 +272,23 @@ mod tests {
 
     fn plan() -> CheckPlan {
         let arrays = [7, 17, 27, 37].map(|first| WordRange { first, count: 5 });
-        CheckPlan { address: 0x1234_5678_9abc_def0, shader: 3, arrays }
+        CheckPlan { address: 0x1234_5678_9abc_def0, shader: 3, arrays, declarations: 90 }
     }
 
-    /// Returns the array and index operands of the calls, by the values of constants and the names of ids.
-    fn calls(words: &[u32]) -> Vec<u32> {
+    /// Returns the array of each call of the check, and 1 for an access that writes.
+    fn calls(words: &[u32]) -> Vec<[u32; 2]> {
         let code: Vec<_> = instructions(words).map(Result::unwrap).collect();
         let value = |id: u32| {
             code.iter().find(|i| i.op == Some(Op::Constant) && i.operand(1) == id).unwrap().operand(2)
         };
-        let calls = code.iter().filter(|i| i.op == Some(Op::FunctionCall) && i.operands().len() == 9);
+        let calls = code.iter().filter(|i| i.op == Some(Op::FunctionCall) && i.operands().len() == 11);
         calls
             .map(|call| {
                 assert_eq!(value(call.operand(4)), 3);
-                assert_eq!(value(call.operand(6)), 7 + 10 * value(call.operand(5)));
-                value(call.operand(5))
+                let array = value(call.operand(5));
+                assert_eq!(value(call.operand(6)), 7 + 10 * array);
+                assert_eq!(value(call.operand(8)), if array % 2 == 0 { 90 } else { 0 });
+                [array, value(call.operand(9))]
             })
             .collect()
     }
@@ -296,7 +323,7 @@ mod tests {
         let checked = with_checked_indices(&words, &plan()).unwrap();
         let mut found = calls(&checked);
         found.sort_unstable();
-        assert_eq!(found, [0, 0, 1, 2, 2]);
+        assert_eq!(found, [[0, 0], [0, 0], [1, 0], [2, 1], [2, 1]]);
         let before = reflect("", ShaderStage::Compute, &words).unwrap();
         let after = reflect("", ShaderStage::Compute, &checked).unwrap();
         assert_eq!(
