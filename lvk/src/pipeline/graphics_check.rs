@@ -8,6 +8,7 @@ use super::local_read::check_inputs;
 use super::portability::check_strides;
 use super::rasterization::Topology;
 use super::render_modules::RenderModules;
+use super::stage_interface_check::check_interfaces;
 use super::state_check::check_state;
 use super::workgroup_memory::{WorkgroupMemoryLimits, check_workgroup_memory};
 use super::workgroup_size::{WorkgroupLimits, check_workgroup_size};
@@ -86,6 +87,7 @@ pub(super) fn check_modules(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &
         module.as_ref().map_or(Ok(()), |module| module.check_stage(stage))?;
     }
     check_layouts(name, desc.layouts, modules.iter())?;
+    check_interfaces(name, modules)?;
     let targets = desc.color.len() as u64;
     check_limit(name, "colour target count", targets, gpu.caps.limits.max_color_targets.into())?;
     desc.color.iter().try_for_each(|target| check_color(gpu, name, target))?;

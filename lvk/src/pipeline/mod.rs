@@ -33,6 +33,7 @@ mod shader_groups;
 pub(crate) mod shader_module;
 pub(crate) mod shader_record;
 pub(crate) mod stage;
+pub(crate) mod stage_interface_check;
 mod state_check;
 mod subgroup_size;
 mod workgroup_memory;

@@ -34,6 +34,7 @@ pub(crate) use spirv::hit_builtins::find_raw_hit_builtin;
 pub(crate) use spirv::input_attachments::InputRead;
 pub(crate) use spirv::passes::check_indices::with_checked_indices;
 pub(crate) use spirv::reflect::{Primitive, Reflection};
+pub(crate) use spirv::stage_interface::LocationValue;
 pub(crate) use spirv::workgroup_memory::SharedBytes;
 pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};
 

@@ -9,7 +9,7 @@ use lvk::{
 };
 use lvk_tests::compute::module;
 use lvk_tests::device;
-use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
+use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, staged_pipeline, target};
 
 fn usage_error(result: lvk::Result<()>, words: &str) {
     match result {
@@ -257,6 +257,35 @@ fn shaders_get_every_attribute_they_read() {
         };
         let made = ctx.create_render_pipeline(&desc).map(drop);
         assert!(matches!(made, Err(Error::InvalidUsage { .. })), "{attributes:?}: {made:?}");
+    }
+}
+
+/// An output that does not match the input of the next stage is an error that names both; a wider one is not.
+#[test]
+fn stages_must_pass_on_what_the_next_stage_reads() {
+    let Some(ctx) = device() else { return };
+    let color = [Format::Rgba32Float.into()];
+    let create = |outputs: &str, inputs: &str| {
+        let vertex = format!("{outputs} void main() {{ gl_Position = vec4(0); a = TYPE(1); }}");
+        let kind = outputs.split_whitespace().rev().nth(1).unwrap();
+        let fragment =
+            format!("{inputs} layout(location = 0) out vec4 result; void main() {{ result = vec4(a.x); }}");
+        let stages =
+            [(ShaderStage::Vertex, &*vertex.replace("TYPE", kind)), (ShaderStage::Fragment, &*fragment)];
+        let desc = RenderPipelineDesc { color: &color, debug_name: "surface", ..Default::default() };
+        staged_pipeline(&ctx, &stages, &desc).map(drop)
+    };
+    let vec3 = "layout(location = 1) in vec3 a;";
+    create("layout(location = 1) out vec3 a;", vec3).unwrap();
+    create("layout(location = 1) out vec4 a;", vec3).unwrap();
+    let start = "surface: fragment shader 'test shader' reads 3 32-bit floats at location 1, component 0 ('a'), but \
+                 vertex shader 'test shader' before it";
+    for (outputs, words) in [
+        ("layout(location = 1) out vec2 a;", "has 2 32-bit floats"),
+        ("layout(location = 1) flat out ivec3 a;", "has 3 32-bit integers"),
+        ("layout(location = 2) out vec3 a;", "writes nothing there"),
+    ] {
+        usage_error(create(outputs, vec3), &format!("{start} {words}; declare the output like the input"));
     }
 }
 

@@ -13,5 +13,6 @@ pub(crate) mod parsed;
 pub(crate) mod passes;
 pub(crate) mod ray_interface;
 pub(crate) mod reflect;
+pub(crate) mod stage_interface;
 pub(crate) mod words;
 pub(crate) mod workgroup_memory;

@@ -7,6 +7,7 @@ use super::blocks::Blocks;
 use super::input_attachments::{InputRead, output_locations, read_input_attachment};
 use super::parsed::{Mode, ParsedModule, Type, Variable};
 use super::ray_interface::RayInterface;
+use super::stage_interface::StageInterface;
 use super::words;
 use super::workgroup_memory::SharedMemory;
 use crate::bindless::layout;
@@ -66,6 +67,8 @@ pub(crate) struct Reflection {
     pub(crate) outputs: u32,
     /// First locations of the inputs; in a vertex stage, its attributes.
     pub(crate) inputs: Vec<u32>,
+    /// The values that the stage takes from the stage before it, and those that it passes on.
+    pub(crate) interface: StageInterface,
 }
 
 /// Reads `words` for `stage` with the entry point `main`. The words may be invalid.
@@ -124,6 +127,7 @@ fn reflect_words(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String
         input_reads,
         outputs: if stage == ShaderStage::Fragment { colors } else { 0 },
         inputs,
+        interface: StageInterface::from_module(stage, &module, entry),
     })
 }
 

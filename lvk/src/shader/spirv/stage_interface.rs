@@ -1,0 +1,253 @@
+//! Inputs and outputs that shader stages pass to each other by location.
+
+use ::spirv::{Decoration, StorageClass};
+
+use super::parsed::{MAX_NESTING, ParsedModule, Type, Variable};
+use crate::format::NumericFormat;
+use crate::shader::ShaderStage;
+
+/// Most locations of a stage. Modules with more are refused elsewhere, so further ones are ignored.
+const MAX_LOCATIONS: usize = 1024;
+
+/// A scalar or vector at a location.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LocationValue {
+    pub(crate) location: u32,
+    /// First of the four components of the location, in 32-bit words.
+    pub(crate) component: u32,
+    /// Number of components of the value.
+    pub(crate) count: u32,
+    /// Bytes of a component.
+    pub(crate) bytes: u32,
+    pub(crate) numbers: NumericFormat,
+    /// True for a value of a whole patch.
+    pub(crate) is_patch: bool,
+    /// Name of the variable; empty without debug names.
+    pub(crate) name: String,
+}
+
+/// The values that a stage takes from the stage before it, and those that it passes on.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct StageInterface {
+    pub(crate) inputs: Vec<LocationValue>,
+    pub(crate) outputs: Vec<LocationValue>,
+}
+
+impl StageInterface {
+    pub(crate) fn from_module(stage: ShaderStage, module: &ParsedModule, entry: usize) -> Self {
+        let mut found = Self::default();
+        for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
+            if variable.storage == StorageClass::Input as u32 {
+                collect(module, variable, has_array_inputs(stage), &mut found.inputs);
+            } else if variable.storage == StorageClass::Output as u32 {
+                collect(module, variable, has_array_outputs(stage), &mut found.outputs);
+            }
+        }
+        found
+    }
+}
+
+impl LocationValue {
+    /// Returns the description in error messages, such as `a vec3 of 32-bit floats`.
+    pub(crate) fn description(&self) -> String {
+        let numbers = match self.numbers {
+            NumericFormat::Float => "floats",
+            NumericFormat::Uint | NumericFormat::Sint => "integers",
+        };
+        format!("{} {}-bit {numbers}", self.count, self.bytes * 8)
+    }
+
+    /// True if a stage that takes `self` can read it from `output`, which has the same location and component.
+    pub(crate) fn accepts(&self, output: &Self) -> bool {
+        let is_float = |value: &Self| value.numbers == NumericFormat::Float;
+        is_float(self) == is_float(output) && self.bytes == output.bytes && self.count <= output.count
+    }
+
+    /// True if the values share words of a location.
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        let end = |value: &Self| value.component + value.count * value.bytes.div_ceil(4);
+        self.is_patch == other.is_patch
+            && self.location == other.location
+            && self.component < end(other)
+            && other.component < end(self)
+    }
+}
+
+/// Stages whose inputs have an element for each vertex.
+fn has_array_inputs(stage: ShaderStage) -> bool {
+    matches!(stage, ShaderStage::TessControl | ShaderStage::TessEval | ShaderStage::Geometry)
+}
+
+/// Stages whose outputs have an element for each vertex or primitive.
+fn has_array_outputs(stage: ShaderStage) -> bool {
+    matches!(stage, ShaderStage::TessControl | ShaderStage::Mesh)
+}
+
+/// Adds the values of a variable. Built-ins have no locations.
+fn collect(module: &ParsedModule, variable: &Variable, is_array: bool, out: &mut Vec<LocationValue>) {
+    let decoration = |of| module.decoration(variable.id, of);
+    let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { return };
+    if decoration(Decoration::BuiltIn).is_some() || decoration(Decoration::PerVertexKHR).is_some() {
+        return;
+    }
+    let is_patch = decoration(Decoration::Patch).is_some();
+    let ty = match module.types.get(target) {
+        Some(Type::Array { element, .. }) if is_array && !is_patch => element,
+        _ => target,
+    };
+    let name = module.names.get(&variable.id).cloned().unwrap_or_default();
+    let component = decoration(Decoration::Component).unwrap_or(0);
+    let mut walk = Walk { module, out, is_patch, name };
+    match (module.types.get(ty), decoration(Decoration::Location)) {
+        (Some(Type::Struct { members }), location) => walk.block(*ty, members, location),
+        (_, Some(location)) => _ = walk.value(*ty, location, component, 0),
+        _ => {}
+    }
+}
+
+struct Walk<'a> {
+    module: &'a ParsedModule,
+    out: &'a mut Vec<LocationValue>,
+    is_patch: bool,
+    name: String,
+}
+
+impl Walk<'_> {
+    /// Adds the members of a block that starts at `first`, or whose members have locations of their own.
+    fn block(&mut self, ty: u32, members: &[u32], first: Option<u32>) {
+        let mut next = first;
+        for (index, member) in (0..).zip(members) {
+            let decoration = |of| self.module.member_decoration(ty, index, of);
+            let own = decoration(Decoration::Location).or(next);
+            let component = decoration(Decoration::Component).unwrap_or(0);
+            let is_builtin = decoration(Decoration::BuiltIn).is_some();
+            let Some(location) = own.filter(|_| !is_builtin) else { continue };
+            self.is_patch |= decoration(Decoration::Patch).is_some();
+            next = Some(self.value(*member, location, component, 0));
+        }
+    }
+
+    /// Adds the values of a type from `location` on. Returns the location that follows.
+    fn value(&mut self, ty: u32, location: u32, component: u32, depth: u32) -> u32 {
+        if depth > MAX_NESTING || self.out.len() > MAX_LOCATIONS {
+            return location;
+        }
+        match self.module.types.get(&ty) {
+            Some(Type::Number { bytes, numbers }) => self.leaf(location, component, 1, *bytes, *numbers),
+            Some(Type::Vector { element, count }) => match self.module.types.get(element) {
+                Some(Type::Number { bytes, numbers }) => {
+                    self.leaf(location, component, *count, *bytes, *numbers)
+                }
+                _ => location,
+            },
+            Some(Type::Matrix { column, count }) => {
+                (0..*count).fold(location, |next, _| self.value(*column, next, component, depth + 1))
+            }
+            Some(Type::Array { element, length }) => {
+                let length = self.module.array_length(*length).unwrap_or(0).min(MAX_LOCATIONS as u64);
+                (0..length).fold(location, |next, _| self.value(*element, next, component, depth + 1))
+            }
+            Some(Type::Struct { members }) => {
+                members.iter().fold(location, |next, member| self.value(*member, next, 0, depth + 1))
+            }
+            _ => location,
+        }
+    }
+
+    fn leaf(&mut self, location: u32, component: u32, count: u32, bytes: u32, numbers: NumericFormat) -> u32 {
+        let (is_patch, name) = (self.is_patch, self.name.clone());
+        self.out.push(LocationValue { location, component, count, bytes, numbers, is_patch, name });
+        // Vectors of more than two 64-bit numbers take two locations.
+        location.saturating_add(if bytes == 8 && count > 2 { 2 } else { 1 })
+    }
+}
+
+#[cfg(all(test, feature = "glsl"))]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test")]
+    use super::*;
+    use crate::shader::spirv::reflect::reflect;
+    use crate::shader::{CompileFiles, CompileOptions, ShaderModuleDesc, ShaderSource, compile};
+
+    fn interface(stage: ShaderStage, text: &str) -> StageInterface {
+        let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };
+        let words = compile(&desc, &CompileOptions::default(), CompileFiles::default()).unwrap();
+        reflect("", stage, &words).unwrap().interface
+    }
+
+    /// Location, component, count and patch of each value.
+    fn places(values: &[LocationValue]) -> Vec<(u32, u32, u32, bool)> {
+        values.iter().map(|value| (value.location, value.component, value.count, value.is_patch)).collect()
+    }
+
+    #[test]
+    fn vectors_matrices_arrays_and_blocks_take_their_locations() {
+        let found = interface(
+            ShaderStage::Vertex,
+            "layout(location = 0) out vec3 a;
+             layout(location = 1, component = 2) out vec2 b;
+             layout(location = 2) out mat3x2 c;
+             layout(location = 5) out float d[2];
+             layout(location = 7) out Block { vec4 e; flat uvec2 f; } block;
+             void main() { a = vec3(0); b = vec2(0); c = mat3x2(0); d[1] = 1; block.f = uvec2(1);
+                 gl_Position = vec4(0); }",
+        );
+        let mut outputs = places(&found.outputs);
+        outputs.sort_unstable();
+        let plain = |location, count| (location, 0, count, false);
+        assert_eq!(
+            outputs,
+            [
+                plain(0, 3),
+                (1, 2, 2, false),
+                plain(2, 2),
+                plain(3, 2),
+                plain(4, 2),
+                plain(5, 1),
+                plain(6, 1),
+                plain(7, 4),
+                plain(8, 2)
+            ]
+        );
+        assert_eq!(found.inputs, []);
+    }
+
+    #[test]
+    fn arrays_of_vertices_count_as_one_vertex() {
+        let found = interface(
+            ShaderStage::Geometry,
+            "layout(triangles) in; layout(points, max_vertices = 1) out;
+             layout(location = 0) in vec2 a[];
+             layout(location = 3) out vec2 b;
+             void main() { b = a[1]; EmitVertex(); }",
+        );
+        assert_eq!(places(&found.inputs), [(0, 0, 2, false)]);
+        assert_eq!(places(&found.outputs), [(3, 0, 2, false)]);
+        let found = interface(
+            ShaderStage::TessEval,
+            "layout(triangles) in; layout(location = 0) in vec2 a[]; layout(location = 1) patch in vec4 b;
+             void main() { gl_Position = b + vec4(a[0], a[1]); }",
+        );
+        assert_eq!(places(&found.inputs), [(0, 0, 2, false), (1, 0, 4, true)]);
+    }
+
+    #[test]
+    fn narrower_inputs_of_the_same_kind_are_accepted() {
+        let value = |count, numbers, bytes| LocationValue {
+            location: 0,
+            component: 0,
+            count,
+            bytes,
+            numbers,
+            is_patch: false,
+            name: String::new(),
+        };
+        let (float, sint, uint) = (NumericFormat::Float, NumericFormat::Sint, NumericFormat::Uint);
+        assert!(value(2, float, 4).accepts(&value(3, float, 4)));
+        assert!(value(1, sint, 4).accepts(&value(1, uint, 4)));
+        assert!(!value(3, float, 4).accepts(&value(2, float, 4)));
+        assert!(!value(1, float, 4).accepts(&value(1, uint, 4)));
+        assert!(!value(1, float, 2).accepts(&value(1, float, 4)));
+        assert_eq!(value(3, float, 4).description(), "3 32-bit floats");
+    }
+}
