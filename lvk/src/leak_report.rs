@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::error::readable::readable_name;
 use crate::store::LiveObject;
 
 /// Most names listed of each kind; the report has only the number of others.
@@ -32,9 +33,10 @@ pub(crate) fn leak_report(live: &[LiveObject]) -> Option<String> {
 }
 
 fn count_by_kind(same: &[&str]) -> String {
+    let name = readable_name(same[0]);
     match same.len() {
-        1 => format!("'{}'", same[0]),
-        count => format!("{count} x '{}'", same[0]),
+        1 => format!("'{name}'"),
+        count => format!("{count} x '{name}'"),
     }
 }
 
