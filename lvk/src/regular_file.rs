@@ -4,12 +4,12 @@ use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind, Read as _};
 use std::path::Path;
 
-/// Reads a file of at most `most_bytes`, as long as it was when it was opened.
+/// Opens a file of at most `most_bytes` for reading. Returns the number of its bytes, too.
 ///
 /// # Errors
 /// Those of the operating system; [`ErrorKind::InvalidInput`] for anything but a regular file, which is not opened;
-/// [`ErrorKind::FileTooLarge`] for a larger file, which is not read; [`ErrorKind::OutOfMemory`].
-pub(crate) fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+/// [`ErrorKind::FileTooLarge`] for a larger file.
+pub fn open(path: &Path, most_bytes: u64) -> io::Result<(File, u64)> {
     // Opening a named pipe would wait for its writer.
     check_kind(&std::fs::metadata(path)?)?;
     let file = File::open(path)?;
@@ -20,6 +20,15 @@ pub(crate) fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
         let message = format!("it has {size} bytes, more than the {most_bytes} that are read of such a file");
         return Err(io::Error::new(ErrorKind::FileTooLarge, message));
     }
+    Ok((file, size))
+}
+
+/// Reads a file of at most `most_bytes`, as long as it was when it was opened.
+///
+/// # Errors
+/// As [`open`]; [`ErrorKind::OutOfMemory`].
+pub fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+    let (file, size) = open(path, most_bytes)?;
     let mut bytes = Vec::new();
     let capacity = usize::try_from(size).map_err(|_| ErrorKind::OutOfMemory)?;
     bytes.try_reserve_exact(capacity).map_err(|_| ErrorKind::OutOfMemory)?;
@@ -31,19 +40,23 @@ pub(crate) fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`read`]; [`ErrorKind::InvalidData`] for bytes that are no UTF-8.
-pub(crate) fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
+pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
     let not_text = |_| io::Error::new(ErrorKind::InvalidData, "it is not text in UTF-8");
     String::from_utf8(read(path, most_bytes)?).map_err(not_text)
 }
 
-fn check_kind(about: &Metadata) -> io::Result<()> {
+/// Checks that a path names a regular file.
+///
+/// # Errors
+/// [`ErrorKind::InvalidInput`], with the kind of what it names.
+pub fn check_kind(about: &Metadata) -> io::Result<()> {
     match about.is_file() {
         true => Ok(()),
         false => Err(io::Error::new(ErrorKind::InvalidInput, format!("it is {}, no file", kind(about)))),
     }
 }
 
-/// What the path names, with an article.
+/// Returns what a path names, with an article.
 fn kind(about: &Metadata) -> &'static str {
     #[cfg(unix)]
     {

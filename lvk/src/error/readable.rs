@@ -37,7 +37,8 @@ pub fn readable_text(text: &str) -> String {
 }
 
 /// Returns a message of one line, in which names may stand. The middle of a message of more than 8,000 bytes is left out.
-pub(crate) fn readable_line(text: &str) -> String {
+#[must_use]
+pub fn readable_line(text: &str) -> String {
     shorten(text.as_bytes(), MAX_LINE_BYTES, LINE_ENDS)
 }
 

@@ -23,7 +23,7 @@ use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
 use super::sequence::{RenderReport, RenderRequest, render_frames};
-use super::{library_warnings, png, print_line, window};
+use super::{library_warnings, png, print_line, print_message, window};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::rtx::RtxConfig;
 use crate::scene::Scene;
@@ -102,10 +102,21 @@ pub fn main_with<S: SampleInfo>(words: Vec<OsString>, event_loop: &mut EventLoop
     match parse::<S>(words) {
         Ok(args) => run_with::<S>(&args, event_loop),
         Err(error) => {
-            // A closed pipe is no reason for another status.
-            let _ = error.print();
+            print_usage(&error);
             ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
         }
+    }
+}
+
+/// Prints the help or the error of a command line. An argument with control characters is shown by escapes.
+fn print_usage(error: &clap::Error) {
+    let plain = error.render().to_string();
+    let readable = lvk::readable_text(&plain);
+    if error.use_stderr() && readable != plain {
+        eprint!("{readable}");
+    } else {
+        // A closed pipe is no reason for another status.
+        let _ = error.print();
     }
 }
 
@@ -125,7 +136,7 @@ fn run_with<S: SampleInfo>(args: &CommandLine<S::Args>, event_loop: &mut EventLo
     match attempt(event_loop, S::NAME, &args.run, |setup| S::open(&args.sample, setup)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            print_message("error", &error);
             ExitCode::from(error.status())
         }
     }
@@ -238,7 +249,7 @@ impl<'a> SampleSetup<'a> {
 /// Prints warnings to standard error.
 pub(crate) fn warn(warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        print_message("warning", warning);
     }
 }
 
@@ -314,7 +325,7 @@ fn show<S: Sample>(
 fn closing_lines(request: &RenderRequest, played: &RenderReport, remark: Option<String>) -> String {
     let RenderReport { timings, written, skipped } = played;
     let remark = remark.map_or_else(String::new, |remark| format!("\n{remark}"));
-    let out = request.out.path().display();
+    let out = lvk::readable_name(request.out.path());
     match (&request.frames, skipped) {
         (Frames::Still(_), _) => format!("{timings}{remark}\nwrote {out}"),
         (Frames::Sequence(_), 0) => format!("{timings}{remark}\nwrote {written} frames to {out}"),

@@ -82,7 +82,7 @@ impl RenderRequest {
     }
 
     fn name(&self) -> String {
-        self.out.path().display().to_string()
+        lvk::readable_name(self.out.path())
     }
 
     fn frame_time(&self, frame: u32) -> FrameTime {
