@@ -68,7 +68,7 @@ fn kind(about: &Metadata) -> &'static str {
             return "a socket";
         }
     }
-    if about.is_dir() { "a folder" } else { "a device" }
+    if about.is_dir() { "a directory" } else { "a device" }
 }
 
 #[cfg(test)]
@@ -99,12 +99,12 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_is_no_file() {
+    fn a_directory_is_no_file() {
         let folder = tempfile::tempdir().unwrap();
         let error = read(folder.path(), 10).unwrap_err();
         assert_eq!(
             (error.kind(), error.to_string().as_str()),
-            (ErrorKind::InvalidInput, "it is a folder, no file")
+            (ErrorKind::InvalidInput, "it is a directory, no file")
         );
     }
 

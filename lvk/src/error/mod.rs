@@ -177,9 +177,10 @@ pub enum Error {
     },
     /// A shader reads more bytes of its record than the record has.
     #[error(
-        "pipeline '{}': the record of {group} has {size} bytes, but shader '{}' reads {expected} bytes; make the Rust \
+        "pipeline '{}': the record of {} has {size} bytes, but shader '{}' reads {expected} bytes; make the Rust \
          struct match the shader's block",
         readable_name(pipeline),
+        readable_name(group),
         readable_name(shader)
     )]
     ShaderRecord {
@@ -401,6 +402,81 @@ mod tests {
         assert_eq!(format!("{error:#?}"), text);
         let boxed: Box<dyn std::error::Error> = Box::new(error);
         assert_eq!(format!("Error: {boxed:?}"), format!("Error: {text}"));
+    }
+
+    /// An error of each kind that has names, all of which are `name`.
+    fn errors_with(name: &str) -> Vec<Error> {
+        let text = || name.to_owned();
+        let label = device_loss::ReportedLabel {
+            name: text(),
+            depth: 0,
+            progress: device_loss::LabelProgress::Begun,
+        };
+        let unfinished =
+            vec![device_loss::UnfinishedCommands { value: 1, name: text(), labels: vec![label] }];
+        let queue =
+            device_loss::QueueLossReport { queue: Queue::Graphics, completed: 0, submitted: 1, unfinished };
+        let fault = device_fault::DeviceFault { description: text(), ..Default::default() };
+        let report = DeviceLossReport { call: "vkQueueSubmit2", fault: Some(fault), queues: vec![queue] };
+        let kind = device_candidate::DeviceKind::Cpu;
+        let candidates = vec![DeviceCandidate {
+            index: 0,
+            name: text(),
+            kind,
+            api_version: (1, 3, 0),
+            driver: text(),
+            missing: vec![text()],
+        }];
+        let difference = LayoutDifference::OnlyInStruct { member: text(), offset: 0, bytes: 4 };
+        vec![
+            Error::NoDevice { problem: Some(text()), candidates, drivers: None },
+            Error::unsupported(text(), text()),
+            Error::LimitExceeded {
+                object: text(),
+                what: "size",
+                requested: 2,
+                limit: 1,
+                origin: LimitOrigin::Device,
+            },
+            Error::StaleHandle { kind: "buffer", name: Some(text()) },
+            Error::usage(text(), text()),
+            Error::SurfaceLost { swapchain: text() },
+            Error::PushConstants { pipeline: text(), expected: 1, offset: 0, size: 2 },
+            Error::LayoutMismatch {
+                pipeline: text(),
+                shader: text(),
+                block: text(),
+                struct_name: "Push",
+                differences: vec![difference],
+            },
+            Error::ShaderRecord { pipeline: text(), shader: text(), group: text(), expected: 2, size: 1 },
+            Error::File { path: name.into(), message: text() },
+            Error::Serialized { object: text(), reason: text() },
+            Error::OverBudget { object: text(), bytes: 2, used: 1, budget: 1 },
+            Error::OutOfDeviceMemory { object: text(), bytes: 1 },
+            Error::DeviceLost { report: Arc::new(report) },
+            Error::Creation { object: text(), source: Box::new(Error::usage(text(), text())) },
+            Error::Shader { name: text(), log: "line 1".to_owned() },
+        ]
+    }
+
+    #[test]
+    fn names_are_escaped_and_shortened_in_every_error() {
+        for error in errors_with("a\u{1b}[2J\u{202e}\r\nb") {
+            let text = error.to_string();
+            assert!(text.contains("a\\u{1b}[2J"), "{text}");
+            assert!(!text.contains(|c: char| c.is_control() || c == '\u{202e}'), "{text}");
+        }
+        for error in errors_with(&"n".repeat(1 << 20)) {
+            let length = error.to_string().len();
+            assert!(length < 20_000, "{length}: {:.200}", error.to_string());
+        }
+    }
+
+    #[test]
+    fn logs_of_the_compiler_keep_their_lines_and_show_no_control_characters() {
+        let error = Error::Shader { name: "a".to_owned(), log: "line 1: '\u{1b}['\nline 2\t".to_owned() };
+        assert_eq!(error.to_string(), "shader 'a': line 1: '\\u{1b}['\nline 2\t");
     }
 
     #[test]

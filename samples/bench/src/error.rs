@@ -37,7 +37,7 @@ pub(super) enum BenchError {
     NoFolder(#[from] std::io::Error),
     #[error(transparent)]
     Listing(#[from] RunError),
-    #[error("validation reported {} messages; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]
+    #[error("number of messages that validation reported: {}; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]
     Validation(Vec<String>),
 }
 

@@ -44,6 +44,11 @@ pub(crate) fn print_line(text: &str) {
     let _ = writeln!(std::io::stdout(), "{}", lvk::readable_text(text));
 }
 
+/// Returns a count with its noun: "1 message", "2 messages".
+pub(crate) fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Prints a line about `subject`, such as "warning", to standard error, without control characters: texts of drivers and
 /// layers may have names in them.
 pub(crate) fn print_message(subject: &str, text: impl std::fmt::Display) {

@@ -90,7 +90,7 @@ pub enum RunError {
     #[error("--resume is for sequences, as --frames 0..240 --out frame_####.png")]
     NothingToResume,
     /// The validation layer was not silent.
-    #[error("validation reported {0} messages")]
+    #[error("validation reported {}", crate::app::counted(*.0, "message"))]
     Validation(usize),
     /// Ctrl-C, or the request of a batch system.
     #[error("interrupted after {done} of {count} frames; every picture written is whole{hint}")]

@@ -220,7 +220,7 @@ fn files_that_are_no_images_say_so() {
         assert!(read(&stored(folder.path(), name, bytes), &Bounds::default()).is_err(), "{name}");
     }
     let error = read(folder.path(), &Bounds::default()).unwrap_err();
-    assert_eq!(error.to_string(), "it is a folder, no file");
+    assert_eq!(error.to_string(), "it is a directory, no file");
     let huge = folder.path().join("huge.png");
     std::fs::File::create(&huge).unwrap().set_len(1 << 40).unwrap();
     let error = read(&huge, &Bounds::default()).unwrap_err();

@@ -163,7 +163,7 @@ mod tests {
         }
         let folder = tempfile::tempdir().unwrap();
         assert!(not_read(&folder.path().join("absent.json")).contains("(os error 2)"));
-        assert_eq!(not_read(folder.path()), "it is a folder, no file");
+        assert_eq!(not_read(folder.path()), "it is a directory, no file");
         std::fs::write(folder.path().join("binary.json"), [0xff, 0xfe]).unwrap();
         assert!(not_read(&folder.path().join("binary.json")).contains("UTF-8"));
     }
