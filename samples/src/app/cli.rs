@@ -99,21 +99,22 @@ pub fn main<S: SampleInfo>() -> ExitCode {
 /// window.
 #[must_use]
 pub fn main_with<S: SampleInfo>(words: Vec<OsString>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
-    match parse::<S>(words) {
+    match parse::<S>(&words) {
         Ok(args) => run_with::<S>(&args, event_loop),
         Err(error) => {
-            print_usage(&error);
+            print_usage(&error, &words);
             ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
         }
     }
 }
 
-/// Prints the help or the error of a command line. An argument with control characters is shown by escapes.
-fn print_usage(error: &clap::Error) {
-    let plain = error.render().to_string();
-    let readable = lvk::readable_text(&plain);
-    if error.use_stderr() && readable != plain {
-        eprint!("{readable}");
+/// Prints the help or the error of a command line. Words with control characters, and long ones, are shown without colours
+/// and in part.
+fn print_usage(error: &clap::Error, words: &[OsString]) {
+    let is_plain = |word: &OsString| word.to_str() == Some(lvk::readable_name(word).as_str());
+    if error.use_stderr() && !words.iter().all(is_plain) {
+        let text = error.render().to_string();
+        text.lines().for_each(|line| eprintln!("{}", lvk::readable_line(line)));
     } else {
         // A closed pipe is no reason for another status.
         let _ = error.print();

@@ -54,7 +54,7 @@ impl Texture {
     pub(super) fn read(path: &Path, budget: &mut PictureBudget) -> Result<Self, String> {
         let bounds = Bounds { bytes_left: budget.bytes_left, ..Bounds::default() };
         let Picture { width, height, rgba, notes } =
-            picture::read(path, &bounds).map_err(|error| readable_line(&error.to_string()))?;
+            picture::read(path, &bounds).map_err(|error| readable_line(error.to_string().trim_end()))?;
         let name = readable_name(path);
         budget.bytes_left = budget.bytes_left.saturating_sub(rgba.len() as u64);
         budget.notes.extend(notes.iter().map(|note| format!("picture {name}: {note}")));

@@ -124,7 +124,7 @@ fn a_pipe_in_place_of_a_cache_is_replaced() {
 fn a_picture_that_is_cut_off_is_warned_of() {
     let Some((desk, _)) = desk_with_device() else { return };
     let mut jpeg = std::io::Cursor::new(Vec::new());
-    let image = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([(4 * x) as u8, (4 * y) as u8, 99]));
+    let image = image::RgbImage::from_fn(256, 256, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
     image.write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
     let jpeg = jpeg.into_inner();
     desk.file("half.jpg", &jpeg[..jpeg.len() / 2]);
@@ -153,6 +153,9 @@ fn names_that_steer_a_terminal_are_escaped_and_long_ones_shortened() {
 
     let absent = desk.run(&["--scene", "absent\u{1b}]0;title\u{7}.obj"]);
     absent.assert_error(2, &["absent\\u{1b}]0;title\\u{7}.obj"]);
-    let usage = desk.run(&["--frames", "\u{1b}[31mred"]);
-    usage.assert_usage_error(&["\\u{1b}[31mred"]);
+    for word in ["\u{7}\u{1b}[31mred", &long[..100_000]] {
+        let usage = desk.run(&["--frames", word]);
+        usage.assert_usage_error(&["--frames"]);
+        assert!(!usage.err.contains(['\u{1b}', '\u{7}']) && usage.err.len() < 20_000, "{:.500}", usage.err);
+    }
 }
