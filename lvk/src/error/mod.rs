@@ -453,7 +453,7 @@ mod tests {
             Error::File { path: name.into(), message: text() },
             Error::Serialized { object: text(), reason: text() },
             Error::OverBudget { object: text(), bytes: 2, used: 1, budget: 1 },
-            Error::OutOfDeviceMemory { object: text(), bytes: 1 },
+            Error::OutOfDeviceMemory { call: "vkAllocateMemory", object: Some(text()), bytes: Some(1) },
             Error::DeviceLost { report: Arc::new(report) },
             Error::Creation { object: text(), source: Box::new(Error::usage(text(), text())) },
             Error::Shader { name: text(), log: "line 1".to_owned() },

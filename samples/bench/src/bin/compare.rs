@@ -44,7 +44,8 @@ fn compare(args: &Args) -> Result<String, String> {
 
 fn read(path: &Path) -> Result<RgbaImage, String> {
     let named = |error: String| format!("{}: {error}", lvk::readable_name(path));
-    let picture = picture::read(path, &Bounds::unshrunk()).map_err(|error| named(error.to_string().trim_end().to_owned()))?;
+    let picture = picture::read(path, &Bounds::unshrunk())
+        .map_err(|error| named(error.to_string().trim_end().to_owned()))?;
     if let Some(note) = picture.notes.first() {
         return Err(named(note.clone()));
     }
