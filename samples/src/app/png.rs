@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_process_left_is_no_obstacle() {
+    fn leftovers_of_a_killed_process_are_no_obstacle() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         for number in 0..1_000 {

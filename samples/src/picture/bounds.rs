@@ -74,8 +74,8 @@ pub(crate) fn shrunk_size([width, height]: [u32; 2], side: u32) -> Option<[u32; 
     (longest > side).then(|| [shrunk(width), shrunk(height)])
 }
 
-/// Returns the note on an image that was shrunk; `None` for one of the same size.
-pub(super) fn shrunk_note(from: [u32; 2], to: [u32; 2]) -> Option<String> {
+/// Returns the warning on an image that was shrunk; `None` for one of the same size.
+pub(super) fn shrunk_warning(from: [u32; 2], to: [u32; 2]) -> Option<String> {
     let [[width, height], [new_width, new_height]] = [from, to];
     let text =
         || format!("{width}x{height} texels are more than are taken; shrunk to {new_width}x{new_height}");
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_is_told_with_size_and_bound() {
+    fn refusals_tell_size_and_bound() {
         let text = |size| Bounds::default().fit(size).unwrap_err().to_string();
         assert_eq!(text([0, 5]), "the image has no pixels");
         for size in [[131_073, 1], [40_000, 40_000]] {

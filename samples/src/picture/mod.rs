@@ -5,8 +5,8 @@
 
 mod bounds;
 mod jpeg_end;
-mod png_rows;
-mod rows;
+mod png_scanlines;
+mod scanlines;
 pub mod shrink;
 mod whole;
 
@@ -30,7 +30,7 @@ pub struct Picture {
     /// Red, green, blue, alpha of each texel, 8 bits each, row by row: `width * height * 4` bytes.
     pub rgba: Vec<u8>,
     /// Differences from the file, for the user.
-    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
 }
 
 /// Errors of reading an image file. The messages do not name the file.
@@ -98,8 +98,8 @@ pub enum PictureError {
     Decoder(#[from] image::ImageError),
 }
 
-/// Reads an image file. An image that exceeds [`Bounds::max_side`] or [`Bounds::max_texels`] is shrunk, with a note. A JPEG
-/// that is cut off is read with a note, too: the texels behind the end are grey.
+/// Reads an image file. An image that exceeds [`Bounds::max_side`] or [`Bounds::max_texels`] is shrunk, with a warning. A JPEG
+/// that is cut off is read with a warning, too: the texels behind the end are grey.
 ///
 /// # Errors
 /// [`PictureError`].
@@ -111,11 +111,11 @@ pub fn read(path: &Path, bounds: &Bounds) -> Result<Picture, PictureError> {
     }
     let reader = reader.with_guessed_format()?;
     let format = reader.format();
-    let mut notes = Vec::new();
+    let mut warnings = Vec::new();
     let picture = match format {
         Some(ImageFormat::Png) => {
             let mut file = reader.into_inner();
-            match png_rows::read(&mut file, bounds)? {
+            match png_scanlines::read(&mut file, bounds)? {
                 Some(picture) => picture,
                 None => {
                     file.rewind()?;
@@ -126,17 +126,17 @@ pub fn read(path: &Path, bounds: &Bounds) -> Result<Picture, PictureError> {
         Some(ImageFormat::Jpeg) => {
             let mut file = reader.into_inner();
             if !jpeg_end::has_end(&mut file)? {
-                let note =
+                let warning =
                     "the file is cut off: it has no end-of-image marker; texels that are missing are grey";
-                notes.push(note.to_owned());
+                warnings.push(warning.to_owned());
             }
             file.rewind()?;
             whole::read(ImageReader::with_format(file, ImageFormat::Jpeg), bounds)?
         }
         _ => whole::read(reader, bounds)?,
     };
-    notes.extend(picture.notes);
-    Ok(Picture { notes, ..picture })
+    warnings.extend(picture.warnings);
+    Ok(Picture { warnings, ..picture })
 }
 
 #[cfg(test)]

@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn few_rows_are_in_memory() {
+    fn few_lines_are_in_memory() {
         for (from, to) in [([9, 1_000], [3, 999]), ([9, 1_000], [9, 7]), ([1, 500], [1, 250])] {
             let mut shrink = Shrink::new(from, to, 1);
             let mut count = 0;

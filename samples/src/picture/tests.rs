@@ -92,7 +92,7 @@ const KINDS: [(ColorType, &[BitDepth]); 5] = [
 ];
 
 #[test]
-fn rows_of_every_kind_of_png_are_those_of_whole_images() {
+fn scanlines_of_every_kind_of_png_are_those_of_whole_images() {
     let folder = tempfile::tempdir().unwrap();
     let mut files: Vec<_> = KINDS
         .iter()
@@ -105,7 +105,7 @@ fn rows_of_every_kind_of_png_are_those_of_whole_images() {
         let expected = image::load_from_memory(bytes).unwrap().into_rgba8();
         assert_eq!([picture.width, picture.height], [expected.width(), expected.height()]);
         assert_eq!(picture.rgba, expected.into_raw(), "kind {number}");
-        assert!(picture.notes.is_empty());
+        assert!(picture.warnings.is_empty());
     }
 }
 
@@ -139,8 +139,8 @@ fn images_that_are_too_large_are_shrunk_like_whole_images_in_every_format() {
         ] {
             let picture = read(&path, &bounds).unwrap();
             assert_eq!([picture.width, picture.height], [width, height], "{name}");
-            let note = format!("61x47 texels are more than are taken; shrunk to {width}x{height}");
-            assert_eq!(picture.notes, [note]);
+            let warning = format!("61x47 texels are more than are taken; shrunk to {width}x{height}");
+            assert_eq!(picture.warnings, [warning]);
             let whole = image::open(&path).unwrap().into_rgba8();
             let filter = image::imageops::FilterType::Triangle;
             let expected = image::imageops::resize(&whole, width, height, filter).into_raw();
@@ -152,11 +152,11 @@ fn images_that_are_too_large_are_shrunk_like_whole_images_in_every_format() {
 }
 
 #[test]
-fn a_file_that_is_cut_off_is_refused_or_noted_in_every_format() {
+fn a_truncated_file_is_refused_or_warned_of_in_every_format() {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in encoded() {
         assert!(
-            read(&stored(folder.path(), name, &bytes), &Bounds::default()).unwrap().notes.is_empty(),
+            read(&stored(folder.path(), name, &bytes), &Bounds::default()).unwrap().warnings.is_empty(),
             "{name}"
         );
         for share in 1..16 {
@@ -164,14 +164,14 @@ fn a_file_that_is_cut_off_is_refused_or_noted_in_every_format() {
             let path = stored(folder.path(), name, cut);
             if let Ok(picture) = read(&path, &Bounds::default()) {
                 assert!(name == "a.jpg", "{name} at {share}/16");
-                assert!(picture.notes[0].starts_with("the file is cut off"), "{:?}", picture.notes);
+                assert!(picture.warnings[0].starts_with("the file is cut off"), "{:?}", picture.warnings);
             }
         }
     }
 }
 
 #[test]
-fn run_length_formats_that_are_cut_off_are_refused() {
+fn truncated_run_length_formats_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     // A TGA of 16x16 texels in runs of 16, of which a half is there.
     let mut tga = vec![0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 16, 0, 16, 0, 24, 0];

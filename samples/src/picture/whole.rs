@@ -5,7 +5,7 @@ use std::io::{BufRead, Seek};
 use image::{DynamicImage, ImageDecoder as _, ImageReader, Limits};
 
 use super::bounds::MAX_DECODED_BYTES;
-use super::rows::{RowSink, eight_bits};
+use super::scanlines::{ScanlineSink, eight_bits};
 use super::{Bounds, Picture, PictureError};
 
 /// Decodes the image and shrinks it where it must be.
@@ -26,7 +26,7 @@ pub(super) fn read<R: BufRead + Seek>(
     }
     let image = DynamicImage::from_decoder(decoder)?;
     match from == to {
-        true => Ok(Picture { width, height, rgba: image.into_rgba8().into_raw(), notes: Vec::new() }),
+        true => Ok(Picture { width, height, rgba: image.into_rgba8().into_raw(), warnings: Vec::new() }),
         false => Ok(shrunk(image, from, to)),
     }
 }
@@ -34,7 +34,7 @@ pub(super) fn read<R: BufRead + Seek>(
 fn shrunk(image: DynamicImage, from: [u32; 2], to: [u32; 2]) -> Picture {
     let channels = usize::from(image.color().channel_count());
     let row = from[0] as usize * channels;
-    let mut sink = RowSink::new(from, to, channels);
+    let mut sink = ScanlineSink::new(from, to, channels);
     match image {
         DynamicImage::ImageLuma8(image) => push_rows(&mut sink, &image, row),
         DynamicImage::ImageLumaA8(image) => push_rows(&mut sink, &image, row),
@@ -45,7 +45,7 @@ fn shrunk(image: DynamicImage, from: [u32; 2], to: [u32; 2]) -> Picture {
         DynamicImage::ImageRgb16(image) => push_wide_rows(&mut sink, &image, row),
         DynamicImage::ImageRgba16(image) => push_wide_rows(&mut sink, &image, row),
         other => {
-            let mut sink = RowSink::new(from, to, 4);
+            let mut sink = ScanlineSink::new(from, to, 4);
             push_rows(&mut sink, &other.into_rgba8(), from[0] as usize * 4);
             return sink.finish();
         }
@@ -53,11 +53,11 @@ fn shrunk(image: DynamicImage, from: [u32; 2], to: [u32; 2]) -> Picture {
     sink.finish()
 }
 
-fn push_rows(sink: &mut RowSink, samples: &[u8], row: usize) {
+fn push_rows(sink: &mut ScanlineSink, samples: &[u8], row: usize) {
     samples.chunks_exact(row).for_each(|row| sink.push(row));
 }
 
-fn push_wide_rows(sink: &mut RowSink, samples: &[u16], row: usize) {
+fn push_wide_rows(sink: &mut ScanlineSink, samples: &[u16], row: usize) {
     let mut eight = Vec::with_capacity(row);
     for row in samples.chunks_exact(row) {
         eight.clear();

@@ -189,7 +189,7 @@ impl Library {
             selected.push(self.material(name));
         }
         let Self { textures, normal_maps, mut warnings, budget, .. } = self;
-        budget.into_notes().into_iter().for_each(|note| warnings.push("pictures", note));
+        budget.into_warnings().into_iter().for_each(|line| warnings.push("pictures", line));
         Selection { materials: selected, textures, normal_maps, warnings: warnings.into_lines() }
     }
 

@@ -22,15 +22,15 @@ pub struct Texture {
 /// Texels on an edge of the stand-in for a missing image.
 const STAND_IN_SIZE: u32 = 16;
 
-/// Bytes of texels that the pictures of a scene may still have, and notes on the pictures read.
+/// Bytes of texels that the pictures of a scene may still have, and warnings on the pictures read.
 pub(super) struct PictureBudget {
     bytes_left: u64,
-    notes: Vec<String>,
+    warnings: Vec<String>,
 }
 
 impl Default for PictureBudget {
     fn default() -> Self {
-        Self { bytes_left: Bounds::MAX_SCENE_BYTES, notes: Vec::new() }
+        Self { bytes_left: Bounds::MAX_SCENE_BYTES, warnings: Vec::new() }
     }
 }
 
@@ -40,24 +40,24 @@ impl PictureBudget {
         self.bytes_left += texture.pixels.len() as u64;
     }
 
-    /// The notes, each with the name of its file.
-    pub(super) fn into_notes(self) -> Vec<String> {
-        self.notes
+    /// The warnings, each with the name of its file.
+    pub(super) fn into_warnings(self) -> Vec<String> {
+        self.warnings
     }
 }
 
 impl Texture {
-    /// Reads an image file within the bounds of [`picture::read`]. Its texels and the notes on it go to `budget`.
+    /// Reads an image file within the bounds of [`picture::read`]. Its texels and the warnings on it go to `budget`.
     ///
     /// # Errors
     /// Describes the error in the file, as text for a warning.
     pub(super) fn read(path: &Path, budget: &mut PictureBudget) -> Result<Self, String> {
         let bounds = Bounds { bytes_left: budget.bytes_left, ..Bounds::default() };
-        let Picture { width, height, rgba, notes } =
+        let Picture { width, height, rgba, warnings } =
             picture::read(path, &bounds).map_err(|error| readable_line(error.to_string().trim_end()))?;
         let name = readable_name(path);
         budget.bytes_left = budget.bytes_left.saturating_sub(rgba.len() as u64);
-        budget.notes.extend(notes.iter().map(|note| format!("picture {name}: {note}")));
+        budget.warnings.extend(warnings.iter().map(|warning| format!("picture {name}: {warning}")));
         Ok(Self { name, width, height, pixels: rgba })
     }
 
@@ -135,7 +135,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("wall.png");
         image::RgbaImage::new(4, 2).save(&path).unwrap();
-        let mut budget = PictureBudget { bytes_left: 70, notes: Vec::new() };
+        let mut budget = PictureBudget { bytes_left: 70, warnings: Vec::new() };
         let first = Texture::read(&path, &mut budget).unwrap();
         Texture::read(&path, &mut budget).unwrap();
         let error = Texture::read(&path, &mut budget).unwrap_err();

@@ -121,7 +121,7 @@ fn a_pipe_in_place_of_a_cache_is_replaced() {
 }
 
 #[test]
-fn a_picture_that_is_cut_off_is_warned_of() {
+fn a_truncated_picture_is_warned_of() {
     let Some((desk, _)) = desk_with_device() else { return };
     let mut jpeg = std::io::Cursor::new(Vec::new());
     let image = image::RgbImage::from_fn(256, 256, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));

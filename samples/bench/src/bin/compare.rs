@@ -46,8 +46,8 @@ fn read(path: &Path) -> Result<RgbaImage, String> {
     let named = |error: String| format!("{}: {error}", lvk::readable_name(path));
     let picture = picture::read(path, &Bounds::unshrunk())
         .map_err(|error| named(error.to_string().trim_end().to_owned()))?;
-    if let Some(note) = picture.notes.first() {
-        return Err(named(note.clone()));
+    if let Some(warning) = picture.warnings.first() {
+        return Err(named(warning.clone()));
     }
     RgbaImage::from_raw(picture.width, picture.height, picture.rgba)
         .ok_or_else(|| named("the image has too few texels".to_owned()))

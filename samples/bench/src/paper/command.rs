@@ -31,7 +31,7 @@ pub(crate) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> 
         false => (args.scenes.clone(), None),
     };
     if let Some(missing_note) = &missing_note {
-        eprintln!("{}", lvk::readable_text(&missing_note));
+        eprintln!("{}", lvk::readable_text(missing_note));
     }
     let started = Instant::now();
     let interrupt = Interrupt::listen();

@@ -4,7 +4,7 @@ use std::io::{BufRead, Seek};
 
 use png::{BitDepth, Decoder, Limits, Transformations};
 
-use super::rows::{RowSink, eight_bits};
+use super::scanlines::{ScanlineSink, eight_bits};
 use super::{Bounds, Picture, PictureError};
 
 /// Most bytes of what the decoder keeps beside a row.
@@ -24,7 +24,7 @@ pub(super) fn read(file: impl BufRead + Seek, bounds: &Bounds) -> Result<Option<
     }
     let mut reader = decoder.read_info()?;
     let (color, depth) = reader.output_color_type();
-    let mut sink = RowSink::new(from, to, color.samples());
+    let mut sink = ScanlineSink::new(from, to, color.samples());
     let mut eight = Vec::new();
     for row in 1..=from[1] {
         let error = |source| PictureError::Row { row, height: from[1], source };

@@ -1,11 +1,11 @@
 //! Texels from rows of samples, shrunk where they must be.
 
 use super::Picture;
-use super::bounds::{self, shrunk_note};
+use super::bounds::{self, shrunk_warning};
 use super::shrink::Shrink;
 
 /// Takes the rows of an image from the top and makes a [`Picture`] of them.
-pub(super) struct RowSink {
+pub(super) struct ScanlineSink {
     from: [u32; 2],
     to: [u32; 2],
     channels: usize,
@@ -14,7 +14,7 @@ pub(super) struct RowSink {
     rgba: Vec<u8>,
 }
 
-impl RowSink {
+impl ScanlineSink {
     /// Starts with no row. Each will have `from[0]` texels of `channels` samples: grey, grey and alpha, red, green and blue,
     /// or these with alpha.
     pub(super) fn new(from: [u32; 2], to: [u32; 2], channels: usize) -> Self {
@@ -34,8 +34,8 @@ impl RowSink {
     /// Returns the image, after its last row.
     pub(super) fn finish(self) -> Picture {
         let [width, height] = self.to;
-        let notes = shrunk_note(self.from, self.to).into_iter().collect();
-        Picture { width, height, rgba: self.rgba, notes }
+        let warnings = shrunk_warning(self.from, self.to).into_iter().collect();
+        Picture { width, height, rgba: self.rgba, warnings }
     }
 }
 
