@@ -111,9 +111,12 @@ pub fn main_with<S: SampleInfo>(words: Vec<OsString>, event_loop: &mut EventLoop
 /// Prints the help or the error of a command line. Words with control characters, and long ones, are shown without colours
 /// and in part.
 fn print_usage(error: &clap::Error, words: &[OsString]) {
-    let is_plain = |word: &OsString| word.to_str() == Some(lvk::readable_name(word).as_str());
-    if error.use_stderr() && !words.iter().all(is_plain) {
-        let text = error.render().to_string();
+    let is_plain = |word: &&OsString| word.to_str() == Some(lvk::readable_name(word).as_str());
+    if error.use_stderr() && !words.iter().all(|word| is_plain(&word)) {
+        let mut text = error.render().to_string();
+        for word in words.iter().filter(|word| !is_plain(word)).filter_map(|word| word.to_str()) {
+            text = text.replace(word, &lvk::readable_name(word));
+        }
         text.lines().for_each(|line| eprintln!("{}", lvk::readable_line(line)));
     } else {
         // A closed pipe is no reason for another status.
