@@ -3,13 +3,13 @@
 use std::ffi::OsStr;
 use std::fs::File;
 use std::hash::{BuildHasher, RandomState};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, SystemTime};
 
-/// Maximum size of a cache in bytes. A larger one is treated as damaged.
+/// Maximum size of a cache in bytes. A larger one is not read.
 pub(crate) const MAX_BYTES: u64 = 1 << 30;
 /// Age from which a temporary file is a leftover of a process that was killed. A write takes seconds.
 const LEFTOVER_AGE: Duration = Duration::from_secs(3600);
@@ -22,14 +22,6 @@ pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
     const PRIME: u64 = 0x0000_0100_0000_01b3;
     let bytes = parts.iter().copied().flatten();
     bytes.fold(BASIS, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(PRIME))
-}
-
-/// Reads a file. Of a file larger than `most_bytes`, only the start is read, which is then rejected as
-/// truncated.
-pub(crate) fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(most_bytes).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// Replaces a file atomically. Concurrent readers, and processes after a crash, find either the old bytes or

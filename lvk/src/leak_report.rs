@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::error::readable::readable_name;
 use crate::store::LiveObject;
 
 /// Most names listed of each kind; the report has only the number of others.
@@ -13,10 +14,12 @@ pub(crate) fn leak_report(live: &[LiveObject]) -> Option<String> {
     if live.is_empty() {
         return None;
     }
-    let mut text = format!(
-        "{} objects were alive when their context ended; drop their holders or destroy them:",
-        live.len()
-    );
+    let mut text = match live.len() {
+        1 => "1 object was alive when its context ended; drop its holder or destroy it:".to_owned(),
+        count => format!(
+            "{count} objects were alive when their context ended; drop their holders or destroy them:"
+        ),
+    };
     for of_kind in live.chunk_by(|a, b| a.kind == b.kind) {
         let mut names: Vec<&str> = of_kind.iter().map(|object| object.name.as_str()).collect();
         names.sort_unstable();
@@ -25,16 +28,18 @@ pub(crate) fn leak_report(live: &[LiveObject]) -> Option<String> {
         // Writing to a String cannot fail.
         let _ = write!(text, "\n  {} {}: {}", of_kind.len(), of_kind[0].kind, said.join(", "));
         if !rest.is_empty() {
-            let _ = write!(text, " and {} other names", rest.len());
+            let names = if rest.len() == 1 { "name" } else { "names" };
+            let _ = write!(text, " and {} other {names}", rest.len());
         }
     }
     Some(text)
 }
 
 fn count_by_kind(same: &[&str]) -> String {
+    let name = readable_name(same[0]);
     match same.len() {
-        1 => format!("'{}'", same[0]),
-        count => format!("{count} x '{}'", same[0]),
+        1 => format!("'{name}'"),
+        count => format!("{count} x '{name}'"),
     }
 }
 
@@ -59,6 +64,13 @@ mod tests {
         let lines: Vec<_> = text.lines().collect();
         assert!(lines[0].starts_with("4 objects were alive when their context ended"), "{text}");
         assert_eq!(lines[1..], ["  3 buffer: 'a', 2 x 'b'", "  1 sampler: 's'"]);
+    }
+
+    #[test]
+    fn one_object_is_told_in_the_singular() {
+        let text = leak_report(&[live_object("buffer", "a\u{1b}[2J")]).unwrap();
+        assert!(text.starts_with("1 object was alive when its context ended; drop its holder"), "{text}");
+        assert!(text.ends_with("1 buffer: 'a\\u{1b}[2J'"), "{text}");
     }
 
     #[test]

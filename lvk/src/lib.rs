@@ -178,6 +178,8 @@ mod parallel;
 mod pipeline;
 mod pool;
 mod queue;
+#[doc(hidden)]
+pub mod regular_file;
 mod resource;
 mod shader;
 #[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled/mod.rs")]
@@ -240,6 +242,8 @@ pub use error::driver_report::{
 };
 pub use error::layout_difference::LayoutDifference;
 pub use error::limit_origin::LimitOrigin;
+#[doc(hidden)]
+pub use error::readable::{readable_bytes, readable_line, readable_name, readable_text};
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;

@@ -62,7 +62,8 @@ pub fn run_line(line: &str, more: Vec<OsString>, event_loop: &mut EventLoopBuild
         Some(sample) => (sample.main)([words, more].concat(), event_loop),
         None => {
             let names = SAMPLES.map(|sample| sample.name).join(", ");
-            eprintln!("error: '{}' names no sample; there are {names}", line.trim());
+            let name = lvk::readable_name(line.trim());
+            crate::app::print_message("error", format_args!("'{name}' names no sample; there are {names}"));
             ExitCode::from(2)
         }
     }

@@ -9,6 +9,7 @@ pub mod hybrid_oit;
 pub mod large_scene;
 pub mod mesh_shaders;
 pub mod omni_shadows;
+pub mod picture;
 pub mod pipelines;
 pub mod raster;
 pub mod reflections;

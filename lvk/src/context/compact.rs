@@ -11,6 +11,7 @@ use crate::accel::compaction::{CompactedSizeQuery, CompactionRefusal, Compaction
 use crate::accel::flags::BuildFlags;
 use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::device_state::DeferredObject;
+use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::lock_order::Guard;
@@ -212,7 +213,7 @@ enum CompactionStep {
 }
 
 fn abort_compaction(target: &Arc<AccelStruct>, error: &Error) {
-    log::warn!("BLAS '{}' stays uncompacted: {error}", target.name);
+    log::warn!("BLAS '{}' stays uncompacted: {error}", readable_name(&*target.name));
     cancel_compactions(std::slice::from_ref(target), CompactionState::Failed);
 }
 

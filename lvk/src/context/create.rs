@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::Context;
 use super::holder::Holder;
+use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::handle::{
@@ -169,7 +170,7 @@ fn warn_of_raw_hit_ids(caps: &Capabilities, desc: &ShaderModuleDesc<'_>) {
         return;
     }
     if let Some((number, helper)) = find_raw_hit_builtin(desc) {
-        let name = desc.debug_name;
+        let name = readable_name(desc.debug_name);
         log::warn!("shader '{name}': {number} counts parts of split and reordered meshes here; use {helper}");
     }
 }

@@ -10,6 +10,7 @@ use super::destroy::Destroy;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::device_state::DeferredObject;
+use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::start::window::WindowHandles;
@@ -480,7 +481,7 @@ impl LiveBackend<'_> {
         let waits = semaphores.iter().map(wait).collect();
         let submission = Submission { waits, ..Submission::default() };
         if let Err(error) = self.ctx.device_state().submitter.submit(submission, || {}).1 {
-            log::error!("{}: an acquired image cannot be released: {error}", self.name);
+            log::error!("{}: an acquired image cannot be released: {error}", readable_name(&**self.name));
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::readable::readable_name;
+
 /// Kind of a device, in order of preference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
@@ -50,9 +52,10 @@ pub struct DeviceCandidate {
 impl fmt::Display for DeviceCandidate {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { index, name, kind, api_version: (major, minor, patch), .. } = self;
+        let name = readable_name(name);
         write!(out, "[{index}] {name} ({kind}, Vulkan {major}.{minor}.{patch}")?;
         if !self.driver.is_empty() {
-            write!(out, ", {}", self.driver)?;
+            write!(out, ", {}", readable_name(&self.driver))?;
         }
         match self.missing.as_slice() {
             [] => out.write_str("): usable"),

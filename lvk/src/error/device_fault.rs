@@ -3,6 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
+use super::readable::readable_line;
+
 /// Fault report of a lost device, from a driver with `VK_EXT_device_fault`
 /// ([`OptionalFeature::DeviceFault`](crate::OptionalFeature)).
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -61,11 +63,12 @@ pub struct VendorFault {
 impl fmt::Display for DeviceFault {
     /// Formats the report in one line, for messages.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}", self.description)?;
+        out.write_str(&readable_line(&self.description))?;
         for FaultAddress { kind, range, .. } in &self.addresses {
             write!(out, "; {kind:?} at {:#x} to {:#x}", range.start, range.end.saturating_sub(1))?;
         }
         for VendorFault { description, code, data } in &self.vendor {
+            let description = readable_line(description);
             write!(out, "; {description} (code {code:#x}, data {data:#x})")?;
         }
         Ok(())

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::device_fault::DeviceFault;
+use super::readable::readable_name;
 use crate::queue::Queue;
 
 /// The report of a lost device: its fault, the unfinished submissions, and the labels under which they ran.
@@ -95,7 +96,8 @@ impl QueueLossReport {
         let Some(oldest) = self.unfinished.first() else { return Ok(()) };
         write!(out, "; the {} queue had not finished {oldest}", self.queue.label())?;
         let (word, names) = oldest.likely_labels();
-        let named: Vec<_> = names.iter().take(MAX_NAMED_LABELS).map(|name| format!("'{name}'")).collect();
+        let named: Vec<_> =
+            names.iter().take(MAX_NAMED_LABELS).map(|name| format!("'{}'", readable_name(name))).collect();
         if !named.is_empty() {
             let more = if names.len() > named.len() { ", .." } else { "" };
             write!(out, " {word} {}{more}", named.join(", "))?;
@@ -145,7 +147,7 @@ impl UnfinishedCommands {
         }
         for label in self.labels.iter().skip(first).take(MAX_LISTED_LABELS) {
             let indent = 2 * label.depth.min(16) as usize;
-            write!(out, "\n    {:9}  {:indent$}{}", label.progress.label(), "", label.name)?;
+            write!(out, "\n    {:9}  {:indent$}{}", label.progress.label(), "", readable_name(&label.name))?;
         }
         write_rest(out, 4, self.labels.len().saturating_sub(first + MAX_LISTED_LABELS))
     }
@@ -155,7 +157,7 @@ impl fmt::Display for UnfinishedCommands {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.name.as_str() {
             "" => write!(out, "submission {}", self.value),
-            name => write!(out, "submission {} '{name}'", self.value),
+            name => write!(out, "submission {} '{}'", self.value, readable_name(name)),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::fmt;
 use super::device_candidate::DeviceCandidate;
 use super::driver_remedies::driver_remedies;
 use super::driver_report::{DriverManifest, DriverReport, VulkanReport};
+use super::readable::readable_line;
 
 impl fmt::Display for DriverReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -23,7 +24,7 @@ impl fmt::Display for VulkanReport {
 /// Writes lines and remedies: one below the other in the alternate form, else in one line.
 fn write_lines(out: &mut fmt::Formatter<'_>, mut lines: Vec<String>, remedies: Vec<String>) -> fmt::Result {
     lines.extend(remedies.into_iter().map(|remedy| format!("remedy: {remedy}")));
-    let lines = lines.iter().map(|line| one_line(line));
+    let lines = lines.iter().map(|line| readable_line(&one_line(line)));
     out.write_str(&lines.collect::<Vec<_>>().join(if out.alternate() { "\n" } else { "; " }))
 }
 

@@ -10,6 +10,7 @@ mod driver_report_text;
 pub(crate) mod layout_difference;
 pub(crate) mod limit_origin;
 mod platform_remedies;
+pub(crate) mod readable;
 
 use std::fmt;
 use std::path::PathBuf;
@@ -24,6 +25,7 @@ use driver_report::DriverReport;
 use driver_report_text::no_device_text;
 use layout_difference::{LayoutDifference, differences_text};
 use limit_origin::LimitOrigin;
+use readable::{readable_line, readable_name, readable_text};
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -42,7 +44,8 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 ///   [`OutOfHostMemory`](Error::OutOfHostMemory), [`File`](Error::File), [`DeviceLost`](Error::DeviceLost),
 ///   [`Vulkan`](Error::Vulkan); [`Creation`](Error::Creation) adds the name of an object to one of these.
 ///
-/// `Debug` has the text of `Display`, as programs whose `main` returns an error print it by `Debug`.
+/// The texts show names of objects and files without control characters, and long ones shortened; the fields have them
+/// as they are. `Debug` has the text of `Display`, as programs whose `main` returns an error print it by `Debug`.
 #[derive(Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -56,7 +59,7 @@ pub enum Error {
     /// Devices exist, but none has the features that the caller requires. The text ends with the remedies.
     #[error(
         "no Vulkan device has what was required: {}",
-        no_device_text(problem.as_deref(), candidates, drivers.as_deref())
+        readable_line(&no_device_text(problem.as_deref(), candidates, drivers.as_deref()))
     )]
     NoDevice {
         /// The problem with the device that the caller requested by number or name.
@@ -68,7 +71,7 @@ pub enum Error {
         drivers: Option<Arc<DriverReport>>,
     },
     /// The device, its driver or a layer lacks a feature that a call needs.
-    #[error("not supported: {what}: {why}")]
+    #[error("not supported: {}: {}", readable_line(what), readable_line(why))]
     Unsupported {
         /// The feature, extension, format or layer.
         what: String,
@@ -76,7 +79,7 @@ pub enum Error {
         why: String,
     },
     /// A size or count exceeds a limit.
-    #[error("{object}: {what} is {requested}, {}", origin.clause(*limit))]
+    #[error("{}: {what} is {requested}, {}", readable_name(object), origin.clause(*limit))]
     LimitExceeded {
         /// Debug name of the object.
         object: String,
@@ -110,7 +113,7 @@ pub enum Error {
         kind: &'static str,
     },
     /// A call has invalid arguments, or is invalid in the current state.
-    #[error("{object}: {message}")]
+    #[error("{}: {}", readable_name(object), readable_line(message))]
     InvalidUsage {
         /// Debug name of the object or name of the call.
         object: String,
@@ -119,7 +122,8 @@ pub enum Error {
     },
     /// The window of a swapchain is gone (`VK_ERROR_SURFACE_LOST_KHR`, also for another surface of the window).
     #[error(
-        "{swapchain}: its window is gone; suspend the swapchain, and resume it in another window, or destroy it before its window"
+        "{}: its window is gone; suspend the swapchain, and resume it in another window, or destroy it before its window",
+        readable_name(swapchain)
     )]
     SurfaceLost {
         /// Debug name of the swapchain.
@@ -137,8 +141,9 @@ pub enum Error {
     },
     /// The pushed bytes do not fit the push-constant block of the bound pipeline.
     #[error(
-        "pipeline '{pipeline}' declares {expected} bytes of push constants, but {offset} + {size} bytes were pushed; \
-         make the Rust struct match the shader's block"
+        "pipeline '{}' declares {expected} bytes of push constants, but {offset} + {size} bytes were pushed; make the Rust \
+         struct match the shader's block",
+        readable_name(pipeline)
     )]
     PushConstants {
         /// Debug name of the pipeline.
@@ -152,8 +157,11 @@ pub enum Error {
     },
     /// A Rust struct and the block of a shader that reads its bytes have different members.
     #[error(
-        "pipeline '{pipeline}': the struct {struct_name} differs from the {block} of shader '{shader}': {}",
-        differences_text(differences)
+        "pipeline '{}': the struct {struct_name} differs from the {} of shader '{}': {}",
+        readable_name(pipeline),
+        readable_name(block),
+        readable_name(shader),
+        readable_line(&differences_text(differences))
     )]
     LayoutMismatch {
         /// Debug name of the pipeline or library.
@@ -169,8 +177,11 @@ pub enum Error {
     },
     /// A shader reads more bytes of its record than the record has.
     #[error(
-        "pipeline '{pipeline}': the record of {group} has {size} bytes, but shader '{shader}' reads {expected} bytes; make \
-         the Rust struct match the shader's block"
+        "pipeline '{}': the record of {} has {size} bytes, but shader '{}' reads {expected} bytes; make the Rust \
+         struct match the shader's block",
+        readable_name(pipeline),
+        readable_name(group),
+        readable_name(shader)
     )]
     ShaderRecord {
         /// Debug name of the pipeline or library.
@@ -185,7 +196,7 @@ pub enum Error {
         size: u64,
     },
     /// A shader did not compile, or its SPIR-V cannot be used.
-    #[error("shader '{name}': {log}")]
+    #[error("shader '{}': {}", readable_name(name), readable_text(log))]
     Shader {
         /// Debug name of the module.
         name: String,
@@ -193,7 +204,7 @@ pub enum Error {
         log: String,
     },
     /// A file could not be read or written.
-    #[error("file '{}': {message}", path.display())]
+    #[error("file '{}': {}", readable_name(path), readable_line(message))]
     File {
         /// The file.
         path: PathBuf,
@@ -201,7 +212,7 @@ pub enum Error {
         message: String,
     },
     /// Serialised bytes of an acceleration structure cannot be used.
-    #[error("{object}: {reason}; build it anew and serialise that")]
+    #[error("{}: {}; build it anew and serialise that", readable_name(object), readable_line(reason))]
     Serialized {
         /// Debug name of the acceleration structure to be created.
         object: String,
@@ -210,8 +221,9 @@ pub enum Error {
     },
     /// An acceleration structure exceeds the budget of the context.
     #[error(
-        "'{object}' needs {bytes} bytes, but acceleration structures have {used} of their budget of {budget} in use; \
-         destroy or compact some, or raise ContextDesc::accel_budget_bytes"
+        "'{}' needs {bytes} bytes, but acceleration structures have {used} of their budget of {budget} in use; destroy or \
+         compact some, or raise ContextDesc::accel_budget_bytes",
+        readable_name(object)
     )]
     OverBudget {
         /// Debug name of the acceleration structure.
@@ -259,7 +271,7 @@ pub enum Error {
         report: Arc<DeviceLossReport>,
     },
     /// The creation of an object failed with an error that does not name the object.
-    #[error("{object}: {source}")]
+    #[error("{}: {source}", readable_name(object))]
     Creation {
         /// Debug name of the object.
         object: String,
@@ -342,14 +354,14 @@ impl fmt::Debug for Error {
 }
 
 fn memory_request(object: Option<&str>, bytes: Option<u64>) -> String {
-    let object = object.map(|object| format!(" for '{object}'")).unwrap_or_default();
+    let object = object.map(|object| format!(" for '{}'", readable_name(object))).unwrap_or_default();
     let bytes = bytes.map(|bytes| format!(" ({bytes} bytes)")).unwrap_or_default();
     object + &bytes
 }
 
 fn stale_object(kind: &str, name: &Option<String>) -> String {
     match name {
-        Some(name) => format!("'{name}'"),
+        Some(name) => format!("'{}'", readable_name(name)),
         None => format!("the {kind}"),
     }
 }
@@ -390,6 +402,81 @@ mod tests {
         assert_eq!(format!("{error:#?}"), text);
         let boxed: Box<dyn std::error::Error> = Box::new(error);
         assert_eq!(format!("Error: {boxed:?}"), format!("Error: {text}"));
+    }
+
+    /// An error of each kind that has names, all of which are `name`.
+    fn errors_with(name: &str) -> Vec<Error> {
+        let text = || name.to_owned();
+        let label = device_loss::ReportedLabel {
+            name: text(),
+            depth: 0,
+            progress: device_loss::LabelProgress::Begun,
+        };
+        let unfinished =
+            vec![device_loss::UnfinishedCommands { value: 1, name: text(), labels: vec![label] }];
+        let queue =
+            device_loss::QueueLossReport { queue: Queue::Graphics, completed: 0, submitted: 1, unfinished };
+        let fault = device_fault::DeviceFault { description: text(), ..Default::default() };
+        let report = DeviceLossReport { call: "vkQueueSubmit2", fault: Some(fault), queues: vec![queue] };
+        let kind = device_candidate::DeviceKind::Cpu;
+        let candidates = vec![DeviceCandidate {
+            index: 0,
+            name: text(),
+            kind,
+            api_version: (1, 3, 0),
+            driver: text(),
+            missing: vec![text()],
+        }];
+        let difference = LayoutDifference::OnlyInStruct { member: text(), offset: 0, bytes: 4 };
+        vec![
+            Error::NoDevice { problem: Some(text()), candidates, drivers: None },
+            Error::unsupported(text(), text()),
+            Error::LimitExceeded {
+                object: text(),
+                what: "size",
+                requested: 2,
+                limit: 1,
+                origin: LimitOrigin::Device,
+            },
+            Error::StaleHandle { kind: "buffer", name: Some(text()) },
+            Error::usage(text(), text()),
+            Error::SurfaceLost { swapchain: text() },
+            Error::PushConstants { pipeline: text(), expected: 1, offset: 0, size: 2 },
+            Error::LayoutMismatch {
+                pipeline: text(),
+                shader: text(),
+                block: text(),
+                struct_name: "Push",
+                differences: vec![difference],
+            },
+            Error::ShaderRecord { pipeline: text(), shader: text(), group: text(), expected: 2, size: 1 },
+            Error::File { path: name.into(), message: text() },
+            Error::Serialized { object: text(), reason: text() },
+            Error::OverBudget { object: text(), bytes: 2, used: 1, budget: 1 },
+            Error::OutOfDeviceMemory { call: "vkAllocateMemory", object: Some(text()), bytes: Some(1) },
+            Error::DeviceLost { report: Arc::new(report) },
+            Error::Creation { object: text(), source: Box::new(Error::usage(text(), text())) },
+            Error::Shader { name: text(), log: "line 1".to_owned() },
+        ]
+    }
+
+    #[test]
+    fn names_are_escaped_and_shortened_in_every_error() {
+        for error in errors_with("a\u{1b}[2J\u{202e}\r\nb") {
+            let text = error.to_string();
+            assert!(text.contains("a\\u{1b}[2J"), "{text}");
+            assert!(!text.contains(|c: char| c.is_control() || c == '\u{202e}'), "{text}");
+        }
+        for error in errors_with(&"n".repeat(1 << 20)) {
+            let length = error.to_string().len();
+            assert!(length < 20_000, "{length}: {:.200}", error.to_string());
+        }
+    }
+
+    #[test]
+    fn logs_of_the_compiler_keep_their_lines_and_show_no_control_characters() {
+        let error = Error::Shader { name: "a".to_owned(), log: "line 1: '\u{1b}['\nline 2\t".to_owned() };
+        assert_eq!(error.to_string(), "shader 'a': line 1: '\\u{1b}['\nline 2\t");
     }
 
     #[test]

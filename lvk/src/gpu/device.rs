@@ -299,7 +299,7 @@ impl Gpu {
         let reason = self.caps.ray_tracing_fallback.clone().unwrap_or_else(|| {
             format!("{}its driver does not offer it, or it was turned off", profile.unwrap_or_default())
         });
-        Error::unsupported(what, format!("the device '{}' has none: {reason}", self.caps.device_name))
+        Error::unsupported(what, format!("the device '{}' lacks support: {reason}", self.caps.device_name))
     }
 
     /// Returns an error unless the device has `feature`. `what` is the refused operation in the error.

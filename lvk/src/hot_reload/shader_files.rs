@@ -1,17 +1,18 @@
 //! The files that shaders were compiled from, and whether they have changed since.
 
 use std::collections::BTreeMap;
-use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use crate::context::Context;
 use crate::context::holder::Holder;
+use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::handle::ShaderModuleHandle;
 use crate::lock_order::{Guard, Mutex, Rank};
-use crate::shader::{ShaderModuleDesc, ShaderSource};
+use crate::regular_file;
+use crate::shader::{MAX_GLSL_BYTES, ShaderModuleDesc, ShaderSource};
 
 /// Compiles files of shaders, and notices when one of them changes.
 ///
@@ -42,7 +43,8 @@ impl ShaderFiles {
     /// where an include was searched in vain.
     ///
     /// # Errors
-    /// [`File`](Error::File) if the file cannot be read, otherwise as [`Context::create_shader_module`].
+    /// [`File`](Error::File) if the file cannot be read, is no regular file or has more than 16 MiB, otherwise as
+    /// [`Context::create_shader_module`].
     pub fn create_module(
         &self,
         ctx: &Context,
@@ -51,9 +53,12 @@ impl ShaderFiles {
     ) -> Result<Holder<ShaderModuleHandle>> {
         let path = path.as_ref();
         self.watch(path);
-        let text = read_to_string(path).map_err(|error| Error::File {
+        let text = regular_file::read_text(path, MAX_GLSL_BYTES).map_err(|error| Error::File {
             path: path.to_owned(),
-            message: format!("the text of shader '{}' cannot be read: {error}", desc.debug_name),
+            message: format!(
+                "the text of shader '{}' cannot be read: {error}",
+                readable_name(desc.debug_name)
+            ),
         })?;
         let dirs: Vec<&Path> = path.parent().into_iter().chain(desc.include_dirs.iter().copied()).collect();
         let desc = ShaderModuleDesc { source: ShaderSource::Glsl(&text), include_dirs: &dirs, ..*desc };

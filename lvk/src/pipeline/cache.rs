@@ -7,10 +7,12 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::cache_file::{CacheOwner, decode_file, encode_file};
-use crate::cache_file::{MAX_BYTES, checksum, read_file, remove_leftovers, replace_file};
+use crate::cache_file::{MAX_BYTES, checksum, remove_leftovers, replace_file};
+use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
+use crate::regular_file;
 
 /// The pipeline cache of a context that has a cache file. The file is written and the cache destroyed on drop.
 pub(crate) struct PipelineCache {
@@ -35,7 +37,7 @@ impl PipelineCache {
         let data = file.as_deref().and_then(|file| match decode_file(&owner, file) {
             Ok(data) => Some(data),
             Err(refusal) => {
-                log::warn!("the pipeline cache '{}' is dropped: {refusal}", path.display());
+                log::warn!("the pipeline cache '{}' is dropped: {refusal}", readable_name(path));
                 None
             }
         });
@@ -88,15 +90,15 @@ impl Drop for PipelineCache {
 
 /// Returns the bytes of the file if it can be read. At the first run there is no file.
 fn read_if_present(path: &Path) -> Option<Vec<u8>> {
-    let error = match read_file(path, MAX_BYTES) {
+    let error = match regular_file::read(path, MAX_BYTES) {
         Ok(file) => return Some(file),
         Err(error) => error,
     };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if error.kind() != ErrorKind::NotFound {
-        log::warn!("the pipeline cache '{}' cannot be read: {error}", path.display());
+        log::warn!("the pipeline cache '{}' cannot be read: {error}", readable_name(path));
     } else if folder.is_some_and(|folder| !folder.is_dir()) {
-        log::warn!("the folder of the pipeline cache '{}' does not exist; create it", path.display());
+        log::warn!("the folder of the pipeline cache '{}' does not exist; create it", readable_name(path));
     }
     None
 }
@@ -107,7 +109,10 @@ fn create_from<'a>(gpu: &Gpu, path: &Path, data: &'a [u8]) -> Result<(vk::Pipeli
         Ok(raw) => Ok((raw, data)),
         Err(result) if data.is_empty() => Err(Error::vulkan("vkCreatePipelineCache")(result)),
         Err(result) => {
-            log::warn!("the pipeline cache '{}' is dropped: the driver returns {result}", path.display());
+            log::warn!(
+                "the pipeline cache '{}' is dropped: the driver returns {result}",
+                readable_name(path)
+            );
             let raw = create_cache(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache"))?;
             Ok((raw, &[]))
         }

@@ -7,6 +7,7 @@ use ash::vk;
 use crate::bindless::Bindless;
 use crate::bindless::index_checks::CheckPlan;
 use crate::error::limit_origin::LimitOrigin;
+use crate::error::readable::readable_name;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
@@ -98,7 +99,8 @@ fn with_index_checks(gpu: &Gpu, desc: &ShaderModuleDesc<'_>, words: Vec<u32>, pl
     match stores.and_then(|()| with_checked_indices(&words, plan)) {
         Ok(checked) => checked,
         Err(why) => {
-            log::warn!("the indices of shader '{}' are not checked: {why}", desc.debug_name);
+            let name = readable_name(desc.debug_name);
+            log::warn!("the indices of shader '{name}' are not checked: {why}");
             words
         }
     }

@@ -6,8 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
 use super::disk_file::{CachedModule, Fingerprint, Included, decode_file, encode_file};
-use crate::cache_file::{is_temporary, read_file, remove_leftovers, replace_file};
+use crate::cache_file::{is_temporary, remove_leftovers, replace_file};
+use crate::error::readable::readable_name;
 use crate::lock_order::{Mutex, Rank};
+use crate::regular_file;
 
 /// Maximum size of a cache folder in bytes. If a folder exceeds it, the least recently used files are removed until the
 /// folder is three quarters full.
@@ -61,11 +63,11 @@ impl ShaderCache {
         is_same: impl FnOnce(&[Included]) -> bool,
     ) -> Option<Vec<u32>> {
         let path = self.path(key);
-        let file = match read_file(&path, MAX_BYTES) {
+        let file = match regular_file::read(&path, MAX_BYTES) {
             Ok(file) => file,
             Err(error) => {
                 if error.kind() != ErrorKind::NotFound {
-                    log::warn!("the compiled shader '{}' cannot be read: {error}", path.display());
+                    log::warn!("the compiled shader '{}' cannot be read: {error}", readable_name(&path));
                 }
                 return None;
             }
@@ -73,7 +75,7 @@ impl ShaderCache {
         let entry = match decode_file(key, &file) {
             Ok(entry) => entry,
             Err(reason) => {
-                log::warn!("the compiled shader '{}' is dropped: {reason}", path.display());
+                log::warn!("the compiled shader '{}' is dropped: {reason}", readable_name(&path));
                 return None;
             }
         };
@@ -92,7 +94,7 @@ impl ShaderCache {
         let file = encode_file(key, entry);
         let written = std::fs::create_dir_all(&self.folder).and_then(|()| replace_file(&path, &file));
         if let Err(error) = written {
-            log::warn!("the compiled shader '{}' cannot be kept: {error}", path.display());
+            log::warn!("the compiled shader '{}' cannot be kept: {error}", readable_name(&path));
             return;
         }
         self.count_bytes(file.len() as u64);

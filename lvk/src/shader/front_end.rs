@@ -16,6 +16,7 @@ use super::spirv::passes::strip_unused_bindings::strip_unused_bindings;
 use super::{ShaderModuleDesc, ShaderStage, diagnostics, preamble};
 use crate::cpu_scope::cpu_scope;
 use crate::error::Result;
+use crate::error::readable::{readable_name, readable_text};
 
 /// Returns the words of `text`, from the cache if it has them.
 pub(super) fn compile_cached(
@@ -99,7 +100,7 @@ fn to_spirv(
     let input = ShaderInput::new_with_limits(&source, &LIMITS, stage, &options, no_defines, Some(includes))?;
     let shader = compiler.create_shader(input)?;
     for warning in diagnostics::warnings(&shader.get_log()) {
-        log::warn!("shader '{name}': {warning}");
+        log::warn!("shader '{}': {}", readable_name(name), readable_text(&warning));
     }
     shader.compile()
 }

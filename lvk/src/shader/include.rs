@@ -7,7 +7,9 @@ use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
 
 use super::disk_file::{Fingerprint, Included};
 use super::preamble;
-use super::sanitize;
+use super::{MAX_GLSL_BYTES, sanitize};
+use crate::error::readable::readable_name;
+use crate::regular_file;
 
 /// Maximum nesting of includes. The compiler recurses on them, so deeper nesting is an error.
 const MAX_DEPTH: usize = 64;
@@ -146,7 +148,10 @@ impl<'a> Includes<'a> {
             places.push(format!("the listed includes ({})", names.join(", ")));
         }
         places.extend(
-            beside.into_iter().chain(self.dirs.iter().copied()).map(|dir| format!("'{}'", dir.display())),
+            beside
+                .into_iter()
+                .chain(self.dirs.iter().copied())
+                .map(|dir| format!("'{}'", readable_name(dir))),
         );
         if places.is_empty() {
             return format!("include '{name}' not found: the module lists no includes and no include_dirs");
@@ -212,8 +217,8 @@ impl IncludeOrigin {
 }
 
 fn read_text(path: &Path) -> Result<String, String> {
-    std::fs::read_to_string(path)
-        .map_err(|error| format!("include '{}' cannot be read: {error}", path.display()))
+    regular_file::read_text(path, MAX_GLSL_BYTES)
+        .map_err(|error| format!("include '{}' cannot be read: {error}", readable_name(path)))
 }
 
 fn canonicalize(path: PathBuf) -> PathBuf {

@@ -38,6 +38,10 @@ pub(crate) use spirv::stage_interface::LocationValue;
 pub(crate) use spirv::workgroup_memory::SharedBytes;
 pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};
 
+/// Most bytes of a file of GLSL.
+#[cfg(feature = "glsl")]
+pub(crate) const MAX_GLSL_BYTES: u64 = 16 << 20;
+
 /// Text of `lvk.hlsli`, which declares the descriptors of the library for HLSL and Slang, for build scripts to write to
 /// a file. The manual's page [`shader_interface`](crate::manual::shader_interface) has the options of the compilers.
 pub const HLSL_HEADER: &str = include_str!("hlsl/lvk.hlsli");

@@ -7,7 +7,9 @@ use super::bvh::primitives::{Mesh, MeshPrimitives};
 use super::bvh::settings::BvhSettings;
 use super::expected_mesh::ExpectedMesh;
 use super::validate_blob;
-use crate::cache_file::{fingerprint, read_file, remove_leftovers, replace_file};
+use crate::cache_file::{fingerprint, remove_leftovers, replace_file};
+use crate::error::readable::readable_name;
+use crate::regular_file;
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 const EXTENSION: &str = ".tree";
@@ -60,19 +62,19 @@ impl BvhCache {
         build: impl FnOnce() -> BlasBlob,
     ) -> BlasBlob {
         let path = self.folder.join(format!("{:016x}{:016x}{EXTENSION}", key.0[0], key.0[1]));
-        match read_file(&path, HEADER_BYTES as u64 + expected.max_blob_bytes()) {
+        match regular_file::read(&path, HEADER_BYTES as u64 + expected.max_blob_bytes()) {
             Ok(file) => match decode_file(&file, expected) {
                 Ok(blob) => return blob,
-                Err(reason) => log::warn!("the tree '{}' is dropped: {reason}", path.display()),
+                Err(reason) => log::warn!("the tree '{}' is dropped: {reason}", readable_name(&path)),
             },
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => log::warn!("the tree '{}' cannot be read: {error}", path.display()),
+            Err(error) => log::warn!("the tree '{}' cannot be read: {error}", readable_name(&path)),
         }
         let blob = build();
         let kept =
             std::fs::create_dir_all(&self.folder).and_then(|()| replace_file(&path, &encode_file(&blob)));
         if let Err(error) = kept {
-            log::warn!("the tree '{}' cannot be kept: {error}", path.display());
+            log::warn!("the tree '{}' cannot be kept: {error}", readable_name(&path));
         }
         blob
     }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::error::readable::readable_name;
+
 /// GPU times of the labelled parts of a frame or a submission.
 ///
 /// See [`Context::set_profiling`](crate::Context::set_profiling). Its `Display` output is an indented list.
@@ -54,7 +56,7 @@ impl GpuScope {
     }
 
     fn print(&self, f: &mut fmt::Formatter<'_>, depth: usize) -> fmt::Result {
-        writeln!(f, "{:10.3} ms  {:indent$}{}", self.ms, "", self.name, indent = 2 * depth)?;
+        writeln!(f, "{:10.3} ms  {:indent$}{}", self.ms, "", readable_name(&self.name), indent = 2 * depth)?;
         self.children.iter().try_for_each(|child| child.print(f, depth + 1))
     }
 }

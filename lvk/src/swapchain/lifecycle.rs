@@ -3,6 +3,7 @@
 
 use super::choose::Failure;
 use crate::error::Result;
+use crate::error::readable::readable_name;
 
 /// The presentation engine of a swapchain. There is one implementor besides the scripted engine of the tests. A real
 /// engine cannot reproduce each order of failures and recreations.
@@ -123,7 +124,7 @@ impl SwapchainState {
                     self.status = SwapchainStatus::SurfaceLost;
                 }
                 Err(Failure::Other(error)) if self.status == SwapchainStatus::SurfaceReleased => {
-                    log::warn!("{name}: its window supports no other surface: {error}");
+                    log::warn!("{}: its window supports no other surface: {error}", readable_name(name));
                     return Err(Failure::SurfaceLost.into_error(name));
                 }
                 Err(Failure::Other(error)) => return Err(error),

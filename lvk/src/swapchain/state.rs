@@ -10,6 +10,7 @@ use super::lifecycle::SwapchainState;
 use super::present_wait::wait_for_all;
 use super::surface::Surface;
 use crate::barrier::ResourceId;
+use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::start::window::WindowHandles;
@@ -160,7 +161,7 @@ impl SwapchainResources {
         if given_up > 0 {
             log::warn!(
                 "{}: presents that do not end within the timeout are abandoned: {given_up}",
-                self.name
+                readable_name(&*self.name)
             );
         } else if told {
             return Ok(());
@@ -189,7 +190,10 @@ impl RetiredChain {
 impl Drop for SwapchainResources {
     fn drop(&mut self) {
         if let Err(error) = self.wait_for_presents() {
-            log::error!("{}: destroyed before its last images were presented: {error}", self.name);
+            log::error!(
+                "{}: destroyed before its last images were presented: {error}",
+                readable_name(&*self.name)
+            );
         }
         let all = self.semaphores.drain(..).map(|(semaphore, _)| semaphore).chain(self.signalled.take());
         for semaphore in all {

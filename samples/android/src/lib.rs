@@ -3,10 +3,10 @@
 #![cfg(target_os = "android")]
 
 use std::ffi::OsString;
-use std::fs::read_to_string;
 use std::thread::sleep;
 use std::time::Duration;
 
+use lvk_samples::app::input_file::{self, FileKind};
 use lvk_samples::catalogue::run_line;
 use winit::event_loop::EventLoop;
 use winit::platform::android::EventLoopBuilderExtAndroid;
@@ -22,7 +22,10 @@ const LOG_DELAY: Duration = Duration::from_millis(300);
 /// The program of the activity, on a thread of its own. What samples print goes to the system's log.
 #[unsafe(no_mangle)]
 fn android_main(app: AndroidApp) {
-    let line = app.external_data_path().and_then(|folder| read_to_string(folder.join(LINE_FILE)).ok());
+    let line = app
+        .external_data_path()
+        .and_then(|folder| input_file::read(&folder.join(LINE_FILE), FileKind::Line).ok());
+    let line = line.and_then(|bytes| String::from_utf8(bytes).ok());
     let line = line.filter(|line| !line.trim().is_empty()).unwrap_or_else(|| DEFAULT_LINE.to_owned());
     let mut more = vec![OsString::from("--window")];
     if let Some(folder) = app.internal_data_path() {

@@ -29,7 +29,7 @@ pub(super) enum BenchError {
     NoTimestamp { device: String },
     #[error("{device} did not finish a compaction within {tries} submissions")]
     NoCompaction { device: String, tries: u32 },
-    #[error("interrupted; {done} of {of} scenes are in {}", page.display())]
+    #[error("interrupted; {done} of {of} scenes are in {}", lvk::readable_name(page))]
     Interrupted { done: usize, of: usize, page: PathBuf },
     #[error("no benchmark is named; `bench --help` lists them")]
     NoBenchmark,
@@ -37,7 +37,7 @@ pub(super) enum BenchError {
     NoFolder(#[from] std::io::Error),
     #[error(transparent)]
     Listing(#[from] RunError),
-    #[error("validation reported {} messages; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]
+    #[error("number of messages that validation reported: {}; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]
     Validation(Vec<String>),
 }
 

@@ -20,7 +20,7 @@ pub fn run(args: &BenchArgs) -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", lvk::readable_text(&error.to_string()));
             ExitCode::from(error.status())
         }
     }

@@ -111,7 +111,7 @@ fn announcement(items: &[(&str, &DownloadPlan, String)], index: Option<&str>, ro
         "lvk: not installed, downloading once: {}; {:.0} MB{index}, into {}",
         what.join(" and "),
         size_bytes as f64 / 1e6,
-        root.display()
+        lvk::readable_name(root)
     )
 }
 
@@ -133,7 +133,10 @@ fn lock_folder(root: &Path) -> Result<File, DownloadError> {
     let locked = match lock_file.try_lock() {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => {
-            eprintln!("lvk: another process is downloading into {}; waiting for it", root.display());
+            eprintln!(
+                "lvk: another process is downloading into {}; waiting for it",
+                lvk::readable_name(root)
+            );
             wait_for_lock(&lock_file)
         }
         Err(TryLockError::Error(error)) => Err(error),

@@ -59,7 +59,7 @@ pub enum DriverError {
         report: Arc<VulkanReport>,
     },
     /// An environment variable has an unknown value.
-    #[error("{name}={value} is not valid; expected {expected}")]
+    #[error("{name}={} is not valid; expected {expected}", lvk::readable_name(value))]
     Variable {
         /// Name of the variable.
         name: &'static str,
@@ -69,7 +69,7 @@ pub enum DriverError {
         expected: &'static str,
     },
     /// A downloaded file cannot be used.
-    #[error("the downloaded {} cannot be used: {reason}; {}", path.display(), remedy(reason))]
+    #[error("the downloaded {} cannot be used: {reason}; {}", lvk::readable_name(path), remedy(reason))]
     Broken {
         /// The downloaded file.
         path: PathBuf,
@@ -95,7 +95,7 @@ pub enum DownloadError {
         what: String,
     },
     /// A command of the package system failed: no network, a glibc that is too old, or an invalid signature.
-    #[error("`{command}` failed: {message}")]
+    #[error("`{}` failed: {}", lvk::readable_line(command), lvk::readable_line(message))]
     PackageTool {
         /// The command that failed.
         command: String,
@@ -115,7 +115,7 @@ pub enum DownloadError {
         tried: String,
     },
     /// A file operation failed.
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error("cannot {action} {}: {source}", lvk::readable_name(path))]
     File {
         /// The attempted operation, as a verb.
         action: &'static str,

@@ -3,7 +3,14 @@
 use std::fs::{self, File};
 use std::path::Path;
 
+use lvk::regular_file;
+
 use crate::error::DownloadError;
+
+/// Most bytes of a library that are read.
+const MAX_BYTES: u64 = 1 << 30;
+/// Most bytes of a text that are read.
+const MAX_TEXT_BYTES: u64 = 1 << 20;
 
 /// Creates `folder` and its parents.
 pub(super) fn create_dir_all(folder: &Path) -> Result<(), DownloadError> {
@@ -27,7 +34,12 @@ pub(super) fn rename(from: &Path, to: &Path) -> Result<(), DownloadError> {
     fs::rename(from, to).map_err(DownloadError::file("move", from))
 }
 
-/// Reads the file `path`.
+/// Reads the file `path`, a regular one.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, DownloadError> {
-    fs::read(path).map_err(DownloadError::file("read", path))
+    regular_file::read(path, MAX_BYTES).map_err(DownloadError::file("read", path))
+}
+
+/// Returns the text of the file `path`, a regular one; `None` if it cannot be read.
+pub(super) fn text(path: &Path) -> Option<String> {
+    regular_file::read_text(path, MAX_TEXT_BYTES).ok()
 }

@@ -127,8 +127,9 @@ fn load_order(tree: &Path, name: &str) -> Result<Vec<String>, DownloadError> {
 
 fn read_needed(path: &Path) -> Result<Vec<String>, DownloadError> {
     let image = file::read(path)?;
-    let damaged =
-        || DownloadError::Content { reason: format!("{} is not an x86-64 library", path.display()) };
+    let damaged = || DownloadError::Content {
+        reason: format!("{} is not an x86-64 library", lvk::readable_name(path)),
+    };
     elf::needed_libraries(&image).ok_or_else(damaged)
 }
 
@@ -137,7 +138,7 @@ fn driver_version(tree: &Path, name: &str) -> String {
     let stem = name.trim_end_matches(".json");
     let entries = fs::read_dir(tree.join("usr/share/vulkan/icd.d")).into_iter().flatten().flatten();
     let mut own = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(stem));
-    let text = own.next().and_then(|entry| fs::read_to_string(entry.path()).ok()).unwrap_or_default();
+    let text = own.next().and_then(|entry| file::text(&entry.path())).unwrap_or_default();
     quoted_value(&text, "api_version").unwrap_or("1.3.0").to_owned()
 }
 

@@ -15,8 +15,9 @@ const DEVICE_EXTENSIONS: [(&CStr, u32); 1] = [(vk::EXT_TOOLING_INFO_NAME, 1)];
 /// Opens the layer `library` and returns its layer manifest. `library_path` is the path in the manifest, relative to the
 /// manifest file.
 pub(super) fn describe(library: &Path, library_path: &str) -> Result<String, DownloadError> {
-    let unusable =
-        |reason: String| DownloadError::Content { reason: format!("{}: {reason}", library.display()) };
+    let unusable = |reason: String| DownloadError::Content {
+        reason: format!("{}: {reason}", lvk::readable_name(library)),
+    };
     // SAFETY: the file comes from a verified package; the initialisers of a Vulkan layer have no preconditions.
     let handle =
         unsafe { libloading::Library::new(library) }.map_err(|error| unusable(with_causes(&error)))?;

@@ -19,6 +19,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::apt::{PackageRequest, Suite};
+use crate::file;
 
 /// The loader inside [`Component::Driver`].
 pub(super) const LOADER: &str = "lib/libvulkan.so.1";
@@ -193,7 +194,7 @@ pub(super) struct Manifest {
 impl Manifest {
     /// Reads the manifest of `folder`; `None` if there is none or its layout version differs.
     pub(super) fn read(folder: &Path) -> Option<Self> {
-        Self::parse(&fs::read_to_string(folder.join(MANIFEST)).ok()?)
+        Self::parse(&file::text(&folder.join(MANIFEST))?)
     }
 
     /// Writes the manifest into `folder`, which marks the folder as complete.

@@ -86,7 +86,7 @@ impl Settings {
     /// Returns the first folder that is writable, or can be created, and creates it.
     pub(super) fn writable_folder(&self) -> Result<&Path, DownloadError> {
         self.folders.iter().map(PathBuf::as_path).find(|folder| is_writable(folder)).ok_or_else(|| {
-            let tried = self.folders.iter().map(|folder| folder.display().to_string());
+            let tried = self.folders.iter().map(lvk::readable_name);
             DownloadError::NoFolder { tried: tried.collect::<Vec<_>>().join(", ") }
         })
     }

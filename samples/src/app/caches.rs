@@ -30,8 +30,9 @@ impl Caches {
         match std::fs::create_dir_all(&folder) {
             Ok(()) => Some(Self::below(&folder, name)),
             Err(error) => {
-                let folder = folder.display();
-                eprintln!("warning: nothing is kept for the next start, as {folder} cannot be made: {error}");
+                let folder = lvk::readable_name(&folder);
+                let text = format!("nothing is kept for the next start, as {folder} cannot be made: {error}");
+                super::print_message("warning", text);
                 None
             }
         }

@@ -23,7 +23,7 @@ use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
 use super::sequence::{RenderReport, RenderRequest, render_frames};
-use super::{library_warnings, png, print_line, window};
+use super::{library_warnings, png, print_line, print_message, window};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::rtx::RtxConfig;
 use crate::scene::Scene;
@@ -99,13 +99,28 @@ pub fn main<S: SampleInfo>() -> ExitCode {
 /// window.
 #[must_use]
 pub fn main_with<S: SampleInfo>(words: Vec<OsString>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
-    match parse::<S>(words) {
+    match parse::<S>(&words) {
         Ok(args) => run_with::<S>(&args, event_loop),
         Err(error) => {
-            // A closed pipe is no reason for another status.
-            let _ = error.print();
+            print_usage(&error, &words);
             ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
         }
+    }
+}
+
+/// Prints the help or the error of a command line. Words with control characters, and long ones, are shown without colours
+/// and in part.
+fn print_usage(error: &clap::Error, words: &[OsString]) {
+    let is_plain = |word: &&OsString| word.to_str() == Some(lvk::readable_name(word).as_str());
+    if error.use_stderr() && !words.iter().all(|word| is_plain(&word)) {
+        let mut text = error.render().to_string();
+        for word in words.iter().filter(|word| !is_plain(word)).filter_map(|word| word.to_str()) {
+            text = text.replace(word, &lvk::readable_name(word));
+        }
+        text.lines().for_each(|line| eprintln!("{}", lvk::readable_line(line)));
+    } else {
+        // A closed pipe is no reason for another status.
+        let _ = error.print();
     }
 }
 
@@ -125,7 +140,7 @@ fn run_with<S: SampleInfo>(args: &CommandLine<S::Args>, event_loop: &mut EventLo
     match attempt(event_loop, S::NAME, &args.run, |setup| S::open(&args.sample, setup)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            print_message("error", &error);
             ExitCode::from(error.status())
         }
     }
@@ -238,7 +253,7 @@ impl<'a> SampleSetup<'a> {
 /// Prints warnings to standard error.
 pub(crate) fn warn(warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        print_message("warning", warning);
     }
 }
 
@@ -314,7 +329,7 @@ fn show<S: Sample>(
 fn closing_lines(request: &RenderRequest, played: &RenderReport, remark: Option<String>) -> String {
     let RenderReport { timings, written, skipped } = played;
     let remark = remark.map_or_else(String::new, |remark| format!("\n{remark}"));
-    let out = request.out.path().display();
+    let out = lvk::readable_name(request.out.path());
     match (&request.frames, skipped) {
         (Frames::Still(_), _) => format!("{timings}{remark}\nwrote {out}"),
         (Frames::Sequence(_), 0) => format!("{timings}{remark}\nwrote {written} frames to {out}"),

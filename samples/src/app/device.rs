@@ -8,10 +8,10 @@ use lvk::{
 };
 
 use super::caches::Caches;
-use super::print_line;
 use super::ray_args::RayTracing;
 use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
+use super::{print_line, print_message};
 use lvk_dev_driver::{self as driver, Driver, DriverError, DriverRequest};
 
 /// Requirements of a sample on the device.
@@ -184,7 +184,7 @@ pub fn query_text(capabilities: &Capabilities, stages: &str) -> String {
 pub(super) fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
     let messages = sink.messages();
     for message in &messages {
-        eprintln!("validation: {message}");
+        print_message("validation", message);
     }
     print_line(&format!("validation messages: {}", messages.len()));
     if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }

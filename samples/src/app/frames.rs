@@ -21,7 +21,7 @@ impl Frames {
     pub fn count(&self) -> u32 {
         match self {
             Self::Still(count) => *count,
-            Self::Sequence(range) => range.end - range.start,
+            Self::Sequence(range) => range.end.saturating_sub(range.start),
         }
     }
 }

@@ -15,7 +15,7 @@ impl Log for ToStandardError {
 
     fn log(&self, record: &Record<'_>) {
         if self.enabled(record.metadata()) {
-            eprintln!("warning: {}", record.args());
+            super::print_message("warning", record.args());
         }
     }
 

@@ -11,6 +11,7 @@ pub mod frame;
 pub mod frame_name;
 pub mod frames;
 pub mod headless;
+pub mod input_file;
 pub mod interrupt;
 pub(crate) mod library_warnings;
 pub mod loading;
@@ -40,5 +41,16 @@ use std::io::Write as _;
 
 /// Prints a line to standard output. Ignores a closed pipe, as in `hybrid | head -1`, so that the image is still written.
 pub(crate) fn print_line(text: &str) {
-    let _ = writeln!(std::io::stdout(), "{text}");
+    let _ = writeln!(std::io::stdout(), "{}", lvk::readable_text(text));
+}
+
+/// Returns a count with its noun: "1 message", "2 messages".
+pub(crate) fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Prints a line about `subject`, such as "warning", to standard error, without control characters: texts of drivers and
+/// layers may have names in them.
+pub(crate) fn print_message(subject: &str, text: impl std::fmt::Display) {
+    let _ = writeln!(std::io::stderr(), "{subject}: {}", lvk::readable_text(&text.to_string()));
 }

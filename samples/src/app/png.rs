@@ -4,11 +4,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use lvk::{readable_name, regular_file};
+
 /// Errors of writing an image.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
     /// The folder does not exist, is no folder, or may not be written to.
-    #[error("cannot write {}: {source}; choose another --out", path.display())]
+    #[error("cannot write {}: {source}; choose another --out", readable_name(path))]
     Unwritable {
         /// The path of the picture.
         path: PathBuf,
@@ -16,13 +18,13 @@ pub enum PngError {
         source: std::io::Error,
     },
     /// The name says that the file is no PNG.
-    #[error("--out {}: the picture is a PNG; name it {}", path.display(), path.with_extension("png").display())]
+    #[error("--out {}: the picture is a PNG; name it {}", readable_name(path), readable_name(path.with_extension("png")))]
     NotPng {
         /// The path of the picture.
         path: PathBuf,
     },
     /// The picture would replace a file that is read.
-    #[error("--out and {option} are the same file, {}; choose another --out", path.display())]
+    #[error("--out and {option} are the same file, {}; choose another --out", readable_name(path))]
     IsInput {
         /// The path of the picture.
         path: PathBuf,
@@ -30,7 +32,7 @@ pub enum PngError {
         option: &'static str,
     },
     /// The pixels do not fit the size.
-    #[error("{} pixels of 4 bytes were to be written to {}, but {bytes} bytes were given", width * height, path.display())]
+    #[error("{} pixels of 4 bytes were to be written to {}, but {bytes} bytes were given", width * height, readable_name(path))]
     WrongLength {
         /// The path of the picture.
         path: PathBuf,
@@ -42,7 +44,7 @@ pub enum PngError {
         bytes: usize,
     },
     /// The picture could not be encoded.
-    #[error("cannot encode {}: {source}", path.display())]
+    #[error("cannot encode {}: {source}", readable_name(path))]
     Encode {
         /// The path of the picture.
         path: PathBuf,
@@ -58,7 +60,7 @@ pub enum PngError {
 /// [`PngError::IsInput`].
 pub fn check_not_input(path: &Path, option: &'static str, input: &Path) -> Result<(), PngError> {
     let is_same = match (path.canonicalize(), input.canonicalize()) {
-        (Ok(path), Ok(input)) => path == input && !is_special(&path),
+        (Ok(path), Ok(input)) => path == input && path.is_file(),
         _ => false,
     };
     if is_same { Err(PngError::IsInput { path: path.into(), option }) } else { Ok(()) }
@@ -74,7 +76,7 @@ pub fn check_writable(path: &Path) -> Result<(), PngError> {
     if path.is_dir() || path.file_name().is_none() {
         return Err(unwritable(std::io::ErrorKind::IsADirectory.into()));
     }
-    if is_special(path) {
+    if is_null_device(path).map_err(unwritable)? {
         return Ok(());
     }
     if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
@@ -84,7 +86,8 @@ pub fn check_writable(path: &Path) -> Result<(), PngError> {
 }
 
 /// Writes `width` x `height` pixels of 4 bytes (RGBA, sRGB, rows from the top) as a PNG. An earlier file at `path` is
-/// replaced in one step; after an error it is unchanged. A device or pipe at `path` is written to and stays what it is.
+/// replaced in one step; after an error it is unchanged. The null device takes the picture and stays what it is; other devices,
+/// pipes and sockets are refused, as writing to them may never end.
 ///
 /// # Errors
 /// [`PngError`].
@@ -103,16 +106,30 @@ pub fn write(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), Pn
     )
     .map_err(|source| PngError::Encode { path: path.into(), source })?;
     let encoded = encoded.into_inner();
-    let written = match is_special(path) {
-        true => std::fs::write(path, &encoded),
+    let written = is_null_device(path).and_then(|is_null| match is_null {
+        true => Ok(()),
         false => Partial::create(path).and_then(|partial| partial.complete(&encoded, path)),
-    };
+    });
     written.map_err(|source| PngError::Unwritable { path: path.into(), source })
 }
 
-/// True if `path` is there and neither a file nor a folder, such as `/dev/null`.
-fn is_special(path: &Path) -> bool {
-    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+/// True if `path` leads to the null device, false for a file, and for a path at which nothing is.
+///
+/// # Errors
+/// [`InvalidInput`](std::io::ErrorKind::InvalidInput) for a folder, a pipe, a socket or another device.
+fn is_null_device(path: &Path) -> std::io::Result<bool> {
+    let Ok(found) = std::fs::metadata(path) else { return Ok(false) };
+    if found.is_file() {
+        return Ok(false);
+    }
+    let is_null = match cfg!(windows) {
+        true => path.file_stem().is_some_and(|stem| stem.eq_ignore_ascii_case("nul")),
+        false => path.canonicalize().is_ok_and(|device| device == Path::new("/dev/null")),
+    };
+    match is_null {
+        true => Ok(true),
+        false => regular_file::check_kind(&found).map(|()| false),
+    }
 }
 
 /// A file beside the final one, removed unless it is completed.
@@ -124,10 +141,16 @@ struct Partial {
 impl Partial {
     fn create(target: &Path) -> std::io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
-        let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = target.with_file_name(format!(".lvk-{}-{number}.partial", std::process::id()));
-        let file = std::fs::File::create(&path)?;
-        Ok(Self { path, file })
+        loop {
+            let number = COUNT.fetch_add(1, Ordering::Relaxed);
+            let path = target.with_file_name(format!(".lvk-{}-{number}.partial", std::process::id()));
+            match std::fs::File::create_new(&path) {
+                Ok(file) => return Ok(Self { path, file }),
+                // An earlier process of this number was killed.
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
     }
 
     fn complete(mut self, content: &[u8], target: &Path) -> std::io::Result<()> {
@@ -181,6 +204,39 @@ mod tests {
         write(&path, 1, 1, &[0; 4]).unwrap();
         assert!(path.is_symlink(), "the way to the device was replaced by a file");
         assert_eq!(files(folder.path()), ["null"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_sockets_and_devices_are_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe.png");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let socket = folder.path().join("socket.png");
+        let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        let names = files(folder.path());
+        for (path, kind) in
+            [(pipe.as_path(), "a named pipe"), (&socket, "a socket"), (Path::new("/dev/zero"), "a device")]
+        {
+            for error in [check_writable(path).unwrap_err(), write(path, 1, 1, &[0; 4]).unwrap_err()] {
+                let expected =
+                    format!("cannot write {}: it is {kind}, no file; choose another --out", path.display());
+                assert_eq!(error.to_string(), expected);
+            }
+        }
+        assert_eq!(files(folder.path()), names);
+    }
+
+    #[test]
+    fn leftovers_of_a_killed_process_are_no_obstacle() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        for number in 0..1_000 {
+            std::fs::create_dir(folder.path().join(format!(".lvk-{}-{number}.partial", std::process::id())))
+                .unwrap();
+        }
+        write(&path, 1, 1, &[0; 4]).unwrap();
+        assert!(path.is_file());
     }
 
     #[test]

@@ -80,6 +80,7 @@ impl Progress {
 
     /// Starts the next stage, called `name`, of `total` steps; 0 steps for a stage that cannot be counted.
     pub fn stage(&mut self, name: &str, total: u64) {
+        let name = &lvk::readable_name(name);
         if let Some(status) = &self.status {
             status.begin(name, total);
         }
@@ -94,7 +95,7 @@ impl Progress {
         bar.set_length(total);
         bar.set_position(0);
         bar.reset_eta();
-        bar.set_message(name.to_owned());
+        bar.set_message(name.clone());
     }
 
     /// Says how many steps of the stage are done.

@@ -40,13 +40,19 @@ pub enum RunError {
     #[error(transparent)]
     Driver(#[from] DriverError),
     /// A range of frames needs a name for each.
-    #[error("--out {name}: a sequence needs # in the name, as frame_####.png, for the frames' numbers")]
+    #[error(
+        "--out {}: a sequence needs # in the name, as frame_####.png, for the frames' numbers",
+        lvk::readable_name(name)
+    )]
     NoNumber {
         /// The name as given.
         name: String,
     },
     /// A single picture has no number.
-    #[error("--out {name} names a sequence, for which --frames is a range, as --frames 0..240")]
+    #[error(
+        "--out {} names a sequence, for which --frames is a range, as --frames 0..240",
+        lvk::readable_name(name)
+    )]
     NoSequence {
         /// The name as given.
         name: String,
@@ -55,7 +61,10 @@ pub enum RunError {
     #[error("--frames with --window is a number of frames to show, as --frames 100, and no range")]
     SequenceInWindow,
     /// The folder of shaders does not exist.
-    #[error("--hot-reload {}: no such folder; name one like 'shaders' of the project", folder.display())]
+    #[error(
+        "--hot-reload {}: no such folder; name one like 'shaders' of the project",
+        lvk::readable_name(folder)
+    )]
     NoShaders {
         /// The folder as given.
         folder: std::path::PathBuf,
@@ -81,7 +90,7 @@ pub enum RunError {
     #[error("--resume is for sequences, as --frames 0..240 --out frame_####.png")]
     NothingToResume,
     /// The validation layer was not silent.
-    #[error("validation reported {0} messages")]
+    #[error("validation reported {}", crate::app::counted(*.0, "message"))]
     Validation(usize),
     /// Ctrl-C, or the request of a batch system.
     #[error("interrupted after {done} of {count} frames; every picture written is whole{hint}")]

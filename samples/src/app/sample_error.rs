@@ -151,7 +151,10 @@ pub enum SampleError {
     #[error("there is no scene to show; name an OBJ file with --scene")]
     NoScenes,
     /// The folder holds no scenes.
-    #[error("no OBJ file in {}; unpack the scenes there (tar -xJf NAME.tar.xz), or name another folder", folder.display())]
+    #[error(
+        "no OBJ file in {}; unpack the scenes there (tar -xJf NAME.tar.xz), or name another folder",
+        lvk::readable_name(folder)
+    )]
     EmptyFolder {
         /// The folder.
         folder: PathBuf,

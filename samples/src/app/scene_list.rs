@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use lvk::readable_name;
+
 /// Environment variable that names the folder of scenes.
 pub const FOLDER_VARIABLE: &str = "LVK_SCENES";
 
@@ -49,10 +51,15 @@ pub fn listing(folder: Option<&Path>) -> String {
         Some(folder) => {
             let found = find(&folder);
             if found.is_empty() {
-                lines.push(format!("no OBJ file in {}", folder.display()));
+                lines.push(format!("no OBJ file in {}", readable_name(&folder)));
             }
             lines.extend(found.iter().map(|scene| {
-                format!("{}  {} ({:.1} MB)", scene.name, scene.path.display(), scene.bytes as f64 / 1e6)
+                format!(
+                    "{}  {} ({:.1} MB)",
+                    readable_name(&scene.name),
+                    readable_name(&scene.path),
+                    scene.bytes as f64 / 1e6
+                )
             }));
         }
     }

@@ -82,7 +82,7 @@ impl RenderRequest {
     }
 
     fn name(&self) -> String {
-        self.out.path().display().to_string()
+        lvk::readable_name(self.out.path())
     }
 
     fn frame_time(&self, frame: u32) -> FrameTime {
@@ -141,7 +141,7 @@ fn sequence(
     interrupt: &Interrupt,
 ) -> Result<RenderReport, RunError> {
     let steps = source.steps_per_frame();
-    let count = range.end - range.start;
+    let count = range.end.saturating_sub(range.start);
     progress.stage("rendering", u64::from(count) * steps);
     let mut played = RenderReport::default();
     for (done, frame) in (0_u32..).zip(range) {

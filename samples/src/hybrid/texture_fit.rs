@@ -1,10 +1,10 @@
 //! Makes a scene's textures fit the device.
 
 use crate::app::sample_error::SampleError;
-use image::RgbaImage;
-use image::imageops::{self, FilterType};
-use lvk::Limits;
+use lvk::{Limits, readable_name};
 
+use crate::picture::shrink::shrink_in_place;
+use crate::picture::shrunk_size;
 use crate::scene::{Scene, Texture};
 
 /// Textures that the sample has beside those of the scene: sky, picture, G-buffer, and what `lvk` keeps for itself.
@@ -33,24 +33,17 @@ pub fn textures_needed(scene: &Scene) -> u32 {
 }
 
 fn fit(texture: &mut Texture, side: u32) -> Option<String> {
-    let (width, height) = shrunk_size([texture.width, texture.height], side)?;
-    let pixels = std::mem::take(&mut texture.pixels);
-    let image = RgbaImage::from_raw(texture.width, texture.height, pixels)?;
-    texture.pixels = imageops::resize(&image, width, height, FilterType::Triangle).into_raw();
+    let from = [texture.width, texture.height];
+    let [width, height] = shrunk_size(from, side)?;
+    shrink_in_place(&mut texture.pixels, from, [width, height]);
     let warning = format!(
         "texture {} of {}x{} texels is larger than the device takes; shrunk to {width}x{height}",
-        texture.name, texture.width, texture.height
+        readable_name(&texture.name),
+        texture.width,
+        texture.height
     );
     (texture.width, texture.height) = (width, height);
     Some(warning)
-}
-
-/// The largest size of the same shape with no side above `side`; `None` for a size that fits.
-fn shrunk_size([width, height]: [u32; 2], side: u32) -> Option<(u32, u32)> {
-    let longest = width.max(height);
-    let shrunk =
-        |length: u32| (u64::from(length) * u64::from(side) / u64::from(longest.max(1))).max(1) as u32;
-    (longest > side).then(|| (shrunk(width), shrunk(height)))
 }
 
 #[cfg(test)]
@@ -68,14 +61,6 @@ mod tests {
 
     fn limits(max_texture_2d: u32, max_bindless_textures: u32) -> Limits {
         Limits { max_texture_2d, max_bindless_textures, ..Limits::default() }
-    }
-
-    #[test]
-    fn only_sizes_beyond_the_limit_shrink_and_keep_their_shape() {
-        assert_eq!(shrunk_size([64, 64], 64), None);
-        assert_eq!(shrunk_size([65, 1], 64), Some((64, 1)));
-        assert_eq!(shrunk_size([1000, 500], 100), Some((100, 50)));
-        assert_eq!(shrunk_size([1, u32::MAX], 16_384), Some((1, 16_384)));
     }
 
     #[test]

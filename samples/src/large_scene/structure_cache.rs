@@ -4,9 +4,10 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use lvk::{BuildFlags, Capabilities};
+use lvk::{BuildFlags, Capabilities, readable_name};
 
 use super::world::{Piece, World};
+use crate::app::input_file::{self, FileKind};
 
 /// A folder of built structures, each in a file named after what it was built from.
 pub(super) struct StructureCache {
@@ -52,11 +53,11 @@ impl StructureCache {
     /// The bytes of an earlier start, if there are any. A file that cannot be read is warned of.
     pub(super) fn read(&self, key: StructureKey) -> Option<Vec<u8>> {
         let path = self.path(key);
-        match std::fs::read(&path) {
+        match input_file::read(&path, FileKind::Structure) {
             Ok(bytes) => Some(bytes),
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => {
-                log::warn!("the structure '{}' cannot be read: {error}", path.display());
+                log::warn!("the structure '{}' cannot be read: {error}", readable_name(&path));
                 None
             }
         }
@@ -66,7 +67,7 @@ impl StructureCache {
     pub(super) fn store(&self, key: StructureKey, bytes: &[u8]) {
         let path = self.path(key);
         if let Err(error) = self.replace(&path, bytes) {
-            log::warn!("the structure '{}' cannot be kept: {error}", path.display());
+            log::warn!("the structure '{}' cannot be kept: {error}", readable_name(&path));
         }
     }
 

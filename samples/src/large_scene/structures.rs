@@ -119,7 +119,7 @@ impl Plan<'_> {
         match unsafe { self.ctx.load_blas(desc, &bytes) } {
             Ok(blas) => Ok(LoadOutcome::Loaded(blas)),
             Err(error) if is_of_file(&error) => {
-                log::warn!("the structure '{}' is dropped: {error}", cache.path(key).display());
+                log::warn!("the structure '{}' is dropped: {error}", lvk::readable_name(cache.path(key)));
                 Ok(LoadOutcome::Refused)
             }
             Err(error) => Err(error),
@@ -201,7 +201,10 @@ impl Plan<'_> {
             match self.ctx.serialize_blas(*blas.holder) {
                 Ok(bytes) => cache.store(*key, &bytes),
                 Err(error) if is_of_file(&error) => {
-                    log::warn!("the structure '{}' cannot be kept: {error}", cache.path(*key).display());
+                    log::warn!(
+                        "the structure '{}' cannot be kept: {error}",
+                        lvk::readable_name(cache.path(*key))
+                    );
                 }
                 Err(error) => return Err(error.into()),
             }

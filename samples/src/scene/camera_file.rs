@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::{Camera, SceneError};
+use crate::app::input_file::{self, FileKind};
 
 /// Light and cameras of one scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +32,9 @@ impl Views {
 
 /// Reads the views of the scene called `name`; in a file with a single scene any name will do.
 pub(super) fn read(path: &Path, name: &str) -> Result<Views, SceneError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SceneError::from_io(path, source))?;
+    let unreadable = |source| SceneError::from_io(path, source);
+    let bytes = input_file::read_named_by_user(path, FileKind::Cameras).map_err(unreadable)?;
+    let text = String::from_utf8(bytes).map_err(|_| wrong(path, 0, "it is not text in UTF-8".to_owned()))?;
     let mut all = parse(path, &text)?;
     let found = match all.iter().position(|views| views.name == name) {
         Some(i) => all.swap_remove(i),

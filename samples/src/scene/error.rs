@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use lvk::{readable_line, readable_name};
+
 /// Errors of loading a scene. Every message names the file and says what to change.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -9,13 +11,13 @@ pub enum SceneError {
     #[error(transparent)]
     Stopped(#[from] crate::app::loading::Stopped),
     /// The file does not exist.
-    #[error("no such file: {}", path.display())]
+    #[error("no such file: {}", readable_name(path))]
     NotFound {
         /// The path as given.
         path: PathBuf,
     },
     /// The file exists but cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {source}", readable_name(path))]
     Unreadable {
         /// The path as given.
         path: PathBuf,
@@ -23,7 +25,7 @@ pub enum SceneError {
         source: std::io::Error,
     },
     /// The content is not a Wavefront OBJ.
-    #[error("{} is not a Wavefront OBJ: {why}", path.display())]
+    #[error("{} is not a Wavefront OBJ: {why}", readable_name(path))]
     NotObj {
         /// The path as given.
         path: PathBuf,
@@ -31,7 +33,7 @@ pub enum SceneError {
         why: &'static str,
     },
     /// A line cannot be understood.
-    #[error("{}:{line}: {what}", path.display())]
+    #[error("{}:{line}: {}", readable_name(path), readable_line(what))]
     BadLine {
         /// The path as given.
         path: PathBuf,
@@ -41,7 +43,10 @@ pub enum SceneError {
         what: String,
     },
     /// A position is NaN or infinite, in the file or after scaling.
-    #[error("{}:{line}: the position is not finite (NaN or infinity); export the mesh again", path.display())]
+    #[error(
+        "{}:{line}: the position is not finite (NaN or infinity); export the mesh again",
+        readable_name(path)
+    )]
     NotFinite {
         /// The path as given.
         path: PathBuf,
@@ -49,7 +54,7 @@ pub enum SceneError {
         line: usize,
     },
     /// A face names a vertex, texture coordinate or normal that the file does not have.
-    #[error("{}:{line}: a face uses {what} {index}, but the file has {count}", path.display())]
+    #[error("{}:{line}: a face uses {what} {index}, but the file has {count}", readable_name(path))]
     IndexOutOfRange {
         /// The path as given.
         path: PathBuf,
@@ -63,7 +68,7 @@ pub enum SceneError {
         count: usize,
     },
     /// The scene has nothing to draw.
-    #[error("{} has no triangle with an area ({degenerate} without); nothing to draw", path.display())]
+    #[error("{} has no triangle with an area ({degenerate} without); nothing to draw", readable_name(path))]
     Empty {
         /// The path as given.
         path: PathBuf,
@@ -71,7 +76,7 @@ pub enum SceneError {
         degenerate: usize,
     },
     /// More vertices or triangles than 32-bit indices reach.
-    #[error("{} has more than {limit} vertices or triangles; split it", path.display())]
+    #[error("{} has more than {limit} vertices or triangles; split it", readable_name(path))]
     TooLarge {
         /// The path as given.
         path: PathBuf,
@@ -85,7 +90,7 @@ pub enum SceneError {
         scale: f32,
     },
     /// The OBJ parser refused the file.
-    #[error("cannot parse {}: {source}", path.display())]
+    #[error("cannot parse {}: {source}", readable_name(path))]
     Parse {
         /// The path as given.
         path: PathBuf,
@@ -95,7 +100,11 @@ pub enum SceneError {
     /// A camera file is wrong. It consists of lines `scene NAME x y z` (the point light's position), each
     /// followed by `sun x y z` where the sun shines (the direction towards it), and by one to five lines `at ex ey ez tx ty tz fov` (eye, target, vertical field of view in
     /// degrees) or `dir ex ey ez dx dy dz fov` (eye, direction); `#` starts a comment.
-    #[error("{}:{line}: {what} (expected `scene NAME x y z`, then `sun x y z`, `at` or `dir` with 7 numbers)", path.display())]
+    #[error(
+        "{}:{line}: {} (expected `scene NAME x y z`, then `sun x y z`, `at` or `dir` with 7 numbers)",
+        readable_name(path),
+        readable_line(what)
+    )]
     CameraFile {
         /// The path as given.
         path: PathBuf,

@@ -6,9 +6,12 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use lvk::readable_name;
+
 use super::Material;
-use super::texture::{Texture, find_image};
+use super::texture::{PictureBudget, Texture, find_image};
 use super::warnings::Warnings;
+use crate::app::input_file::{self, FileKind};
 
 /// Materials by name, and the images they use.
 #[derive(Default)]
@@ -20,6 +23,7 @@ pub(super) struct Library {
     normal_maps: Vec<Texture>,
     /// `None` for images that cannot be read.
     normal_map_numbers: HashMap<PathBuf, Option<u32>>,
+    budget: PictureBudget,
     warnings: Warnings,
 }
 
@@ -68,10 +72,11 @@ impl Library {
     }
 
     fn read_file(&mut self, path: &Path) {
-        let content = match std::fs::read(path) {
+        let content = match input_file::read(path, FileKind::Mtl) {
             Ok(content) => content,
             Err(error) => {
-                let line = format!("material library {}: {error}; materials are stand-ins", path.display());
+                let line =
+                    format!("material library {}: {error}; materials are stand-ins", readable_name(path));
                 return self.warnings.push("material libraries", line);
             }
         };
@@ -79,7 +84,7 @@ impl Library {
         match tobj::load_mtl_buf(&mut text.as_bytes()) {
             Ok((parsed, _)) => parsed.iter().for_each(|source| self.add(source, path)),
             Err(error) => {
-                let line = format!("material library {}: {error}", path.display());
+                let line = format!("material library {}: {error}", readable_name(path));
                 self.warnings.push("material libraries", line);
             }
         }
@@ -112,11 +117,11 @@ impl Library {
             return number;
         }
         let texture = match &found {
-            Some(path) => Texture::read(path),
+            Some(path) => Texture::read(path, &mut self.budget),
             None => Err("no such file".to_owned()),
         };
         let texture = texture.unwrap_or_else(|why| {
-            let line = format!("texture {}: {why}; magenta checks stand in", path.display());
+            let line = format!("texture {}: {why}; magenta checks stand in", readable_name(path));
             self.warnings.push("textures", line);
             Texture::stand_in(name)
         });
@@ -139,7 +144,7 @@ impl Library {
             return number;
         }
         let read = match &found {
-            Some(path) => Texture::read_relief(path),
+            Some(path) => Texture::read_relief(path, &mut self.budget),
             None => Err("no such file".to_owned()),
         };
         let number = match read {
@@ -148,7 +153,7 @@ impl Library {
                 Some(self.normal_maps.len() as u32 - 1)
             }
             Err(why) => {
-                let line = format!("normal map {}: {why}; the surface is smooth", path.display());
+                let line = format!("normal map {}: {why}; the surface is smooth", readable_name(path));
                 self.warnings.push("textures", line);
                 None
             }
@@ -159,10 +164,13 @@ impl Library {
 
     /// The texture with alpha from the mask; as it is, with a warning, where the mask cannot be read.
     fn with_holes(&mut self, texture: Texture, mask: &Path) -> Texture {
-        match Texture::read(mask) {
-            Ok(mask) => texture.masked(&mask),
+        match Texture::read(mask, &mut self.budget) {
+            Ok(mask) => {
+                self.budget.give_back(&mask);
+                texture.masked(&mask)
+            }
             Err(why) => {
-                let line = format!("mask {}: {why}; there are no holes", mask.display());
+                let line = format!("mask {}: {why}; there are no holes", readable_name(mask));
                 self.warnings.push("textures", line);
                 texture
             }
@@ -180,13 +188,14 @@ impl Library {
             };
             selected.push(self.material(name));
         }
-        let Self { textures, normal_maps, warnings, .. } = self;
+        let Self { textures, normal_maps, mut warnings, budget, .. } = self;
+        budget.into_warnings().into_iter().for_each(|line| warnings.push("pictures", line));
         Selection { materials: selected, textures, normal_maps, warnings: warnings.into_lines() }
     }
 
     fn material(&mut self, name: &str) -> Material {
         let Some(Definition { material, image, mask, relief }) = self.materials.get(name).cloned() else {
-            let line = format!("material `{name}` is not defined; glaring orange stands in");
+            let line = format!("material `{}` is not defined; glaring orange stands in", readable_name(name));
             self.warnings.push("materials", line);
             return Material::stand_in(name);
         };

@@ -8,6 +8,7 @@ use super::mtl::{Library, Selection};
 use super::obj_text::{CleanObj, clean};
 use super::setting::Setting;
 use super::{Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals};
+use crate::app::input_file::{self, FileKind};
 use crate::app::progress::Progress;
 
 /// Implements [`Scene::from_obj`].
@@ -48,7 +49,8 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
 }
 
 fn read_clean(path: &Path, name: &str, progress: &mut Progress) -> Result<CleanObj, SceneError> {
-    let content = std::fs::read(path).map_err(|source| SceneError::from_io(path, source))?;
+    let content = input_file::read_named_by_user(path, FileKind::Obj)
+        .map_err(|source| SceneError::from_io(path, source))?;
     progress.stage(&format!("{name}: reading"), content.len() as u64);
     clean(path, &content, progress)
 }

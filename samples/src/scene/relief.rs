@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::Texture;
+use super::texture::PictureBudget;
 
 /// Scale of heights: slope of a rise from black to white within a texel.
 const STEEPNESS: f32 = 2.0;
@@ -14,8 +15,8 @@ impl Texture {
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub(super) fn read_relief(path: &Path) -> Result<Self, String> {
-        let image = Self::read(path)?;
+    pub(super) fn read_relief(path: &Path, budget: &mut PictureBudget) -> Result<Self, String> {
+        let image = Self::read(path, budget)?;
         Ok(if shows_directions(&image) { with_green_up(image) } else { directions_of_heights(&image) })
     }
 }

@@ -2,6 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use lvk::{readable_line, readable_name};
+
+use crate::picture::{self, Bounds, Picture};
+
 /// An image that repeats over a surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
@@ -18,23 +22,43 @@ pub struct Texture {
 /// Texels on an edge of the stand-in for a missing image.
 const STAND_IN_SIZE: u32 = 16;
 
+/// Bytes of texels that the pictures of a scene may still have, and warnings on the pictures read.
+pub(super) struct PictureBudget {
+    bytes_left: u64,
+    warnings: Vec<String>,
+}
+
+impl Default for PictureBudget {
+    fn default() -> Self {
+        Self { bytes_left: Bounds::MAX_SCENE_BYTES, warnings: Vec::new() }
+    }
+}
+
+impl PictureBudget {
+    /// Takes back the bytes of a picture that is not kept.
+    pub(super) fn give_back(&mut self, texture: &Texture) {
+        self.bytes_left += texture.pixels.len() as u64;
+    }
+
+    /// The warnings, each with the name of its file.
+    pub(super) fn into_warnings(self) -> Vec<String> {
+        self.warnings
+    }
+}
+
 impl Texture {
-    /// Reads an image file.
+    /// Reads an image file within the bounds of [`picture::read`]. Its texels and the warnings on it go to `budget`.
     ///
     /// # Errors
     /// Describes the error in the file, as text for a warning.
-    pub(super) fn read(path: &Path) -> Result<Self, String> {
-        let decoded = image::ImageReader::open(path)
-            .and_then(|reader| reader.with_guessed_format())
-            .map_err(|error| error.to_string())?
-            .decode()
-            .map_err(|error| error.to_string())?
-            .into_rgba8();
-        let (width, height) = decoded.dimensions();
-        if width == 0 || height == 0 {
-            return Err("the image has no pixels".to_owned());
-        }
-        Ok(Self { name: path.display().to_string(), width, height, pixels: decoded.into_raw() })
+    pub(super) fn read(path: &Path, budget: &mut PictureBudget) -> Result<Self, String> {
+        let bounds = Bounds { bytes_left: budget.bytes_left, ..Bounds::default() };
+        let Picture { width, height, rgba, warnings } =
+            picture::read(path, &bounds).map_err(|error| readable_line(error.to_string().trim_end()))?;
+        let name = readable_name(path);
+        budget.bytes_left = budget.bytes_left.saturating_sub(rgba.len() as u64);
+        budget.warnings.extend(warnings.iter().map(|warning| format!("picture {name}: {warning}")));
+        Ok(Self { name, width, height, pixels: rgba })
     }
 
     /// The same with holes where `mask`, stretched over it, is dark: its red becomes alpha.
@@ -101,8 +125,23 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("broken.png");
         std::fs::write(&path, b"\x89PNG\r\n\x1a\nnothing").unwrap();
-        assert!(Texture::read(&path).is_err());
-        assert!(Texture::read(&folder.path().join("absent.png")).is_err());
+        let mut budget = PictureBudget::default();
+        assert!(Texture::read(&path, &mut budget).is_err());
+        assert!(Texture::read(&folder.path().join("absent.png"), &mut budget).is_err());
+    }
+
+    #[test]
+    fn pictures_of_a_scene_share_a_budget() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("wall.png");
+        image::RgbaImage::new(4, 2).save(&path).unwrap();
+        let mut budget = PictureBudget { bytes_left: 70, warnings: Vec::new() };
+        let first = Texture::read(&path, &mut budget).unwrap();
+        Texture::read(&path, &mut budget).unwrap();
+        let error = Texture::read(&path, &mut budget).unwrap_err();
+        assert!(error.starts_with("its 32 bytes of texels are more than the 6 that are left"), "{error}");
+        budget.give_back(&first);
+        assert!(Texture::read(&path, &mut budget).is_ok());
     }
 
     #[test]

@@ -8,4 +8,5 @@ mod layouts;
 mod modules;
 mod other_languages;
 mod pipeline_cache;
+mod special_files;
 mod subgroups;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use crate::error::readable::{char_start, readable_text};
 use crate::lock_order::{Guard, Mutex, Rank};
 
 /// Checks of the validation layer. The layer must be installed; see [`ValidationMode::Standard`].
@@ -35,7 +36,7 @@ pub struct ValidationMessage {
 impl fmt::Display for ValidationMessage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let severity = if self.error { "error" } else { "warning" };
-        write!(f, "validation {severity} {}: {}", self.id, self.text)
+        write!(f, "validation {severity} {}: {}", self.id, readable_text(&self.text))
     }
 }
 
@@ -169,7 +170,12 @@ unsafe fn text(ptr: *const std::ffi::c_char) -> String {
     unsafe { CStr::from_ptr(ptr) }.to_string_lossy().into_owned()
 }
 
-/// Returns a C string for a debug name. Interior NUL bytes are dropped.
+/// Most bytes of a name that driver and layers get, which print it whole.
+const MAX_NAME_BYTES: usize = 1_000;
+
+/// Returns a C string for a debug name. Interior NUL bytes are dropped, and bytes of a long name.
 pub(crate) fn c_name(name: &str) -> CString {
+    let most = char_start(name.as_bytes(), MAX_NAME_BYTES.min(name.len()));
+    let name = name.get(..most).unwrap_or_default();
     CString::new(name.replace('\0', "")).unwrap_or_default()
 }

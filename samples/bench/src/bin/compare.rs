@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use image::RgbaImage;
 use lvk_samples::app::metrics;
+use lvk_samples::picture::{self, Bounds};
 
 /// Compares two images of the same size.
 #[derive(Parser)]
@@ -24,7 +25,7 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(message) => {
-            eprintln!("error: {message}");
+            eprintln!("error: {}", lvk::readable_text(&message));
             ExitCode::from(2)
         }
     }
@@ -42,6 +43,12 @@ fn compare(args: &Args) -> Result<String, String> {
 }
 
 fn read(path: &Path) -> Result<RgbaImage, String> {
-    let picture = image::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok(picture.to_rgba8())
+    let named = |error: String| format!("{}: {error}", lvk::readable_name(path));
+    let picture = picture::read(path, &Bounds::unshrunk())
+        .map_err(|error| named(error.to_string().trim_end().to_owned()))?;
+    if let Some(warning) = picture.warnings.first() {
+        return Err(named(warning.clone()));
+    }
+    RgbaImage::from_raw(picture.width, picture.height, picture.rgba)
+        .ok_or_else(|| named("the image has too few texels".to_owned()))
 }

@@ -31,7 +31,7 @@ pub(crate) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> 
         false => (args.scenes.clone(), None),
     };
     if let Some(missing_note) = &missing_note {
-        eprintln!("{missing_note}");
+        eprintln!("{}", lvk::readable_text(missing_note));
     }
     let started = Instant::now();
     let interrupt = Interrupt::listen();
@@ -71,7 +71,7 @@ pub(crate) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> 
     let mut table = tables::summary(title, &scenes, &paths);
     let seconds = started.elapsed().as_secs();
     table.add_note(format!("took {} min {} s", seconds / 60, seconds % 60));
-    table.add_note(format!("all tables, plots and images: {}", page.display()));
+    table.add_note(format!("all tables, plots and images: {}", lvk::readable_name(page)));
     Ok(table)
 }
 
@@ -100,7 +100,7 @@ fn load(scene: &Path, progress: &mut Progress) -> Result<Scene, BenchError> {
 }
 
 fn warn(warnings: &[String]) {
-    warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    warnings.iter().for_each(|warning| eprintln!("warning: {}", lvk::readable_text(warning)));
 }
 
 fn start_experiment(setup: &Setup, args: &PaperArgs, ctx: &Context) -> Result<Experiment, BenchError> {

@@ -20,7 +20,7 @@ pub enum PaperError {
     #[error(transparent)]
     Size(#[from] SizeError),
     /// A file of the report could not be written.
-    #[error("cannot write {}: {source}; choose another --out", path.display())]
+    #[error("cannot write {}: {source}; choose another --out", lvk::readable_name(path))]
     Write {
         /// The file.
         path: PathBuf,

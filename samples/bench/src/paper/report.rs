@@ -1,6 +1,7 @@
 //! Writes the report folder: a Markdown page, CSV files, plots and images.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 
 use lvk::Capabilities;
@@ -180,7 +181,9 @@ the same models, the kitchen replaces its gallery, and its camera positions are 
 fn write_atomically(path: &Path, text: &str) -> std::io::Result<()> {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".part");
-    std::fs::write(&partial, text)?;
+    // An earlier run may have left one, and opening a pipe of that name would wait for its reader.
+    let _ = std::fs::remove_file(&partial);
+    std::fs::File::create_new(&partial)?.write_all(text.as_bytes())?;
     std::fs::rename(&partial, path)
 }
 

@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::file;
+
 const ARCHIVE: &str = "http://deb.debian.org/debian";
 const SECURITY: &str = "http://deb.debian.org/debian-security";
 const RELEASES: [&str; 9] =
@@ -82,9 +84,9 @@ fn read_sources(configuration: &Path) -> Vec<Source> {
     let mut files: Vec<PathBuf> = listed.map(|entry| entry.path()).collect();
     files.sort();
     files.insert(0, configuration.join("sources.list"));
-    let parse = |file: &PathBuf| {
-        let text = fs::read_to_string(file).unwrap_or_default();
-        match file.extension().and_then(|extension| extension.to_str()) {
+    let parse = |path: &PathBuf| {
+        let text = file::text(path).unwrap_or_default();
+        match path.extension().and_then(|extension| extension.to_str()) {
             Some("list") => parse_lines(&text),
             Some("sources") => parse_stanzas(&text),
             _ => Vec::new(),

@@ -170,7 +170,7 @@ fn run_and_capture(
     let failed = |message: String| DownloadError::PackageTool { command: description.to_owned(), message };
     let mut child = command.spawn().map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => {
-            DownloadError::MissingTool { what: command.get_program().display().to_string() }
+            DownloadError::MissingTool { what: lvk::readable_name(command.get_program()) }
         }
         _ => failed(error.to_string()),
     })?;
@@ -208,7 +208,7 @@ fn check_requirements() -> Result<(), DownloadError> {
     if keyring.is_file() {
         Ok(())
     } else {
-        Err(DownloadError::MissingTool { what: keyring.display().to_string() })
+        Err(DownloadError::MissingTool { what: lvk::readable_name(keyring) })
     }
 }
 

@@ -23,12 +23,12 @@ use super::ui_input::{UiInput, notches};
 use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
-use crate::app::print_line;
 use crate::app::run_args::RunArgs;
 use crate::app::run_error::RunError;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::screenshot::{Screenshot, free_name};
 use crate::app::ui::{Panel, PanelInfo};
+use crate::app::{print_line, print_message};
 use crate::shader_folder;
 
 /// Time between two looks at a window that shows nothing.
@@ -343,7 +343,9 @@ impl<S: Sample> Running<S> {
     fn reload(&mut self) {
         self.panel.shader_error = self.sample.reload().err().map(|error| error.to_string());
         match &self.panel.shader_error {
-            Some(error) => eprintln!("error: {error}\nthe shaders from before stay in use"),
+            Some(error) => {
+                print_message("error", format_args!("{error}\nthe shaders from before stay in use"))
+            }
             None => eprintln!("shaders compiled anew"),
         }
     }
@@ -430,7 +432,7 @@ impl<S: Sample> Running<S> {
         if let Some(size) = self.resize.next(self.size, Instant::now())
             && let Err(error) = self.sample.resize(size)
         {
-            eprintln!("warning: pictures keep their size: {error}");
+            print_message("warning", format_args!("pictures keep their size: {error}"));
         }
     }
 
@@ -468,9 +470,9 @@ impl<S: Sample> Running<S> {
         self.wants_screenshot = false;
         let path = file.map_or_else(|| free_name(Path::new(""), name), Path::to_owned);
         match shot.and_then(|shot| shot.write(&self.ctx, &path)) {
-            Ok(()) => print_line(&format!("wrote {}", path.display())),
+            Ok(()) => print_line(&format!("wrote {}", lvk::readable_name(path))),
             Err(error) if file.is_some() => return Err(error),
-            Err(error) => eprintln!("error: {error}"),
+            Err(error) => print_message("error", error),
         }
         Ok(())
     }

@@ -1,13 +1,12 @@
 //! Reads one driver manifest and opens its library.
 
-use std::fs::File;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::json::Json;
 use super::manifest_search::Variables;
 use crate::error::causes::with_causes;
 use crate::error::driver_report::{DriverManifest, ManifestOutcome};
+use crate::regular_file;
 
 /// Most bytes of a manifest that are read.
 const MAX_BYTES: u64 = 1 << 20;
@@ -62,14 +61,7 @@ pub(super) fn open_library(path: &Path) -> Result<(), String> {
 }
 
 fn read_text(path: &Path) -> Result<String, String> {
-    // Opening a named pipe would wait for its writer.
-    if !path.metadata().map_err(|error| error.to_string())?.is_file() {
-        return Err("it is not a file".to_owned());
-    }
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-    String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8".to_owned())
+    regular_file::read_text(path, MAX_BYTES).map_err(|error| error.to_string())
 }
 
 impl Contents {
@@ -171,7 +163,7 @@ mod tests {
         }
         let folder = tempfile::tempdir().unwrap();
         assert!(not_read(&folder.path().join("absent.json")).contains("(os error 2)"));
-        assert_eq!(not_read(folder.path()), "it is not a file");
+        assert_eq!(not_read(folder.path()), "it is a directory, no file");
         std::fs::write(folder.path().join("binary.json"), [0xff, 0xfe]).unwrap();
         assert!(not_read(&folder.path().join("binary.json")).contains("UTF-8"));
     }
