@@ -33,9 +33,12 @@ impl Context {
     /// `shaderStorageImageArrayDynamicIndexing`, `shaderStorageImageWriteWithoutFormat` and `fragmentStoresAndAtomics`.
     /// The same holds for those of `shaderTerminateInvocation`, `shaderDemoteToHelperInvocation`,
     /// `shaderZeroInitializeWorkgroupMemory`, `shaderIntegerDotProduct`, `shaderSubgroupExtendedTypes` and
-    /// `vulkanMemoryModel` that shaders use; every such device has these. Other code must use the queues only within
-    /// [`with_raw_queue`](Self::with_raw_queue) or [`with_raw_queue_of`](Self::with_raw_queue_of), or while no thread
-    /// uses the context.
+    /// `vulkanMemoryModel` that shaders use; every such device has these. All of these features are enabled on a device
+    /// that is created with the chain of the requirements
+    /// ([`DeviceRequirements::feature_chain`](crate::DeviceRequirements::feature_chain)).
+    ///
+    /// Other code must use the queues only within [`with_raw_queue`](Self::with_raw_queue) or
+    /// [`with_raw_queue_of`](Self::with_raw_queue_of), or while no thread uses the context.
     ///
     /// # Errors
     /// [`NoDevice`](crate::Error::NoDevice) where the device lacks a requirement of the library;
