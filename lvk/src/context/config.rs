@@ -84,8 +84,9 @@ pub struct ContextDesc<'a> {
     /// tables and gathered inputs of meshes that are split or reordered
     /// ([`AccelStructInfo::table_bytes`](crate::AccelStructInfo::table_bytes)). Default: `u64::MAX`, no limit.
     pub accel_budget_bytes: u64,
-    /// Number of texture slots in the bindless set. It is clamped to the number that the device allows beside the other bindings
-    /// of the set, and to [`Limits::max_bindless_textures`](crate::Limits::max_bindless_textures). Default: 16,384.
+    /// Number of texture slots in the bindless set. It is clamped to the number that the device allows beside the other
+    /// bindings of the set, and to [`Limits::max_bindless_textures`](crate::Limits::max_bindless_textures).
+    /// Default: 16,384.
     pub max_textures: u32,
     /// Y'CbCr conversions that textures may use. A conversion that the device lacks is an error only when such a
     /// texture is created. Default: [`YuvConversion::DEFAULT`].

@@ -1,7 +1,7 @@
 //! The docstring of each public field that callers fill in ends with the default of the field, and the default is true.
 //!
-//! A struct with `Default` is filled in by callers unless it is one of the [`RESULTS`], which the library returns: their
-//! defaults are zeros and empty lists, and have no meaning of their own.
+//! A struct with `Default` is filled in by callers unless it is one of the [`RESULTS`], which the library returns:
+//! their defaults are zeros and empty lists, and have no meaning of their own.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::HashMap;
