@@ -27,14 +27,14 @@ use glam::{Mat4, Vec3, Vec4};
 /// Points are `[f32; 3]`, or anything that converts to it, as the vectors of `glam`, `mint` and `nalgebra` do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InstanceCulling {
-    /// Position of the viewer.
+    /// Position of the viewer. Default: `[0.0; 3]`.
     pub eye: [f32; 3],
     /// Planes of the frustum: a point `p` is inside if `dot(xyz, p) + w >= 0`. The lengths of the normals do not
-    /// matter. A plane with the normal 0 culls nothing.
+    /// matter. A plane with the normal 0 culls nothing. Default: normals of 0, which cull nothing.
     pub planes: [[f32; 4]; 6],
-    /// Distance by which the planes are moved outwards, in world units; a negative one moves them inwards.
+    /// Distance by which the planes are moved outwards, in world units; a negative one moves them inwards. Default: 0.
     pub frustum_margin: f32,
-    /// Smallest angle under which an instance must appear, in radians, 0 to π; 0 culls nothing.
+    /// Smallest angle under which an instance must appear, in radians, 0 to π; 0 culls nothing. Default: 0.
     pub min_angle: f32,
 }
 

@@ -25,16 +25,19 @@ pub enum PrimitiveOrder {
 #[derive(Debug, Clone, Copy)]
 pub struct BlasDesc<'a> {
     /// The geometries, all triangles or all AABBs. Shaders read a hit's index in the list as `gl_GeometryIndexEXT`.
+    /// Default: empty.
     pub geometries: &'a [BlasGeometry],
-    /// Build preferences, and the operations allowed later.
+    /// Build preferences, and the operations allowed later. Default: [`BuildFlags::FAST_TRACE`].
     pub flags: BuildFlags,
     /// Order in which the primitives are built. It is derived from the contents of the buffers at creation.
+    /// Default: [`PrimitiveOrder::Auto`].
     pub order: PrimitiveOrder,
     /// The opacity of the triangles of each geometry, in the order of `geometries`; a shorter list leaves the rest
     /// without. The micromap has as many triangles as the geometry. The structure is built in the given order, and it
     /// is not split. Needs [`OptionalFeature::OpacityMicromaps`](crate::OptionalFeature::OpacityMicromaps).
+    /// Default: empty.
     pub opacity: &'a [Option<OpacityMicromapHandle>],
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"blas"`.
     pub debug_name: &'a str,
 }
 

@@ -97,11 +97,11 @@ impl TriangleOpacity {
 /// [`Context::create_opacity_micromap`](crate::Context::create_opacity_micromap).
 #[derive(Debug, Clone, Copy)]
 pub struct OpacityMicromapDesc<'a> {
-    /// The maps.
+    /// The maps. Default: empty.
     pub maps: &'a [OpacityMap<'a>],
-    /// The opacity of each triangle, in the order of the geometry.
+    /// The opacity of each triangle, in the order of the geometry. Default: empty.
     pub triangles: &'a [TriangleOpacity],
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"opacity micromap"`.
     pub debug_name: &'a str,
 }
 

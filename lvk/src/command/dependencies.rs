@@ -13,19 +13,19 @@ use crate::submit::SubmitHandle;
 /// rays. If a graphics pipeline queries rays, a render pass sees the builds recorded before it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Dependencies<'a> {
-    /// Textures and views that are sampled or fetched: all their mips and layers.
+    /// Textures and views that are sampled or fetched: all their mips and layers. Default: empty.
     pub sampled_images: &'a [TextureHandle],
-    /// Textures and views that are written or read as storage images: the first mip of each.
+    /// Textures and views that are written or read as storage images: the first mip of each. Default: empty.
     pub storage_images: &'a [TextureHandle],
-    /// Buffers that are written, or both read and written.
+    /// Buffers that are written, or both read and written. Default: empty.
     pub buffers: &'a [BufferHandle],
-    /// Buffers that are only read.
+    /// Buffers that are only read. Default: empty.
     pub read_buffers: &'a [BufferHandle],
     /// Acceleration structures that shaders query. Needed only by a render pass in the same command buffer as the
-    /// build, if the pass's pipelines are created after it began.
+    /// build, if the pass's pipelines are created after it began. Default: empty.
     pub acceleration_structures: &'a [AccelStructHandle],
     /// Submissions, of any queue, that the whole command buffer begins after. Rarely needed: the library waits by
     /// itself for the resources named above and for those that commands name. A submission listed here moves no texture
-    /// to this queue: declare textures with more usages than `SAMPLED` above.
+    /// to this queue: declare textures with more usages than `SAMPLED` above. Default: empty.
     pub wait_for: &'a [SubmitHandle],
 }

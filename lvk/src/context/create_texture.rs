@@ -133,19 +133,11 @@ impl Context {
 /// Fails unless the initial contents have the expected number of bytes. `mips` is the texture's number of mips.
 pub(super) fn check_data_size(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
     let wrong = |message: String| Err(Error::usage(desc.debug_name, message));
-    let Some(data) = desc.data else {
-        return match desc.generate_mips {
-            true => wrong(
-                "mips are generated from data; without it use CommandBuffer::generate_mipmaps".to_owned(),
-            ),
-            false => Ok(()),
-        };
-    };
+    check_generated_mips(desc, mips)?;
+    let Some(data) = desc.data else { return Ok(()) };
     let count = mips_in_data(desc, mips);
-    if count > mips || (desc.generate_mips && count != 1) {
-        return wrong(format!(
-            "the data has {count} mips; the texture has {mips}, and mips are generated from a single one"
-        ));
+    if count > mips {
+        return wrong(format!("the data has {count} mips, but the texture has {mips}"));
     }
     let sizes = (0..count).map(|mip| {
         let [width, height] = desc.extent.map(|side| (side >> mip).max(1));
@@ -157,6 +149,31 @@ pub(super) fn check_data_size(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
     }
     let given = data.len();
     wrong(format!("{count} mips have {expected} bytes in all layers and slices, but {given} were given"))
+}
+
+/// Fails if mips are to be generated without data, from several mips of data, or into a texture without further mips.
+/// `mips` is the texture's number of mips.
+fn check_generated_mips(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
+    let wrong = |message: String| Err(Error::usage(desc.debug_name, message));
+    if !desc.generate_mips {
+        return Ok(());
+    }
+    if desc.data.is_none() {
+        return wrong(
+            "mips are generated from data; without it use CommandBuffer::generate_mipmaps".to_owned(),
+        );
+    }
+    let count = mips_in_data(desc, mips);
+    if count != 1 {
+        return wrong(format!("the data has {count} mips, but mips are generated from a single one"));
+    }
+    let full = desc.full_mips();
+    if mips == 1 && full > 1 {
+        return wrong(format!(
+            "generate_mips needs more than the one mip of the texture; give it mips: 0 for all {full}"
+        ));
+    }
+    Ok(())
 }
 
 fn mips_in_data(desc: &TextureDesc<'_>, mips: u32) -> u32 {
@@ -171,4 +188,43 @@ pub(super) fn default_views(texture: &Texture) -> Result<TextureViews> {
         sampled: if sampled { Some(texture.sampled_view()?) } else { None },
         storage: if storage { Some(texture.storage_view()?) } else { None },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::resource::texture_desc::TextureKind;
+
+    fn error(desc: &TextureDesc<'_>, mips: u32) -> String {
+        check_data_size(desc, mips).map_or_else(|error| error.to_string(), |()| String::new())
+    }
+
+    #[test]
+    fn mips_are_generated_from_one_mip_of_data_into_further_mips() {
+        let data = [0; 4 * 4 * 4];
+        let desc = TextureDesc {
+            extent: [4, 4],
+            data: Some(&data),
+            generate_mips: true,
+            debug_name: "bark",
+            ..TextureDesc::default()
+        };
+        assert_eq!(error(&desc, 3), "");
+        assert_eq!(error(&desc, 2), "");
+        let alone = error(&desc, 1);
+        assert!(alone.starts_with("bark: ") && alone.ends_with("give it mips: 0 for all 3"), "{alone}");
+        assert!(error(&TextureDesc { data: None, ..desc }, 3).contains("generated from data"));
+        assert!(error(&TextureDesc { data_mips: 2, ..desc }, 3).contains("a single one"));
+        assert!(error(&TextureDesc { data_mips: 0, ..desc }, 3).contains("a single one"));
+    }
+
+    #[test]
+    fn a_texture_of_one_texel_has_all_its_mips() {
+        let desc = TextureDesc { data: Some(&[0; 4]), generate_mips: true, ..TextureDesc::default() };
+        assert_eq!(error(&desc, 1), "");
+        assert!(error(&TextureDesc { data_mips: 2, generate_mips: false, ..desc }, 1).contains("has 1"));
+        let volume = TextureDesc { kind: TextureKind::D3 { depth: 2 }, data: Some(&[0; 8]), ..desc };
+        assert!(error(&volume, 1).ends_with("give it mips: 0 for all 2"));
+        assert_eq!(error(&volume, 2), "");
+    }
 }

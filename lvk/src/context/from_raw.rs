@@ -14,9 +14,10 @@ impl Context {
     /// destroys none of them.
     ///
     /// [`requirements`](Self::requirements) says what the device needs, and
-    /// [`DeviceRequirements::raw_context`](crate::DeviceRequirements::raw_context) fills in `raw`. Members of `desc` that
-    /// configure device creation are ignored: the library, the device, required features, the profile, and user extensions. Its ray tracing requests apply as far as `raw` allows them. A window needs the
-    /// extensions for its window system and for swapchains in `raw`.
+    /// [`DeviceRequirements::raw_context`](crate::DeviceRequirements::raw_context) fills in `raw`. Members of `desc`
+    /// that configure device creation are ignored: the library, the device, required features, the profile, and user
+    /// extensions. Its ray tracing requests apply as far as `raw` allows them. A window needs the extensions for its
+    /// window system and for swapchains in `raw`.
     ///
     /// The caller turns the validation layer on. With [`ContextDesc::validation`], the context receives the layer's
     /// messages about everything on the instance, which needs `VK_EXT_debug_utils` in `raw`.
@@ -33,9 +34,12 @@ impl Context {
     /// `shaderStorageImageArrayDynamicIndexing`, `shaderStorageImageWriteWithoutFormat` and `fragmentStoresAndAtomics`.
     /// The same holds for those of `shaderTerminateInvocation`, `shaderDemoteToHelperInvocation`,
     /// `shaderZeroInitializeWorkgroupMemory`, `shaderIntegerDotProduct`, `shaderSubgroupExtendedTypes` and
-    /// `vulkanMemoryModel` that shaders use; every such device has these. Other code must use the queues only within
-    /// [`with_raw_queue`](Self::with_raw_queue) or [`with_raw_queue_of`](Self::with_raw_queue_of), or while no thread
-    /// uses the context.
+    /// `vulkanMemoryModel` that shaders use; every such device has these. All of these features are enabled on a device
+    /// that is created with the chain of the requirements
+    /// ([`DeviceRequirements::feature_chain`](crate::DeviceRequirements::feature_chain)).
+    ///
+    /// Other code must use the queues only within [`with_raw_queue`](Self::with_raw_queue) or
+    /// [`with_raw_queue_of`](Self::with_raw_queue_of), or while no thread uses the context.
     ///
     /// # Errors
     /// [`NoDevice`](crate::Error::NoDevice) where the device lacks a requirement of the library;

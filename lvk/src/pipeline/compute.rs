@@ -20,22 +20,22 @@ use crate::shader::ShaderStage;
 /// Describes a compute pipeline.
 #[derive(Debug, Clone, Copy)]
 pub struct ComputePipelineDesc<'a> {
-    /// The compute shader.
+    /// The compute shader. Default: none.
     pub module: Option<ShaderModuleHandle>,
-    /// Values of specialization constants.
+    /// Values of specialization constants. Default: empty.
     pub specialization: &'a [SpecializationConstant],
     /// Invocations of each subgroup (`VkPipelineShaderStageRequiredSubgroupSizeCreateInfo`): a power of two within
     /// [`Limits::subgroup`](crate::Limits::subgroup). `None` leaves the size to the device. Needs
-    /// [`OptionalFeature::SubgroupSizeControl`](crate::OptionalFeature::SubgroupSizeControl).
+    /// [`OptionalFeature::SubgroupSizeControl`](crate::OptionalFeature::SubgroupSizeControl). Default: none.
     pub required_subgroup_size: Option<u32>,
     /// True if all invocations of every subgroup are active when it starts
     /// (`VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT`). The size of the workgroup along x is then a
     /// multiple of `required_subgroup_size`, or of the largest subgroup size without it. Needs
-    /// [`OptionalFeature::ComputeFullSubgroups`](crate::OptionalFeature::ComputeFullSubgroups).
+    /// [`OptionalFeature::ComputeFullSubgroups`](crate::OptionalFeature::ComputeFullSubgroups). Default: false.
     pub full_subgroups: bool,
-    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    /// Rust structs for the blocks of the shaders, compared with them at creation. Default: empty.
     pub layouts: &'a [BlockLayout],
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"compute pipeline"`.
     pub debug_name: &'a str,
 }
 

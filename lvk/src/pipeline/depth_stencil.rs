@@ -73,17 +73,17 @@ impl StencilOp {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct StencilFace {
     /// Comparison of the reference with the target's value, both masked by [`read_mask`](Self::read_mask). A fragment
-    /// passes if the comparison is true.
+    /// passes if the comparison is true. Default: [`CompareOp::Always`].
     pub compare: CompareOp,
-    /// Operation if a fragment fails the stencil test.
+    /// Operation if a fragment fails the stencil test. Default: [`StencilOp::Keep`].
     pub fail: StencilOp,
-    /// Operation if a fragment passes the stencil test and fails the depth test.
+    /// Operation if a fragment passes the stencil test and fails the depth test. Default: [`StencilOp::Keep`].
     pub depth_fail: StencilOp,
-    /// Operation if a fragment passes both tests.
+    /// Operation if a fragment passes both tests. Default: [`StencilOp::Keep`].
     pub pass: StencilOp,
-    /// Bits that are compared.
+    /// Bits that are compared. Default: `u8::MAX`, all bits.
     pub read_mask: u8,
-    /// Bits that are written.
+    /// Bits that are written. Default: `u8::MAX`, all bits.
     pub write_mask: u8,
 }
 
@@ -123,9 +123,9 @@ impl StencilFace {
 /// [`RenderPass::stencil_reference`](crate::RenderPass::stencil_reference).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct StencilTest {
-    /// Test of front faces, lines and points.
+    /// Test of front faces, lines and points. Default: the default [`StencilFace`].
     pub front: StencilFace,
-    /// Test of back faces.
+    /// Test of back faces. Default: the default [`StencilFace`].
     pub back: StencilFace,
 }
 

@@ -14,22 +14,22 @@ use crate::handle::ShaderModuleHandle;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct VertexBinding {
     /// Distance between consecutive vertices or instances, in bytes: a multiple of
-    /// [`Limits::vertex_stride_alignment`](crate::Limits::vertex_stride_alignment).
+    /// [`Limits::vertex_stride_alignment`](crate::Limits::vertex_stride_alignment). Default: 0.
     pub stride: u32,
-    /// True if the attributes advance once for each instance instead of each vertex.
+    /// True if the attributes advance once for each instance instead of each vertex. Default: false.
     pub per_instance: bool,
 }
 
 /// A vertex attribute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct VertexAttribute {
-    /// The shader's `location`.
+    /// The shader's `location`. Default: 0.
     pub location: u32,
-    /// Index into the bindings.
+    /// Index into the bindings. Default: 0.
     pub binding: u32,
-    /// Format of the attribute.
+    /// Format of the attribute. Default: [`VertexFormat::F32x3`].
     pub format: VertexFormat,
-    /// Offset in the vertex, in bytes.
+    /// Offset in the vertex, in bytes. Default: 0.
     pub offset: u32,
 }
 
@@ -65,65 +65,69 @@ impl From<Format> for ColorTarget {
 /// Describes a graphics pipeline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderPipelineDesc<'a> {
-    /// The vertex shader; `None` in pipelines with a mesh shader.
+    /// The vertex shader; `None` in pipelines with a mesh shader. Default: none.
     pub vertex: Option<ShaderModuleHandle>,
-    /// Task shader: decides how many mesh workgroups run. Optional, and only valid with a mesh shader.
+    /// Task shader: decides how many mesh workgroups run. Optional, and only valid with a mesh shader. Default: none.
     pub task: Option<ShaderModuleHandle>,
     /// Mesh shader: outputs vertices and primitives, in place of a vertex shader
-    /// ([`Capabilities::mesh_shader`](crate::Capabilities::mesh_shader)).
+    /// ([`Capabilities::mesh_shader`](crate::Capabilities::mesh_shader)). Default: none.
     pub mesh: Option<ShaderModuleHandle>,
     /// Tessellation control shader (hull): decides how finely each patch is divided. It needs an evaluation shader,
     /// [`Topology::Patches`] and [`OptionalFeature::TessellationShader`](crate::OptionalFeature::TessellationShader).
+    /// Default: none.
     pub tess_control: Option<ShaderModuleHandle>,
-    /// Tessellation evaluation shader (domain): computes the vertices of a divided patch.
+    /// Tessellation evaluation shader (domain): computes the vertices of a divided patch. Default: none.
     pub tess_eval: Option<ShaderModuleHandle>,
     /// Geometry shader: outputs primitives for each input primitive. Needs
-    /// [`OptionalFeature::GeometryShader`](crate::OptionalFeature::GeometryShader).
+    /// [`OptionalFeature::GeometryShader`](crate::OptionalFeature::GeometryShader). Default: none.
     pub geometry: Option<ShaderModuleHandle>,
-    /// The fragment shader; `None` writes only depth and stencil.
+    /// The fragment shader; `None` writes only depth and stencil. Default: none.
     pub fragment: Option<ShaderModuleHandle>,
     /// Primitives that the vertices form; ignored with a mesh shader, which declares its own.
+    /// Default: [`Topology::Triangles`].
     pub topology: Topology,
-    /// Faces that are culled.
+    /// Faces that are culled. Default: [`CullMode::None`].
     pub cull: CullMode,
-    /// Winding of front faces.
+    /// Winding of front faces. Default: [`FrontFace::CounterClockwise`].
     pub front_face: FrontFace,
-    /// Rendered part of a triangle: its inside, its edges or its vertices.
+    /// Rendered part of a triangle: its inside, its edges or its vertices. Default: [`PolygonMode::Fill`].
     pub polygon: PolygonMode,
     /// Width of lines in pixels, within [`Limits::line_width`](crate::Limits::line_width). Any other width than 1 needs
-    /// [`OptionalFeature::WideLines`](crate::OptionalFeature::WideLines).
+    /// [`OptionalFeature::WideLines`](crate::OptionalFeature::WideLines). Default: 1.
     pub line_width: f32,
     /// Offset of the depths of triangles; `None` for no offset.
-    /// [`RenderPass::depth_bias`](crate::RenderPass::depth_bias) may replace it.
+    /// [`RenderPass::depth_bias`](crate::RenderPass::depth_bias) may replace it. Default: none.
     pub depth_bias: Option<DepthBias>,
     /// True if depths beyond the viewport's range are clamped to it instead of clipped. Needs
-    /// [`OptionalFeature::DepthClamp`](crate::OptionalFeature::DepthClamp).
+    /// [`OptionalFeature::DepthClamp`](crate::OptionalFeature::DepthClamp). Default: false.
     pub depth_clamp: bool,
-    /// Vertex buffers; empty if the shader reads its vertices by address.
+    /// Vertex buffers; empty if the shader reads its vertices by address. Default: empty.
     pub vertex_bindings: &'a [VertexBinding],
-    /// Attributes read from the vertex buffers.
+    /// Attributes read from the vertex buffers. Default: empty.
     pub vertex_attributes: &'a [VertexAttribute],
-    /// Colour targets, in the order of the shader's outputs. Targets without an output are not changed.
+    /// Colour targets, in the order of the shader's outputs. Targets without an output are not changed. Default: empty.
     pub color: &'a [ColorTarget],
-    /// Depth test; `None` draws without depth.
+    /// Depth test; `None` draws without depth. Default: none.
     pub depth: Option<DepthTest>,
     /// Stencil test; `None` draws without stencil. The format of [`depth`](Self::depth) must contain stencil.
+    /// Default: none.
     pub stencil: Option<StencilTest>,
     /// Number of samples per pixel; equals that of the targets ([`TextureDesc::samples`](crate::TextureDesc::samples)).
+    /// Default: 1.
     pub samples: u32,
-    /// True if the alpha of the first output decides how many of a pixel's samples are covered.
+    /// True if the alpha of the first output decides how many of a pixel's samples are covered. Default: false.
     pub alpha_to_coverage: bool,
     /// Minimum fraction of a pixel's samples for which the fragment shader runs, 0 to 1. A shader that reads
     /// `gl_SampleID` runs for each sample. Any other value than 0 needs
-    /// [`OptionalFeature::SampleRateShading`](crate::OptionalFeature::SampleRateShading).
+    /// [`OptionalFeature::SampleRateShading`](crate::OptionalFeature::SampleRateShading). Default: 0.
     pub sample_shading: f32,
     /// Bit mask of the views that each draw renders; 0 without multiview. Must equal
-    /// [`RenderPassDesc::view_mask`](crate::RenderPassDesc::view_mask).
+    /// [`RenderPassDesc::view_mask`](crate::RenderPassDesc::view_mask). Default: 0.
     pub view_mask: u32,
     /// Pixels that a fragment covers; `None` for one pixel.
     /// [`RenderPass::shading_rate`](crate::RenderPass::shading_rate) may replace it. Passes with
     /// [`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate) do not take pipelines with `None`. Needs
-    /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
+    /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate). Default: none.
     pub shading_rate: Option<ShadingRate>,
     /// True to link the pipeline from parts that the context shares among pipelines (`VK_EXT_graphics_pipeline_library`):
     /// vertex input, shaders before rasterisation, fragment shader, output. Only parts that no live pipeline has are
@@ -131,13 +135,13 @@ pub struct RenderPipelineDesc<'a> {
     ///
     /// The whole pipeline is compiled without
     /// [`OptionalFeature::GraphicsPipelineLibrary`](crate::OptionalFeature::GraphicsPipelineLibrary), without a fragment
-    /// shader, with a shading rate, and with a fragment shader that reads targets of its pass.
+    /// shader, with a shading rate, and with a fragment shader that reads targets of its pass. Default: false.
     pub fast_link: bool,
-    /// Values of specialization constants.
+    /// Values of specialization constants. Default: empty.
     pub specialization: &'a [SpecializationConstant],
-    /// Rust structs for the blocks of the shaders, compared with them at creation.
+    /// Rust structs for the blocks of the shaders, compared with them at creation. Default: empty.
     pub layouts: &'a [BlockLayout],
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"render pipeline"`.
     pub debug_name: &'a str,
 }
 

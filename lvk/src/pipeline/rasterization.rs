@@ -97,12 +97,12 @@ pub enum PolygonMode {
 /// resolves. `m` is the greatest slope of the triangle's depth over a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DepthBias {
-    /// Factor of the least difference `r`.
+    /// Factor of the least difference `r`. Default: 0.
     pub constant: f32,
-    /// Factor of the slope `m`.
+    /// Factor of the slope `m`. Default: 0.
     pub slope: f32,
     /// Greatest offset, or the least offset if negative; 0 for no limit. Any other value than 0 needs
-    /// [`OptionalFeature::DepthBiasClamp`](crate::OptionalFeature::DepthBiasClamp).
+    /// [`OptionalFeature::DepthBiasClamp`](crate::OptionalFeature::DepthBiasClamp). Default: 0.
     pub clamp: f32,
 }
 

@@ -24,31 +24,31 @@ use crate::shader::ShaderStage;
 /// `max_recursion`, `max_payload_bytes` and `max_hit_attribute_bytes` must equal those of the pipelines.
 #[derive(Debug, Clone, Copy)]
 pub struct RayTracingLibraryDesc<'a> {
-    /// Ray generation shaders.
+    /// Ray generation shaders. Default: empty.
     pub ray_gen: &'a [ShaderModuleHandle],
-    /// Miss shaders.
+    /// Miss shaders. Default: empty.
     pub miss: &'a [ShaderModuleHandle],
-    /// Hit groups.
+    /// Hit groups. Default: empty.
     pub hit_groups: &'a [HitGroup<'a>],
-    /// Callable shaders.
+    /// Callable shaders. Default: empty.
     pub callable: &'a [ShaderModuleHandle],
-    /// See [`RayTracingPipelineDesc::ray_gen_records`].
+    /// See [`RayTracingPipelineDesc::ray_gen_records`]. Default: empty.
     pub ray_gen_records: &'a [ShaderRecord<'a>],
-    /// See [`RayTracingPipelineDesc::miss_records`].
+    /// See [`RayTracingPipelineDesc::miss_records`]. Default: empty.
     pub miss_records: &'a [ShaderRecord<'a>],
-    /// See [`RayTracingPipelineDesc::callable_records`].
+    /// See [`RayTracingPipelineDesc::callable_records`]. Default: empty.
     pub callable_records: &'a [ShaderRecord<'a>],
-    /// See [`RayTracingPipelineDesc::max_recursion`].
+    /// See [`RayTracingPipelineDesc::max_recursion`]. Default: 1.
     pub max_recursion: u32,
-    /// See [`RayTracingPipelineDesc::max_payload_bytes`].
+    /// See [`RayTracingPipelineDesc::max_payload_bytes`]. Default: 64.
     pub max_payload_bytes: u32,
-    /// See [`RayTracingPipelineDesc::max_hit_attribute_bytes`].
+    /// See [`RayTracingPipelineDesc::max_hit_attribute_bytes`]. Default: 8.
     pub max_hit_attribute_bytes: u32,
-    /// Values of specialization constants.
+    /// Values of specialization constants. Default: empty.
     pub specialization: &'a [SpecializationConstant],
-    /// See [`RayTracingPipelineDesc::layouts`].
+    /// See [`RayTracingPipelineDesc::layouts`]. Default: empty.
     pub layouts: &'a [BlockLayout],
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"ray tracing library"`.
     pub debug_name: &'a str,
 }
 

@@ -17,10 +17,12 @@ use crate::lock_order::{Mutex, Rank};
 use crate::resource::sharing::Sharing;
 
 bitflags! {
-    /// Allowed uses of a buffer (`VkBufferUsageFlags`). Copies and access by address are always allowed.
+    /// Allowed uses of a buffer (`VkBufferUsageFlags`). Copies, and reads and writes of shaders by address, are always
+    /// allowed and need no flag.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
     pub struct BufferUsage: u32 {
-        /// Read and written by shaders through its address.
+        /// Bound as a storage buffer (`VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`), which access by address does not need:
+        /// for [`DeviceInstances`](crate::DeviceInstances), and for descriptors of the application's own Vulkan calls.
         const STORAGE = 1;
         /// Holds indices of indexed draws.
         const INDEX = 1 << 1;
@@ -36,15 +38,15 @@ bitflags! {
 /// Describes a buffer.
 #[derive(Debug, Clone, Copy)]
 pub struct BufferDesc<'a> {
-    /// Size in bytes, at least 1. 0 with `data` is the size of the data.
+    /// Size in bytes, at least 1. 0 with `data` is the size of the data. Default: 0.
     pub size_bytes: u64,
-    /// Allowed uses of the buffer.
+    /// Allowed uses of the buffer. Default: [`BufferUsage::STORAGE`].
     pub usage: BufferUsage,
-    /// Memory type of the buffer.
+    /// Memory type of the buffer. Default: [`MemoryKind::Device`].
     pub memory: MemoryKind,
-    /// Initial contents, at most `size_bytes`.
+    /// Initial contents, at most `size_bytes`. Default: none.
     pub data: Option<&'a [u8]>,
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"buffer"`.
     pub debug_name: &'a str,
 }
 

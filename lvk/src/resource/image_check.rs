@@ -55,7 +55,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     check_transient(desc)?;
     check_input(gpu, desc)?;
     check_rates(gpu, desc)?;
-    let full = 32 - width.max(height).max(depth).leading_zeros();
+    let full = desc.full_mips();
     if desc.mips > full {
         let message =
             format!("{} mips, but {width} x {height} x {depth} texels have at most {full}", desc.mips);

@@ -93,11 +93,11 @@ impl QueryKind {
 /// Describes a pool of queries.
 #[derive(Debug, Clone, Copy)]
 pub struct QueryPoolDesc<'a> {
-    /// Measurement of all queries of the pool.
+    /// Measurement of all queries of the pool. Default: [`QueryKind::Timestamps`].
     pub kind: QueryKind,
-    /// Number of queries, 1 to 65,536.
+    /// Number of queries, 1 to 65,536. Default: 2.
     pub count: u32,
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"query pool"`.
     pub debug_name: &'a str,
 }
 

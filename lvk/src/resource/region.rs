@@ -8,22 +8,23 @@ use crate::format::{Aspect, CopyAspect};
 /// Part of a texture: a rectangle of one mip of some layers, or a 3D region of one mip of a volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct TextureRegion {
-    /// Mip level; in a view, relative to its first mip.
+    /// Mip level; in a view, relative to its first mip. Default: 0.
     pub mip: u32,
-    /// First layer or cube face; in a view, relative to its first layer.
+    /// First layer or cube face; in a view, relative to its first layer. Default: 0.
     pub layer: u32,
-    /// Number of layers; 0 is all from `layer` on. The texels of consecutive layers follow each other.
+    /// Number of layers; 0 is all from `layer` on. The texels of consecutive layers follow each other. Default: 1.
     pub layers: u32,
     /// First column and row, in texels. Must be multiples of the [block](crate::Format::block_extent).
+    /// Default: `[0, 0]`.
     pub offset: [u32; 2],
     /// Width and height in texels; `[0, 0]` is all from `offset` on. Must be multiples of the block, or end at the
-    /// edge.
+    /// edge. Default: `[0, 0]`.
     pub extent: [u32; 2],
-    /// First slice of a volume; 0 for all other kinds.
+    /// First slice of a volume; 0 for all other kinds. Default: 0.
     pub z: u32,
-    /// Number of slices; 0 is all from `z` on. Must be 0 or 1 for all kinds but volumes.
+    /// Number of slices; 0 is all from `z` on. Must be 0 or 1 for all kinds but volumes. Default: 0.
     pub depth: u32,
-    /// Aspect of each texel.
+    /// Aspect of each texel. Default: [`Aspect::Main`].
     pub aspect: Aspect,
 }
 
@@ -46,13 +47,13 @@ impl Default for TextureRegion {
 /// Mips and layers of a texture; the default is all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct TextureRange {
-    /// First mip.
+    /// First mip. Default: 0.
     pub base_mip: u32,
-    /// Number of mips; 0 is all from `base_mip` on.
+    /// Number of mips; 0 is all from `base_mip` on. Default: 0.
     pub mips: u32,
-    /// First layer.
+    /// First layer. Default: 0.
     pub base_layer: u32,
-    /// Number of layers; 0 is all from `base_layer` on.
+    /// Number of layers; 0 is all from `base_layer` on. Default: 0.
     pub layers: u32,
 }
 

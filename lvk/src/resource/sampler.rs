@@ -159,27 +159,30 @@ impl CompareOp {
 /// Describes a sampler.
 #[derive(Debug, Clone, Copy)]
 pub struct SamplerDesc<'a> {
-    /// Filter when texels are larger than pixels.
+    /// Filter when texels are larger than pixels. Default: [`Filter::Linear`].
     pub mag_filter: Filter,
-    /// Filter when texels are smaller than pixels.
+    /// Filter when texels are smaller than pixels. Default: [`Filter::Linear`].
     pub min_filter: Filter,
-    /// Filter between mips.
+    /// Filter between mips. Default: [`Filter::Linear`].
     pub mip_filter: Filter,
-    /// Addressing along u, v and w.
+    /// Addressing along u, v and w. Default: [`AddressMode::Repeat`] along each.
     pub address: [AddressMode; 3],
-    /// Largest anisotropy, 1 to 16; clamped to the limit of the device.
+    /// Largest anisotropy, 1 to 16; clamped to the limit of the device. Default: 1.
     pub max_anisotropy: f32,
     /// Comparison of a comparison sampler, which shaders read through `kSamplersShadow[]`; `None` for other samplers.
+    /// Default: none.
     pub compare: Option<CompareOp>,
-    /// Colour beyond the edge under [`AddressMode::ClampToBorder`].
+    /// Colour beyond the edge under [`AddressMode::ClampToBorder`]. Default: [`BorderColor::TransparentBlack`].
     pub border: BorderColor,
     /// Reduction of the texels that are read. Must be the mean in comparison samplers.
+    /// Default: [`SamplerReductionMode::Mean`].
     pub reduction: SamplerReductionMode,
     /// Value added to the level of detail; its magnitude is at most [`Limits::max_lod_bias`](crate::Limits).
+    /// Default: 0.
     pub lod_bias: f32,
-    /// Smallest and largest level of detail.
+    /// Smallest and largest level of detail. Default: 0 and 1000, all mips (`VK_LOD_CLAMP_NONE`).
     pub lod_range: [f32; 2],
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"sampler"`.
     pub debug_name: &'a str,
 }
 

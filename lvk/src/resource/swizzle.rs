@@ -23,13 +23,13 @@ pub enum Channel {
 /// [identity](Self::IDENTITY) need [`OptionalFeature::ViewSwizzle`](crate::OptionalFeature::ViewSwizzle).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Swizzle {
-    /// Source of the red channel.
+    /// Source of the red channel. Default: [`Channel::Red`].
     pub red: Channel,
-    /// Source of the green channel.
+    /// Source of the green channel. Default: [`Channel::Green`].
     pub green: Channel,
-    /// Source of the blue channel.
+    /// Source of the blue channel. Default: [`Channel::Blue`].
     pub blue: Channel,
-    /// Source of the alpha channel.
+    /// Source of the alpha channel. Default: [`Channel::Alpha`].
     pub alpha: Channel,
 }
 

@@ -98,44 +98,53 @@ pub enum TextureMemory {
 /// Describes a texture.
 #[derive(Debug, Clone, Copy)]
 pub struct TextureDesc<'a> {
-    /// Shape of the texture.
+    /// Shape of the texture. Default: [`TextureKind::D2`].
     pub kind: TextureKind,
-    /// Format of the texels.
+    /// Format of the texels. Default: [`Format::Rgba8Unorm`].
     pub format: Format,
-    /// Width and height of mip 0 in texels. The height of a `D1` texture is 1.
+    /// Width and height of mip 0 in texels. The height of a `D1` texture is 1. Default: `[1, 1]`.
     pub extent: [u32; 2],
-    /// Number of mips; 0 is the whole chain down to one texel.
+    /// Number of mips; 0 is the whole chain down to one texel. Default: 1.
     pub mips: u32,
     /// Samples per texel: 1, or a power of two for a multisampled target, an element of `kTextures2DMS[]`. A
     /// multisampled texture has one mip and is `D2` or `D2Array`. It takes no data: passes and clears write it,
-    /// resolves read it. [`Limits::color_samples`](crate::Limits) holds the supported counts.
+    /// resolves read it. [`Limits::color_samples`](crate::Limits) holds the supported counts. Default: 1.
     pub samples: u32,
-    /// Allowed uses of the texture.
+    /// Allowed uses of the texture. Default: [`TextureUsage::SAMPLED`].
     pub usage: TextureUsage,
-    /// Memory of the texture.
+    /// Memory of the texture. Default: [`TextureMemory::Device`].
     pub memory: TextureMemory,
     /// Other colour formats with the same texel size that views may have
     /// ([`Context::create_texture_view`](crate::Context::create_texture_view)). With such formats, a usage is allowed
     /// if at least one of all the formats supports it. The texture itself has the usages that its own format supports.
     ///
     /// Any entry (`VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT`) may disable the compression of the image, so list only the
-    /// formats that are needed.
+    /// formats that are needed. Default: empty.
     pub view_formats: &'a [Format],
     /// Sources of the four channels that shaders sample. Storage images and targets are not swizzled.
+    /// Default: [`Swizzle::IDENTITY`].
     pub swizzle: Swizzle,
     /// Initial contents, tightly packed: mip by mip from 0 on, with all layers or slices of a mip in order. Formats
-    /// with depth and stencil take the depth only. Y'CbCr formats take all planes in order.
+    /// with depth and stencil take the depth only. Y'CbCr formats take all planes in order. Default: none.
     pub data: Option<&'a [u8]>,
-    /// Number of mips in `data`; 0 is all.
+    /// Number of mips in `data`; 0 is all mips of the texture. Default: 1.
     pub data_mips: u32,
     /// Index of the conversion of a Y'CbCr texture in [`ContextDesc::yuv`](crate::ContextDesc). `None` is the first one
-    /// of the format.
+    /// of the format. Default: none.
     pub conversion: Option<usize>,
-    /// True if the other mips are created by halving the last mip of `data`, which has one mip. Needs a colour format
-    /// that the device can filter.
+    /// True if the other mips are created by halving mip 0, the only one in `data`. Needs a colour format that the
+    /// device can filter, and more than one mip: with `mips: 0` the texture has all. Default: false.
     pub generate_mips: bool,
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"texture"`.
     pub debug_name: &'a str,
+}
+
+impl TextureDesc<'_> {
+    /// Returns the number of mips of the whole chain, from mip 0 down to one texel.
+    pub(crate) fn full_mips(&self) -> u32 {
+        let [width, height] = self.extent;
+        32 - width.max(height).max(self.kind.depth()).leading_zeros()
+    }
 }
 
 impl Default for TextureDesc<'_> {

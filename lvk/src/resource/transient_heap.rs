@@ -28,10 +28,11 @@ pub struct TransientTexture<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct TransientHeapDesc<'a> {
     /// The textures with their lifetimes. Steps are numbers of the application, usually one for each pass of a frame.
+    /// Default: empty.
     pub textures: &'a [TransientTexture<'a>],
-    /// Queue of the command buffers that use the textures.
+    /// Queue of the command buffers that use the textures. Default: [`Queue::Graphics`].
     pub queue: Queue,
-    /// Name in error messages.
+    /// Name in error messages. Default: `"transient heap"`.
     pub debug_name: &'a str,
 }
 

@@ -18,32 +18,35 @@ use crate::lock_order::{Mutex, Rank};
 /// Describes a view: a texture of some mips and layers of another texture, optionally with another kind or format.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TextureViewDesc<'a> {
-    /// The viewed texture. It may be a view itself; mips and layers are then relative to its first ones.
+    /// The viewed texture. It may be a view itself; mips and layers are then relative to its first ones. Default: none.
     pub texture: Option<TextureHandle>,
     /// Shape of the view. It also defines the number of layers from [`base_layer`](Self::base_layer) on: 1, the layers
     /// of an array, or 6 for each cube. `None` is the shape of the texture. Arrays then have all layers, or whole
     /// cubes, from `base_layer` on. Volumes have the depth of `base_mip`.
     ///
     /// Cube views are possible of square arrays of at least six layers. Views of volumes are volumes with all slices.
+    /// Default: none.
     pub kind: Option<TextureKind>,
-    /// First mip.
+    /// First mip. Default: 0.
     pub base_mip: u32,
-    /// Number of mips; 0 is all from [`base_mip`](Self::base_mip) on.
+    /// Number of mips; 0 is all from [`base_mip`](Self::base_mip) on. Default: 0.
     pub mips: u32,
-    /// First layer.
+    /// First layer. Default: 0.
     pub base_layer: u32,
     /// Format of the texels for shaders and passes: the texture's own, or one of its
-    /// [`view_formats`](crate::TextureDesc::view_formats). `None` is the texture's own.
+    /// [`view_formats`](crate::TextureDesc::view_formats). `None` is the texture's own. Default: none.
     pub format: Option<Format>,
     /// Aspect of the texels that shaders sample. The stencil of a format with stencil is an element of
     /// `kTexturesU2D[]`. A plane of a Y'CbCr format is a texture of [its own format](Format::plane_format).
+    /// Default: [`Aspect::Main`].
     pub aspect: Aspect,
     /// Sources of the channels that shaders sample. Storage images and targets are not swizzled.
+    /// Default: [`Swizzle::IDENTITY`].
     pub swizzle: Swizzle,
     /// Allowed uses of the view, a subset of the uses of its texture. `None` is every use that the format and the
-    /// swizzle allow.
+    /// swizzle allow. Default: none.
     pub usage: Option<TextureUsage>,
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: empty.
     pub debug_name: &'a str,
 }
 

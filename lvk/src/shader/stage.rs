@@ -185,20 +185,20 @@ pub enum ShaderSource<'a> {
 /// with `lvk/` belong to the library. `#pragma once` and include guards both work.
 #[derive(Debug, Clone, Copy)]
 pub struct ShaderModuleDesc<'a> {
-    /// The stage the module is for.
+    /// The stage the module is for. Default: [`ShaderStage::Vertex`].
     pub stage: ShaderStage,
-    /// The program text.
+    /// The program text. Default: an empty [`ShaderSource::Glsl`].
     pub source: ShaderSource<'a>,
-    /// Files for `#include` in memory: name as written in the directive (with `/`), and text.
+    /// Files for `#include` in memory: name as written in the directive (with `/`), and text. Default: empty.
     pub includes: &'a [(&'a str, &'a str)],
-    /// Folders that `#include` searches, in order.
+    /// Folders that `#include` searches, in order. Default: empty.
     pub include_dirs: &'a [&'a Path],
-    /// Macros defined before the text: name and replacement (may be empty). Ignored for SPIR-V.
+    /// Macros defined before the text: name and replacement (may be empty). Ignored for SPIR-V. Default: empty.
     pub defines: &'a [(&'a str, &'a str)],
     /// Embeds the text and its includes in the module (`OpSource`), for frame and shader debuggers. Ignored for SPIR-V.
-    /// Line numbers are not embedded: the compiler's crate does not provide them.
+    /// Line numbers are not embedded: the compiler's crate does not provide them. Default: false.
     pub debug_info: bool,
-    /// Name shown in errors and by debugging tools.
+    /// Name shown in errors and by debugging tools. Default: `"shader module"`.
     pub debug_name: &'a str,
 }
 

@@ -81,15 +81,15 @@ impl ColorSpace {
 /// HDR metadata of images in [`ColorSpace::Hdr10`] or brighter than white, for the display (`VkHdrMetadataEXT`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HdrMetadata {
-    /// CIE 1931 chromaticities of red, green and blue of the mastering display.
+    /// CIE 1931 chromaticities of red, green and blue of the mastering display. Default: those of BT.2020.
     pub primaries: [[f32; 2]; 3],
-    /// CIE 1931 chromaticity of the white point of the mastering display.
+    /// CIE 1931 chromaticity of the white point of the mastering display. Default: `[0.3127, 0.3290]`, D65.
     pub white_point: [f32; 2],
-    /// Minimum and maximum luminance of the mastering display, in cd/m².
+    /// Minimum and maximum luminance of the mastering display, in cd/m². Default: `[0.001, 1000.0]`.
     pub luminance: [f32; 2],
-    /// Maximum luminance of any pixel of all images, in cd/m².
+    /// Maximum luminance of any pixel of all images, in cd/m². Default: 1000.
     pub max_content_light_level: f32,
-    /// Maximum of the average luminance of an image, in cd/m².
+    /// Maximum of the average luminance of an image, in cd/m². Default: 400.
     pub max_frame_average_light_level: f32,
 }
 
@@ -125,24 +125,24 @@ impl HdrMetadata {
 #[derive(Debug, Clone)]
 pub struct SwapchainDesc<'a> {
     /// The window; `None` for the window of the context ([`ContextDesc::window`](crate::ContextDesc)). The swapchain
-    /// keeps the window alive. A window has one swapchain.
+    /// keeps the window alive. A window has one swapchain. Default: none.
     pub window: Option<Arc<dyn WindowHandles>>,
     /// Width and height of the window in pixels. The size reported by the window system takes precedence; Wayland
-    /// leaves the size to the application. A 0 means that the window is minimised.
+    /// leaves the size to the application. A 0 means that the window is minimised. Default: `[640, 480]`.
     pub extent: [u32; 2],
-    /// Requested present modes. The first supported one is used, or [`PresentMode::Fifo`] if none is.
+    /// Requested present modes. The first supported one is used, or [`PresentMode::Fifo`] if none is. Default: empty.
     pub present_modes: &'a [PresentMode],
     /// Requested colour spaces. The first supported one is used. If none is, [`ColorSpace::Srgb`] and then
-    /// [`ColorSpace::SrgbEncoded`] are tried.
+    /// [`ColorSpace::SrgbEncoded`] are tried. Default: empty.
     pub color_spaces: &'a [ColorSpace],
-    /// HDR metadata for the display, if the device can set them.
+    /// HDR metadata for the display, if the device can set them. Default: none.
     pub hdr: Option<HdrMetadata>,
-    /// Uses of the images, besides copies.
+    /// Uses of the images, besides copies. Default: [`TextureUsage::TARGET`].
     pub usage: TextureUsage,
     /// Number of images, clamped to the supported range. With 0 the library chooses: one more than the window system
-    /// needs itself, and at least three for [`PresentMode::Mailbox`].
+    /// needs itself, and at least three for [`PresentMode::Mailbox`]. Default: 0.
     pub image_count: u32,
-    /// Name in error messages, validation messages and debuggers.
+    /// Name in error messages, validation messages and debuggers. Default: `"swapchain"`.
     pub debug_name: &'a str,
 }
 

@@ -3,6 +3,7 @@
 mod android;
 mod circles;
 mod contributing;
+mod defaults;
 mod docstrings;
 mod examples;
 mod features;

@@ -39,6 +39,7 @@ fn impossible_shapes_are_typed_errors() {
         TextureDesc { usage: TextureUsage::empty(), ..Default::default() },
         TextureDesc { data: Some(&[0; 3]), ..Default::default() },
         TextureDesc { kind: cube, data: Some(&[0; 4]), ..Default::default() },
+        TextureDesc { extent: [2, 1], data: Some(&[0; 8]), generate_mips: true, ..Default::default() },
     ];
     for (index, desc) in wrong.into_iter().enumerate() {
         let error = make(desc);

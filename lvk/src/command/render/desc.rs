@@ -174,34 +174,37 @@ impl DepthAttachment {
 /// Describes a render pass.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RenderPassDesc<'a> {
-    /// Colour targets, in the order of the shaders' outputs.
+    /// Colour targets, in the order of the shaders' outputs. Default: empty.
     pub color: &'a [ColorAttachment],
-    /// Depth and stencil target.
+    /// Depth and stencil target. Default: none.
     pub depth: Option<DepthAttachment>,
     /// Number of layers drawn to in each target, from the target's own first on; 0 and 1 both mean one. Draws choose
     /// their layer by `gl_Layer`, in the geometry and mesh stages, and with
     /// [`OptionalFeature::ShaderOutputLayer`](crate::OptionalFeature::ShaderOutputLayer) in the vertex stage.
+    /// Default: 0.
     pub layers: u32,
     /// Views that each draw renders at once, a bit for each: bit `i` draws to layer `i` of each target, counted from
     /// the target's own first. Shaders read the view from `gl_ViewIndex` (`#extension GL_EXT_multiview`). 0 for a pass
     /// without views. Needs [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview); at most
-    /// [`Limits::max_views`](crate::Limits::max_views).
+    /// [`Limits::max_views`](crate::Limits::max_views). Default: 0.
     pub view_mask: u32,
     /// The pixels that are loaded, cleared, drawn and stored: x, y, width and height. `None` for all pixels.
+    /// Default: none.
     pub area: Option<[u32; 4]>,
     /// True if fragment shaders read the targets that have [`TextureUsage::INPUT`](crate::TextureUsage::INPUT). Each
     /// reads the results of earlier draws of the pass at its own pixel (`LVK_INPUT`, `LVK_DEPTH_INPUT`,
     /// `LVK_STENCIL_INPUT` and `subpassLoad`). Needs [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
+    /// Default: false.
     pub local_read: bool,
     /// Texture of shading rates. Pipelines combine their own [`shading_rate`](crate::RenderPipelineDesc::shading_rate)
-    /// with it.
+    /// with it. Default: none.
     pub shading_rate: Option<ShadingRateAttachment>,
     /// Resources that the pass's shaders access bindlessly, and resources that its draws read and that were written
     /// earlier in the same command buffer. No barrier can be recorded inside a pass. Acceleration structures need not
-    /// be listed.
+    /// be listed. Default: empty.
     pub dependencies: Dependencies<'a>,
-    /// Name of the pass in debuggers; empty for none.
+    /// Name of the pass in debuggers; empty for none. Default: empty.
     pub debug_name: &'a str,
-    /// Colour of the pass in debuggers, as [`Label::color`](crate::Label::color).
+    /// Colour of the pass in debuggers, as [`Label::color`](crate::Label::color). Default: four zeros.
     pub debug_color: [f32; 4],
 }

@@ -42,10 +42,11 @@ impl ShadingRateCombiner {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ShadingRate {
     /// Width and height in pixels, each 1, 2 or 4: one of [`Context::shading_rates`](crate::Context::shading_rates).
+    /// Default: `[1, 1]`.
     pub size: [u32; 2],
-    /// Combiner of the pipeline's rate with the primitive's rate.
+    /// Combiner of the pipeline's rate with the primitive's rate. Default: [`ShadingRateCombiner::Keep`].
     pub primitive: ShadingRateCombiner,
-    /// Combiner of that result with the attachment's rate.
+    /// Combiner of that result with the attachment's rate. Default: [`ShadingRateCombiner::Keep`].
     pub attachment: ShadingRateCombiner,
 }
 

@@ -11,9 +11,9 @@ use super::messenger::c_name;
 /// A name alone is a label without a colour: calls that take `impl Into<Label>` take a `&str`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Label<'a> {
-    /// The text.
+    /// The text. Default: empty.
     pub name: &'a str,
-    /// Red, green, blue and alpha from 0 to 1. Tools ignore four zeros.
+    /// Red, green, blue and alpha from 0 to 1. Tools ignore four zeros. Default: four zeros.
     pub color: [f32; 4],
 }
 

@@ -9,7 +9,9 @@ use ash::vk;
 use crate::error::readable::{char_start, readable_text};
 use crate::lock_order::{Guard, Mutex, Rank};
 
-/// Checks of the validation layer. The layer must be installed; see [`ValidationMode::Standard`].
+/// Checks of the validation layer, which must be installed for all modes but [`Off`](ValidationMode::Off): from the
+/// Vulkan SDK, or from the package of the distribution. The environment variable `VK_ADD_LAYER_PATH` names the folder
+/// of a layer that is installed elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ValidationMode {
     /// No layer is loaded.

@@ -57,6 +57,10 @@ impl FeatureChain {
     /// extensions, as Vulkan forbids both together; the missing structures of promoted extensions are. Structures
     /// that the library does not know are left alone.
     ///
+    /// Core features may also be given in `pEnabledFeatures`. Without `VkPhysicalDeviceFeatures2` in the chain, the
+    /// result points to a copy of these features in `self`, with those of the library added; the caller's structure is
+    /// not written. Vulkan forbids both together.
+    ///
     /// # Safety
     /// The pointers of `info` are valid for `'a`, those of its chain also for writing. Nothing else accesses the
     /// structures of the chain during the call.

@@ -27,53 +27,53 @@ use crate::gpu::caps::optional_features::FeatureSet;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceProfile {
-    /// Name of the profile, for messages and [`Capabilities::profile`].
+    /// Name of the profile, for messages and [`Capabilities::profile`]. Default: `"custom"`.
     pub name: Cow<'static, str>,
-    /// True if ray tracing pipelines may be used.
+    /// True if ray tracing pipelines may be used. Default: true.
     pub ray_tracing_pipeline: bool,
-    /// True if ray queries may be used.
+    /// True if ray queries may be used. Default: true.
     pub ray_query: bool,
-    /// True if vertex positions of hit triangles may be fetched.
+    /// True if vertex positions of hit triangles may be fetched. Default: true.
     pub position_fetch: bool,
-    /// True if task and mesh shaders may be used.
+    /// True if task and mesh shaders may be used. Default: true.
     pub mesh_shader: bool,
-    /// Optional features that are hidden.
+    /// Optional features that are hidden. Default: [`FeatureSet::NONE`].
     pub hidden: FeatureSet,
-    /// Minimum alignment of scratch addresses in bytes, rounded up to a power of two.
+    /// Minimum alignment of scratch addresses in bytes, rounded up to a power of two. Default: 1.
     pub min_scratch_alignment: u32,
     /// Maximum size of a storage buffer descriptor in bytes.
     ///
     /// Shaders access the caller's buffers by address, where no device applies this limit. Some devices build
     /// acceleration structures through such descriptors. Their acceleration structures and build scratch are
-    /// bound by it, so it tightens the next two limits too.
+    /// bound by it, so it tightens the next two limits too. Default: `u64::MAX`.
     pub max_storage_buffer_range: u64,
     /// Maximum size of one acceleration structure in bytes. Meshes that need more are split into several BLAS; a
-    /// larger TLAS is refused.
+    /// larger TLAS is refused. Default: `u64::MAX`.
     pub max_accel_structure_bytes: u64,
     /// Maximum scratch size of one build in bytes. Meshes beyond it are split, and a TLAS beyond it is
-    /// refused.
+    /// refused. Default: `u64::MAX`.
     pub max_accel_scratch_bytes: u64,
-    /// Maximum shared memory of a compute, task or mesh workgroup in bytes.
+    /// Maximum shared memory of a compute, task or mesh workgroup in bytes. Default: `u32::MAX`.
     pub max_shared_bytes: u32,
-    /// Maximum number of invocations of a compute workgroup, and along each of its axes.
+    /// Maximum number of invocations of a compute workgroup, and along each of its axes. Default: `u32::MAX`.
     pub max_workgroup_invocations: u32,
-    /// Maximum size of push constants in bytes.
+    /// Maximum size of push constants in bytes. Default: `u32::MAX`.
     pub max_push_constant_bytes: u32,
-    /// Maximum width and height of 2D and cube textures and of render targets, in texels.
+    /// Maximum width and height of 2D and cube textures and of render targets, in texels. Default: `u32::MAX`.
     pub max_texture_side: u32,
-    /// Maximum number of textures of a context.
+    /// Maximum number of textures of a context. Default: `u32::MAX`.
     pub max_textures: u32,
-    /// Maximum number of samplers of a context.
+    /// Maximum number of samplers of a context. Default: `u32::MAX`.
     pub max_samplers: u32,
-    /// Minimum alignment of vertex strides in bytes, rounded up to a power of two.
+    /// Minimum alignment of vertex strides in bytes, rounded up to a power of two. Default: 1.
     pub min_vertex_stride_alignment: u32,
-    /// Maximum number of primitives in one BLAS.
+    /// Maximum number of primitives in one BLAS. Default: `u64::MAX`.
     pub max_blas_primitives: u64,
     /// Minimum BLAS size in bytes per primitive. It replaces a smaller driver value; 0 keeps the driver's
-    /// value.
+    /// value. Default: 0.
     pub structure_bytes_per_primitive: u64,
     /// Minimum BLAS build scratch in bytes per primitive. It replaces a smaller driver value; 0 keeps the
-    /// driver's value.
+    /// driver's value. Default: 0.
     pub scratch_bytes_per_primitive: u64,
 }
 
