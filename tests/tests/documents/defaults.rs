@@ -233,16 +233,16 @@ fn results_are_structs_with_a_derived_default() {
 mod tests {
     use super::*;
 
-    fn of(text: &str) -> Vec<String> {
+    fn complaints_about(text: &str) -> Vec<String> {
         complaints("a.rs", text, &HashMap::from([("Filter".to_owned(), "Linear".to_owned())]))
     }
 
     fn derived(field: &str) -> Vec<String> {
-        of(&format!("#[derive(Debug, Default)]\npub struct A {{\n{field}\n}}\n"))
+        complaints_about(&format!("#[derive(Debug, Default)]\npub struct A {{\n{field}\n}}\n"))
     }
 
     #[test]
-    fn missing_and_wrong_defaults_of_derives_are_found() {
+    fn missing_and_wrong_defaults_of_derives_are_refused() {
         assert_eq!(derived("    /// Width. Default: 0.\n    pub a: u32,"), Vec::<String>::new());
         assert_eq!(
             derived("    /// Name. Default: empty, no name.\n    pub a: &'a str,"),
@@ -267,12 +267,14 @@ mod tests {
     fn written_values_are_compared() {
         let head = "pub struct A<'a> {\n    /// Side. Default: 2.\n    pub a: f32,\n}\n";
         let with = |value: &str| {
-            of(&format!("{head}\nimpl Default for A<'_> {{\n Self {{ b: [1, 2], a: {value} }}\n}}\n"))
+            complaints_about(&format!(
+                "{head}\nimpl Default for A<'_> {{\n Self {{ b: [1, 2], a: {value} }}\n}}\n"
+            ))
         };
         assert_eq!(with("2.0"), Vec::<String>::new());
         assert_eq!(with("side()"), Vec::<String>::new());
         assert_eq!(with("3.0"), ["a.rs: A::a says \"2\" in place of \"3\""]);
-        assert_eq!(of(head), ["a.rs: A::a says a default, but callers have none"]);
+        assert_eq!(complaints_about(head), ["a.rs: A::a says a default, but callers have none"]);
     }
 
     #[test]
