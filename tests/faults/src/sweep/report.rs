@@ -133,5 +133,5 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
 
 fn last_lines(text: &str) -> String {
     let lines: Vec<&str> = text.trim().lines().collect();
-    lines[lines.len().saturating_sub(6)..].join("\n")
+    lines[lines.len().saturating_sub(4)..].join("\n")
 }

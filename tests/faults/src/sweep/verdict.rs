@@ -138,10 +138,15 @@ fn judge_result(
     }
 }
 
-/// True if the error names the command that failed, or the object whose window is gone.
+/// True if the error names the command that failed, or the object whose window is gone. A fault that stays may be met
+/// by another command first, where the library goes on without the one that failed.
 fn names_cause(error: &str, fault: &Fault) -> bool {
-    error.contains(&fault.command)
-        || fault.error == FaultError::SurfaceLost && error.contains("its window is gone")
+    let names = |command: &str| error.contains(command);
+    names(&fault.command)
+        || fault.stays && names("vk")
+        || fault.error == FaultError::SurfaceLost && names("its window is gone")
+        // The loader calls it while it creates a device.
+        || fault.command == "vkEnumerateDeviceExtensionProperties" && names("vkCreateDevice")
 }
 
 #[cfg(test)]
