@@ -74,11 +74,14 @@ impl FromStr for Fault {
     fn from_str(text: &str) -> Result<Self, NoFault> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let parsed = match *words {
-            [command, call, error, stays @ ("once" | "stays")] => call
-                .parse()
-                .ok()
-                .zip(FaultError::named(error))
-                .map(|(call, error)| Self { command: command.to_owned(), call, error, stays: stays == "stays" }),
+            [command, call, error, stays @ ("once" | "stays")] => {
+                call.parse().ok().zip(FaultError::named(error)).map(|(call, error)| Self {
+                    command: command.to_owned(),
+                    call,
+                    error,
+                    stays: stays == "stays",
+                })
+            }
             _ => None,
         };
         parsed.ok_or_else(|| NoFault(text.to_owned()))
@@ -102,8 +105,13 @@ mod tests {
 
     #[test]
     fn other_texts_are_refused() {
-        for text in ["", "vkCreateBuffer", "vkCreateBuffer x host-memory once", "vkCreateBuffer 1 rain once", "a 1 device-lost ever"]
-        {
+        for text in [
+            "",
+            "vkCreateBuffer",
+            "vkCreateBuffer x host-memory once",
+            "vkCreateBuffer 1 rain once",
+            "a 1 device-lost ever",
+        ] {
             assert!(text.parse::<Fault>().unwrap_err().to_string().starts_with(&format!("'{text}'")));
         }
     }

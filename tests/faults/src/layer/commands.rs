@@ -39,19 +39,33 @@ pub(super) struct Command {
 }
 
 macro_rules! creates {
-    () => { Creates::Nothing };
-    ($kind:literal) => { Creates::One($kind) };
-    ($kind:literal $count:literal) => { Creates::Many($kind, $count) };
+    () => {
+        Creates::Nothing
+    };
+    ($kind:literal) => {
+        Creates::One($kind)
+    };
+    ($kind:literal $count:literal) => {
+        Creates::Many($kind, $count)
+    };
 }
 
 macro_rules! alias {
-    () => { None };
-    ($alias:literal) => { Some($alias) };
+    () => {
+        None
+    };
+    ($alias:literal) => {
+        Some($alias)
+    };
 }
 
 macro_rules! answers {
-    () => { 0 };
-    ($answers:expr) => { $answers };
+    () => {
+        0
+    };
+    ($answers:expr) => {
+        $answers
+    };
 }
 
 /// Declares the list of commands: type of the function, number of arguments, and what else differs from command to command.

@@ -13,7 +13,9 @@ pub(super) static COMMANDS: LazyLock<Vec<Command>> = LazyLock::new(commands);
 static NUMBERS: LazyLock<HashMap<&'static str, usize>> = LazyLock::new(|| {
     let names = COMMANDS.iter().enumerate();
     names
-        .flat_map(|(number, command)| [Some((command.name, number)), command.alias.map(|name| (name, number))])
+        .flat_map(|(number, command)| {
+            [Some((command.name, number)), command.alias.map(|name| (name, number))]
+        })
         .flatten()
         .collect()
 });

@@ -96,8 +96,12 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
     let (clean, calls) = run(program, &layer, caches.path(), None)?;
     let commands: BTreeSet<_> = calls.iter().map(|call| &call.command).collect();
     let faults = plan.faults(&calls);
-    let mut report =
-        SweepReport { calls: calls.len(), commands: commands.len(), planned: faults.len(), ..Default::default() };
+    let mut report = SweepReport {
+        calls: calls.len(),
+        commands: commands.len(),
+        planned: faults.len(),
+        ..Default::default()
+    };
     let mut flaws_of_clean = flaws(None, &clean, &clean);
     if clean.ending != Ending::Status(0) || calls.is_empty() {
         flaws_of_clean.push(Flaw::WrongResult);

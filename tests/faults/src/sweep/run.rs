@@ -96,7 +96,11 @@ pub fn run(
     let mut command = Command::new(&program.path);
     command.arg(&out).args(&program.args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
     command.env("XDG_DATA_HOME", layer.folder.path()).env("LVK_FAULT_LAYER", "1");
-    command.env("LVK_CACHE", &used).env(LOG_VARIABLE, &log).env_remove(FAULT_VARIABLE).env_remove(AGAIN_VARIABLE);
+    command
+        .env("LVK_CACHE", &used)
+        .env(LOG_VARIABLE, &log)
+        .env_remove(FAULT_VARIABLE)
+        .env_remove(AGAIN_VARIABLE);
     command.envs(program.variables.iter().map(|(name, value)| (name, value)));
     if let Some(fault) = fault {
         command.env(FAULT_VARIABLE, fault.to_string());

@@ -2,8 +2,9 @@
 
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags,
-    ComputePipelineDesc, Context, ContextDesc, Dependencies, DeviceProfile, Holder, RayQueryRequest, ShaderModuleDesc,
-    ShaderSource, ShaderStage, TextureDesc, TextureRegion, TextureUsage, TlasDesc, TlasInstance, Triangles,
+    ComputePipelineDesc, Context, ContextDesc, Dependencies, DeviceProfile, Holder, RayQueryRequest,
+    ShaderModuleDesc, ShaderSource, ShaderStage, TextureDesc, TextureRegion, TextureUsage, TlasDesc,
+    TlasInstance, Triangles,
 };
 
 use crate::{Failure, context};
@@ -54,9 +55,9 @@ fn positions(ctx: &Context, half: f32) -> lvk::Result<Holder<BufferHandle>> {
 
 fn batch(ctx: &Context) -> Result<Vec<u8>, Failure> {
     let buffers = [positions(ctx, 0.0)?, positions(ctx, 1.0)?];
-    let geometries = buffers.each_ref().map(|buffer| {
-        [BlasGeometry::Triangles(Triangles::packed(**buffer, 3 * TRIANGLES))]
-    });
+    let geometries = buffers
+        .each_ref()
+        .map(|buffer| [BlasGeometry::Triangles(Triangles::packed(**buffer, 3 * TRIANGLES))]);
     let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_COMPACTION;
     let descs = geometries.each_ref().map(|geometries| BlasDesc {
         geometries,
@@ -84,15 +85,24 @@ fn batch(ctx: &Context) -> Result<Vec<u8>, Failure> {
 /// Returns the pixels of a picture of the structures.
 fn trace(ctx: &Context, blases: &[Holder<AccelStructHandle>]) -> lvk::Result<Vec<u8>> {
     let instances: Vec<_> = blases.iter().map(|blas| TlasInstance::new(**blas)).collect();
-    let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, debug_name: "scene", ..Default::default() })?;
+    let tlas =
+        ctx.create_tlas(&TlasDesc { instances: &instances, debug_name: "scene", ..Default::default() })?;
     let (extent, usage) = ([32, 32], TextureUsage::STORAGE);
-    let image = ctx.create_texture(&TextureDesc { extent, usage, debug_name: "picture", ..Default::default() })?;
+    let image =
+        ctx.create_texture(&TextureDesc { extent, usage, debug_name: "picture", ..Default::default() })?;
     let (stage, source) = (ShaderStage::Compute, ShaderSource::Glsl(TRACE));
-    let module =
-        ctx.create_shader_module(&ShaderModuleDesc { stage, source, debug_name: "trace.comp", ..Default::default() })?;
+    let module = ctx.create_shader_module(&ShaderModuleDesc {
+        stage,
+        source,
+        debug_name: "trace.comp",
+        ..Default::default()
+    })?;
     let module = Some(*module);
-    let pipeline =
-        ctx.create_compute_pipeline(&ComputePipelineDesc { module, debug_name: "trace", ..Default::default() })?;
+    let pipeline = ctx.create_compute_pipeline(&ComputePipelineDesc {
+        module,
+        debug_name: "trace",
+        ..Default::default()
+    })?;
     let mut cmd = ctx.acquire_command_buffer()?;
     cmd.bind_compute_pipeline(*pipeline)?;
     cmd.push_constants(&[tlas.index(), image.index()])?;

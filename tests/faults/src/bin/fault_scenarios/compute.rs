@@ -1,8 +1,8 @@
 //! Compute steps that scenarios share: each reads one buffer of words and writes another.
 
 use lvk::{
-    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies,
-    Holder, Result, ShaderModuleDesc, ShaderSource, ShaderStage,
+    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
+    Dependencies, Holder, Result, ShaderModuleDesc, ShaderSource, ShaderStage,
 };
 
 /// Words of a buffer.
@@ -28,8 +28,12 @@ struct Push {
 /// Creates the pipeline of a step.
 pub(crate) fn step_pipeline(ctx: &Context) -> Result<Holder<ComputePipelineHandle>> {
     let (stage, source) = (ShaderStage::Compute, ShaderSource::Glsl(STEP));
-    let module =
-        ctx.create_shader_module(&ShaderModuleDesc { stage, source, debug_name: "step.comp", ..Default::default() })?;
+    let module = ctx.create_shader_module(&ShaderModuleDesc {
+        stage,
+        source,
+        debug_name: "step.comp",
+        ..Default::default()
+    })?;
     let module = Some(*module);
     ctx.create_compute_pipeline(&ComputePipelineDesc { module, debug_name: "step", ..Default::default() })
 }

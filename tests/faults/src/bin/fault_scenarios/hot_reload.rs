@@ -4,12 +4,13 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
+use lvk_dev_driver::{DriverRequest, prepare};
 use lvk::{
-    BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, ContextDesc, Dependencies, Holder, Reloadable, ShaderFiles,
-    ShaderModuleDesc, ShaderStage,
+    BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, ContextDesc, Dependencies, Holder,
+    Reloadable, ShaderFiles, ShaderModuleDesc, ShaderStage,
 };
 
-use crate::{Failure, context};
+use crate::Failure;
 
 const TEXT: &str = "
     #include \"value.glsl\"
@@ -24,7 +25,9 @@ pub(crate) fn reload() -> Result<Vec<u8>, Failure> {
     let (path, value) = (folder.path().join("write.comp.glsl"), folder.path().join("value.glsl"));
     fs::write(&path, TEXT)?;
     fs::write(&value, "#define VALUE 7")?;
-    let ctx = context(ContextDesc::default())?;
+    let driver = prepare(&DriverRequest::default())?;
+    // Without a cache of shaders, as the texts lie in another folder in each run.
+    let ctx = Context::new(&ContextDesc { vulkan_library: driver.loader.as_deref(), ..Default::default() })?;
     let mut pipeline =
         Reloadable::new(&ctx, move |ctx, files| create(ctx, files, &path))?.with_period(Duration::ZERO);
     let mut words = written(&ctx, **pipeline)?;
@@ -45,7 +48,8 @@ fn create(ctx: &Context, files: &ShaderFiles, path: &Path) -> lvk::Result<Holder
 }
 
 fn written(ctx: &Context, pipeline: ComputePipelineHandle) -> lvk::Result<Vec<u8>> {
-    let buffer = ctx.create_buffer(&BufferDesc { size_bytes: 4, debug_name: "word", ..Default::default() })?;
+    let buffer =
+        ctx.create_buffer(&BufferDesc { size_bytes: 4, debug_name: "word", ..Default::default() })?;
     let mut cmd = ctx.acquire_command_buffer()?;
     cmd.bind_compute_pipeline(pipeline)?;
     cmd.push_constants(&buffer.address()?)?;

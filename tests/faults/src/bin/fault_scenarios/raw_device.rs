@@ -80,8 +80,7 @@ pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
         let raw = engine.raw.create_device(physical, &info, None).map_err(in_call("vkCreateDevice"))?;
         let device = EngineDevice { raw };
         let done = EngineSemaphore::new(&device.raw)?;
-        let ctx =
-            Context::from_raw(needs.raw_context(device.raw.clone(), needs.queues(&device.raw)), &desc)?;
+        let ctx = Context::from_raw(needs.raw_context(device.raw.clone(), needs.queues(&device.raw)), &desc)?;
         let words = step(&ctx, &device.raw, done.raw);
         let idle = ctx.wait_idle();
         drop(ctx);
