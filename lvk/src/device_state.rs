@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use ash::vk;
 
@@ -339,7 +340,7 @@ impl DeviceState {
 impl Drop for DeviceState {
     fn drop(&mut self) {
         // SAFETY: no command buffer is being recorded or submitted: each holds a reference to `self`.
-        let idle = unsafe { self.gpu.device.device_wait_idle() };
+        let idle = persistent_wait(|| unsafe { self.gpu.device.device_wait_idle() }, std::thread::sleep);
         // The caller has the report of a loss.
         if let Err(result) = idle
             && self.submitter.loss().get().is_none()
@@ -348,5 +349,50 @@ impl Drop for DeviceState {
         }
         drop(self.submitter.drain());
         self.free_leaked_objects();
+    }
+}
+
+/// Waits for the device. A wait that fails for want of memory is tried again for about a second: objects that the device
+/// still uses must not be destroyed, and the work that is under way ends in the meantime.
+fn persistent_wait(
+    mut wait: impl FnMut() -> Result<(), vk::Result>,
+    mut pause: impl FnMut(Duration),
+) -> Result<(), vk::Result> {
+    const PAUSE: Duration = Duration::from_millis(20);
+    const TRIES: usize = 50;
+    for _ in 0..TRIES {
+        match wait() {
+            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) => {
+                pause(PAUSE)
+            }
+            ended => return ended,
+        }
+    }
+    wait()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the results of the wait, and the number of pauses, for a wait that gives these results, the last for good.
+    fn waited(results: &[Result<(), vk::Result>]) -> (Result<(), vk::Result>, usize) {
+        let (mut calls, mut pauses) = (0, 0);
+        let wait = || {
+            calls += 1;
+            results[(calls - 1).min(results.len() - 1)]
+        };
+        (persistent_wait(wait, |_| pauses += 1), pauses)
+    }
+
+    #[test]
+    fn a_wait_that_lacks_memory_is_tried_again() {
+        let (host, device) =
+            (Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY), Err(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY));
+        assert_eq!(waited(&[Ok(())]), (Ok(()), 0));
+        assert_eq!(waited(&[host, device, Ok(())]), (Ok(()), 2));
+        assert_eq!(waited(&[host]), (host, 50));
+        let lost = Err(vk::Result::ERROR_DEVICE_LOST);
+        assert_eq!(waited(&[device, lost]), (lost, 1), "no wait brings a lost device back");
     }
 }

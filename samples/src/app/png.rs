@@ -1,10 +1,17 @@
 //! Writes pictures so that a file is either complete or not there.
 
+use std::ffi::OsStr;
+use std::hash::{BuildHasher, RandomState};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, SystemTime};
 
 use lvk::{readable_name, regular_file};
+
+/// Age from which a file in part is a leftover of a process that was killed. A write takes seconds.
+const LEFTOVER_AGE: Duration = Duration::from_secs(3600);
 
 /// Errors of writing an image.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +74,7 @@ pub fn check_not_input(path: &Path, option: &'static str, input: &Path) -> Resul
 }
 
 /// Checks that a picture can be written to `path` later, without leaving anything behind. An existing file at
-/// `path` is not touched.
+/// `path` is not touched. Files in part that killed processes left in its folder more than an hour ago are removed.
 ///
 /// # Errors
 /// [`PngError::Unwritable`], and [`PngError::NotPng`] for a name that does not end in `.png`, in whatever case.
@@ -82,6 +89,7 @@ pub fn check_writable(path: &Path) -> Result<(), PngError> {
     if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(PngError::NotPng { path: path.into() });
     }
+    remove_leftovers(path);
     Partial::create(path).map(drop).map_err(unwritable)
 }
 
@@ -140,17 +148,9 @@ struct Partial {
 
 impl Partial {
     fn create(target: &Path) -> std::io::Result<Self> {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        loop {
-            let number = COUNT.fetch_add(1, Ordering::Relaxed);
-            let path = target.with_file_name(format!(".lvk-{}-{number}.partial", std::process::id()));
-            match std::fs::File::create_new(&path) {
-                Ok(file) => return Ok(Self { path, file }),
-                // An earlier process of this number was killed.
-                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(error),
-            }
-        }
+        let path = target.with_file_name(partial_name());
+        let file = std::fs::File::create_new(&path)?;
+        Ok(Self { path, file })
     }
 
     fn complete(mut self, content: &[u8], target: &Path) -> std::io::Result<()> {
@@ -164,6 +164,42 @@ impl Drop for Partial {
     fn drop(&mut self) {
         // After the renaming there is nothing left to remove.
         let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// Returns a name that no other process uses: containers that share a folder may have equal process numbers, so a random
+/// number takes their place.
+fn partial_name() -> String {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
+    format!(".lvk-{:016x}-{}.partial", *PROCESS, COUNT.fetch_add(1, Ordering::Relaxed))
+}
+
+/// True if `name` is that of a file in part, of this or of an earlier version.
+fn is_partial(name: &OsStr) -> bool {
+    let name = name.to_str().unwrap_or_default();
+    let unique = name.strip_prefix(".lvk-").and_then(|name| name.strip_suffix(".partial"));
+    unique
+        .and_then(|unique| unique.split_once('-'))
+        .is_some_and(|parts| [parts.0, parts.1].iter().all(|part| is_hexadecimal(part)))
+}
+
+fn is_hexadecimal(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+/// Removes the files in part that killed processes left beside `target`. Files of the last hour stay, since another
+/// process may be writing them. Errors are ignored: the next start tries again.
+fn remove_leftovers(target: &Path) {
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let Ok(entries) = std::fs::read_dir(folder.unwrap_or(Path::new("."))) else { return };
+    let now = SystemTime::now();
+    for entry in entries.flatten().filter(|entry| is_partial(&entry.file_name())) {
+        let written = entry.metadata().and_then(|data| data.modified());
+        let age = written.ok().and_then(|written| now.duration_since(written).ok());
+        if age.is_some_and(|age| age > LEFTOVER_AGE) {
+            let _ = std::fs::remove_file(entry.path());
+        }
     }
 }
 
@@ -192,6 +228,33 @@ mod tests {
         let read = image::open(&path).unwrap().into_rgba8();
         assert_eq!((read.dimensions(), read.into_raw()), ((3, 2), pixels));
         assert_eq!(files(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn only_old_files_in_part_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let create = |name: &str, seconds: u64| {
+            let file = std::fs::File::create(folder.path().join(name)).unwrap();
+            file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
+        };
+        for name in [".lvk-12-3.partial", ".lvk-00ff00ff00ff00ff-0.partial"] {
+            create(name, 9000);
+        }
+        let kept = [".lvk-12-4.partial", ".lvk-12.partial", ".lvk-my-notes.partial", "lvk-12-3.partial"];
+        for (name, seconds) in kept.into_iter().zip([60, 9000, 9000, 9000]) {
+            create(name, seconds);
+        }
+        check_writable(&folder.path().join("a.png")).unwrap();
+        assert_eq!(files(folder.path()), kept);
+        remove_leftovers(&folder.path().join("absent/a.png"));
+    }
+
+    #[test]
+    fn names_of_files_in_part_differ_and_are_recognised() {
+        let names = [partial_name(), partial_name()];
+        assert_ne!(names[0], names[1]);
+        assert!(names.iter().all(|name| is_partial(OsStr::new(name))), "{names:?}");
+        assert!(!names[0].contains(&format!("-{}-", std::process::id())));
     }
 
     #[cfg(unix)]

@@ -1,0 +1,95 @@
+//! Runs one scenario in which a Vulkan call may fail: `fault_scenarios FOLDER NAME ARGUMENTS...`.
+//!
+//! The result is written to the folder. After a failure the scenario is tried again, in the same process, if the
+//! environment says so. Status 0: the first try has succeeded. Status 1: it has failed, with one line `error: ...`.
+
+mod blas;
+mod compute;
+mod hot_reload;
+mod leak;
+mod queues;
+mod raw_device;
+mod threads;
+#[cfg(target_os = "linux")]
+mod window;
+
+use std::error::Error;
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::ExitCode;
+
+use lvk::{Context, ContextDesc};
+use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_samples::catalogue::run_line;
+use winit::event_loop::EventLoop;
+
+/// Error of a scenario.
+type Failure = Box<dyn Error + Send + Sync>;
+
+/// A scenario that returns its result as bytes.
+type Scenario = fn() -> Result<Vec<u8>, Failure>;
+
+/// Names of the results, as the crate's library expects them.
+const RESULTS: [&str; 2] = ["first.png", "second.png"];
+
+fn scenario(name: &str) -> Option<Scenario> {
+    Some(match name {
+        "blas" => blas::on_device,
+        "blas_software" => blas::in_software,
+        "threads" => threads::eight,
+        "queues" => queues::three,
+        "raw_device" => raw_device::guest,
+        "hot_reload" => hot_reload::reload,
+        "leak" => leak::forgotten_fence,
+        #[cfg(target_os = "linux")]
+        "window" => window::frames_and_resize,
+        _ => return None,
+    })
+}
+
+/// Creates the context of a scenario, with caches in the folder `LVK_CACHE`.
+fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
+    let driver = prepare(&DriverRequest::default())?;
+    let caches = std::env::var_os("LVK_CACHE").map(std::path::PathBuf::from);
+    let pipelines = caches.as_ref().map(|folder| folder.join("pipelines"));
+    Ok(Context::new(&ContextDesc {
+        application_name: "faults",
+        vulkan_library: driver.loader.as_deref(),
+        pipeline_cache: pipelines.as_deref(),
+        shader_cache: caches.as_deref(),
+        tree_cache: caches.as_deref(),
+        ..desc
+    })?)
+}
+
+/// Runs a scenario of this program, or the sample of this name.
+fn attempt(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
+    let Some(scenario) = scenario(name) else {
+        let mut words: Vec<OsString> = args.iter().map(OsString::from).collect();
+        words.extend([OsString::from("--out"), result.into()]);
+        return match run_line(name, words, &mut EventLoop::builder()) {
+            ExitCode::SUCCESS => Ok(()),
+            status => Err(status),
+        };
+    };
+    let written = scenario().and_then(|bytes| Ok(std::fs::write(result, bytes)?));
+    written.map_err(|error| {
+        eprintln!("error: {error}");
+        ExitCode::FAILURE
+    })
+}
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let [folder, name, args @ ..] = &*words else {
+        eprintln!("error: write FOLDER NAME ARGUMENTS...");
+        return ExitCode::from(2);
+    };
+    let [first, second] = RESULTS.map(|result| Path::new(folder).join(result));
+    let Err(status) = attempt(name, args, &first) else { return ExitCode::SUCCESS };
+    if std::env::var_os("LVK_FAULT_AGAIN").is_some() {
+        // The result of the second try says how it went.
+        let _ = attempt(name, args, &second);
+    }
+    status
+}

@@ -1,0 +1,30 @@
+//! Work that goes from queue to queue.
+
+use lvk::{ContextDesc, Queue, QueueRequest};
+
+use crate::compute::{WORDS, read_words, record_step, step_pipeline, words_buffer};
+use crate::{Failure, context};
+
+/// Steps on the graphics and the compute queue, copies on the transfer queue. Returns the words of three buffers.
+pub(crate) fn three() -> Result<Vec<u8>, Failure> {
+    let ctx = context(ContextDesc { queues: QueueRequest::Emulated, ..Default::default() })?;
+    let pipeline = step_pipeline(&ctx)?;
+    let buffers = [words_buffer(&ctx, 1)?, words_buffer(&ctx, 2)?, words_buffer(&ctx, 3)?];
+    for round in 0..3 {
+        for (place, queue) in (0..).zip(Queue::ALL) {
+            let pair = [*buffers[place % 3], *buffers[(place + 1) % 3]];
+            let mut cmd = ctx.acquire_command_buffer_on(queue)?;
+            match queue {
+                Queue::Transfer => cmd.copy_buffer(pair[0], 0, pair[1], 0, 4 * WORDS as u64)?,
+                _ => record_step(&ctx, &mut cmd, *pipeline, pair, round)?,
+            }
+            ctx.submit(cmd)?;
+        }
+    }
+    let mut bytes = Vec::new();
+    for buffer in &buffers {
+        bytes.extend(read_words(&ctx, **buffer)?);
+    }
+    ctx.wait_idle()?;
+    Ok(bytes)
+}

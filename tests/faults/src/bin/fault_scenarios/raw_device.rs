@@ -1,0 +1,120 @@
+//! A context on a device that another engine has created.
+
+use lvk::ash::{self, vk};
+use lvk::{Context, ContextDesc, RawSignal};
+use lvk_dev_driver::{DriverRequest, prepare};
+
+use crate::Failure;
+use crate::compute::{read_words, record_step, step_pipeline, words_buffer};
+
+/// Turns an error of the engine's own calls into one that names the command.
+fn in_call(command: &'static str) -> impl Fn(vk::Result) -> Failure {
+    move |result| format!("engine: {command} failed: {result}").into()
+}
+
+/// Instance of the engine, destroyed at the end.
+struct EngineInstance {
+    entry: ash::Entry,
+    raw: ash::Instance,
+}
+
+impl Drop for EngineInstance {
+    fn drop(&mut self) {
+        // SAFETY: the device is destroyed first.
+        unsafe { self.raw.destroy_instance(None) };
+    }
+}
+
+/// Device of the engine, destroyed at the end.
+struct EngineDevice {
+    raw: ash::Device,
+}
+
+impl Drop for EngineDevice {
+    fn drop(&mut self) {
+        // SAFETY: the context and the semaphore are destroyed first.
+        unsafe { self.raw.destroy_device(None) };
+    }
+}
+
+/// Timeline semaphore of the engine, destroyed at the end.
+struct EngineSemaphore<'a> {
+    device: &'a ash::Device,
+    raw: vk::Semaphore,
+}
+
+impl<'a> EngineSemaphore<'a> {
+    fn new(device: &'a ash::Device) -> Result<Self, Failure> {
+        let mut timeline = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut timeline);
+        // SAFETY: the description is valid.
+        let raw = unsafe { device.create_semaphore(&info, None) }.map_err(in_call("vkCreateSemaphore"))?;
+        Ok(Self { device, raw })
+    }
+}
+
+impl Drop for EngineSemaphore<'_> {
+    fn drop(&mut self) {
+        // SAFETY: the engine waits for the device before.
+        unsafe {
+            let _ = self.device.device_wait_idle();
+            self.device.destroy_semaphore(self.raw, None);
+        }
+    }
+}
+
+/// Runs a step on the engine's device; the engine waits for it. Returns the words.
+pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
+    let engine = instance()?;
+    // SAFETY: the instance is alive.
+    let devices =
+        unsafe { engine.raw.enumerate_physical_devices() }.map_err(in_call("vkEnumeratePhysicalDevices"))?;
+    let physical = *devices.first().ok_or("no device")?;
+    let desc = ContextDesc::default();
+    // SAFETY: the handles belong together, and are destroyed after the context and all that it made.
+    unsafe {
+        let needs = Context::requirements(&engine.entry, &engine.raw, &[], physical, &desc)?;
+        let (queues, mut chain) = (needs.queue_create_infos(), needs.feature_chain());
+        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+        let info = chain.merge_into(info)?;
+        let raw = engine.raw.create_device(physical, &info, None).map_err(in_call("vkCreateDevice"))?;
+        let device = EngineDevice { raw };
+        let done = EngineSemaphore::new(&device.raw)?;
+        let ctx = Context::from_raw(needs.raw_context(device.raw.clone(), needs.queues(&device.raw)), &desc)?;
+        let words = step(&ctx, &device.raw, done.raw);
+        let idle = ctx.wait_idle();
+        drop(ctx);
+        let words = words?;
+        idle?;
+        Ok(words)
+    }
+}
+
+fn instance() -> Result<EngineInstance, Failure> {
+    let driver = prepare(&DriverRequest::default())?;
+    let version = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+    let info = vk::InstanceCreateInfo::default().application_info(&version);
+    // SAFETY: the library is a Vulkan loader, and the description is valid.
+    unsafe {
+        let entry = match &driver.loader {
+            Some(path) => ash::Entry::load_from(path)?,
+            None => ash::Entry::load()?,
+        };
+        let raw = entry.create_instance(&info, None).map_err(in_call("vkCreateInstance"))?;
+        Ok(EngineInstance { entry, raw })
+    }
+}
+
+fn step(ctx: &Context, device: &ash::Device, done: vk::Semaphore) -> Result<Vec<u8>, Failure> {
+    let pipeline = step_pipeline(ctx)?;
+    let (from, to) = (words_buffer(ctx, 5)?, words_buffer(ctx, 0)?);
+    let mut cmd = ctx.acquire_command_buffer()?;
+    record_step(ctx, &mut cmd, *pipeline, [*from, *to], 9)?;
+    // SAFETY: the semaphore is of this device, and its value was 0.
+    unsafe { ctx.submit_with(cmd, &[], &[RawSignal { semaphore: done, value: 1 }])? };
+    let semaphores = [done];
+    let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&[1]);
+    // SAFETY: the semaphore is alive.
+    unsafe { device.wait_semaphores(&info, u64::MAX) }.map_err(in_call("vkWaitSemaphores"))?;
+    Ok(read_words(ctx, *to)?)
+}

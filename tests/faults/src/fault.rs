@@ -1,0 +1,118 @@
+//! Faults: the call that fails, and its error.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Errors that a call can be made to answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FaultError {
+    /// `VK_ERROR_OUT_OF_HOST_MEMORY`.
+    HostMemory,
+    /// `VK_ERROR_OUT_OF_DEVICE_MEMORY`.
+    DeviceMemory,
+    /// `VK_ERROR_DEVICE_LOST`. The device stays lost.
+    DeviceLost,
+    /// `VK_ERROR_SURFACE_LOST_KHR`.
+    SurfaceLost,
+    /// `VK_ERROR_OUT_OF_DATE_KHR`.
+    OutOfDate,
+}
+
+impl FaultError {
+    /// Every error.
+    pub const ALL: [Self; 5] =
+        [Self::HostMemory, Self::DeviceMemory, Self::DeviceLost, Self::SurfaceLost, Self::OutOfDate];
+
+    /// Returns the name of the error in logs.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::HostMemory => "host-memory",
+            Self::DeviceMemory => "device-memory",
+            Self::DeviceLost => "device-lost",
+            Self::SurfaceLost => "surface-lost",
+            Self::OutOfDate => "out-of-date",
+        }
+    }
+
+    /// Returns the error of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|error| error.name() == name)
+    }
+}
+
+/// A call that fails. A command and the number of its call stay the same from run to run, where threads change the
+/// order of all calls.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Name of the Vulkan command.
+    pub command: String,
+    /// Number of the call among those of the command, from 1.
+    pub call: u32,
+    /// The error.
+    pub error: FaultError,
+    /// True if all later calls of every command fail, too, as far as the command may answer the error.
+    pub stays: bool,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { command, call, error, stays } = self;
+        write!(out, "{command} {call} {} {}", error.name(), if *stays { "stays" } else { "once" })
+    }
+}
+
+/// A text that describes no fault.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is no fault; write COMMAND CALL ERROR once|stays")]
+pub struct NoFault(String);
+
+impl FromStr for Fault {
+    type Err = NoFault;
+
+    fn from_str(text: &str) -> Result<Self, NoFault> {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let parsed = match *words {
+            [command, call, error, stays @ ("once" | "stays")] => {
+                call.parse().ok().zip(FaultError::named(error)).map(|(call, error)| Self {
+                    command: command.to_owned(),
+                    call,
+                    error,
+                    stays: stays == "stays",
+                })
+            }
+            _ => None,
+        };
+        parsed.ok_or_else(|| NoFault(text.to_owned()))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_come_back_from_their_text() {
+        for error in FaultError::ALL {
+            for stays in [false, true] {
+                let fault = Fault { command: "vkCreateBuffer".into(), call: 3, error, stays };
+                assert_eq!(fault.to_string().parse(), Ok(fault));
+            }
+        }
+    }
+
+    #[test]
+    fn other_texts_are_refused() {
+        for text in [
+            "",
+            "vkCreateBuffer",
+            "vkCreateBuffer x host-memory once",
+            "vkCreateBuffer 1 rain once",
+            "a 1 device-lost ever",
+        ] {
+            assert!(text.parse::<Fault>().unwrap_err().to_string().starts_with(&format!("'{text}'")));
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The functions of the next layer, for each instance and device.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock, PoisonError, RwLock};
+
+use ash::vk;
+
+use super::commands::{Command, commands};
+
+/// Every command that the layer wraps.
+pub(super) static COMMANDS: LazyLock<Vec<Command>> = LazyLock::new(commands);
+static NUMBERS: LazyLock<HashMap<&'static str, usize>> = LazyLock::new(|| {
+    let names = COMMANDS.iter().enumerate();
+    names
+        .flat_map(|(number, command)| {
+            [Some((command.name, number)), command.alias.map(|name| (name, number))]
+        })
+        .flatten()
+        .collect()
+});
+static TABLES: LazyLock<RwLock<HashMap<usize, Arc<Table>>>> = LazyLock::new(RwLock::default);
+
+/// The functions below the layer for one instance or one device.
+pub(super) struct Table {
+    /// Addresses by number of the command; 0 where there is none.
+    next: Vec<usize>,
+    /// `vkGetInstanceProcAddr` or `vkGetDeviceProcAddr` of the next layer.
+    pub(super) proc_addr: usize,
+    /// `vkDestroyInstance` or `vkDestroyDevice` of the next layer.
+    pub(super) destroy: usize,
+    /// `vkDeviceWaitIdle` of the next layer, and the device.
+    pub(super) finish: Option<(vk::PFN_vkDeviceWaitIdle, vk::Device)>,
+    /// True for a device that a fault has lost.
+    pub(super) lost: AtomicBool,
+}
+
+impl Table {
+    /// Collects the functions by name.
+    pub(super) fn new(find: impl Fn(&str) -> usize, proc_addr: usize, destroy: &str) -> Self {
+        let next = COMMANDS
+            .iter()
+            .map(|command| match (find(command.name), command.alias) {
+                (0, Some(alias)) => find(alias),
+                (found, _) => found,
+            })
+            .collect();
+        Self { next, proc_addr, destroy: find(destroy), finish: None, lost: AtomicBool::new(false) }
+    }
+
+    /// Loses the device, once it has finished the work that it has.
+    pub(super) fn lose(&self) {
+        if let Some((wait, device)) = self.finish {
+            // SAFETY: the device is alive, as a command of it is being called.
+            let _ = unsafe { wait(device) };
+        }
+        self.lost.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Returns the number of a wrapped command.
+pub(super) fn number_of(name: &str) -> Option<usize> {
+    NUMBERS.get(name).copied()
+}
+
+/// Returns the key of an instance, a physical device, a device, a queue or a command buffer: the loader's dispatch table.
+pub(super) fn key_of(handle: u64) -> usize {
+    // SAFETY: a dispatchable handle points to the pointer to the loader's dispatch table.
+    unsafe { *(handle as usize as *const usize) }
+}
+
+/// Keeps the functions for a new instance or device.
+pub(super) fn insert(handle: u64, table: Table) {
+    let mut tables = TABLES.write().unwrap_or_else(PoisonError::into_inner);
+    tables.insert(key_of(handle), Arc::new(table));
+}
+
+/// Returns the functions for a dispatchable handle.
+pub(super) fn table_of(handle: u64) -> Option<Arc<Table>> {
+    TABLES.read().unwrap_or_else(PoisonError::into_inner).get(&key_of(handle)).cloned()
+}
+
+/// Removes and returns the functions of an instance or a device that ends.
+pub(super) fn remove(handle: u64) -> Option<Arc<Table>> {
+    TABLES.write().unwrap_or_else(PoisonError::into_inner).remove(&key_of(handle))
+}
+
+/// Returns the address of command `number` in the layer below, for a dispatchable handle.
+pub(super) fn next(number: usize, handle: u64) -> Option<usize> {
+    table_of(handle).map(|table| table.next[number]).filter(|address| *address != 0)
+}

@@ -1,0 +1,156 @@
+//! Counts calls and live objects of the process, and says which call fails.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use ash::vk;
+
+use super::commands::{Creates, DATED, LOST, SURFACE};
+use super::dispatch::{COMMANDS, table_of};
+use crate::call_log;
+use crate::fault::{Fault, FaultError};
+
+/// Environment variable with the path of the log.
+pub const LOG_VARIABLE: &str = "LVK_FAULT_LOG";
+/// Environment variable with the [`Fault`].
+pub const FAULT_VARIABLE: &str = "LVK_FAULT";
+
+static INJECTOR: LazyLock<Injector> = LazyLock::new(Injector::from_env);
+
+/// Returns the injector of the process.
+pub(super) fn injector() -> &'static Injector {
+    &INJECTOR
+}
+
+/// State of the layer in one process.
+pub(super) struct Injector {
+    fault: Option<Fault>,
+    log: Option<File>,
+    reached: AtomicBool,
+    counts: Mutex<Counts>,
+}
+
+#[derive(Default)]
+struct Counts {
+    calls: HashMap<&'static str, u32>,
+    live: BTreeMap<&'static str, i64>,
+}
+
+impl Injector {
+    fn from_env() -> Self {
+        let path = std::env::var_os(LOG_VARIABLE);
+        let log = path.and_then(|path| File::options().append(true).create(true).open(path).ok());
+        let fault = std::env::var(FAULT_VARIABLE).ok().and_then(|text| text.parse().ok());
+        Self { fault, log, reached: AtomicBool::new(false), counts: Mutex::default() }
+    }
+
+    fn write(&self, line: &str) {
+        if let Some(mut log) = self.log.as_ref() {
+            // The sweep notices a log that is incomplete.
+            let _ = log.write_all(format!("{line}\n").as_bytes());
+        }
+    }
+
+    fn counts(&self) -> std::sync::MutexGuard<'_, Counts> {
+        self.counts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts a call of a wrapped command on a handle. Returns the error if the call is to fail.
+    pub(super) fn called(&self, number: usize, handle: u64) -> Option<vk::Result> {
+        let command = &COMMANDS[number];
+        let table = table_of(handle);
+        let is_lost = table.as_ref().is_some_and(|table| table.lost.load(Ordering::Relaxed));
+        let fault = self.called_by_name(command.name, command.answers);
+        if fault == Some(vk::Result::ERROR_DEVICE_LOST) && !is_lost {
+            table.inspect(|table| table.lose());
+        }
+        fault.or((is_lost && command.answers & LOST != 0).then_some(vk::Result::ERROR_DEVICE_LOST))
+    }
+
+    /// Counts a call of a command that may give `answers`. Returns the error if the call is to fail.
+    pub(super) fn called_by_name(&self, name: &'static str, answers: u8) -> Option<vk::Result> {
+        let count = {
+            let mut counts = self.counts();
+            let count = counts.calls.entry(name).or_default();
+            *count += 1;
+            *count
+        };
+        let Some(fault) = &self.fault else {
+            self.write(&call_log::call_line(name, &errors_of(answers)));
+            return None;
+        };
+        if !errors_of(answers).contains(&fault.error) {
+            return None;
+        }
+        if fault.command == name && fault.call == count {
+            self.reached.store(true, Ordering::Relaxed);
+            self.write(&call_log::fault_line(name));
+            return Some(result_of(fault.error));
+        }
+        (fault.stays && self.reached.load(Ordering::Relaxed)).then(|| result_of(fault.error))
+    }
+
+    /// Counts the objects that a successful call has created.
+    ///
+    /// # Safety
+    /// `words` are the arguments of the call; where the command creates objects, the last points to their handles.
+    pub(super) unsafe fn created(&self, number: usize, words: &[u64]) {
+        let (kind, count) = match COMMANDS[number].creates {
+            Creates::Nothing => return,
+            Creates::One(kind) => (kind, 1),
+            Creates::Many(kind, argument) => (kind, words[argument] as usize),
+        };
+        let handles = words[words.len() - 1] as usize as *const u64;
+        for index in 0..count {
+            // SAFETY: by contract there are `count` handles.
+            if unsafe { handles.add(index).read() } != 0 {
+                self.count(kind, 1);
+            }
+        }
+    }
+
+    /// Counts the object that a call destroys.
+    pub(super) fn destroyed(&self, number: usize, object: u64) {
+        if let Some(kind) = COMMANDS[number].destroys.filter(|_| object != 0) {
+            self.count(kind, -1);
+        }
+    }
+
+    /// Adds to the number of live objects of a kind.
+    pub(super) fn count(&self, kind: &'static str, change: i64) {
+        *self.counts().live.entry(kind).or_default() += change;
+    }
+
+    /// Adds to the number of live instances, and logs all live objects.
+    pub(super) fn count_instance(&self, change: i64) {
+        self.count("VkInstance", change);
+        let live = self.counts().live.clone();
+        self.write(&call_log::live_line(&live));
+    }
+}
+
+/// Returns the errors that a command with these bits may answer.
+fn errors_of(answers: u8) -> Vec<FaultError> {
+    let mut errors = vec![FaultError::HostMemory, FaultError::DeviceMemory];
+    for (bit, error) in
+        [(LOST, FaultError::DeviceLost), (SURFACE, FaultError::SurfaceLost), (DATED, FaultError::OutOfDate)]
+    {
+        if answers & bit != 0 {
+            errors.push(error);
+        }
+    }
+    errors
+}
+
+fn result_of(error: FaultError) -> vk::Result {
+    match error {
+        FaultError::HostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+        FaultError::DeviceMemory => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+        FaultError::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
+        FaultError::SurfaceLost => vk::Result::ERROR_SURFACE_LOST_KHR,
+        FaultError::OutOfDate => vk::Result::ERROR_OUT_OF_DATE_KHR,
+    }
+}

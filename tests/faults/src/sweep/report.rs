@@ -1,0 +1,141 @@
+//! Runs all faults of a plan, and counts what came of them.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::io;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::plan::SweepPlan;
+use super::run::{LayerFolder, Program, run};
+use super::verdict::{Ending, Flaw, flaws};
+use crate::fault::Fault;
+
+/// Processes at the same time.
+const JOBS: usize = 2;
+
+/// A run with flaws.
+#[derive(Debug)]
+pub struct FlawedRun {
+    /// The fault; `None` for a run without.
+    pub fault: Option<Fault>,
+    /// The flaws.
+    pub flaws: Vec<Flaw>,
+    /// The last lines of standard error.
+    pub stderr: String,
+}
+
+/// Counts of a sweep.
+#[derive(Debug, Default)]
+pub struct SweepReport {
+    /// Calls of the run without fault.
+    pub calls: usize,
+    /// Commands among them.
+    pub commands: usize,
+    /// Faults of the plan.
+    pub planned: usize,
+    /// Runs with a fault.
+    pub runs: usize,
+    /// Runs in which the fault was reached.
+    pub reached: usize,
+    /// Runs that ended with an error.
+    pub refused: usize,
+    /// Runs that ended with success.
+    pub succeeded: usize,
+    /// Runs with flaws.
+    pub flawed: Vec<FlawedRun>,
+    /// Time of the sweep.
+    pub time: Duration,
+}
+
+impl fmt::Display for SweepReport {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { calls, commands, planned, runs, reached, refused, succeeded, flawed, time } = self;
+        write!(
+            out,
+            "{calls} calls of {commands} commands, {runs} of {planned} faults, {reached} reached, {refused} errors, \
+             {succeeded} successes, {} flawed, {} s",
+            flawed.len(),
+            time.as_secs()
+        )?;
+        for run in flawed {
+            let fault = run.fault.as_ref().map_or_else(|| "no fault".to_owned(), ToString::to_string);
+            let texts: Vec<_> = run.flaws.iter().map(ToString::to_string).collect();
+            write!(out, "\n  {fault}: {}\n    {}", texts.join("; "), run.stderr.replace('\n', "\n    "))?;
+        }
+        Ok(())
+    }
+}
+
+impl SweepReport {
+    fn add(&mut self, fault: &Fault, outcome: &super::verdict::RunOutcome, flaws: Vec<Flaw>) {
+        self.runs += 1;
+        self.reached += usize::from(outcome.reached);
+        match outcome.ending {
+            Ending::Status(0) => self.succeeded += 1,
+            Ending::Status(_) => self.refused += 1,
+            _ => {}
+        }
+        if !flaws.is_empty() {
+            let stderr = last_lines(&outcome.stderr);
+            self.flawed.push(FlawedRun { fault: Some(fault.clone()), flaws, stderr });
+        }
+    }
+}
+
+/// Runs a program without a fault, then with each fault of the plan until `budget` has passed.
+///
+/// # Errors
+/// Those of files and processes.
+pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Result<SweepReport> {
+    let start = Instant::now();
+    let (layer, caches) = (LayerFolder::new()?, tempfile::tempdir()?);
+    // The first run fills the caches.
+    run(program, &layer, caches.path(), None)?;
+    let (clean, calls) = run(program, &layer, caches.path(), None)?;
+    let commands: BTreeSet<_> = calls.iter().map(|call| &call.command).collect();
+    let faults = plan.faults(&calls);
+    let mut report = SweepReport {
+        calls: calls.len(),
+        commands: commands.len(),
+        planned: faults.len(),
+        ..Default::default()
+    };
+    let mut flaws_of_clean = flaws(None, &clean, &clean);
+    if clean.ending != Ending::Status(0) || calls.is_empty() {
+        flaws_of_clean.push(Flaw::WrongResult);
+    }
+    if !flaws_of_clean.is_empty() {
+        let stderr = last_lines(&clean.stderr);
+        report.flawed.push(FlawedRun { fault: None, flaws: flaws_of_clean, stderr });
+        return Ok(report);
+    }
+    let (next, report) = (AtomicUsize::new(0), Mutex::new(report));
+    let work = || -> io::Result<()> {
+        while let Some(fault) = faults.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if start.elapsed() > budget {
+                break;
+            }
+            let (outcome, _) = run(program, &layer, caches.path(), Some(fault))?;
+            let flaws = flaws(Some(fault), &outcome, &clean);
+            report.lock().unwrap_or_else(PoisonError::into_inner).add(fault, &outcome, flaws);
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..JOBS).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().try_for_each(|thread| match thread.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        })
+    })?;
+    let mut report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
+    report.time = start.elapsed();
+    Ok(report)
+}
+
+fn last_lines(text: &str) -> String {
+    let lines: Vec<&str> = text.trim().lines().collect();
+    lines[lines.len().saturating_sub(4)..].join("\n")
+}

@@ -1,0 +1,175 @@
+//! Runs a program once under the layer.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use super::verdict::{Ending, RunOutcome};
+use crate::call_log::{Call, CallLog};
+use crate::fault::Fault;
+use crate::layer::{FAULT_VARIABLE, LOG_VARIABLE};
+
+/// Longest time of one run.
+const TIMEOUT: Duration = Duration::from_secs(120);
+/// File of the first result, in the folder that the program gets as its first argument.
+pub const FIRST: &str = "first.png";
+/// File of the second result.
+pub const SECOND: &str = "second.png";
+/// Environment variable that tells the program to try again after a failure.
+pub const AGAIN_VARIABLE: &str = "LVK_FAULT_AGAIN";
+
+/// A program to run under the layer: `PROGRAM FOLDER ARGUMENTS...`, which writes [`FIRST`] and perhaps [`SECOND`].
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// Path of the program.
+    pub path: PathBuf,
+    /// Arguments after the folder.
+    pub args: Vec<String>,
+    /// Further environment variables.
+    pub variables: Vec<(String, String)>,
+}
+
+/// A folder with the description of the layer, in which the Vulkan loader searches.
+pub struct LayerFolder {
+    folder: tempfile::TempDir,
+}
+
+impl LayerFolder {
+    /// Describes the layer of this crate, the dynamic library beside the test program.
+    ///
+    /// # Errors
+    /// Those of files; `NotFound` where the library was not built.
+    pub fn new() -> io::Result<Self> {
+        let folder = tempfile::tempdir()?;
+        let layers = folder.path().join("vulkan/implicit_layer.d");
+        fs::create_dir_all(&layers)?;
+        let library = layer_library()?;
+        let description = format!(
+            r#"{{ "file_format_version": "1.2.1", "layer": {{
+                "name": "VK_LAYER_LVK_faults", "type": "GLOBAL", "library_path": "{}",
+                "api_version": "1.4.300", "implementation_version": "1", "description": "Makes calls fail",
+                "enable_environment": {{ "LVK_FAULT_LAYER": "1" }},
+                "disable_environment": {{ "LVK_NO_FAULT_LAYER": "1" }},
+                "pre_instance_functions": {{
+                    "vkEnumerateInstanceVersion": "lvk_fault_instance_version",
+                    "vkEnumerateInstanceExtensionProperties": "lvk_fault_instance_extensions",
+                    "vkEnumerateInstanceLayerProperties": "lvk_fault_instance_layers" }} }} }}"#,
+            library.display()
+        );
+        fs::write(layers.join("lvk_faults.json"), description)?;
+        Ok(Self { folder })
+    }
+}
+
+/// Finds the newest `liblvk_faults.so` beside the running program or in the folder above.
+fn layer_library() -> io::Result<PathBuf> {
+    let program = std::env::current_exe()?;
+    let folders = program.ancestors().skip(1).take(2);
+    let found = folders.map(|folder| folder.join("liblvk_faults.so")).filter(|path| path.exists());
+    let newest = found.max_by_key(|path| path.metadata().and_then(|data| data.modified()).ok());
+    newest.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "liblvk_faults.so was not built"))
+}
+
+/// Runs the program. Without a fault it uses `caches` itself and fills them, and the calls are returned, too; with one
+/// it uses a copy.
+///
+/// # Errors
+/// Those of files and processes.
+pub fn run(
+    program: &Program,
+    layer: &LayerFolder,
+    caches: &Path,
+    fault: Option<&Fault>,
+) -> io::Result<(RunOutcome, Vec<Call>)> {
+    let folder = tempfile::tempdir()?;
+    let (out, log) = (folder.path().join("out"), folder.path().join("log"));
+    fs::create_dir(&out)?;
+    let used = match fault {
+        Some(_) => copied(caches, &folder.path().join("caches"))?,
+        None => caches.to_owned(),
+    };
+    let stderr = fs::File::create(folder.path().join("stderr"))?;
+    let mut command = Command::new(&program.path);
+    command.arg(&out).args(&program.args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
+    command.env("XDG_DATA_HOME", layer.folder.path()).env("LVK_FAULT_LAYER", "1");
+    command
+        .env("LVK_CACHE", &used)
+        .env(LOG_VARIABLE, &log)
+        .env_remove(FAULT_VARIABLE)
+        .env_remove(AGAIN_VARIABLE);
+    command.envs(program.variables.iter().map(|(name, value)| (name, value)));
+    if let Some(fault) = fault {
+        command.env(FAULT_VARIABLE, fault.to_string());
+        if !fault.stays {
+            command.env(AGAIN_VARIABLE, "1");
+        }
+    }
+    let ending = end(&mut command.spawn()?)?;
+    let log = CallLog::parse(&String::from_utf8_lossy(&fs::read(&log).unwrap_or_default()));
+    let mut files = BTreeSet::new();
+    list(&out, "out", &mut files)?;
+    list(&used, "caches", &mut files)?;
+    for result in [FIRST, SECOND] {
+        files.remove(&format!("out/{result}"));
+    }
+    let outcome = RunOutcome {
+        ending,
+        stderr: String::from_utf8_lossy(&fs::read(folder.path().join("stderr"))?).into_owned(),
+        reached: log.reached,
+        live: log.live,
+        result: fs::read(out.join(FIRST)).ok(),
+        second_result: fs::read(out.join(SECOND)).ok(),
+        files,
+    };
+    Ok((outcome, log.calls))
+}
+
+fn end(child: &mut Child) -> io::Result<Ending> {
+    let start = Instant::now();
+    while start.elapsed() < TIMEOUT {
+        if let Some(status) = child.try_wait()? {
+            return Ok(ending(status));
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill()?;
+    child.wait()?;
+    Ok(Ending::Hang)
+}
+
+fn ending(status: ExitStatus) -> Ending {
+    match (status.code(), status.signal()) {
+        (Some(code), _) => Ending::Status(code),
+        (None, signal) => Ending::Signal(signal.unwrap_or_default()),
+    }
+}
+
+/// Adds the files of a folder, by paths that start with `name`.
+fn list(folder: &Path, name: &str, files: &mut BTreeSet<String>) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = format!("{name}/{}", entry.file_name().to_string_lossy());
+        match entry.file_type()?.is_dir() {
+            true => list(&entry.path(), &name, files)?,
+            false => drop(files.insert(name)),
+        }
+    }
+    Ok(())
+}
+
+fn copied(from: &Path, to: &Path) -> io::Result<PathBuf> {
+    fs::create_dir(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        match entry.file_type()?.is_dir() {
+            true => drop(copied(&entry.path(), &target)?),
+            false => drop(fs::copy(entry.path(), target)?),
+        }
+    }
+    Ok(to.to_owned())
+}

@@ -1,0 +1,231 @@
+//! The verdict on one run: decided from plain values.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use crate::fault::{Fault, FaultError};
+
+/// The end of a process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The process has ended with this status.
+    Status(i32),
+    /// A signal has ended the process.
+    Signal(i32),
+    /// The process did not end in time.
+    Hang,
+}
+
+/// Observations of one run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunOutcome {
+    /// The end of the process.
+    pub ending: Ending,
+    /// Standard error of the process.
+    pub stderr: String,
+    /// True if the fault was reached.
+    pub reached: bool,
+    /// Live objects at the end, by type.
+    pub live: BTreeMap<String, i64>,
+    /// The result of the first try, a picture or values. `None` if it was not written.
+    pub result: Option<Vec<u8>>,
+    /// The result of the second try, in the same process after the first has failed.
+    pub second_result: Option<Vec<u8>>,
+    /// Names of files beside the results, and in the caches.
+    pub files: BTreeSet<String>,
+}
+
+/// A defect of a run.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Flaw {
+    /// The process did not end in time.
+    Hang,
+    /// A signal has ended the process.
+    Signal(i32),
+    /// The text of a panic.
+    Panic,
+    /// A status other than 0 and 1.
+    Status(i32),
+    /// Objects that were not destroyed.
+    Leak(String),
+    /// Files that a run without fault does not leave.
+    Litter(String),
+    /// Success with another result.
+    WrongResult,
+    /// Failure that leaves an incomplete result.
+    PartialResult,
+    /// Failure without one line that tells the error.
+    NoMessage,
+    /// An error that does not name the command that has failed.
+    UnnamedCommand(String),
+    /// No result of a second try in the same process, or another.
+    NotRecovered,
+}
+
+impl fmt::Display for Flaw {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Hang => out.write_str("hang"),
+            Self::Signal(signal) => write!(out, "ended by signal {signal}"),
+            Self::Panic => out.write_str("panic"),
+            Self::Status(status) => write!(out, "status {status}"),
+            Self::Leak(objects) => write!(out, "leak of {objects}"),
+            Self::Litter(files) => write!(out, "left files {files}"),
+            Self::WrongResult => out.write_str("wrong result"),
+            Self::PartialResult => out.write_str("partial result"),
+            Self::NoMessage => out.write_str("no message, or several"),
+            Self::UnnamedCommand(message) => write!(out, "the command is not named: {message}"),
+            Self::NotRecovered => out.write_str("a second try in the same process fails"),
+        }
+    }
+}
+
+/// Judges a run with `fault` by a run without.
+#[must_use]
+pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> Vec<Flaw> {
+    let mut flaws = Vec::new();
+    match found.ending {
+        Ending::Hang => flaws.push(Flaw::Hang),
+        Ending::Signal(signal) => flaws.push(Flaw::Signal(signal)),
+        Ending::Status(status @ (0 | 1)) => judge_result(fault, found, clean, status == 0, &mut flaws),
+        Ending::Status(status) => flaws.push(Flaw::Status(status)),
+    }
+    if found.stderr.contains("panicked at") {
+        flaws.push(Flaw::Panic);
+    }
+    let live: Vec<_> = found.live.iter().filter(|(_, count)| **count != 0).collect();
+    if !live.is_empty() {
+        let texts: Vec<_> = live.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+        flaws.push(Flaw::Leak(texts.join(", ")));
+    }
+    let litter: Vec<_> = found.files.difference(&clean.files).cloned().collect();
+    if !litter.is_empty() {
+        flaws.push(Flaw::Litter(litter.join(", ")));
+    }
+    flaws
+}
+
+fn judge_result(
+    fault: Option<&Fault>,
+    found: &RunOutcome,
+    clean: &RunOutcome,
+    succeeded: bool,
+    flaws: &mut Vec<Flaw>,
+) {
+    if succeeded {
+        if found.result.is_none() || found.result != clean.result {
+            flaws.push(Flaw::WrongResult);
+        }
+        return;
+    }
+    if found.result.is_some() && found.result != clean.result {
+        flaws.push(Flaw::PartialResult);
+    }
+    let errors: Vec<&str> = found.stderr.lines().filter(|line| line.starts_with("error: ")).collect();
+    let stays = fault.is_some_and(|fault| fault.stays);
+    match *errors {
+        [error, ..] if errors.len() == 1 || stays => {
+            if fault.is_some_and(|fault| !names_cause(error, fault)) {
+                flaws.push(Flaw::UnnamedCommand(error.to_owned()));
+            }
+        }
+        _ => flaws.push(Flaw::NoMessage),
+    }
+    // A fault that stays hinders the second try, too.
+    let tries_again = fault.is_some_and(|fault| !fault.stays);
+    if tries_again && (found.second_result.is_none() || found.second_result != clean.result) {
+        flaws.push(Flaw::NotRecovered);
+    }
+}
+
+/// True if the error names the command that failed, or the object whose window is gone. A fault that stays may be met
+/// by another command first, where the library goes on without the one that failed.
+fn names_cause(error: &str, fault: &Fault) -> bool {
+    let names = |command: &str| error.contains(command);
+    names(&fault.command)
+        || fault.stays && names("vk")
+        || fault.error == FaultError::SurfaceLost && names("its window is gone")
+        // The loader calls it while it creates a device.
+        || fault.command == "vkEnumerateDeviceExtensionProperties" && names("vkCreateDevice")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clean() -> RunOutcome {
+        RunOutcome {
+            ending: Ending::Status(0),
+            stderr: String::new(),
+            reached: false,
+            live: BTreeMap::new(),
+            result: Some(b"picture".to_vec()),
+            second_result: None,
+            files: BTreeSet::from(["caches/pipelines".to_owned()]),
+        }
+    }
+
+    fn refused() -> RunOutcome {
+        RunOutcome {
+            ending: Ending::Status(1),
+            stderr: "warning: x\nerror: out of host memory in vkCreateBuffer\n".to_owned(),
+            reached: true,
+            result: None,
+            second_result: clean().result,
+            ..clean()
+        }
+    }
+
+    fn fault(stays: bool) -> Fault {
+        Fault { command: "vkCreateBuffer".into(), call: 1, error: FaultError::HostMemory, stays }
+    }
+
+    fn found(outcome: &RunOutcome) -> Vec<Flaw> {
+        flaws(Some(&fault(false)), outcome, &clean())
+    }
+
+    #[test]
+    fn the_right_result_and_a_polite_refusal_pass() {
+        for outcome in [clean(), refused()] {
+            assert_eq!(found(&outcome), []);
+        }
+        let twice = RunOutcome { second_result: None, stderr: refused().stderr.repeat(2), ..refused() };
+        assert_eq!(flaws(Some(&fault(true)), &twice, &clean()), [], "the second try meets the fault, too");
+        assert_eq!(found(&twice), [Flaw::NoMessage, Flaw::NotRecovered]);
+    }
+
+    #[test]
+    fn every_flaw_is_caught() {
+        let unnamed = "error: out of memory".to_owned();
+        let cases = [
+            (RunOutcome { ending: Ending::Hang, ..refused() }, Flaw::Hang),
+            (RunOutcome { ending: Ending::Signal(11), ..refused() }, Flaw::Signal(11)),
+            (RunOutcome { ending: Ending::Status(2), ..refused() }, Flaw::Status(2)),
+            (
+                RunOutcome {
+                    stderr: refused().stderr + "thread 'main' panicked at src/a.rs:1:2:\n",
+                    ..refused()
+                },
+                Flaw::Panic,
+            ),
+            (
+                RunOutcome { live: BTreeMap::from([("VkBuffer".to_owned(), 2)]), ..clean() },
+                Flaw::Leak("2 VkBuffer".into()),
+            ),
+            (
+                RunOutcome { files: BTreeSet::from([".lvk-1.partial".to_owned()]), ..clean() },
+                Flaw::Litter(".lvk-1.partial".into()),
+            ),
+            (RunOutcome { result: Some(b"pic".to_vec()), ..clean() }, Flaw::WrongResult),
+            (RunOutcome { result: None, ..clean() }, Flaw::WrongResult),
+            (RunOutcome { result: Some(b"pic".to_vec()), ..refused() }, Flaw::PartialResult),
+            (RunOutcome { stderr: String::new(), ..refused() }, Flaw::NoMessage),
+            (RunOutcome { stderr: unnamed.clone(), ..refused() }, Flaw::UnnamedCommand(unnamed)),
+            (RunOutcome { second_result: None, ..refused() }, Flaw::NotRecovered),
+            (RunOutcome { second_result: Some(b"pic".to_vec()), ..refused() }, Flaw::NotRecovered),
+        ];
+        for (outcome, flaw) in cases {
+            assert_eq!(found(&outcome), [flaw]);
+        }
+    }
+}

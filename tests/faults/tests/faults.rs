@@ -1,0 +1,153 @@
+//! Calls of the samples and of scenarios fail: each run ends with the right result or with an error, and leaves nothing.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use lvk_dev_driver::virtual_display;
+use lvk_faults::fault::FaultError;
+use lvk_faults::sweep::plan::SweepPlan;
+use lvk_faults::sweep::report::sweep;
+use lvk_faults::sweep::run::{LayerFolder, Program, run};
+use lvk_faults::sweep::verdict::{Flaw, flaws};
+
+/// Time of a full sweep.
+const WHOLE: Duration = Duration::from_secs(6 * 3600);
+/// Time of a sweep in the normal tests.
+const SAMPLE: Duration = Duration::from_secs(40);
+
+/// A scene of six triangles: a floor, a mirror behind and a pane of glass before it.
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scene.obj");
+
+fn program(line: &str) -> Program {
+    let args = line.split_whitespace().map(|word| word.replace("SCENE", SCENE)).collect();
+    Program { path: PathBuf::from(env!("CARGO_BIN_EXE_fault_scenarios")), args, variables: Vec::new() }
+}
+
+fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Duration) {
+    let report = sweep(program, plan, budget).unwrap();
+    println!("{line}: {report}");
+    assert!(report.flawed.is_empty() && report.reached > 0, "{line}: {report}");
+}
+
+/// Runs the whole sweep; `LVK_FAULT_MOST` bounds the number of faults.
+fn whole(line: &str) {
+    let most = std::env::var("LVK_FAULT_MOST").ok().and_then(|text| text.parse().ok()).unwrap_or(usize::MAX);
+    assert_no_flaws(line, &program(line), &SweepPlan { most, ..SweepPlan::full() }, WHOLE);
+}
+
+/// Declares an ignored test for each scenario.
+macro_rules! whole_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            whole($line);
+        }
+    )*};
+}
+
+whole_sweeps! {
+    whole_hybrid_pipeline: "hybrid --width 64 --height 36 --frames 1 --rt pipeline --scene SCENE";
+    whole_hybrid_query: "hybrid --width 64 --height 36 --frames 1 --rt query --scene SCENE";
+    whole_hybrid_software: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
+    whole_hello_triangle: "hello_triangle --width 64 --height 36 --frames 1";
+    whole_rtx_hello: "rtx_hello --width 64 --height 36 --frames 1";
+    whole_rtx_ao: "rtx_ao --width 64 --height 36 --frames 1 --passes 1";
+    whole_rtx_pipeline: "rtx_pipeline --width 64 --height 36 --frames 1";
+    whole_rtx_textures: "rtx_textures --width 64 --height 36 --frames 1";
+    whole_deferred: "deferred --width 64 --height 36 --frames 1 --lights 20";
+    whole_hybrid_oit: "hybrid_oit --width 64 --height 36 --frames 1 --supersampling 1";
+    whole_large_scene: "large_scene --width 64 --height 36 --frames 1 --triangles 2000 --copies 3 --samples 1";
+    whole_omni_shadows: "omni_shadows --width 64 --height 36 --frames 1";
+    whole_reflections: "reflections --width 64 --height 36 --frames 1 --samples 1";
+    whole_render_to_cube_map: "render_to_cube_map --width 64 --height 36 --frames 1 --face-size 32";
+    whole_sponza: "sponza --width 64 --height 36 --frames 1 --shadow-size 256";
+    whole_triplanar: "triplanar --width 64 --height 36 --frames 1";
+    whole_yuv: "yuv --width 64 --height 36 --frames 1";
+    whole_blas: "blas";
+    whole_blas_software: "blas_software";
+    whole_threads: "threads";
+    whole_queues: "queues";
+    whole_raw_device: "raw_device";
+    whole_hot_reload: "hot_reload";
+}
+
+#[test]
+#[ignore = "minutes: .ci/slow faults"]
+fn whole_window() {
+    let Some((_display, program)) = in_window() else { return };
+    assert_no_flaws("window", &program, &SweepPlan::full(), WHOLE);
+}
+
+/// The scenario in a window, and the X server that shows it.
+fn in_window() -> Option<(lvk_dev_driver::VirtualDisplay, Program)> {
+    let display = match virtual_display() {
+        Ok(display) => display,
+        Err(error) => {
+            assert!(std::env::var_os("LVK_REQUIRE_GPU").is_none(), "{error}");
+            eprintln!("SKIPPED, no X server for windows: {error}");
+            return None;
+        }
+    };
+    let variables = vec![("DISPLAY".to_owned(), display.name().to_owned())];
+    Some((display, Program { variables, ..program("window") }))
+}
+
+/// Some of the faults of the whole sweeps, spread evenly.
+fn some(most: usize) -> SweepPlan {
+    SweepPlan { most, ..SweepPlan::full() }
+}
+
+#[test]
+fn some_calls_of_the_hybrid_sample_fail() {
+    let line = "hybrid --width 64 --height 36 --frames 1 --rt pipeline --scene SCENE";
+    assert_no_flaws(line, &program(line), &some(30), SAMPLE);
+}
+
+#[test]
+fn some_calls_of_scenarios_fail() {
+    for line in ["blas", "threads", "queues", "raw_device", "hot_reload"] {
+        assert_no_flaws(line, &program(line), &some(12), SAMPLE / 2);
+    }
+}
+
+#[test]
+fn some_calls_of_a_window_fail() {
+    let Some((_display, program)) = in_window() else { return };
+    let errors = vec![FaultError::SurfaceLost, FaultError::OutOfDate];
+    assert_no_flaws("window", &program, &SweepPlan { errors, ..some(12) }, SAMPLE);
+}
+
+/// The layer sees objects that are not destroyed.
+#[test]
+fn a_forgotten_fence_is_a_leak() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (outcome, calls) = run(&program("leak"), &layer, caches.path(), None).unwrap();
+    assert_eq!(flaws(None, &outcome, &outcome), [Flaw::Leak("1 VkFence".into())], "{}", outcome.stderr);
+    assert!(calls.len() > 50 && calls.iter().any(|call| call.command == "vkCreateFence"));
+}
+
+/// Faults are injected, and told by the name of the call; a library that goes on without ray tracing needs a device, too.
+#[test]
+fn a_fault_at_the_creation_of_the_device_is_told() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    for (error, text) in [("host-memory", "out of host memory"), ("device-lost", "lost")] {
+        let fault = format!("vkCreateDevice 1 {error} stays").parse().unwrap();
+        let (outcome, _) = run(&program("queues"), &layer, caches.path(), Some(&fault)).unwrap();
+        assert!(outcome.reached && outcome.stderr.contains(text), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("vkCreateDevice"), "{}", outcome.stderr);
+    }
+}
+
+/// The layer stays loaded, so that a fault that is to happen once does not hit the second try.
+#[test]
+fn a_fault_happens_once_in_a_process() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (clean, _) = run(&program("queues"), &layer, caches.path(), None).unwrap();
+    let fault = "vkQueueSubmit2 2 device-lost once".parse().unwrap();
+    let (outcome, _) = run(&program("queues"), &layer, caches.path(), Some(&fault)).unwrap();
+    assert_eq!(flaws(Some(&fault), &outcome, &clean), [], "{}", outcome.stderr);
+    assert_eq!((outcome.result, outcome.second_result), (None, clean.result));
+}
