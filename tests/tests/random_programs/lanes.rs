@@ -1,0 +1,184 @@
+//! The tests: seeds of the bounded lane, kept programs, programs on several threads, and the long lane.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use super::environment::Environment;
+use super::op::{Kind, Op, program};
+use super::plan::QUEUES;
+use super::run::{Failure, run};
+use super::shrink::shrink;
+
+/// Operations of a program.
+const LENGTH: usize = 400;
+/// Programs of the bounded lane, for each kind of queues.
+const BOUNDED_SEEDS: u64 = 40;
+/// Most runs of a failing program while it is shrunk.
+const TRIES: usize = 400;
+/// Programs after which objects and memory are counted.
+const CHECKED_EVERY: u64 = 16;
+/// A program that takes longer hangs.
+const HANG: Duration = Duration::from_secs(120);
+
+/// Seeds that have failed once. They are always replayed.
+const KEPT_SEEDS: [u64; 0] = [];
+
+/// Ends the process if the count of finished programs stands still.
+struct Watchdog {
+    finished: AtomicU64,
+    is_over: AtomicBool,
+}
+
+impl Watchdog {
+    /// Runs `work` under the watch.
+    fn watch<T>(work: impl FnOnce(&Self) -> T) -> T {
+        let dog = Self { finished: AtomicU64::new(0), is_over: AtomicBool::new(false) };
+        std::thread::scope(|scope| {
+            scope.spawn(|| dog.look());
+            let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&dog)));
+            dog.is_over.store(true, Ordering::Relaxed);
+            result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+
+    fn look(&self) {
+        let (mut seen, mut since) = (u64::MAX, Instant::now());
+        while !self.is_over.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(50));
+            let finished = self.finished.load(Ordering::Relaxed);
+            if finished != seen {
+                (seen, since) = (finished, Instant::now());
+            } else if since.elapsed() > HANG {
+                eprintln!("a program hangs after {finished} finished ones");
+                std::process::abort();
+            }
+        }
+    }
+}
+
+/// Returns the text of a failing program of a seed, shrunk.
+fn report(seed: u64, queues: lvk::QueueRequest, ops: &[Op], failure: &Failure) -> String {
+    let fails = |ops: &[Op]| {
+        let Some(env) = Environment::new(queues) else { return false };
+        run(&env, ops).is_err() || env.check_all_gone().is_err() || env.check_messages().is_err()
+    };
+    let end = (failure.at + 1).min(ops.len());
+    let begin = if fails(&ops[..end]) { &ops[..end] } else { ops };
+    let small = shrink(begin, TRIES, fails);
+    format!("seed {seed}, {queues:?}, operation {}: {}\nshrunk to {small:#?}", failure.at, failure.message)
+}
+
+/// Runs the programs of seeds one after the other. Returns the number of operations.
+///
+/// # Panics
+/// When one of them fails.
+fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &Watchdog) -> Option<u64> {
+    let env = Environment::new(queues)?;
+    let mut executed = 0;
+    for (count, seed) in (1..).zip(seeds) {
+        let ops = program(seed, LENGTH);
+        let outcome = run(&env, &ops).and_then(|done| {
+            if count % CHECKED_EVERY == 0 {
+                let gone = env.check_all_gone().and_then(|()| env.check_messages());
+                gone.map_err(|message| Failure { at: LENGTH, message })?;
+            }
+            Ok(done)
+        });
+        match outcome {
+            Ok(done) => executed += done,
+            Err(failure) => unreachable!("{}", report(seed, queues, &ops, &failure)),
+        }
+        dog.finished.fetch_add(1, Ordering::Relaxed);
+    }
+    assert_eq!(env.check_all_gone(), Ok(()));
+    assert_eq!(env.check_messages(), Ok(()));
+    Some(executed)
+}
+
+/// Runs the programs of seeds on several threads of one context. Returns the number of operations.
+///
+/// # Panics
+/// When one of them fails.
+fn run_on_threads(queues: lvk::QueueRequest, seeds: &[u64], threads: usize, dog: &Watchdog) -> Option<u64> {
+    let env = Environment::new(queues)?;
+    let (next, executed) = (AtomicU64::new(0), AtomicU64::new(0));
+    let work = || {
+        while let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize) {
+            match run(&env, &program(*seed, LENGTH)) {
+                Ok(done) => executed.fetch_add(done, Ordering::Relaxed),
+                Err(failure) => unreachable!("seed {seed}, {queues:?}, {threads} threads: {failure:?}"),
+            };
+            dog.finished.fetch_add(1, Ordering::Relaxed);
+        }
+    };
+    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
+    assert_eq!(env.check_all_gone(), Ok(()));
+    assert_eq!(env.check_messages(), Ok(()));
+    Some(executed.into_inner())
+}
+
+#[test]
+fn random_programs_do_what_the_model_says() {
+    Watchdog::watch(|dog| {
+        for queues in QUEUES {
+            let seeds = KEPT_SEEDS.into_iter().chain(0..BOUNDED_SEEDS);
+            let Some(executed) = run_seeds(queues, seeds, dog) else { return };
+            eprintln!("{executed} operations with {queues:?}");
+            assert!(executed > BOUNDED_SEEDS * LENGTH as u64 / 2, "most operations find nothing to work on");
+        }
+    });
+}
+
+#[test]
+fn random_programs_on_four_threads_of_one_context_do_what_the_model_says() {
+    Watchdog::watch(|dog| {
+        for queues in QUEUES {
+            let seeds: Vec<u64> = (1_000_000..1_000_000 + BOUNDED_SEEDS / 2).collect();
+            let Some(executed) = run_on_threads(queues, &seeds, 4, dog) else { return };
+            eprintln!("{executed} operations on four threads with {queues:?}");
+        }
+    });
+}
+
+/// A model that is wrong about one kind of commands is found out, and the program shrinks to what shows it.
+#[test]
+fn a_wrong_model_is_detected_and_the_program_shrunk() {
+    let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
+    env.lies = true;
+    let failing = (0..).map(|seed| program(seed, LENGTH)).find(|ops| run(&env, ops).is_err());
+    let Some(ops) = failing else { return };
+    let small = shrink(&ops, TRIES, |ops| run(&env, ops).is_err());
+    assert!(small.len() <= 3, "{small:#?}");
+    assert!(small.iter().any(|op| op.kind == Kind::FillBuffer), "{small:#?}");
+    assert!(small.iter().any(|op| op.kind == Kind::CreateBuffer), "{small:#?}");
+    env.lies = false;
+    assert!(run(&env, &small).is_ok(), "the library itself is right");
+}
+
+fn number(variable: &str, default: u64) -> u64 {
+    std::env::var(variable).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
+}
+
+/// Runs `LVK_RANDOM_PROGRAMS` programs from seed `LVK_RANDOM_SEED` on, on `LVK_RANDOM_THREADS` threads, for both kinds
+/// of queues in turn.
+#[test]
+#[ignore = "long: .ci/slow random"]
+fn many_random_programs() {
+    const BLOCK: u64 = 500;
+    let (first, count) = (number("LVK_RANDOM_SEED", 10_000_000), number("LVK_RANDOM_PROGRAMS", 2_000));
+    let threads = number("LVK_RANDOM_THREADS", 1) as usize;
+    let (start, mut total) = (Instant::now(), 0);
+    Watchdog::watch(|dog| {
+        for (block, begin) in (first..first + count).step_by(BLOCK as usize).enumerate() {
+            let seeds = begin..(begin + BLOCK).min(first + count);
+            let queues = QUEUES[block % QUEUES.len()];
+            let done = match threads {
+                1 => run_seeds(queues, seeds, dog),
+                threads => run_on_threads(queues, &seeds.collect::<Vec<_>>(), threads, dog),
+            };
+            let Some(done) = done else { return };
+            total += done;
+            eprintln!("{total} operations, {:.0} a second", total as f64 / start.elapsed().as_secs_f64());
+        }
+    });
+}
