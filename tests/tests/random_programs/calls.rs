@@ -175,6 +175,7 @@ impl World<'_> {
             mips,
             usage,
             data: data.as_deref(),
+            data_mips: 0,
             debug_name: "random texture",
             ..Default::default()
         });
@@ -362,7 +363,7 @@ impl World<'_> {
             self.memory.tlas.push(Tlas::default());
             self.memory.apply(&Effect::Place { tlas, instances: known });
             let count = raw.len() as u32;
-            let info = TlasInfo { capacity: capacity.max(count).max(1), is_updatable, count };
+            let info = TlasInfo { capacity: capacity.max(count), is_updatable, count };
             self.tlas.push(Object::new(holder, info));
         }
         Ok(true)

@@ -62,6 +62,8 @@ pub struct Environment {
     pub foreign: Foreign,
     ctx: Context,
     sinks: [ValidationSink; 2],
+    /// Bytes of acceleration structures before any program.
+    own_bytes: u64,
     /// True if the model is wrong on purpose: fills write another value than the model expects.
     pub lies: bool,
 }
@@ -75,7 +77,8 @@ impl Environment {
         let kit = Kit::new(&ctx);
         let foreign = Foreign::new(other);
         let (Ok(kit), Ok(foreign)) = (kit, foreign) else { unreachable!("the set-up of the programs fails") };
-        Some(Self { kit, foreign, ctx, sinks: [sink, other_sink], lies: false })
+        let own_bytes = ctx.accel_memory().structure_bytes;
+        Some(Self { own_bytes, kit, foreign, ctx, sinks: [sink, other_sink], lies: false })
     }
 
     /// Returns the context.
@@ -98,8 +101,9 @@ impl Environment {
             return Err(format!("objects are alive after the program: {live:?}"));
         }
         let bytes = self.ctx.accel_memory().structure_bytes;
-        if bytes != 0 {
-            return Err(format!("{bytes} bytes of acceleration structures are left after the program"));
+        if bytes != self.own_bytes {
+            let before = self.own_bytes;
+            return Err(format!("acceleration structures take {bytes} bytes after the program, {before} before"));
         }
         Ok(())
     }

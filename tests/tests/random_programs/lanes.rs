@@ -58,14 +58,22 @@ impl Watchdog {
 
 /// Returns the text of a failing program of a seed, shrunk.
 fn report(seed: u64, queues: lvk::QueueRequest, ops: &[Op], failure: &Failure) -> String {
-    let fails = |ops: &[Op]| {
-        let Some(env) = Environment::new(queues) else { return false };
-        run(&env, ops).is_err() || env.check_all_gone().is_err() || env.check_messages().is_err()
-    };
+    let fails = |ops: &[Op]| Environment::new(queues).is_some_and(|env| run_and_check(&env, ops).is_err());
     let end = (failure.at + 1).min(ops.len());
     let begin = if fails(&ops[..end]) { &ops[..end] } else { ops };
     let small = shrink(begin, TRIES, fails);
-    format!("seed {seed}, {queues:?}, operation {}: {}\nshrunk to {small:#?}", failure.at, failure.message)
+    let outcome = Environment::new(queues).map(|env| run_and_check(&env, &small));
+    format!(
+        "seed {seed}, {queues:?}, operation {}: {}\nshrunk to {small:#?}\nwhich ends with {outcome:?}",
+        failure.at, failure.message
+    )
+}
+
+/// Runs a program alone on a context, and checks that nothing is left.
+fn run_and_check(env: &Environment, ops: &[Op]) -> Result<(), Failure> {
+    run(env, ops)?;
+    let gone = env.check_all_gone().and_then(|()| env.check_messages());
+    gone.map_err(|message| Failure { at: ops.len(), message })
 }
 
 /// Runs the programs of seeds one after the other. Returns the number of operations.
@@ -138,6 +146,12 @@ fn random_programs_on_four_threads_of_one_context_do_what_the_model_says() {
             eprintln!("{executed} operations on four threads with {queues:?}");
         }
     });
+}
+
+#[test]
+fn an_empty_program_leaves_nothing() {
+    let Some(env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
+    assert!(run_and_check(&env, &[]).is_ok(), "{:?}", run_and_check(&env, &[]));
 }
 
 /// A model that is wrong about one kind of commands is found out, and the program shrinks to what shows it.

@@ -34,7 +34,7 @@ pub fn run(env: &Environment, ops: &[Op]) -> Result<u64, Failure> {
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         let mut world = World::new(env).map_err(|error| error.to_string())?;
         for op in ops {
-            if world.step(op)? {
+            if world.step(op).map_err(|message| format!("{op:?}: {message}"))? {
                 world.executed += 1;
             }
             at += 1;
