@@ -1,7 +1,7 @@
 //! Bytes as the model knows them: the range in which each lies.
 
 /// Range of one byte. A known byte has equal ends, a byte with unknown contents has the whole range.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Cell {
     /// Least value.
     pub low: u8,
@@ -29,6 +29,16 @@ impl Cell {
     }
 }
 
+impl std::fmt::Debug for Cell {
+    /// Formats a known byte as such.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.is_known() {
+            true => write!(out, "{:x}", self.low),
+            false => write!(out, "{:x}-{:x}", self.low, self.high),
+        }
+    }
+}
+
 /// Returns known cells of these bytes.
 pub fn known(bytes: &[u8]) -> Vec<Cell> {
     bytes.iter().copied().map(Cell::known).collect()
@@ -42,7 +52,11 @@ pub fn compare(what: &str, found: &[u8], expected: &[Cell]) -> Result<(), String
     let wrong = found.iter().zip(expected).position(|(byte, cell)| !cell.allows(*byte));
     match wrong {
         None => Ok(()),
-        Some(at) => Err(format!("{what}: byte {at} is {:#04x}, expected {:x?}", found[at], expected[at])),
+        Some(at) => {
+            let end = (at + 8).min(found.len());
+            let (bytes, cells) = (&found[at..end], &expected[at..end]);
+            Err(format!("{what}: from byte {at} of {} on {bytes:x?}, expected {cells:x?}", found.len()))
+        }
     }
 }
 
@@ -61,7 +75,7 @@ fn unknown_bytes_may_have_any_value_and_known_ones_only_theirs() {
     assert!(Cell::UNKNOWN.allows(0) && Cell::UNKNOWN.allows(255) && !Cell::UNKNOWN.is_known());
     let expected = [Cell::known(3), Cell::UNKNOWN, Cell { low: 4, high: 6 }];
     assert_eq!(compare("b", &[3, 99, 5], &expected), Ok(()));
-    assert!(compare("b", &[3, 99, 7], &expected).unwrap_err().contains("byte 2 is 0x07"));
+    assert!(compare("b", &[3, 99, 7], &expected).unwrap_err().contains("from byte 2 of 3 on [7]"));
     assert!(compare("b", &[3, 99], &expected).unwrap_err().contains("2 bytes"));
 }
 

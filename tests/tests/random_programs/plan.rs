@@ -116,8 +116,8 @@ impl World<'_> {
         let (start, length, inside) = range(n[2], n[3], self.size(from.live));
         let room = self.size(to.live);
         let target = if n[4] % 24 == 23 { room as u64 } else { u64::from(n[4]) % (room as u64 + 1) };
-        let length = if n[4] % 24 < 22 { length.min(room as u64 - target.min(room as u64)) } else { length };
-        let fits = inside && target + length <= room as u64;
+        let length = if inside && n[4] % 24 < 22 { length.min(room as u64 - target.min(room as u64)) } else { length };
+        let fits = inside && target.saturating_add(length) <= room as u64;
         let overlaps = from.live == to.live && start < target.saturating_add(length) && target < start.saturating_add(length);
         if !fits || (overlaps && length > 0) {
             problems.push(Problem::Usage);

@@ -321,14 +321,15 @@ impl World<'_> {
             return None;
         }
         let only_extent_is_wrong = info.is_some_and(|info| region.mip < info.part.mips && region.layer < info.part.layers);
-        if place.is_none() && texture.problem.is_none() && region.extent[0] == 0 && only_extent_is_wrong {
+        // A wrong rectangle is refused after the pass has begun, which clears.
+        let clears = n[5] & 1 == 1;
+        if place.is_none() && only_extent_is_wrong && (clears || region.extent[0] == 0) {
             return None;
         }
         let mut problems = graphics_problems(queue, [texture.problem, lack.then_some(Problem::Usage)]);
         problems.extend(place_problems.into_iter().filter(|problem| !problems.contains(problem)).collect::<Vec<_>>());
         let format = info.map_or(Format::R32Uint, |info| info.format);
         let (cleared, drawn) = (texel(format, n[3]), texel(format, n[4]));
-        let clears = n[5] & 1 == 1;
         let effects = match (info, place) {
             (Some(info), Some(place)) if problems.is_empty() => {
                 let one_layer = Place { layers: 1, ..place };
