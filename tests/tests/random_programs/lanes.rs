@@ -12,7 +12,7 @@ use super::shrink::shrink;
 /// Operations of a program.
 const LENGTH: usize = 400;
 /// Programs of the bounded lane, for each kind of queues.
-const BOUNDED_SEEDS: u64 = 40;
+const BOUNDED_SEEDS: u64 = 160;
 /// Most runs of a failing program while it is shrunk.
 const TRIES: usize = 400;
 /// Programs after which objects and memory are counted.
@@ -20,8 +20,8 @@ const CHECKED_EVERY: u64 = 16;
 /// A program that takes longer hangs.
 const HANG: Duration = Duration::from_secs(120);
 
-/// Seeds that have failed once. They are always replayed.
-const KEPT_SEEDS: [u64; 0] = [];
+/// Seeds whose programs have failed, by a mistake of the library or of the model. They are always replayed.
+const KEPT_SEEDS: [u64; 4] = [5, 22, 30, 20_000_381];
 
 /// Ends the process if the count of finished programs stands still.
 struct Watchdog {

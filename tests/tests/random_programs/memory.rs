@@ -159,25 +159,27 @@ impl Memory {
         self.images[to.image].write(to, &scaled);
     }
 
-    /// Halves a mip. Known is the range of the mip before, or of the four texels where both sides are even.
+    /// Halves a mip. The mean is known of texels along even sides and along sides of one texel, else only the range of
+    /// the whole mip.
     fn halve(&mut self, first: &Place, step: u32) {
         let image = &self.images[first.image];
         let at = |mip| Place { mip, offset: [0, 0], extent: mip_extent(image.extent, mip), ..*first };
         let (from, to) = (at(first.mip + step - 1), at(first.mip + step));
         let cells = image.read(&from);
         let bytes = texel_bytes(image.format);
-        let exact = [0, 1].iter().all(|axis| from.extent[*axis] == 2 * to.extent[*axis]);
+        let steps = [0, 1].map(|axis| from.extent[axis] / to.extent[axis]);
+        let is_mean = (0..2).all(|axis| steps[axis] <= 2 && steps[axis] * to.extent[axis] == from.extent[axis]);
         let mut halved = Vec::with_capacity(to.texels() * bytes);
         for texel in 0..to.texels() as u32 {
             let [width, height] = to.extent;
             let (x, y, layer) = (texel % width, texel / width % height, texel / (width * height));
             let source = |x: u32, y: u32| ((layer * from.extent[1] + y) * from.extent[0] + x) as usize * bytes;
-            let sources: Vec<usize> = if exact {
-                [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| source(2 * x + dx, 2 * y + dy)).to_vec()
-            } else {
-                (0..from.extent[1]).flat_map(|y| (0..from.extent[0]).map(move |x| source(x, y))).collect()
-            };
-            halved.extend(mean(&cells, &sources, image.format));
+            let (low, size) = if is_mean { ([steps[0] * x, steps[1] * y], steps) } else { ([0, 0], from.extent) };
+            let columns = low[0]..low[0] + size[0];
+            let rows = low[1]..low[1] + size[1];
+            let sources: Vec<usize> =
+                rows.flat_map(|y| columns.clone().map(move |x| source(x, y))).collect();
+            halved.extend(mean(&cells, &sources, is_mean, image.format));
         }
         self.images[first.image].write(&to, &halved);
     }
@@ -213,7 +215,7 @@ fn nearest(at: u32, from: u32, to: u32) -> u32 {
 }
 
 /// Returns the mean of texels, as far as it is known: exactly of equal texels, within one of bytes, not of floats.
-fn mean(cells: &[Cell], sources: &[usize], format: Format) -> Vec<Cell> {
+fn mean(cells: &[Cell], sources: &[usize], is_mean: bool, format: Format) -> Vec<Cell> {
     let bytes = texel_bytes(format);
     let texel = |start: usize| &cells[start..start + bytes];
     let first = texel(sources[0]);
@@ -224,13 +226,15 @@ fn mean(cells: &[Cell], sources: &[usize], format: Format) -> Vec<Cell> {
     if format != Format::Rgba8Unorm {
         return vec![Cell::UNKNOWN; bytes];
     }
-    (0..bytes).map(|byte| mean_byte(sources.iter().map(|start| cells[start + byte]), sources.len())).collect()
+    let count = is_mean.then_some(sources.len() as u32);
+    (0..bytes).map(|byte| mean_byte(sources.iter().map(|start| cells[start + byte]), count)).collect()
 }
 
-fn mean_byte(cells: impl Iterator<Item = Cell> + Clone, count: usize) -> Cell {
-    let (low, high) = if count == 4 {
+/// Returns the range of the mean of `count` cells, or without a count that of the cells.
+fn mean_byte(cells: impl Iterator<Item = Cell> + Clone, count: Option<u32>) -> Cell {
+    let (low, high) = if let Some(count) = count {
         let sum = |end: fn(Cell) -> u8| cells.clone().map(|cell| u32::from(end(cell))).sum::<u32>();
-        (sum(|cell| cell.low) / 4, sum(|cell| cell.high).div_ceil(4))
+        (sum(|cell| cell.low) / count, sum(|cell| cell.high).div_ceil(count))
     } else {
         let ends = cells.fold((u8::MAX, 0), |(low, high), cell| (low.min(cell.low), high.max(cell.high)));
         (ends.0.into(), ends.1.into())
@@ -267,11 +271,13 @@ mod tests {
     #[test]
     fn means_are_exact_of_equal_texels_and_within_one_of_others() {
         let cells = known(&[8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 8, 8, 12]);
-        let found = mean(&cells, &[0, 4, 8], Format::Rgba8Unorm);
+        let found = mean(&cells, &[0, 4, 8], true, Format::Rgba8Unorm);
         assert_eq!(found, known(&[8; 4]));
-        let found = mean(&cells, &[0, 4, 8, 12], Format::Rgba8Unorm);
+        let found = mean(&cells, &[0, 4, 8, 12], true, Format::Rgba8Unorm);
         assert_eq!(found[0], Cell { low: 7, high: 10 });
         assert_eq!(found[3], Cell { low: 8, high: 10 });
+        let found = mean(&cells, &[0, 4, 12], false, Format::Rgba8Unorm);
+        assert_eq!(found[3], Cell { low: 7, high: 13 });
     }
 
     #[test]
