@@ -41,10 +41,9 @@ impl World<'_> {
         let problems: Vec<_> = problem.then_some(Problem::Usage).into_iter().collect();
         let size_bytes = size as u64;
         let size = if size == 0 { given } else { size };
-        let usage = BufferUsage::STORAGE;
         let made = self.ctx().create_buffer(&BufferDesc {
             size_bytes,
-            usage,
+            usage: BufferUsage::STORAGE,
             memory,
             data: data.as_deref(),
             debug_name: "random buffer",
@@ -53,7 +52,7 @@ impl World<'_> {
             let mut cells = vec![Cell::UNKNOWN; size];
             cells[..given].copy_from_slice(&known(data.as_deref().unwrap_or_default()));
             self.memory.buffers.push(cells);
-            self.buffers.push(Object::new(holder, BufferInfo { size, memory, usage }));
+            self.buffers.push(Object::new(holder, BufferInfo { size, memory }));
         }
         Ok(true)
     }

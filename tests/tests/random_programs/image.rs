@@ -11,8 +11,6 @@ pub struct Image {
     pub format: Format,
     /// Width and height of mip 0.
     pub extent: [u32; 2],
-    /// Number of layers.
-    pub layers: u32,
     mips: Vec<Vec<Cell>>,
 }
 
@@ -67,7 +65,7 @@ impl Image {
             let [width, height] = mip_extent(extent, mip);
             vec![Cell::UNKNOWN; width as usize * height as usize * layers as usize * texel_bytes(format)]
         };
-        Self { format, extent, layers, mips: (0..mips).map(cells).collect() }
+        Self { format, extent, mips: (0..mips).map(cells).collect() }
     }
 
     /// Returns the start of each row of a place, in cells, and the cells of a row.

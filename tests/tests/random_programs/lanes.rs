@@ -1,5 +1,6 @@
 //! The tests: seeds of the bounded lane, kept programs, programs on several threads, and the long lane.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -8,11 +9,12 @@ use super::op::{Kind, Op, program};
 use super::plan::QUEUES;
 use super::run::{Failure, run};
 use super::shrink::shrink;
+use super::world::Tally;
 
 /// Operations of a program.
 const LENGTH: usize = 400;
 /// Programs of the bounded lane, for each kind of queues.
-const BOUNDED_SEEDS: u64 = 160;
+const BOUNDED_SEEDS: u64 = 400;
 /// Most runs of a failing program while it is shrunk.
 const TRIES: usize = 400;
 /// Programs after which objects and memory are counted.
@@ -76,13 +78,13 @@ fn run_and_check(env: &Environment, ops: &[Op]) -> Result<(), Failure> {
     gone.map_err(|message| Failure { at: ops.len(), message })
 }
 
-/// Runs the programs of seeds one after the other. Returns the number of operations.
+/// Runs the programs of seeds one after the other. Returns what they have done.
 ///
 /// # Panics
 /// When one of them fails.
-fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &Watchdog) -> Option<u64> {
+fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &Watchdog) -> Option<Tally> {
     let env = Environment::new(queues)?;
-    let mut executed = 0;
+    let mut total = Tally::default();
     for (count, seed) in (1..).zip(seeds) {
         let ops = program(seed, LENGTH);
         let outcome = run(&env, &ops).and_then(|done| {
@@ -93,27 +95,27 @@ fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &
             Ok(done)
         });
         match outcome {
-            Ok(done) => executed += done,
+            Ok(done) => total += done,
             Err(failure) => unreachable!("{}", report(seed, queues, &ops, &failure)),
         }
         dog.finished.fetch_add(1, Ordering::Relaxed);
     }
     assert_eq!(env.check_all_gone(), Ok(()));
     assert_eq!(env.check_messages(), Ok(()));
-    Some(executed)
+    Some(total)
 }
 
-/// Runs the programs of seeds on several threads of one context. Returns the number of operations.
+/// Runs the programs of seeds on several threads of one context. Returns what they have done.
 ///
 /// # Panics
 /// When one of them fails.
-fn run_on_threads(queues: lvk::QueueRequest, seeds: &[u64], threads: usize, dog: &Watchdog) -> Option<u64> {
+fn run_on_threads(queues: lvk::QueueRequest, seeds: &[u64], threads: usize, dog: &Watchdog) -> Option<Tally> {
     let env = Environment::new(queues)?;
-    let (next, executed) = (AtomicU64::new(0), AtomicU64::new(0));
+    let (next, total) = (AtomicU64::new(0), Mutex::new(Tally::default()));
     let work = || {
         while let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize) {
             match run(&env, &program(*seed, LENGTH)) {
-                Ok(done) => executed.fetch_add(done, Ordering::Relaxed),
+                Ok(done) => *total.lock().unwrap_or_else(std::sync::PoisonError::into_inner) += done,
                 Err(failure) => unreachable!("seed {seed}, {queues:?}, {threads} threads: {failure:?}"),
             };
             dog.finished.fetch_add(1, Ordering::Relaxed);
@@ -122,7 +124,7 @@ fn run_on_threads(queues: lvk::QueueRequest, seeds: &[u64], threads: usize, dog:
     std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
     assert_eq!(env.check_all_gone(), Ok(()));
     assert_eq!(env.check_messages(), Ok(()));
-    Some(executed.into_inner())
+    total.into_inner().ok()
 }
 
 #[test]
@@ -130,9 +132,11 @@ fn random_programs_do_what_the_model_says() {
     Watchdog::watch(|dog| {
         for queues in QUEUES {
             let seeds = KEPT_SEEDS.into_iter().chain(0..BOUNDED_SEEDS);
-            let Some(executed) = run_seeds(queues, seeds, dog) else { return };
-            eprintln!("{executed} operations with {queues:?}");
-            assert!(executed > BOUNDED_SEEDS * LENGTH as u64 / 2, "most operations find nothing to work on");
+            let Some(total) = run_seeds(queues, seeds, dog) else { return };
+            eprintln!("{queues:?}: {total}");
+            let programs = BOUNDED_SEEDS;
+            assert!(total.executed > programs * LENGTH as u64 / 2, "most operations find nothing to work on");
+            assert!(total.refused > 5 * programs && total.hits > programs, "errors or rays are too rare");
         }
     });
 }
@@ -142,8 +146,8 @@ fn random_programs_on_four_threads_of_one_context_do_what_the_model_says() {
     Watchdog::watch(|dog| {
         for queues in QUEUES {
             let seeds: Vec<u64> = (1_000_000..1_000_000 + BOUNDED_SEEDS / 2).collect();
-            let Some(executed) = run_on_threads(queues, &seeds, 4, dog) else { return };
-            eprintln!("{executed} operations on four threads with {queues:?}");
+            let Some(total) = run_on_threads(queues, &seeds, 4, dog) else { return };
+            eprintln!("{queues:?}, four threads: {total}");
         }
     });
 }
@@ -181,7 +185,7 @@ fn many_random_programs() {
     const BLOCK: u64 = 500;
     let (first, count) = (number("LVK_RANDOM_SEED", 10_000_000), number("LVK_RANDOM_PROGRAMS", 2_000));
     let threads = number("LVK_RANDOM_THREADS", 1) as usize;
-    let (start, mut total) = (Instant::now(), 0);
+    let (start, mut total) = (Instant::now(), Tally::default());
     Watchdog::watch(|dog| {
         for (block, begin) in (first..first + count).step_by(BLOCK as usize).enumerate() {
             let seeds = begin..(begin + BLOCK).min(first + count);
@@ -192,7 +196,8 @@ fn many_random_programs() {
             };
             let Some(done) = done else { return };
             total += done;
-            eprintln!("{total} operations, {:.0} a second", total as f64 / start.elapsed().as_secs_f64());
+            let rate = total.executed as f64 / start.elapsed().as_secs_f64();
+            eprintln!("{total}; {rate:.0} operations a second");
         }
     });
 }

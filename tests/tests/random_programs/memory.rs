@@ -26,6 +26,8 @@ pub struct Memory {
     pub blas: Vec<Blas>,
     /// TLAS.
     pub tlas: Vec<Tlas>,
+    /// Rays that must hit a triangle, of all traces so far.
+    pub hits: u64,
 }
 
 /// Contents of a BLAS.
@@ -133,6 +135,9 @@ impl Memory {
             }
             Effect::Trace { tlas, to } => {
                 let cells: Vec<_> = (0..RAYS).flat_map(|ray| self.hit(*tlas, ray)).collect();
+                let miss = MISS.to_le_bytes().map(Cell::known);
+                let is_hit = |word: &&[Cell]| **word != miss && word[0].is_known();
+                self.hits += cells.chunks(4).filter(is_hit).count() as u64;
                 self.write(to.0, to.1, &cells);
             }
         }

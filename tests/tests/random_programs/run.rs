@@ -9,7 +9,7 @@ use lvk_tests::random::Random;
 use super::cell::compare;
 use super::environment::Environment;
 use super::op::{Kind, Op};
-use super::world::{Object, Open, Problem, World, judge, pick};
+use super::world::{Object, Open, Problem, Tally, World, judge, pick};
 
 /// Most command buffers that are recorded at once.
 const MOST_OPEN: usize = 4;
@@ -25,17 +25,17 @@ pub struct Failure {
     pub message: String,
 }
 
-/// Runs a program. Returns the number of operations that had objects to work on.
+/// Runs a program. Returns what it has done.
 ///
 /// # Errors
 /// The first difference from the model, a panic, or a message of the validation layer.
-pub fn run(env: &Environment, ops: &[Op]) -> Result<u64, Failure> {
+pub fn run(env: &Environment, ops: &[Op]) -> Result<Tally, Failure> {
     let mut at = 0;
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         let mut world = World::new(env).map_err(|error| error.to_string())?;
         for op in ops {
             if world.step(op).map_err(|message| format!("{op:?}: {message}"))? {
-                world.executed += 1;
+                world.tally.executed += 1;
             }
             at += 1;
         }
@@ -173,7 +173,9 @@ impl World<'_> {
             let ops: Vec<Op> = (0..2 + n[2] % 8).map(|_| Op::random_recorded(&mut random)).collect();
             plans.push(ops.iter().filter_map(|op| self.plan(op, at)).collect());
         }
-        self.executed += plans.iter().map(|plans| plans.len() as u64).sum::<u64>();
+        let planned = || plans.iter().flatten();
+        self.tally.executed += planned().count() as u64;
+        self.tally.refused += planned().filter(|planned| !planned.problems.is_empty()).count() as u64;
         let env = self.env;
         let outcomes: Vec<Result<(), String>> = std::thread::scope(|scope| {
             let threads = self.open.iter_mut().zip(plans).map(|(open, plans)| {
@@ -278,8 +280,8 @@ impl World<'_> {
         Ok(destroy(self.env, &mut self.tlas, picked.map(|found| (found.handle, found.live)), n[1]))
     }
 
-    /// Compares all contents, and drops everything. Returns the number of operations.
-    fn finish(mut self) -> Result<u64, String> {
+    /// Compares all contents, and drops everything. Returns what the program has done.
+    fn finish(mut self) -> Result<Tally, String> {
         while !self.pending.is_empty() {
             self.finish_readback([0, 1, 0, 0, 0, 0])?;
         }
@@ -297,10 +299,10 @@ impl World<'_> {
                 compare(&format!("mip {mip} of texture {number} at the end"), &bytes, &expected)?;
             }
         }
-        let (env, executed) = (self.env, self.executed);
+        let (env, tally) = (self.env, Tally { hits: self.memory.hits, ..self.tally });
         drop(self);
         env.check_messages()?;
-        Ok(executed)
+        Ok(tally)
     }
 }
 

@@ -117,7 +117,6 @@ pub fn pick<H: Destroy + Copy, T>(objects: &[Object<H, T>], n: u16, foreign: H) 
 pub struct BufferInfo {
     pub size: usize,
     pub memory: MemoryKind,
-    pub usage: BufferUsage,
 }
 
 /// What the model knows of a texture or view.
@@ -172,6 +171,32 @@ pub struct Pending {
     pub expected: Vec<Cell>,
 }
 
+/// What programs have done.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub struct Tally {
+    /// Operations that had objects to work on.
+    pub executed: u64,
+    /// Recorded commands among them that had to be refused.
+    pub refused: u64,
+    /// Rays that had to hit a triangle.
+    pub hits: u64,
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.executed += other.executed;
+        self.refused += other.refused;
+        self.hits += other.hits;
+    }
+}
+
+impl std::fmt::Display for Tally {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { executed, refused, hits } = self;
+        write!(out, "{executed} operations, {refused} of them refused commands, {hits} rays with hits")
+    }
+}
+
 /// The state of a program.
 pub struct World<'a> {
     pub env: &'a Environment,
@@ -188,8 +213,8 @@ pub struct World<'a> {
     /// Arguments of indirect dispatches.
     pub arguments: Holder<BufferHandle>,
     pub queries: Holder<QueryPoolHandle>,
-    /// Operations that ran.
-    pub executed: u64,
+    /// What ran so far.
+    pub tally: Tally,
 }
 
 impl<'a> World<'a> {
@@ -212,7 +237,7 @@ impl<'a> World<'a> {
             open: Vec::new(),
             submitted: Vec::new(),
             pending: Vec::new(),
-            executed: 0,
+            tally: Tally::default(),
         })
     }
 
@@ -250,10 +275,11 @@ impl<'a> World<'a> {
     pub fn record(&mut self, at: usize, planned: Planned) -> Result<(), String> {
         let Planned { action, problems, effects } = planned;
         let (env, open) = (self.env, &mut self.open[at]);
-        if judge(action(env, &mut open.cmd), &problems)?.is_some() {
-            open.effects.extend(effects);
+        match judge(action(env, &mut open.cmd), &problems)? {
+            Some(()) => open.effects.extend(effects),
+            None => self.tally.refused += 1,
         }
-        self.executed += 1;
+        self.tally.executed += 1;
         Ok(())
     }
 }
