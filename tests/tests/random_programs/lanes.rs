@@ -23,7 +23,7 @@ const CHECKED_EVERY: u64 = 16;
 const HANG: Duration = Duration::from_secs(120);
 
 /// Seeds whose programs have failed, by a mistake of the library or of the model. They are always replayed.
-const KEPT_SEEDS: [u64; 4] = [5, 22, 30, 20_000_381];
+const KEPT_SEEDS: [u64; 6] = [5, 22, 30, 1_000_026, 20_000_381, 20_009_249];
 
 /// Ends the process if the count of finished programs stands still.
 struct Watchdog {
@@ -136,7 +136,7 @@ fn random_programs_do_what_the_model_says() {
             eprintln!("{queues:?}: {total}");
             let programs = BOUNDED_SEEDS;
             assert!(total.executed > programs * LENGTH as u64 / 2, "most operations find nothing to work on");
-            assert!(total.refused > 5 * programs && total.hits > programs, "errors or rays are too rare");
+            assert!(total.refused > 5 * programs && total.hits > 5 * programs, "errors or rays are too rare");
         }
     });
 }

@@ -221,6 +221,15 @@ impl World<'_> {
         })
     }
 
+    /// Returns exactly `count` words of a buffer. `None` if it is smaller.
+    pub(super) fn exact_words(&self, pick: u16, start: u16, count: usize) -> Option<Words> {
+        let buffer = self.pick_buffer(pick)?;
+        let size = if buffer.live.is_some() { self.size(buffer.live) } else { 4 * count };
+        let room = (size / 4).checked_sub(count)?;
+        let offset = 4 * (usize::from(start) % (room + 1));
+        Some(Words { handle: buffer.handle, number: buffer.live, problem: buffer.problem, offset, count })
+    }
+
     fn dispatch_fill(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
         let to = self.words(n[0], n[1], n[2], 64)?;
         let problems = compute_problems(queue, [to.problem]);

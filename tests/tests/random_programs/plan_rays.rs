@@ -86,7 +86,7 @@ impl World<'_> {
     pub(super) fn instances(&self, n: [u16; 3], most: usize) -> (Vec<TlasInstance>, Vec<Instance>, Vec<Problem>) {
         let (mut raw, mut known, mut problems) = (Vec::new(), Vec::new(), Vec::new());
         for slot in 0..usize::from(n[0]) % (most + 1) {
-            let Some(blas) = self.pick_blas((n[1] >> slot) | u16::from(slot == 0)) else { break };
+            let Some(blas) = self.pick_blas(n[1] >> slot) else { break };
             problems.extend(blas.problem);
             let depth = u32::from((n[2] >> (2 * slot)) % 30);
             let instance = Instance {
@@ -143,10 +143,7 @@ impl World<'_> {
 
     pub(super) fn trace(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
         let tlas = self.pick_tlas(n[0])?.live?;
-        let to = self.words(n[1], n[2], u16::MAX, RAYS)?;
-        if to.count < RAYS {
-            return None;
-        }
+        let to = self.exact_words(n[1], n[2], RAYS)?;
         let problems = compute_problems(queue, [to.problem]);
         let effects = match to.number {
             Some(number) if problems.is_empty() => vec![Effect::Trace { tlas, to: (number, to.offset) }],

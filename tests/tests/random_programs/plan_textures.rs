@@ -283,8 +283,8 @@ impl World<'_> {
         let place = info.map(|info| info.part.whole(mip));
         let [width, height] = place.map_or([1, 1], |place| place.extent);
         let texels = (width * height) as usize;
-        let to = self.words(n[2], n[3], u16::MAX, texels)?;
-        if to.count < texels || info.is_some_and(|info| texel_bytes(info.format) != 4) {
+        let to = self.exact_words(n[2], n[3], texels)?;
+        if info.is_some_and(|info| texel_bytes(info.format) != 4) {
             return None;
         }
         let problems = compute_problems(queue, [texture.problem, lack, to.problem]);
