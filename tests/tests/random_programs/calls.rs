@@ -1,8 +1,8 @@
 //! Calls of the context on buffers, textures and acceleration structures.
 
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, Format, MemoryKind, SamplerDesc, TextureDesc,
-    TextureKind, TextureUsage, TextureViewDesc, TlasDesc, Triangles,
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, Format, MemoryKind, SamplerDesc,
+    TextureDesc, TextureKind, TextureUsage, TextureViewDesc, TlasDesc, Triangles,
 };
 
 use super::cell::{Cell, compare, known, pattern};
@@ -136,32 +136,9 @@ impl World<'_> {
         if self.textures.iter().filter(|texture| texture.holder.is_some()).count() >= MOST {
             return Ok(false);
         }
-        let format = [Format::R32Uint, Format::Rgba8Unorm, Format::R32Float, Format::R8Uint][usize::from(n[0] % 4)];
-        let all = TextureUsage::SAMPLED | TextureUsage::STORAGE | TextureUsage::TARGET;
-        let usage = match n[1] % 8 {
-            _ if format == Format::R8Uint => TextureUsage::SAMPLED,
-            0 => TextureUsage::SAMPLED,
-            1 => TextureUsage::STORAGE,
-            2 => TextureUsage::TARGET,
-            3 => TextureUsage::empty(),
-            _ => all,
-        };
-        let sides = [1_u32, 2, 3, 4, 5, 6, 8];
-        let mut extent = [n[2], n[2] >> 4].map(|bits| sides[usize::from(bits) % sides.len()]);
-        let is_array = n[3] % 4 == 0;
-        let layers = if is_array { 1 + u32::from(n[3] >> 2) % 3 } else { 1 };
-        let full = 32 - extent[0].max(extent[1]).leading_zeros();
-        let mut mips = 1 + u32::from(n[4]) % full.min(3);
-        let mut problems: Vec<_> = usage.is_empty().then_some(Problem::Usage).into_iter().collect();
-        match n[5] % 32 {
-            0 => extent[0] = 0,
-            1 => mips = full + 1,
-            _ => {}
-        }
-        if n[5] % 32 < 2 {
-            problems.push(Problem::Usage);
-        }
-        let part = Part { image: self.memory.images.len(), base_mip: 0, mips, base_layer: 0, layers, extent };
+        let (info, mut problems) = choose_texture(n, self.memory.images.len());
+        let TextureInfo { part, format, usage, is_array } = info;
+        let Part { mips, layers, extent, .. } = part;
         let bytes: usize = (0..mips).map(|mip| part.whole(mip).texels() * texel_bytes(format)).sum();
         let data = (n[5] % 3 == 0).then(|| pattern(n[5], bytes + usize::from(n[5] % 32 == 3)));
         if data.as_ref().is_some_and(|data| data.len() != bytes) {
@@ -180,18 +157,22 @@ impl World<'_> {
         });
         if let Some(holder) = judge(made, &problems)? {
             self.memory.images.push(Image::new(format, extent, layers, mips));
-            let mut rest = data.as_deref().unwrap_or_default();
-            for mip in 0..mips {
-                let place = part.whole(mip);
-                let (own, others) = rest.split_at(rest.len().min(place.texels() * texel_bytes(format)));
-                if !own.is_empty() {
-                    self.memory.apply(&Effect::Texels { place, bytes: own.to_vec() });
-                }
-                rest = others;
-            }
-            self.textures.push(Object::new(holder, TextureInfo { part, format, usage, is_array }));
+            self.fill_mips(&info, data.as_deref().unwrap_or_default());
+            self.textures.push(Object::new(holder, info));
         }
         Ok(true)
+    }
+
+    /// Writes the initial contents of a texture, as far as they reach, mip by mip.
+    fn fill_mips(&mut self, info: &TextureInfo, mut data: &[u8]) {
+        for mip in 0..info.part.mips {
+            let place = info.part.whole(mip);
+            let (own, others) = data.split_at(data.len().min(place.texels() * texel_bytes(info.format)));
+            if !own.is_empty() {
+                self.memory.apply(&Effect::Texels { place, bytes: own.to_vec() });
+            }
+            data = others;
+        }
     }
 
     pub(super) fn create_view(&mut self, n: [u16; 6]) -> Outcome {
@@ -272,7 +253,9 @@ impl World<'_> {
 
     pub(super) fn create_sampler(&mut self) -> Outcome {
         if self.samplers.len() < 40 {
-            let made = self.ctx().create_sampler(&SamplerDesc { debug_name: "random sampler", ..Default::default() });
+            let made = self
+                .ctx()
+                .create_sampler(&SamplerDesc { debug_name: "random sampler", ..Default::default() });
             self.samplers.extend(judge(made, &[])?.map(|holder| Object::new(holder, ())));
         }
         Ok(true)
@@ -284,8 +267,11 @@ impl World<'_> {
         }
         let count = 1 + usize::from(n[0] % 3);
         let depths: Vec<u32> = (0..count).map(|triangle| triangle_depth(n[1 + triangle])).collect();
-        let data: Vec<u8> =
-            depths.iter().enumerate().flat_map(|(triangle, depth)| triangle_bytes(triangle, *depth)).collect();
+        let data: Vec<u8> = depths
+            .iter()
+            .enumerate()
+            .flat_map(|(triangle, depth)| triangle_bytes(triangle, *depth))
+            .collect();
         let made = self.ctx().create_buffer(&BufferDesc {
             usage: BufferUsage::ACCEL_INPUT,
             data: Some(&data),
@@ -318,7 +304,8 @@ impl World<'_> {
             return Ok(false);
         }
         let (is_updatable, can_compact) = (n[1] & 1 == 1, n[1] & 2 == 2);
-        let mut flags = [BuildFlags::FAST_TRACE, BuildFlags::FAST_BUILD, BuildFlags::LOW_MEMORY][usize::from(n[2] % 3)];
+        let mut flags =
+            [BuildFlags::FAST_TRACE, BuildFlags::FAST_BUILD, BuildFlags::LOW_MEMORY][usize::from(n[2] % 3)];
         flags.set(BuildFlags::ALLOW_UPDATE, is_updatable);
         flags.set(BuildFlags::ALLOW_COMPACTION, can_compact);
         let mut problems: Vec<_> = mesh.problem.into_iter().collect();
@@ -332,7 +319,8 @@ impl World<'_> {
             problems.push(Problem::Usage);
         }
         let geometries = [BlasGeometry::Triangles(Triangles::packed(mesh.handle, vertices))];
-        let desc = BlasDesc { geometries: &geometries, flags, debug_name: "random BLAS", ..Default::default() };
+        let desc =
+            BlasDesc { geometries: &geometries, flags, debug_name: "random BLAS", ..Default::default() };
         let made = self.ctx().create_blas(&desc);
         if let (Some(holder), Some(mesh)) = (judge(made, &problems)?, mesh.live) {
             self.memory.blas.push(Blas { mesh, ..Default::default() });
@@ -356,7 +344,8 @@ impl World<'_> {
             problems.push(Problem::Usage);
         }
         let capacity = u32::from(n[5] % 5);
-        let desc = TlasDesc { instances: &raw, capacity, flags, debug_name: "random TLAS", ..Default::default() };
+        let desc =
+            TlasDesc { instances: &raw, capacity, flags, debug_name: "random TLAS", ..Default::default() };
         if let Some(holder) = judge(self.ctx().create_tlas(&desc), &problems)? {
             let tlas = self.memory.tlas.len();
             self.memory.tlas.push(Tlas::default());
@@ -389,6 +378,37 @@ impl World<'_> {
         }
         Ok(true)
     }
+}
+
+/// Returns a texture with this number of its image, mostly one that can be created, and its problems.
+fn choose_texture(n: [u16; 6], image: usize) -> (TextureInfo, Vec<Problem>) {
+    const SIDES: [u32; 7] = [1, 2, 3, 4, 5, 6, 8];
+    const FORMATS: [Format; 4] = [Format::R32Uint, Format::Rgba8Unorm, Format::R32Float, Format::R8Uint];
+    let format = FORMATS[usize::from(n[0] % 4)];
+    let usage = match n[1] % 8 {
+        _ if format == Format::R8Uint => TextureUsage::SAMPLED,
+        0 => TextureUsage::SAMPLED,
+        1 => TextureUsage::STORAGE,
+        2 => TextureUsage::TARGET,
+        3 => TextureUsage::empty(),
+        _ => TextureUsage::SAMPLED | TextureUsage::STORAGE | TextureUsage::TARGET,
+    };
+    let mut extent = [n[2], n[2] >> 4].map(|bits| SIDES[usize::from(bits) % SIDES.len()]);
+    let is_array = n[3] % 4 == 0;
+    let layers = if is_array { 1 + u32::from(n[3] >> 2) % 3 } else { 1 };
+    let full = 32 - extent[0].max(extent[1]).leading_zeros();
+    let mut mips = 1 + u32::from(n[4]) % full.min(3);
+    let mut problems: Vec<_> = usage.is_empty().then_some(Problem::Usage).into_iter().collect();
+    match n[5] % 32 {
+        0 => extent[0] = 0,
+        1 => mips = full + 1,
+        _ => {}
+    }
+    if n[5] % 32 < 2 {
+        problems.push(Problem::Usage);
+    }
+    let part = Part { image, base_mip: 0, mips, base_layer: 0, layers, extent };
+    (TextureInfo { part, format, usage, is_array }, problems)
 }
 
 /// Extents are those of the mips; keeps the model's halving next to its users.

@@ -90,7 +90,11 @@ impl Environment {
     pub fn check_messages(&self) -> Result<(), String> {
         let messages: Vec<String> =
             self.sinks.iter().flat_map(ValidationSink::take).map(|message| message.to_string()).collect();
-        if messages.is_empty() { Ok(()) } else { Err(format!("the validation layer says: {}", messages.join("\n"))) }
+        if messages.is_empty() {
+            Ok(())
+        } else {
+            Err(format!("the validation layer says: {}", messages.join("\n")))
+        }
     }
 
     /// Fails if an object of a program is alive, or if the GPU uses memory of acceleration structures.
@@ -103,7 +107,9 @@ impl Environment {
         let bytes = self.ctx.accel_memory().structure_bytes;
         if bytes != self.own_bytes {
             let before = self.own_bytes;
-            return Err(format!("acceleration structures take {bytes} bytes after the program, {before} before"));
+            return Err(format!(
+                "acceleration structures take {bytes} bytes after the program, {before} before"
+            ));
         }
         Ok(())
     }

@@ -73,8 +73,9 @@ impl Image {
         let [width, height] = mip_extent(self.extent, place.mip);
         let bytes = texel_bytes(self.format);
         let row = |layer: u32, y: u32| ((layer * height + y) * width + place.offset[0]) as usize * bytes;
-        let rows = (place.layer..place.layer + place.layers)
-            .flat_map(|layer| (place.offset[1]..place.offset[1] + place.extent[1]).map(move |y| row(layer, y)));
+        let rows = (place.layer..place.layer + place.layers).flat_map(|layer| {
+            (place.offset[1]..place.offset[1] + place.extent[1]).map(move |y| row(layer, y))
+        });
         (rows.collect(), place.extent[0] as usize * bytes)
     }
 

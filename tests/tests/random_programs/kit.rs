@@ -3,7 +3,8 @@
 use bytemuck::NoUninit;
 use lvk::{
     ComputePipelineHandle, Context, Format, HitGroup, Holder, RayTracingPipelineDesc,
-    RayTracingPipelineHandle, RenderPipelineDesc, RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage,
+    RayTracingPipelineHandle, RenderPipelineDesc, RenderPipelineHandle, ShaderModuleDesc, ShaderSource,
+    ShaderStage,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::raster::render_pipeline;
@@ -165,7 +166,8 @@ fn draw_pipeline(ctx: &Context, format: Format) -> Holder<RenderPipelineHandle> 
              gl_Position = vec4(corner * 4.0 - 1.0, 0.5, 1.0);
          }}"
     );
-    let fragment = format!("{HEAD} layout(location = 0) out {kind} result; void main() {{ result = {value}; }}");
+    let fragment =
+        format!("{HEAD} layout(location = 0) out {kind} result; void main() {{ result = {value}; }}");
     let desc = RenderPipelineDesc { color: &[format.into()], ..Default::default() };
     render_pipeline(ctx, &vertex, &fragment, &desc)
 }

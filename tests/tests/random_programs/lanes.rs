@@ -23,7 +23,7 @@ const CHECKED_EVERY: u64 = 16;
 const HANG: Duration = Duration::from_secs(120);
 
 /// Seeds whose programs have failed, by a mistake of the library or of the model. They are always replayed.
-const KEPT_SEEDS: [u64; 6] = [5, 22, 30, 1_000_026, 20_000_381, 20_009_249];
+const KEPT_SEEDS: [u64; 7] = [5, 22, 30, 1_000_026, 20_000_381, 20_009_249, 100_001_171];
 
 /// Ends the process if the count of finished programs stands still.
 struct Watchdog {

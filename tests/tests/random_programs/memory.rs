@@ -133,14 +133,16 @@ impl Memory {
                 let seen = |instance: &Instance| (*instance, self.blas[instance.blas].version);
                 self.tlas[*tlas].instances = instances.iter().map(seen).collect();
             }
-            Effect::Trace { tlas, to } => {
-                let cells: Vec<_> = (0..RAYS).flat_map(|ray| self.hit(*tlas, ray)).collect();
-                let miss = MISS.to_le_bytes().map(Cell::known);
-                let is_hit = |word: &&[Cell]| **word != miss && word[0].is_known();
-                self.hits += cells.chunks(4).filter(is_hit).count() as u64;
-                self.write(to.0, to.1, &cells);
-            }
+            Effect::Trace { tlas, to } => self.trace(*tlas, *to),
         }
+    }
+
+    fn trace(&mut self, tlas: usize, (buffer, offset): (usize, usize)) {
+        let cells: Vec<_> = (0..RAYS).flat_map(|ray| self.hit(tlas, ray)).collect();
+        let miss = MISS.to_le_bytes().map(Cell::known);
+        let is_hit = |word: &&[Cell]| **word != miss && word[0].is_known();
+        self.hits += cells.chunks(4).filter(is_hit).count() as u64;
+        self.write(buffer, offset, &cells);
     }
 
     fn write(&mut self, buffer: usize, offset: usize, cells: &[Cell]) {
@@ -155,7 +157,8 @@ impl Memory {
         for layer in 0..to.layers {
             for y in 0..to.extent[1] {
                 for x in 0..to.extent[0] {
-                    let [x, y] = [(0, x), (1, y)].map(|(axis, at)| nearest(at, from.extent[axis], to.extent[axis]));
+                    let [x, y] =
+                        [(0, x), (1, y)].map(|(axis, at)| nearest(at, from.extent[axis], to.extent[axis]));
                     let texel = ((layer * from.extent[1] + y) * from.extent[0] + x) as usize * bytes;
                     scaled.extend_from_slice(&cells[texel..texel + bytes]);
                 }
@@ -173,17 +176,19 @@ impl Memory {
         let cells = image.read(&from);
         let bytes = texel_bytes(image.format);
         let steps = [0, 1].map(|axis| from.extent[axis] / to.extent[axis]);
-        let is_mean = (0..2).all(|axis| steps[axis] <= 2 && steps[axis] * to.extent[axis] == from.extent[axis]);
+        let is_mean =
+            (0..2).all(|axis| steps[axis] <= 2 && steps[axis] * to.extent[axis] == from.extent[axis]);
         let mut halved = Vec::with_capacity(to.texels() * bytes);
         for texel in 0..to.texels() as u32 {
             let [width, height] = to.extent;
             let (x, y, layer) = (texel % width, texel / width % height, texel / (width * height));
-            let source = |x: u32, y: u32| ((layer * from.extent[1] + y) * from.extent[0] + x) as usize * bytes;
-            let (low, size) = if is_mean { ([steps[0] * x, steps[1] * y], steps) } else { ([0, 0], from.extent) };
+            let source =
+                |x: u32, y: u32| ((layer * from.extent[1] + y) * from.extent[0] + x) as usize * bytes;
+            let (low, size) =
+                if is_mean { ([steps[0] * x, steps[1] * y], steps) } else { ([0, 0], from.extent) };
             let columns = low[0]..low[0] + size[0];
             let rows = low[1]..low[1] + size[1];
-            let sources: Vec<usize> =
-                rows.flat_map(|y| columns.clone().map(move |x| source(x, y))).collect();
+            let sources: Vec<usize> = rows.flat_map(|y| columns.clone().map(move |x| source(x, y))).collect();
             halved.extend(mean(&cells, &sources, is_mean, image.format));
         }
         self.images[first.image].write(&to, &halved);
@@ -201,7 +206,8 @@ impl Memory {
             let depth = blas.depths.get(triangle).map(|depth| depth + instance.depth);
             let hit = depth.filter(|_| instance.is_visible && instance.slot == slot);
             if let Some(depth) = hit {
-                nearest = Some(nearest.map_or((depth, instance.custom), |best| best.min((depth, instance.custom))));
+                nearest =
+                    Some(nearest.map_or((depth, instance.custom), |best| best.min((depth, instance.custom))));
             }
         }
         let word = nearest.map_or(MISS, |(depth, custom)| hit_word(custom, triangle as u32, depth));
@@ -224,7 +230,8 @@ fn mean(cells: &[Cell], sources: &[usize], is_mean: bool, format: Format) -> Vec
     let bytes = texel_bytes(format);
     let texel = |start: usize| &cells[start..start + bytes];
     let first = texel(sources[0]);
-    let alike = sources.iter().all(|start| texel(*start) == first && first.iter().all(|cell| cell.is_known()));
+    let alike =
+        sources.iter().all(|start| texel(*start) == first && first.iter().all(|cell| cell.is_known()));
     if alike {
         return first.to_vec();
     }
@@ -260,10 +267,15 @@ mod tests {
     fn rays_hit_the_nearest_visible_triangle_and_nothing_where_a_blas_is_newer() {
         let instance = |blas, depth, custom| Instance { blas, slot: 1, depth, custom, is_visible: true };
         let blas = |depths: &[u32]| Blas { mesh: 0, depths: depths.to_vec(), version: 1 };
-        let mut memory = Memory { blas: vec![blas(&[5, 9]), blas(&[3])], tlas: vec![Tlas::default()], ..Default::default() };
+        let mut memory = Memory {
+            blas: vec![blas(&[5, 9]), blas(&[3])],
+            tlas: vec![Tlas::default()],
+            ..Default::default()
+        };
         memory.meshes = vec![vec![5, 9]];
         let hidden = Instance { is_visible: false, ..instance(1, 0, 3) };
-        memory.apply(&Effect::Place { tlas: 0, instances: vec![instance(0, 2, 1), hidden, instance(1, 6, 2)] });
+        memory
+            .apply(&Effect::Place { tlas: 0, instances: vec![instance(0, 2, 1), hidden, instance(1, 6, 2)] });
         let word = |word: u32| word.to_le_bytes().map(Cell::known);
         assert_eq!(memory.hit(0, 3), word(hit_word(1, 0, 7)));
         assert_eq!(memory.hit(0, 4), word(hit_word(1, 1, 11)));

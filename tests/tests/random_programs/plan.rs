@@ -116,9 +116,12 @@ impl World<'_> {
         let (start, length, inside) = range(n[2], n[3], self.size(from.live));
         let room = self.size(to.live);
         let target = if n[4] % 24 == 23 { room as u64 } else { u64::from(n[4]) % (room as u64 + 1) };
-        let length = if inside && n[4] % 24 < 22 { length.min(room as u64 - target.min(room as u64)) } else { length };
+        let length =
+            if inside && n[4] % 24 < 22 { length.min(room as u64 - target.min(room as u64)) } else { length };
         let fits = inside && target.saturating_add(length) <= room as u64;
-        let overlaps = from.live == to.live && start < target.saturating_add(length) && target < start.saturating_add(length);
+        let overlaps = from.live == to.live
+            && start < target.saturating_add(length)
+            && target < start.saturating_add(length);
         if !fits || (overlaps && length > 0) {
             problems.push(Problem::Usage);
         }
@@ -239,7 +242,10 @@ impl World<'_> {
             let address = env.ctx().buffer_address(to.handle)? + to.offset as u64;
             cmd.bind_compute_pipeline(env.kit.kernel(Kernel::Fill))?;
             cmd.push_constants(&Push { to: address, number: seed, ..Default::default() })?;
-            cmd.dispatch([to.count as u32, 1, 1], &Dependencies { buffers: &[to.handle], ..Default::default() })
+            cmd.dispatch(
+                [to.count as u32, 1, 1],
+                &Dependencies { buffers: &[to.handle], ..Default::default() },
+            )
         }))
     }
 
@@ -286,7 +292,11 @@ impl World<'_> {
         let problems = compute_problems(queue, [from.problem, to.problem]);
         let effects = match (from.number, to.number) {
             (Some(source), Some(sink)) if problems.is_empty() => {
-                vec![Effect::CopyBytes { from: (source, from.offset), to: (sink, to.offset), size: 4 * to.count }]
+                vec![Effect::CopyBytes {
+                    from: (source, from.offset),
+                    to: (sink, to.offset),
+                    size: 4 * to.count,
+                }]
             }
             _ => Vec::new(),
         };
@@ -319,7 +329,10 @@ impl World<'_> {
             let from = cmd.upload_slice(&bytes)?;
             cmd.bind_compute_pipeline(env.kit.kernel(Kernel::Copy))?;
             cmd.push_constants(&Push { to: target, from, ..Default::default() })?;
-            cmd.dispatch([to.count as u32, 1, 1], &Dependencies { buffers: &[to.handle], ..Default::default() })
+            cmd.dispatch(
+                [to.count as u32, 1, 1],
+                &Dependencies { buffers: &[to.handle], ..Default::default() },
+            )
         }))
     }
 

@@ -83,7 +83,11 @@ impl World<'_> {
     }
 
     /// Returns up to `most` instances, those of the model, and the problems of their handles.
-    pub(super) fn instances(&self, n: [u16; 3], most: usize) -> (Vec<TlasInstance>, Vec<Instance>, Vec<Problem>) {
+    pub(super) fn instances(
+        &self,
+        n: [u16; 3],
+        most: usize,
+    ) -> (Vec<TlasInstance>, Vec<Instance>, Vec<Problem>) {
         let (mut raw, mut known, mut problems) = (Vec::new(), Vec::new(), Vec::new());
         for slot in 0..usize::from(n[0]) % (most + 1) {
             let Some(blas) = self.pick_blas(n[1] >> slot) else { break };

@@ -1,8 +1,8 @@
 //! Plans of commands that use textures.
 
 use lvk::{
-    ClearValue, ColorAttachment, ColorLoadOp, Dependencies, Filter, Format, Queue, RenderPassDesc, TextureHandle,
-    TextureRange, TextureRegion, TextureUsage,
+    ClearValue, ColorAttachment, ColorLoadOp, Dependencies, Filter, Format, Queue, RenderPassDesc,
+    TextureHandle, TextureRange, TextureRegion, TextureUsage,
 };
 
 use super::cell::{pattern, pattern_byte};
@@ -27,6 +27,15 @@ fn clear_value(format: Format, seed: u16) -> ClearValue {
         Format::R32Uint => ClearValue::Uint([word; 4]),
         Format::R32Float => ClearValue::Color([f32::from_bits(word); 4]),
         _ => ClearValue::Color(word.to_le_bytes().map(|byte| f32::from(byte) / 255.0)),
+    }
+}
+
+/// Returns the operation that clears a target to [`texel`] of a seed, or loads it.
+fn load_op(format: Format, seed: Option<u16>) -> ColorLoadOp {
+    match seed.map(|seed| clear_value(format, seed)) {
+        Some(ClearValue::Uint(value)) => ColorLoadOp::ClearUint(value),
+        Some(ClearValue::Color(value)) => ColorLoadOp::Clear(value),
+        _ => ColorLoadOp::Load,
     }
 }
 
@@ -72,7 +81,13 @@ impl World<'_> {
     }
 
     /// Returns an offset in a buffer for the packed texels of a place, and the problem of one that does not fit.
-    fn packed_offset(&self, n: u16, buffer: Option<usize>, place: Option<Place>, format: Format) -> (u64, Option<Problem>) {
+    fn packed_offset(
+        &self,
+        n: u16,
+        buffer: Option<usize>,
+        place: Option<Place>,
+        format: Format,
+    ) -> (u64, Option<Problem>) {
         let size = buffer.map_or(16, |number| self.buffers[number].info.size);
         let bytes = place.map_or(0, |place| place.texels() * texel_bytes(format));
         let (offset, _, _) = range(n, 0, size.saturating_sub(bytes));
@@ -94,7 +109,9 @@ impl World<'_> {
             _ => Vec::new(),
         };
         let (from, to) = (buffer.handle, texture.handle);
-        Some(Planned::new(problems, effects, move |_, cmd| cmd.copy_buffer_to_texture(from, offset, to, &region)))
+        Some(Planned::new(problems, effects, move |_, cmd| {
+            cmd.copy_buffer_to_texture(from, offset, to, &region)
+        }))
     }
 
     pub(super) fn texture_to_buffer(&self, n: [u16; 6]) -> Option<Planned> {
@@ -110,7 +127,9 @@ impl World<'_> {
             _ => Vec::new(),
         };
         let (to, from) = (buffer.handle, texture.handle);
-        Some(Planned::new(problems, effects, move |_, cmd| cmd.copy_texture_to_buffer(from, &region, to, offset)))
+        Some(Planned::new(problems, effects, move |_, cmd| {
+            cmd.copy_texture_to_buffer(from, &region, to, offset)
+        }))
     }
 
     pub(super) fn copy_texture(&self, n: [u16; 6]) -> Option<Planned> {
@@ -125,7 +144,8 @@ impl World<'_> {
             }
             _ => None,
         };
-        let formats = [&source, &target].map(|texture| self.info(texture).map(|info| texel_bytes(info.format)));
+        let formats =
+            [&source, &target].map(|texture| self.info(texture).map(|info| texel_bytes(info.format)));
         let differ = matches!(formats, [Some(one), Some(other)] if one != other);
         let meet = matches!((from_place, to_place), (Some(one), Some(other)) if one.meets(&other));
         if differ || meet || (to_place.is_none() && target.problem.is_none()) {
@@ -205,7 +225,8 @@ impl World<'_> {
                 problems.push(Problem::Unsupported);
             }
         }
-        if matches!((from_place, to_place), (Some(one), Some(other)) if one.meets(&other) || one.layers != other.layers) {
+        if matches!((from_place, to_place), (Some(one), Some(other)) if one.meets(&other) || one.layers != other.layers)
+        {
             problems.push(Problem::Usage);
         }
         let effects = match (from_place, to_place) {
@@ -320,41 +341,32 @@ impl World<'_> {
         if lack && place.is_none() {
             return None;
         }
-        let only_extent_is_wrong = info.is_some_and(|info| region.mip < info.part.mips && region.layer < info.part.layers);
+        let only_extent_is_wrong =
+            info.is_some_and(|info| region.mip < info.part.mips && region.layer < info.part.layers);
         // A wrong rectangle is refused after the pass has begun, which clears.
         let clears = n[5] & 1 == 1;
         if place.is_none() && only_extent_is_wrong && (clears || region.extent[0] == 0) {
             return None;
         }
         let mut problems = graphics_problems(queue, [texture.problem, lack.then_some(Problem::Usage)]);
-        problems.extend(place_problems.into_iter().filter(|problem| !problems.contains(problem)).collect::<Vec<_>>());
+        problems.extend(
+            place_problems.into_iter().filter(|problem| !problems.contains(problem)).collect::<Vec<_>>(),
+        );
         let format = info.map_or(Format::R32Uint, |info| info.format);
-        let (cleared, drawn) = (texel(format, n[3]), texel(format, n[4]));
+        let (drawn, word) = texel(format, n[4]);
         let effects = match (info, place) {
             (Some(info), Some(place)) if problems.is_empty() => {
                 let one_layer = Place { layers: 1, ..place };
                 let whole = Place { layer: place.layer, layers: 1, ..info.part.whole(region.mip) };
-                let clear = clears.then_some(Effect::Fill { place: whole, texel: cleared.0 });
-                clear.into_iter().chain([Effect::Fill { place: one_layer, texel: drawn.0 }]).collect()
+                let clear = clears.then_some(Effect::Fill { place: whole, texel: texel(format, n[3]).0 });
+                clear.into_iter().chain([Effect::Fill { place: one_layer, texel: drawn }]).collect()
             }
             _ => Vec::new(),
         };
-        let load = match clear_value(format, n[3]) {
-            _ if !clears => ColorLoadOp::Load,
-            ClearValue::Uint(value) => ColorLoadOp::ClearUint(value),
-            ClearValue::Color(value) => ColorLoadOp::Clear(value),
-            _ => ColorLoadOp::Load,
-        };
-        let target = ColorAttachment {
-            texture: texture.handle,
-            mip: region.mip,
-            layer: region.layer,
-            load,
-            store: true,
-            resolve: None,
-        };
-        let (offset, extent) = (region.offset, region.extent);
-        let word = drawn.1;
+        let load = load_op(format, clears.then_some(n[3]));
+        let TextureRegion { mip, layer, offset, extent, .. } = region;
+        let target =
+            ColorAttachment { texture: texture.handle, mip, layer, load, store: true, resolve: None };
         Some(Planned::new(problems, effects, move |env, cmd| {
             let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &[target], ..Default::default() })?;
             pass.bind_render_pipeline(env.kit.draw(format))?;

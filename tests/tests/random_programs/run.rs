@@ -285,15 +285,19 @@ impl World<'_> {
         while !self.pending.is_empty() {
             self.finish_readback([0, 1, 0, 0, 0, 0])?;
         }
-        for (number, buffer) in self.buffers.iter().enumerate().filter(|(_, buffer)| buffer.holder.is_some()) {
+        for (number, buffer) in self.buffers.iter().enumerate().filter(|(_, buffer)| buffer.holder.is_some())
+        {
             let mut bytes = vec![0; buffer.info.size];
             judge(self.ctx().download_buffer(buffer.handle, 0, &mut bytes), &[])?;
             compare(&format!("buffer {number} at the end"), &bytes, &self.memory.buffers[number])?;
         }
-        for (number, texture) in self.textures.iter().enumerate().filter(|(_, texture)| texture.holder.is_some()) {
+        for (number, texture) in
+            self.textures.iter().enumerate().filter(|(_, texture)| texture.holder.is_some())
+        {
             for mip in 0..texture.info.part.mips {
                 let region = lvk::TextureRegion { mip, layers: 0, ..Default::default() };
-                let bytes = judge(self.ctx().download_texture(texture.handle, &region), &[])?.unwrap_or_default();
+                let bytes =
+                    judge(self.ctx().download_texture(texture.handle, &region), &[])?.unwrap_or_default();
                 let place = texture.info.part.whole(mip);
                 let expected = self.memory.images[place.image].read(&place);
                 compare(&format!("mip {mip} of texture {number} at the end"), &bytes, &expected)?;

@@ -98,7 +98,12 @@ pub fn pick<H: Destroy + Copy, T>(objects: &[Object<H, T>], n: u16, foreign: H) 
     let choose = |is_alive: bool, n: usize| {
         let fits = |(_, object): &(usize, &Object<H, T>)| object.holder.is_some() == is_alive;
         let count = objects.iter().enumerate().filter(fits).count();
-        objects.iter().enumerate().filter(fits).nth(n % count.max(1)).map(|(number, object)| (number, object.handle))
+        objects
+            .iter()
+            .enumerate()
+            .filter(fits)
+            .nth(n % count.max(1))
+            .map(|(number, object)| (number, object.handle))
     };
     let n = usize::from(n);
     match n % 32 {
@@ -107,8 +112,11 @@ pub fn pick<H: Destroy + Copy, T>(objects: &[Object<H, T>], n: u16, foreign: H) 
             stale.map(|(_, handle)| Picked { handle, live: None, problem: Some(Problem::Stale) })
         }
         31 => Some(Picked { handle: foreign, live: None, problem: Some(Problem::Foreign) }),
-        _ => choose(true, n / 32 + n % 32)
-            .map(|(number, handle)| Picked { handle, live: Some(number), problem: None }),
+        _ => choose(true, n / 32 + n % 32).map(|(number, handle)| Picked {
+            handle,
+            live: Some(number),
+            problem: None,
+        }),
     }
 }
 
@@ -220,8 +228,12 @@ pub struct World<'a> {
 impl<'a> World<'a> {
     /// Returns the state in which a program begins.
     pub fn new(env: &'a Environment) -> lvk::Result<Self> {
-        let arguments =
-            lvk::BufferDesc { size_bytes: 16, usage: BufferUsage::INDIRECT, debug_name: "arguments", ..Default::default() };
+        let arguments = lvk::BufferDesc {
+            size_bytes: 16,
+            usage: BufferUsage::INDIRECT,
+            debug_name: "arguments",
+            ..Default::default()
+        };
         let queries = lvk::QueryPoolDesc { count: 4, debug_name: "times", ..Default::default() };
         Ok(Self {
             arguments: env.ctx().create_buffer(&arguments)?,
