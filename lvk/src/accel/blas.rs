@@ -105,8 +105,11 @@ impl Blas {
         builds: u64,
     ) -> Option<Arc<BlasStructures>> {
         let mut state = self.lock_state();
-        let settled = state.open_builds == 0 && state.builds == builds;
-        settled.then(|| std::mem::replace(&mut state.structures, Arc::new(body)))
+        if state.open_builds > 0 || state.builds != builds {
+            // The parameter `body` is dropped after the guard: its memory is freed under another lock.
+            return None;
+        }
+        Some(std::mem::replace(&mut state.structures, Arc::new(body)))
     }
 
     /// Bytes of memory of the BVH for software ray queries. Compaction does not change it.

@@ -96,11 +96,16 @@ impl CommandBuffer {
             let index = updates.index_of(target);
             let TlasEntry { target, tracker: update, no_refs, .. } = updates.entry(index);
             let previous = cmd.previous_state(tlas, update, no_refs);
+            let is_current = blas_refs.is_current(&|handle| cmd.shared.blas_ref(handle));
             let kernel_instances =
                 cmd.record_instances(target, tlas, blas_refs, source, contents.built_count)?;
             cmd.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, false)?;
-            let (recorded, blas_refs, source) =
+            let (mut recorded, blas_refs, source) =
                 cmd.publish(tlas, &previous, kernel_instances.into_change(count, false));
+            if !is_current {
+                // The set keeps destroyed BLAS. The next update must look up its handles, and find those stale.
+                recorded.generation = contents.generation;
+            }
             updates.record_build(index, &recorded, blas_refs, source);
             Ok(())
         })

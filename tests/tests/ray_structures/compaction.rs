@@ -232,6 +232,53 @@ fn compaction_waits_for_builds_that_are_recorded() -> Result<()> {
     Ok(())
 }
 
+/// The TLAS that is written again still shows a destroyed BLAS, whose handle is stale nevertheless.
+#[test]
+fn a_destroyed_blas_stays_stale_when_its_tlas_is_written_again() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let scene = scene();
+    let mut gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    let shown = instances(&scene.placed, &gpu.models);
+    drop(gpu.models.pop());
+    ctx.compact(&handles(&gpu))?;
+    wait_for_compaction(&ctx)?;
+    ctx.wait_idle()?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    let updated = cmd.update_tlas(*gpu.tlas, &shown, BuildMode::Rebuild);
+    assert!(matches!(updated, Err(Error::StaleHandle { .. })), "{updated:?}");
+    Ok(())
+}
+
+/// Another thread records a build just when the copy begins: the new memory is not needed then, and goes back.
+#[test]
+fn a_copy_that_a_build_overtakes_is_put_off() -> Result<()> {
+    let Some(ctx) = device().filter(|ctx| requires_device_accel_structs(ctx, "structures that are copied"))
+    else {
+        return Ok(());
+    };
+    let check = HitCheck::new(&ctx)?;
+    let scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    let first = *gpu.models[0];
+    ctx.compact(&[first])?;
+    ctx.wait_idle()?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    let (give, take) = std::sync::mpsc::channel();
+    before_next_command_buffer(move || {
+        let recording =
+            std::thread::spawn(move || cmd.build_blas(&[first], BuildMode::Rebuild).map(|()| cmd));
+        let _ = give.send(recording.join());
+    });
+    ctx.next_frame()?;
+    let Ok(Ok(recorded)) = take.try_recv() else { unreachable!("the copy was to begin") };
+    expect_pending(&ctx, first)?;
+    ctx.submit(recorded?)?;
+    wait_for_compaction(&ctx)?;
+    wait_for_compaction(&ctx)?;
+    done(&ctx, first)?;
+    check.scene("built when the copy began", &gpu.tlas, &scene)
+}
+
 /// A build between the question and the copy makes the answer worthless: it is asked again.
 #[test]
 fn a_build_after_the_question_makes_another_one() -> Result<()> {

@@ -1,0 +1,116 @@
+//! A context, the pipelines of the programs, and another context whose handles are foreign.
+
+use lvk::{
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context,
+    Holder, QueueRequest, SubmitHandle, TextureDesc, TextureHandle, Triangles, ValidationSink,
+};
+use lvk_tests::device_with;
+
+use super::kit::Kit;
+
+/// Objects of another context.
+pub struct Foreign {
+    ctx: Context,
+    buffer: Holder<BufferHandle>,
+    texture: Holder<TextureHandle>,
+    blas: Holder<AccelStructHandle>,
+    /// A submission.
+    pub submission: SubmitHandle,
+}
+
+impl Foreign {
+    fn new(ctx: Context) -> lvk::Result<Self> {
+        let corners = [[0.0_f32, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+        let buffer = ctx.create_buffer(&BufferDesc {
+            data: Some(bytemuck::cast_slice(&corners)),
+            usage: BufferUsage::ACCEL_INPUT,
+            ..Default::default()
+        })?;
+        let geometries = [BlasGeometry::Triangles(Triangles::packed(*buffer, 3))];
+        let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?;
+        let texture = ctx.create_texture(&TextureDesc::default())?;
+        let submission = ctx.flush()?;
+        Ok(Self { ctx, buffer, texture, blas, submission })
+    }
+
+    /// Returns a buffer.
+    pub fn buffer(&self) -> BufferHandle {
+        *self.buffer
+    }
+
+    /// Returns a texture.
+    pub fn texture(&self) -> TextureHandle {
+        *self.texture
+    }
+
+    /// Returns a BLAS.
+    pub fn blas(&self) -> AccelStructHandle {
+        *self.blas
+    }
+
+    /// Returns a command buffer.
+    pub fn command_buffer(&self) -> lvk::Result<CommandBuffer> {
+        self.ctx.acquire_command_buffer()
+    }
+}
+
+/// Everything that programs share. Declared before the context, the pipelines and foreign objects go first.
+pub struct Environment {
+    /// Pipelines.
+    pub kit: Kit,
+    /// Objects of another context.
+    pub foreign: Foreign,
+    ctx: Context,
+    sinks: [ValidationSink; 2],
+    /// Bytes of acceleration structures before any program.
+    own_bytes: u64,
+    /// True if the model is wrong on purpose: fills write another value than the model expects.
+    pub lies: bool,
+}
+
+impl Environment {
+    /// Creates both contexts. `None` as for [`lvk_tests::device`].
+    pub fn new(queues: QueueRequest) -> Option<Self> {
+        let (ctx, sink) = device_with(|desc| desc.queues = queues)?.into_context();
+        let (other, other_sink) = device_with(|_| {})?.into_context();
+        let (ctx, other) = (ctx?, other?);
+        let kit = Kit::new(&ctx);
+        let foreign = Foreign::new(other);
+        let (Ok(kit), Ok(foreign)) = (kit, foreign) else { unreachable!("the set-up of the programs fails") };
+        let own_bytes = ctx.accel_memory().structure_bytes;
+        Some(Self { own_bytes, kit, foreign, ctx, sinks: [sink, other_sink], lies: false })
+    }
+
+    /// Returns the context.
+    pub fn ctx(&self) -> &Context {
+        &self.ctx
+    }
+
+    /// Fails if the validation layer sent a message since the last call.
+    pub fn check_messages(&self) -> Result<(), String> {
+        let messages: Vec<String> =
+            self.sinks.iter().flat_map(ValidationSink::take).map(|message| message.to_string()).collect();
+        if messages.is_empty() {
+            Ok(())
+        } else {
+            Err(format!("the validation layer says: {}", messages.join("\n")))
+        }
+    }
+
+    /// Fails if an object of a program is alive, or if the GPU uses memory of acceleration structures.
+    pub fn check_all_gone(&self) -> Result<(), String> {
+        self.ctx.wait_idle().map_err(|error| error.to_string())?;
+        let live = self.ctx.live_objects();
+        if live.len() != self.kit.object_count() {
+            return Err(format!("objects are alive after the program: {live:?}"));
+        }
+        let bytes = self.ctx.accel_memory().structure_bytes;
+        if bytes != self.own_bytes {
+            let before = self.own_bytes;
+            return Err(format!(
+                "acceleration structures take {bytes} bytes after the program, {before} before"
+            ));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,200 @@
+//! Operations of a program: a kind, and small numbers that are taken modulo the choices there are. Any list of
+//! operations is therefore a program, and so is any part of it.
+
+use lvk_tests::random::Random;
+
+/// Kind of an operation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    CreateBuffer,
+    DestroyBuffer,
+    UploadBuffer,
+    DownloadBuffer,
+    ReadBufferLater,
+    BufferAddress,
+    CreateTexture,
+    CreateView,
+    DestroyTexture,
+    UploadTexture,
+    DownloadTexture,
+    ReadTextureLater,
+    FinishReadback,
+    CreateSampler,
+    DestroySampler,
+    CreateMesh,
+    UploadMesh,
+    DestroyMesh,
+    CreateBlas,
+    DestroyBlas,
+    CreateTlas,
+    DestroyTlas,
+    Compact,
+    AccelInfo,
+    Acquire,
+    Submit,
+    DropCommands,
+    RecordOnThreads,
+    Wait,
+    IsDone,
+    WaitIdle,
+    Flush,
+    NextFrame,
+    CopyBuffer,
+    CopyRegions,
+    FillBuffer,
+    UpdateBuffer,
+    UpdateTexture,
+    BufferToTexture,
+    TextureToBuffer,
+    CopyTexture,
+    ClearTexture,
+    Blit,
+    Mipmaps,
+    DispatchFill,
+    DispatchIndirect,
+    DispatchCopy,
+    ReadUploaded,
+    StoreImage,
+    FetchTexture,
+    Draw,
+    Timestamp,
+    Label,
+    MoveTriangle,
+    BuildBlas,
+    UpdateTlas,
+    Trace,
+}
+
+/// Kinds that record a command. The others are calls of the context.
+const RECORDED: [(Kind, u16); 24] = [
+    (Kind::CopyBuffer, 6),
+    (Kind::CopyRegions, 3),
+    (Kind::FillBuffer, 6),
+    (Kind::UpdateBuffer, 5),
+    (Kind::UpdateTexture, 4),
+    (Kind::BufferToTexture, 5),
+    (Kind::TextureToBuffer, 5),
+    (Kind::CopyTexture, 5),
+    (Kind::ClearTexture, 4),
+    (Kind::Blit, 4),
+    (Kind::Mipmaps, 2),
+    (Kind::DispatchFill, 4),
+    (Kind::DispatchIndirect, 2),
+    (Kind::DispatchCopy, 4),
+    (Kind::ReadUploaded, 3),
+    (Kind::StoreImage, 3),
+    (Kind::FetchTexture, 3),
+    (Kind::Draw, 3),
+    (Kind::Timestamp, 1),
+    (Kind::Label, 2),
+    (Kind::MoveTriangle, 3),
+    (Kind::BuildBlas, 3),
+    (Kind::UpdateTlas, 6),
+    (Kind::Trace, 8),
+];
+
+const CALLED: [(Kind, u16); 33] = [
+    (Kind::CreateBuffer, 4),
+    (Kind::DestroyBuffer, 2),
+    (Kind::UploadBuffer, 5),
+    (Kind::DownloadBuffer, 2),
+    (Kind::ReadBufferLater, 2),
+    (Kind::BufferAddress, 2),
+    (Kind::CreateTexture, 4),
+    (Kind::CreateView, 3),
+    (Kind::DestroyTexture, 2),
+    (Kind::UploadTexture, 4),
+    (Kind::DownloadTexture, 2),
+    (Kind::ReadTextureLater, 2),
+    (Kind::FinishReadback, 3),
+    (Kind::CreateSampler, 1),
+    (Kind::DestroySampler, 1),
+    (Kind::CreateMesh, 3),
+    (Kind::UploadMesh, 2),
+    (Kind::DestroyMesh, 1),
+    (Kind::CreateBlas, 5),
+    (Kind::DestroyBlas, 1),
+    (Kind::CreateTlas, 5),
+    (Kind::DestroyTlas, 1),
+    (Kind::Compact, 1),
+    (Kind::AccelInfo, 1),
+    (Kind::Acquire, 5),
+    (Kind::Submit, 7),
+    (Kind::DropCommands, 1),
+    (Kind::RecordOnThreads, 1),
+    (Kind::Wait, 2),
+    (Kind::IsDone, 2),
+    (Kind::WaitIdle, 1),
+    (Kind::Flush, 1),
+    (Kind::NextFrame, 1),
+];
+
+/// An operation.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Op {
+    /// Kind.
+    pub kind: Kind,
+    /// Its numbers.
+    pub n: [u16; 6],
+}
+
+/// Returns an operation, in the form in which failures print it.
+pub fn op(kind: Kind, n: [u16; 6]) -> Op {
+    Op { kind, n }
+}
+
+impl std::fmt::Debug for Op {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "op(Kind::{:?}, {:?})", self.kind, self.n)
+    }
+}
+
+impl Op {
+    /// Returns a random operation.
+    pub fn random(random: &mut Random) -> Self {
+        let called = total(&CALLED);
+        let at = (random.bits() % u64::from(called + total(&RECORDED))) as u16;
+        let kind = if at < called { kind_at(&CALLED, at) } else { kind_at(&RECORDED, at - called) };
+        Self { kind, n: numbers(random) }
+    }
+
+    /// Returns a random operation that records a command.
+    pub fn random_recorded(random: &mut Random) -> Self {
+        let at = (random.bits() % u64::from(total(&RECORDED))) as u16;
+        Self { kind: kind_at(&RECORDED, at), n: numbers(random) }
+    }
+}
+
+/// Returns the program of a seed.
+pub fn program(seed: u64, length: usize) -> Vec<Op> {
+    let mut random = Random::new(seed);
+    (0..length).map(|_| Op::random(&mut random)).collect()
+}
+
+fn numbers(random: &mut Random) -> [u16; 6] {
+    let (low, high) = (random.bits(), random.bits());
+    [low, low >> 16, low >> 32, high, high >> 16, high >> 32].map(|bits| bits as u16)
+}
+
+fn total(kinds: &[(Kind, u16)]) -> u16 {
+    kinds.iter().map(|(_, weight)| weight).sum()
+}
+
+/// Returns the kind whose range of weights contains `at`.
+fn kind_at(kinds: &[(Kind, u16)], mut at: u16) -> Kind {
+    for (kind, weight) in kinds {
+        if at < *weight {
+            return *kind;
+        }
+        at -= weight;
+    }
+    kinds[0].0
+}
+
+#[test]
+fn a_seed_is_one_program_with_every_kind() {
+    let ops = program(3, 5_000);
+    assert_eq!(ops, program(3, 5_000));
+    let kinds: std::collections::HashSet<Kind> = ops.iter().map(|op| op.kind).collect();
+    assert_eq!(kinds.len(), RECORDED.len() + CALLED.len());
+}

@@ -1,0 +1,307 @@
+//! The objects of a program beside what the model knows of them, and the outcomes that calls must have.
+
+use std::collections::HashMap;
+
+use lvk::{
+    AccelStructHandle, BufferHandle, BufferUsage, CommandBuffer, Context, Destroy, Error, Format, Holder,
+    MemoryKind, QueryPoolHandle, Queue, Readback, SamplerHandle, SubmitHandle, TextureHandle, TextureUsage,
+};
+
+use super::cell::Cell;
+use super::environment::Environment;
+use super::image::Part;
+use super::memory::{Effect, Memory};
+use super::plan::Planned;
+
+/// Reason why a call must fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Problem {
+    /// The object of a handle was destroyed.
+    Stale,
+    /// The object belongs to another context.
+    Foreign,
+    /// Arguments that are never valid.
+    Usage,
+    /// A count over a limit.
+    Limit,
+    /// The device cannot do this.
+    Unsupported,
+    /// The queue cannot do this.
+    WrongQueue,
+}
+
+impl Problem {
+    fn is(self, error: &Error) -> bool {
+        match self {
+            Self::Stale => matches!(error, Error::StaleHandle { .. }),
+            Self::Foreign => matches!(error, Error::ForeignHandle { .. }),
+            Self::Usage => matches!(error, Error::InvalidUsage { .. }),
+            Self::Limit => matches!(error, Error::LimitExceeded { .. }),
+            Self::Unsupported => matches!(error, Error::Unsupported { .. }),
+            Self::WrongQueue => matches!(error, Error::WrongQueue { .. }),
+        }
+    }
+}
+
+/// Compares the outcome of a call with the problems of its arguments: without any it must succeed, else fail with
+/// the error of one of them. Returns the value of a success.
+pub fn judge<T>(result: lvk::Result<T>, problems: &[Problem]) -> Result<Option<T>, String> {
+    match result {
+        Ok(value) if problems.is_empty() => Ok(Some(value)),
+        Ok(_) => Err(format!("the call succeeded, expected an error of {problems:?}")),
+        Err(error) => {
+            let cause = match &error {
+                Error::Creation { source, .. } => source,
+                error => error,
+            };
+            if problems.iter().any(|problem| problem.is(cause)) {
+                return Ok(None);
+            }
+            Err(format!("the call failed with '{error}', expected {problems:?}"))
+        }
+    }
+}
+
+/// An object: its holder while it is alive, and what the model knows of it.
+pub struct Object<H: Destroy, T> {
+    /// `None` once it is destroyed.
+    pub holder: Option<Holder<H>>,
+    /// Handle, also after its destruction.
+    pub handle: H,
+    /// Bindless index.
+    pub index: u32,
+    /// What the model knows.
+    pub info: T,
+}
+
+impl<H: Destroy + Copy, T> Object<H, T> {
+    /// Returns a live object.
+    pub fn new(holder: Holder<H>, info: T) -> Self {
+        Self { handle: holder.handle(), index: holder.index(), holder: Some(holder), info }
+    }
+}
+
+/// A handle, its object if that is alive, else the problem.
+#[derive(Debug, Clone, Copy)]
+pub struct Picked<H> {
+    /// The handle.
+    pub handle: H,
+    /// Number of the object, if it is alive.
+    pub live: Option<usize>,
+    /// Reason why calls refuse the handle.
+    pub problem: Option<Problem>,
+}
+
+/// Chooses a handle: in one of 32 cases that of a destroyed object, in one `foreign`, else that of a live object.
+/// `None` if there is none.
+pub fn pick<H: Destroy + Copy, T>(objects: &[Object<H, T>], n: u16, foreign: H) -> Option<Picked<H>> {
+    let choose = |is_alive: bool, n: usize| {
+        let fits = |(_, object): &(usize, &Object<H, T>)| object.holder.is_some() == is_alive;
+        let count = objects.iter().enumerate().filter(fits).count();
+        objects
+            .iter()
+            .enumerate()
+            .filter(fits)
+            .nth(n % count.max(1))
+            .map(|(number, object)| (number, object.handle))
+    };
+    let n = usize::from(n);
+    match n % 32 {
+        30 => {
+            let stale = choose(false, n / 32);
+            stale.map(|(_, handle)| Picked { handle, live: None, problem: Some(Problem::Stale) })
+        }
+        31 => Some(Picked { handle: foreign, live: None, problem: Some(Problem::Foreign) }),
+        _ => choose(true, n / 32 + n % 32).map(|(number, handle)| Picked {
+            handle,
+            live: Some(number),
+            problem: None,
+        }),
+    }
+}
+
+/// What the model knows of a buffer; its number is that of its bytes.
+#[derive(Debug, Clone, Copy)]
+pub struct BufferInfo {
+    pub size: usize,
+    pub memory: MemoryKind,
+}
+
+/// What the model knows of a texture or view.
+#[derive(Debug, Clone, Copy)]
+pub struct TextureInfo {
+    pub part: Part,
+    pub format: Format,
+    pub usage: TextureUsage,
+    pub is_array: bool,
+}
+
+/// What the model knows of a BLAS; its number is that of its contents.
+#[derive(Debug, Clone, Copy)]
+pub struct BlasInfo {
+    pub mesh: usize,
+    pub is_updatable: bool,
+    pub can_compact: bool,
+    pub was_compacted: bool,
+}
+
+/// What the model knows of a TLAS; its number is that of its contents.
+#[derive(Debug, Clone, Copy)]
+pub struct TlasInfo {
+    pub capacity: u32,
+    pub is_updatable: bool,
+    /// Number of instances after the last submission.
+    pub count: u32,
+}
+
+/// A command buffer that is being recorded.
+pub struct Open {
+    pub cmd: CommandBuffer,
+    pub queue: Queue,
+    /// Effects of its commands once it is submitted.
+    pub effects: Vec<Effect>,
+    /// Its updates of TLAS.
+    pub tlas: HashMap<usize, OpenTlas>,
+}
+
+/// Updates of a TLAS in a command buffer.
+#[derive(Debug, Clone, Copy)]
+pub struct OpenTlas {
+    /// Number of instances after the last one.
+    pub count: u32,
+    /// Number that must be submitted before, if the first is a refit.
+    pub expected: Option<u32>,
+}
+
+/// Bytes that are read later, and those that the model expects.
+pub struct Pending {
+    pub readback: Readback,
+    pub expected: Vec<Cell>,
+}
+
+/// What programs have done.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub struct Tally {
+    /// Operations that had objects to work on.
+    pub executed: u64,
+    /// Recorded commands among them that had to be refused.
+    pub refused: u64,
+    /// Rays that had to hit a triangle.
+    pub hits: u64,
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.executed += other.executed;
+        self.refused += other.refused;
+        self.hits += other.hits;
+    }
+}
+
+impl std::fmt::Display for Tally {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { executed, refused, hits } = self;
+        write!(out, "{executed} operations, {refused} of them refused commands, {hits} rays with hits")
+    }
+}
+
+/// The state of a program.
+pub struct World<'a> {
+    pub env: &'a Environment,
+    pub memory: Memory,
+    pub buffers: Vec<Object<BufferHandle, BufferInfo>>,
+    pub textures: Vec<Object<TextureHandle, TextureInfo>>,
+    pub samplers: Vec<Object<SamplerHandle, ()>>,
+    pub meshes: Vec<Object<BufferHandle, usize>>,
+    pub blas: Vec<Object<AccelStructHandle, BlasInfo>>,
+    pub tlas: Vec<Object<AccelStructHandle, TlasInfo>>,
+    pub open: Vec<Open>,
+    pub submitted: Vec<SubmitHandle>,
+    pub pending: Vec<Pending>,
+    /// Arguments of indirect dispatches.
+    pub arguments: Holder<BufferHandle>,
+    pub queries: Holder<QueryPoolHandle>,
+    /// What ran so far.
+    pub tally: Tally,
+}
+
+impl<'a> World<'a> {
+    /// Returns the state in which a program begins.
+    pub fn new(env: &'a Environment) -> lvk::Result<Self> {
+        let arguments = lvk::BufferDesc {
+            size_bytes: 16,
+            usage: BufferUsage::INDIRECT,
+            debug_name: "arguments",
+            ..Default::default()
+        };
+        let queries = lvk::QueryPoolDesc { count: 4, debug_name: "times", ..Default::default() };
+        Ok(Self {
+            arguments: env.ctx().create_buffer(&arguments)?,
+            queries: env.ctx().create_query_pool(&queries)?,
+            env,
+            memory: Memory::default(),
+            buffers: Vec::new(),
+            textures: Vec::new(),
+            samplers: Vec::new(),
+            meshes: Vec::new(),
+            blas: Vec::new(),
+            tlas: Vec::new(),
+            open: Vec::new(),
+            submitted: Vec::new(),
+            pending: Vec::new(),
+            tally: Tally::default(),
+        })
+    }
+
+    /// Returns the context.
+    pub fn ctx(&self) -> &'a Context {
+        self.env.ctx()
+    }
+
+    /// Chooses a buffer.
+    pub fn pick_buffer(&self, n: u16) -> Option<Picked<BufferHandle>> {
+        pick(&self.buffers, n, self.env.foreign.buffer())
+    }
+
+    /// Chooses a texture or view.
+    pub fn pick_texture(&self, n: u16) -> Option<Picked<TextureHandle>> {
+        pick(&self.textures, n, self.env.foreign.texture())
+    }
+
+    /// Chooses the vertices of a mesh.
+    pub fn pick_mesh(&self, n: u16) -> Option<Picked<BufferHandle>> {
+        pick(&self.meshes, n, self.env.foreign.buffer())
+    }
+
+    /// Chooses a BLAS.
+    pub fn pick_blas(&self, n: u16) -> Option<Picked<AccelStructHandle>> {
+        pick(&self.blas, n, self.env.foreign.blas())
+    }
+
+    /// Chooses a TLAS.
+    pub fn pick_tlas(&self, n: u16) -> Option<Picked<AccelStructHandle>> {
+        pick(&self.tlas, n, self.env.foreign.blas())
+    }
+
+    /// Records a planned command into an open command buffer.
+    pub fn record(&mut self, at: usize, planned: Planned) -> Result<(), String> {
+        let Planned { action, problems, effects } = planned;
+        let (env, open) = (self.env, &mut self.open[at]);
+        match judge(action(env, &mut open.cmd), &problems)? {
+            Some(()) => open.effects.extend(effects),
+            None => self.tally.refused += 1,
+        }
+        self.tally.executed += 1;
+        Ok(())
+    }
+}
+
+#[test]
+fn outcomes_are_those_of_the_problems() {
+    let stale = || Error::StaleHandle { kind: "buffer", name: None };
+    assert_eq!(judge(Ok(3), &[]), Ok(Some(3)));
+    assert!(judge(Ok(3), &[Problem::Usage]).is_err());
+    assert_eq!(judge::<()>(Err(stale()), &[Problem::Usage, Problem::Stale]), Ok(None));
+    assert!(judge::<()>(Err(stale()), &[]).unwrap_err().contains("stale buffer"));
+    assert!(judge::<()>(Err(stale()), &[Problem::Foreign]).is_err());
+}
