@@ -97,22 +97,22 @@ fn collect(module: &ParsedModule, variable: &Variable, is_array: bool, out: &mut
     };
     let name = module.names.get(&variable.id).cloned().unwrap_or_default();
     let component = decoration(Decoration::Component).unwrap_or(0);
-    let mut walk = Walk { module, out, is_patch, name };
+    let mut collector = LocationCollector { module, out, is_patch, name };
     match (module.types.get(ty), decoration(Decoration::Location)) {
-        (Some(Type::Struct { members }), location) => walk.block(*ty, members, location),
-        (_, Some(location)) => _ = walk.value(*ty, location, component, 0),
+        (Some(Type::Struct { members }), location) => collector.block(*ty, members, location),
+        (_, Some(location)) => _ = collector.value(*ty, location, component, 0),
         _ => {}
     }
 }
 
-struct Walk<'a> {
+struct LocationCollector<'a> {
     module: &'a ParsedModule,
     out: &'a mut Vec<LocationValue>,
     is_patch: bool,
     name: String,
 }
 
-impl Walk<'_> {
+impl LocationCollector<'_> {
     /// Adds the members of a block that starts at `first`, or whose members have locations of their own.
     fn block(&mut self, ty: u32, members: &[u32], first: Option<u32>) {
         let mut next = first;
