@@ -261,7 +261,7 @@ impl World<'_> {
             2 => 8,
             _ => 0,
         };
-        if n[4] % 12 == 0 {
+        if n[4].is_multiple_of(12) {
             let buffer = self.pick_buffer(n[5])?;
             problems.extend(buffer.problem);
             if buffer.problem.is_none() {
