@@ -4,11 +4,11 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use lvk_dev_driver::{DriverRequest, prepare};
 use lvk::{
     BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, ContextDesc, Dependencies, Holder,
     Reloadable, ShaderFiles, ShaderModuleDesc, ShaderStage,
 };
+use lvk_dev_driver::{DriverRequest, prepare};
 
 use crate::Failure;
 
