@@ -378,7 +378,7 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     for device in &mut devices {
         device.capabilities.remove_features(unknown);
         if let Some(probe) = &probe {
-            device.select_present_queue(probe.queue_family(device.raw));
+            device.select_present_queue(probe.queue_family(device.raw))?;
         }
     }
     let indexed = devices.iter_mut().enumerate();

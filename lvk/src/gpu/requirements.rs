@@ -62,7 +62,7 @@ impl<'a> DeviceRequirements<'a> {
                 return Err(Error::usage("instance_extensions", message));
             }
             let probe = SurfaceProbe::new(&instance, window)?;
-            found.select_present_queue(probe.queue_family(found.raw));
+            found.select_present_queue(probe.queue_family(found.raw))?;
         }
         let candidate = candidate(0, &mut found, request).device;
         if !candidate.missing.is_empty() {

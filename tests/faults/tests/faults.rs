@@ -5,12 +5,13 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use lvk_dev_driver::virtual_display;
+use lvk_dev_driver::{VirtualDisplay, virtual_display};
 use lvk_faults::fault::FaultError;
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
 use lvk_faults::sweep::run::{LayerFolder, Program, run};
 use lvk_faults::sweep::verdict::{Flaw, flaws};
+use x11rb::rust_connection::RustConnection;
 
 /// Time of a full sweep.
 const WHOLE: Duration = Duration::from_secs(6 * 3600);
@@ -31,10 +32,14 @@ fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Dura
     assert!(report.flawed.is_empty() && report.reached > 0, "{line}: {report}");
 }
 
-/// Runs the whole sweep; `LVK_FAULT_MOST` bounds the number of faults.
+/// Returns the bound on the number of faults of whole sweeps, `LVK_FAULT_MOST`.
+fn most() -> usize {
+    std::env::var("LVK_FAULT_MOST").ok().and_then(|text| text.parse().ok()).unwrap_or(usize::MAX)
+}
+
+/// Runs the whole sweep, as far as [`most`] allows.
 fn whole(line: &str) {
-    let most = std::env::var("LVK_FAULT_MOST").ok().and_then(|text| text.parse().ok()).unwrap_or(usize::MAX);
-    assert_no_flaws(line, &program(line), &SweepPlan { most, ..SweepPlan::full() }, WHOLE);
+    assert_no_flaws(line, &program(line), &SweepPlan { most: most(), ..SweepPlan::full() }, WHOLE);
 }
 
 /// Declares an ignored test for each scenario.
@@ -77,12 +82,14 @@ whole_sweeps! {
 #[test]
 #[ignore = "minutes: .ci/slow faults"]
 fn whole_window() {
-    let Some((_display, program)) = in_window() else { return };
-    assert_no_flaws("window", &program, &SweepPlan::full(), WHOLE);
+    let Some((_connection, _display, program)) = in_window() else { return };
+    let most = most();
+    assert_no_flaws("window", &program, &SweepPlan { most, ..SweepPlan::full() }, WHOLE);
 }
 
-/// The scenario in a window, and the X server that shows it.
-fn in_window() -> Option<(lvk_dev_driver::VirtualDisplay, Program)> {
+/// Returns the scenario in a window, the X server that shows it, and a connection: without one the server ends with the first
+/// program.
+fn in_window() -> Option<(RustConnection, VirtualDisplay, Program)> {
     let display = match virtual_display() {
         Ok(display) => display,
         Err(error) => {
@@ -92,7 +99,8 @@ fn in_window() -> Option<(lvk_dev_driver::VirtualDisplay, Program)> {
         }
     };
     let variables = vec![("DISPLAY".to_owned(), display.name().to_owned())];
-    Some((display, Program { variables, ..program("window") }))
+    let (connection, _) = RustConnection::connect(Some(display.name())).unwrap();
+    Some((connection, display, Program { variables, ..program("window") }))
 }
 
 /// Some of the faults of the whole sweeps, spread evenly.
@@ -115,7 +123,7 @@ fn some_calls_of_scenarios_fail() {
 
 #[test]
 fn some_calls_of_a_window_fail() {
-    let Some((_display, program)) = in_window() else { return };
+    let Some((_connection, _display, program)) = in_window() else { return };
     let errors = vec![FaultError::SurfaceLost, FaultError::OutOfDate];
     assert_no_flaws("window", &program, &SweepPlan { errors, ..some(12) }, SAMPLE);
 }

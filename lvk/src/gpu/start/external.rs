@@ -249,7 +249,7 @@ impl RawContext<'_> {
         if !found.capabilities.has(OptionalFeature::Swapchain) {
             return Err(wrong("features", "VK_KHR_swapchain is missing; ContextDesc::window needs it"));
         }
-        if !SurfaceProbe::new(instance, window)?.presents(self.physical_device, self.queue_family) {
+        if !SurfaceProbe::new(instance, window)?.presents(self.physical_device, self.queue_family)? {
             let family = self.queue_family;
             return Err(wrong(
                 "queue_family",

@@ -254,14 +254,17 @@ pub(super) fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration 
 }
 
 impl PhysicalDevice {
-    /// Selects the family whose queues present to the window, or records that the device has no such family.
-    pub(crate) fn select_present_queue(&mut self, family: Option<u32>) {
+    /// Selects the family whose queues present to the window, or records that the device has no such family. Another error
+    /// than want of memory is recorded too, since another device may present.
+    pub(crate) fn select_present_queue(&mut self, family: Result<Option<u32>>) -> Result<()> {
+        const QUEUE: &str = "a queue for graphics and compute that presents to the window";
         match family {
-            Some(family) => self.use_single_family(family),
-            None => {
-                self.missing.push("a queue for graphics and compute that presents to the window".to_owned())
-            }
+            Ok(Some(family)) => self.use_single_family(family),
+            Ok(None) => self.missing.push(QUEUE.to_owned()),
+            Err(error @ Error::Vulkan { .. }) => self.missing.push(format!("{QUEUE} ({error})")),
+            Err(error) => return Err(error),
         }
+        Ok(())
     }
 }
 

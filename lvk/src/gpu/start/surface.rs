@@ -56,21 +56,23 @@ impl<'a> SurfaceProbe<'a> {
 
     /// Returns the first queue family of the device that supports graphics, compute and presenting to this
     /// window.
-    pub(crate) fn queue_family(&self, device: vk::PhysicalDevice) -> Option<u32> {
+    pub(crate) fn queue_family(&self, device: vk::PhysicalDevice) -> Result<Option<u32>> {
         let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         // SAFETY: the device belongs to the instance.
         let families = unsafe { self.instance.get_physical_device_queue_family_properties(device) };
-        (0..).zip(&families).find_map(|(index, family)| {
-            let fits = family.queue_flags.contains(needed) && self.presents(device, index);
-            fits.then_some(index)
-        })
+        for (index, family) in (0..).zip(&families) {
+            if family.queue_flags.contains(needed) && self.presents(device, index)? {
+                return Ok(Some(index));
+            }
+        }
+        Ok(None)
     }
 
     /// True if queues of the family can present to this window.
-    pub(crate) fn presents(&self, device: vk::PhysicalDevice, family: u32) -> bool {
+    pub(crate) fn presents(&self, device: vk::PhysicalDevice, family: u32) -> Result<bool> {
         // SAFETY: device and surface belong to the instance.
         unsafe { self.functions.get_physical_device_surface_support(device, family, self.raw) }
-            .unwrap_or(false)
+            .map_err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR"))
     }
 }
 

@@ -14,11 +14,11 @@ impl SurfaceProbe {
         match *window {}
     }
 
-    pub(crate) fn presents(&self, _: vk::PhysicalDevice, _: u32) -> bool {
+    pub(crate) fn presents(&self, _: vk::PhysicalDevice, _: u32) -> Result<bool> {
         match *self {}
     }
 
-    pub(crate) fn queue_family(&self, _: vk::PhysicalDevice) -> Option<u32> {
+    pub(crate) fn queue_family(&self, _: vk::PhysicalDevice) -> Result<Option<u32>> {
         match *self {}
     }
 }
