@@ -33,7 +33,9 @@ impl SweepPlan {
             *call += 1;
             for &error in errors.iter().filter(|error| self.errors.contains(error)) {
                 let of = |&stays| Fault { command: command.clone(), call: *call, error, stays };
-                faults.extend(self.stays.iter().map(of));
+                // A swapchain that stays out of date shows nothing, which is no defect.
+                let stays = self.stays.iter().filter(|stays| !**stays || error != FaultError::OutOfDate);
+                faults.extend(stays.map(of));
             }
         }
         let stride = faults.len().div_ceil(self.most.max(1)).max(1);
@@ -63,5 +65,7 @@ mod tests {
         assert_eq!(texts(&once), "a 1 host-memory once, b 1 host-memory once, a 2 host-memory once");
         assert_eq!(texts(&SweepPlan { most: 2, ..once }), "a 1 host-memory once, a 2 host-memory once");
         assert_eq!(SweepPlan::full().faults(&calls).len(), 12);
+        let dated = [call("c", &[FaultError::OutOfDate])];
+        assert_eq!(SweepPlan::full().faults(&dated).len(), 1, "it does not stay");
     }
 }

@@ -145,6 +145,8 @@ fn names_cause(error: &str, fault: &Fault) -> bool {
     names(&fault.command)
         || fault.stays && names("vk")
         || fault.error == FaultError::SurfaceLost && names("its window is gone")
+        // The library has one name for the commands of all window systems.
+        || fault.command.starts_with("vkCreate") && fault.command.ends_with("SurfaceKHR") && names("vkCreateSurfaceKHR")
         // The loader calls it while it creates a device.
         || fault.command == "vkEnumerateDeviceExtensionProperties" && names("vkCreateDevice")
 }
@@ -192,6 +194,19 @@ mod tests {
         let twice = RunOutcome { second_result: None, stderr: refused().stderr.repeat(2), ..refused() };
         assert_eq!(flaws(Some(&fault(true)), &twice, &clean()), [], "the second try meets the fault, too");
         assert_eq!(found(&twice), [Flaw::NoMessage, Flaw::NotRecovered]);
+    }
+
+    #[test]
+    fn commands_may_have_the_name_of_their_caller() {
+        let names = |command: &str, error, text| {
+            names_cause(text, &Fault { command: command.into(), error, ..fault(false) })
+        };
+        let memory = FaultError::HostMemory;
+        assert!(names("vkCreateXcbSurfaceKHR", memory, "error: out of host memory in vkCreateSurfaceKHR"));
+        assert!(names("vkEnumerateDeviceExtensionProperties", memory, "error: vkCreateDevice failed"));
+        assert!(names("vkQueuePresentKHR", FaultError::SurfaceLost, "error: swapchain: its window is gone"));
+        assert!(!names("vkQueuePresentKHR", memory, "error: swapchain: its window is gone"));
+        assert!(!names("vkCreateBuffer", memory, "error: vkCreateDevice failed"));
     }
 
     #[test]
