@@ -47,20 +47,22 @@ pub(super) unsafe fn create_surface(
     window: RawWindowHandle,
 ) -> Result<vk::SurfaceKHR> {
     let incomplete = || Error::usage("window", "its handle names no display, connection or program");
-    let made: VkResult<vk::SurfaceKHR> = match (display, window) {
+    let (made, call): (VkResult<vk::SurfaceKHR>, _) = match (display, window) {
         (RawDisplayHandle::Xlib(display), RawWindowHandle::Xlib(window)) => {
             let display = display.display.ok_or_else(incomplete)?;
             let info = vk::XlibSurfaceCreateInfoKHR::default().dpy(display.as_ptr()).window(window.window);
+            let functions = khr::xlib_surface::Instance::new(entry, instance);
             // SAFETY: the caller promises what the call needs.
-            unsafe { khr::xlib_surface::Instance::new(entry, instance).create_xlib_surface(&info, None) }
+            (unsafe { functions.create_xlib_surface(&info, None) }, "vkCreateXlibSurfaceKHR")
         }
         (RawDisplayHandle::Xcb(display), RawWindowHandle::Xcb(window)) => {
             let connection = display.connection.ok_or_else(incomplete)?;
             let info = vk::XcbSurfaceCreateInfoKHR::default()
                 .connection(connection.as_ptr())
                 .window(window.window.get());
+            let functions = khr::xcb_surface::Instance::new(entry, instance);
             // SAFETY: as above.
-            unsafe { khr::xcb_surface::Instance::new(entry, instance).create_xcb_surface(&info, None) }
+            (unsafe { functions.create_xcb_surface(&info, None) }, "vkCreateXcbSurfaceKHR")
         }
         (RawDisplayHandle::Wayland(display), RawWindowHandle::Wayland(window)) => {
             let info = vk::WaylandSurfaceCreateInfoKHR::default()
@@ -68,20 +70,21 @@ pub(super) unsafe fn create_surface(
                 .surface(window.surface.as_ptr());
             let functions = khr::wayland_surface::Instance::new(entry, instance);
             // SAFETY: as above.
-            unsafe { functions.create_wayland_surface(&info, None) }
+            (unsafe { functions.create_wayland_surface(&info, None) }, "vkCreateWaylandSurfaceKHR")
         }
         (RawDisplayHandle::Windows(_), RawWindowHandle::Win32(window)) => {
             let program = window.hinstance.ok_or_else(incomplete)?;
             let info =
                 vk::Win32SurfaceCreateInfoKHR::default().hinstance(program.get()).hwnd(window.hwnd.get());
+            let functions = khr::win32_surface::Instance::new(entry, instance);
             // SAFETY: as above.
-            unsafe { khr::win32_surface::Instance::new(entry, instance).create_win32_surface(&info, None) }
+            (unsafe { functions.create_win32_surface(&info, None) }, "vkCreateWin32SurfaceKHR")
         }
         (RawDisplayHandle::Android(_), RawWindowHandle::AndroidNdk(window)) => {
             let info = vk::AndroidSurfaceCreateInfoKHR::default().window(window.a_native_window.as_ptr());
             let functions = khr::android_surface::Instance::new(entry, instance);
             // SAFETY: as above.
-            unsafe { functions.create_android_surface(&info, None) }
+            (unsafe { functions.create_android_surface(&info, None) }, "vkCreateAndroidSurfaceKHR")
         }
         #[cfg(target_vendor = "apple")]
         (RawDisplayHandle::AppKit(_) | RawDisplayHandle::UiKit(_), window) => {
@@ -90,11 +93,11 @@ pub(super) unsafe fn create_surface(
             let info = vk::MetalSurfaceCreateInfoEXT::default().layer(layer.as_ptr().as_ptr().cast());
             let functions = ash::ext::metal_surface::Instance::new(entry, instance);
             // SAFETY: the layer is alive; afterwards the view keeps it.
-            unsafe { functions.create_metal_surface(&info, None) }
+            (unsafe { functions.create_metal_surface(&info, None) }, "vkCreateMetalSurfaceEXT")
         }
         _ => return Err(Error::usage("window", "its two handles are of different window systems")),
     };
-    made.map_err(Error::vulkan("vkCreateSurfaceKHR"))
+    made.map_err(Error::vulkan(call))
 }
 
 /// Returns the Metal layer of a view, or puts one into the view, which then keeps it.
