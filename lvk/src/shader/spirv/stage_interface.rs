@@ -175,9 +175,12 @@ mod tests {
         reflect("", stage, &words).unwrap().interface
     }
 
-    /// Location, component, count and patch of each value.
+    /// Location, component, count and patch of each value, sorted.
     fn places(values: &[LocationValue]) -> Vec<(u32, u32, u32, bool)> {
-        values.iter().map(|value| (value.location, value.component, value.count, value.is_patch)).collect()
+        let place = |value: &LocationValue| (value.location, value.component, value.count, value.is_patch);
+        let mut places: Vec<_> = values.iter().map(place).collect();
+        places.sort_unstable();
+        places
     }
 
     #[test]
@@ -192,11 +195,9 @@ mod tests {
              void main() { a = vec3(0); b = vec2(0); c = mat3x2(0); d[1] = 1; block.f = uvec2(1);
                  gl_Position = vec4(0); }",
         );
-        let mut outputs = places(&found.outputs);
-        outputs.sort_unstable();
         let plain = |location, count| (location, 0, count, false);
         assert_eq!(
-            outputs,
+            places(&found.outputs),
             [
                 plain(0, 3),
                 (1, 2, 2, false),
