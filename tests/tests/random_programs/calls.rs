@@ -140,7 +140,7 @@ impl World<'_> {
         let TextureInfo { part, format, usage, is_array } = info;
         let Part { mips, layers, extent, .. } = part;
         let bytes: usize = (0..mips).map(|mip| part.whole(mip).texels() * texel_bytes(format)).sum();
-        let data = (n[5] % 3 == 0).then(|| pattern(n[5], bytes + usize::from(n[5] % 32 == 3)));
+        let data = (n[5].is_multiple_of(3)).then(|| pattern(n[5], bytes + usize::from(n[5] % 32 == 3)));
         if data.as_ref().is_some_and(|data| data.len() != bytes) {
             problems.push(Problem::Usage);
         }
@@ -184,7 +184,7 @@ impl World<'_> {
         let mut problems: Vec<_> = texture.problem.into_iter().collect();
         let (base_mip, mips) = (u32::from(n[1] % 4), u32::from(n[2] % 3));
         let base_layer = u32::from(n[3] % 3);
-        let is_flat = n[4] % 2 == 0;
+        let is_flat = n[4].is_multiple_of(2);
         let mut view = None;
         if let Some(info) = info {
             let part = info.part;
@@ -394,7 +394,7 @@ fn choose_texture(n: [u16; 6], image: usize) -> (TextureInfo, Vec<Problem>) {
         _ => TextureUsage::SAMPLED | TextureUsage::STORAGE | TextureUsage::TARGET,
     };
     let mut extent = [n[2], n[2] >> 4].map(|bits| SIDES[usize::from(bits) % SIDES.len()]);
-    let is_array = n[3] % 4 == 0;
+    let is_array = n[3].is_multiple_of(4);
     let layers = if is_array { 1 + u32::from(n[3] >> 2) % 3 } else { 1 };
     let full = 32 - extent[0].max(extent[1]).leading_zeros();
     let mut mips = 1 + u32::from(n[4]) % full.min(3);

@@ -261,7 +261,7 @@ impl World<'_> {
             2 => 8,
             _ => 0,
         };
-        if n[4] % 12 == 0 {
+        if n[4].is_multiple_of(12) {
             let buffer = self.pick_buffer(n[5])?;
             problems.extend(buffer.problem);
             if buffer.problem.is_none() {
@@ -355,7 +355,7 @@ impl World<'_> {
 pub struct Words {
     /// Handle of the buffer.
     pub handle: lvk::BufferHandle,
-    /// Its number, if it is alive.
+    /// Number of the buffer, if it is alive.
     pub number: Option<usize>,
     /// Reason why calls refuse it.
     pub problem: Option<Problem>,

@@ -246,7 +246,7 @@ impl World<'_> {
         if n[1] % 8 == 7 {
             return Ok(true);
         }
-        if n[1] % 2 == 0 {
+        if n[1].is_multiple_of(2) {
             judge(pending.readback.is_ready(), &[])?;
         }
         if let Some(bytes) = judge(pending.readback.wait(), &[])? {
@@ -320,7 +320,7 @@ fn destroy<H: Destroy + Copy, T>(
     let Some((handle, live)) = picked else { return false };
     let holder = live.and_then(|number| objects[number].holder.take());
     match holder {
-        Some(holder) if n % 2 == 0 => drop(holder),
+        Some(holder) if n.is_multiple_of(2) => drop(holder),
         Some(holder) => env.ctx().destroy(holder.release()),
         None => env.ctx().destroy(handle),
     }

@@ -160,7 +160,7 @@ pub struct Open {
     pub queue: Queue,
     /// Effects of its commands once it is submitted.
     pub effects: Vec<Effect>,
-    /// Its updates of TLAS.
+    /// Updates of TLAS by its commands.
     pub tlas: HashMap<usize, OpenTlas>,
 }
 
