@@ -59,8 +59,12 @@ impl Watchdog {
 }
 
 /// Returns the text of a failing program of a seed, shrunk.
-fn report(seed: u64, queues: lvk::QueueRequest, ops: &[Op], failure: &Failure) -> String {
-    let fails = |ops: &[Op]| Environment::new(queues).is_some_and(|env| run_and_check(&env, ops).is_err());
+fn report((seed, queues): (u64, lvk::QueueRequest), ops: &[Op], failure: &Failure, dog: &Watchdog) -> String {
+    eprintln!("seed {seed}, {queues:?} fails and is shrunk: {failure:?}");
+    let fails = |ops: &[Op]| {
+        dog.finished.fetch_add(1, Ordering::Relaxed);
+        Environment::new(queues).is_some_and(|env| run_and_check(&env, ops).is_err())
+    };
     let end = (failure.at + 1).min(ops.len());
     let begin = if fails(&ops[..end]) { &ops[..end] } else { ops };
     let small = shrink(begin, TRIES, fails);
@@ -96,7 +100,7 @@ fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &
         });
         match outcome {
             Ok(done) => total += done,
-            Err(failure) => unreachable!("{}", report(seed, queues, &ops, &failure)),
+            Err(failure) => unreachable!("{}", report((seed, queues), &ops, &failure, dog)),
         }
         dog.finished.fetch_add(1, Ordering::Relaxed);
     }

@@ -162,6 +162,8 @@ pub struct Open {
     pub effects: Vec<Effect>,
     /// Updates of TLAS by its commands.
     pub tlas: HashMap<usize, OpenTlas>,
+    /// The BLAS that its commands build or reference, with their versions when the first was recorded.
+    pub blas: HashMap<usize, u32>,
 }
 
 /// Updates of a TLAS in a command buffer.
