@@ -134,7 +134,7 @@ const CALLED: [(Kind, u16); 33] = [
 pub struct Op {
     /// Kind.
     pub kind: Kind,
-    /// Its numbers.
+    /// Numbers that choose objects, ranges and mistakes.
     pub n: [u16; 6],
 }
 

@@ -92,7 +92,7 @@ impl World<'_> {
             Kind::Draw => self.draw(n, queue),
             Kind::Timestamp => self.timestamp(n, queue),
             Kind::MoveTriangle => self.move_triangle(n),
-            Kind::BuildBlas => self.build_blas(n, queue),
+            Kind::BuildBlas => self.build_blas(n, at),
             Kind::UpdateTlas => self.update_tlas(n, at),
             Kind::Trace => self.trace(n, queue),
             _ => Some(Planned::new(Vec::new(), Vec::new(), move |_, cmd| {
@@ -355,7 +355,7 @@ impl World<'_> {
 pub struct Words {
     /// Handle of the buffer.
     pub handle: lvk::BufferHandle,
-    /// Its number, if it is alive.
+    /// Number of the buffer, if it is alive.
     pub number: Option<usize>,
     /// Reason why calls refuse it.
     pub problem: Option<Problem>,

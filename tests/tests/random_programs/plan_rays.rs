@@ -43,13 +43,13 @@ impl World<'_> {
         }))
     }
 
-    pub(super) fn build_blas(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
+    pub(super) fn build_blas(&mut self, n: [u16; 6], at: usize) -> Option<Planned> {
         let mut picked = vec![self.pick_blas(n[0])?];
         if n[1] % 2 == 1 {
             picked.push(self.pick_blas(n[2])?);
         }
         let mode = mode(n[3]);
-        let mut problems = compute_problems(queue, [None]);
+        let mut problems = compute_problems(self.open[at].queue, [None]);
         for blas in &picked {
             problems.extend(blas.problem);
             let Some(number) = blas.live else { continue };
@@ -74,12 +74,21 @@ impl World<'_> {
             problems.push(tlas.problem.unwrap_or(Problem::Usage));
             handles.push(tlas.handle);
         }
+        self.note_versions(at, picked.iter().filter_map(|blas| blas.live));
         let effects = if problems.is_empty() {
             picked.iter().filter_map(|blas| blas.live).map(|blas| Effect::Build { blas }).collect()
         } else {
             Vec::new()
         };
         Some(Planned::new(problems, effects, move |_, cmd| cmd.build_blas(&handles, mode)))
+    }
+
+    /// Notes the versions of BLAS that a command uses.
+    fn note_versions(&mut self, at: usize, used: impl Iterator<Item = usize>) {
+        for blas in used {
+            let version = self.memory.blas[blas].version;
+            self.open[at].blas.entry(blas).or_insert(version);
+        }
     }
 
     /// Returns up to `most` instances, those of the model, and the problems of their handles.
@@ -132,6 +141,7 @@ impl World<'_> {
                 problems.push(Problem::Usage);
             }
             if problems.is_empty() {
+                self.note_versions(at, known.iter().map(|instance| instance.blas));
                 let refits = mode != BuildMode::Rebuild && info.is_updatable && is_same;
                 let expected = match before {
                     Some(open) => open.expected,

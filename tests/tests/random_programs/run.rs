@@ -104,7 +104,7 @@ impl World<'_> {
 
     fn open_commands(&mut self, queue: Queue) -> Result<(), String> {
         let cmd = self.ctx().acquire_command_buffer_on(queue).map_err(|error| error.to_string())?;
-        self.open.push(Open { cmd, queue, effects: Vec::new(), tlas: HashMap::new() });
+        self.open.push(Open { cmd, queue, effects: Vec::new(), tlas: HashMap::new(), blas: HashMap::new() });
         Ok(())
     }
 
@@ -137,10 +137,14 @@ impl World<'_> {
                 problems.push(Problem::Usage);
             }
         }
+        let is_overtaken = self.is_overtaken(&open);
         let sent = match n[1] % 4 {
             0 => self.ctx().submit_in_background(open.cmd),
             _ => self.ctx().submit(open.cmd),
         };
+        if is_overtaken && matches!(sent, Err(lvk::Error::InvalidUsage { .. })) {
+            return Ok(true);
+        }
         if let Some(handle) = judge(sent, &problems)? {
             open.effects.iter().for_each(|effect| self.memory.apply(effect));
             for (tlas, updates) in open.tlas {
@@ -152,6 +156,13 @@ impl World<'_> {
             }
         }
         Ok(true)
+    }
+
+    /// True if the submission may be refused: software traces, and a BLAS of the commands was built since they were
+    /// recorded. It depends on the builder of the BLAS.
+    fn is_overtaken(&self, open: &Open) -> bool {
+        self.ctx().capabilities().ray_query_path == lvk::RayQueryPath::Software
+            && open.blas.iter().any(|(blas, version)| self.memory.blas[*blas].version != *version)
     }
 
     fn drop_commands(&mut self, n: [u16; 6]) -> Result<bool, String> {

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_failure_does_not_need_goes() {
+    fn parts_that_a_failure_does_not_need_go() {
         let mut ops = program(1, 60);
         ops.insert(20, op(Kind::Label, [40, 7, 9, 9, 9, 9]));
         ops.insert(50, op(Kind::WaitIdle, [5; 6]));

@@ -160,8 +160,10 @@ pub struct Open {
     pub queue: Queue,
     /// Effects of its commands once it is submitted.
     pub effects: Vec<Effect>,
-    /// Its updates of TLAS.
+    /// Updates of TLAS by its commands.
     pub tlas: HashMap<usize, OpenTlas>,
+    /// The BLAS that its commands build or reference, with their versions when the first was recorded.
+    pub blas: HashMap<usize, u32>,
 }
 
 /// Updates of a TLAS in a command buffer.

@@ -1,4 +1,4 @@
-//! The tests: seeds of the bounded lane, kept programs, programs on several threads, and the long lane.
+//! The tests: seeds of the bounded tests, kept programs, programs on several threads, and the long run.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -13,7 +13,7 @@ use super::world::Tally;
 
 /// Operations of a program.
 const LENGTH: usize = 400;
-/// Programs of the bounded lane, for each kind of queues.
+/// Programs of the bounded tests, for each kind of queues.
 const BOUNDED_SEEDS: u64 = 400;
 /// Most runs of a failing program while it is shrunk.
 const TRIES: usize = 400;
@@ -36,14 +36,14 @@ impl Watchdog {
     fn watch<T>(work: impl FnOnce(&Self) -> T) -> T {
         let dog = Self { finished: AtomicU64::new(0), is_over: AtomicBool::new(false) };
         std::thread::scope(|scope| {
-            scope.spawn(|| dog.look());
+            scope.spawn(|| dog.wait_for_hang());
             let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&dog)));
             dog.is_over.store(true, Ordering::Relaxed);
             result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         })
     }
 
-    fn look(&self) {
+    fn wait_for_hang(&self) {
         let (mut seen, mut since) = (u64::MAX, Instant::now());
         while !self.is_over.load(Ordering::Relaxed) {
             std::thread::sleep(Duration::from_millis(50));
@@ -59,8 +59,12 @@ impl Watchdog {
 }
 
 /// Returns the text of a failing program of a seed, shrunk.
-fn report(seed: u64, queues: lvk::QueueRequest, ops: &[Op], failure: &Failure) -> String {
-    let fails = |ops: &[Op]| Environment::new(queues).is_some_and(|env| run_and_check(&env, ops).is_err());
+fn report((seed, queues): (u64, lvk::QueueRequest), ops: &[Op], failure: &Failure, dog: &Watchdog) -> String {
+    eprintln!("seed {seed}, {queues:?} fails and is shrunk: {failure:?}");
+    let fails = |ops: &[Op]| {
+        dog.finished.fetch_add(1, Ordering::Relaxed);
+        Environment::new(queues).is_some_and(|env| run_and_check(&env, ops).is_err())
+    };
     let end = (failure.at + 1).min(ops.len());
     let begin = if fails(&ops[..end]) { &ops[..end] } else { ops };
     let small = shrink(begin, TRIES, fails);
@@ -96,7 +100,7 @@ fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &
         });
         match outcome {
             Ok(done) => total += done,
-            Err(failure) => unreachable!("{}", report(seed, queues, &ops, &failure)),
+            Err(failure) => unreachable!("{}", report((seed, queues), &ops, &failure, dog)),
         }
         dog.finished.fetch_add(1, Ordering::Relaxed);
     }
