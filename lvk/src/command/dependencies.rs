@@ -3,7 +3,8 @@
 use crate::handle::{AccelStructHandle, BufferHandle, TextureHandle};
 use crate::submit::SubmitHandle;
 
-/// The resources that a draw, dispatch or trace accesses bindlessly, so that the library can record barriers.
+/// The resources that a draw, dispatch or trace accesses bindlessly and that a command writes, so that the library can
+/// record barriers.
 ///
 /// Resources that were only uploaded need no declaration: they are readable everywhere. Declare resources that an
 /// earlier command wrote (storage images, buffers, render targets now sampled) and resources that this command writes.

@@ -20,7 +20,8 @@ impl Context {
     /// window system and for swapchains in `raw`.
     ///
     /// The caller turns the validation layer on. With [`ContextDesc::validation`], the context receives the layer's
-    /// messages about everything on the instance, which needs `VK_EXT_debug_utils` in `raw`.
+    /// messages about everything on the instance, which needs `VK_EXT_debug_utils` in `raw`. Vulkan does not tell whether
+    /// the layer is on: without it, there are no messages.
     ///
     /// # Safety
     /// The handles must belong together and live until the last clone, holder and command buffer of the context is
