@@ -2,17 +2,13 @@
 
 use std::ffi::OsStr;
 use std::fs::File;
-use std::hash::{BuildHasher, RandomState};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, SystemTime};
+
+use crate::temporary_file::{self, is_unique_part, unique_part};
 
 /// Maximum size of a cache in bytes. A larger one is not read.
 pub(crate) const MAX_BYTES: u64 = 1 << 30;
-/// Age from which a temporary file is a leftover of a process that was killed. A write takes seconds.
-const LEFTOVER_AGE: Duration = Duration::from_secs(3600);
 /// Extension of temporary files.
 const TEMPORARY: &str = ".tmp";
 
@@ -42,16 +38,13 @@ fn write_temporary(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.sync_all()
 }
 
-/// Returns a name in the same folder that no other context uses, in no process: containers that share a folder may have
-/// equal process numbers, so a random number takes their place.
+/// Returns a name in the same folder that no other context uses, in no process.
 fn temporary_name(path: &Path) -> io::Result<PathBuf> {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
     let Some(name) = path.file_name() else {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
     };
     let mut name = name.to_owned();
-    name.push(format!(".{:016x}-{}{TEMPORARY}", *PROCESS, COUNT.fetch_add(1, Ordering::Relaxed)));
+    name.push(format!(".{}{TEMPORARY}", unique_part()));
     Ok(path.with_file_name(name))
 }
 
@@ -59,22 +52,12 @@ fn temporary_name(path: &Path) -> io::Result<PathBuf> {
 pub(crate) fn is_temporary(name: &OsStr, is_cache: impl Fn(&str) -> bool) -> bool {
     let Some(name) = name.to_str().and_then(|name| name.strip_suffix(TEMPORARY)) else { return false };
     let Some((cache, unique)) = name.rsplit_once('.') else { return false };
-    let is_unique = unique.bytes().all(|byte| byte.is_ascii_hexdigit() || byte == b'-');
-    is_unique && unique.contains('-') && is_cache(cache)
+    is_unique_part(unique) && is_cache(cache)
 }
 
-/// Removes temporary files that killed processes left in a folder, of cache files whose name passes `is_cache`. Files of
-/// the last hour stay, since another process may be writing them. Errors are ignored: the next start tries again.
+/// Removes temporary files that killed processes left in a folder, of cache files whose name passes `is_cache`.
 pub(crate) fn remove_leftovers(folder: &Path, is_cache: impl Fn(&str) -> bool) {
-    let Ok(entries) = std::fs::read_dir(folder) else { return };
-    let now = SystemTime::now();
-    for entry in entries.flatten().filter(|entry| is_temporary(&entry.file_name(), &is_cache)) {
-        let written = entry.metadata().and_then(|data| data.modified());
-        let age = written.ok().and_then(|written| now.duration_since(written).ok());
-        if age.is_some_and(|age| age > LEFTOVER_AGE) {
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
+    temporary_file::remove_leftovers(folder, |name| is_temporary(name, &is_cache));
 }
 
 /// Returns a checksum, computed eight bytes at a time. It detects damage and different contents, but not
@@ -92,6 +75,8 @@ pub(crate) fn fingerprint(bytes: &[u8], seed: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::time::{Duration, SystemTime};
+
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {

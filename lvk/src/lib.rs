@@ -188,6 +188,8 @@ mod store;
 mod submit;
 #[cfg(feature = "window")]
 mod swapchain;
+#[doc(hidden)]
+pub mod temporary_file;
 #[cfg(any(test, feature = "test-hooks"))]
 mod test_support;
 mod upload;

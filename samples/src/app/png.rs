@@ -1,17 +1,11 @@
 //! Writes pictures so that a file is either complete or not there.
 
 use std::ffi::OsStr;
-use std::hash::{BuildHasher, RandomState};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, SystemTime};
 
+use lvk::temporary_file::{self, is_unique_part, unique_part};
 use lvk::{readable_name, regular_file};
-
-/// Age from which a file in part is a leftover of a process that was killed. A write takes seconds.
-const LEFTOVER_AGE: Duration = Duration::from_secs(3600);
 
 /// Errors of writing an image.
 #[derive(Debug, thiserror::Error)]
@@ -167,44 +161,28 @@ impl Drop for Partial {
     }
 }
 
-/// Returns a name that no other process uses: containers that share a folder may have equal process numbers, so a random
-/// number takes their place.
+/// Returns a name that no other process uses.
 fn partial_name() -> String {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    static PROCESS: LazyLock<u64> = LazyLock::new(|| RandomState::new().hash_one(std::process::id()));
-    format!(".lvk-{:016x}-{}.partial", *PROCESS, COUNT.fetch_add(1, Ordering::Relaxed))
+    format!(".lvk-{}.partial", unique_part())
 }
 
 /// True if `name` is that of a file in part, of this or of an earlier version.
 fn is_partial(name: &OsStr) -> bool {
     let name = name.to_str().unwrap_or_default();
     let unique = name.strip_prefix(".lvk-").and_then(|name| name.strip_suffix(".partial"));
-    unique
-        .and_then(|unique| unique.split_once('-'))
-        .is_some_and(|parts| [parts.0, parts.1].iter().all(|part| is_hexadecimal(part)))
+    unique.is_some_and(is_unique_part)
 }
 
-fn is_hexadecimal(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_hexdigit())
-}
-
-/// Removes the files in part that killed processes left beside `target`. Files of the last hour stay, since another
-/// process may be writing them. Errors are ignored: the next start tries again.
+/// Removes the files in part that killed processes left beside `target`.
 fn remove_leftovers(target: &Path) {
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let Ok(entries) = std::fs::read_dir(folder.unwrap_or(Path::new("."))) else { return };
-    let now = SystemTime::now();
-    for entry in entries.flatten().filter(|entry| is_partial(&entry.file_name())) {
-        let written = entry.metadata().and_then(|data| data.modified());
-        let age = written.ok().and_then(|written| now.duration_since(written).ok());
-        if age.is_some_and(|age| age > LEFTOVER_AGE) {
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
+    temporary_file::remove_leftovers(folder.unwrap_or(Path::new(".")), is_partial);
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::{Duration, SystemTime};
+
     use super::*;
 
     fn files(folder: &Path) -> Vec<String> {

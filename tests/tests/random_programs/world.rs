@@ -70,7 +70,7 @@ pub struct Object<H: Destroy, T> {
     pub handle: H,
     /// Bindless index.
     pub index: u32,
-    /// What the model knows.
+    /// Contents and properties in the model.
     pub info: T,
 }
 
@@ -120,14 +120,14 @@ pub fn pick<H: Destroy + Copy, T>(objects: &[Object<H, T>], n: u16, foreign: H) 
     }
 }
 
-/// What the model knows of a buffer; its number is that of its bytes.
+/// Properties of a buffer in the model. The number of the buffer is that of its bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct BufferInfo {
     pub size: usize,
     pub memory: MemoryKind,
 }
 
-/// What the model knows of a texture or view.
+/// Properties of a texture or view in the model.
 #[derive(Debug, Clone, Copy)]
 pub struct TextureInfo {
     pub part: Part,
@@ -136,7 +136,7 @@ pub struct TextureInfo {
     pub is_array: bool,
 }
 
-/// What the model knows of a BLAS; its number is that of its contents.
+/// Properties of a BLAS in the model. The number of the BLAS is that of its contents.
 #[derive(Debug, Clone, Copy)]
 pub struct BlasInfo {
     pub mesh: usize,
@@ -145,7 +145,7 @@ pub struct BlasInfo {
     pub was_compacted: bool,
 }
 
-/// What the model knows of a TLAS; its number is that of its contents.
+/// Properties of a TLAS in the model. The number of the TLAS is that of its contents.
 #[derive(Debug, Clone, Copy)]
 pub struct TlasInfo {
     pub capacity: u32,
@@ -181,7 +181,7 @@ pub struct Pending {
     pub expected: Vec<Cell>,
 }
 
-/// What programs have done.
+/// Counts of executed and refused operations.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub struct Tally {
     /// Operations that had objects to work on.
@@ -223,7 +223,7 @@ pub struct World<'a> {
     /// Arguments of indirect dispatches.
     pub arguments: Holder<BufferHandle>,
     pub queries: Holder<QueryPoolHandle>,
-    /// What ran so far.
+    /// Counts so far.
     pub tally: Tally,
 }
 
