@@ -1,8 +1,10 @@
 //! Calls of the samples and of scenarios fail: each run ends with the right result or with an error, and leaves nothing.
 #![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
+use std::fmt::Display;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Duration;
 
 use lvk_dev_driver::{VirtualDisplay, virtual_display};
@@ -32,14 +34,30 @@ fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Dura
     assert!(report.flawed.is_empty() && report.reached > 0, "{line}: {report}");
 }
 
-/// Returns the bound on the number of faults of whole sweeps, `LVK_FAULT_MOST`.
-fn most() -> usize {
-    std::env::var("LVK_FAULT_MOST").ok().and_then(|text| text.parse().ok()).unwrap_or(usize::MAX)
+/// Returns the plan of whole sweeps, bounded by `LVK_FAULT_MOST`, a number, and `LVK_FAULT_PART`, as `2/3`.
+fn whole_plan() -> SweepPlan {
+    let full = SweepPlan::full();
+    SweepPlan {
+        most: variable("LVK_FAULT_MOST", full.most),
+        part: variable("LVK_FAULT_PART", full.part),
+        ..full
+    }
 }
 
-/// Runs the whole sweep, as far as [`most`] allows.
+/// Returns the value of an environment variable, or `default` where it is not set.
+fn variable<T: FromStr>(name: &str, default: T) -> T
+where
+    T::Err: Display,
+{
+    match std::env::var(name) {
+        Ok(text) => text.parse().unwrap_or_else(|error| panic!("{name}: {error}")),
+        Err(_) => default,
+    }
+}
+
+/// Runs the whole sweep, as far as [`whole_plan`] goes.
 fn whole(line: &str) {
-    assert_no_flaws(line, &program(line), &SweepPlan { most: most(), ..SweepPlan::full() }, WHOLE);
+    assert_no_flaws(line, &program(line), &whole_plan(), WHOLE);
 }
 
 /// Declares an ignored test for each scenario.
@@ -57,16 +75,30 @@ whole_sweeps! {
     whole_hybrid_pipeline: "hybrid --width 64 --height 36 --frames 1 --rt pipeline --scene SCENE";
     whole_hybrid_query: "hybrid --width 64 --height 36 --frames 1 --rt query --scene SCENE";
     whole_hybrid_software: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
+    whole_rtx_hello_pipeline: "rtx_hello --width 64 --height 36 --frames 1 --rt pipeline";
+    whole_rtx_hello_query: "rtx_hello --width 64 --height 36 --frames 1 --rt query";
+    whole_rtx_hello_software: "rtx_hello --width 64 --height 36 --frames 1 --rt software";
+    whole_rtx_ao_pipeline: "rtx_ao --width 64 --height 36 --frames 1 --rt pipeline --passes 1";
+    whole_rtx_ao_query: "rtx_ao --width 64 --height 36 --frames 1 --rt query --passes 1";
+    whole_rtx_ao_software: "rtx_ao --width 64 --height 36 --frames 1 --rt software --passes 1";
+    whole_rtx_pipeline_pipeline: "rtx_pipeline --width 64 --height 36 --frames 1 --rt pipeline";
+    whole_rtx_pipeline_query: "rtx_pipeline --width 64 --height 36 --frames 1 --rt query";
+    whole_rtx_pipeline_software: "rtx_pipeline --width 64 --height 36 --frames 1 --rt software";
+    whole_rtx_textures_pipeline: "rtx_textures --width 64 --height 36 --frames 1 --rt pipeline";
+    whole_rtx_textures_query: "rtx_textures --width 64 --height 36 --frames 1 --rt query";
+    whole_rtx_textures_software: "rtx_textures --width 64 --height 36 --frames 1 --rt software";
+    whole_hybrid_oit_pipeline: "hybrid_oit --width 64 --height 36 --frames 1 --rt pipeline --supersampling 1";
+    whole_hybrid_oit_query: "hybrid_oit --width 64 --height 36 --frames 1 --rt query --supersampling 1";
+    whole_hybrid_oit_software: "hybrid_oit --width 64 --height 36 --frames 1 --rt software --supersampling 1";
+    whole_large_scene_pipeline: "large_scene --width 64 --height 36 --frames 1 --rt pipeline --triangles 2000 --copies 3 --samples 1";
+    whole_large_scene_query: "large_scene --width 64 --height 36 --frames 1 --rt query --triangles 2000 --copies 3 --samples 1";
+    whole_large_scene_software: "large_scene --width 64 --height 36 --frames 1 --rt software --triangles 2000 --copies 3 --samples 1";
+    whole_reflections_pipeline: "reflections --width 64 --height 36 --frames 1 --rt pipeline --samples 1";
+    whole_reflections_query: "reflections --width 64 --height 36 --frames 1 --rt query --samples 1";
+    whole_reflections_software: "reflections --width 64 --height 36 --frames 1 --rt software --samples 1";
     whole_hello_triangle: "hello_triangle --width 64 --height 36 --frames 1";
-    whole_rtx_hello: "rtx_hello --width 64 --height 36 --frames 1";
-    whole_rtx_ao: "rtx_ao --width 64 --height 36 --frames 1 --passes 1";
-    whole_rtx_pipeline: "rtx_pipeline --width 64 --height 36 --frames 1";
-    whole_rtx_textures: "rtx_textures --width 64 --height 36 --frames 1";
     whole_deferred: "deferred --width 64 --height 36 --frames 1 --lights 20";
-    whole_hybrid_oit: "hybrid_oit --width 64 --height 36 --frames 1 --supersampling 1";
-    whole_large_scene: "large_scene --width 64 --height 36 --frames 1 --triangles 2000 --copies 3 --samples 1";
     whole_omni_shadows: "omni_shadows --width 64 --height 36 --frames 1";
-    whole_reflections: "reflections --width 64 --height 36 --frames 1 --samples 1";
     whole_render_to_cube_map: "render_to_cube_map --width 64 --height 36 --frames 1 --face-size 32";
     whole_sponza: "sponza --width 64 --height 36 --frames 1 --shadow-size 256";
     whole_triplanar: "triplanar --width 64 --height 36 --frames 1";
@@ -83,8 +115,7 @@ whole_sweeps! {
 #[ignore = "minutes: .ci/slow faults"]
 fn whole_window() {
     let Some((_connection, _display, program)) = in_window() else { return };
-    let most = most();
-    assert_no_flaws("window", &program, &SweepPlan { most, ..SweepPlan::full() }, WHOLE);
+    assert_no_flaws("window", &program, &whole_plan(), WHOLE);
 }
 
 /// Returns the scenario in a window, the X server that shows it, and a connection: without one the server ends with the first

@@ -1,6 +1,7 @@
 //! The faults of a sweep, as plain values.
 
 use std::collections::HashMap;
+use std::str::FromStr;
 
 use crate::call_log::Call;
 use crate::fault::{Fault, FaultError};
@@ -10,17 +11,52 @@ use crate::fault::{Fault, FaultError};
 pub struct SweepPlan {
     /// Most faults to try. If there are more, those tried are spread evenly.
     pub most: usize,
+    /// Part of these faults to try, so that several runs share a sweep.
+    pub part: Part,
     /// Errors to inject.
     pub errors: Vec<FaultError>,
     /// Faults of one call, and faults that stay.
     pub stays: Vec<bool>,
 }
 
+/// One of several parts of a list: every `count`-th element, from the one numbered `index`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Number of the part, less than `count`.
+    pub index: usize,
+    /// Number of parts, at least 1.
+    pub count: usize,
+}
+
+impl Part {
+    /// The whole list.
+    pub const WHOLE: Self = Self { index: 0, count: 1 };
+}
+
+impl FromStr for Part {
+    type Err = String;
+
+    /// Parses `2/3`, the second of three parts.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers =
+            text.split_once('/').and_then(|(n, count)| Some((n.parse().ok()?, count.parse().ok()?)));
+        match numbers {
+            Some((number, count)) if (1..=count).contains(&number) => Ok(Self { index: number - 1, count }),
+            _ => Err(format!("'{text}' is no part: write 2/3 for the second of three")),
+        }
+    }
+}
+
 impl SweepPlan {
     /// Every fault.
     #[must_use]
     pub fn full() -> Self {
-        Self { most: usize::MAX, errors: FaultError::ALL.to_vec(), stays: vec![false, true] }
+        Self {
+            most: usize::MAX,
+            part: Part::WHOLE,
+            errors: FaultError::ALL.to_vec(),
+            stays: vec![false, true],
+        }
     }
 
     /// Returns the faults for the calls of a run without fault.
@@ -39,12 +75,14 @@ impl SweepPlan {
             }
         }
         let stride = faults.len().div_ceil(self.most.max(1)).max(1);
-        faults.into_iter().step_by(stride).collect()
+        let chosen = faults.into_iter().step_by(stride);
+        chosen.skip(self.part.index).step_by(self.part.count.max(1)).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
     use super::*;
 
     fn call(command: &str, errors: &[FaultError]) -> Call {
@@ -61,10 +99,19 @@ mod tests {
         };
         let lost = SweepPlan { errors: vec![FaultError::DeviceLost], ..SweepPlan::full() };
         assert_eq!(texts(&lost), "b 1 device-lost once, b 1 device-lost stays");
-        let once = SweepPlan { stays: vec![false], errors: vec![FaultError::HostMemory], most: 9 };
+        let once =
+            SweepPlan { stays: vec![false], errors: vec![FaultError::HostMemory], ..SweepPlan::full() };
         assert_eq!(texts(&once), "a 1 host-memory once, b 1 host-memory once, a 2 host-memory once");
-        assert_eq!(texts(&SweepPlan { most: 2, ..once }), "a 1 host-memory once, a 2 host-memory once");
+        assert_eq!(
+            texts(&SweepPlan { most: 2, ..once.clone() }),
+            "a 1 host-memory once, a 2 host-memory once"
+        );
         assert_eq!(SweepPlan::full().faults(&calls).len(), 12);
+        let second = SweepPlan { part: "2/3".parse().unwrap(), ..once.clone() };
+        assert_eq!(texts(&second), "b 1 host-memory once");
+        for bad in ["0/3", "4/3", "1", "/", "-1/2"] {
+            assert!(bad.parse::<Part>().is_err(), "{bad}");
+        }
         let dated = [call("c", &[FaultError::OutOfDate])];
         assert_eq!(SweepPlan::full().faults(&dated).len(), 1, "it does not stay");
     }

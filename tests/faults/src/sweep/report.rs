@@ -12,8 +12,10 @@ use super::run::{LayerFolder, Program, run};
 use super::verdict::{Ending, Flaw, flaws};
 use crate::fault::Fault;
 
-/// Processes at the same time.
-const JOBS: usize = 2;
+/// Returns the number of processes at the same time.
+fn jobs() -> usize {
+    std::thread::available_parallelism().map_or(2, |count| count.get().max(2))
+}
 
 /// A run with flaws.
 #[derive(Debug)]
@@ -124,7 +126,7 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
         Ok(())
     };
     std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..JOBS).map(|_| scope.spawn(work)).collect();
+        let threads: Vec<_> = (0..jobs()).map(|_| scope.spawn(work)).collect();
         threads.into_iter().try_for_each(|thread| match thread.join() {
             Ok(result) => result,
             Err(panic) => std::panic::resume_unwind(panic),
