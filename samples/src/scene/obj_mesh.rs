@@ -12,7 +12,7 @@ use super::placement::{Extent, Placement};
 use super::polygon::{self, Split};
 use crate::app::progress::Progress;
 
-/// Bounds of the positions that faces use. Warns of texture coordinates and normals that are no numbers, where faces use them.
+/// Bounds of the positions that faces with an area use. Warns of texture coordinates and normals that are no numbers, where faces use them.
 ///
 /// # Errors
 /// [`SceneError::NotFinite`] for the first such position.
@@ -20,8 +20,10 @@ pub(super) fn check(path: &Path, obj: &mut ObjText) -> Result<Extent, SceneError
     let mut used =
         [obj.positions.len(), obj.texcoords.len(), obj.normals.len()].map(|count| vec![false; count]);
     let mut extent = Extent::new();
+    for face in 0..obj.faces.len() {
+        add_face(&mut extent, obj, face);
+    }
     for corner in &obj.corners {
-        extent.add(obj.positions[corner[0] as usize]);
         for (used, &index) in used.iter_mut().zip(corner).filter(|(_, index)| **index != NONE) {
             used[index as usize] = true;
         }
@@ -40,6 +42,17 @@ pub(super) fn check(path: &Path, obj: &mut ObjText) -> Result<Extent, SceneError
         obj.warnings.push(if flaw.kind == 1 { "texture coordinates" } else { "normals" }, text);
     }
     Ok(extent)
+}
+
+/// Adds the corners of a face, unless they are at fewer than three places, so that it has no area.
+fn add_face(extent: &mut Extent, obj: &ObjText, face: usize) {
+    let corners = &obj.corners[obj.faces[face].start..obj.face_end(face)];
+    let places = || corners.iter().map(|corner| obj.positions[corner[0] as usize]);
+    let first = places().next();
+    let second = places().find(|place| Some(*place) != first);
+    if places().any(|place| second.is_some() && Some(place) != first && Some(place) != second) {
+        places().for_each(|place| extent.add(place));
+    }
 }
 
 /// The triangles of the faces in scene units. Corners that agree in everything share a vertex. `colors` are linear; empty, or
