@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use spade::handles::{FaceHandle, InnerTag};
-use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
+use spade::{CdtEdge, ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 /// A place of the polygon and the first of its corners there.
 struct Place {
@@ -20,6 +20,8 @@ impl HasPosition for Place {
 }
 
 type Cdt = ConstrainedDelaunayTriangulation<Place>;
+
+type InnerFace<'a> = FaceHandle<'a, InnerTag, Place, (), CdtEdge<()>, ()>;
 
 /// Edges of the polygon between places, the lower place first, and how often the polygon runs along each.
 type EdgeCounts = HashMap<[usize; 2], u32>;
@@ -62,7 +64,7 @@ fn places_and_edges(points: &[[f64; 2]]) -> (Vec<Place>, EdgeCounts) {
 /// a longer one of the polygon.
 fn inside(cdt: &Cdt, edges: &EdgeCounts) -> Option<Vec<[usize; 3]>> {
     let mut is_inside: Vec<Option<bool>> = vec![None; cdt.num_all_faces()];
-    let mut waiting: Vec<(FaceHandle<'_, InnerTag, Place, (), spade::CdtEdge<()>, ()>, bool)> = Vec::new();
+    let mut waiting: Vec<(InnerFace<'_>, bool)> = Vec::new();
     for edge in cdt.convex_hull().map(|edge| edge.rev()) {
         let crosses = crosses(edge, edges)?;
         waiting.extend(edge.face().as_inner().map(|face| (face, crosses)));
@@ -84,10 +86,7 @@ fn inside(cdt: &Cdt, edges: &EdgeCounts) -> Option<Vec<[usize; 3]>> {
 }
 
 /// True if the polygon runs an odd number of times along the edge.
-fn crosses(
-    edge: spade::handles::DirectedEdgeHandle<'_, Place, (), spade::CdtEdge<()>, ()>,
-    edges: &EdgeCounts,
-) -> Option<bool> {
+fn crosses(edge: DirectedEdgeHandle<'_, Place, (), CdtEdge<()>, ()>, edges: &EdgeCounts) -> Option<bool> {
     if !edge.is_constraint_edge() {
         return Some(false);
     }

@@ -51,6 +51,8 @@ mod sky;
 mod text_lines;
 mod text_numbers;
 mod texture;
+#[cfg(test)]
+mod tobj_comparison_tests;
 mod vertex_colors;
 mod warnings;
 
@@ -73,8 +75,7 @@ pub use texture::Texture;
 /// Everything a renderer needs, in flat arrays.
 ///
 /// Invariants, kept by every constructor: `positions`, `normals` and `texcoords` have the same length, which `colors` has too
-/// unless it is empty; every
-/// index is in range; every position and texture coordinate is finite; every normal has unit length;
+/// unless it is empty; every index is in range; every position and texture coordinate is finite; every normal has unit length;
 /// `triangle_materials` and `source_triangles` have one entry per triangle; there is at least one triangle.
 #[derive(Debug, Clone)]
 pub struct Scene {

@@ -260,12 +260,12 @@ fn library_names(folder: &Path, argument: &[u8]) -> Vec<Vec<u8>> {
     let is_as_written = |name: &[u8]| folder.join(path_of(unquoted(name))).is_file();
     let parts: Vec<&[u8]> = words(argument).map(unquoted).collect();
     let owned = |parts: &[&[u8]]| parts.iter().map(|part| part.to_vec()).collect();
-    if parts.len() > 1 && !names_in(argument).any(is_as_written) && parts.iter().all(|part| exists(part)) {
+    if parts.len() > 1 && !names_in(argument).any(is_as_written) && parts.iter().all(&exists) {
         return owned(&parts);
     }
-    match names_in(argument).find(exists) {
+    match names_in(argument).find(&exists) {
         Some(whole) => owned(&[unquoted(whole)]),
-        None if parts.iter().any(|part| exists(part)) => owned(&parts),
+        None if parts.iter().any(exists) => owned(&parts),
         None => owned(&[unquoted(argument)]),
     }
 }
@@ -347,7 +347,7 @@ mod tests {
     }
 
     fn material(lines: &str) -> Material {
-        materials(&format!("newmtl m\n{lines}\n")).0.remove(0)
+        materials(format!("newmtl m\n{lines}\n")).0.remove(0)
     }
 
     #[test]

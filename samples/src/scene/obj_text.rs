@@ -467,35 +467,5 @@ mod tests {
         fn any_bytes_end_in_a_result(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
             let _ = parsed(&bytes);
         }
-
-        /// Another reader finds the same in files that it can read.
-        #[test]
-        fn another_reader_finds_the_same(
-            vertices in proptest::collection::vec(prop::array::uniform3(-1e3f32..1e3), 3..12),
-            picks in proptest::collection::vec(proptest::collection::vec(0..1000usize, 3..6), 1..12),
-        ) {
-            let mut text = String::new();
-            for [x, y, z] in &vertices {
-                text += &format!("v {x} {y} {z}\n");
-            }
-            for (number, pick) in picks.iter().enumerate() {
-                let sign = |corner: usize| match number % 2 {
-                    0 => format!(" {}", corner % vertices.len() + 1),
-                    _ => format!(" -{}", corner % vertices.len() + 1),
-                };
-                text += &format!("f{}\n", pick.iter().map(|corner| sign(*corner)).collect::<String>());
-            }
-            let options = tobj::LoadOptions::default();
-            let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| {
-                Ok((Vec::new(), Default::default()))
-            }).unwrap();
-            let obj = parsed(&text).unwrap();
-            let corners: Vec<u32> = obj.corners.iter().map(|corner| corner[0]).collect();
-            let theirs: Vec<f32> = models[0].mesh.indices.iter().flat_map(|index| {
-                models[0].mesh.positions[3 * *index as usize..][..3].to_vec()
-            }).collect();
-            let ours: Vec<f32> = corners.iter().flat_map(|index| obj.positions[*index as usize].map(|x| x as f32)).collect();
-            prop_assert_eq!(ours, theirs);
-        }
     }
 }
