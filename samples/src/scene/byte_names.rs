@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_found_by_foreign_paths_and_capitals() {
+    fn foreign_paths_and_other_capitals_lead_to_files() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("textures")).unwrap();
         std::fs::write(folder.path().join("textures/Wood.PNG"), b"").unwrap();

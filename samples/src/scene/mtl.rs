@@ -482,7 +482,7 @@ mod tests {
     }
 
     #[test]
-    fn libraries_are_found_by_foreign_paths_and_capitals() {
+    fn foreign_paths_and_other_capitals_lead_to_libraries() {
         let folder = tempfile::tempdir().unwrap();
         let units = "newmtl m\nKd 1 0 0\n".encode_utf16().flat_map(u16::to_le_bytes);
         let utf_16: Vec<u8> = [0xff, 0xfe].into_iter().chain(units).collect();

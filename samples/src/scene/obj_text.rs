@@ -60,7 +60,7 @@ pub(super) struct Face {
 pub(super) struct Flaw {
     /// Place of its kind in [`KINDS`].
     pub kind: usize,
-    /// Its number among its kind, from 0.
+    /// Number among the elements of the kind, from 0.
     pub index: usize,
     /// Line in the file, from 1.
     pub line: usize,
