@@ -1,6 +1,9 @@
 //! Names in scene files: bytes of any encoding, which a comment may follow, and which may name a file.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+use crate::app::input_file::{self, FileKind};
 
 /// Lengths that are tried of a name with several `#`.
 const MOST_ENDS: usize = 8;
@@ -42,6 +45,14 @@ pub(super) fn find_file(folder: &Path, name: &[u8], subfolders: &[&str]) -> Opti
 /// The name as a path for messages about a file that is not there.
 pub(super) fn path_of(name: &[u8]) -> PathBuf {
     paths(name).into_iter().next().unwrap_or_default()
+}
+
+/// Why [`find_file`] found no file at `path`: there is none, or something that is no regular file.
+pub(super) fn why_absent(path: &Path, kind: FileKind) -> String {
+    match input_file::open(path, kind) {
+        Err(error) if error.kind() != ErrorKind::NotFound => error.to_string(),
+        _ => "no such file".to_owned(),
+    }
 }
 
 /// The paths that the bytes of a name may mean.

@@ -30,6 +30,7 @@ mod camera_path;
 mod error;
 mod framing;
 mod gpu_camera;
+mod image_name;
 mod interior;
 mod large_polygon;
 mod light;

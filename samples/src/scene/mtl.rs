@@ -6,16 +6,14 @@ use std::path::{Path, PathBuf};
 use lvk::{readable_bytes, readable_name};
 
 use super::Material;
-use super::byte_names::{find_file, names_in, path_of, unquoted};
+use super::byte_names::{find_file, names_in, path_of, unquoted, why_absent};
+use super::image_name::{Absence, Image};
 use super::mtl_text::{self, MtlEntry};
 use super::text_lines::decoded;
 use super::text_numbers::words;
 use super::texture::{PictureBudget, Texture};
 use super::warnings::Warnings;
 use crate::app::input_file::{self, FileKind};
-
-/// Folders beside a library that hold its images, where the library names folders of another machine.
-const IMAGE_FOLDERS: &[&str] = &["textures"];
 
 /// Materials by name, and the images they use.
 #[derive(Default)]
@@ -53,27 +51,6 @@ struct Definition {
     relief: Option<Image>,
 }
 
-/// An image as a library names it, and the folder of that library.
-#[derive(Clone)]
-struct Image {
-    folder: PathBuf,
-    /// The rest of the line.
-    name: Vec<u8>,
-}
-
-impl Image {
-    fn find(&self) -> Option<PathBuf> {
-        names_in(&self.name).find_map(|name| find_file(&self.folder, unquoted(name), IMAGE_FOLDERS))
-    }
-
-    /// Path for messages about an image that is not found.
-    fn absent(&self) -> PathBuf {
-        let name: Vec<u8> =
-            unquoted(&self.name).iter().map(|b| if *b == b'\\' { b'/' } else { *b }).collect();
-        self.folder.join(path_of(&name))
-    }
-}
-
 impl Library {
     /// Reads the libraries that the OBJ file at `obj_path` names. A missing library is a warning.
     pub(super) fn read(obj_path: &Path, arguments: &[Vec<u8>]) -> Self {
@@ -86,7 +63,10 @@ impl Library {
             }
             match find_file(folder, &name, &[]) {
                 Some(file) => library.read_file(&file),
-                None => library.warn_of_library(&folder.join(path_of(&name)), "no such file"),
+                None => {
+                    let path = folder.join(path_of(&name));
+                    library.warn_of_library(&path, &why_absent(&path, FileKind::Mtl));
+                }
             }
         }
         library
@@ -129,8 +109,7 @@ impl Library {
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut material = convert(entry);
-        let image =
-            |name: &Option<Vec<u8>>| name.clone().map(|name| Image { folder: folder.to_path_buf(), name });
+        let image = |name: &Option<Vec<u8>>| name.as_ref().map(|name| Image::new(folder, name));
         let relief = image(&entry.relief_map);
         let (image, mask) = (image(&entry.diffuse_map), image(&entry.dissolve_map));
         // Exporters often leave Kd black beside a texture, meaning the texture alone.
@@ -143,14 +122,14 @@ impl Library {
     /// Number of the image, which is read on first use; a stand-in and a warning when that fails.
     fn texture(&mut self, image: &Image, mask: Option<PathBuf>) -> u32 {
         let found = image.find();
-        let path = found.clone().unwrap_or_else(|| image.absent());
+        let path = found.as_ref().unwrap_or_else(|absence| &absence.path).clone();
         let key = (file_identity(&path), mask.as_deref().map(file_identity));
         if let Some(&number) = self.texture_numbers.get(&key) {
             return number;
         }
         let texture = match &found {
-            Some(path) => Texture::read(path, &mut self.budget),
-            None => Err("no such file".to_owned()),
+            Ok(path) => Texture::read(path, &mut self.budget),
+            Err(absence) => Err(absence.why.clone()),
         };
         let texture = texture.unwrap_or_else(|why| {
             let line = format!("texture {}: {why}; magenta checks stand in", readable_name(&path));
@@ -170,14 +149,14 @@ impl Library {
     /// Number of the normal map, which is read on first use; none, and a warning, when that fails.
     fn normal_map(&mut self, image: &Image) -> Option<u32> {
         let found = image.find();
-        let path = found.clone().unwrap_or_else(|| image.absent());
+        let path = found.as_ref().unwrap_or_else(|absence| &absence.path).clone();
         let key = file_identity(&path);
         if let Some(&number) = self.normal_map_numbers.get(&key) {
             return number;
         }
         let read = match &found {
-            Some(path) => Texture::read_relief(path, &mut self.budget),
-            None => Err("no such file".to_owned()),
+            Ok(path) => Texture::read_relief(path, &mut self.budget),
+            Err(absence) => Err(absence.why.clone()),
         };
         let number = match read {
             Ok(map) => {
@@ -194,6 +173,15 @@ impl Library {
         number
     }
 
+    /// The file of the mask; none, and a warning, when there is none.
+    fn mask_file(&mut self, mask: &Image) -> Option<PathBuf> {
+        mask.find().map_err(|Absence { path, why }| self.warn_of_mask(&path, &why)).ok()
+    }
+
+    fn warn_of_mask(&mut self, path: &Path, why: &str) {
+        self.warnings.push("textures", format!("mask {}: {why}; there are no holes", readable_name(path)));
+    }
+
     /// The texture with alpha from the mask; as it is, with a warning, where the mask cannot be read.
     fn with_holes(&mut self, texture: Texture, mask: &Path) -> Texture {
         match Texture::read(mask, &mut self.budget) {
@@ -202,8 +190,7 @@ impl Library {
                 texture.masked(&mask)
             }
             Err(why) => {
-                let line = format!("mask {}: {why}; there are no holes", readable_name(mask));
-                self.warnings.push("textures", line);
+                self.warn_of_mask(mask, &why);
                 texture
             }
         }
@@ -240,8 +227,8 @@ impl Library {
             self.warnings.push("materials", line);
             return Material::stand_in(&name);
         };
-        let mask = mask.and_then(|mask| mask.find());
-        let is_masked = image.is_some() && mask.is_some();
+        let mask = mask.filter(|_| image.is_some()).and_then(|mask| self.mask_file(&mask));
+        let is_masked = mask.is_some();
         let albedo_texture = image.map(|image| self.texture(&image, mask));
         let relief = relief.filter(|_| self.wants_normal_maps);
         let normal_map = relief.and_then(|relief| self.normal_map(&relief));
@@ -404,6 +391,14 @@ mod tests {
         let (found, warnings) = materials("newmtl other\n");
         assert_eq!(found[0], Material::stand_in("m"));
         assert!(warnings[0].contains("`m`"));
+
+        let folder = tempfile::tempdir().unwrap();
+        image::RgbImage::new(1, 1).save(folder.path().join("t.png")).unwrap();
+        std::fs::write(folder.path().join("a.mtl"), "newmtl m\nmap_Kd t.png\nmap_d absent.png\n").unwrap();
+        let library = Library::read(&folder.path().join("a.obj"), &[b"a.mtl".to_vec()]);
+        let found = library.select(&[Some(b"m".to_vec())]);
+        assert!(found.warnings[0].contains("absent.png: no such file; there are no holes"));
+        assert!(!found.materials[0].is_masked);
 
         let library = Library::read(Path::new("/nowhere/a.obj"), &[b"absent.mtl".to_vec()]);
         assert!(library.select(&[]).warnings[0].contains("absent.mtl"));
