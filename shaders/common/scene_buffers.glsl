@@ -39,6 +39,7 @@ struct Scene {
     TriangleArray triangles;
     TriangleInfoArray triangleInfos;
     MaterialArray materials;
+    uvec2 colors; // address of a Vec3Array, linear, one for each vertex; 0 if all are white
 };
 
 #endif

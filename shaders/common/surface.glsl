@@ -32,16 +32,27 @@ vec2 barycentricsAlong(uint triangle, vec3 origin, vec3 direction) {
     return b / max(b.x + b.y, 1.0);
 }
 
+// Colour of the vertices between them.
+vec3 vertexColor(uvec3 corner, vec2 b) {
+    if (frame.scene.colors == uvec2(0u)) {
+        return vec3(1.0);
+    }
+    Vec3Array colors = Vec3Array(frame.scene.colors);
+    vec3 c0 = colors.at[corner.x];
+    return c0 + b.x * (colors.at[corner.y] - c0) + b.y * (colors.at[corner.z] - c0);
+}
+
 vec3 sampleAlbedo(TriangleInfo info, uvec3 corner, vec2 b, float coneWidth, float cosine, uint smp) {
     Material material = frame.scene.materials.at[info.material];
+    vec3 albedo = material.albedo * vertexColor(corner, b);
     if (material.albedoTexture == kNoTexture) {
-        return material.albedo;
+        return albedo;
     }
     vec2 uv0 = frame.scene.texcoords.at[corner.x];
     vec2 uv = uv0 + b.x * (frame.scene.texcoords.at[corner.y] - uv0) +
               b.y * (frame.scene.texcoords.at[corner.z] - uv0);
     float lod = coneTextureLod(info.lodConstant, coneWidth, cosine);
-    return material.albedo * textureBindless2DLod(material.albedoTexture, smp, uv, lod).rgb;
+    return albedo * textureBindless2DLod(material.albedoTexture, smp, uv, lod).rgb;
 }
 
 // `coneWidth` is the footprint at the ray's origin, `spread` its growth per unit of distance.

@@ -22,6 +22,7 @@ struct Body {
     uvec2 texcoords;
     uvec2 triangles;
     uvec2 paints; // one for each triangle
+    uvec2 colors; // of vertices, linear; 0 if all are white
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer BodyArray { Body at[]; };

@@ -11,6 +11,7 @@ layout(location = 1) in vec3 inNormal;
 layout(location = 2) in vec2 inTexcoord;
 layout(location = 3) flat in vec3 inGeometric;
 layout(location = 4) flat in uint inTriangle;
+layout(location = 5) in vec3 inColor;
 
 layout(location = 0) out vec4 outAlbedo;
 #ifdef RTX_AO_TARGETS
@@ -33,9 +34,9 @@ vec3 albedoHere() {
     vec2 right = dFdx(inTexcoord);
     vec2 down = dFdy(inTexcoord);
     if (paint.tex == kNoTexture) {
-        return paint.albedo;
+        return paint.albedo * inColor;
     }
-    return paint.albedo * textureBindless2DGrad(paint.tex, frame.smp, inTexcoord, right, down).rgb;
+    return paint.albedo * inColor * textureBindless2DGrad(paint.tex, frame.smp, inTexcoord, right, down).rgb;
 }
 
 void main() {

@@ -6,6 +6,7 @@ layout(location = 1) out vec3 outNormal;
 layout(location = 2) out vec2 outTexcoord;
 layout(location = 3) flat out vec3 outGeometric;
 layout(location = 4) flat out uint outTriangle;
+layout(location = 5) out vec3 outColor;
 
 invariant gl_Position; // the pass that colours draws where the one before left its depth
 
@@ -25,6 +26,8 @@ void main() {
     outPosition = cornerPosition(corner);
     outNormal = toWorld(vec4(Vec3Array(frame.bodies.at[body].normals).at[corner], 0.0));
     outTexcoord = Vec2Array(frame.bodies.at[body].texcoords).at[corner];
+    uvec2 colors = frame.bodies.at[body].colors;
+    outColor = colors == uvec2(0u) ? vec3(1.0) : Vec3Array(colors).at[corner];
     vec3 first = cornerPosition(corners.x);
     outGeometric = normalize(cross(cornerPosition(corners.y) - first, cornerPosition(corners.z) - first));
     gl_Position = cameraClip(frame.camera, outPosition);

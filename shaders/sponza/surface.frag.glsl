@@ -8,6 +8,7 @@ layout(location = 0) in vec3 inPosition;
 layout(location = 1) in vec3 inNormal;
 layout(location = 2) in vec2 inTexcoord;
 layout(location = 3) flat in uint inMaterial;
+layout(location = 4) in vec3 inColor;
 
 layout(location = 0) out vec4 outColor;
 
@@ -45,7 +46,7 @@ void main() {
         discard;
     }
     Material material = frame.scene.materials.at[inMaterial];
-    vec3 albedo = material.albedo * texel.rgb;
+    vec3 albedo = material.albedo * inColor * texel.rgb;
     vec3 ambient = mix(frame.sun.ambientBelow, frame.sun.ambientAbove, 0.5 + 0.5 * normal.y);
     vec3 light = material.emission + albedo * ambient;
     float cosine = dot(normal, frame.sun.direction);

@@ -20,6 +20,7 @@ lvk::shader_struct! {
         pub(super) triangles: u64,
         pub(super) triangle_infos: u64,
         pub(super) materials: u64,
+        pub(super) colors: [u32; 2],
     }
 }
 

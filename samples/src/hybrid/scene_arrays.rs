@@ -18,7 +18,7 @@ use crate::scene::{Material, Scene};
 pub(crate) struct SceneArrays {
     positions: Holder<BufferHandle>,
     triangles: Holder<BufferHandle>,
-    _held: [Holder<BufferHandle>; 4],
+    _held: ([Holder<BufferHandle>; 4], Option<Holder<BufferHandle>>),
     addresses: SceneAddresses,
 }
 
@@ -61,6 +61,9 @@ impl SceneArrays {
         let triangles = array(ctx, "scene triangles", input | BufferUsage::INDEX, &scene.triangles)?;
         let triangle_infos = array(ctx, "scene triangle infos", read, &infos)?;
         let materials = array(ctx, "scene materials", read, &materials)?;
+        let has_colors = !scene.colors.is_empty();
+        let colors =
+            has_colors.then(|| array(ctx, "scene vertex colours", read, &scene.colors)).transpose()?;
         let addresses = SceneAddresses {
             positions: positions.address()?,
             normals: normals.address()?,
@@ -68,8 +71,10 @@ impl SceneArrays {
             triangles: triangles.address()?,
             triangle_infos: triangle_infos.address()?,
             materials: materials.address()?,
+            colors: address_words(colors.as_ref())?,
         };
-        Ok(Self { positions, triangles, _held: [normals, texcoords, triangle_infos, materials], addresses })
+        let held = ([normals, texcoords, triangle_infos, materials], colors);
+        Ok(Self { positions, triangles, _held: held, addresses })
     }
 
     /// Addresses of the arrays.
@@ -97,6 +102,12 @@ impl SceneArrays {
             flags: GeometryFlags::OPAQUE,
         })
     }
+}
+
+/// The lower and the upper half of a buffer's address; 0 without a buffer.
+fn address_words(buffer: Option<&Holder<BufferHandle>>) -> lvk::Result<[u32; 2]> {
+    let address = buffer.map_or(Ok(0), |buffer| buffer.address())?;
+    Ok([address as u32, (address >> 32) as u32])
 }
 
 fn triangle_info(scene: &Scene, triangle: usize) -> TriangleInfo {

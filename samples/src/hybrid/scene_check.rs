@@ -31,6 +31,10 @@ pub(crate) fn check_promises(scene: &Scene) -> Result<(), SampleError> {
         (scene.opaque_triangle_count as usize <= triangles, "more triangles are opaque than it has"),
         (scene.normals.len() == vertices, "it needs a normal for each position"),
         (scene.texcoords.len() == vertices, "it needs a texture coordinate for each position"),
+        (
+            scene.colors.is_empty() || scene.colors.len() == vertices,
+            "it needs a colour for each position, or none",
+        ),
         (scene.triangle_materials.len() == triangles, "it needs a material for each triangle"),
         (scene.source_triangles.len() == triangles, "it needs a source number for each triangle"),
         (scene.triangles.iter().flatten().all(is_vertex), "a triangle names a vertex that is not there"),
@@ -58,11 +62,12 @@ mod tests {
     fn a_broken_scene_is_refused_and_a_whole_one_is_not() {
         let whole = Scene::procedural();
         assert!(check(&whole).is_ok());
-        let breakers: [fn(&mut Scene); 9] = [
+        let breakers: [fn(&mut Scene); 10] = [
             |scene| scene.triangles.clear(),
             |scene| scene.opaque_triangle_count = u32::MAX,
             |scene| scene.normals.clear(),
             |scene| scene.texcoords.truncate(1),
+            |scene| scene.colors = vec![[0.5; 3]],
             |scene| scene.source_triangles.truncate(1),
             |scene| scene.triangles[5][2] = scene.positions.len() as u32,
             |scene| scene.triangle_materials[7] = 1000,

@@ -32,6 +32,7 @@ fn empty_like(scene: &Scene) -> Scene {
         positions: Vec::new(),
         normals: Vec::new(),
         texcoords: Vec::new(),
+        colors: Vec::new(),
         triangles: Vec::new(),
         triangle_materials: Vec::new(),
         source_triangles: Vec::new(),
@@ -54,6 +55,7 @@ fn append_surfaces(all: &mut Scene, scene: &mut Scene) {
         ..material
     };
     all.materials.extend(std::mem::take(&mut scene.materials).into_iter().map(renumbered));
+    append_colors(all, scene.positions.len(), &std::mem::take(&mut scene.colors));
     all.positions.append(&mut scene.positions);
     all.normals.append(&mut scene.normals);
     all.texcoords.append(&mut scene.texcoords);
@@ -61,6 +63,16 @@ fn append_surfaces(all: &mut Scene, scene: &mut Scene) {
     all.normal_maps.append(&mut scene.normal_maps);
     all.warnings.append(&mut scene.warnings);
     all.degenerate_triangle_count += scene.degenerate_triangle_count;
+}
+
+/// Appends colours, white where there are none, for as many vertices as follow those of `all`.
+fn append_colors(all: &mut Scene, count: usize, colors: &[[f32; 3]]) {
+    if all.colors.is_empty() && colors.is_empty() {
+        return;
+    }
+    all.colors.resize(all.positions.len(), [1.0; 3]);
+    all.colors.extend(colors);
+    all.colors.resize(all.positions.len() + count, [1.0; 3]);
 }
 
 /// Appends the opaque triangles of `scene`, or the others, if there are any.
@@ -126,6 +138,7 @@ fn bake_instance(to: &mut Scene, world: &World, instance: &Instance) {
     let normal = |n: &[f32; 3]| {
         instance.place.transform_vector3(Vec3::from(*n)).normalize_or(Vec3::from(*n)).to_array()
     };
+    append_colors(to, vertices.len(), from.colors.get(vertices.clone()).unwrap_or_default());
     to.positions.extend(from.positions[vertices.clone()].iter().map(position));
     to.normals.extend(from.normals[vertices.clone()].iter().map(normal));
     to.texcoords.extend(&from.texcoords[vertices]);
@@ -198,6 +211,21 @@ mod tests {
                 assert!(corners.into_iter().all(|vertex| piece.vertices.contains(vertex)));
             }
         }
+    }
+
+    #[test]
+    fn colors_stay_with_their_vertices() {
+        let mut colored = Scene::town();
+        colored.colors = colored.positions.iter().map(|p| p.map(|x| 0.5 + 0.01 * x)).collect();
+        let counts = [Scene::town().positions.len(), colored.positions.len()];
+        let (all, _) = merge(vec![Scene::town(), colored.clone(), Scene::town()]);
+        assert_eq!(all.colors.len(), all.positions.len());
+        let (before, rest) = all.colors.split_at(counts[0]);
+        let (own, after) = rest.split_at(counts[1]);
+        assert!(own == colored.colors && before.iter().chain(after).all(|color| *color == [1.0; 3]));
+        let combined = World::street(vec![colored], 2).unwrap().combined().unwrap();
+        crate::hybrid::check_promises(&combined.scene).unwrap();
+        assert!(combined.scene.colors.iter().any(|color| *color != [1.0; 3]));
     }
 
     #[test]

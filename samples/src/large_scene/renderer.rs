@@ -195,4 +195,4 @@ fn lighting(scene: &Scene, farthest: f32) -> Lighting {
     Lighting::sunlit(&scene.sun.unwrap_or(no_sun), &Ambient { above, below }, farthest)
 }
 
-const _: () = assert!(std::mem::offset_of!(FrameConstants, places) == 256);
+const _: () = assert!(std::mem::offset_of!(FrameConstants, places) == 264);

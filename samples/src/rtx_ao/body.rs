@@ -16,8 +16,8 @@ use crate::scene::{Material, Scene};
 #[repr(C)]
 pub(super) struct BodyConstants {
     rows: [f32; 12],
-    /// Addresses of positions, normals, texture coordinates, triangles and paints.
-    addresses: [u64; 5],
+    /// Addresses of positions, normals, texture coordinates, triangles, paints and colours; the last may be 0.
+    addresses: [u64; 6],
 }
 
 /// `Paint` in `shaders/rtx_ao/frame.glsl`.
@@ -32,8 +32,8 @@ struct Paint {
 pub(super) struct Body {
     pub(super) blas: Holder<AccelStructHandle>,
     pub(super) triangle_count: u32,
-    addresses: [u64; 5],
-    _held: ([Holder<BufferHandle>; 5], Vec<Holder<TextureHandle>>),
+    addresses: [u64; 6],
+    _held: (Vec<Holder<BufferHandle>>, Vec<Holder<TextureHandle>>),
 }
 
 impl Body {
@@ -47,14 +47,17 @@ impl Body {
         let paint = |material: &u32| paint(&scene.materials[*material as usize], &textures);
         let paints: Vec<Paint> = scene.triangle_materials[..count].iter().map(paint).collect();
         let (read, input) = (BufferUsage::STORAGE, BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT);
-        let buffers = [
+        let mut buffers = vec![
             array(ctx, "positions", input, &scene.positions)?,
             array(ctx, "normals", read, &scene.normals)?,
             array(ctx, "texture coordinates", read, &scene.texcoords)?,
             array(ctx, "triangles", input, &scene.triangles[..count])?,
             array(ctx, "paints", read, &paints)?,
         ];
-        let mut addresses = [0; 5];
+        if !scene.colors.is_empty() {
+            buffers.push(array(ctx, "vertex colours", read, &scene.colors)?);
+        }
+        let mut addresses = [0; 6];
         for (address, buffer) in addresses.iter_mut().zip(&buffers) {
             *address = buffer.address()?;
         }

@@ -78,7 +78,9 @@ impl SampleInfo for RtxAo {
         let textures = scene.textures.len() as u32 + 16;
         let context = setup.device(&DeviceNeeds { textures, ..DeviceNeeds::tracing(args.tracing.rt) })?;
         let rtx = RtxConfig::from_args(args.tracing.rt, setup.extent(), context.capabilities())?;
-        let radius = args.radius.or(turning.is_some().then_some(TOWN_RADIUS));
+        // As the mesh: a radius beyond its range would leave single precision.
+        let resized = |radius: f32| (f64::from(radius) * scene.resize).clamp(1e-9, 1e9) as f32;
+        let radius = args.radius.map(resized).or(turning.is_some().then_some(TOWN_RADIUS));
         let (passes, rays) = (args.passes, args.rays);
         let config = RtxAoConfig { rtx, passes, rays, radius };
         setup.progress.stage("uploading the scene and building acceleration structures", 0);

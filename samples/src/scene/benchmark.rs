@@ -44,8 +44,10 @@ pub(super) fn find(name: &str, triangle_count: usize) -> Option<BenchmarkScene> 
     let (_, _, scale) = KNOWN.into_iter().find(|&(known, count, _)| {
         known == name && triangle_count.abs_diff(count).saturating_mul(20) <= count
     })?;
-    let mut all = camera_file::parse(Path::new("built-in"), VIEWS).ok()?.into_iter();
-    all.find(|views| views.name == name).map(|views| BenchmarkScene { scale, views })
+    let path = Path::new("built-in");
+    let mut all = camera_file::parse(path, VIEWS.as_bytes()).ok()?.into_iter();
+    let views = all.find(|views| views.name == name.as_bytes())?;
+    Some(BenchmarkScene { scale, views: views.placed(path, |point| point).ok()? })
 }
 
 #[cfg(test)]

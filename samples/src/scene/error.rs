@@ -42,9 +42,9 @@ pub enum SceneError {
         /// The error.
         what: String,
     },
-    /// A position is NaN or infinite, in the file or after scaling.
+    /// A position that a face uses is NaN or infinite.
     #[error(
-        "{}:{line}: the position is not finite (NaN or infinity); export the mesh again",
+        "{}:{line}: the position is not finite (NaN or infinity), and a face uses it; export the mesh again",
         readable_name(path)
     )]
     NotFinite {
@@ -88,14 +88,6 @@ pub enum SceneError {
     BadScale {
         /// The scale as given.
         scale: f32,
-    },
-    /// The OBJ parser refused the file.
-    #[error("cannot parse {}: {source}", readable_name(path))]
-    Parse {
-        /// The path as given.
-        path: PathBuf,
-        /// Error of the parser.
-        source: tobj::LoadError,
     },
     /// A camera file is wrong. It consists of lines `scene NAME x y z` (the point light's position), each
     /// followed by `sun x y z` where the sun shines (the direction towards it), and by one to five lines `at ex ey ez tx ty tz fov` (eye, target, vertical field of view in

@@ -36,7 +36,7 @@ fn around(mesh: &Mesh) -> Views {
         Camera { eye: eye.to_array(), ..far }
     };
     let light = center + radius * Vec3::new(1.1, 1.8, 1.6);
-    Views { name: String::new(), light: light.to_array(), sun: None, cameras: directions.map(camera).into() }
+    Views { light: light.to_array(), sun: None, cameras: directions.map(camera).into() }
 }
 
 /// Distance from the middle of a box with the given half size at which a camera sees all of it, in a picture

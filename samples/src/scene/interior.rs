@@ -25,7 +25,7 @@ pub(super) fn views(mesh: &Mesh) -> Option<Views> {
         chosen.push(shots.swap_remove(next));
     }
     let cameras = chosen.iter().map(Shot::camera).collect();
-    Some(Views { name: String::new(), light: grid.lamp().to_array(), sun: None, cameras })
+    Some(Views { light: grid.lamp().to_array(), sun: None, cameras })
 }
 
 /// A view that could be taken.

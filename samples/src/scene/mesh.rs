@@ -10,6 +10,7 @@ pub(super) struct Mesh {
     pub positions: Vec<[f32; 3]>,
     pub normals: Vec<[f32; 3]>,
     pub texcoords: Vec<[f32; 2]>,
+    pub colors: Vec<[f32; 3]>,
     pub triangles: Vec<[u32; 3]>,
     pub triangle_materials: Vec<u32>,
     pub source_triangles: Vec<u32>,
@@ -22,6 +23,15 @@ impl Mesh {
         self.normals.push(normal);
         self.texcoords.push(texcoord);
         (self.positions.len() - 1) as u32
+    }
+
+    /// Appends a vertex like `vertex` but for its normal, and returns its number.
+    pub fn double_vertex(&mut self, vertex: u32, normal: [f32; 3]) -> u32 {
+        let vertex = vertex as usize;
+        if let Some(&color) = self.colors.get(vertex) {
+            self.colors.push(color);
+        }
+        self.add_vertex(self.positions[vertex], normal, self.texcoords[vertex])
     }
 
     /// Appends a triangle, numbered in the order of calls.
@@ -90,6 +100,7 @@ impl Mesh {
         self.positions = used.iter().map(|&i| self.positions[i]).collect();
         self.normals = used.iter().map(|&i| self.normals[i]).collect();
         self.texcoords = used.iter().map(|&i| self.texcoords[i]).collect();
+        self.colors = used.iter().filter_map(|&i| self.colors.get(i).copied()).collect();
     }
 }
 
@@ -123,6 +134,7 @@ mod tests {
             let mut mesh = Mesh::default();
             for corner in &corners {
                 mesh.add_vertex(corner.map(f32::from), [0.0, 1.0, 0.0], [f32::from(corner[0]), 0.0]);
+                mesh.colors.push(corner.map(|x| f32::from(x) + 9.0));
             }
             for (vertices, material) in &picks {
                 mesh.add_triangle(vertices.map(|v| u32::from(v) % corners.len() as u32), *material);
@@ -145,6 +157,7 @@ mod tests {
                     let (new, old) = (mesh.triangles[i][corner] as usize, before.triangles[source][corner] as usize);
                     prop_assert_eq!(mesh.positions[new], before.positions[old]);
                     prop_assert_eq!(mesh.texcoords[new], before.texcoords[old]);
+                    prop_assert_eq!(mesh.colors[new], before.colors[old]);
                 }
             }
             let used = mesh.triangles.iter().flatten().max().map_or(0, |&m| m as usize + 1);

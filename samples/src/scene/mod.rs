@@ -11,7 +11,7 @@
 //! towards the viewer, `l` the unit vector to a light, `r` the direction of view mirrored at `n`:
 //!
 //! ```text
-//! base    = albedo * texture
+//! base    = albedo * texture * vertex colour
 //! direct  = sum over lights that are seen: light(p) * (base * max(n.l, 0) + specular * max(r.l, 0)^shininess)
 //! phong   = emission + base * ambient.evaluate(n) + direct        (specular only where n.l > 0)
 //! glass   = fresnel * mirrored + (1 - fresnel) * refracted         (fresnel from `ior`)
@@ -23,28 +23,38 @@
 //! [`Sky::radiance`]. The picture is `sRGB(1 - exp(-result))`, which [`display`] computes on the CPU.
 
 mod benchmark;
+mod byte_names;
 mod camera;
 mod camera_file;
 mod camera_path;
 mod error;
 mod framing;
 mod gpu_camera;
+mod image_name;
 mod interior;
+mod large_polygon;
 mod light;
 mod material;
 mod mesh;
 mod mtl;
+mod mtl_text;
 pub(crate) mod noise;
 mod normals;
 mod obj;
+mod obj_mesh;
 mod obj_text;
+mod placement;
 mod polygon;
 mod procedural;
-mod recentre;
 mod relief;
 mod setting;
 mod sky;
+mod text_lines;
+mod text_numbers;
 mod texture;
+#[cfg(test)]
+mod tobj_comparison_tests;
+mod vertex_colors;
 mod warnings;
 
 use std::path::PathBuf;
@@ -65,8 +75,8 @@ pub use texture::Texture;
 
 /// Everything a renderer needs, in flat arrays.
 ///
-/// Invariants, kept by every constructor: `positions`, `normals` and `texcoords` have the same length; every
-/// index is in range; every position and texture coordinate is finite; every normal has unit length;
+/// Invariants, kept by every constructor: `positions`, `normals` and `texcoords` have the same length, which `colors` has too
+/// unless it is empty; every index is in range; every position and texture coordinate is finite; every normal has unit length;
 /// `triangle_materials` and `source_triangles` have one entry per triangle; there is at least one triangle.
 #[derive(Debug, Clone)]
 pub struct Scene {
@@ -78,6 +88,8 @@ pub struct Scene {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates in images that repeat; (0, 0) is the image's first texel, so `v` runs down.
     pub texcoords: Vec<[f32; 2]>,
+    /// Vertex colours, linear RGB, 0 to 1, which multiply the diffuse reflectance; empty if all are white.
+    pub colors: Vec<[f32; 3]>,
     /// Vertex indices; opaque triangles first, then refractive ones, each group in the order of
     /// the source.
     pub triangles: Vec<[u32; 3]>,
@@ -106,6 +118,9 @@ pub struct Scene {
     pub cameras: [Camera; 5],
     /// Triangles of the source without area, which were dropped.
     pub degenerate_triangle_count: u32,
+    /// Factor from the units of the file, after [`ObjOptions::scale`], to scene units: a power of two for a mesh so large or small
+    /// that its numbers would leave the range of single precision, else 1. Cameras and lights are in scene units.
+    pub resize: f64,
     /// Errors of the source and their corrections, one line each, for the user to read.
     pub warnings: Vec<String>,
 }
@@ -113,7 +128,7 @@ pub struct Scene {
 /// Options for reading an OBJ file.
 #[derive(Debug, Clone, Default)]
 pub struct ObjOptions {
-    /// Factor from file units to scene units; `None` takes the known scale of a benchmark scene, else 1.
+    /// Factor from file units to scene units ([`Scene::resize`] comes on top); `None` takes the known scale of a benchmark scene, else 1.
     pub scale: Option<f32>,
     /// A camera file (see [`SceneError::CameraFile`]); `None` takes the built-in cameras of a benchmark scene,
     /// else cameras computed from the geometry.
@@ -129,8 +144,8 @@ impl Scene {
     /// [`Scene::warnings`].
     ///
     /// # Errors
-    /// [`SceneError`] when the file cannot be read, is no OBJ, has no triangle with area, a position that is not
-    /// finite or an index out of range, or when the camera file is wrong.
+    /// [`SceneError`] when the file cannot be read, is no OBJ, has no triangle with area, a face with a position that is not
+    /// finite, or an index out of range, or when the camera file is wrong.
     pub fn from_obj(
         path: &std::path::Path,
         options: &ObjOptions,

@@ -1,25 +1,31 @@
 //! Reads MTL libraries: Phong parameters, mirrors, glass and textures.
-//!
-//! Like the OBJ text, the MTL text is rewritten before tobj parses it: one odd line (`Kd spectral ...`,
-//! `map_Kd -s 2 2 1 wood.png`) would otherwise cost the whole library.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use lvk::readable_name;
+use lvk::{readable_bytes, readable_name};
 
 use super::Material;
-use super::texture::{PictureBudget, Texture, find_image};
+use super::byte_names::{find_file, names_in, path_of, unquoted, why_absent};
+use super::image_name::{Absence, Image};
+use super::mtl_text::{self, MtlEntry};
+use super::text_lines::decoded;
+use super::text_numbers::words;
+use super::texture::{PictureBudget, Texture};
 use super::warnings::Warnings;
 use crate::app::input_file::{self, FileKind};
 
 /// Materials by name, and the images they use.
 #[derive(Default)]
 pub(super) struct Library {
-    materials: HashMap<String, Definition>,
+    /// Definitions by the rest of their `newmtl` line.
+    materials: HashMap<Vec<u8>, Definition>,
+    /// The rest of a `newmtl` line by its part in front of what may be a comment.
+    shortened: HashMap<Vec<u8>, Vec<u8>>,
     textures: Vec<Texture>,
     texture_numbers: HashMap<(PathBuf, Option<PathBuf>), u32>,
     wants_normal_maps: bool,
+    has_vertex_colors: bool,
     normal_maps: Vec<Texture>,
     /// `None` for images that cannot be read.
     normal_map_numbers: HashMap<PathBuf, Option<u32>>,
@@ -45,22 +51,22 @@ struct Definition {
     relief: Option<Image>,
 }
 
-/// An image as a library names it, and the folder of that library.
-#[derive(Clone)]
-struct Image {
-    folder: PathBuf,
-    name: String,
-}
-
 impl Library {
     /// Reads the libraries that the OBJ file at `obj_path` names. A missing library is a warning.
-    pub(super) fn read(obj_path: &Path, names: &[String]) -> Self {
+    pub(super) fn read(obj_path: &Path, arguments: &[Vec<u8>]) -> Self {
         let folder = obj_path.parent().unwrap_or(Path::new(""));
         let mut library = Self::default();
         let mut seen = HashSet::new();
-        for file in names.iter().flat_map(|name| library_files(folder, name)) {
-            if seen.insert(file.clone()) {
-                library.read_file(&file);
+        for name in arguments.iter().flat_map(|argument| library_names(folder, argument)) {
+            if !seen.insert(name.clone()) {
+                continue;
+            }
+            match find_file(folder, &name, &[]) {
+                Some(file) => library.read_file(&file),
+                None => {
+                    let path = folder.join(path_of(&name));
+                    library.warn_of_library(&path, &why_absent(&path, FileKind::Mtl));
+                }
             }
         }
         library
@@ -71,59 +77,64 @@ impl Library {
         Self { wants_normal_maps: true, ..self }
     }
 
+    /// The mesh has colours, which a surface without a material shows as they are.
+    pub(super) fn with_vertex_colors(self) -> Self {
+        Self { has_vertex_colors: true, ..self }
+    }
+
     fn read_file(&mut self, path: &Path) {
         let content = match input_file::read(path, FileKind::Mtl) {
             Ok(content) => content,
-            Err(error) => {
-                let line =
-                    format!("material library {}: {error}; materials are stand-ins", readable_name(path));
-                return self.warnings.push("material libraries", line);
-            }
+            Err(error) => return self.warn_of_library(path, &error.to_string()),
         };
-        let text = clean(&String::from_utf8_lossy(&content));
-        match tobj::load_mtl_buf(&mut text.as_bytes()) {
-            Ok((parsed, _)) => parsed.iter().for_each(|source| self.add(source, path)),
-            Err(error) => {
-                let line = format!("material library {}: {error}", readable_name(path));
-                self.warnings.push("material libraries", line);
-            }
+        let (entries, flawed_lines) = mtl_text::parse(&decoded(&content));
+        for line in flawed_lines {
+            let text = format!("{}:{line}: a number is not finite; the line is ignored", readable_name(path));
+            self.warnings.push("numbers of materials", text);
         }
+        entries.iter().for_each(|entry| self.add(entry, path));
     }
 
-    fn add(&mut self, source: &tobj::Material, path: &Path) {
-        if self.materials.contains_key(&source.name) {
+    fn warn_of_library(&mut self, path: &Path, why: &str) {
+        let line = format!("material library {}: {why}; materials are stand-ins", readable_name(path));
+        self.warnings.push("material libraries", line);
+    }
+
+    fn add(&mut self, entry: &MtlEntry, path: &Path) {
+        if self.materials.contains_key(&entry.name) {
             return;
         }
+        for name in names_in(&entry.name).skip(1) {
+            self.shortened.entry(name.to_vec()).or_insert_with(|| entry.name.clone());
+        }
         let folder = path.parent().unwrap_or(Path::new(""));
-        let mut material = convert(source);
-        let image =
-            |name: &Option<String>| name.clone().map(|name| Image { folder: folder.to_path_buf(), name });
-        let relief = image(&source.normal_texture);
-        let (image, mask) = (image(&source.diffuse_texture), image(&source.dissolve_texture));
+        let mut material = convert(entry);
+        let image = |name: &Option<Vec<u8>>| name.as_ref().map(|name| Image::new(folder, name));
+        let relief = image(&entry.relief_map);
+        let (image, mask) = (image(&entry.diffuse_map), image(&entry.dissolve_map));
         // Exporters often leave Kd black beside a texture, meaning the texture alone.
         if image.is_some() && material.albedo == [0.0; 3] && !material.is_refractive() {
             material.albedo = [1.0; 3];
         }
-        self.materials.insert(source.name.clone(), Definition { material, image, mask, relief });
+        self.materials.insert(entry.name.clone(), Definition { material, image, mask, relief });
     }
 
     /// Number of the image, which is read on first use; a stand-in and a warning when that fails.
-    fn texture(&mut self, Image { folder, name }: &Image, mask: Option<PathBuf>) -> u32 {
-        let name = &name.replace('\\', "/");
-        let found = find_image(folder, name);
-        let path = found.clone().unwrap_or_else(|| folder.join(name));
+    fn texture(&mut self, image: &Image, mask: Option<PathBuf>) -> u32 {
+        let found = image.find();
+        let path = found.as_ref().unwrap_or_else(|absence| &absence.path).clone();
         let key = (file_identity(&path), mask.as_deref().map(file_identity));
         if let Some(&number) = self.texture_numbers.get(&key) {
             return number;
         }
         let texture = match &found {
-            Some(path) => Texture::read(path, &mut self.budget),
-            None => Err("no such file".to_owned()),
+            Ok(path) => Texture::read(path, &mut self.budget),
+            Err(absence) => Err(absence.why.clone()),
         };
         let texture = texture.unwrap_or_else(|why| {
-            let line = format!("texture {}: {why}; magenta checks stand in", readable_name(path));
+            let line = format!("texture {}: {why}; magenta checks stand in", readable_name(&path));
             self.warnings.push("textures", line);
-            Texture::stand_in(name)
+            Texture::stand_in(&readable_name(&path))
         });
         let texture = match &mask {
             Some(mask) => self.with_holes(texture, mask),
@@ -136,16 +147,16 @@ impl Library {
     }
 
     /// Number of the normal map, which is read on first use; none, and a warning, when that fails.
-    fn normal_map(&mut self, Image { folder, name }: &Image) -> Option<u32> {
-        let found = find_image(folder, name);
-        let path = found.clone().unwrap_or_else(|| folder.join(name));
+    fn normal_map(&mut self, image: &Image) -> Option<u32> {
+        let found = image.find();
+        let path = found.as_ref().unwrap_or_else(|absence| &absence.path).clone();
         let key = file_identity(&path);
         if let Some(&number) = self.normal_map_numbers.get(&key) {
             return number;
         }
         let read = match &found {
-            Some(path) => Texture::read_relief(path, &mut self.budget),
-            None => Err("no such file".to_owned()),
+            Ok(path) => Texture::read_relief(path, &mut self.budget),
+            Err(absence) => Err(absence.why.clone()),
         };
         let number = match read {
             Ok(map) => {
@@ -153,13 +164,22 @@ impl Library {
                 Some(self.normal_maps.len() as u32 - 1)
             }
             Err(why) => {
-                let line = format!("normal map {}: {why}; the surface is smooth", readable_name(path));
+                let line = format!("normal map {}: {why}; the surface is smooth", readable_name(&path));
                 self.warnings.push("textures", line);
                 None
             }
         };
         self.normal_map_numbers.insert(key, number);
         number
+    }
+
+    /// The file of the mask; none, and a warning, when there is none.
+    fn mask_file(&mut self, mask: &Image) -> Option<PathBuf> {
+        mask.find().map_err(|Absence { path, why }| self.warn_of_mask(&path, &why)).ok()
+    }
+
+    fn warn_of_mask(&mut self, path: &Path, why: &str) {
+        self.warnings.push("textures", format!("mask {}: {why}; there are no holes", readable_name(path)));
     }
 
     /// The texture with alpha from the mask; as it is, with a warning, where the mask cannot be read.
@@ -170,8 +190,7 @@ impl Library {
                 texture.masked(&mask)
             }
             Err(why) => {
-                let line = format!("mask {}: {why}; there are no holes", readable_name(mask));
-                self.warnings.push("textures", line);
+                self.warn_of_mask(mask, &why);
                 texture
             }
         }
@@ -179,11 +198,12 @@ impl Library {
 
     /// The materials that `names` ask for, in that order, with stand-ins for undefined ones; then the images
     /// of these and the warnings.
-    pub(super) fn select(mut self, names: &[Option<String>]) -> Selection {
+    pub(super) fn select(mut self, names: &[Option<Vec<u8>>]) -> Selection {
         let mut selected = Vec::with_capacity(names.len());
         for name in names {
             let Some(name) = name else {
-                selected.push(Material::matte("(none)", [0.6; 3]));
+                let albedo = if self.has_vertex_colors { 1.0 } else { 0.6 };
+                selected.push(Material::matte("(none)", [albedo; 3]));
                 continue;
             };
             selected.push(self.material(name));
@@ -193,14 +213,22 @@ impl Library {
         Selection { materials: selected, textures, normal_maps, warnings: warnings.into_lines() }
     }
 
-    fn material(&mut self, name: &str) -> Material {
-        let Some(Definition { material, image, mask, relief }) = self.materials.get(name).cloned() else {
-            let line = format!("material `{}` is not defined; glaring orange stands in", readable_name(name));
+    /// The definition that the rest of a `usemtl` line names.
+    fn definition(&self, name: &[u8]) -> Option<&Definition> {
+        let whole =
+            |name: &[u8]| self.materials.get(name).or_else(|| self.materials.get(self.shortened.get(name)?));
+        names_in(name).find_map(whole)
+    }
+
+    fn material(&mut self, name: &[u8]) -> Material {
+        let Some(Definition { material, image, mask, relief }) = self.definition(name).cloned() else {
+            let name = readable_bytes(name);
+            let line = format!("material `{name}` is not defined; glaring orange stands in");
             self.warnings.push("materials", line);
-            return Material::stand_in(name);
+            return Material::stand_in(&name);
         };
-        let mask = mask.and_then(|mask| find_image(&mask.folder, &mask.name));
-        let is_masked = image.is_some() && mask.is_some();
+        let mask = mask.filter(|_| image.is_some()).and_then(|mask| self.mask_file(&mask));
+        let is_masked = mask.is_some();
         let albedo_texture = image.map(|image| self.texture(&image, mask));
         let relief = relief.filter(|_| self.wants_normal_maps);
         let normal_map = relief.and_then(|relief| self.normal_map(&relief));
@@ -213,106 +241,38 @@ fn file_identity(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// The files that a `mtllib` argument means: one name that may hold blanks, or several names.
-fn library_files(folder: &Path, argument: &str) -> Vec<PathBuf> {
-    let argument = argument.trim_matches('"').replace('\\', "/");
-    let whole = folder.join(&argument);
-    let parts: Vec<PathBuf> = argument.split_whitespace().map(|part| folder.join(part)).collect();
-    match parts.iter().any(|part| part.is_file()) && !whole.is_file() {
-        true => parts,
-        false => vec![whole],
+/// The names that a `mtllib` argument holds: one, which may hold blanks, or several.
+fn library_names(folder: &Path, argument: &[u8]) -> Vec<Vec<u8>> {
+    let exists = |name: &&[u8]| find_file(folder, unquoted(name), &[]).is_some();
+    let is_as_written = |name: &[u8]| folder.join(path_of(unquoted(name))).is_file();
+    let parts: Vec<&[u8]> = words(argument).map(unquoted).collect();
+    let owned = |parts: &[&[u8]]| parts.iter().map(|part| part.to_vec()).collect();
+    if parts.len() > 1 && !names_in(argument).any(is_as_written) && parts.iter().all(&exists) {
+        return owned(&parts);
     }
-}
-
-/// Keeps the lines that [`convert`] uses, in the form that tobj accepts.
-fn clean(text: &str) -> String {
-    let mut cleaned = String::with_capacity(text.len());
-    let mut inside = false;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    for line in text.lines().map(str::trim) {
-        let (keyword, rest) = line.split_once(|c: char| c.is_whitespace()).unwrap_or((line, ""));
-        let rest = rest.trim();
-        let kept = match keyword.to_ascii_lowercase().as_str() {
-            "newmtl" if !rest.is_empty() => Some(format!("newmtl {rest}")),
-            "kd" => color(rest).map(|c| format!("Kd {c}")),
-            "ks" => color(rest).map(|c| format!("Ks {c}")),
-            "ke" => color(rest).map(|c| format!("Ke {c}")),
-            "tf" => color(rest).map(|c| format!("Tf {c}")),
-            "ns" => number(rest).map(|n| format!("Ns {n}")),
-            "ni" => number(rest).map(|n| format!("Ni {n}")),
-            "d" => number(rest.trim_start_matches("-halo")).map(|n| format!("d {n}")),
-            "tr" => number(rest).map(|n| format!("Tr {n}")),
-            "illum" => number(rest).map(|n| format!("illum {}", n.clamp(0.0, 10.0) as u8)),
-            "map_kd" => image_name(rest).map(|name| format!("map_Kd {name}")),
-            "map_d" => image_name(rest).map(|name| format!("map_d {name}")),
-            "norm" | "map_bump" | "bump" => image_name(rest).map(|name| format!("map_Bump {name}")),
-            _ => None,
-        };
-        inside |= keyword.eq_ignore_ascii_case("newmtl");
-        if let Some(kept) = kept.filter(|_| inside) {
-            cleaned.push_str(&kept);
-            cleaned.push('\n');
-        }
+    match names_in(argument).find(&exists) {
+        Some(whole) => owned(&[unquoted(whole)]),
+        None if parts.iter().any(exists) => owned(&parts),
+        None => owned(&[unquoted(argument)]),
     }
-    cleaned
-}
-
-fn number(text: &str) -> Option<f32> {
-    text.split_whitespace().next()?.parse().ok().filter(|n: &f32| n.is_finite())
-}
-
-/// Three numbers, or one that stands for all three.
-fn color(text: &str) -> Option<String> {
-    let mut words = text.split_whitespace().map(|word| word.parse::<f32>().ok().filter(|n| n.is_finite()));
-    let red = words.next()??;
-    let (green, blue) = match words.next() {
-        Some(green) => (green?, words.next()??),
-        None => (red, red),
-    };
-    Some(format!("{red} {green} {blue}"))
-}
-
-/// The file name behind the options of a `map_` line; it may hold blanks. The options are not applied.
-fn image_name(text: &str) -> Option<String> {
-    let mut rest = text.trim();
-    while rest.starts_with('-') {
-        let (option, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-        let (fewest, most) = match option.to_ascii_lowercase().as_str() {
-            "-s" | "-o" | "-t" => (1, 3),
-            "-mm" => (2, 2),
-            "-blendu" | "-blendv" | "-cc" | "-clamp" | "-texres" | "-bm" | "-boost" | "-imfchan"
-            | "-type" => (1, 1),
-            _ => break,
-        };
-        rest = after.trim_start();
-        for i in 0..most {
-            let (word, after) = rest.split_once(char::is_whitespace)?;
-            if i >= fewest && word.parse::<f32>().is_err() {
-                break;
-            }
-            rest = after.trim_start();
-        }
-    }
-    let name = rest.trim_matches('"').trim();
-    (!name.is_empty()).then(|| name.to_owned())
 }
 
 /// Phong parameters, mirror and glass from MTL's illumination models.
-fn convert(source: &tobj::Material) -> Material {
-    let specular = source.specular.unwrap_or([0.0; 3]).map(unit);
-    let illumination = source.illumination_model.unwrap_or(2);
+fn convert(entry: &MtlEntry) -> Material {
+    let specular = entry.specular.unwrap_or([0.0; 3]).map(unit);
+    let illumination = entry.illumination.unwrap_or(2);
     let mut material = Material {
-        albedo: source.diffuse.unwrap_or([0.6; 3]).map(unit),
+        albedo: entry.diffuse.unwrap_or([0.6; 3]).map(unit),
         specular,
-        shininess: source.shininess.unwrap_or(10.0).clamp(1.0, 10_000.0),
-        emission: source.emissive.unwrap_or([0.0; 3]).map(|c| c.max(0.0)),
-        ..Material::matte(&source.name, [0.0; 3])
+        shininess: entry.shininess.unwrap_or(10.0).clamp(1.0, 10_000.0),
+        emission: entry.emissive.unwrap_or([0.0; 3]).map(|c| c.max(0.0)),
+        ..Material::matte(&readable_bytes(&entry.name), [0.0; 3])
     };
-    material.transmission = transmission(source, illumination);
+    material.transmission = transmission(entry, illumination);
     if material.is_refractive() {
         let default_ior = if is_glass(illumination) { 1.5 } else { 1.0 };
-        material.ior = source.optical_density.unwrap_or(default_ior).clamp(1.0, 4.0);
-        material.tint = filter_color(source);
+        material.ior = entry.optical_density.unwrap_or(default_ior).clamp(1.0, 4.0);
+        material.tint = filter_color(entry);
     } else if matches!(illumination, 3 | 5 | 8) {
         make_mirror(&mut material);
     }
@@ -340,12 +300,9 @@ fn is_glass(illumination: u8) -> bool {
 
 /// Share of light that passes: one minus `d` (or `Tr`); 0.9 for a glass model that says nothing else. Less than
 /// 0.05 counts as opaque.
-fn transmission(source: &tobj::Material, illumination: u8) -> f32 {
-    let by_tr = || source.unknown_param.get("Tr")?.parse::<f32>().ok().filter(|&tr| tr < 1.0);
-    let share = match source.dissolve {
-        Some(dissolve) => 1.0 - dissolve,
-        None => by_tr().unwrap_or(0.0),
-    };
+fn transmission(entry: &MtlEntry, illumination: u8) -> f32 {
+    let by_tr = entry.transparency.filter(|&tr| tr < 1.0).unwrap_or(0.0);
+    let share = entry.dissolve.map_or(by_tr, |dissolve| 1.0 - dissolve);
     match share {
         s if s >= 0.05 => s.min(0.95),
         _ if is_glass(illumination) => 0.9,
@@ -354,14 +311,10 @@ fn transmission(source: &tobj::Material, illumination: u8) -> f32 {
 }
 
 /// Hue of `Tf`. Files disagree whether it filters or absorbs, so its brightness says nothing.
-fn filter_color(source: &tobj::Material) -> [f32; 3] {
-    let words = source.unknown_param.get("Tf").map(String::as_str).unwrap_or_default();
-    let values: Vec<f32> = words.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-    let brightest = values.iter().copied().fold(0.0, f32::max);
-    match values[..] {
-        [red, green, blue] if brightest > 0.0 => [red, green, blue].map(|c| unit(c / brightest)),
-        _ => [1.0; 3],
-    }
+fn filter_color(entry: &MtlEntry) -> [f32; 3] {
+    let values = entry.filter.unwrap_or([1.0; 3]);
+    let brightest = values.into_iter().fold(0.0, f32::max);
+    if brightest > 0.0 { values.map(|c| unit(c / brightest)) } else { [1.0; 3] }
 }
 
 fn unit(value: f32) -> f32 {
@@ -372,16 +325,16 @@ fn unit(value: f32) -> f32 {
 mod tests {
     use super::*;
 
-    fn materials(text: &str) -> (Vec<Material>, Vec<String>) {
+    fn materials(text: impl AsRef<[u8]>) -> (Vec<Material>, Vec<String>) {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("a.mtl"), text).unwrap();
-        let library = Library::read(&folder.path().join("a.obj"), &["a.mtl".to_owned()]);
-        let Selection { materials, warnings, .. } = library.select(&[Some("m".to_owned())]);
+        std::fs::write(folder.path().join("a.mtl"), text.as_ref()).unwrap();
+        let library = Library::read(&folder.path().join("a.obj"), &[b"a.mtl".to_vec()]);
+        let Selection { materials, warnings, .. } = library.select(&[Some(b"m".to_vec())]);
         (materials, warnings)
     }
 
     fn material(lines: &str) -> Material {
-        materials(&format!("newmtl m\n{lines}\n")).0.remove(0)
+        materials(format!("newmtl m\n{lines}\n")).0.remove(0)
     }
 
     #[test]
@@ -413,27 +366,6 @@ mod tests {
     }
 
     #[test]
-    fn odd_lines_cost_only_themselves() {
-        let m = material("Kd spectral file.rfl 1\nKs x\nNs\nillum two\nd -halo 0.5\nNi nan\nKe 1 1 1");
-        assert_eq!((m.emission, m.specular, m.transmission), ([1.0; 3], [0.0; 3], 0.5));
-    }
-
-    #[test]
-    fn the_image_name_follows_the_options() {
-        for (text, name) in [
-            ("wood.png", "wood.png"),
-            ("-s 2 2 1 my wood.png", "my wood.png"),
-            ("-s 2 -o 0.5 0.5 -clamp on \"a b.png\"", "a b.png"),
-            ("-mm 0 1 -bm 0.3 -imfchan r a.png", "a.png"),
-            ("-strange.png", "-strange.png"),
-        ] {
-            assert_eq!(image_name(text).as_deref(), Some(name), "{text}");
-        }
-        assert_eq!(image_name("-s 1 1 1"), None);
-        assert_eq!(image_name(""), None);
-    }
-
-    #[test]
     fn a_byte_order_mark_is_skipped() {
         let (found, warnings) = materials("\u{feff}newmtl m\nKd 1 0 0\n");
         assert_eq!((found[0].albedo, warnings.len()), ([1.0, 0.0, 0.0], 0));
@@ -443,8 +375,8 @@ mod tests {
     fn images_of_unused_materials_are_neither_read_nor_missed() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.mtl"), "newmtl m\nnewmtl other\nmap_Kd absent.png\n").unwrap();
-        let library = Library::read(&folder.path().join("a.obj"), &["a.mtl".to_owned()]);
-        let Selection { textures, warnings, .. } = library.select(&[Some("m".to_owned())]);
+        let library = Library::read(&folder.path().join("a.obj"), &[b"a.mtl".to_vec()]);
+        let Selection { textures, warnings, .. } = library.select(&[Some(b"m".to_vec())]);
         assert_eq!((textures.len(), warnings.len()), (0, 0), "{warnings:?}");
     }
 
@@ -460,7 +392,15 @@ mod tests {
         assert_eq!(found[0], Material::stand_in("m"));
         assert!(warnings[0].contains("`m`"));
 
-        let library = Library::read(Path::new("/nowhere/a.obj"), &["absent.mtl".to_owned()]);
+        let folder = tempfile::tempdir().unwrap();
+        image::RgbImage::new(1, 1).save(folder.path().join("t.png")).unwrap();
+        std::fs::write(folder.path().join("a.mtl"), "newmtl m\nmap_Kd t.png\nmap_d absent.png\n").unwrap();
+        let library = Library::read(&folder.path().join("a.obj"), &[b"a.mtl".to_vec()]);
+        let found = library.select(&[Some(b"m".to_vec())]);
+        assert!(found.warnings[0].contains("absent.png: no such file; there are no holes"));
+        assert!(!found.materials[0].is_masked);
+
+        let library = Library::read(Path::new("/nowhere/a.obj"), &[b"absent.mtl".to_vec()]);
         assert!(library.select(&[]).warnings[0].contains("absent.mtl"));
     }
 
@@ -473,8 +413,8 @@ mod tests {
         let text =
             "newmtl a\nnorm n.png\nnewmtl b\nmap_Bump -bm 0.3 n.png\nnewmtl c\nbump absent.png\nnewmtl d\n";
         std::fs::write(folder.path().join("a.mtl"), text).unwrap();
-        let library = || Library::read(&folder.path().join("a.obj"), &["a.mtl".to_owned()]);
-        let names = ["a", "b", "c", "d"].map(|name| Some(name.to_owned()));
+        let library = || Library::read(&folder.path().join("a.obj"), &[b"a.mtl".to_vec()]);
+        let names = ["a", "b", "c", "d"].map(|name| Some(name.as_bytes().to_vec()));
         let with = library().with_normal_maps().select(&names);
         let numbers =
             |found: &Selection| -> Vec<_> { found.materials.iter().map(|m| m.normal_map).collect() };
@@ -484,5 +424,103 @@ mod tests {
         let without = library().select(&names);
         assert_eq!((numbers(&without), without.normal_maps.len()), (vec![None; 4], 0));
         assert!(without.warnings.is_empty(), "{:?}", without.warnings);
+    }
+
+    /// Names of the materials that `usemtl` lines get from a library with `text`.
+    fn names(text: &[u8], asked: &[&[u8]]) -> Vec<String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.mtl"), text).unwrap();
+        let library = Library::read(&folder.path().join("a.obj"), &[b"a.mtl".to_vec()]);
+        let names: Vec<_> = asked.iter().map(|name| Some(name.to_vec())).collect();
+        library.select(&names).materials.into_iter().map(|material| material.name).collect()
+    }
+
+    #[test]
+    fn names_are_compared_as_bytes() {
+        let text = b"newmtl M\xe4\nKd 1 0 0\nnewmtl M\xf6\nKd 0 1 0\n";
+        assert_eq!(names(text, &[b"M\xf6", b"M\xe4"]), ["M\\xf6", "M\\xe4"]);
+        let stand_in = names(text, &["M\u{f6}".as_bytes()]);
+        assert_eq!(stand_in, ["M\u{f6}"], "UTF-8 is another name");
+    }
+
+    #[test]
+    fn comments_end_names_unless_the_whole_name_exists() {
+        assert_eq!(
+            names(b"newmtl wall # north\n", &[b"wall", b"wall # other", b"wall # north"]),
+            ["wall # north"; 3]
+        );
+        let two = b"newmtl wall #1\nnewmtl wall #2\nnewmtl wall\n";
+        assert_eq!(names(two, &[b"wall #2", b"wall #1", b"wall # x"]), ["wall #2", "wall #1", "wall"]);
+    }
+
+    #[test]
+    fn comments_end_names_of_images_and_libraries() {
+        let folder = tempfile::tempdir().unwrap();
+        let save = |name: &str, red| {
+            image::RgbImage::from_pixel(1, 1, image::Rgb([red, 0, 0]))
+                .save(folder.path().join(name))
+                .unwrap();
+        };
+        save("wood.png", 1);
+        save("wood #2.png", 2);
+        let text = "newmtl a\nmap_Kd wood.png # oak\nnewmtl b\nmap_Kd -s 1 1 \"wood #2.png\" # ash\nnewmtl c\nmap_Kd wood #2.png\n";
+        std::fs::write(folder.path().join("my lib.mtl"), text).unwrap();
+        let library = Library::read(&folder.path().join("a.obj"), &[b"my lib.mtl # materials".to_vec()]);
+        let found = library.select(&[b"a", b"b", b"c"].map(|name| Some(name.to_vec())));
+        assert_eq!(found.warnings, Vec::<String>::new());
+        let reds: Vec<u8> = found
+            .materials
+            .iter()
+            .map(|m| found.textures[m.albedo_texture.unwrap() as usize].pixels[0])
+            .collect();
+        assert_eq!(reds, [1, 2, 2]);
+    }
+
+    #[test]
+    fn foreign_paths_and_other_capitals_lead_to_libraries() {
+        let folder = tempfile::tempdir().unwrap();
+        let units = "newmtl m\nKd 1 0 0\n".encode_utf16().flat_map(u16::to_le_bytes);
+        let utf_16: Vec<u8> = [0xff, 0xfe].into_iter().chain(units).collect();
+        for content in [b"newmtl m\nKd 1 0 0\n".to_vec(), b"newmtl m\rKd 1 0 0\r".to_vec(), utf_16] {
+            std::fs::write(folder.path().join("a.mtl"), content).unwrap();
+            for argument in
+                ["a.mtl", "A.MTL", "C:\\Users\\x\\Desktop\\a.mtl", "\"a.mtl\"", "b.mtl /tmp/no/A.mtl"]
+            {
+                let library = Library::read(&folder.path().join("a.obj"), &[argument.as_bytes().to_vec()]);
+                let found = library.select(&[Some(b"m".to_vec())]);
+                assert_eq!(found.materials[0].albedo, [1.0, 0.0, 0.0], "{argument}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_may_name_several_libraries() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("x")).unwrap();
+        for (name, text) in
+            [("x/one.mtl", "newmtl a\n"), ("x/two.mtl", "newmtl b\n"), ("x/one two.mtl", "newmtl c\n")]
+        {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        for (argument, defined) in [
+            ("x/one.mtl x/two.mtl", vec!["a", "b"]),
+            ("x/one.mtl x\\TWO.mtl # both", vec!["a", "b"]),
+            ("x/one.mtl y/no.mtl", vec!["a"]),
+            ("x/one two.mtl", vec!["c"]),
+        ] {
+            let library = Library::read(&folder.path().join("a.obj"), &[argument.as_bytes().to_vec()]);
+            let found: Vec<_> = ["a", "b", "c"]
+                .into_iter()
+                .filter(|name| library.definition(name.as_bytes()).is_some())
+                .collect();
+            assert_eq!(found, defined, "{argument}");
+        }
+    }
+
+    #[test]
+    fn lines_with_numbers_that_are_not_finite_are_named() {
+        let (found, warnings) = materials("newmtl m\nKd 1 1 1\nKd -1.#IND00 0 0\n");
+        assert_eq!(found[0].albedo, [1.0; 3]);
+        assert!(warnings.len() == 1 && warnings[0].contains("a.mtl:3"), "{warnings:?}");
     }
 }

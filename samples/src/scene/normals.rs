@@ -67,11 +67,7 @@ fn split_vertices(mesh: &mut Mesh, corners: &[(usize, usize)], chosen: &[usize],
                 mesh.normals[vertex as usize] = normal.to_array();
                 return vertex;
             }
-            mesh.add_vertex(
-                mesh.positions[vertex as usize],
-                normal.to_array(),
-                mesh.texcoords[vertex as usize],
-            )
+            mesh.double_vertex(vertex, normal.to_array())
         });
         mesh.triangles[triangle][corner] = split;
     }
@@ -140,6 +136,14 @@ mod tests {
         for vertex in [0, 1, 3, 4] {
             assert!((fold.normals[vertex][1] - 1.0).abs() < 1e-5, "{:?}", fold.normals[vertex]);
         }
+    }
+
+    #[test]
+    fn doubled_vertices_keep_their_colors() {
+        let mut cube = mesh(&CUBE, &CUBE_FACES);
+        cube.colors = CUBE.to_vec();
+        complete(&mut cube);
+        assert_eq!((cube.colors.len(), &cube.colors), (24, &cube.positions));
     }
 
     #[test]

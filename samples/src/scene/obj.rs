@@ -1,107 +1,80 @@
-//! Loads a Wavefront OBJ file: clean the text, parse, put together, mend normals, arrange, light and frame.
+//! Loads a Wavefront OBJ file: parse, check, place, put together, mend normals, arrange, light and frame.
 
-use std::io::{BufRead, Read};
 use std::path::Path;
 
 use super::mesh::Mesh;
 use super::mtl::{Library, Selection};
-use super::obj_text::{CleanObj, clean};
+use super::obj_text::{self, ObjText};
+use super::placement::Placement;
 use super::setting::Setting;
-use super::{Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals};
+use super::text_lines::decoded;
+use super::{
+    Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals, obj_mesh, vertex_colors,
+};
 use crate::app::input_file::{self, FileKind};
 use crate::app::progress::Progress;
 
 /// Implements [`Scene::from_obj`].
 pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -> Result<Scene, SceneError> {
-    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = path.file_stem().unwrap_or_default();
+    let name = stem.to_string_lossy().into_owned();
     if let Some(scale) = options.scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
         return Err(SceneError::BadScale { scale });
     }
-    let mut own_views = options.cameras.as_ref().map(|file| camera_file::read(file, &name)).transpose()?;
-    let mut obj = read_clean(path, &name, progress)?;
+    let own_views = options.cameras.as_ref().map(|file| camera_file::read(file, stem.as_encoded_bytes()));
+    let own_views = own_views.transpose()?.zip(options.cameras.as_ref());
+    let mut obj = read_text(path, &name, progress)?;
+    let extent = obj_mesh::check(path, &mut obj)?;
     let benchmark = benchmark::find(&name, obj.triangle_count);
     let scale = options.scale.or(benchmark.as_ref().map(|known| known.scale)).unwrap_or(1.0);
-    own_views.iter_mut().for_each(|views| views.move_by(obj.origin.map(|x| -x * f64::from(scale))));
-    let views = own_views.or(benchmark.map(|known| known.views));
-    let library = Library::read(path, &obj.libraries);
-    let library = if options.normal_maps { library.with_normal_maps() } else { library };
-    let mut mesh = parse(path, &obj, scale, &format!("{name}: parsing"), progress)?;
+    let placement = Placement::new(&extent, scale);
+    placement.warnings().into_iter().for_each(|line| obj.warnings.push("placement", line));
+    let own_views = own_views.map(|(views, file)| views.placed(file, |point| placement.place_point(point)));
+    let views = own_views.transpose()?.or(benchmark.map(|known| known.views));
+    let colors = vertex_colors::linear(std::mem::take(&mut obj.colors), &mut obj.warnings);
+    progress.stage(&format!("{name}: putting faces together"), obj.faces.len() as u64);
+    let mut mesh = obj_mesh::build(path, &mut obj, &colors, &placement, progress)?;
     let degenerate = mesh.drop_degenerate();
     if mesh.triangles.is_empty() {
         return Err(SceneError::Empty { path: path.into(), degenerate });
     }
     let names = names_in_use(&mut mesh, &obj.materials);
     progress.stage(&format!("{name}: textures"), 0);
-    let Selection { materials, textures, normal_maps, warnings } = library.select(&names);
-    obj.warnings.extend(warnings);
+    let library = read_library(path, &obj, options, !colors.is_empty());
+    let Selection { materials, textures, normal_maps, warnings: of_materials } = library.select(&names);
+    let mut warnings = obj.warnings.into_lines();
+    warnings.extend(of_materials);
     progress.go_on()?;
     progress.stage(&format!("{name}: arranging triangles"), 0);
-    let opaque_triangle_count = finish(&mut mesh, &materials, &mut obj.warnings, degenerate);
+    let opaque_triangle_count = finish(&mut mesh, &materials, &mut warnings, degenerate);
     let setting = Setting::from_mesh(&mesh, views);
     Ok(Scene {
         opaque_triangle_count,
         textures,
         normal_maps,
         degenerate_triangle_count: degenerate as u32,
-        warnings: obj.warnings,
+        resize: placement.resize(),
+        warnings,
         ..setting.into_scene(name, mesh, materials)
     })
 }
 
-fn read_clean(path: &Path, name: &str, progress: &mut Progress) -> Result<CleanObj, SceneError> {
+fn read_text(path: &Path, name: &str, progress: &mut Progress) -> Result<ObjText, SceneError> {
     let content = input_file::read_named_by_user(path, FileKind::Obj)
         .map_err(|source| SceneError::from_io(path, source))?;
+    let content = decoded(&content);
     progress.stage(&format!("{name}: reading"), content.len() as u64);
-    clean(path, &content, progress)
+    obj_text::parse(path, &content, progress)
 }
 
-/// Parses the cleaned text. Material numbers are those of [`CleanObj::materials`].
-fn parse(
-    path: &Path,
-    obj: &CleanObj,
-    scale: f32,
-    stage: &str,
-    progress: &mut Progress,
-) -> Result<Mesh, SceneError> {
-    let options = tobj::LoadOptions { single_index: true, triangulate: true, ..Default::default() };
-    progress.stage(stage, obj.text.len() as u64);
-    let mut reader = Watched { rest: obj.text.as_bytes(), total: obj.text.len(), progress };
-    let parsed = tobj::load_obj_buf(&mut reader, &options, |_| numbered(obj.materials.len()))
-        .map_err(|source| SceneError::Parse { path: path.into(), source });
-    reader.progress.go_on()?;
-    let (models, _) = parsed?;
-    let mut mesh = Mesh::default();
-    for model in &models {
-        append(&mut mesh, &model.mesh, scale);
-    }
-    match mesh.positions.iter().flatten().all(|x| x.is_finite()) {
-        true => Ok(mesh),
-        false => Err(SceneError::BadScale { scale }),
-    }
-}
-
-/// Materials named `0`, `1`, ... as the cleaned text names them; only their numbers matter to the parser.
-fn numbered(count: usize) -> tobj::MTLLoadResult {
-    let materials = vec![tobj::Material::default(); count];
-    Ok((materials, (0..count).map(|number| (number.to_string(), number)).collect()))
-}
-
-fn append(mesh: &mut Mesh, part: &tobj::Mesh, scale: f32) {
-    let first = mesh.positions.len() as u32;
-    let positions = part.positions.as_chunks::<3>().0;
-    let normals = part.normals.as_chunks::<3>().0;
-    let texcoords = part.texcoords.as_chunks::<2>().0;
-    for ((position, normal), texcoord) in positions.iter().zip(normals).zip(texcoords) {
-        mesh.add_vertex(position.map(|x| x * scale), *normal, [texcoord[0], 1.0 - texcoord[1]]);
-    }
-    let material = part.material_id.unwrap_or_default() as u32;
-    for triangle in part.indices.as_chunks::<3>().0 {
-        mesh.add_triangle(triangle.map(|i| first + i), material);
-    }
+fn read_library(path: &Path, obj: &ObjText, options: &ObjOptions, has_colors: bool) -> Library {
+    let library = Library::read(path, &obj.libraries);
+    let library = if options.normal_maps { library.with_normal_maps() } else { library };
+    if has_colors { library.with_vertex_colors() } else { library }
 }
 
 /// Renumbers the materials so that only used ones are left; returns their names.
-fn names_in_use(mesh: &mut Mesh, names: &[Option<String>]) -> Vec<Option<String>> {
+fn names_in_use(mesh: &mut Mesh, names: &[Option<Vec<u8>>]) -> Vec<Option<Vec<u8>>> {
     let mut used = vec![false; names.len()];
     mesh.triangle_materials.iter().for_each(|&material| used[material as usize] = true);
     let mut next = 0;
@@ -125,51 +98,19 @@ fn finish(mesh: &mut Mesh, materials: &[Material], warnings: &mut Vec<String>, d
     mesh.arrange(materials)
 }
 
-/// A reader that reports its progress, and fails once the load is cancelled.
-struct Watched<'a> {
-    rest: &'a [u8],
-    total: usize,
-    progress: &'a mut Progress,
-}
-
-impl Read for Watched<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let count = self.fill_buf()?.read(buffer)?;
-        self.consume(count);
-        Ok(count)
-    }
-}
-
-impl BufRead for Watched<'_> {
-    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
-        const BLOCK: usize = 1 << 16;
-        self.progress.go_on().map_err(std::io::Error::other)?;
-        Ok(&self.rest[..self.rest.len().min(BLOCK)])
-    }
-
-    fn consume(&mut self, count: usize) {
-        const STEP: usize = 1 << 20;
-        let before = self.rest.len() / STEP;
-        self.rest = self.rest.get(count..).unwrap_or_default();
-        if self.rest.len() / STEP != before {
-            self.progress.set((self.total - self.rest.len()) as u64);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
     /// Loads `text` from a folder that also holds `files`.
-    fn load_text(text: &str, files: &[(&str, &[u8])]) -> Result<Scene, SceneError> {
+    fn load_text(text: impl AsRef<[u8]>, files: &[(&str, &[u8])]) -> Result<Scene, SceneError> {
         let folder = tempfile::tempdir().unwrap();
         for (name, content) in files {
             std::fs::write(folder.path().join(name), content).unwrap();
         }
         let path = folder.path().join("mesh.obj");
-        std::fs::write(&path, text).unwrap();
+        std::fs::write(&path, text.as_ref()).unwrap();
         load(&path, &ObjOptions::default(), &mut Progress::hidden())
     }
 
@@ -179,6 +120,7 @@ mod tests {
         let vertex_count = scene.positions.len();
         assert_eq!(scene.normals.len(), vertex_count);
         assert_eq!(scene.texcoords.len(), vertex_count);
+        assert!(scene.colors.is_empty() || scene.colors.len() == vertex_count);
         assert!(scene.triangles.iter().flatten().all(|&v| (v as usize) < vertex_count));
         assert_eq!(scene.triangle_materials.len(), scene.triangles.len());
         assert_eq!(scene.source_triangles.len(), scene.triangles.len());
@@ -197,7 +139,7 @@ mod tests {
 
     #[test]
     fn polygons_become_fans_numbered_in_the_order_of_the_file() {
-        let scene = load_text(&format!("{TRIANGLE}f 1 2 4 3\nf 1 2 3\n"), &[]).unwrap();
+        let scene = load_text(format!("{TRIANGLE}f 1 2 4 3\nf 1 2 3\n"), &[]).unwrap();
         assert_consistent(&scene);
         let mut sources = scene.source_triangles.clone();
         sources.sort_unstable();
@@ -233,7 +175,7 @@ mod tests {
 
     #[test]
     fn texture_coordinates_run_down() {
-        let scene = load_text(&format!("{TRIANGLE}vt 0.25 1\nf 1/1 2/1 3/1\n"), &[]).unwrap();
+        let scene = load_text(format!("{TRIANGLE}vt 0.25 1\nf 1/1 2/1 3/1\n"), &[]).unwrap();
         assert!(scene.texcoords.iter().all(|&t| t == [0.25, 0.0]));
     }
 
@@ -301,6 +243,147 @@ mod tests {
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert!(matches!(width(Some(bad)), Err(SceneError::BadScale { .. })), "{bad}");
         }
+    }
+
+    /// The same triangle near and far, and a vertex at the origin that no face uses.
+    #[test]
+    fn only_vertices_in_use_count_for_the_extent() {
+        let near = "v 0 0 0\nv 1 0 0\nv 0 1 0.5\n";
+        let far = "v 500000 5000000 100\nv 500001 5000000 100\nv 500000 5000001 100.5\n";
+        let used = load_text(format!("{near}f 1 2 3\n"), &[]).unwrap();
+        for unused in
+            ["", "v 0 0 0\n", "v nan inf -1.#IND00\n", "v 1e300 0 0\n", "v 0 0 0\nf 4 4 4\nf 4 1 4\n"]
+        {
+            let found = load_text(format!("{far}{unused}f 1 2 3\n"), &[]).unwrap();
+            let size = |scene: &Scene| {
+                let (low, high) = scene.bounds();
+                [0, 1, 2].map(|i| high[i] - low[i])
+            };
+            assert_eq!(size(&found), size(&used), "{unused}");
+            assert!(found.bounds().1.iter().all(|x| x.abs() <= 1.0), "moved to the origin");
+            let degenerate = usize::from(found.degenerate_triangle_count > 0);
+            assert_eq!(found.warnings.len(), 1 + degenerate, "{:?}", found.warnings);
+        }
+        let bad = load_text(format!("{near}v 0 nan 0\nv 0 0 1.#INF\nf 1 2 3\nf 1 2 5\n"), &[]);
+        assert!(matches!(bad, Err(SceneError::NotFinite { line: 5, .. })));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_mended_with_their_lines() {
+        for bad in ["-1.#IND00 -1.#IND00 -1.#IND00", "nan nan nan", "0 1.#QNAN 1", "-nan(ind) 0 0", "inf 0 0"]
+        {
+            let text = format!("{TRIANGLE}vn 1 0 0\nvn {bad}\nvt {bad}\nvt nan 0\nf 1/1/2 2/1/2 3/1/2\n");
+            let scene = load_text(text, &[]).unwrap();
+            assert_consistent(&scene);
+            assert!(scene.normals.iter().all(|n| *n == [0.0, 0.0, 1.0]), "{bad}: {:?}", scene.normals);
+            let [texcoord, normal] = [&scene.warnings[1], &scene.warnings[0]];
+            assert!(normal.contains("mesh.obj:6: the normal"), "{normal}");
+            assert!(texcoord.contains("mesh.obj:7: the texture coordinate"), "{texcoord}");
+            assert_eq!(scene.warnings.len(), 2, "the second is not used: {:?}", scene.warnings);
+        }
+    }
+
+    /// A model of any size is drawn as at usual size, through cameras of a file too.
+    #[test]
+    fn a_model_of_any_size_is_drawn_alike() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, cameras) = (folder.path().join("mesh.obj"), folder.path().join("views.txt"));
+        let at_size = |size: f64| {
+            let point = |[x, y, z]: [f64; 3]| format!("{:e} {:e} {:e}", x * size, y * size, z * size);
+            let corners = [[1.0, 0.0, 0.0], [3.0, 0.0, 1.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
+            let vertices: String = corners.iter().map(|corner| format!("v {}\n", point(*corner))).collect();
+            let texts = (
+                format!("{vertices}f 1 2 3 4\nf 1 3 4\n"),
+                format!(
+                    "scene mesh {}\nat {} {} 60\ndir {} 0 0 -1 50\n",
+                    point([1.0, 5.0, 1.0]),
+                    point([4.0, 4.0, 4.0]),
+                    point([1.0, 1.0, 0.5]),
+                    point([1.0, 1.0, 9.0]),
+                ),
+            );
+            std::fs::write(&path, texts.0).unwrap();
+            std::fs::write(&cameras, texts.1).unwrap();
+            let options = ObjOptions { cameras: Some(cameras.clone()), ..ObjOptions::default() };
+            load(&path, &options, &mut Progress::hidden()).unwrap()
+        };
+        let usual = at_size(1.0);
+        assert!(usual.warnings.is_empty() && usual.resize == 1.0);
+        for size in [1e-300, 1e-40, 1e-16, 1e-12, 1e-6, 1e8, 1e10, 1e20, 1e39, 1e300] {
+            let found = at_size(size);
+            assert_consistent(&found);
+            let unit = f64::from(found.positions[0][0]);
+            let is_alike = |a: &[f32; 3], b: &[f32; 3]| {
+                a.iter().zip(b).all(|(a, b)| (f64::from(*a) / unit - f64::from(*b)).abs() < 2e-6)
+            };
+            assert!(found.positions.iter().zip(&usual.positions).all(|(a, b)| is_alike(a, b)), "{size}");
+            assert!(is_alike(&found.light.position, &usual.light.position), "{size}");
+            for (a, b) in found.cameras.iter().zip(&usual.cameras) {
+                assert!(is_alike(&a.eye, &b.eye), "{size}: {a:?} {b:?}");
+                let forward = |camera: &crate::scene::Camera| glam::Vec3::from(camera.frame()[2]);
+                assert!(forward(a).distance(forward(b)) < 1e-5, "{size}");
+            }
+            assert!((found.resize * size / unit - 1.0).abs() < 1e-6 && found.warnings.len() == 1, "{size}");
+        }
+    }
+
+    #[test]
+    fn names_of_materials_and_libraries_are_bytes() {
+        let mtl = b"newmtl M\xe4\nKd 1 0 0\nnewmtl M\xf6\nKd 0 1 0\n";
+        let text = [
+            b"mtllib a.mtl # all\n".as_slice(),
+            TRIANGLE.as_bytes(),
+            b"usemtl M\xe4\nf 1 2 3\nusemtl M\xf6 # other\nf 2 3 4\n",
+        ];
+        let scene = load_text(text.concat(), &[("a.mtl", mtl)]).unwrap();
+        let albedos: Vec<_> =
+            scene.triangle_materials.iter().map(|m| scene.materials[*m as usize].albedo).collect();
+        assert_eq!(albedos, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert_eq!(scene.warnings, Vec::<String>::new());
+    }
+
+    #[test]
+    fn text_of_16_bits_and_of_old_systems_is_read() {
+        let text = format!("mtllib a.mtl\n{TRIANGLE}usemtl h\u{f6}he\nf 1 2 3\n");
+        let mtl = "newmtl h\u{f6}he\nKd 1 0 0\n";
+        let utf_16 = |text: &str| -> Vec<u8> {
+            "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect()
+        };
+        for (obj, mtl) in [
+            (utf_16(&text), utf_16(mtl)),
+            (utf_16(&text), mtl.as_bytes().to_vec()),
+            (text.replace('\n', "\r").into_bytes(), mtl.replace('\n', "\r").into_bytes()),
+        ] {
+            let scene = load_text(obj, &[("a.mtl", &mtl)]).unwrap();
+            assert_eq!((scene.materials[0].albedo, scene.warnings.len()), ([1.0, 0.0, 0.0], 0));
+        }
+    }
+
+    #[test]
+    fn colors_belong_to_their_vertices_and_are_linear() {
+        let text = "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 0 1 0 0 0 1\nv 1 1 0.5\nf 3 2 1\nf 2 3 4\n";
+        let scene = load_text(text, &[]).unwrap();
+        assert_consistent(&scene);
+        for (position, color) in scene.positions.iter().zip(&scene.colors) {
+            let expected = match position {
+                [0.0, 0.0, _] => [1.0, 0.0, 0.0],
+                [1.0, 0.0, _] => [0.0, 0.214_041_14, 0.0],
+                [0.0, 1.0, _] => [0.0, 0.0, 1.0],
+                _ => [1.0; 3],
+            };
+            assert!((0..3).all(|i| (color[i] - expected[i]).abs() < 1e-5), "{position:?}: {color:?}");
+        }
+        assert_eq!(scene.materials[0].albedo, [1.0; 3], "no material darkens them");
+        let plain = load_text("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n", &[]).unwrap();
+        assert!(plain.colors.is_empty() && plain.materials[0].albedo == [0.6; 3]);
+    }
+
+    #[test]
+    fn faces_that_cross_themselves_are_named() {
+        let text = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 1 -1 0\nf 1 2 3\nf 1 2 3 4\n";
+        let scene = load_text(text, &[]).unwrap();
+        assert_eq!(scene.triangles.len(), 3);
+        assert!(scene.warnings[0].contains("mesh.obj:6: the face crosses itself"), "{:?}", scene.warnings);
     }
 
     proptest! {

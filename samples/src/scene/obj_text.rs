@@ -1,85 +1,115 @@
-//! Turns OBJ text as found in the wild into OBJ text that the parser reads without loss.
+//! Parses OBJ text as found in the wild: `v`, `vt`, `vn`, `f`, `usemtl` and `mtllib`.
 //!
-//! tobj reads clean files well, but it stops at Latin-1 comments, continued lines and one-component texture
-//! coordinates, mixes up normals when only some corners have them, and may overflow on wild indices. So the
-//! text is rewritten first: only `v`, `vt`, `vn`, `f` and `usemtl` are left, all vertices before all faces,
-//! every corner has all three indices, positive and checked, concave faces are triangles. Index 1 of `vt` and `vn` is a placeholder (all
-//! zero) for corners that have none. Materials are numbered.
+//! Names are bytes. Numbers stay as in the file, in double precision, until the extent of the mesh is known. Statements that
+//! follow each other in any order are resolved here: relative indices become absolute and are checked.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
-use std::ops::Range;
 use std::path::Path;
 
-use super::recentre::{self, Extent};
-use super::{SceneError, polygon};
+use lvk::{readable_bytes, readable_name};
+
+use super::SceneError;
+use super::text_lines::{next_logical_line, split_word};
+use super::text_numbers::{Number, words};
+use super::warnings::Warnings;
 use crate::app::progress::Progress;
 
-/// The rewritten file and what was taken out of it.
-pub(super) struct CleanObj {
-    /// Text for the parser; starts with `mtllib` so that its material loader runs first.
-    pub text: String,
+/// Index of a corner without a texture coordinate or normal.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// The content of an OBJ file. All indices of corners are in range.
+#[derive(Default)]
+pub(super) struct ObjText {
+    /// Positions in file units; all NaN where the file has a number that is not finite.
+    pub positions: Vec<[f64; 3]>,
+    /// Colours as in the file; empty, or as many as positions.
+    pub colors: Vec<[f32; 3]>,
+    /// Texture coordinates, `v` up.
+    pub texcoords: Vec<[f32; 2]>,
+    /// Unit normals, or zero where the file has no usable one.
+    pub normals: Vec<[f32; 3]>,
+    /// Faces in the order of the file.
+    pub faces: Vec<Face>,
+    /// Position, texture coordinate and normal of each corner of the faces; the last two may be [`NONE`].
+    pub corners: Vec<[u32; 3]>,
     /// Name behind each material number; `None` for faces before the first `usemtl`.
-    pub materials: Vec<Option<String>>,
+    pub materials: Vec<Option<Vec<u8>>>,
     /// Arguments of the `mtllib` lines, in order.
-    pub libraries: Vec<String>,
+    pub libraries: Vec<Vec<u8>>,
+    /// Elements with a number that is not finite, or without one that they need.
+    pub flaws: Vec<Flaw>,
     /// Number of triangles that the faces make.
     pub triangle_count: usize,
-    /// Offset subtracted from every position: the centre of a mesh far from its origin, else 0.
-    pub origin: [f64; 3],
-    /// Corrections of the file, for the user.
-    pub warnings: Vec<String>,
+    /// Corrections of the file.
+    pub warnings: Warnings,
 }
 
-/// The material number that the cleaned text gives to faces before the first `usemtl`.
-pub(super) const NO_MATERIAL: usize = 0;
+/// A polygon of at least three corners, which end where those of the next face start.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Face {
+    /// Number of its first corner in [`ObjText::corners`].
+    pub start: usize,
+    /// Number of its material in [`ObjText::materials`].
+    pub material: u32,
+    /// Line in the file, from 1.
+    pub line: u32,
+}
 
-/// Rewrites the OBJ file `content`, read from `path` (which errors name).
-pub(super) fn clean(path: &Path, content: &[u8], progress: &mut Progress) -> Result<CleanObj, SceneError> {
+/// An element that cannot be used as it is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Flaw {
+    /// Place of its kind in [`KINDS`].
+    pub kind: usize,
+    /// Number among the elements of the kind, from 0.
+    pub index: usize,
+    /// Line in the file, from 1.
+    pub line: usize,
+}
+
+/// The kinds of elements that corners name.
+pub(super) const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+impl ObjText {
+    /// Number of the corner behind the last one of a face.
+    pub(super) fn face_end(&self, face: usize) -> usize {
+        self.faces.get(face + 1).map_or(self.corners.len(), |next| next.start)
+    }
+}
+
+/// Parses the decoded OBJ file `content`, read from `path` (which errors name).
+pub(super) fn parse(path: &Path, content: &[u8], progress: &mut Progress) -> Result<ObjText, SceneError> {
     if content.contains(&0) {
         return Err(SceneError::NotObj { path: path.into(), why: "it holds binary data" });
     }
-    let mut cleaner = Cleaner::new(path, content.len());
-    let mut rest = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content);
+    let mut parser = Parser {
+        path,
+        line_number: 0,
+        obj: ObjText { materials: vec![None], ..ObjText::default() },
+        reach: [Reach::default(); 3],
+        material: 0,
+        numbers: HashMap::new(),
+        short_faces: 0,
+        weights: 0,
+    };
+    let mut rest = content;
     while !rest.is_empty() {
-        let (line, line_count, after) = next_logical_line(rest);
-        cleaner.line_number += 1;
-        cleaner.line(&line)?;
-        cleaner.line_number += line_count - 1;
+        let (line, after) = next_logical_line(rest);
+        parser.line_number += 1;
+        parser.statement(&line.text)?;
+        if line.is_cut {
+            parser.warn(
+                "continued lines",
+                "it ends in a backslash, but the next line is a statement of its own",
+            );
+        }
+        parser.line_number += line.line_count - 1;
         rest = after;
-        if cleaner.line_number.is_multiple_of(65_536) {
+        if parser.line_number.is_multiple_of(65_536) {
             progress.set((content.len() - rest.len()) as u64);
             progress.go_on()?;
         }
     }
-    cleaner.finish()
-}
-
-/// One line with its continuations (`\` before the line end) joined, how many lines of the file it took, and
-/// what follows. Bytes that are no UTF-8 become replacement characters: they only occur in names and comments.
-fn next_logical_line(content: &[u8]) -> (Cow<'_, str>, usize, &[u8]) {
-    let (first, mut rest) = split_line(content);
-    if first.last() != Some(&b'\\') {
-        return (String::from_utf8_lossy(first), 1, rest);
-    }
-    let mut joined = first[..first.len() - 1].to_vec();
-    let mut count = 1;
-    while !rest.is_empty() {
-        let (next, after) = split_line(rest);
-        (rest, count) = (after, count + 1);
-        joined.push(b' ');
-        joined.extend_from_slice(next.strip_suffix(b"\\").unwrap_or(next));
-        if next.last() != Some(&b'\\') {
-            break;
-        }
-    }
-    (Cow::Owned(String::from_utf8_lossy(&joined).into_owned()), count, rest)
-}
-
-fn split_line(content: &[u8]) -> (&[u8], &[u8]) {
-    let end = content.iter().position(|&b| b == b'\n').unwrap_or(content.len());
-    let line = &content[..end];
-    (line.strip_suffix(b"\r").unwrap_or(line), content.get(end + 1..).unwrap_or_default())
+    parser.finish()
 }
 
 /// The largest index a kind of element was asked for, and where.
@@ -90,265 +120,213 @@ struct Reach {
     line: usize,
 }
 
-struct Cleaner<'a> {
+struct Parser<'a> {
     path: &'a Path,
     line_number: usize,
-    vertices: String,
-    faces: String,
-    positions: Vec<[f64; 3]>,
-    extent: Extent,
-    /// Indices in `faces` of polygons with more than three vertices.
-    polygons: Vec<Range<usize>>,
-    counts: [usize; 3],
+    obj: ObjText,
     reach: [Reach; 3],
-    materials: Vec<Option<String>>,
-    numbers: HashMap<String, usize>,
-    libraries: Vec<String>,
-    triangle_count: usize,
-    mended_attributes: usize,
+    /// Number of the material of the faces that follow.
+    material: u32,
+    numbers: HashMap<Vec<u8>, u32>,
     short_faces: usize,
+    /// Positions with a weight other than 1.
+    weights: usize,
 }
 
-const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
-
-impl<'a> Cleaner<'a> {
-    fn new(path: &'a Path, size: usize) -> Self {
-        let mut vertices = String::with_capacity(size / 2);
-        vertices.push_str("mtllib materials\nvt 0 0\nvn 0 0 0\n");
-        let mut faces = String::with_capacity(size / 2);
-        faces.push_str("usemtl 0\n");
-        Self {
-            path,
-            line_number: 0,
-            vertices,
-            faces,
-            positions: Vec::new(),
-            extent: Extent::new(),
-            polygons: Vec::new(),
-            counts: [0; 3],
-            reach: [Reach::default(); 3],
-            materials: vec![None],
-            numbers: HashMap::new(),
-            libraries: Vec::new(),
-            triangle_count: 0,
-            mended_attributes: 0,
-            short_faces: 0,
-        }
-    }
-
-    fn line(&mut self, line: &str) -> Result<(), SceneError> {
-        let line = line.trim();
-        let (keyword, rest) = line.split_once(|c: char| c.is_whitespace()).unwrap_or((line, ""));
+impl Parser<'_> {
+    fn statement(&mut self, line: &[u8]) -> Result<(), SceneError> {
+        let (keyword, rest) = split_word(line);
         match keyword {
-            "v" => self.position(without_comment(rest)),
-            "vt" => {
-                self.attribute("vt", 1, 2, without_comment(rest));
-                Ok(())
-            }
-            "vn" => {
-                self.attribute("vn", 2, 3, without_comment(rest));
-                Ok(())
-            }
-            "f" | "fo" => self.face(without_comment(rest)),
-            "usemtl" => {
-                self.use_material(rest.trim());
-                Ok(())
-            }
-            "mtllib" => {
-                self.libraries.push(rest.trim().to_owned());
-                Ok(())
-            }
-            _ => Ok(()),
+            b"v" => self.position(rest)?,
+            b"vt" => self.texcoord(rest),
+            b"vn" => self.normal(rest),
+            b"f" | b"fo" => self.face(rest)?,
+            b"usemtl" => self.use_material(rest),
+            b"mtllib" if !rest.is_empty() => self.obj.libraries.push(rest.to_vec()),
+            _ => {}
         }
+        Ok(())
     }
 
-    fn position(&mut self, rest: &str) -> Result<(), SceneError> {
-        self.vertices.push('v');
-        let mut found = 0;
+    /// A position, and behind it a weight, or a colour of three numbers.
+    fn position(&mut self, rest: &[u8]) -> Result<(), SceneError> {
         let mut position = [0.0; 3];
-        for word in rest.split_whitespace().take(3) {
-            match word.parse::<f32>() {
-                Ok(value) if value.is_finite() => {
-                    position[found] = word.parse().unwrap_or(f64::from(value));
-                    found += 1;
+        let mut extra = [Number::Unreadable; 4];
+        let mut found = 0;
+        for word in words(rest).take(7) {
+            let number = Number::from_word(word);
+            match number {
+                _ if found >= 3 => extra[found - 3] = number,
+                Number::Finite(value) => position[found] = value,
+                Number::NotFinite => position = [f64::NAN; 3],
+                Number::Unreadable => {
+                    return Err(self.bad(format!("`{}` is not a number", readable_bytes(word))));
                 }
-                Ok(_) => {
-                    return Err(SceneError::NotFinite { path: self.path.into(), line: self.line_number });
-                }
-                Err(_) => return Err(self.bad(format!("`{}` is not a number", shortened(word)))),
             }
-            self.vertices.push(' ');
-            self.vertices.push_str(word);
+            found += 1;
         }
         if found < 3 {
             return Err(self.bad(format!("a position needs 3 numbers, found {found}")));
         }
-        self.vertices.push('\n');
-        self.positions.push(position);
-        self.extent.add(position);
-        self.counts[0] += 1;
+        if position.iter().any(|x| x.is_nan()) {
+            position = [f64::NAN; 3];
+            self.flaw(0, self.obj.positions.len());
+        }
+        let is_weighted = found == 4 && !matches!(extra[0], Number::Finite(0.0 | 1.0));
+        self.weights += usize::from(is_weighted);
+        self.color(extra.first_chunk().filter(|_| found >= 6));
+        self.obj.positions.push(position);
         Ok(())
     }
 
-    /// Texture coordinates and normals are mended rather than refused: what is missing or no finite number
-    /// becomes 0 (a normal of 0 is computed from the faces later).
-    fn attribute(&mut self, keyword: &str, kind: usize, size: usize, rest: &str) {
-        self.vertices.push_str(keyword);
-        let mut words = rest.split_whitespace();
-        for i in 0..size {
-            let word = words.next();
-            let usable = word.filter(|w| w.parse::<f32>().is_ok_and(f32::is_finite));
-            if usable.is_none() && !(kind == 1 && i == 1 && word.is_none()) {
-                self.mended_attributes += 1;
+    /// Keeps the colour of the position that is pushed next. A position without one is white.
+    fn color(&mut self, numbers: Option<&[Number; 3]>) {
+        const WHITE: [f32; 3] = [1.0; 3];
+        let colors = &mut self.obj.colors;
+        match numbers.map(|numbers| numbers.map(Number::finite_f32)) {
+            Some([Some(red), Some(green), Some(blue)]) => {
+                colors.resize(self.obj.positions.len(), WHITE);
+                colors.push([red, green, blue]);
             }
-            self.vertices.push(' ');
-            self.vertices.push_str(usable.unwrap_or("0"));
+            _ if !colors.is_empty() => colors.push(WHITE),
+            _ => {}
         }
-        self.vertices.push('\n');
-        self.counts[kind] += 1;
     }
 
-    fn face(&mut self, rest: &str) -> Result<(), SceneError> {
-        let start = self.faces.len();
-        self.faces.push('f');
-        let mut corner_count = 0;
-        for word in rest.split_whitespace() {
-            self.corner(word)?;
-            corner_count += 1;
+    /// Texture coordinates are mended: a number that is missing or not finite becomes 0.
+    fn texcoord(&mut self, rest: &[u8]) {
+        let mut words = words(rest).map(|word| Number::from_word(word).finite_f32());
+        let [u, v] = [words.next().flatten(), words.next().unwrap_or(Some(0.0))];
+        if u.is_none() || v.is_none() {
+            self.flaw(1, self.obj.texcoords.len());
         }
+        self.obj.texcoords.push([u.unwrap_or(0.0), v.unwrap_or(0.0)]);
+    }
+
+    /// A normal that lacks a number becomes 0, for which one is computed later.
+    fn normal(&mut self, rest: &[u8]) {
+        let mut words = words(rest).map(|word| match Number::from_word(word) {
+            Number::Finite(value) => Some(value),
+            _ => None,
+        });
+        let found = [0; 3].map(|_| words.next().flatten());
+        let normal = match found {
+            [Some(x), Some(y), Some(z)] => glam::DVec3::new(x, y, z).normalize_or_zero().as_vec3(),
+            _ => {
+                self.flaw(2, self.obj.normals.len());
+                glam::Vec3::ZERO
+            }
+        };
+        self.obj.normals.push(normal.to_array());
+    }
+
+    fn face(&mut self, rest: &[u8]) -> Result<(), SceneError> {
+        let start = self.obj.corners.len();
+        for word in words(rest) {
+            let corner = self.corner(word)?;
+            self.obj.corners.push(corner);
+        }
+        let corner_count = self.obj.corners.len() - start;
         if corner_count < 3 {
-            self.faces.truncate(start);
+            self.obj.corners.truncate(start);
             self.short_faces += 1;
             return Ok(());
         }
-        self.faces.push('\n');
-        if corner_count > 3 {
-            self.polygons.push(start..self.faces.len());
-        }
-        self.triangle_count += corner_count - 2;
+        let line = u32::try_from(self.line_number).unwrap_or(u32::MAX);
+        self.obj.faces.push(Face { start, material: self.material, line });
+        self.obj.triangle_count += corner_count - 2;
         Ok(())
     }
 
-    fn corner(&mut self, word: &str) -> Result<(), SceneError> {
-        let mut parts = word.split('/');
-        for kind in 0..3 {
-            let text = parts.next().unwrap_or("");
-            let number = match text {
-                "" if kind > 0 => 1,
-                _ => match text.parse::<i64>() {
-                    Ok(index) => self.resolve(kind, index)?,
-                    Err(_) => return Err(self.bad(format!("`{}` is not a face corner", shortened(word)))),
-                },
-            };
-            self.faces.push(if kind == 0 { ' ' } else { '/' });
-            push_number(&mut self.faces, number);
+    fn corner(&mut self, word: &[u8]) -> Result<[u32; 3], SceneError> {
+        let mut corner = [NONE; 3];
+        let mut parts = word.split(|byte| *byte == b'/');
+        for (kind, place) in corner.iter_mut().enumerate() {
+            let text = parts.next().unwrap_or_default();
+            if kind > 0 && text.is_empty() {
+                continue;
+            }
+            let index = std::str::from_utf8(text).ok().and_then(|text| text.parse().ok());
+            *place = self.resolve(kind, index.ok_or_else(|| self.no_corner(word))?)?;
         }
         match parts.next() {
-            None => Ok(()),
-            Some(_) => Err(self.bad(format!("`{}` is not a face corner", shortened(word)))),
+            None => Ok(corner),
+            Some(_) => Err(self.no_corner(word)),
         }
     }
 
-    /// Number of the element in the cleaned text, where texture coordinates and normals stand behind a
-    /// placeholder.
-    fn resolve(&mut self, kind: usize, index: i64) -> Result<usize, SceneError> {
-        let absolute = if index < 0 { self.counts[kind] as i64 + index } else { index - 1 };
+    /// Number of the element, from 0. Elements may follow the faces that name them.
+    fn resolve(&mut self, kind: usize, index: i64) -> Result<u32, SceneError> {
+        let absolute = if index < 0 { self.count(kind) as i64 + index } else { index - 1 };
         let Ok(position) = usize::try_from(absolute) else {
             return Err(self.out_of_range(kind, index, self.line_number));
         };
         if position >= self.reach[kind].highest {
             self.reach[kind] = Reach { highest: position + 1, index, line: self.line_number };
         }
-        Ok(position + 1 + usize::from(kind > 0))
+        // Files whose numbers 32 bits do not hold are refused by `finish`.
+        Ok(u32::try_from(position).unwrap_or(NONE - 1))
     }
 
-    fn use_material(&mut self, name: &str) {
-        let number = match self.numbers.get(name) {
-            _ if name.is_empty() => NO_MATERIAL,
+    fn use_material(&mut self, name: &[u8]) {
+        self.material = match self.numbers.get(name) {
+            _ if name.is_empty() => 0,
             Some(&number) => number,
             None => {
-                self.materials.push(Some(name.to_owned()));
-                self.numbers.insert(name.to_owned(), self.materials.len() - 1);
-                self.materials.len() - 1
+                let number = self.obj.materials.len() as u32;
+                self.obj.materials.push(Some(name.to_vec()));
+                self.numbers.insert(name.to_vec(), number);
+                number
             }
         };
-        self.faces.push_str("usemtl ");
-        push_number(&mut self.faces, number);
-        self.faces.push('\n');
     }
 
-    fn finish(mut self) -> Result<CleanObj, SceneError> {
+    fn finish(mut self) -> Result<ObjText, SceneError> {
         for kind in 0..3 {
             let Reach { highest, index, line } = self.reach[kind];
-            if highest > self.counts[kind] {
+            if highest > self.count(kind) {
                 return Err(self.out_of_range(kind, index, line));
             }
         }
         let path = self.path.to_path_buf();
-        if self.counts[0] == 0 && self.triangle_count == 0 {
+        if self.obj.positions.is_empty() && self.obj.triangle_count == 0 {
             return Err(SceneError::NotObj { path, why: "it has neither vertices (`v`) nor faces (`f`)" });
         }
-        if self.triangle_count == 0 {
+        if self.obj.triangle_count == 0 {
             return Err(SceneError::Empty { path, degenerate: 0 });
         }
         let limit = u32::MAX / 4;
-        if self.triangle_count.max(self.counts[0]) > limit as usize {
+        if self.obj.triangle_count.max(self.reach.map(|reach| reach.highest).into_iter().fold(0, usize::max))
+            > limit as usize
+        {
             return Err(SceneError::TooLarge { path, limit });
         }
-        let mut warnings = self.warnings();
-        let origin = self.recentre(&mut warnings);
-        self.append_faces();
-        let Self { vertices, materials, libraries, triangle_count, .. } = self;
-        Ok(CleanObj { text: vertices, materials, libraries, triangle_count, origin, warnings })
-    }
-
-    fn recentre(&mut self, warnings: &mut Vec<String>) -> [f64; 3] {
-        let Some(centre) = self.extent.far_centre() else {
-            return [0.0; 3];
-        };
-        self.vertices = recentre::moved(&self.vertices, centre);
-        let [x, y, z] = centre;
-        warnings.push(format!("the mesh lies far from its origin; ({x}, {y}, {z}) was taken from it"));
-        centre
-    }
-
-    /// Puts the faces behind the vertices, concave ones as triangles. Fans are left to the parser.
-    fn append_faces(&mut self) {
-        let mut copied = 0;
-        for range in &self.polygons {
-            let words: Vec<&str> = self.faces[range.clone()].split_whitespace().skip(1).collect();
-            let corners: Vec<[f64; 3]> = words.iter().filter_map(|word| self.position_of(word)).collect();
-            let Some(triangles) = polygon::split(&corners).filter(|_| corners.len() == words.len()) else {
-                continue;
-            };
-            self.vertices.push_str(&self.faces[copied..range.start]);
-            for [a, b, c] in triangles {
-                for part in ["f ", words[a], " ", words[b], " ", words[c], "\n"] {
-                    self.vertices.push_str(part);
-                }
-            }
-            copied = range.end;
-        }
-        self.vertices.push_str(&self.faces[copied..]);
-    }
-
-    fn position_of(&self, corner: &str) -> Option<[f64; 3]> {
-        let number: usize = corner.split('/').next()?.parse().ok()?;
-        self.positions.get(number.checked_sub(1)?).copied()
-    }
-
-    fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
         if self.short_faces > 0 {
-            warnings.push(format!("{} faces with fewer than 3 corners were left out", self.short_faces));
+            let line = format!("{} faces with fewer than 3 corners were left out", self.short_faces);
+            self.obj.warnings.push("short faces", line);
         }
-        if self.mended_attributes > 0 {
-            let count = self.mended_attributes;
-            warnings.push(format!(
-                "{count} components of texture coordinates or normals were unusable; taken as 0"
-            ));
+        if self.weights > 0 {
+            let line = format!("weights of {} vertices (`v x y z w`) were ignored", self.weights);
+            self.obj.warnings.push("weights", line);
         }
-        warnings
+        Ok(self.obj)
+    }
+
+    fn count(&self, kind: usize) -> usize {
+        [self.obj.positions.len(), self.obj.texcoords.len(), self.obj.normals.len()][kind]
+    }
+
+    fn flaw(&mut self, kind: usize, index: usize) {
+        self.obj.flaws.push(Flaw { kind, index, line: self.line_number });
+    }
+
+    fn warn(&mut self, kind: &'static str, what: &str) {
+        let line = format!("{}:{}: {what}", readable_name(self.path), self.line_number);
+        self.obj.warnings.push(kind, line);
+    }
+
+    fn no_corner(&self, word: &[u8]) -> SceneError {
+        self.bad(format!("`{}` is not a face corner", readable_bytes(word)))
     }
 
     fn bad(&self, what: String) -> SceneError {
@@ -356,31 +334,9 @@ impl<'a> Cleaner<'a> {
     }
 
     fn out_of_range(&self, kind: usize, index: i64, line: usize) -> SceneError {
-        let (what, count) = (KINDS[kind], self.counts[kind]);
+        let (what, count) = (KINDS[kind], self.count(kind));
         SceneError::IndexOutOfRange { path: self.path.into(), line, what, index, count }
     }
-}
-
-fn without_comment(rest: &str) -> &str {
-    rest.split('#').next().unwrap_or("")
-}
-
-fn shortened(word: &str) -> String {
-    word.chars().take(24).collect()
-}
-
-fn push_number(text: &mut String, mut number: usize) {
-    let mut digits = [0u8; 20];
-    let mut start = digits.len();
-    loop {
-        start -= 1;
-        digits[start] = b'0' + (number % 10) as u8;
-        number /= 10;
-        if number == 0 {
-            break;
-        }
-    }
-    text.extend(digits[start..].iter().map(|&digit| char::from(digit)));
 }
 
 #[cfg(test)]
@@ -388,35 +344,53 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn cleaned(text: &[u8]) -> Result<CleanObj, SceneError> {
-        clean(Path::new("a.obj"), text, &mut Progress::hidden())
+    fn parsed(text: impl AsRef<[u8]>) -> Result<ObjText, SceneError> {
+        parse(Path::new("a.obj"), text.as_ref(), &mut Progress::hidden())
     }
 
-    fn faces(text: &str) -> Vec<String> {
-        let clean = cleaned(text.as_bytes()).unwrap();
-        clean.text.lines().filter(|line| line.starts_with('f')).map(str::to_owned).collect()
+    /// Corners of each face, with numbers from 0.
+    fn faces(text: impl AsRef<[u8]>) -> Vec<Vec<[u32; 3]>> {
+        let obj = parsed(text).unwrap();
+        (0..obj.faces.len())
+            .map(|face| obj.corners[obj.faces[face].start..obj.face_end(face)].to_vec())
+            .collect()
+    }
+
+    fn warnings(text: &str) -> Vec<String> {
+        parsed(text).unwrap().warnings.into_lines()
     }
 
     const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
+    const PLAIN: [[u32; 3]; 3] = [[0, NONE, NONE], [1, NONE, NONE], [2, NONE, NONE]];
 
     #[test]
-    fn corners_become_complete_and_absolute() {
-        assert_eq!(faces(&format!("{CORNERS}f 1 2 3\n")), ["f 1/1/1 2/1/1 3/1/1"]);
-        assert_eq!(faces(&format!("{CORNERS}f -3/-1/-1 2//1 3/1\n")), ["f 1/2/2 2/1/2 3/2/1"]);
+    fn corners_become_absolute() {
+        assert_eq!(faces(format!("{CORNERS}f 1 2 3\n")), [PLAIN]);
+        assert_eq!(
+            faces(format!("{CORNERS}f -3/-1/-1 2//1 3/1\n")),
+            [[[0, 0, 0], [1, NONE, 0], [2, 0, NONE]]]
+        );
+        assert_eq!(faces(format!("f 1 2 3\n{CORNERS}")), [PLAIN], "vertices may follow");
     }
 
     #[test]
-    fn carriage_returns_blanks_comments_and_continuations_are_understood() {
+    fn blanks_comments_and_continuations_are_understood() {
         let text =
-            "# caf\u{e9}\r\nv 0 0 0 \r\n\tv 1 0 0 0.5 0.5 0.5\r\nv 0 1 0 # top\r\nf 1 2 \\\r\n 3 # t  \r\n";
-        assert_eq!(faces(text), ["f 1/1/1 2/1/1 3/1/1"]);
-        let latin = [b"# caf\xe9\n".as_slice(), CORNERS.as_bytes(), b"f 1 2 3"].concat();
-        assert!(cleaned(&latin).is_ok());
+            "# caf\u{e9}\r\nv 0 0 0 \r\n\tv 1 0 0 0.5 0.5 0.5\r\nv 0 1 0 # top\r\nf 1 2 \\ \r\n 3 # t  \r\n";
+        assert_eq!(faces(text), [PLAIN]);
+        assert_eq!(faces([b"# caf\xe9\n".as_slice(), CORNERS.as_bytes(), b"f 1 2 3"].concat()), [PLAIN]);
+        assert_eq!(faces(format!("{CORNERS}f 1 2 3\n").replace('\n', "\r")), [PLAIN]);
     }
 
     #[test]
-    fn vertices_may_follow_the_faces_that_use_them() {
-        assert_eq!(faces(&format!("f 1 2 3\n{CORNERS}")), ["f 1/1/1 2/1/1 3/1/1"]);
+    fn lines_that_end_in_a_backslash_lose_nothing() {
+        let text = format!("# from C:\\models\\\n{CORNERS}g parts\\\nf 1 2 3\nusemtl wall\\\nf 3 2 1\n");
+        let obj = parsed(&text).unwrap();
+        assert_eq!((obj.positions.len(), obj.faces.len()), (3, 2));
+        assert_eq!(obj.materials, [None, Some(b"wall\\".to_vec())]);
+        assert!(obj.warnings.into_lines().is_empty());
+        let cut = warnings(&format!("{CORNERS}f 1 2 3 \\\nf 3 2 1\n"));
+        assert!(cut[0].starts_with("a.obj:6: it ends in a backslash"), "{cut:?}");
     }
 
     #[test]
@@ -429,7 +403,7 @@ mod tests {
             ("f 1//1 2//9223372036854775807 3//1", "normal", i64::MAX),
             ("f 1//1 2//-9223372036854775808 3//1", "normal", i64::MIN),
         ] {
-            match cleaned(format!("{CORNERS}{face}\n").as_bytes()).err().unwrap() {
+            match parsed(format!("{CORNERS}{face}\n")).err().unwrap() {
                 SceneError::IndexOutOfRange { line, what: w, index: i, .. } => {
                     assert_eq!((line, w, i), (6, what, index), "{face}");
                 }
@@ -440,72 +414,58 @@ mod tests {
 
     #[test]
     fn text_without_a_mesh_is_refused() {
-        assert!(matches!(cleaned(b"\x89PNG\r\n\x1a\n\0\0"), Err(SceneError::NotObj { .. })));
-        assert!(matches!(cleaned(b"hello world\n"), Err(SceneError::NotObj { .. })));
-        assert!(matches!(cleaned(b""), Err(SceneError::NotObj { .. })));
-        assert!(matches!(cleaned(CORNERS.as_bytes()), Err(SceneError::Empty { .. })));
-        assert!(matches!(cleaned(b"v 0 nan 0\n"), Err(SceneError::NotFinite { line: 1, .. })));
-        assert!(matches!(cleaned(b"v 0 1e99 0\n"), Err(SceneError::NotFinite { line: 1, .. })));
-        assert!(matches!(cleaned(b"\nv 0 0\n"), Err(SceneError::BadLine { line: 2, .. })));
-        assert!(matches!(cleaned(b"v 0 0 x\n"), Err(SceneError::BadLine { line: 1, .. })));
-        assert!(matches!(cleaned(b"v 0 0 0\nf 1/1/1/1 1 1\n"), Err(SceneError::BadLine { line: 2, .. })));
+        assert!(matches!(parsed(b"\x89PNG\r\n\x1a\n\0\0"), Err(SceneError::NotObj { .. })));
+        assert!(matches!(parsed("hello world\n"), Err(SceneError::NotObj { .. })));
+        assert!(matches!(parsed(""), Err(SceneError::NotObj { .. })));
+        assert!(matches!(parsed(CORNERS), Err(SceneError::Empty { .. })));
+        assert!(matches!(parsed("\nv 0 0\n"), Err(SceneError::BadLine { line: 2, .. })));
+        assert!(matches!(parsed("v 0 0 x\n"), Err(SceneError::BadLine { line: 1, .. })));
+        assert!(matches!(parsed("v 0 0 0\nf 1/1/1/1 1 1\n"), Err(SceneError::BadLine { line: 2, .. })));
+        assert!(matches!(parsed("v 0 0 0\nf 1.5 1 1\n"), Err(SceneError::BadLine { line: 2, .. })));
     }
 
     #[test]
-    fn materials_are_numbered_by_first_use() {
-        let text =
-            format!("mtllib my file.mtl\n{CORNERS}f 1 2 3\nusemtl b c\nusemtl a\nusemtl b c\nf 1 2 3\n");
-        let clean = cleaned(text.as_bytes()).unwrap();
-        assert_eq!(clean.materials, [None, Some("b c".to_owned()), Some("a".to_owned())]);
-        assert_eq!(clean.libraries, ["my file.mtl"]);
-        assert!(clean.text.ends_with("usemtl 1\nusemtl 2\nusemtl 1\nf 1/1/1 2/1/1 3/1/1\n"));
+    fn materials_are_numbered_by_first_use_and_their_names_are_bytes() {
+        let text = [
+            b"mtllib my file.mtl\nusemtl b c\n".as_slice(),
+            CORNERS.as_bytes(),
+            b"f 1 2 3\nusemtl M\xe4\nf 1 2 3\nusemtl M\xf6\nusemtl b c\nf 1 2 3\nusemtl\nf 1 2 3\n",
+        ];
+        let obj = parsed(text.concat()).unwrap();
+        let names = [&b"b c"[..], b"M\xe4", b"M\xf6"].map(|name| Some(name.to_vec()));
+        assert_eq!((obj.materials[0].clone(), &obj.materials[1..]), (None, &names[..]));
+        assert_eq!(obj.libraries, [b"my file.mtl"]);
+        assert_eq!(obj.faces.iter().map(|face| face.material).collect::<Vec<_>>(), [1, 2, 1, 0]);
     }
 
     #[test]
-    fn concave_faces_become_triangles_and_convex_ones_stay() {
-        let text = "v 0 0 0\nv 2 0 0\nv 0.5 0.5 0\nv 0 2 0\nv 2 2 0\n";
-        assert_eq!(faces(&format!("{text}f 1 2 5 4\n")), ["f 1/1/1 2/1/1 5/1/1 4/1/1"]);
-        for face in ["f 1 2 3 4", "f 2 3 4 1", "f 3 4 1 2", "f 4 1 2 3"] {
-            let found = faces(&format!("{face}\n{text}f 1 2 5\n"));
-            assert_eq!(found.len(), 3, "{face}: {found:?}");
-            assert_eq!(found[2], "f 1/1/1 2/1/1 5/1/1");
-            let across = |line: &String| !line.contains(" 1/") || !line.contains(" 3/");
-            assert!(!found[..2].iter().any(across), "{face}: {found:?}");
-        }
+    fn numbers_that_are_not_finite_are_flaws_with_their_lines() {
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1.#INF 0\nvt 0.5\nvt nan 1\nvt 1e39 1\nvn 0 -nan(ind) 1\n\
+                    vn -1.#IND00 -1.#IND00 -1.#IND00\nvn 0 1\nvn 0 0 2\nf 1 2 3\n";
+        let obj = parsed(text).unwrap();
+        assert_eq!(obj.texcoords, [[0.5, 0.0], [0.0, 1.0], [0.0, 1.0]]);
+        assert_eq!(obj.normals, [[0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]);
+        assert!(obj.positions[2].iter().all(|x| x.is_nan()));
+        let flaws: Vec<_> = obj.flaws.iter().map(|flaw| (flaw.kind, flaw.index, flaw.line)).collect();
+        assert_eq!(flaws, [(0, 2, 3), (1, 1, 5), (1, 2, 6), (2, 0, 7), (2, 1, 8), (2, 2, 9)]);
     }
 
     #[test]
-    fn a_byte_order_mark_is_skipped() {
-        assert_eq!(faces(&format!("\u{feff}{CORNERS}f 1 2 3\n")), ["f 1/1/1 2/1/1 3/1/1"]);
-    }
-
-    #[test]
-    fn unusable_attributes_become_zero_with_a_warning() {
-        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5\nvt nan 1\nvn 0 -nan(ind) 1\nf 1 2 3\n";
-        let clean = cleaned(text.as_bytes()).unwrap();
-        assert!(clean.text.contains("vt 0.5 0\nvt 0 1\nvn 0 0 1\n"), "{}", clean.text);
-        assert_eq!(clean.warnings.len(), 1);
+    fn colors_are_told_from_weights() {
+        let faces = "f 1 2 3\n";
+        let obj =
+            parsed(format!("v 0 0 0\nv 1 0 0 0.1 0.2 0.3\nv 0 1 0 1 0 0 0.5\nv 1 1 1 1 0 nan\n{faces}"))
+                .unwrap();
+        assert_eq!(obj.colors, [[1.0; 3], [0.1, 0.2, 0.3], [1.0, 0.0, 0.0], [1.0; 3]]);
+        let weighted = format!("v 0 0 0 1\nv 1 0 0 1.0\nv 0 1 0 0.5\nv 9 9 9 1 1\n{faces}");
+        assert!(parsed(&weighted).unwrap().colors.is_empty());
+        assert_eq!(warnings(&weighted), ["weights of 1 vertices (`v x y z w`) were ignored"]);
     }
 
     proptest! {
         #[test]
         fn any_bytes_end_in_a_result(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
-            let _ = cleaned(&bytes);
-        }
-
-        #[test]
-        fn the_parser_accepts_checked_text(lines in proptest::collection::vec(
-            prop_oneof![
-                "v( -?[0-9]{1,3}(\\.[0-9])?){3,5}", "vt( [0-9]){0,3}", "vn( [0-9]){0,3}",
-                "f( -?[0-9]{1,2}(/[0-9]?(/-?[0-9]?)?)?){0,5}", "usemtl [a-c]?", "o", "\\PC{0,20}",
-            ], 0..40)) {
-            if let Ok(clean) = cleaned(lines.join("\n").as_bytes()) {
-                let options = tobj::LoadOptions { single_index: true, triangulate: true, ..Default::default() };
-                let loaded = tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, |_| {
-                    Ok((Vec::new(), Default::default()))
-                });
-                prop_assert!(loaded.is_ok(), "{:?} from\n{}", loaded.err(), clean.text);
-            }
+            let _ = parsed(&bytes);
         }
     }
 }

@@ -1,17 +1,36 @@
 //! Splits faces of any number of corners into triangles that cover the face, also where it is concave.
 
-/// Ears are sought up to this many corners; the search takes up to the cube of their number.
-const MOST_CORNERS: usize = 1_000;
+use super::large_polygon;
 
-/// Triangles, as corner numbers and wound like the face, of the face with these corners; always two fewer than
-/// corners. `None` when a fan around the first corner is right (the face is convex) or as good as anything (it
-/// has no plane, cuts itself or has more than 1,000 corners).
-pub(super) fn split(corners: &[[f64; 3]]) -> Option<Vec<[usize; 3]>> {
-    let flat = flatten(corners)?;
-    if is_convex(&flat) || corners.len() > MOST_CORNERS {
-        return None;
+/// Ears are sought up to this many corners; the search takes up to the cube of their number.
+const MOST_EARS: usize = 100;
+
+/// Division of a face into triangles.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Split {
+    /// A fan around the first corner: the face is convex, or a line or point, for which any division does.
+    Fan,
+    /// Triangles as corner numbers, wound like the face.
+    Triangles(Vec<[usize; 3]>),
+    /// The face crosses itself, so that it has no inside. A fan is as good as anything.
+    Crossed,
+}
+
+/// Divides the face with these corners, which may be concave. Ears of small faces are cut off, which is fast for them; large
+/// ones take near linear time.
+pub(super) fn split(corners: &[[f64; 3]]) -> Split {
+    let Some(flat) = flatten(corners) else {
+        // Its parts cancel each other out, or it has none.
+        return if fan_has_area(corners) { Split::Crossed } else { Split::Fan };
+    };
+    if is_convex(&flat) {
+        return Split::Fan;
     }
-    clip_ears(&flat)
+    let small = if flat.len() <= MOST_EARS { clip_ears(&flat) } else { None };
+    match small.or_else(|| large_polygon::triangulate(&flat)) {
+        Some(triangles) => Split::Triangles(triangles),
+        None => Split::Crossed,
+    }
 }
 
 /// The corners in the plane of the face (its Newell normal's two minor axes), counter-clockwise.
@@ -35,6 +54,12 @@ fn flatten(corners: &[[f64; 3]]) -> Option<Vec<[f64; 2]>> {
         false => ((main + 2) % 3, (main + 1) % 3),
     };
     Some(points.iter().map(|point| [point[u], point[v]]).collect())
+}
+
+fn fan_has_area(corners: &[[f64; 3]]) -> bool {
+    let corners: Vec<glam::DVec3> = corners.iter().map(|corner| glam::DVec3::from(*corner)).collect();
+    let edge = |corner: usize| corners[corner] - corners[0];
+    (2..corners.len()).any(|corner| edge(corner - 1).cross(edge(corner)) != glam::DVec3::ZERO)
 }
 
 fn is_convex(points: &[[f64; 2]]) -> bool {
@@ -68,8 +93,10 @@ fn clip_ears(points: &[[f64; 2]]) -> Option<Vec<[usize; 3]>> {
         left.remove(ear);
         start = ear;
     }
+    // The signed areas sum up to that of the face: what is too much is taken away here.
+    let is_simple = turn(points[left[0]], points[left[1]], points[left[2]]) >= 0.0;
     triangles.push([left[0], left[1], left[2]]);
-    Some(triangles)
+    is_simple.then_some(triangles)
 }
 
 fn triangle(left: &[usize], i: usize) -> [usize; 3] {
@@ -111,7 +138,7 @@ mod tests {
                 if turn >= 3 {
                     corners.reverse();
                 }
-                let triangles = split(&corners).unwrap();
+                let Split::Triangles(triangles) = split(&corners) else { panic!("not divided") };
                 assert_eq!(triangles.len(), 6);
                 assert!((area(&corners, &triangles) - 10.0).abs() < 1e-5, "start {start}, turn {turn}");
                 let normal = |[a, b, c]: [usize; 3]| {
@@ -124,17 +151,31 @@ mod tests {
     }
 
     #[test]
-    fn convex_flat_tangled_and_huge_faces_stay_fans() {
+    fn convex_and_flat_faces_are_fans_and_crossed_ones_are_known() {
         let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-        assert_eq!(split(&square), None);
-        assert_eq!(split(&[[1.0; 3]; 5]), None);
-        assert_eq!(split(&[]), None);
-        let star = |i: usize| {
-            let angle = i as f64 * std::f64::consts::TAU / 50_000.0;
-            let radius = if i.is_multiple_of(2) { 1.0 } else { 0.5 };
-            [radius * angle.cos(), radius * angle.sin(), 0.0]
-        };
-        assert_eq!(split(&(0..50_000).map(star).collect::<Vec<_>>()), None);
-        assert_eq!(split(&(0..1_000).map(|i| star(50 * i + i % 2)).collect::<Vec<_>>()).unwrap().len(), 998);
+        assert_eq!(split(&square), Split::Fan);
+        assert_eq!(split(&[[1.0; 3]; 5]), Split::Fan);
+        assert_eq!(split(&[]), Split::Fan);
+        let crossed = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [1.0, -1.0, 0.0]];
+        assert_eq!(split(&crossed), Split::Crossed);
+        let bow_tie = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+        assert_eq!(split(&bow_tie), Split::Crossed);
+    }
+
+    #[test]
+    fn stars_of_any_size_are_covered_once() {
+        for count in [8, MOST_EARS, MOST_EARS + 2, 1_000, 1_002, 50_000] {
+            let corner = |i: usize| {
+                let angle = i as f64 * std::f64::consts::TAU / count as f64;
+                let radius = if i.is_multiple_of(2) { 1.0 } else { 0.5 };
+                [3.0, radius * angle.cos(), radius * angle.sin()]
+            };
+            let corners: Vec<_> = (0..count).map(corner).collect();
+            let Split::Triangles(triangles) = split(&corners) else { panic!("{count} corners") };
+            assert_eq!(triangles.len(), count - 2);
+            // As many kites with sides of 1 and 0.5 as half of the corners.
+            let expected = 0.5 * count as f64 * 0.5 * (std::f64::consts::TAU / count as f64).sin();
+            assert!((area(&corners, &triangles) / expected - 1.0).abs() < 1e-9, "{count} corners");
+        }
     }
 }

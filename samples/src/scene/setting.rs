@@ -49,6 +49,7 @@ impl Setting {
             positions: mesh.positions,
             normals: mesh.normals,
             texcoords: mesh.texcoords,
+            colors: mesh.colors,
             triangles: mesh.triangles,
             triangle_materials: mesh.triangle_materials,
             source_triangles: mesh.source_triangles,
@@ -61,6 +62,7 @@ impl Setting {
             sky: self.sky,
             cameras: self.cameras,
             degenerate_triangle_count: 0,
+            resize: 1.0,
             warnings: Vec::new(),
         }
     }

@@ -1,6 +1,6 @@
 //! Images on surfaces.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use lvk::{readable_line, readable_name};
 
@@ -83,42 +83,9 @@ impl Texture {
     }
 }
 
-/// Finds the file that an MTL means by `name`, seen from `folder`: as written (backslashes are separators),
-/// with other capitals, or, if the folders of the name do not exist on this machine, by its last part
-/// in `folder` or in `folder/textures`.
-pub(super) fn find_image(folder: &Path, name: &str) -> Option<PathBuf> {
-    let name = name.replace('\\', "/");
-    let last = name.rsplit('/').next().unwrap_or_default();
-    let candidates = [folder.join(&name), folder.join(last), folder.join("textures").join(last)];
-    let exact = candidates.iter().find(|path| path.is_file()).cloned();
-    exact.or_else(|| candidates.iter().find_map(|path| with_other_capitals(path)))
-}
-
-fn with_other_capitals(path: &Path) -> Option<PathBuf> {
-    let wanted = path.file_name()?.to_str()?.to_lowercase();
-    let entries = std::fs::read_dir(path.parent()?).ok()?.flatten();
-    let matching = entries.filter(|entry| entry.file_name().to_string_lossy().to_lowercase() == wanted);
-    matching.map(|entry| entry.path()).filter(|path| path.is_file()).min()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn images_are_opened_by_foreign_paths_and_capitals() {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("textures")).unwrap();
-        std::fs::write(folder.path().join("textures/Wood.PNG"), b"").unwrap();
-        let wood = folder.path().join("textures/Wood.PNG").canonicalize().unwrap();
-        for name in
-            ["textures/Wood.PNG", "textures\\Wood.PNG", "C:\\art\\Wood.PNG", "wood.png", "Textures/wood.png"]
-        {
-            let found = find_image(folder.path(), name).unwrap();
-            assert_eq!(found.canonicalize().unwrap(), wood, "{name}");
-        }
-        assert_eq!(find_image(folder.path(), "stone.png"), None);
-    }
 
     #[test]
     fn a_broken_image_is_an_error_and_not_a_panic() {

@@ -76,6 +76,6 @@ impl GpuView {
     }
 }
 
-const _: () = assert!(std::mem::offset_of!(FrameConstants, views) == 160);
-const _: () = assert!(std::mem::offset_of!(FrameConstants, counts) == 368);
-const _: () = assert!(std::mem::offset_of!(FrameConstants, sun) == 384);
+const _: () = assert!(std::mem::offset_of!(FrameConstants, views) == 168);
+const _: () = assert!(std::mem::offset_of!(FrameConstants, counts) == 376);
+const _: () = assert!(std::mem::offset_of!(FrameConstants, sun) == 392);

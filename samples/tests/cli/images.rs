@@ -20,7 +20,7 @@ fn a_scene_that_cannot_be_loaded_is_named_and_leaves_nothing() {
         (desk.file("nothing.obj", ""), ["nothing.obj", "not a Wavefront OBJ"]),
         (desk.file("points.obj", "v 0 0 0\nv 1 0 0\n"), ["points.obj", "nothing to draw"]),
         (desk.file("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), ["line.obj", "nothing to draw"]),
-        (desk.file("nan.obj", format!("{TRIANGLE}v 0 nan 0\n")), ["nan.obj:5", "not finite"]),
+        (desk.file("nan.obj", format!("{TRIANGLE}v 0 nan 0\nf 1 2 4\n")), ["nan.obj:5", "not finite"]),
         (desk.file("word.obj", format!("{TRIANGLE}v 0 zero 0\n")), ["word.obj:5", "zero"]),
         (desk.file("range.obj", format!("{TRIANGLE}f 1 2 4\n")), ["range.obj:5", "vertex 4"]),
         (desk.file("back.obj", format!("{TRIANGLE}f -1 -2 -4\n")), ["back.obj:5", "vertex -4"]),

@@ -10,6 +10,7 @@ mod hybrid_reference;
 mod hybrid_visibility;
 mod large_scene;
 mod mesh_shaders;
+mod obj_files;
 mod omni_shadows;
 mod panels;
 mod paper;

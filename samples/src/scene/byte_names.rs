@@ -1,0 +1,155 @@
+//! Names in scene files: bytes of any encoding, which a comment may follow, and which may name a file.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use crate::app::input_file::{self, FileKind};
+
+/// Lengths that are tried of a name with several `#`.
+const MOST_ENDS: usize = 8;
+
+/// What the rest of a line may name: all of it, or what stands in front of a `#` behind a blank, longest first. Names may hold
+/// `#`, so the caller takes the first that exists. There is at least one.
+pub(super) fn names_in(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let text = text.trim_ascii();
+    let begins_comment = |at: &usize| text[*at] == b'#' && text[at - 1].is_ascii_whitespace();
+    let ends = (1..text.len()).rev().filter(begins_comment).take(MOST_ENDS);
+    std::iter::once(text).chain(ends.map(|end| text[..end].trim_ascii_end()))
+}
+
+/// The name between quotation marks if `text` begins with one, else all of it.
+pub(super) fn unquoted(text: &[u8]) -> &[u8] {
+    let Some(rest) = text.strip_prefix(b"\"") else { return text };
+    rest.split(|byte| *byte == b'"').next().unwrap_or_default().trim_ascii()
+}
+
+/// Finds the regular file that a scene file in `folder` means by `name`: as written (backslashes are separators), with other
+/// capitals, or, if the folders of the name do not exist on this machine, by its last part in `folder` or in one of its
+/// `subfolders`. Bytes that are no UTF-8 are those of the file's name, or Latin-1 for it.
+pub(super) fn find_file(folder: &Path, name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
+    let name: Vec<u8> = name.iter().map(|byte| if *byte == b'\\' { b'/' } else { *byte }).collect();
+    let last = name.rsplit(|byte| *byte == b'/').next().unwrap_or_default();
+    if last.is_empty() {
+        return None;
+    }
+    let beside = subfolders.iter().map(|subfolder| folder.join(subfolder));
+    let folders: Vec<PathBuf> = std::iter::once(folder.to_path_buf()).chain(beside).collect();
+    let mut candidates: Vec<PathBuf> = paths(&name).iter().map(|path| folder.join(path)).collect();
+    for folder in &folders {
+        candidates.extend(paths(last).iter().map(|path| folder.join(path)));
+    }
+    let exact = candidates.iter().find(|path| path.is_file()).cloned();
+    exact.or_else(|| candidates.iter().find_map(|path| with_other_capitals(path)))
+}
+
+/// The name as a path for messages about a file that is not there.
+pub(super) fn path_of(name: &[u8]) -> PathBuf {
+    paths(name).into_iter().next().unwrap_or_default()
+}
+
+/// Why [`find_file`] found no file at `path`: there is none, or something that is no regular file.
+pub(super) fn why_absent(path: &Path, kind: FileKind) -> String {
+    match input_file::open(path, kind) {
+        Err(error) if error.kind() != ErrorKind::NotFound => error.to_string(),
+        _ => "no such file".to_owned(),
+    }
+}
+
+/// The paths that the bytes of a name may mean.
+fn paths(name: &[u8]) -> Vec<PathBuf> {
+    match std::str::from_utf8(name) {
+        Ok(text) => vec![text.into()],
+        Err(_) => path_of_bytes(name).into_iter().chain([latin_1(name).into()]).collect(),
+    }
+}
+
+#[cfg(unix)]
+fn path_of_bytes(name: &[u8]) -> Option<PathBuf> {
+    use std::os::unix::ffi::OsStrExt;
+    Some(std::ffi::OsStr::from_bytes(name).into())
+}
+
+/// Names of files are text here.
+#[cfg(not(unix))]
+fn path_of_bytes(_: &[u8]) -> Option<PathBuf> {
+    None
+}
+
+fn latin_1(name: &[u8]) -> String {
+    name.iter().map(|byte| char::from(*byte)).collect()
+}
+
+/// The file in the same folder whose name differs in capitals, or in whether it is UTF-8 or Latin-1.
+fn with_other_capitals(path: &Path) -> Option<PathBuf> {
+    let folded = |name: &std::ffi::OsStr| {
+        let bytes = name.as_encoded_bytes();
+        std::str::from_utf8(bytes).map_or_else(|_| latin_1(bytes), str::to_owned).to_lowercase()
+    };
+    let wanted = folded(path.file_name()?);
+    let entries = std::fs::read_dir(path.parent()?).ok()?.flatten();
+    let matching = entries.filter(|entry| folded(&entry.file_name()) == wanted);
+    matching.map(|entry| entry.path()).filter(|path| path.is_file()).min()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_comment_may_end_a_name() {
+        let found =
+            |text: &str| -> Vec<String> { names_in(text.as_bytes()).map(lvk::readable_bytes).collect() };
+        assert_eq!(found(" wall "), ["wall"]);
+        assert_eq!(found("wall # north"), ["wall # north", "wall"]);
+        assert_eq!(found("no #1 wall\t# north"), ["no #1 wall\\t# north", "no #1 wall", "no"]);
+        assert_eq!(found("wall#2"), ["wall#2"]);
+        assert_eq!(found("#2"), ["#2"]);
+        assert_eq!(found(&"a #".repeat(100_000)).len(), MOST_ENDS + 1);
+        assert_eq!(unquoted(b"\"a b.png\" # c"), b"a b.png");
+    }
+
+    #[test]
+    fn foreign_paths_and_other_capitals_lead_to_files() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("textures")).unwrap();
+        std::fs::write(folder.path().join("textures/Wood.PNG"), b"").unwrap();
+        let wood = folder.path().join("textures/Wood.PNG").canonicalize().unwrap();
+        for name in
+            ["textures/Wood.PNG", "textures\\Wood.PNG", "C:\\art\\Wood.PNG", "wood.png", "Textures/wood.png"]
+        {
+            let found = find_file(folder.path(), name.as_bytes(), &["textures"]).unwrap();
+            assert_eq!(found.canonicalize().unwrap(), wood, "{name}");
+        }
+        for name in ["stone.png", "", "textures", "textures/", "."] {
+            assert_eq!(find_file(folder.path(), name.as_bytes(), &["textures"]), None, "{name}");
+        }
+        assert_eq!(find_file(folder.path(), b"wood.png", &[]), None);
+    }
+
+    #[test]
+    fn latin_1_names_files_of_utf_8() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("Größe.png"), b"").unwrap();
+        for name in
+            ["Größe.png".as_bytes(), b"Gr\xf6\xdfe.png", b"gr\xf6\xdfe.PNG", b"D:\\x\\GR\xd6\xdfE.png"]
+        {
+            assert!(find_file(folder.path(), name, &[]).is_some(), "{}", lvk::readable_bytes(name));
+        }
+        assert_eq!(find_file(folder.path(), b"Gr\xfc\xdfe.png", &[]), None);
+    }
+
+    /// macOS takes no such names.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn names_of_files_are_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, content) in [(&b"M\xe4.mtl"[..], "a"), (b"M\xf6.mtl", "b")] {
+            std::fs::write(folder.path().join(path_of_bytes(name).unwrap()), content).unwrap();
+        }
+        let content = |name: &[u8]| std::fs::read(find_file(folder.path(), name, &[]).unwrap()).unwrap();
+        assert_eq!(
+            (content(b"M\xe4.mtl"), content(b"M\xf6.mtl"), content(b"m\xd6.MTL")),
+            (b"a".to_vec(), b"b".to_vec(), b"b".to_vec())
+        );
+    }
+}

@@ -1,0 +1,135 @@
+//! Makes a mesh of parsed OBJ text: checks, places and divides its faces.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use lvk::readable_name;
+
+use super::SceneError;
+use super::mesh::Mesh;
+use super::obj_text::{KINDS, NONE, ObjText};
+use super::placement::{Extent, Placement};
+use super::polygon::{self, Split};
+use crate::app::progress::Progress;
+
+/// Bounds of the positions that faces with an area use. Warns of texture coordinates and normals that are no numbers, where faces use them.
+///
+/// # Errors
+/// [`SceneError::NotFinite`] for the first such position.
+pub(super) fn check(path: &Path, obj: &mut ObjText) -> Result<Extent, SceneError> {
+    let mut used =
+        [obj.positions.len(), obj.texcoords.len(), obj.normals.len()].map(|count| vec![false; count]);
+    let mut extent = Extent::new();
+    for face in 0..obj.faces.len() {
+        add_face(&mut extent, obj, face);
+    }
+    for corner in &obj.corners {
+        for (used, &index) in used.iter_mut().zip(corner).filter(|(_, index)| **index != NONE) {
+            used[index as usize] = true;
+        }
+    }
+    let flaws = std::mem::take(&mut obj.flaws);
+    for flaw in flaws.into_iter().filter(|flaw| used[flaw.kind][flaw.index]) {
+        let line = flaw.line;
+        let mended = match flaw.kind {
+            0 => return Err(SceneError::NotFinite { path: path.into(), line }),
+            1 => "0 stands in for it",
+            _ => "a normal is computed",
+        };
+        let path = readable_name(path);
+        let what = KINDS[flaw.kind];
+        let text = format!("{path}:{line}: the {what} lacks a finite number; {mended}");
+        obj.warnings.push(if flaw.kind == 1 { "texture coordinates" } else { "normals" }, text);
+    }
+    Ok(extent)
+}
+
+/// Adds the corners of a face, unless they are at fewer than three places, so that it has no area.
+fn add_face(extent: &mut Extent, obj: &ObjText, face: usize) {
+    let corners = &obj.corners[obj.faces[face].start..obj.face_end(face)];
+    let places = || corners.iter().map(|corner| obj.positions[corner[0] as usize]);
+    let first = places().next();
+    let second = places().find(|place| Some(*place) != first);
+    if places().any(|place| second.is_some() && Some(place) != first && Some(place) != second) {
+        places().for_each(|place| extent.add(place));
+    }
+}
+
+/// The triangles of the faces in scene units. Corners that agree in everything share a vertex. `colors` are linear; empty, or
+/// one for each position. Appends to the warnings of `obj` which faces cross themselves.
+pub(super) fn build(
+    path: &Path,
+    obj: &mut ObjText,
+    colors: &[[f32; 3]],
+    placement: &Placement,
+    progress: &mut Progress,
+) -> Result<Mesh, SceneError> {
+    let mut builder = Builder { obj, colors, placement, mesh: Mesh::default(), numbers: HashMap::new() };
+    let mut crossed_lines = Vec::new();
+    for face in 0..builder.obj.faces.len() {
+        if builder.face(face) {
+            crossed_lines.push(builder.obj.faces[face].line);
+        }
+        if face.is_multiple_of(65_536) {
+            progress.set(face as u64);
+            progress.go_on()?;
+        }
+    }
+    let mesh = builder.mesh;
+    for line in crossed_lines {
+        let path = readable_name(path);
+        let text = format!("{path}:{line}: the face crosses itself; it is filled as a fan");
+        obj.warnings.push("faces", text);
+    }
+    Ok(mesh)
+}
+
+struct Builder<'a> {
+    obj: &'a ObjText,
+    colors: &'a [[f32; 3]],
+    placement: &'a Placement,
+    mesh: Mesh,
+    /// Vertices by the position, texture coordinate and normal of their corners.
+    numbers: HashMap<[u32; 3], u32>,
+}
+
+impl Builder<'_> {
+    /// Appends the triangles of a face; true if it crosses itself.
+    fn face(&mut self, number: usize) -> bool {
+        let range = self.obj.faces[number].start..self.obj.face_end(number);
+        let vertices: Vec<u32> = range.clone().map(|corner| self.vertex(self.obj.corners[corner])).collect();
+        let material = self.obj.faces[number].material;
+        let split = match range.len() {
+            3 => Split::Fan,
+            _ => {
+                let place = |corner: &[u32; 3]| self.placement.place(self.obj.positions[corner[0] as usize]);
+                polygon::split(&self.obj.corners[range].iter().map(place).collect::<Vec<_>>())
+            }
+        };
+        let is_crossed = split == Split::Crossed;
+        match split {
+            Split::Triangles(triangles) => {
+                for triangle in triangles {
+                    self.mesh.add_triangle(triangle.map(|corner| vertices[corner]), material);
+                }
+            }
+            Split::Fan | Split::Crossed => {
+                for pair in vertices[1..].windows(2) {
+                    self.mesh.add_triangle([vertices[0], pair[0], pair[1]], material);
+                }
+            }
+        }
+        is_crossed
+    }
+
+    fn vertex(&mut self, corner: [u32; 3]) -> u32 {
+        *self.numbers.entry(corner).or_insert_with(|| {
+            let [position, texcoord, normal] = corner.map(|index| index as usize);
+            let placed = self.placement.place(self.obj.positions[position]).map(|x| x as f32);
+            let [u, v] = self.obj.texcoords.get(texcoord).copied().unwrap_or_default();
+            let normal = self.obj.normals.get(normal).copied().unwrap_or_default();
+            self.mesh.colors.extend(self.colors.get(position));
+            self.mesh.add_vertex(placed, normal, [u, 1.0 - v])
+        })
+    }
+}
