@@ -68,6 +68,18 @@ pub enum DriverError {
         /// The accepted values.
         expected: &'static str,
     },
+    /// The address space of the process is limited to less than the software driver needs.
+    #[error(
+        "the address space of this process is limited to {} MiB, and the software driver needs {} MiB: without them it \
+         would end the process; raise the limit (`ulimit -v unlimited`)",
+        limit >> 20, needed >> 20
+    )]
+    AddressSpace {
+        /// The limit, in bytes.
+        limit: u64,
+        /// Bytes that the driver needs.
+        needed: u64,
+    },
     /// A downloaded file cannot be used.
     #[error("the downloaded {} cannot be used: {reason}; {}", lvk::readable_name(path), remedy(reason))]
     Broken {

@@ -14,6 +14,7 @@
 //! | `LVK_VULKAN_DIR=path` | the folder for downloaded files |
 //! | `VK_DRIVER_FILES`, `VK_ICD_FILENAMES` | drivers chosen by the user, used unchanged |
 
+mod address_space;
 mod apt;
 mod cache_folder;
 mod display;
@@ -90,8 +91,8 @@ struct Prepared {
 /// Provides a Vulkan driver to this process. Downloads a software driver if the system has none with ray tracing.
 ///
 /// Call this function before the first Vulkan call, from any thread. Later calls return the same driver at no cost. The
-/// function prints one line with the reason if it takes the downloaded driver for lack of another. It sets `VK_DRIVER_FILES` for a downloaded driver and adds the folder of the downloaded layer to
-/// `VK_ADD_LAYER_PATH`.
+/// function prints one line with the reason if it takes the downloaded driver for lack of another. It sets
+/// `VK_DRIVER_FILES` for a downloaded driver and adds the folder of the downloaded layer to `VK_ADD_LAYER_PATH`.
 ///
 /// # Errors
 /// See [`DriverError`]. Each message names what to install or set.
@@ -221,6 +222,7 @@ impl DriverSource {
         if self == Self::UserDrivers {
             return Ok(Driver { loader, origin: DriverOrigin::System, system: None });
         }
+        address_space::check()?;
         library_preload::preload(&folder, &Manifest::read(&folder).unwrap_or_default().preload)?;
         Ok(Driver { loader, origin: DriverOrigin::Downloaded { folder }, system: None })
     }
