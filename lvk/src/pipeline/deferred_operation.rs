@@ -36,7 +36,11 @@ pub(crate) unsafe fn compile(
         (vk::Result::OPERATION_NOT_DEFERRED_KHR, _) => vk::Result::SUCCESS,
         (result, _) => result,
     });
-    result.result().map_err(Error::vulkan("vkCreateRayTracingPipelinesKHR"))?;
+    if let Err(error) = result.result() {
+        // SAFETY: null, or a pipeline that was made before the operation failed, and that is used nowhere.
+        unsafe { gpu.device.destroy_pipeline(raw, None) };
+        return Err(Error::vulkan("vkCreateRayTracingPipelinesKHR")(error));
+    }
     Ok(raw)
 }
 

@@ -98,6 +98,7 @@ whole_sweeps! {
     whole_reflections_software: "reflections --width 64 --height 36 --frames 1 --rt software --samples 1";
     whole_hello_triangle: "hello_triangle --width 64 --height 36 --frames 1";
     whole_deferred: "deferred --width 64 --height 36 --frames 1 --lights 20";
+    whole_mesh_shaders: "mesh_shaders --width 64 --height 36 --frames 1";
     whole_omni_shadows: "omni_shadows --width 64 --height 36 --frames 1";
     whole_render_to_cube_map: "render_to_cube_map --width 64 --height 36 --frames 1 --face-size 32";
     whole_sponza: "sponza --width 64 --height 36 --frames 1 --shadow-size 256";

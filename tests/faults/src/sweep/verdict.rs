@@ -150,6 +150,8 @@ fn names_cause(error: &str, fault: &Fault) -> bool {
         || fault.error == FaultError::SurfaceLost && names("its window is gone")
         // The loader calls it while it creates a device.
         || fault.command == "vkEnumerateDeviceExtensionProperties" && names("vkCreateDevice")
+        // Its result is that of the command that was deferred.
+        || fault.command == "vkGetDeferredOperationResultKHR" && names("vkCreateRayTracingPipelinesKHR")
 }
 
 #[cfg(test)]
@@ -205,6 +207,8 @@ mod tests {
         };
         let memory = FaultError::HostMemory;
         assert!(names("vkEnumerateDeviceExtensionProperties", memory, "error: vkCreateDevice failed"));
+        let deferred = "error: out of host memory in vkCreateRayTracingPipelinesKHR for 'rays'";
+        assert!(names("vkGetDeferredOperationResultKHR", memory, deferred));
         assert!(names("vkQueuePresentKHR", FaultError::SurfaceLost, "error: swapchain: its window is gone"));
         assert!(!names("vkQueuePresentKHR", memory, "error: swapchain: its window is gone"));
         assert!(!names("vkCreateBuffer", memory, "error: vkCreateDevice failed"));
