@@ -488,14 +488,14 @@ fn create(
     // The structures pushed below precede the caller's chain, which stays unchanged.
     all.p_next = extra.feature_chain();
     let all = all.push_next(&mut chain.v11).push_next(&mut chain.v12).push_next(&mut chain.v13);
-    let mut all = chain.ext.append_to_chain(all, &|name| extensions.contains(&name));
+    let all = chain.ext.append_to_chain(all, &|name| extensions.contains(&name));
     let priorities = [1.0; 3];
     let queues = queue_infos(&chosen.queue_locations, &priorities);
     let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
-    let info = vk::DeviceCreateInfo::default()
-        .queue_create_infos(&queues)
-        .enabled_extension_names(&names)
-        .push_next(&mut all);
+    let mut info =
+        vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&names);
+    // `push_next` would write to the last structure, which may be the caller's, in memory that is only shared.
+    info.p_next = (&raw const all).cast();
     // SAFETY: every pointer in `info` lives until the end of this function. The caller guarantees the
     // validity of its own chain.
     let make = || unsafe { instance.raw.create_device(chosen.raw, &info, None) };

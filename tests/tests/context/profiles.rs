@@ -321,11 +321,8 @@ fn extensions_of_the_callers_own_are_on() {
     };
     let refused = module(&plain).map(drop).unwrap_err().to_string();
     assert!(refused.contains("FragmentShaderPixelInterlockEXT"), "{refused}");
-    // SAFETY: the physical device belongs to the instance.
-    let there =
-        unsafe { plain.raw_instance().enumerate_device_extension_properties(plain.raw_physical_device()) };
     let name = ash::ext::fragment_shader_interlock::NAME;
-    if !there.unwrap().iter().any(|found| found.extension_name_as_c_str() == Ok(name)) {
+    if !has_extension(&plain, name) {
         eprintln!("NOT TESTED, the device lacks {name:?}");
         return;
     }
@@ -342,6 +339,35 @@ fn extensions_of_the_callers_own_are_on() {
     // SAFETY: the device is alive.
     let found = unsafe { ctx.raw_instance().get_device_proc_addr(device, c"vkGetMemoryFdKHR".as_ptr()) };
     assert!(found.is_some());
+}
+
+/// The loader maps the bytes of an immutable static without write access.
+#[test]
+fn the_callers_features_may_lie_in_memory_that_cannot_be_written() {
+    static FEATURES: vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'static> =
+        vk::PhysicalDeviceDepthClipEnableFeaturesEXT {
+            s_type: vk::StructureType::PHYSICAL_DEVICE_DEPTH_CLIP_ENABLE_FEATURES_EXT,
+            p_next: std::ptr::null_mut(),
+            depth_clip_enable: vk::TRUE,
+            _marker: std::marker::PhantomData,
+        };
+    let Some(plain) = device() else { return };
+    let name = ash::ext::depth_clip_enable::NAME;
+    if !has_extension(&plain, name) {
+        eprintln!("NOT TESTED, the device lacks {name:?}");
+        return;
+    }
+    let extensions = [name];
+    // SAFETY: the chain is one structure of an extension that the device has; devices that have it have the feature.
+    let extra = unsafe { UserExtensions::new(&[], &extensions, Some(&FEATURES), &[]) };
+    drop(device_with(|desc| desc.user_extensions = extra));
+}
+
+fn has_extension(ctx: &Context, name: &CStr) -> bool {
+    // SAFETY: the physical device belongs to the instance.
+    let there =
+        unsafe { ctx.raw_instance().enumerate_device_extension_properties(ctx.raw_physical_device()) };
+    there.unwrap().iter().any(|found| found.extension_name_as_c_str() == Ok(name))
 }
 
 #[test]

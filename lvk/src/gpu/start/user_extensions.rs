@@ -53,7 +53,7 @@ impl<'a> UserExtensions<'a> {
         self.capabilities
     }
 
-    /// Returns the head of the chain, or null. Vulkan only reads the chain.
+    /// Returns the head of the chain, or null. Neither Vulkan nor the library writes to the chain.
     pub(crate) fn feature_chain(&self) -> *mut c_void {
         self.features.map_or(ptr::null_mut(), |head| ptr::from_ref(head).cast::<c_void>().cast_mut())
     }
