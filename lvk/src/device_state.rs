@@ -339,20 +339,19 @@ impl DeviceState {
 
 impl Drop for DeviceState {
     fn drop(&mut self) {
-        // SAFETY: no command buffer is being recorded or submitted: each holds a reference to `self`.
-        let idle = persistent_wait(|| unsafe { self.gpu.device.device_wait_idle() }, std::thread::sleep);
+        let idle = persistent_wait(|| self.gpu.queues.wait_idle(&self.gpu.device), std::thread::sleep);
         // The caller has the report of a loss.
         if let Err(result) = idle
             && self.submitter.loss().get().is_none()
         {
-            log::error!("vkDeviceWaitIdle returned {result} at the end of a context");
+            log::error!("vkQueueWaitIdle returned {result} at the end of a context");
         }
         drop(self.submitter.drain());
         self.free_leaked_objects();
     }
 }
 
-/// Waits for the device. A wait that fails for want of memory is tried again for about a second: objects that the device
+/// Waits for the queues. A wait that fails for want of memory is tried again for about a second: objects that the device
 /// still uses must not be destroyed, and the work that is under way ends in the meantime.
 fn persistent_wait(
     mut wait: impl FnMut() -> Result<(), vk::Result>,

@@ -418,7 +418,8 @@ impl<T> Submitter<T> {
     /// uses the semaphores that a submission waited for after the submission has signalled its own.
     pub(crate) fn wait_for_semaphores(&self) -> Result<()> {
         if self.uses_external_semaphores.load(Ordering::Relaxed) {
-            self.explain_loss(self.gpu.queues.wait_idle(&self.gpu.device))?;
+            let idle = self.gpu.queues.wait_idle(&self.gpu.device);
+            self.explain_loss(idle.map_err(Error::vulkan("vkQueueWaitIdle")))?;
         }
         Ok(())
     }

@@ -2,15 +2,16 @@
 //! the library destroys nothing that it does not own.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use std::ffi::CStr;
+use std::ffi::{CStr, c_void};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use lvk::ash::vk::Handle;
 use lvk::ash::{self, vk};
 use lvk::{
-    BufferHandle, BufferUsage, ColorAttachment, CommandBuffer, ComputePipelineHandle, Context, ContextDesc,
-    Dependencies, Error, FeatureSet, Format, Holder, ImportedBuffer, ImportedTexture, OptionalFeature,
-    RawContext, RawSignal, RawWait, RenderPassDesc, RenderPipelineDesc, ShaderStage, TextureDesc,
-    TextureHandle, TextureUsage, ValidationMode, ValidationSink,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, CommandBuffer, ComputePipelineHandle, Context,
+    ContextDesc, Dependencies, Error, FeatureSet, Format, Holder, ImportedBuffer, ImportedTexture,
+    OptionalFeature, RawContext, RawSignal, RawWait, RenderPassDesc, RenderPipelineDesc, ShaderStage,
+    TextureDesc, TextureHandle, TextureUsage, ValidationMode, ValidationSink,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::guest_engine::GuestInstance;
@@ -505,6 +506,38 @@ fn the_reason_for_the_ray_query_path_is_the_engines_device() {
     let Some(engine) = Engine::new() else { return };
     let reason = engine.context().capabilities().ray_query_reason;
     assert_eq!(reason, "the engine's device has no ray queries enabled");
+}
+
+/// An engine uses its other queues while a context ends, and a wait for the device would need all of them.
+#[test]
+fn a_context_waits_for_its_own_queues_only() {
+    static DEVICE_WAITS: AtomicU32 = AtomicU32::new(0);
+    unsafe extern "system" fn count_wait(_: vk::Device) -> vk::Result {
+        DEVICE_WAITS.fetch_add(1, Ordering::Relaxed);
+        vk::Result::SUCCESS
+    }
+    let Some(engine) = Engine::new() else { return };
+    let handle = engine.device.handle();
+    let find = |name: &CStr| {
+        if name == c"vkDeviceWaitIdle" {
+            return count_wait as *const c_void;
+        }
+        // SAFETY: the device is alive.
+        let found = unsafe { engine.instance.raw.get_device_proc_addr(handle, name.as_ptr()) };
+        found.map_or(std::ptr::null(), |function| function as *const c_void)
+    };
+    // SAFETY: the functions are those of the device, and one of the same signature.
+    let device = unsafe { ash::Device::load_with(find, handle) };
+    // SAFETY: as in `Engine::context`.
+    let ctx =
+        unsafe { Context::from_raw(RawContext { device, ..engine.raw() }, &ContextDesc::default()).unwrap() };
+    let desc = BufferDesc { data: Some(&[7; 64]), ..Default::default() };
+    let buffer = ctx.create_buffer(&desc).unwrap();
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.fill_buffer(*buffer, 0, 64, 8).unwrap();
+    ctx.submit(cmd).unwrap();
+    drop((buffer, ctx));
+    assert_eq!(DEVICE_WAITS.load(Ordering::Relaxed), 0);
 }
 
 #[test]

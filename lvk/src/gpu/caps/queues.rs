@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicU32;
 
 use ash::vk;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
 
@@ -171,12 +171,13 @@ impl Queues {
         self.raw[self.raw_index[queue_index]].lock()
     }
 
-    /// Waits until each Vulkan queue is idle (`vkQueueWaitIdle`).
-    pub(crate) fn wait_idle(&self, device: &ash::Device) -> Result<()> {
-        self.raw.iter().try_for_each(|queue| {
-            // SAFETY: the queue is locked.
-            unsafe { device.queue_wait_idle(*queue.lock()) }.map_err(Error::vulkan("vkQueueWaitIdle"))
-        })
+    /// Waits until each Vulkan queue is idle (`vkQueueWaitIdle`). Unlike a wait for the device, this needs no exclusive
+    /// access to other queues, which the engine of an external device uses.
+    pub(crate) fn wait_idle(&self, device: &ash::Device) -> Result<(), vk::Result> {
+        // SAFETY: the queue is locked.
+        let waits = self.raw.iter().map(|queue| unsafe { device.queue_wait_idle(*queue.lock()) });
+        // A queue whose wait fails does not keep the others from being waited for.
+        waits.fold(Ok(()), Result::and)
     }
 
     /// Returns the family of a queue index.
