@@ -1,6 +1,7 @@
 //! Buffers: downloads equal what was uploaded, copied, filled or written by shaders, and wrong use returns an error.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk::ash::vk;
 use lvk::{BufferCopy, BufferDesc, BufferUsage, Context, Dependencies, Error, Holder, MemoryKind};
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::noise::noise;
@@ -208,7 +209,11 @@ fn impossible_sizes_are_typed_errors() {
         assert!(matches!(error, Error::InvalidUsage { .. }) && names_object(&error), "{error}");
     }
     let limit = ctx.capabilities().limits.max_buffer_bytes;
-    for size in [limit + 1, u64::MAX] {
+    let of_device = largest_buffer(&ctx);
+    assert!((limit..limit + 4).contains(&of_device), "{limit} of {of_device}");
+    // Buffers are made with a multiple of 4 bytes.
+    assert!(limit.next_multiple_of(4) <= of_device, "{limit} of {of_device}");
+    for size in [limit + 1, of_device.max(limit + 1), u64::MAX] {
         match sized(size, None) {
             Error::LimitExceeded { requested, limit: found, .. } => {
                 assert_eq!((requested, found), (size, limit))
@@ -216,6 +221,15 @@ fn impossible_sizes_are_typed_errors() {
             other => unreachable!("{other}"),
         }
     }
+}
+
+/// Returns the size of the largest buffer that the device allows, in bytes.
+fn largest_buffer(ctx: &Context) -> u64 {
+    let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+    let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v13);
+    // SAFETY: the physical device belongs to the instance and has Vulkan 1.3.
+    unsafe { ctx.raw_instance().get_physical_device_properties2(ctx.raw_physical_device(), &mut all) };
+    v13.max_buffer_size
 }
 
 #[test]

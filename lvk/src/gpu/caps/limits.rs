@@ -32,7 +32,7 @@ pub struct Limits {
     pub color_samples: u32,
     /// Supported sample counts of depth targets, as a sum (`framebufferDepthSampleCounts`).
     pub depth_samples: u32,
-    /// Maximum size of a buffer in bytes (`maxBufferSize`).
+    /// Maximum size of a buffer in bytes (`maxBufferSize`, rounded down to a multiple of 4).
     pub max_buffer_bytes: u64,
     /// Maximum memory of one buffer or texture, in bytes (`maxMemoryAllocationSize`).
     pub max_allocation_bytes: u64,
@@ -153,7 +153,8 @@ impl Limits {
         accel: &vk::PhysicalDeviceAccelerationStructurePropertiesKHR<'_>,
         pipeline: &vk::PhysicalDeviceRayTracingPipelinePropertiesKHR<'_>,
     ) -> Self {
-        let accel_bytes = max_accel_bytes(v12.driver_id, plain.max_storage_buffer_range, v13.max_buffer_size);
+        let buffer_bytes = max_buffer_bytes(v13.max_buffer_size);
+        let accel_bytes = max_accel_bytes(v12.driver_id, plain.max_storage_buffer_range, buffer_bytes);
         let mut limits = Self {
             max_lod_bias: plain.max_sampler_lod_bias,
             max_texture_1d: plain.max_image_dimension1_d,
@@ -163,7 +164,7 @@ impl Limits {
             max_texture_layers: plain.max_image_array_layers,
             color_samples: plain.framebuffer_color_sample_counts.as_raw(),
             depth_samples: plain.framebuffer_depth_sample_counts.as_raw(),
-            max_buffer_bytes: v13.max_buffer_size,
+            max_buffer_bytes: buffer_bytes,
             max_storage_buffer_range: plain.max_storage_buffer_range.into(),
             max_push_constant_bytes: plain.max_push_constants_size,
             max_color_targets: plain.max_color_attachments.min(8),
@@ -225,6 +226,12 @@ mod software {
     pub(crate) const MAX_PRIMITIVES: u64 = 1 << 27;
 }
 
+/// Returns the maximum size of a buffer in bytes. Buffers are created with a multiple of 4 bytes, which must not exceed the
+/// device's own limit, `u32::MAX` on lavapipe.
+fn max_buffer_bytes(of_device: u64) -> u64 {
+    of_device - of_device % 4
+}
+
 /// Returns the maximum size of an acceleration structure or its scratch, in bytes. Builds with Arm's own
 /// driver fail if either exceeds the range of a storage buffer, although Vulkan has no such limit.
 fn max_accel_bytes(driver: vk::DriverId, storage_range: u32, buffer_bytes: u64) -> u64 {
@@ -256,6 +263,14 @@ fn size_bindless(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_within_the_limit_stay_within_it_when_they_are_rounded_up() {
+        for of_device in [u64::from(u32::MAX), 1 << 30, u64::MAX, u64::MAX - 3, 7] {
+            let most = max_buffer_bytes(of_device);
+            assert!(most.next_multiple_of(4) <= of_device && of_device - most < 4, "{of_device}");
+        }
+    }
 
     #[test]
     fn only_arms_driver_bounds_structures_by_the_storage_range() {
