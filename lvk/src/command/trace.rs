@@ -22,10 +22,12 @@ impl CommandBuffer {
     pub fn bind_ray_tracing_pipeline(&mut self, pipeline: RayTracingPipelineHandle) -> Result<()> {
         self.needs_compute("a trace")?;
         let pipeline = self.shared.store.ray_tracing_pipelines.get(pipeline)?;
+        // A pass that was forgotten instead of dropped is still open, and Vulkan sets no stack size in a pass.
+        self.end_rendering();
         let point = vk::PipelineBindPoint::RAY_TRACING_KHR;
         self.bind_pipeline(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
         let ext = self.shared.gpu.ray_tracing_functions()?;
-        // SAFETY: the command buffer is being recorded, and the size is that of the pipeline just bound.
+        // SAFETY: the command buffer is being recorded outside of a pass, and the size is that of the pipeline just bound.
         unsafe { ext.cmd_set_ray_tracing_pipeline_stack_size(self.raw(), pipeline.stack_bytes) };
         self.ray_tracing = Some(pipeline);
         Ok(())

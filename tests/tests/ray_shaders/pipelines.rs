@@ -1,9 +1,9 @@
 //! Ray tracing pipelines: shader order, records, stacks, libraries, indirect traces, and errors.
 
 use lvk::{
-    BufferDesc, BufferUsage, Context, Dependencies, Error, FeatureRequest, HitGroup, Holder,
-    RayTracingLibraryDesc, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderRecord, ShaderStage,
-    SpecializationConstant, SpecializationValue, record_bytes,
+    BufferDesc, BufferUsage, ColorAttachment, Context, Dependencies, Error, FeatureRequest, HitGroup, Holder,
+    RayTracingLibraryDesc, RayTracingPipelineDesc, RenderPassDesc, Result, ShaderModuleHandle, ShaderRecord,
+    ShaderStage, SpecializationConstant, SpecializationValue, TextureDesc, TextureUsage, record_bytes,
 };
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::random::Random;
@@ -144,6 +144,22 @@ fn every_kind_of_shader_reads_its_own_record() -> Result<()> {
         assert_eq!(answers, expected.iter().map(|answer| answer + Tag::sum(number)).collect::<Vec<_>>());
     }
     Ok(())
+}
+
+/// Vulkan sets the stack size of a pipeline outside of passes only.
+#[test]
+fn a_forgotten_pass_ends_before_a_pipeline_is_bound() -> Result<()> {
+    let Some(ctx) = pipeline_device() else { return Ok(()) };
+    let ray_gen = ray_gen(&ctx, "", "0u")?;
+    let desc = RayTracingPipelineDesc { ray_gen: &[*ray_gen], ..Default::default() };
+    let pipeline = ctx.create_ray_tracing_pipeline(&desc)?;
+    let target = ctx.create_texture(&TextureDesc { usage: TextureUsage::TARGET, ..Default::default() })?;
+    let color = [ColorAttachment::clear(*target, [0.0; 4])];
+    let mut cmd = ctx.acquire_command_buffer()?;
+    std::mem::forget(cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() })?);
+    cmd.bind_ray_tracing_pipeline(*pipeline)?;
+    ctx.submit(cmd)?;
+    ctx.wait_idle()
 }
 
 #[test]
