@@ -91,10 +91,15 @@ impl Context {
     }
 
     /// Writes the initial contents with a host copy, so that no submission is needed.
-    fn fill_with_host_copy(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
+    ///
+    /// # Safety
+    /// The texture is new, and its image has the usage for host copies. The regions are different mips of it, each with all
+    /// of its bytes.
+    unsafe fn fill_with_host_copy(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
         let (shared, image) = (self.device_state(), &texture.image);
         let range = image.barrier_image().range(image.shape.all_subresources());
-        host_copy::fill_from_host(&shared.gpu, image.raw, range, contents)?;
+        // SAFETY: guaranteed by the caller.
+        unsafe { host_copy::fill_from_host(&shared.gpu, image.raw, range, contents) }?;
         shared.submitter.mark_host_written(image.id, image.shape);
         Ok(())
     }
@@ -118,7 +123,9 @@ impl Context {
             }
         }
         if texture.image.host_filled {
-            return self.fill_with_host_copy(&texture, &regions);
+            // SAFETY: the image was created to be filled so, and no command has used it. Each region is a mip with the bytes
+            // that were split off for it.
+            return unsafe { self.fill_with_host_copy(&texture, &regions) };
         }
         for (region, bytes) in regions {
             self.upload_region(&texture, region, bytes)?;

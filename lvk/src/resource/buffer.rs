@@ -279,8 +279,8 @@ impl Buffer {
     pub(crate) fn write_initial(&self, bytes: &[u8]) -> bool {
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
         let reached = self.allocation.as_ref().filter(|own| own.properties.contains(coherent));
-        let Some(start) = reached.and_then(ObjectMemory::mapped) else { return false };
-        debug_assert!(bytes.len() as u64 <= self.size_bytes);
+        let start = reached.and_then(ObjectMemory::mapped).filter(|_| self.contains(0, bytes.len()));
+        let Some(start) = start else { return false };
         // SAFETY: the mapping has the buffer's size and lives as long as `self`, which no other thread uses yet.
         unsafe { start.as_ptr().copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
         true
@@ -295,10 +295,17 @@ impl Buffer {
         true
     }
 
+    /// True if `size` bytes from `offset` on lie inside the buffer. Callers have told the user of any other range, so this
+    /// only keeps a mistake of theirs from memory behind the mapping.
+    fn contains(&self, offset: u64, size: usize) -> bool {
+        let is_inside = offset.checked_add(size as u64).is_some_and(|end| end <= self.size_bytes);
+        debug_assert!(is_inside, "{size} bytes at {offset} are outside of '{}'", self.name);
+        is_inside
+    }
+
     /// Writes mapped memory. Returns `false` if the buffer is not mapped. The range must have been checked.
     pub(crate) fn write(&self, offset: u64, bytes: &[u8]) -> bool {
-        let Some(start) = self.mapped() else { return false };
-        debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
+        let Some(start) = self.mapped().filter(|_| self.contains(offset, bytes.len())) else { return false };
         let _copying = self.copying.lock();
         // SAFETY: the range lies inside the mapping, which lives as long as `self`; other threads wait.
         unsafe {
@@ -309,8 +316,7 @@ impl Buffer {
 
     /// Reads mapped memory. Returns `false` if the buffer is not mapped. The range must have been checked.
     pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> bool {
-        let Some(start) = self.mapped() else { return false };
-        debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
+        let Some(start) = self.mapped().filter(|_| self.contains(offset, bytes.len())) else { return false };
         let _copying = self.copying.lock();
         // SAFETY: the range lies inside the mapping, which lives as long as `self`; other threads wait.
         unsafe {

@@ -30,9 +30,11 @@ fn is_plain(desc: &TextureDesc<'_>) -> bool {
         && planes == 1
 }
 
-/// Writes the initial contents of a new image for which [`can_fill_from_host`] is true. Each region has all of its
-/// bytes. `range` is the whole image.
-pub(crate) fn fill_from_host(
+/// Writes the initial contents of a new image for which [`can_fill_from_host`] is true. `range` is the whole image.
+///
+/// # Safety
+/// The image is new and has the usage for host copies. The regions are different mips of it, each with all of its bytes.
+pub(crate) unsafe fn fill_from_host(
     gpu: &Gpu,
     image: vk::Image,
     range: vk::ImageSubresourceRange,
@@ -49,8 +51,7 @@ pub(crate) fn fill_from_host(
         copy
     };
     let copies_to_make: Vec<_> = contents.iter().map(copy).collect();
-    // SAFETY: the image is new and has the usage for host copies; the regions are different mips of the image and have
-    // all their bytes.
+    // SAFETY: guaranteed by the caller.
     unsafe { copies.write_image(image, range, &copies_to_make) }
 }
 
