@@ -48,7 +48,8 @@ pub(super) fn check_manifest(path: &Path, variables: Variables<'_>, open: OpenLi
 
 /// Opens a driver's library and closes it. Fails if it is no Vulkan driver.
 pub(super) fn open_library(path: &Path) -> Result<(), String> {
-    // SAFETY: the Vulkan loader opens the same library, so its initialisers run in this process anyway.
+    // SAFETY: the Vulkan loader opens the same library, so its initialisers run in this process anyway. Like the loader, a
+    // program with more privileges than its user takes no library from the environment.
     let library = unsafe { libloading::Library::new(path) }.map_err(|error| with_causes(&error))?;
     let entries: [&[u8]; 2] = [b"vk_icdGetInstanceProcAddr\0", b"vkGetInstanceProcAddr\0"];
     // SAFETY: the symbols are only looked up; a pointer of any type fits.

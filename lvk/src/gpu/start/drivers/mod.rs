@@ -5,7 +5,9 @@
 mod json;
 mod manifest;
 mod manifest_search;
+mod privileges;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::error::causes::with_causes;
@@ -27,7 +29,8 @@ const LOADER_NAME: &str = if cfg!(windows) {
 impl DriverReport {
     /// Searches the driver manifests and opens the library of each, which executes its initialisers.
     pub(crate) fn query(loader: LoaderReport, failure: Option<String>) -> Self {
-        let variables = |name: &str| std::env::var_os(name);
+        let is_privileged = privileges::exceed_the_users();
+        let variables = |name: &str| trusted_variable(name, is_privileged);
         let searched = searched_paths(&variables);
         let files = manifest_files(&searched);
         let manifests = files.iter().map(|path| check_manifest(path, &variables, &open_library)).collect();
@@ -52,6 +55,11 @@ impl LoaderReport {
     }
 }
 
+/// Returns the value of an environment variable; `None` in a program with more privileges than its user, like the loader.
+fn trusted_variable(name: &str, is_privileged: bool) -> Option<OsString> {
+    if is_privileged { None } else { std::env::var_os(name) }
+}
+
 /// Returns the mapped file whose name begins with `name`, from Linux's list of the mappings of a process.
 fn mapped_file(maps: &str, name: &str) -> Option<PathBuf> {
     let files = maps.lines().filter_map(|line| line.find('/').and_then(|start| line.get(start..)));
@@ -74,6 +82,12 @@ mod tests {
         assert_eq!(mapped_file(maps, "libvulkan.so.1"), Some("/opt/my libs/libvulkan.so.1.3.239".into()));
         assert_eq!(mapped_file(maps, "vulkan-1.dll"), None);
         assert_eq!(mapped_file("", "libvulkan.so.1"), None);
+    }
+
+    #[test]
+    fn a_privileged_program_takes_nothing_from_the_environment() {
+        assert!(trusted_variable("PATH", false).is_some());
+        assert_eq!(trusted_variable("PATH", true), None);
     }
 
     #[test]
