@@ -17,7 +17,8 @@ use crate::resource::ycbcr::YuvConversion;
 pub struct ContextDesc<'a> {
     /// Name of the application, for drivers and tools. Default: `"lvk"`.
     pub application_name: &'a str,
-    /// The Vulkan loader to open instead of the system's `libvulkan.so.1`. Default: none.
+    /// The Vulkan loader to open instead of the system's `libvulkan.so.1`. Its code runs in the process, so name only a
+    /// library that is as trustworthy as the program. Default: none.
     pub vulkan_library: Option<&'a Path>,
     /// The device to use: its index in [`Context::devices`](crate::Context::devices) or part of its name. The
     /// environment variable `LVK_DEVICE` takes precedence. Without either, the best device that meets the requirements

@@ -24,8 +24,9 @@ impl Context {
     /// the layer is on: without it, there are no messages.
     ///
     /// # Safety
-    /// The handles must belong together and live until the last clone, holder and command buffer of the context is
-    /// dropped. Everything that `raw` declares as enabled must have been enabled at device creation. In addition every
+    /// The handles must belong together and live until the last object that refers to the context is dropped: clones,
+    /// holders and command buffers, but also each `SharedSemaphore`, [`Readback`](crate::Readback),
+    /// [`PendingPipeline`](crate::PendingPipeline) and `Reloadable`. Everything that `raw` declares as enabled must have been enabled at device creation. In addition every
     /// feature that [`Context::new`](Self::new) needs of a device must be enabled: `bufferDeviceAddress`,
     /// `timelineSemaphore`, `synchronization2`, `dynamicRendering`, `maintenance4`, `scalarBlockLayout`,
     /// `hostQueryReset`, `independentBlend`, `runtimeDescriptorArray`, `descriptorBindingPartiallyBound`,
@@ -40,7 +41,8 @@ impl Context {
     /// ([`DeviceRequirements::feature_chain`](crate::DeviceRequirements::feature_chain)).
     ///
     /// Other code must use the queues only within [`with_raw_queue`](Self::with_raw_queue) or
-    /// [`with_raw_queue_of`](Self::with_raw_queue_of), or while no thread uses the context.
+    /// [`with_raw_queue_of`](Self::with_raw_queue_of), or while no thread uses the context. The end of the context waits
+    /// for these queues. Other queues of the device are the caller's alone.
     ///
     /// # Errors
     /// [`NoDevice`](crate::Error::NoDevice) where the device lacks a requirement of the library;

@@ -210,7 +210,8 @@ impl PresentSync {
 
 impl Drop for PresentSync {
     fn drop(&mut self) {
-        // SAFETY: the owner has waited for the presents.
+        // SAFETY: the owner has waited for the presents, or has given up those that do not end: a presentation engine that
+        // never finishes them uses the semaphore no more.
         unsafe {
             self.gpu.device.destroy_semaphore(self.drawn, None);
             self.present_fence.into_iter().for_each(|fence| self.gpu.device.destroy_fence(fence, None));

@@ -44,7 +44,8 @@ impl fmt::Display for ValidationMessage {
 
 /// Collects the messages of the validation layer. Clones are cheap and share the same messages. A test can
 /// therefore keep a clone and read it after the context is destroyed. A logger may read the sink while it
-/// handles a message.
+/// handles a message. It must not use a context then, whose locks the thread may hold, and a panic in it ends the
+/// process: the driver has called it.
 #[derive(Debug, Clone)]
 pub struct ValidationSink {
     messages: Arc<Mutex<Vec<ValidationMessage>>>,

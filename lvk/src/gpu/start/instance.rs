@@ -191,7 +191,8 @@ pub(crate) fn external_extensions(
 }
 
 fn load_entry(library: Option<&Path>) -> Result<ash::Entry, ash::LoadingError> {
-    // SAFETY: the loader is a well-known system library; loading it runs its initialisers only.
+    // SAFETY: opening a library runs its code. It is the system's loader, or the one that the application trusts, as
+    // `ContextDesc::vulkan_library` demands.
     unsafe {
         match library {
             Some(path) => ash::Entry::load_from(path),

@@ -13,6 +13,10 @@ use crate::gpu::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeatur
 ///
 /// The library may hold its locks while it queries the handles and while it drops the last reference to the
 /// window. Neither operation may use a context.
+///
+/// The surface uses the handles for as long as the library holds the value, not only while they are lent. An own
+/// implementation therefore closes the window no earlier than its drop, and returns handles that belong together. Else
+/// the driver uses a window that no longer exists, which is undefined behaviour.
 pub trait WindowHandles: HasDisplayHandle + HasWindowHandle + Send + Sync {}
 
 impl<T: HasDisplayHandle + HasWindowHandle + Send + Sync> WindowHandles for T {}
