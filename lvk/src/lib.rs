@@ -67,6 +67,7 @@
 //! | compute, build and copy while the graphics queue draws | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`], [`CommandBuffer::push_label`] |
+//! | know what is not checked | [`manual::unchecked`] |
 //! | find out why a device was lost | [`DeviceLossReport`], [`ContextDesc::checkpoints`] |
 //! | use raw Vulkan calls, or another engine's device | [`manual::interop`], [`Context::requirements`] |
 //! | compare with LightweightVK, feature by feature | [`manual::parity`] |
@@ -91,28 +92,9 @@
 //!
 //! # What is not checked
 //!
-//! * Indices and addresses inside shaders. A shader that indexes past the arrays, or reads through a wrong address,
-//!   causes undefined behaviour on the GPU, as in every bindless design. [`ContextDesc::check_indices`] finds wrong
-//!   indices. Slot 0 of each array and every free slot hold a visible default descriptor. Among the textures, it is a
-//!   2D texture.
-//! * Dependencies. [`ContextDesc::check_indices`] finds textures that a command does not declare. Nothing finds such
-//!   buffers.
-//! * Bytes that shaders read by address. [`BlockLayout`] compares the layout of a struct with that of the block, but not
-//!   whether the address leads to such a struct.
-//! * The hit groups of instances. A ray that hits an instance whose
-//!   [`hit_group_offset`](TlasInstance::hit_group_offset), with the offset of the trace, is beyond the hit groups of the
-//!   pipeline reads beyond the shader binding table. A TLAS can serve several pipelines, and the mask of a trace can
-//!   leave instances out.
-//! * The depth of recursion. A hit or miss shader that traces a ray deeper than
-//!   [`max_recursion`](RayTracingPipelineDesc::max_recursion) is undefined behaviour. Such a shader may count the depth
-//!   itself, so its presence is no error.
-//! * The usage of imported images and buffers, which Vulkan does not tell.
-//! * Vertices. Indices and draws may read beyond the end of a vertex buffer.
-//! * Workgroup memory with unresolved array lengths. The library checks declared shared variables and task payloads
-//!   against the limits of their stage, with the constants of each pipeline. It resolves only array lengths that use
-//!   operations on 32-bit integers and booleans.
-//! * Memory for the vertices and primitives of mesh shaders (`maxMeshOutputMemorySize`,
-//!   `maxMeshPayloadAndOutputMemorySize`, `maxMeshOutputComponents`). It depends on the driver's storage of them.
+//! Shaders are not checked: their indices, addresses, loops, and the dependencies of their commands. One table,
+//! [`manual::unchecked`], lists every mistake of safe code that is no [`Error`], with its result, the tool that notices
+//! it, and the remedy.
 //!
 //! # What `lvk` does not do (yet)
 //!

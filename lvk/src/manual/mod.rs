@@ -30,6 +30,9 @@ pub mod shader_interface {}
 #[doc = include_str!("debugging.md")]
 pub mod debugging {}
 
+#[doc = include_str!("unchecked.md")]
+pub mod unchecked {}
+
 #[doc = include_str!("interop.md")]
 pub mod interop {}
 
