@@ -4,6 +4,7 @@ mod android;
 mod circles;
 mod contributing;
 mod defaults;
+mod dependencies;
 mod docstrings;
 mod examples;
 mod features;
