@@ -19,3 +19,4 @@ mod programs;
 mod readme;
 mod rust_modules;
 mod rust_tokens;
+mod unsafety;
