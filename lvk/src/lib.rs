@@ -95,8 +95,8 @@
 //!   causes undefined behaviour on the GPU, as in every bindless design. [`ContextDesc::check_indices`] finds wrong
 //!   indices. Slot 0 of each array and every free slot hold a visible default descriptor. Among the textures, it is a
 //!   2D texture.
-//! * Dependencies. [`ContextDesc::check_indices`] finds textures that a command does not declare. Nothing finds such
-//!   buffers.
+//! * Dependencies. [`ContextDesc::check_indices`] finds textures that a command does not declare. It is off by default,
+//!   as every access then costs several memory reads. Nothing finds such buffers, as an address does not tell its buffer.
 //! * Bytes that shaders read by address. [`BlockLayout`] compares the layout of a struct with that of the block, but not
 //!   whether the address leads to such a struct.
 //! * The hit groups of instances. A ray that hits an instance whose
@@ -107,7 +107,8 @@
 //!   [`max_recursion`](RayTracingPipelineDesc::max_recursion) is undefined behaviour. Such a shader may count the depth
 //!   itself, so its presence is no error.
 //! * The usage of imported images and buffers, which Vulkan does not tell.
-//! * Vertices. Indices and draws may read beyond the end of a vertex buffer.
+//! * Vertices. Indices and draws may read beyond the end of a vertex buffer, as the values of indices and of indirect
+//!   arguments are known to the GPU only.
 //! * Workgroup memory with unresolved array lengths. The library checks declared shared variables and task payloads
 //!   against the limits of their stage, with the constants of each pipeline. It resolves only array lengths that use
 //!   operations on 32-bit integers and booleans.
