@@ -182,17 +182,18 @@ pub use test_support::hooks as test_hooks;
 
 pub use ash;
 #[cfg(feature = "glam")]
-pub use {accel::instance::transform_rows, glam};
+pub use {accel::transform::transform_rows, glam};
 
 pub use accel::culling::InstanceCulling;
 pub use accel::desc::{BlasDesc, PrimitiveOrder};
 pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
-pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, rows_from_columns};
+pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance};
 pub use accel::micromap_desc::{
     OpacityFormat, OpacityMap, OpacityMicromapDesc, OpacityState, TriangleOpacity,
 };
 pub use accel::tlas_desc::TlasDesc;
+pub use accel::transform::rows_from_columns;
 pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
 pub use command::dependencies::Dependencies;

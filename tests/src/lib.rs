@@ -33,6 +33,7 @@ pub mod scene_obj;
 pub mod scene_shadow_mask;
 pub mod shader_groups;
 pub mod sphere_scene;
+pub mod strange_window;
 pub mod subprocess;
 pub mod vertex_deform;
 pub mod warnings;

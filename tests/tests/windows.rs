@@ -7,6 +7,7 @@ use std::sync::Arc;
 use lvk::*;
 use lvk_tests::device::vulkan;
 use lvk_tests::random::Random;
+use lvk_tests::strange_window::{self, Strange, expect_refused};
 use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::windows::{TestWindow, desktop, fill, present_color, present_until_visible};
@@ -513,7 +514,9 @@ fn invalid_swapchains_are_refused() {
         profile: Some(&profile),
         ..Default::default()
     };
-    let error = Context::new(&desc).unwrap_err().to_string();
+    let error = Context::new(&desc).unwrap_err();
+    assert!(matches!(error, Error::NoDevice { .. }), "{error}");
+    let error = error.to_string();
     assert!(error.contains("VK_KHR_swapchain (hidden by the device profile 'core-only')"), "{error}");
     // Wishes are no demands.
     let wishes = SwapchainDesc {
@@ -534,4 +537,43 @@ fn invalid_swapchains_are_refused() {
     assert!(matches!(ctx.suspend_swapchain(handle), Err(Error::StaleHandle { .. })));
     let resumed = ctx.resume_swapchain(handle, &(window as Arc<_>), [1, 1]);
     assert!(matches!(resumed, Err(Error::StaleHandle { .. })));
+}
+
+#[test]
+fn numbers_queues_and_contexts_that_do_not_fit_are_refused() {
+    let Some((window, ctx)) = window_with(|desc| desc.queues = QueueRequest::Emulated) else { return };
+    for hdr in [
+        HdrMetadata { luminance: [f32::NAN, 1000.0], ..Default::default() },
+        HdrMetadata { white_point: [0.3, f32::INFINITY], ..Default::default() },
+        HdrMetadata { primaries: [[-0.1; 2]; 3], ..Default::default() },
+        HdrMetadata { max_content_light_level: -1.0, ..Default::default() },
+    ] {
+        let desc = SwapchainDesc { hdr: Some(hdr), debug_name: "bright", ..Default::default() };
+        let told = message(ctx.create_swapchain(&desc));
+        assert!(told.contains("bright") && told.contains("finite numbers from 0"), "{told}");
+    }
+    for strange in
+        [Strange::WithoutHandle, Strange::OfUnknownSystem, Strange::OfTwoSystems, Strange::WithoutConnection]
+    {
+        let desc = SwapchainDesc { window: strange_window::window(strange), ..Default::default() };
+        expect_refused(strange, &ctx.create_swapchain(&desc).unwrap_err());
+    }
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    let Some(other) = device() else { return };
+    let foreign = |answer: Result<()>| {
+        assert!(matches!(answer, Err(Error::ForeignHandle { kind: "swapchain" })), "{answer:?}");
+    };
+    foreign(other.next_image(*swapchain).map(drop));
+    foreign(other.swapchain_info(*swapchain).map(drop));
+    foreign(other.resize_swapchain(*swapchain, [1, 1]));
+    foreign(other.set_present_mode(*swapchain, &[]));
+    foreign(other.suspend_swapchain(*swapchain));
+    foreign(other.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [1, 1]));
+    foreign(other.present(other.acquire_command_buffer().unwrap(), image).map(drop));
+    // What was refused is presented right afterwards.
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    let told = message(ctx.present(ctx.acquire_command_buffer_on(Queue::Compute).unwrap(), image));
+    assert!(told.contains("swapchain") && told.contains("belong to the graphics queue"), "{told}");
+    present_until_visible(&ctx, *swapchain, &window, RED);
 }

@@ -7,11 +7,10 @@ use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
 use super::flags::{AccelStructSizes, BuildFlags};
-use super::geometry::{
-    BlasGeometry, IDENTITY_ROWS, VulkanGeometry, check_geometries, host_or_device_address,
-};
+use super::geometry::{BlasGeometry, VulkanGeometry, check_geometries, host_or_device_address};
 use super::micromap::{Micromap, OpacityAttachment};
 use super::primitive_map::PrimitiveMap;
+use super::transform::IDENTITY_ROWS;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::handle::BufferHandle;

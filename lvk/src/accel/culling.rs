@@ -125,7 +125,7 @@ mod tests {
     use glam::{Affine3A, Quat, Vec4Swizzles};
     use proptest::prelude::*;
 
-    use super::super::instance::transform_rows;
+    use super::super::transform::transform_rows;
     use super::*;
 
     const EYE: Vec3 = Vec3::new(1.0, 2.0, 3.0);

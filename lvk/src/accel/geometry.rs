@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 use bitflags::bitflags;
 
+use super::transform::is_finite;
 use crate::error::limit_origin::LimitOrigin;
 use crate::error::{Error, Result, check_limit, check_limit_of};
 use crate::format::{IndexFormat, VertexFormat};
@@ -90,7 +91,7 @@ impl Triangles {
 /// A matrix of 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GeometryTransform {
-    /// A matrix by value; [`rows_from_columns`](crate::rows_from_columns) converts columns.
+    /// A matrix of finite numbers by value; [`rows_from_columns`](crate::rows_from_columns) converts columns.
     Rows([f32; 12]),
     /// 48 bytes in a buffer, read by every build.
     Buffer {
@@ -132,7 +133,6 @@ pub enum BlasGeometry {
 }
 
 /// The identity transform, in rows.
-pub(crate) const IDENTITY_ROWS: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// A geometry in Vulkan's form, with its number of primitives.
 #[derive(Clone, Copy)]
@@ -204,12 +204,17 @@ impl BlasGeometry {
     }
 }
 
-/// Checks the list of geometries and the formats of each.
+/// Checks the list of geometries, and the formats and the transform of each.
 pub(crate) fn check_geometries(name: &str, geometries: &[BlasGeometry], limits: &Limits) -> Result<()> {
-    geometries.iter().try_for_each(|geometry| match geometry {
-        BlasGeometry::Triangles(triangles) => check_formats(name, triangles),
-        BlasGeometry::Aabbs(_) => Ok(()),
-    })?;
+    for (index, geometry) in geometries.iter().enumerate() {
+        if let BlasGeometry::Triangles(triangles) = geometry {
+            check_formats(name, triangles)?;
+        }
+        if geometry.transform_rows().is_some_and(|rows| !is_finite(&rows)) {
+            let message = format!("the transform of geometry {index} is not finite; give finite numbers");
+            return Err(Error::usage(name, message));
+        }
+    }
     if geometries.is_empty() {
         return Err(Error::usage(name, "a bottom-level structure needs at least one geometry"));
     }

@@ -6,7 +6,7 @@ use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 
 use super::blas_refs::{BitSet, BlasRef, BlasRefCollector, BlasRefSet, ResolveBlas};
-use super::geometry::IDENTITY_ROWS;
+use super::transform::{IDENTITY_ROWS, is_finite};
 use crate::error::limit_origin::LimitOrigin;
 use crate::error::{Error, Result, check_limit_of};
 use crate::handle::{AccelStructHandle, BufferHandle};
@@ -67,27 +67,6 @@ impl TlasInstance {
     }
 }
 
-/// Returns the rows of an affine transform in Vulkan's order (`VkTransformMatrixKHR`), from its columns: the images of
-/// the three axes, and the translation.
-///
-/// The columns are those of `glam`'s `Affine3A::to_cols_array_2d` and of `mint`'s `ColumnMatrix3x4`.
-///
-/// ```
-/// let place = glam::Affine3A::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
-/// let rows = lvk::rows_from_columns(place.to_cols_array_2d());
-/// assert_eq!(rows, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0]);
-/// ```
-pub fn rows_from_columns(columns: impl Into<[[f32; 3]; 4]>) -> [f32; 12] {
-    let columns = columns.into();
-    std::array::from_fn(|at| columns[at % 4][at / 4])
-}
-
-/// Returns the rows of an affine transform of the crate `glam` in Vulkan's order (`VkTransformMatrixKHR`).
-#[cfg(any(feature = "glam", test))]
-pub fn transform_rows(transform: &glam::Affine3A) -> [f32; 12] {
-    rows_from_columns(transform.to_cols_array_2d())
-}
-
 /// The record that Vulkan reads (`VkAccelerationStructureInstanceKHR`).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -138,13 +117,6 @@ pub(crate) fn is_valid(instance: &TlasInstance) -> bool {
     fits && is_finite(&instance.transform) && !instance.flags.contains(BOTH)
 }
 
-/// True if all numbers are finite: no exponent is all ones. Needs no branch for each number.
-#[inline]
-fn is_finite(transform: &[f32; 12]) -> bool {
-    let all = transform.iter().fold(0, |all, number| all | ((number.to_bits() & 0x7fff_ffff) + 0x0080_0000));
-    all >> 31 == 0
-}
-
 #[cold]
 fn invalid_reason(name: &str, index: usize, instance: &TlasInstance) -> Error {
     const LARGEST: u32 = (1 << 24) - 1;
@@ -165,7 +137,7 @@ pub(crate) fn to_raw(instance: &TlasInstance, blas_address: u64) -> RawInstance 
     RawInstance {
         transform: instance.transform,
         custom_index_and_mask: instance.custom_index | u32::from(instance.mask) << 24,
-        hit_group_offset_and_flags: instance.hit_group_offset | u32::from(instance.flags.bits()) << 24,
+        hit_group_offset_and_flags: instance.hit_group_offset | u32::from(known_bits(instance.flags)) << 24,
         blas_address,
     }
 }
@@ -184,6 +156,12 @@ pub(crate) enum WrittenRefs {
     Changed(Arc<BlasRefSet>),
     /// Some BLAS need more than an address; the written data is invalid.
     NeedsKernel,
+}
+
+/// Returns the flags without bits that [`InstanceFlags`] does not name, which may mean something to the device.
+#[inline]
+fn known_bits(flags: InstanceFlags) -> u8 {
+    flags.intersection(InstanceFlags::all()).bits()
 }
 
 /// Checks `instances` and writes them with BLAS addresses. Long lists are written by several threads. `previous` is
@@ -521,24 +499,10 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_has_vulkans_row_order() {
-        let transform = glam::Affine3A::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
-        let rows = rows_from_columns(transform.to_cols_array_2d());
-        assert_eq!(rows, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0]);
-    }
-
-    #[test]
-    fn a_transform_is_finite_only_if_all_its_numbers_are() {
-        for number in [0.0, -0.0, 1.5, f32::MAX, -f32::MAX, f32::MIN_POSITIVE, 1e-45] {
-            assert!(is_finite(&[number; 12]), "{number}");
-        }
-        for place in 0..12 {
-            for number in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-                let mut transform = [f32::MAX; 12];
-                transform[place] = number;
-                assert!(!is_finite(&transform), "{number} at {place}");
-            }
-        }
+    fn bits_without_a_name_do_not_get_to_the_device() {
+        let flags = InstanceFlags::from_bits_retain(0xf0) | InstanceFlags::NO_CULL;
+        let instance = TlasInstance { flags, ..TlasInstance::new(AccelStructHandle::from_bits(1)) };
+        assert_eq!(to_raw(&instance, 0).hit_group_offset_and_flags, 1 << 24);
     }
 
     #[test]

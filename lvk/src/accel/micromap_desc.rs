@@ -294,5 +294,11 @@ mod tests {
         let two = OpacityMap { format: OpacityFormat::TwoStates, ..map };
         assert!(error(&[two], &first).contains("give it the format FourStates"));
         assert!(error(&[map], &[TriangleOpacity::Map(1)]).contains("triangle 0 has map 1"));
+        let desc = OpacityMicromapDesc { maps: &[two], triangles: &first, debug_name: "leaf" };
+        let refused = MicromapPlan::new(&desc, &LIMITS).unwrap_err();
+        assert!(matches!(&refused, Error::InvalidUsage { object, .. } if object == "leaf"), "{refused}");
+        let fine = [OpacityMap { level: 3, ..map }];
+        let refused = MicromapPlan::new(&OpacityMicromapDesc { maps: &fine, ..desc }, &LIMITS).unwrap_err();
+        assert!(matches!(&refused, Error::LimitExceeded { object, .. } if object == "leaf"), "{refused}");
     }
 }

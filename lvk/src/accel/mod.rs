@@ -28,5 +28,6 @@ pub(crate) mod storage;
 pub(crate) mod tlas;
 pub(crate) mod tlas_desc;
 pub(crate) mod tlas_tracker;
+pub(crate) mod transform;
 
 pub(crate) use accel_struct::AccelStruct;

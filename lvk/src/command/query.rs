@@ -24,9 +24,7 @@ impl CommandBuffer {
         self.needs_compute("a reset of queries")?;
         let pool = self.shared.store.query_pools.get(pool)?;
         let Some(count) = queries.end.checked_sub(queries.start) else {
-            let Range { start, end } = queries;
-            let message = format!("the range {start}..{end} of queries ends before it begins");
-            return Err(Error::usage(&pool.name, message));
+            return Err(Error::reversed_range(&pool.name, "queries", &queries));
         };
         pool.check_range(queries.start, count)?;
         self.state.queries.check_reset(&pool, queries.clone())?;

@@ -67,7 +67,7 @@ pub struct ContextDesc<'a> {
     /// A weaker device to emulate on this device. It applies to the requirements above as well. `None` uses the device
     /// as it is. Default: none.
     pub profile: Option<&'a DeviceProfile>,
-    /// Number of frames that the CPU may be ahead of the GPU, 1 to 8. See
+    /// Number of frames that the CPU may be ahead of the GPU, clamped to 1 to 8. See
     /// [`Context::next_frame`](crate::Context::next_frame). Default: 2.
     pub frames_in_flight: u32,
     /// Staging memory that is kept, in bytes. Uploads are submitted automatically once they fill half of it. A larger

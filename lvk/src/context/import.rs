@@ -165,13 +165,15 @@ impl Context {
     /// submission runs.
     ///
     /// # Errors
-    /// As [`submit`](Self::submit).
+    /// As [`submit`](Self::submit), and [`InvalidUsage`](Error::InvalidUsage) for a null semaphore.
     pub unsafe fn submit_with(
         &self,
         cmd: CommandBuffer,
         waits: &[RawWait],
         signals: &[RawSignal],
     ) -> Result<SubmitHandle> {
+        check_not_null("wait for", waits.iter().map(|wait| wait.semaphore))?;
+        check_not_null("signal", signals.iter().map(|signal| signal.semaphore))?;
         let info = |semaphore, value| vk::SemaphoreSubmitInfo::default().semaphore(semaphore).value(value);
         let waits = waits.iter().map(|wait| info(wait.semaphore, wait.value).stage_mask(wait.stages));
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
@@ -192,5 +194,17 @@ impl Context {
     pub fn raw_timeline_of(&self, queue: Queue) -> vk::Semaphore {
         let shared = self.device_state();
         shared.submitter.timeline(shared.gpu.queues.queue_index(queue)).raw
+    }
+}
+
+/// Fails if one of the semaphores of a submission is null.
+fn check_not_null(what: &str, mut semaphores: impl Iterator<Item = vk::Semaphore>) -> Result<()> {
+    match semaphores.position(|semaphore| semaphore == vk::Semaphore::null()) {
+        None => Ok(()),
+        Some(index) => {
+            let message =
+                format!("semaphore {index} to {what} is null; leave it out, or give one of this device");
+            Err(Error::usage("submit_with", message))
+        }
     }
 }

@@ -76,9 +76,11 @@ impl Context {
         Ok(self.device_state().store.textures.get(texture)?.image.raw)
     }
 
-    /// Returns the view that shaders sample.
+    /// Returns the view that shaders sample. The texture needs the usage [`TextureUsage::SAMPLED`].
     pub fn raw_image_view(&self, texture: TextureHandle) -> Result<vk::ImageView> {
-        self.device_state().store.textures.get(texture)?.sampled_view()
+        let texture = self.device_state().store.textures.get(texture)?;
+        texture.check_usage(TextureUsage::SAMPLED)?;
+        texture.sampled_view()
     }
 
     /// Returns the view that render passes draw to: one layer, or one slice of a volume, of a mip.

@@ -60,11 +60,6 @@ impl std::fmt::Debug for Readback {
     }
 }
 
-/// Returns the error for a range of `what` that ends before it begins.
-fn reversed_range(object: &str, what: &str, Range { start, end }: Range<u64>) -> Error {
-    Error::usage(object, format!("the range {start}..{end} of {what} ends before it begins"))
-}
-
 impl Context {
     /// Starts a copy of bytes of a buffer in any memory to the host, after everything submitted so far. Does not wait.
     ///
@@ -75,7 +70,7 @@ impl Context {
         let find = || self.device_state().store.buffers.get(buffer);
         let found = find()?;
         let Some(size) = range.end.checked_sub(range.start) else {
-            return Err(reversed_range(&found.name, "bytes", range));
+            return Err(Error::reversed_range(&found.name, "bytes", &range));
         };
         found.check_range(range.start, size)?;
         drop(found);

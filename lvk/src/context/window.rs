@@ -55,6 +55,7 @@ impl Context {
         if desc.usage.is_empty() {
             return Err(Error::usage(name, "give its images at least one usage"));
         }
+        desc.hdr.map_or(Ok(()), |hdr| hdr.check()).map_err(|why| Error::usage(name, why))?;
         let wishes = SwapchainConfig {
             extent: desc.extent,
             present_modes: desc.present_modes.to_vec(),

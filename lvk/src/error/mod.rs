@@ -13,6 +13,7 @@ mod platform_remedies;
 pub(crate) mod readable;
 
 use std::fmt;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -338,6 +339,13 @@ impl Error {
     /// Returns the error for a mistake of the caller about `object`.
     pub(crate) fn usage(object: impl Into<String>, message: impl Into<String>) -> Self {
         Self::InvalidUsage { object: object.into(), message: message.into() }
+    }
+
+    /// Returns the error for a range of `what` that ends before it begins.
+    #[cold]
+    pub(crate) fn reversed_range<T: fmt::Display>(object: &str, what: &str, range: &Range<T>) -> Self {
+        let Range { start, end } = range;
+        Self::usage(object, format!("the range {start}..{end} of {what} ends before it begins"))
     }
 
     /// Returns the error for a feature that the device lacks.

@@ -199,8 +199,9 @@ pub(super) fn blend_state(
     blend: Option<Blend>,
     write: ColorWriteMask,
 ) -> vk::PipelineColorBlendAttachmentState {
-    let state = vk::PipelineColorBlendAttachmentState::default()
-        .color_write_mask(vk::ColorComponentFlags::from_raw(write.bits()));
+    let state = vk::PipelineColorBlendAttachmentState::default().color_write_mask(
+        vk::ColorComponentFlags::from_raw(write.intersection(ColorWriteMask::all()).bits()),
+    );
     let Some(Blend { color, alpha }) = blend else { return state };
     state
         .blend_enable(true)
@@ -223,6 +224,7 @@ mod tests {
             (ColorWriteMask::GREEN, vk::ColorComponentFlags::G),
             (ColorWriteMask::BLUE, vk::ColorComponentFlags::B),
             (ColorWriteMask::ALPHA, vk::ColorComponentFlags::A),
+            (ColorWriteMask::from_bits_retain(0xf1), vk::ColorComponentFlags::R),
         ] {
             assert_eq!(blend_state(None, own).color_write_mask, raw);
         }

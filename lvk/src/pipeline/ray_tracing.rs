@@ -14,7 +14,8 @@ use super::sbt_order::{PerRegion, sbt_order};
 use super::shader_groups::{CompiledGroups, ShaderGroups};
 use super::shader_module::ModuleLookup;
 use crate::cpu_scope::cpu_scope;
-use crate::error::{Error, Result};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit_of};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
 use crate::gpu::start::driver_workarounds::with_shared_device_lock;
@@ -86,11 +87,10 @@ impl RayTracingPipeline {
             vk::PipelineCreateFlags::empty(),
         )?;
         gpu.name(raw, name);
-        let pipeline = Self {
+        let mut pipeline = Self {
             raw,
             push_constant_bytes: parts.iter().map(|part| part.push_constant_bytes).max().unwrap_or(0),
-            stack_bytes: stack_sizes(ext, raw, &parts)
-                .pipeline_bytes(desc.max_recursion, desc.max_callable_depth),
+            stack_bytes: 0,
             name: name.into(),
             base: table.address.next_multiple_of(limits.base_alignment.into()),
             table: Arc::new(table),
@@ -98,6 +98,7 @@ impl RayTracingPipeline {
             gpu: Arc::clone(gpu),
             _libraries: libraries.to_vec(),
         };
+        pipeline.set_stack_size(stack_sizes(ext, raw, &parts), desc)?;
         let order = sbt_order(&counts);
         let handles = pipeline.handles(order.len() as u32, limits.handle_bytes)?;
         let mut bytes = vec![0; pipeline.plan.bytes as usize];
@@ -105,6 +106,14 @@ impl RayTracingPipeline {
         write_sbt(&pipeline.plan, &limits, &handles, &records, &mut bytes);
         let offset = pipeline.base - pipeline.table.address;
         Ok((pipeline, SbtContents { offset, bytes }))
+    }
+
+    fn set_stack_size(&mut self, sizes: StackSizes, desc: &RayTracingPipelineDesc<'_>) -> Result<()> {
+        let bytes = sizes.pipeline_bytes(desc.max_recursion, desc.max_callable_depth);
+        let what = "stack of one ray in bytes (max_recursion, max_callable_depth)";
+        check_limit_of(LimitOrigin::Vulkan, &self.name, what, bytes, u32::MAX.into())?;
+        self.stack_bytes = bytes as u32;
+        Ok(())
     }
 
     fn handles(&self, group_count: u32, handle_bytes: u32) -> Result<Vec<u8>> {

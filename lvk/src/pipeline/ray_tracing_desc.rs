@@ -46,7 +46,8 @@ pub struct RayTracingPipelineDesc<'a> {
     /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays. Deeper traces are undefined behaviour,
     /// which the library does not check. Default: 1.
     pub max_recursion: u32,
-    /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others. Default: 1.
+    /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others. The stack of a ray grows with it and
+    /// has at most `u32::MAX` bytes. Default: 1.
     pub max_callable_depth: u32,
     /// Largest payload of any shader in bytes. Used only with libraries: see
     /// [`RayTracingLibraryDesc`](crate::RayTracingLibraryDesc). Default: 64.

@@ -34,14 +34,13 @@ impl StackSizes {
     /// A ray generation shader traces a ray, whose closest-hit or miss shader traces the next ray, up to a depth of
     /// `recursion`. Intersection and any-hit shaders trace no rays, so only those of the last ray can be on top of the
     /// stack. Callable shaders may be on top of any shader.
-    pub(crate) fn pipeline_bytes(&self, recursion: u32, callable_depth: u32) -> u32 {
+    pub(crate) fn pipeline_bytes(&self, recursion: u32, callable_depth: u32) -> u64 {
         let shade = self.closest_hit.max(self.miss);
         let last = shade.max(self.intersection.saturating_add(self.any_hit));
         let deeper = u64::from(recursion.saturating_sub(1)).saturating_mul(shade);
         let calls = u64::from(callable_depth).saturating_mul(self.callable);
         let last = if recursion == 0 { 0 } else { last };
-        let bytes = self.ray_gen.saturating_add(last).saturating_add(deeper).saturating_add(calls);
-        u32::try_from(bytes).unwrap_or(u32::MAX)
+        self.ray_gen.saturating_add(last).saturating_add(deeper).saturating_add(calls)
     }
 }
 
@@ -95,7 +94,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_chain_of_calls_is_deeper(shaders in shaders(), recursion in 0..3_u32, calls in 0..4_u32) {
-            let bytes = u64::from(sizes(&shaders).pipeline_bytes(recursion, calls));
+            let bytes = sizes(&shaders).pipeline_bytes(recursion, calls);
             let deepest = deepest(&shaders, recursion, calls);
             prop_assert!(bytes >= deepest);
             if recursion <= 1 {
@@ -125,10 +124,10 @@ mod tests {
     }
 
     #[test]
-    fn sizes_beyond_32_bits_saturate() {
+    fn sizes_beyond_64_bits_saturate() {
         let mut sizes = StackSizes::default();
         sizes.add(ShaderStage::ClosestHit, u64::MAX);
         sizes.add(ShaderStage::Callable, u64::MAX / 2);
-        assert_eq!(sizes.pipeline_bytes(u32::MAX, u32::MAX), u32::MAX);
+        assert_eq!(sizes.pipeline_bytes(u32::MAX, u32::MAX), u64::MAX);
     }
 }

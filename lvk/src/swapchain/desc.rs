@@ -78,7 +78,8 @@ impl ColorSpace {
     }
 }
 
-/// HDR metadata of images in [`ColorSpace::Hdr10`] or brighter than white, for the display (`VkHdrMetadataEXT`).
+/// HDR metadata of images in [`ColorSpace::Hdr10`] or brighter than white, for the display (`VkHdrMetadataEXT`). All
+/// numbers are finite, and none is negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HdrMetadata {
     /// CIE 1931 chromaticities of red, green and blue of the mastering display. Default: those of BT.2020.
@@ -107,6 +108,17 @@ impl Default for HdrMetadata {
 }
 
 impl HdrMetadata {
+    /// Fails unless all numbers are finite and none is negative.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self { primaries, white_point, luminance, .. } = self;
+        let levels = [self.max_content_light_level, self.max_frame_average_light_level];
+        let mut numbers = primaries.iter().chain([white_point, luminance, &levels]).flatten();
+        match numbers.find(|number| !(number.is_finite() && **number >= 0.0)) {
+            None => Ok(()),
+            Some(number) => Err(format!("HDR metadata are finite numbers from 0, not {number}")),
+        }
+    }
+
     pub(crate) fn raw(&self) -> vk::HdrMetadataEXT<'static> {
         let point = |[x, y]: [f32; 2]| vk::XYColorEXT { x, y };
         vk::HdrMetadataEXT::default()

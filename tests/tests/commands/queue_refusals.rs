@@ -2,11 +2,12 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferHandle, BufferUsage, BuildMode, ClearValue, ColorAttachment, Context, Dependencies, Error, Filter,
-    Format, Holder, ImportedBuffer, QueryKind, QueryPoolDesc, Queue, RenderPassDesc, SubmitHandle,
-    TextureDesc, TextureRange, TextureRegion, TextureUsage,
+    BufferHandle, BufferUsage, BuildMode, ClearValue, ColorAttachment, CommandBuffer, Context, Dependencies,
+    DeviceInstances, Error, Filter, Format, Holder, ImportedBuffer, QueryKind, QueryPoolDesc, Queue,
+    RayTracingPipelineDesc, RenderPassDesc, ShaderStage, SubmitHandle, TextureDesc, TextureRange,
+    TextureRegion, TextureUsage, TlasDesc,
 };
-use lvk_tests::compute::{read_words, words_buffer};
+use lvk_tests::compute::{module, read_words, words_buffer};
 use lvk_tests::device_with;
 use lvk_tests::queues::{WORDS, for_each_queue_request, step, step_pipeline, submit_on};
 use lvk_tests::raster::usage_error;
@@ -55,13 +56,32 @@ fn queues_refuse_what_they_cannot_do() {
                 wrong_queue(cmd.reset_queries(*occlusion, 0..1), queue);
                 wrong_queue(cmd.build_blas(&[], BuildMode::Rebuild), queue);
                 wrong_queue(ctx.create_blas_batch_on(queue, &[]), queue);
+                refuse_rays(ctx, &mut cmd, *words);
             }
+            wrong_queue(cmd.copy_texture(*depth, &whole, *depth, &whole), queue);
             cmd.fill_buffer(*words, 0, 256, 8).unwrap();
             ctx.submit(cmd).unwrap();
             assert_eq!(read_words(ctx, *words, WORDS), [8; WORDS]);
         }
         check_foreign(ctx, &words);
     });
+}
+
+/// Asserts that the transfer queue refuses traces and updates of TLAS, where the device has them.
+fn refuse_rays(ctx: &Context, cmd: &mut CommandBuffer, words: BufferHandle) {
+    let caps = ctx.capabilities();
+    if caps.ray_tracing_pipeline {
+        let ray_gen = module(ctx, ShaderStage::RayGen, "void main() {}");
+        let desc = RayTracingPipelineDesc { ray_gen: &[*ray_gen], ..Default::default() };
+        let pipeline = ctx.create_ray_tracing_pipeline(&desc).unwrap();
+        wrong_queue(cmd.bind_ray_tracing_pipeline(*pipeline), Queue::Transfer);
+    }
+    if caps.ray_tracing_pipeline || caps.ray_query {
+        let tlas = ctx.create_tlas(&TlasDesc { capacity: 1, ..Default::default() }).unwrap();
+        let nothing = DeviceInstances { buffer: words, offset: 0, count: 0, blas: &[] };
+        wrong_queue(cmd.update_tlas(*tlas, &[], BuildMode::Rebuild), Queue::Transfer);
+        wrong_queue(cmd.update_tlas_from_buffer(*tlas, &nothing, BuildMode::Rebuild), Queue::Transfer);
+    }
 }
 
 /// Images and buffers of others belong to the graphics queue unless they were made for all.

@@ -190,7 +190,9 @@ fn two_contexts_share_a_semaphore() {
 }
 
 fn message<T>(result: lvk::Result<T>) -> String {
-    result.err().map(|error| error.to_string()).unwrap_or_default()
+    let Err(error) = result else { return String::new() };
+    assert!(matches!(error, Error::InvalidUsage { .. } | Error::Unsupported { .. }), "{error:?}");
+    error.to_string()
 }
 
 #[test]
@@ -270,6 +272,14 @@ fn wrong_descriptions_are_refused() {
         let unknown = MemoryFd { memory_type_index: 40, ..opaque(1 << 20) };
         let refused = message(ctx.import_buffer_memory(&buffer_desc(), unknown));
         assert!(refused.contains("memory type 40"), "{refused}");
+        let data = TextureDesc { data: Some(&[0; 4]), ..texture_desc() };
+        let refused = message(ctx.import_texture_memory(&data, opaque(1 << 20)));
+        assert!(refused.contains("shared texture: imported memory has its contents"), "{refused}");
+        let refused = message(ctx.import_texture_memory(&texture_desc(), opaque(4)));
+        assert!(refused.contains("shared texture: the imported memory has 4 bytes"), "{refused}");
+        let sync_file =
+            ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile, other_file());
+        assert!(message(sync_file).contains("a sync file holds a binary semaphore"));
         let timeline = ctx.create_shared_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile);
         assert!(message(timeline).contains("a sync file holds a binary semaphore"));
     }

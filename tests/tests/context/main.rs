@@ -9,3 +9,4 @@ mod no_ray_tracing;
 mod profiles;
 mod requirements;
 mod start;
+mod strange_windows;

@@ -386,3 +386,14 @@ fn unknown_extensions_are_named() {
         assert!(error.to_string().contains("VK_LVK_nowhere"), "{error}");
     }
 }
+
+#[test]
+fn an_unknown_name_of_a_profile_is_an_error_with_the_known_ones() {
+    match DeviceProfile::named("Mali-G715") {
+        Err(Error::InvalidUsage { object, message }) => {
+            assert!(object.contains("'Mali-G715'"), "{object}");
+            assert!(DeviceProfile::names().all(|name| message.contains(name)), "{message}");
+        }
+        other => unreachable!("{other:?}"),
+    }
+}

@@ -1,6 +1,7 @@
 //! Tests that hold documents and the tree of sources against each other.
 
 mod android;
+mod bad_input;
 mod circles;
 mod contributing;
 mod defaults;

@@ -2,6 +2,8 @@
 //! records nothing.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::ops::Range;
+
 use lvk::{
     BufferDesc, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CompareOp, Context, Dependencies,
     DepthAttachment, DepthLoadOp, DepthTest, Error, Format, IndexFormat, RenderPass, RenderPassDesc,
@@ -299,4 +301,39 @@ fn usages_of_targets_are_checked_by_format() {
     let color = [ColorAttachment::clear(*depth, [0.0; 4])];
     let desc = RenderPassDesc { color: &color, ..Default::default() };
     usage_error(cmd.begin_rendering(&desc).map(drop), "depth format");
+}
+
+/// Ranges that Rust takes for empty, in a pass that can draw.
+#[test]
+fn reversed_ranges_and_long_constants_are_refused() {
+    let Some(ctx) = device() else { return };
+    let desc =
+        RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], debug_name: "plain", ..Default::default() };
+    let pipeline = render_pipeline(&ctx, COVER, PAINT, &desc);
+    let usage = BufferUsage::INDEX;
+    let indices = ctx.create_buffer(&BufferDesc { size_bytes: 64, usage, ..Default::default() }).unwrap();
+    let target = target(&ctx, Format::Rgba8Unorm, [4, 4]);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let color = [ColorAttachment::clear(*target, [0.0; 4])];
+    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
+    pass.bind_render_pipeline(*pipeline).unwrap();
+    match pass.push_constants(&[0.0_f32; 9]) {
+        Err(Error::PushConstants { pipeline, expected: 20, size: 36, .. }) => assert_eq!(pipeline, "plain"),
+        other => unreachable!("{other:?}"),
+    }
+    pass.push_constants(&[0.0_f32; 5]).unwrap();
+    pass.bind_index_buffer(*indices, 0, IndexFormat::U32).unwrap();
+    let (reversed, one) = (Range { start: 3, end: 0 }, 0..1);
+    usage_error(
+        pass.draw(reversed.clone(), one.clone()),
+        "draw: the range 3..0 of vertices ends before it begins",
+    );
+    usage_error(pass.draw(0..3, reversed.clone()), "3..0 of instances");
+    usage_error(pass.draw_indexed(reversed.clone(), 0, one), "draw_indexed: the range 3..0 of indices");
+    usage_error(pass.draw_indexed(0..3, 0, reversed), "3..0 of instances");
+    pass.draw(2..2, 0..1).unwrap();
+    pass.draw_indexed(7..7, 0, 5..5).unwrap();
+    drop(pass);
+    ctx.submit(cmd).unwrap();
+    assert_eq!(pixels::<[u8; 4]>(&ctx, *target), [[0; 4]; 16]);
 }

@@ -3,8 +3,8 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    BuildFlags, BuildMode, Context, DeviceProfile, Error, GeometryFlags, HitGroup, RayQueryPath, Result,
-    ShaderStage, TlasDesc,
+    BlasDesc, BuildFlags, BuildMode, Context, DeviceProfile, Error, GeometryFlags, HitGroup, RayQueryPath,
+    Result, ShaderStage, TlasDesc,
 };
 use lvk_tests::hit_check::rays_for;
 use lvk_tests::meshes::Mesh;
@@ -189,6 +189,12 @@ fn without_the_capability_only_software_can_fetch() -> Result<()> {
     assert!(matches!(error, Error::Unsupported { .. }), "{error:?}");
     let text = error.to_string();
     assert!(text.contains("POSITION_FETCH, which 'model' has in its flags"), "{text}");
+    let flags = BuildFlags::POSITION_FETCH;
+    let refused = ctx.create_blas(&BlasDesc { flags, debug_name: "bare", ..Default::default() });
+    assert!(
+        matches!(&refused, Err(Error::Unsupported { what, .. }) if what.contains("'bare'")),
+        "{refused:?}"
+    );
     for method in Method::available(&ctx) {
         let Err(error) = tracer(&ctx, method, 0) else { unreachable!("the shader must not compile") };
         assert!(matches!(error, Error::Shader { .. } | Error::Unsupported { .. }), "{error:?}");

@@ -3,9 +3,9 @@
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
     Aabbs, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags,
-    BuildMode, CommandBuffer, Context, Dependencies, Error, GeometryFlags, HitGroup, Holder, IndexFormat,
-    Indices, InstanceFlags, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderRecord, ShaderStage,
-    TlasDesc, TlasInstance, Triangles,
+    BuildMode, CommandBuffer, Context, Dependencies, Error, GeometryFlags, GeometryTransform, HitGroup,
+    Holder, IndexFormat, Indices, InstanceFlags, RayTracingPipelineDesc, Result, ShaderModuleHandle,
+    ShaderRecord, ShaderStage, TlasDesc, TlasInstance, Triangles,
 };
 use lvk_tests::device;
 use lvk_tests::hit_comparison::HitComparison;
@@ -17,6 +17,9 @@ use lvk_tests::rays::random_rays;
 const RAY_GEN: &str = include_str!("../../shaders/closest.rgen.glsl");
 const MISS: &str = include_str!("../../shaders/record.rmiss.glsl");
 const HIT: &str = include_str!("../../shaders/record.rchit.glsl");
+
+/// A callable shader, which needs some bytes of the stack.
+const CALLABLE: &str = "layout(location = 0) callableDataInEXT vec4 data; void main() { data = vec4(1); }";
 
 /// A scene that traces right as long as the context is in order.
 struct Intact {
@@ -127,6 +130,17 @@ fn geometry_that_does_not_fit_its_buffers_is_refused() -> Result<()> {
         refused(words, blas(&ctx, &[BlasGeometry::Triangles(triangles)]));
         refused(words, blas(&ctx, &[BlasGeometry::Triangles(indexed), BlasGeometry::Triangles(triangles)]));
         intact.check()?;
+    }
+    for number in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let transform = Some(GeometryTransform::Rows([number; 12]));
+        let odd = BlasGeometry::Triangles(Triangles { transform, ..good });
+        let geometries = [BlasGeometry::Triangles(good), odd];
+        let words = "wrong: the transform of geometry 1 is not finite; give finite numbers";
+        refused(words, blas(&ctx, &geometries));
+        refused(
+            words,
+            ctx.blas_sizes(&BlasDesc { geometries: &geometries, debug_name: "wrong", ..Default::default() }),
+        );
     }
     let _fits = blas(&ctx, &[BlasGeometry::Triangles(good), BlasGeometry::Triangles(indexed)])?;
     intact.check()
@@ -325,6 +339,11 @@ fn pipelines_without_sense_are_refused() -> Result<()> {
     let cases = [
         ("at least one ray generation shader", RayTracingPipelineDesc { ray_gen: &[], ..good }),
         ("recursion depth", RayTracingPipelineDesc { max_recursion: limits.max_ray_recursion + 1, ..good }),
+        ("recursion depth of 0", RayTracingPipelineDesc { max_recursion: 0, ..good }),
+        (
+            "hit attributes in bytes",
+            RayTracingPipelineDesc { max_hit_attribute_bytes: limits.max_hit_attribute_bytes + 1, ..good },
+        ),
         ("RayGen module is needed", RayTracingPipelineDesc { ray_gen: &miss, ..good }),
         ("Miss module is needed", RayTracingPipelineDesc { miss: &ray_gen, ..good }),
         ("Callable module is needed", RayTracingPipelineDesc { callable: &miss, ..good }),
@@ -336,6 +355,9 @@ fn pipelines_without_sense_are_refused() -> Result<()> {
         refused(words, ctx.create_ray_tracing_pipeline(&desc));
         intact.check()?;
     }
+    let calls = shader(&ctx, ShaderStage::Callable, CALLABLE)?;
+    let deep = RayTracingPipelineDesc { callable: &[*calls], max_callable_depth: u32::MAX, ..good };
+    refused("wrong: stack of one ray in bytes", ctx.create_ray_tracing_pipeline(&deep));
     drop(modules);
     refused("shader module", ctx.create_ray_tracing_pipeline(&good));
     intact.check()

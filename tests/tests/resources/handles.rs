@@ -385,3 +385,32 @@ fn names_reach_vulkan_where_a_tool_reads_them() {
         assert_eq!(named, expected, "{wish:?}: {messages:?}");
     }
 }
+
+#[test]
+fn no_way_of_submission_takes_command_buffers_of_another_context() {
+    let (Some(ctx), Some(other)) = (device(), device()) else { return };
+    let theirs = || other.acquire_command_buffer().unwrap();
+    let refused = |result: lvk::Result<lvk::SubmitHandle>| {
+        let Err(Error::InvalidUsage { object, message }) = result else { unreachable!("{result:?}") };
+        assert_eq!((&*object, &*message), ("submit", "the command buffer belongs to another context"));
+    };
+    refused(ctx.submit_in_background(theirs()));
+    // SAFETY: there are no semaphores.
+    refused(unsafe { ctx.submit_with(theirs(), &[], &[]) });
+    let nothing = vk::Semaphore::null();
+    let wait = lvk::RawWait { semaphore: nothing, value: 0, stages: vk::PipelineStageFlags2::ALL_COMMANDS };
+    let signal = lvk::RawSignal { semaphore: nothing, value: 0 };
+    for (waits, signals, words) in [
+        (&[wait][..], &[][..], "semaphore 0 to wait for is null"),
+        (&[], &[signal], "semaphore 0 to signal is null"),
+    ] {
+        let cmd = ctx.acquire_command_buffer().unwrap();
+        // SAFETY: the semaphores are refused.
+        match unsafe { ctx.submit_with(cmd, waits, signals) } {
+            Err(Error::InvalidUsage { object, message }) => {
+                assert!(object == "submit_with" && message.contains(words), "{object}: {message}");
+            }
+            other => unreachable!("{words}: {other:?}"),
+        }
+    }
+}

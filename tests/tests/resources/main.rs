@@ -3,6 +3,7 @@
 mod bindless;
 mod bindless_checks;
 mod buffers;
+mod every_handle;
 mod handles;
 mod host_copies;
 mod push_constants;

@@ -9,7 +9,7 @@ use lvk::{
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::queues::{REQUESTS, submit_on};
 use lvk_tests::random::Random;
-use lvk_tests::raster::render_pipeline;
+use lvk_tests::raster::{self, render_pipeline};
 use lvk_tests::{device, device_with};
 
 /// Copies words from one address to another.
@@ -174,12 +174,21 @@ fn dropped_command_buffers_return_their_memory() {
 #[test]
 fn a_value_larger_than_the_kept_memory_is_refused_by_its_size() {
     const KEPT: u64 = 128 << 10;
+    static LARGE: [[u64; 1024]; 32] = [[0; 1024]; 32];
     let Some(ctx) = device_with(|desc| desc.staging_bytes = KEPT) else { return };
     let (copier, target) = (Copier::new(&ctx), words_buffer(&ctx, &[0; 2]));
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let error = cmd.upload_slice(&vec![0_u8; KEPT as usize + 1]).unwrap_err();
     assert!(matches!(error, Error::UploadTooLarge { bytes, limit: KEPT } if bytes == KEPT + 1), "{error}");
     assert!(error.to_string().contains("staging_bytes (131072 bytes); raise it"), "{error}");
+    let large = vec![0_u8; KEPT as usize + 1];
+    let texture = raster::target(&ctx, Format::Rgba8Unorm, [1, 1]);
+    let color = [ColorAttachment::clear(*texture, [0.0; 4])];
+    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
+    assert!(matches!(pass.upload_slice(&large), Err(Error::UploadTooLarge { limit: KEPT, .. })));
+    assert!(matches!(pass.upload(&LARGE), Err(Error::UploadTooLarge { limit: KEPT, .. })));
+    drop(pass);
+    assert!(matches!(cmd.upload(&LARGE), Err(Error::UploadTooLarge { limit: KEPT, .. })));
     cmd.upload_slice(&vec![0_u8; KEPT as usize]).unwrap();
     cmd.upload_slice::<u32>(&[]).unwrap();
     let source = cmd.upload(&[5, 6]).unwrap();

@@ -3,7 +3,7 @@
 
 use lvk::{
     ComputePipelineDesc, Context, Dependencies, DeviceProfile, Error, ShaderModuleDesc, ShaderSource,
-    ShaderStage, SpecializationConstant, SpecializationValue,
+    ShaderStage, SpecializationConstant, SpecializationValue, compile_glsl,
 };
 use lvk_tests::compute::{compute_pipeline, module, read_words, words_buffer};
 use lvk_tests::{device, device_with};
@@ -183,6 +183,7 @@ fn the_stage_of_a_module_must_be_the_stage_it_is_used_in() {
         "{error}"
     );
     let error = ctx.create_compute_pipeline(&ComputePipelineDesc::default()).map(drop).unwrap_err();
+    assert!(matches!(&error, Error::InvalidUsage { object, .. } if object == "compute pipeline"), "{error}");
     assert!(error.to_string().contains("give the pipeline a compute shader"), "{error}");
 }
 
@@ -269,4 +270,30 @@ fn shared_memory_over_the_limit_is_refused() {
     }
     let most = ctx.capabilities().limits.max_shared_bytes;
     assert_eq!(most, 16_384, "every device shares so much");
+}
+
+#[test]
+fn texts_compiled_without_a_context_have_the_same_errors() {
+    let Some(ctx) = device() else { return };
+    let compile = |desc: &ShaderModuleDesc<'_>| match compile_glsl(
+        &ShaderModuleDesc { debug_name: "odd one", ..*desc },
+        ctx.capabilities(),
+    ) {
+        Err(Error::Shader { name, log }) => {
+            assert_eq!(name, "odd one");
+            log
+        }
+        other => unreachable!("{other:?}"),
+    };
+    let good = "layout(local_size_x = 1) in;\nvoid main() {}";
+    for text in ["", "void main() {\n    nowhere;\n}", "#version 330\nvoid main() {}", "int \u{e9};", "\0"] {
+        assert_eq!(compile(&compute(text)), refused(&ctx, &compute(text)), "{text:?}");
+    }
+    for define in [("", "1"), ("A B", "1"), ("A\0", "1"), ("A", "1\n#error no"), ("A", "\0"), ("9", "1")] {
+        let desc = ShaderModuleDesc { defines: &[define], ..compute(good) };
+        let log = compile(&desc);
+        assert!(log.starts_with("define '"), "{define:?}: {log}");
+        assert_eq!(refused(&ctx, &desc), log);
+    }
+    assert!(compile_glsl(&compute(good), ctx.capabilities()).is_ok());
 }

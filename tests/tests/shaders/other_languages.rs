@@ -10,9 +10,10 @@ use std::process::Command;
 use bytemuck::NoUninit;
 use lvk::glam::Vec3;
 use lvk::{
-    BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, DeviceProfile, Format,
-    GeometryFlags, HLSL_HEADER, HitGroup, Holder, RayQueryRequest, Result, SamplerDesc, ShaderModuleDesc,
-    ShaderModuleHandle, ShaderSource, ShaderStage, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
+    BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, DeviceProfile, Error,
+    Format, GeometryFlags, HLSL_HEADER, HitGroup, Holder, RayQueryRequest, Result, SamplerDesc,
+    ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage, TextureDesc, TextureHandle,
+    TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::ray_scene::RayScene;
@@ -283,6 +284,7 @@ fn queries_of_the_device_are_refused_where_the_library_traverses() {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return };
     for foreign in &QUERY {
         let error = foreign.pipeline(&ctx).map(drop).unwrap_err();
+        assert!(matches!(error, Error::InvalidUsage { .. }), "{error}");
         let text = error.to_string();
         assert!(text.contains(foreign.name) && text.contains("ray queries"), "{text}");
     }

@@ -1,6 +1,7 @@
 //! Refused textures: impossible shapes and regions, and uses without the usage flag.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk::ash::vk;
 use lvk::{
     BufferDesc, Context, Dependencies, Error, Filter, Format, Holder, TextureDesc, TextureHandle,
     TextureKind, TextureRegion, TextureUsage,
@@ -74,6 +75,9 @@ fn impossible_regions_are_errors_and_record_nothing() {
             cmd.blit_texture(*texture, bad, *other, &good, Filter::Nearest),
             cmd.copy_texture_to_buffer(*texture, bad, *buffer, 0),
             cmd.copy_buffer_to_texture(*buffer, 0, *texture, bad),
+            cmd.update_texture(*texture, bad, &[0; 64]),
+            cmd.resolve_texture(*texture, bad, *other, &good),
+            ctx.read_texture_later(*texture, bad).map(drop),
         ];
         for result in results {
             assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{bad:?}: {result:?}");
@@ -91,6 +95,8 @@ fn impossible_regions_are_errors_and_record_nothing() {
         cmd.copy_texture(*texture, &good, *other, &good),
         cmd.copy_texture(*texture, &region([0, 0], [1, 1]), *texture, &region([2, 2], [1, 1])),
         cmd.blit_texture(*texture, &good, *texture, &good, Filter::Nearest),
+        cmd.update_texture(*texture, &good, &[0; 63]),
+        cmd.copy_buffer_to_texture(*buffer, u64::MAX - 3, *texture, &good),
     ];
     for (index, result) in results.into_iter().enumerate() {
         assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{index}: {result:?}");
@@ -131,4 +137,32 @@ fn textures_serve_only_what_their_usage_says() {
     }
     cmd.dispatch([1, 1, 1], &Dependencies::default()).unwrap();
     ctx.submit(cmd).unwrap();
+}
+
+/// Views for other engines have the usages of their texture.
+#[test]
+fn raw_views_need_their_usage_and_their_part() {
+    let Some(ctx) = device() else { return };
+    let make = |usage, debug_name| {
+        let desc = TextureDesc { usage, extent: [4, 4], mips: 1, debug_name, ..Default::default() };
+        ctx.create_texture(&desc).unwrap()
+    };
+    let (stored, drawn) = (make(TextureUsage::STORAGE, "stored"), make(TextureUsage::TARGET, "drawn"));
+    let sampled = make(TextureUsage::SAMPLED, "sampled");
+    let refused = |result: lvk::Result<vk::ImageView>, words: &str| match result {
+        Err(Error::InvalidUsage { object, message }) => {
+            let text = format!("{object}: {message}");
+            assert!(text.contains(words), "{text}");
+        }
+        other => unreachable!("{words}: {other:?}"),
+    };
+    for (texture, name) in [(*stored, "stored"), (*drawn, "drawn")] {
+        let words = format!("{name}: create the texture with TextureUsage(SAMPLED) in its usage");
+        refused(ctx.raw_image_view(texture), &words);
+    }
+    refused(ctx.raw_target_view(*sampled, 0, 0), "sampled: create the texture with TextureUsage(TARGET)");
+    refused(ctx.raw_target_view(*drawn, 1, 0), "drawn: mip 1 of layer 0 does not exist");
+    refused(ctx.raw_target_view(*drawn, 0, u32::MAX), "drawn: mip 0 of layer 4294967295 does not exist");
+    ctx.raw_image_view(*sampled).unwrap();
+    ctx.raw_target_view(*drawn, 0, 0).unwrap();
 }

@@ -80,7 +80,9 @@ impl RenderPass<'_> {
     #[inline]
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) -> Result<()> {
         self.check_draw()?;
-        let (count, instance_count) = (range_length(&vertices), range_length(&instances));
+        check_order("draw", "vertices", &vertices)?;
+        check_order("draw", "instances", &instances)?;
+        let (count, instance_count) = (vertices.end - vertices.start, instances.end - instances.start);
         // SAFETY: a pipeline is bound with all its vertex buffers and push constants.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
@@ -102,7 +104,9 @@ impl RenderPass<'_> {
             let message = format!("indices {indices:?} are drawn, but {} are bound", bound.count);
             return Err(Error::usage(&bound.buffer.name, message));
         }
-        let (count, instance_count) = (range_length(&indices), range_length(&instances));
+        check_order("draw_indexed", "indices", &indices)?;
+        check_order("draw_indexed", "instances", &instances)?;
+        let (count, instance_count) = (indices.end - indices.start, instances.end - instances.start);
         // SAFETY: as in `draw`, and the indices lie inside the bound buffer.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
@@ -239,7 +243,8 @@ impl RenderPass<'_> {
     }
 }
 
+/// Fails if the range ends before it begins.
 #[inline]
-fn range_length(range: &Range<u32>) -> u32 {
-    range.end.saturating_sub(range.start)
+fn check_order(call: &str, what: &str, range: &Range<u32>) -> Result<()> {
+    if range.start <= range.end { Ok(()) } else { Err(Error::reversed_range(call, what, range)) }
 }

@@ -99,7 +99,7 @@ mod tests {
     use glam::{Affine3A, Quat};
 
     use super::*;
-    use crate::accel::instance::transform_rows;
+    use crate::accel::transform::transform_rows;
 
     #[test]
     fn a_matrix_is_singular_however_its_numbers_were_rounded() {

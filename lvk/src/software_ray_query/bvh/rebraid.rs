@@ -109,7 +109,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::accel::instance::{TlasInstance, transform_rows};
+    use crate::accel::instance::TlasInstance;
+    use crate::accel::transform::transform_rows;
     use crate::handle::{AccelStructHandle, Handle};
     use crate::software_ray_query::bvh::encode_instances::{InstancedBlas, place_instance};
     use crate::software_ray_query::bvh::subtrees::tests::{primitives, row, structure};

@@ -1,0 +1,276 @@
+//! The page of bad input: it has every call that can fail and every error, and its tests exist.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::collections::BTreeSet;
+
+use crate::held_by::{cells, project};
+
+const PAGE: &str = include_str!("../../../docs/bad-input.md");
+/// The public interface, one item a line; `.ci/api` holds it to the sources.
+const INTERFACE: &str = include_str!("../../../lvk/public-api.txt");
+const ERRORS: &str = include_str!("../../../lvk/src/error/mod.rs");
+/// Handles of objects. A submission has none.
+const HANDLES: [&str; 11] = [
+    "AccelStructHandle",
+    "BufferHandle",
+    "ComputePipelineHandle",
+    "OpacityMicromapHandle",
+    "QueryPoolHandle",
+    "RayTracingLibraryHandle",
+    "RayTracingPipelineHandle",
+    "RenderPipelineHandle",
+    "SamplerHandle",
+    "ShaderModuleHandle",
+    "SwapchainHandle",
+];
+
+/// Functions of the harness that expect an error of a variant.
+const EXPECTING: [(&str, &str); 4] = [
+    ("InvalidUsage", "usage_error("),
+    ("InvalidUsage", "expect_refused("),
+    ("Unsupported", "unsupported("),
+    ("Unsupported", "expect_refused("),
+];
+
+/// A line of a table of bad input.
+#[derive(Debug)]
+struct Row<'a> {
+    /// Functions, as `Context::wait`.
+    calls: Vec<&'a str>,
+    /// Variants of `Error`.
+    errors: Vec<&'a str>,
+    /// Test functions, as `resources::buffers::name`, or `lvk::path::name` for a unit test of the library.
+    tests: Vec<&'a str>,
+}
+
+/// A function of the public interface that returns `lvk::Result`.
+#[derive(Debug, PartialEq)]
+struct Call {
+    name: String,
+    takes_handle: bool,
+}
+
+/// Returns the names in backticks of a cell or line.
+fn quoted(text: &str) -> Vec<&str> {
+    text.split('`').skip(1).step_by(2).collect()
+}
+
+/// Returns the rows of all tables with the head `call | wrong | error | test`, or what is wrong with a line.
+fn rows(page: &str) -> Result<Vec<Row<'_>>, String> {
+    let mut found = Vec::new();
+    for line in page.lines() {
+        let Some(cells) = cells(line) else { continue };
+        let [calls, wrong, errors, tests] = cells[..] else { return Err(format!("four cells: {line}")) };
+        if tests == "test" || tests == "---" {
+            continue;
+        }
+        let row = Row { calls: quoted(calls), errors: quoted(errors), tests: quoted(tests) };
+        if wrong.is_empty() || row.calls.is_empty() || row.errors.is_empty() || row.tests.is_empty() {
+            return Err(format!("a cell is empty: {line}"));
+        }
+        found.push(row);
+    }
+    Ok(found)
+}
+
+/// Returns the names that begin the items of the list below a title.
+fn list<'a>(page: &'a str, title: &str) -> Vec<&'a str> {
+    let (_, section) = page.split_once(&format!("\n## {title}\n")).unwrap();
+    let section = section.split("\n## ").next().unwrap();
+    let items = section.lines().filter_map(|line| line.strip_prefix("- "));
+    items.flat_map(|item| quoted(item.split(": ").next().unwrap())).collect()
+}
+
+/// Returns the fallible functions among the lines of the interface.
+fn fallible_calls(interface: &str) -> Vec<Call> {
+    interface.lines().filter_map(fallible_call).collect()
+}
+
+fn fallible_call(line: &str) -> Option<Call> {
+    let (_, function) = line.split_once("fn lvk::")?;
+    let (head, result) = function.rsplit_once(" -> ")?;
+    if !result.contains("lvk::Result<") {
+        return None;
+    }
+    let (mut name, mut depth) = (String::new(), 0);
+    let mut letters = head.char_indices();
+    let arguments = loop {
+        match letters.next()? {
+            (at, '(') if depth == 0 => break &head[at..],
+            (_, '<') => depth += 1,
+            (_, '>') => depth -= 1,
+            (_, letter) if depth == 0 => name.push(letter),
+            _ => {}
+        }
+    };
+    let takes_handle = HANDLES.iter().any(|handle| arguments.contains(&format!("lvk::{handle}")));
+    Some(Call { name, takes_handle })
+}
+
+/// Returns the variants of `pub enum Error` in a source.
+fn variants(source: &str) -> Vec<&str> {
+    let (_, body) = source.split_once("pub enum Error {\n").unwrap();
+    let body = body.split("\n}").next().unwrap();
+    let lines = body.lines().filter_map(|line| line.strip_prefix("    "));
+    let heads = lines.filter(|line| line.starts_with(|letter: char| letter.is_ascii_uppercase()));
+    heads.map(|line| line.split([' ', '(', ',']).next().unwrap()).collect()
+}
+
+/// Returns the source of the module of a test.
+fn source(module: &[&str]) -> Option<String> {
+    let files = match module {
+        ["lvk", path @ ..] => {
+            let path = format!("lvk/src/{}", path.join("/"));
+            [format!("{path}.rs"), format!("{path}/mod.rs")]
+        }
+        path => {
+            let path = format!("tests/tests/{}", path.join("/"));
+            [format!("{path}.rs"), format!("{path}/main.rs")]
+        }
+    };
+    files.iter().find_map(|file| std::fs::read_to_string(project().join(file)).ok())
+}
+
+/// True if the source has a test function of this name.
+fn has_test(source: &str, name: &str) -> bool {
+    let mut marked = false;
+    source.lines().map(str::trim).any(|line| {
+        let found = marked && line.starts_with(&format!("fn {name}("));
+        marked = line == "#[test]" || (marked && (line.starts_with("#[") || line.starts_with("//")));
+        found
+    })
+}
+
+/// Returns what is wrong with the tests of a row: they are missing, or their file contains neither the call nor the error.
+fn complaints(row: &Row<'_>) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut sources = String::new();
+    for test in &row.tests {
+        let path: Vec<&str> = test.split("::").collect();
+        let (name, module) = path.split_last().unwrap();
+        match source(module).filter(|source| has_test(source, name)) {
+            Some(source) => sources += &source,
+            None => found.push(format!("there is no test {test}")),
+        }
+    }
+    let is_expected = |error: &&str| {
+        let by_helper = EXPECTING.iter().filter(|(variant, _)| variant == error);
+        sources.contains(&format!("Error::{error}"))
+            || by_helper.map(|(_, helper)| helper).any(|name| sources.contains(name))
+    };
+    let in_tests = row.tests.iter().any(|test| !test.starts_with("lvk::"));
+    let functions = row.calls.iter().filter_map(|call| call.rsplit("::").next()).filter(|_| in_tests);
+    let absent = functions.map(|name| format!("{name}(")).filter(|call| !sources.contains(call.as_str()));
+    let unexpected = row.errors.iter().filter(|error| !is_expected(error)).map(|error| (*error).to_owned());
+    let absent = absent.chain(unexpected);
+    found.extend(absent.map(|word| format!("{word:?} is not in the file of {:?}", row.tests)));
+    found
+}
+
+fn assert_none<T: std::fmt::Debug>(what: &str, wrong: &[T]) {
+    assert!(wrong.is_empty(), "{what}: {wrong:#?}");
+}
+
+#[test]
+fn every_fallible_call_has_a_row_or_a_reason() {
+    let rows = rows(PAGE).unwrap();
+    let by_shortage: BTreeSet<_> = list(PAGE, "Calls that no input makes fail").into_iter().collect();
+    let with_rows: BTreeSet<_> = rows.iter().flat_map(|row| &row.calls).copied().collect();
+    let calls = fallible_calls(INTERFACE);
+    assert!(calls.len() > 150, "{} calls", calls.len());
+    let known: BTreeSet<_> = calls.iter().map(|call| call.name.as_str()).collect();
+    let named: BTreeSet<_> = with_rows.union(&by_shortage).copied().collect();
+    assert_none("without a row", &known.difference(&named).collect::<Vec<_>>());
+    assert_none("no such call", &named.difference(&known).collect::<Vec<_>>());
+    assert_none("in a row and in the list", &with_rows.intersection(&by_shortage).collect::<Vec<_>>());
+}
+
+#[test]
+fn every_error_has_a_row_or_a_reason() {
+    let rows = rows(PAGE).unwrap();
+    let with_rows: BTreeSet<_> = rows.iter().flat_map(|row| &row.errors).copied().collect();
+    let without: BTreeSet<_> = list(PAGE, "Errors of other causes").into_iter().collect();
+    let known: BTreeSet<_> = variants(ERRORS).into_iter().collect();
+    let named: BTreeSet<_> = with_rows.union(&without).copied().collect();
+    assert_none("without a row", &known.difference(&named).collect::<Vec<_>>());
+    assert_none("no such error", &named.difference(&known).collect::<Vec<_>>());
+    assert_none("in a row and in the list", &with_rows.intersection(&without).collect::<Vec<_>>());
+}
+
+#[test]
+fn every_row_names_tests_that_make_the_call_and_expect_the_error() {
+    let rows = rows(PAGE).unwrap();
+    assert_none("wrong rows", &rows.iter().flat_map(complaints).collect::<Vec<_>>());
+}
+
+#[test]
+fn every_call_with_a_handle_is_tried_with_destroyed_and_foreign_ones() {
+    let rows = rows(PAGE).unwrap();
+    let tried = |call: &str| {
+        let of_handles =
+            |row: &&Row<'_>| ["StaleHandle", "ForeignHandle"].iter().all(|error| row.errors.contains(error));
+        rows.iter().filter(of_handles).any(|row| row.calls.contains(&call))
+    };
+    let calls = fallible_calls(INTERFACE).into_iter().filter(|call| call.takes_handle);
+    let untried: Vec<_> = calls.filter(|call| !tried(&call.name)).map(|call| call.name).collect();
+    assert_none("no row of handles has", &untried);
+}
+
+#[test]
+fn rows_that_do_not_hold_are_noticed() {
+    let row = |call, error, test| Row { calls: vec![call], errors: vec![error], tests: vec![test] };
+    let right = row(
+        "Context::buffer_address",
+        "StaleHandle",
+        "resources::handles::a_released_object_outlives_its_holder",
+    );
+    assert_none("right", &complaints(&right));
+    let unit = row(
+        "Context::a",
+        "InvalidUsage",
+        "lvk::accel::micromap_desc::impossible_maps_are_errors_that_name_the_micromap_and_the_number",
+    );
+    assert_none("a unit test", &complaints(&unit));
+    for wrong in [
+        row("Context::buffer_address", "StaleHandle", "resources::handles::no_such_test"),
+        row("Context::buffer_address", "StaleHandle", "resources::handles::expect_all_refused"),
+        row(
+            "Context::buffer_address",
+            "StaleHandle",
+            "resources::nowhere::a_released_object_outlives_its_holder",
+        ),
+        row(
+            "Context::no_such_call",
+            "StaleHandle",
+            "resources::handles::a_released_object_outlives_its_holder",
+        ),
+        row(
+            "Context::buffer_address",
+            "OverBudget",
+            "resources::handles::a_released_object_outlives_its_holder",
+        ),
+    ] {
+        assert_eq!(complaints(&wrong).iter().filter(|text| !text.is_empty()).count().min(1), 1, "{wrong:?}");
+    }
+    assert!(rows("| `a` | b | `c` |").is_err() && rows("| `a` | | `C` | `d::e` |").is_err());
+    assert_eq!(rows("| call | wrong | error | test |\n|---|---|---|---|\n").unwrap().len(), 0);
+}
+
+#[test]
+fn the_interface_is_read() {
+    let call = |line| fallible_call(line);
+    let found = |name: &str, takes_handle| Some(Call { name: name.to_owned(), takes_handle });
+    let upload = "pub fn lvk::CommandBuffer::upload<T: a::B>(&mut self, &T) -> lvk::Result<u64>";
+    assert_eq!(call(upload), found("CommandBuffer::upload", false));
+    let address = "pub fn lvk::Holder<lvk::BufferHandle>::address(&self) -> lvk::Result<u64>";
+    assert_eq!(call(address), found("Holder::address", false));
+    let raw = "pub unsafe fn lvk::Context::raw(&self, &[lvk::BufferHandle]) -> a::Vec<lvk::Result<()>>";
+    assert_eq!(call(raw), found("Context::raw", true));
+    assert_eq!(call("pub fn lvk::Context::limits(&self) -> lvk::Limits"), None);
+    assert_eq!(
+        variants(
+            "pub enum Error {\n    /// A.\n    A {\n        /// B.\n        b: u32,\n    },\n    C(u32),\n}\n"
+        ),
+        ["A", "C"]
+    );
+}
