@@ -1,7 +1,8 @@
 //! Names in scene files: bytes of any encoding, which a comment may follow, and which may name a file.
 
+use std::ffi::OsStr;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use crate::app::input_file::{self, FileKind};
 
@@ -23,23 +24,46 @@ pub(super) fn unquoted(text: &[u8]) -> &[u8] {
     rest.split(|byte| *byte == b'"').next().unwrap_or_default().trim_ascii()
 }
 
-/// Finds the regular file that a scene file in `folder` means by `name`: as written (backslashes are separators), with other
-/// capitals, or, if the folders of the name do not exist on this machine, by its last part in `folder` or in one of its
-/// `subfolders`. Bytes that are no UTF-8 are those of the file's name, or Latin-1 for it.
-pub(super) fn find_file(folder: &Path, name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
+/// Finds the regular file that a scene file means by `name`, which is relative to one of `folders`: as written (backslashes are
+/// separators), with other capitals, with `%20` and the like decoded, or, if the folders of the name do not exist on this
+/// machine, by its last part in one of `folders` or of their `subfolders`. Bytes that are no UTF-8 are those of the file's name,
+/// or Latin-1 for it.
+pub(super) fn find_file(folders: &[&Path], name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
     let name: Vec<u8> = name.iter().map(|byte| if *byte == b'\\' { b'/' } else { *byte }).collect();
+    let decoded = percent_decoded(&name);
+    std::iter::once(name).chain(decoded).find_map(|name| find_named(folders, &name, subfolders))
+}
+
+fn find_named(folders: &[&Path], name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
     let last = name.rsplit(|byte| *byte == b'/').next().unwrap_or_default();
     if last.is_empty() {
         return None;
     }
-    let beside = subfolders.iter().map(|subfolder| folder.join(subfolder));
-    let folders: Vec<PathBuf> = std::iter::once(folder.to_path_buf()).chain(beside).collect();
-    let mut candidates: Vec<PathBuf> = paths(&name).iter().map(|path| folder.join(path)).collect();
-    for folder in &folders {
-        candidates.extend(paths(last).iter().map(|path| folder.join(path)));
+    let beside =
+        subfolders.iter().flat_map(|subfolder| folders.iter().map(move |folder| folder.join(subfolder)));
+    let all: Vec<PathBuf> = folders.iter().map(|folder| folder.to_path_buf()).chain(beside).collect();
+    let whole =
+        folders.iter().flat_map(|folder| paths(name).into_iter().map(|path| (folder.to_path_buf(), path)));
+    let by_last = all.iter().flat_map(|folder| paths(last).into_iter().map(|path| (folder.clone(), path)));
+    let candidates: Vec<(PathBuf, PathBuf)> = whole.chain(by_last).collect();
+    let exact = candidates.iter().map(|(folder, path)| folder.join(path)).find(|path| path.is_file());
+    exact.or_else(|| candidates.iter().find_map(|(folder, path)| with_other_capitals(folder, path)))
+}
+
+/// The name with the bytes that `%` and two hexadecimal digits stand for, as in addresses; `None` if it has none.
+fn percent_decoded(name: &[u8]) -> Option<Vec<u8>> {
+    let mut decoded = Vec::with_capacity(name.len());
+    let mut rest = name;
+    while let [first, after @ ..] = rest {
+        let digits = after
+            .first_chunk::<2>()
+            .filter(|_| *first == b'%')
+            .filter(|d| d.iter().all(u8::is_ascii_hexdigit));
+        let byte = digits.and_then(|digits| u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok());
+        decoded.push(byte.unwrap_or(*first));
+        rest = if byte.is_some() { &after[2..] } else { after };
     }
-    let exact = candidates.iter().find(|path| path.is_file()).cloned();
-    exact.or_else(|| candidates.iter().find_map(|path| with_other_capitals(path)))
+    (decoded.len() < name.len()).then_some(decoded)
 }
 
 /// The name as a path for messages about a file that is not there.
@@ -79,16 +103,28 @@ fn latin_1(name: &[u8]) -> String {
     name.iter().map(|byte| char::from(*byte)).collect()
 }
 
-/// The file in the same folder whose name differs in capitals, or in whether it is UTF-8 or Latin-1.
-fn with_other_capitals(path: &Path) -> Option<PathBuf> {
-    let folded = |name: &std::ffi::OsStr| {
+/// The file at `path` in `folder`, where names may differ in capitals, or in whether they are UTF-8 or Latin-1.
+fn with_other_capitals(folder: &Path, path: &Path) -> Option<PathBuf> {
+    let mut found = folder.to_path_buf();
+    for component in path.components() {
+        let next = found.join(component);
+        found = match component {
+            Component::Normal(name) if !next.exists() => entry_with_other_capitals(&found, name)?,
+            _ => next,
+        };
+    }
+    found.is_file().then_some(found)
+}
+
+fn entry_with_other_capitals(folder: &Path, name: &OsStr) -> Option<PathBuf> {
+    let folded = |name: &OsStr| {
         let bytes = name.as_encoded_bytes();
         std::str::from_utf8(bytes).map_or_else(|_| latin_1(bytes), str::to_owned).to_lowercase()
     };
-    let wanted = folded(path.file_name()?);
-    let entries = std::fs::read_dir(path.parent()?).ok()?.flatten();
-    let matching = entries.filter(|entry| folded(&entry.file_name()) == wanted);
-    matching.map(|entry| entry.path()).filter(|path| path.is_file()).min()
+    let wanted = folded(name);
+    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let entries = std::fs::read_dir(listed).ok()?.flatten().map(|entry| entry.file_name());
+    entries.filter(|name| folded(name) == wanted).min().map(|name| folder.join(name))
 }
 
 #[cfg(test)]
@@ -117,13 +153,31 @@ mod tests {
         for name in
             ["textures/Wood.PNG", "textures\\Wood.PNG", "C:\\art\\Wood.PNG", "wood.png", "Textures/wood.png"]
         {
-            let found = find_file(folder.path(), name.as_bytes(), &["textures"]).unwrap();
+            let found = find_file(&[folder.path()], name.as_bytes(), &["textures"]).unwrap();
             assert_eq!(found.canonicalize().unwrap(), wood, "{name}");
         }
         for name in ["stone.png", "", "textures", "textures/", "."] {
-            assert_eq!(find_file(folder.path(), name.as_bytes(), &["textures"]), None, "{name}");
+            assert_eq!(find_file(&[folder.path()], name.as_bytes(), &["textures"]), None, "{name}");
         }
-        assert_eq!(find_file(folder.path(), b"wood.png", &[]), None);
+        assert_eq!(find_file(&[folder.path()], b"wood.png", &[]), None);
+        let others = [Path::new("/nowhere"), folder.path()];
+        assert!(find_file(&others, b"TEXTURES\\wood.png", &[]).is_some(), "a folder with other capitals");
+    }
+
+    #[test]
+    fn bytes_of_addresses_are_decoded_where_no_file_has_the_name() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["my wood.png", "a%20b.png", "a b.png"] {
+            std::fs::write(folder.path().join(name), b"").unwrap();
+        }
+        let found = |name: &str| find_file(&[folder.path()], name.as_bytes(), &[]);
+        assert_eq!(found("my%20wood.png"), Some(folder.path().join("my wood.png")));
+        assert_eq!(found("file:///C:/x/My%20Wood.png"), Some(folder.path().join("my wood.png")));
+        assert_eq!(found("a%20b.png"), Some(folder.path().join("a%20b.png")));
+        for name in ["my%2", "%", "%zz", "100%", "my%20stone.png"] {
+            assert_eq!(found(name), None, "{name}");
+        }
+        assert_eq!(percent_decoded(b"h%C3%b6he%"), Some("h\u{f6}he%".as_bytes().to_vec()));
     }
 
     #[test]
@@ -133,9 +187,9 @@ mod tests {
         for name in
             ["Größe.png".as_bytes(), b"Gr\xf6\xdfe.png", b"gr\xf6\xdfe.PNG", b"D:\\x\\GR\xd6\xdfE.png"]
         {
-            assert!(find_file(folder.path(), name, &[]).is_some(), "{}", lvk::readable_bytes(name));
+            assert!(find_file(&[folder.path()], name, &[]).is_some(), "{}", lvk::readable_bytes(name));
         }
-        assert_eq!(find_file(folder.path(), b"Gr\xfc\xdfe.png", &[]), None);
+        assert_eq!(find_file(&[folder.path()], b"Gr\xfc\xdfe.png", &[]), None);
     }
 
     /// macOS takes no such names.
@@ -146,7 +200,7 @@ mod tests {
         for (name, content) in [(&b"M\xe4.mtl"[..], "a"), (b"M\xf6.mtl", "b")] {
             std::fs::write(folder.path().join(path_of_bytes(name).unwrap()), content).unwrap();
         }
-        let content = |name: &[u8]| std::fs::read(find_file(folder.path(), name, &[]).unwrap()).unwrap();
+        let content = |name: &[u8]| std::fs::read(find_file(&[folder.path()], name, &[]).unwrap()).unwrap();
         assert_eq!(
             (content(b"M\xe4.mtl"), content(b"M\xf6.mtl"), content(b"m\xd6.MTL")),
             (b"a".to_vec(), b"b".to_vec(), b"b".to_vec())

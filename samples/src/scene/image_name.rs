@@ -1,17 +1,20 @@
 //! Images as libraries name them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::rc::Rc;
 
 use super::byte_names::{find_file, names_in, path_of, unquoted, why_absent};
 use crate::app::input_file::FileKind;
 
-/// Folders beside a library that hold its images, where the library names folders of another machine.
-const IMAGE_FOLDERS: &[&str] = &["textures"];
+/// Folders beside a library that hold its images, where the library names folders of another machine. Archives of models
+/// often have `source` beside `textures`.
+const IMAGE_FOLDERS: &[&str] = &["textures", "../textures"];
 
-/// An image as a library names it, and the folder of that library.
+/// An image as a library names it.
 #[derive(Clone)]
 pub(super) struct Image {
-    folder: PathBuf,
+    /// The folder of the library, then that of the OBJ file.
+    folders: Rc<[PathBuf; 2]>,
     /// The rest of the line.
     name: Vec<u8>,
 }
@@ -26,17 +29,18 @@ pub(super) struct Absence {
 }
 
 impl Image {
-    pub(super) fn new(folder: &Path, name: &[u8]) -> Self {
-        Self { folder: folder.into(), name: name.into() }
+    pub(super) fn new(folders: &Rc<[PathBuf; 2]>, name: &[u8]) -> Self {
+        Self { folders: folders.clone(), name: name.into() }
     }
 
     /// The file that the name means.
     pub(super) fn find(&self) -> Result<PathBuf, Absence> {
-        let named = |name| find_file(&self.folder, unquoted(name), IMAGE_FOLDERS);
+        let folders = self.folders.each_ref().map(|folder| folder.as_path());
+        let named = |name| find_file(&folders, unquoted(name), IMAGE_FOLDERS);
         names_in(&self.name).find_map(named).ok_or_else(|| {
             let name: Vec<u8> =
                 unquoted(&self.name).iter().map(|b| if *b == b'\\' { b'/' } else { *b }).collect();
-            let path = self.folder.join(path_of(&name));
+            let path = folders[0].join(path_of(&name));
             Absence { why: why_absent(&path, FileKind::Picture), path }
         })
     }

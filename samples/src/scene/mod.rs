@@ -28,6 +28,8 @@ mod camera;
 mod camera_file;
 mod camera_path;
 mod error;
+#[cfg(test)]
+mod exporter_tests;
 mod framing;
 mod gpu_camera;
 mod image_name;
@@ -49,6 +51,7 @@ mod procedural;
 mod relief;
 mod setting;
 mod sky;
+mod texcoord_mapping;
 mod text_lines;
 mod text_numbers;
 mod texture;

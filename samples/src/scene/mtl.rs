@@ -2,13 +2,15 @@
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use lvk::{readable_bytes, readable_name};
 
 use super::Material;
 use super::byte_names::{find_file, names_in, path_of, unquoted, why_absent};
 use super::image_name::{Absence, Image};
-use super::mtl_text::{self, MtlEntry};
+use super::mtl_text::{self, MapOptions, MtlEntry};
+use super::texcoord_mapping::Mapping;
 use super::text_lines::decoded;
 use super::text_numbers::words;
 use super::texture::{PictureBudget, Texture};
@@ -31,11 +33,15 @@ pub(super) struct Library {
     normal_map_numbers: HashMap<PathBuf, Option<u32>>,
     budget: PictureBudget,
     warnings: Warnings,
+    /// The folder of the OBJ file.
+    folder: PathBuf,
 }
 
 /// Result of [`Library::select`].
 pub(super) struct Selection {
     pub(super) materials: Vec<Material>,
+    /// Changes of the texture coordinates of each material.
+    pub(super) mappings: Vec<Option<Mapping>>,
     pub(super) textures: Vec<Texture>,
     pub(super) normal_maps: Vec<Texture>,
     pub(super) warnings: Vec<String>,
@@ -49,27 +55,48 @@ struct Definition {
     /// Mask of holes: dark texels are holes.
     mask: Option<Image>,
     relief: Option<Image>,
+    mapping: Option<Mapping>,
+    /// Options of its image that are not applied.
+    ignored_options: Vec<String>,
 }
 
 impl Library {
     /// Reads the libraries that the OBJ file at `obj_path` names. A missing library is a warning.
     pub(super) fn read(obj_path: &Path, arguments: &[Vec<u8>]) -> Self {
         let folder = obj_path.parent().unwrap_or(Path::new(""));
-        let mut library = Self::default();
+        let mut library = Self { folder: folder.into(), ..Self::default() };
         let mut seen = HashSet::new();
+        let mut is_missing = false;
         for name in arguments.iter().flat_map(|argument| library_names(folder, argument)) {
-            if !seen.insert(name.clone()) {
+            let found = find_file(&[folder], &name, &[]);
+            if !seen.insert(found.clone().unwrap_or_else(|| folder.join(path_of(&name)))) {
                 continue;
             }
-            match find_file(folder, &name, &[]) {
+            match found {
                 Some(file) => library.read_file(&file),
                 None => {
                     let path = folder.join(path_of(&name));
                     library.warn_of_library(&path, &why_absent(&path, FileKind::Mtl));
+                    is_missing = true;
                 }
             }
         }
-        library
+        let is_read = seen.contains(&obj_path.with_extension("mtl"));
+        if is_missing && !is_read { library.with_namesake_of(obj_path) } else { library }
+    }
+
+    /// Reads the library that has the name of the OBJ file too, if there is one: both may have been renamed.
+    pub(super) fn with_namesake_of(mut self, obj_path: &Path) -> Self {
+        let path = obj_path.with_extension("mtl");
+        if path.is_file() {
+            let line = format!(
+                "the material library {} has the name of the OBJ file; it is read",
+                readable_name(&path)
+            );
+            self.warnings.push("namesakes", line);
+            self.read_file(&path);
+        }
+        self
     }
 
     /// Materials have their normal maps too.
@@ -107,16 +134,20 @@ impl Library {
         for name in names_in(&entry.name).skip(1) {
             self.shortened.entry(name.to_vec()).or_insert_with(|| entry.name.clone());
         }
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let folders = Rc::new([path.parent().unwrap_or(Path::new("")).to_path_buf(), self.folder.clone()]);
         let mut material = convert(entry);
-        let image = |name: &Option<Vec<u8>>| name.as_ref().map(|name| Image::new(folder, name));
+        let image = |name: &Option<Vec<u8>>| name.as_ref().map(|name| Image::new(&folders, name));
         let relief = image(&entry.relief_map);
         let (image, mask) = (image(&entry.diffuse_map), image(&entry.dissolve_map));
         // Exporters often leave Kd black beside a texture, meaning the texture alone.
         if image.is_some() && material.albedo == [0.0; 3] && !material.is_refractive() {
             material.albedo = [1.0; 3];
         }
-        self.materials.insert(entry.name.clone(), Definition { material, image, mask, relief });
+        let MapOptions { scale, offset, ignored } = entry.diffuse_options.clone();
+        let is_mapped = [scale, offset] != [[1.0; 2], [0.0; 2]];
+        let mapping = is_mapped.then_some(Mapping { scale, offset });
+        let definition = Definition { material, image, mask, relief, mapping, ignored_options: ignored };
+        self.materials.insert(entry.name.clone(), definition);
     }
 
     /// Number of the image, which is read on first use; a stand-in and a warning when that fails.
@@ -200,6 +231,8 @@ impl Library {
     /// of these and the warnings.
     pub(super) fn select(mut self, names: &[Option<Vec<u8>>]) -> Selection {
         let mut selected = Vec::with_capacity(names.len());
+        let mapping = |name: &Option<Vec<u8>>| self.definition(name.as_deref()?)?.mapping;
+        let mappings = names.iter().map(mapping).collect();
         for name in names {
             let Some(name) = name else {
                 let albedo = if self.has_vertex_colors { 1.0 } else { 0.6 };
@@ -210,7 +243,7 @@ impl Library {
         }
         let Self { textures, normal_maps, mut warnings, budget, .. } = self;
         budget.into_warnings().into_iter().for_each(|line| warnings.push("pictures", line));
-        Selection { materials: selected, textures, normal_maps, warnings: warnings.into_lines() }
+        Selection { materials: selected, mappings, textures, normal_maps, warnings: warnings.into_lines() }
     }
 
     /// The definition that the rest of a `usemtl` line names.
@@ -221,12 +254,17 @@ impl Library {
     }
 
     fn material(&mut self, name: &[u8]) -> Material {
-        let Some(Definition { material, image, mask, relief }) = self.definition(name).cloned() else {
+        let Some(definition) = self.definition(name).cloned() else {
             let name = readable_bytes(name);
             let line = format!("material `{name}` is not defined; glaring orange stands in");
             self.warnings.push("materials", line);
             return Material::stand_in(&name);
         };
+        let Definition { material, image, mask, relief, .. } = definition;
+        for option in definition.ignored_options {
+            let line = format!("material `{}`: the option `{option}` of its image is ignored", material.name);
+            self.warnings.push("options of images", line);
+        }
         let mask = mask.filter(|_| image.is_some()).and_then(|mask| self.mask_file(&mask));
         let is_masked = mask.is_some();
         let albedo_texture = image.map(|image| self.texture(&image, mask));
@@ -243,7 +281,7 @@ fn file_identity(path: &Path) -> PathBuf {
 
 /// The names that a `mtllib` argument holds: one, which may hold blanks, or several.
 fn library_names(folder: &Path, argument: &[u8]) -> Vec<Vec<u8>> {
-    let exists = |name: &&[u8]| find_file(folder, unquoted(name), &[]).is_some();
+    let exists = |name: &&[u8]| find_file(&[folder], unquoted(name), &[]).is_some();
     let is_as_written = |name: &[u8]| folder.join(path_of(unquoted(name))).is_file();
     let parts: Vec<&[u8]> = words(argument).map(unquoted).collect();
     let owned = |parts: &[&[u8]]| parts.iter().map(|part| part.to_vec()).collect();
@@ -259,8 +297,8 @@ fn library_names(folder: &Path, argument: &[u8]) -> Vec<Vec<u8>> {
 
 /// Phong parameters, mirror and glass from MTL's illumination models.
 fn convert(entry: &MtlEntry) -> Material {
-    let specular = entry.specular.unwrap_or([0.0; 3]).map(unit);
     let illumination = entry.illumination.unwrap_or(2);
+    let specular = entry.specular.filter(|_| has_highlight(entry)).unwrap_or([0.0; 3]).map(unit);
     let mut material = Material {
         albedo: entry.diffuse.unwrap_or([0.6; 3]).map(unit),
         specular,
@@ -277,6 +315,15 @@ fn convert(entry: &MtlEntry) -> Material {
         make_mirror(&mut material);
     }
     material
+}
+
+/// Models 0 and 1 have no highlight. An exponent of 0 would make one as large as the surface: exporters write it for none.
+fn has_highlight(entry: &MtlEntry) -> bool {
+    match entry.illumination {
+        Some(0 | 1) => false,
+        Some(3 | 5 | 8) => true,
+        _ => entry.shininess != Some(0.0),
+    }
 }
 
 /// A mirror as strong as its brightest `Ks` and of its colour. Rough metal (low `Ns`) scatters instead: below
@@ -298,15 +345,31 @@ fn is_glass(illumination: u8) -> bool {
     matches!(illumination, 4 | 6 | 7 | 9)
 }
 
-/// Share of light that passes: one minus `d` (or `Tr`); 0.9 for a glass model that says nothing else. Less than
-/// 0.05 counts as opaque.
+/// Share of light that passes: one minus `d` (or `Tr`), and for a glass model without either what `Ni` and `Tf` say. Less than 0.05
+/// counts as opaque.
 fn transmission(entry: &MtlEntry, illumination: u8) -> f32 {
     let by_tr = entry.transparency.filter(|&tr| tr < 1.0).unwrap_or(0.0);
     let share = entry.dissolve.map_or(by_tr, |dissolve| 1.0 - dissolve);
     match share {
         s if s >= 0.05 => s.min(0.95),
-        _ if is_glass(illumination) => 0.9,
+        _ if is_glass(illumination) => transmission_of_glass(entry, illumination),
         _ => 0.0,
+    }
+}
+
+/// 0.9, but for the opaque materials that exporters give a glass model. Maya writes model 4 with `Ni 1.00` for all materials,
+/// and `Tf` as one minus their transparency; Cinema 4D writes model 4 with `d 1`.
+fn transmission_of_glass(entry: &MtlEntry, illumination: u8) -> f32 {
+    let bends = entry.optical_density.is_none_or(|density| density > 1.0);
+    let is_said = entry.dissolve.is_some() || entry.transparency == Some(0.0);
+    let is_said_opaque = is_said && (!bends || matches!(illumination, 4 | 9));
+    match entry.filter {
+        _ if is_said_opaque => 0.0,
+        _ if bends => 0.9,
+        filter => match 1.0 - filter.unwrap_or([1.0; 3]).into_iter().fold(0.0, f32::max) {
+            share if share >= 0.05 => share.min(0.95),
+            _ => 0.0,
+        },
     }
 }
 

@@ -1,4 +1,6 @@
-//! Parses MTL text as found in the wild: an odd line (`Kd spectral ...`, `map_Kd -s 2 2 1 wood.png`) costs only itself.
+//! Parses MTL text as found in the wild: an odd line (`Kd spectral ...`) costs only itself.
+
+use lvk::readable_bytes;
 
 use super::text_lines::{lines, split_word};
 use super::text_numbers::{Number, words};
@@ -28,10 +30,51 @@ pub(super) struct MtlEntry {
     pub illumination: Option<u8>,
     /// `map_Kd`: the name behind the options and what follows it on its line.
     pub diffuse_map: Option<Vec<u8>>,
+    /// The options of `map_Kd`.
+    pub diffuse_options: MapOptions,
     /// `map_d`, in the same form.
     pub dissolve_map: Option<Vec<u8>>,
     /// `norm`, `map_bump` or `bump`, in the same form.
     pub relief_map: Option<Vec<u8>>,
+}
+
+/// Options in front of the name of an image.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MapOptions {
+    /// `-s`: factors of `u` and `v`.
+    pub scale: [f32; 2],
+    /// `-o`: added to `u` and `v` after scaling.
+    pub offset: [f32; 2],
+    /// Options that change the image and are not applied, as in the file.
+    pub ignored: Vec<String>,
+}
+
+impl Default for MapOptions {
+    fn default() -> Self {
+        Self { scale: [1.0; 2], offset: [0.0; 2], ignored: Vec::new() }
+    }
+}
+
+impl MapOptions {
+    /// Takes an option in lower case and its values.
+    fn take(&mut self, option: &[u8], values: &[&[u8]]) {
+        let number = |i: usize| values.get(i).and_then(|word| Number::from_word(word).finite_f32());
+        let replace =
+            |pair: &mut [f32; 2]| pair.iter_mut().zip(0..).for_each(|(x, i)| *x = number(i).unwrap_or(*x));
+        let usual: &[f32] = match option {
+            b"-s" => return replace(&mut self.scale),
+            b"-o" => return replace(&mut self.offset),
+            b"-t" => &[0.0; 3],
+            b"-mm" => &[0.0, 1.0],
+            b"-clamp" | b"-cc" if values[0].eq_ignore_ascii_case(b"off") => return,
+            b"-clamp" | b"-cc" | b"-imfchan" => &[],
+            _ => return,
+        };
+        if usual.is_empty() || (0..values.len()).any(|i| number(i) != usual.get(i).copied()) {
+            let words = std::iter::once(option).chain(values.iter().copied());
+            self.ignored.push(words.map(readable_bytes).collect::<Vec<_>>().join(" "));
+        }
+    }
 }
 
 /// The entries of the decoded MTL file `content`, and the lines, from 1, with numbers that are not finite.
@@ -70,9 +113,14 @@ impl MtlEntry {
             b"d" => replace(&mut self.dissolve, number(rest.strip_prefix(b"-halo").unwrap_or(rest))),
             b"tr" => replace(&mut self.transparency, number(rest)),
             b"illum" => replace(&mut self.illumination, number(rest).map(|n| n.clamp(0.0, 10.0) as u8)),
-            b"map_kd" => !replace(&mut self.diffuse_map, image_name(rest)),
-            b"map_d" => !replace(&mut self.dissolve_map, image_name(rest)),
-            b"norm" | b"map_bump" | b"bump" => !replace(&mut self.relief_map, image_name(rest)),
+            b"map_kd" => {
+                if let Some((name, options)) = image_name(rest) {
+                    (self.diffuse_map, self.diffuse_options) = (Some(name), options);
+                }
+                false
+            }
+            b"map_d" => !replace(&mut self.dissolve_map, name_alone(rest)),
+            b"norm" | b"map_bump" | b"bump" => !replace(&mut self.relief_map, name_alone(rest)),
             _ => false,
         }
     }
@@ -92,9 +140,14 @@ fn color(text: &[u8]) -> Option<[f32; 3]> {
     }
 }
 
-/// The file name behind the options of a `map_` line, and what follows it; it may hold blanks. The options are not applied.
-fn image_name(text: &[u8]) -> Option<Vec<u8>> {
+fn name_alone(text: &[u8]) -> Option<Vec<u8>> {
+    image_name(text).map(|(name, _)| name)
+}
+
+/// The file name behind the options of a `map_` line and what follows it, which may hold blanks, and the options.
+fn image_name(text: &[u8]) -> Option<(Vec<u8>, MapOptions)> {
     let mut rest = text.trim_ascii();
+    let mut options = MapOptions::default();
     while rest.starts_with(b"-") {
         let (option, after) = split_word(rest);
         let (fewest, most) = match option.to_ascii_lowercase().as_slice() {
@@ -105,15 +158,18 @@ fn image_name(text: &[u8]) -> Option<Vec<u8>> {
             _ => break,
         };
         rest = after;
+        let mut values = Vec::with_capacity(most);
         for i in 0..most {
             let (word, after) = split_word(rest);
             if i >= fewest && Number::from_word(word) == Number::Unreadable {
                 break;
             }
+            values.push(word);
             rest = after;
         }
+        options.take(&option.to_ascii_lowercase(), &values);
     }
-    (!rest.is_empty()).then(|| rest.to_vec())
+    (!rest.is_empty()).then(|| (rest.to_vec(), options))
 }
 
 #[cfg(test)]
@@ -162,10 +218,30 @@ mod tests {
             ("-strange.png", "-strange.png"),
             ("wood.png # of oak", "wood.png # of oak"),
         ] {
-            assert_eq!(image_name(text.as_bytes()).as_deref(), Some(name.as_bytes()), "{text}");
+            assert_eq!(name_alone(text.as_bytes()).as_deref(), Some(name.as_bytes()), "{text}");
         }
         assert_eq!(image_name(b"-s"), None);
         assert_eq!(image_name(b"-s 1 1 1"), None);
         assert_eq!(image_name(b""), None);
+    }
+
+    #[test]
+    fn options_are_taken_or_known_to_be_ignored() {
+        let options = |text: &str| image_name(text.as_bytes()).unwrap().1;
+        let placed = options("-o 0.5 0.25 0 -S 2 3 1 a.png");
+        assert_eq!((placed.scale, placed.offset, placed.ignored.len()), ([2.0, 3.0], [0.5, 0.25], 0));
+        assert_eq!(options("-s 2 a.png").scale, [2.0, 1.0]);
+        for usual in [
+            "-t 0 0 0",
+            "-mm 0 1",
+            "-clamp off",
+            "-cc OFF",
+            "-blendu on -blendv off -texres 512 -boost 2",
+            "-bm 1",
+        ] {
+            assert_eq!(options(&format!("{usual} a.png")), MapOptions::default(), "{usual}");
+        }
+        let ignored = options("-clamp on -mm 0.2 0.5 -imfchan r -t 1 a.png").ignored;
+        assert_eq!(ignored, ["-clamp on", "-mm 0.2 0.5", "-imfchan r", "-t 1"]);
     }
 }

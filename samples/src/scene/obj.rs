@@ -7,9 +7,11 @@ use super::mtl::{Library, Selection};
 use super::obj_text::{self, ObjText};
 use super::placement::Placement;
 use super::setting::Setting;
+use super::texcoord_mapping::Mapping;
 use super::text_lines::decoded;
 use super::{
-    Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals, obj_mesh, vertex_colors,
+    Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals, obj_mesh, texcoord_mapping,
+    vertex_colors,
 };
 use crate::app::input_file::{self, FileKind};
 use crate::app::progress::Progress;
@@ -41,12 +43,13 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
     let names = names_in_use(&mut mesh, &obj.materials);
     progress.stage(&format!("{name}: textures"), 0);
     let library = read_library(path, &obj, options, !colors.is_empty());
-    let Selection { materials, textures, normal_maps, warnings: of_materials } = library.select(&names);
+    let Selection { materials, mappings, textures, normal_maps, warnings: of_materials } =
+        library.select(&names);
     let mut warnings = obj.warnings.into_lines();
     warnings.extend(of_materials);
     progress.go_on()?;
     progress.stage(&format!("{name}: arranging triangles"), 0);
-    let opaque_triangle_count = finish(&mut mesh, &materials, &mut warnings, degenerate);
+    let opaque_triangle_count = finish(&mut mesh, &materials, &mappings, &mut warnings, degenerate);
     let setting = Setting::from_mesh(&mesh, views);
     Ok(Scene {
         opaque_triangle_count,
@@ -69,6 +72,8 @@ fn read_text(path: &Path, name: &str, progress: &mut Progress) -> Result<ObjText
 
 fn read_library(path: &Path, obj: &ObjText, options: &ObjOptions, has_colors: bool) -> Library {
     let library = Library::read(path, &obj.libraries);
+    let is_unnamed = obj.libraries.is_empty() && obj.materials.len() > 1;
+    let library = if is_unnamed { library.with_namesake_of(path) } else { library };
     let library = if options.normal_maps { library.with_normal_maps() } else { library };
     if has_colors { library.with_vertex_colors() } else { library }
 }
@@ -90,11 +95,18 @@ fn names_in_use(mesh: &mut Mesh, names: &[Option<Vec<u8>>]) -> Vec<Option<Vec<u8
     names.iter().zip(used).filter(|(_, is_used)| *is_used).map(|(name, _)| name.clone()).collect()
 }
 
-fn finish(mesh: &mut Mesh, materials: &[Material], warnings: &mut Vec<String>, degenerate: usize) -> u32 {
+fn finish(
+    mesh: &mut Mesh,
+    materials: &[Material],
+    mappings: &[Option<Mapping>],
+    warnings: &mut Vec<String>,
+    degenerate: usize,
+) -> u32 {
     if degenerate > 0 {
         warnings.push(format!("{degenerate} triangles without area were left out"));
     }
     normals::complete(mesh);
+    texcoord_mapping::apply(mesh, mappings);
     mesh.arrange(materials)
 }
 

@@ -9,8 +9,9 @@ use std::path::Path;
 use lvk::{readable_bytes, readable_name};
 
 use super::SceneError;
-use super::text_lines::{next_logical_line, split_word};
+use super::text_lines::{is_keyword, next_logical_line, split_word};
 use super::text_numbers::{Number, words};
+use super::vertex_colors;
 use super::warnings::Warnings;
 use crate::app::progress::Progress;
 
@@ -90,6 +91,7 @@ pub(super) fn parse(path: &Path, content: &[u8], progress: &mut Progress) -> Res
         numbers: HashMap::new(),
         short_faces: 0,
         weights: 0,
+        paint: Vec::new(),
     };
     let mut rest = content;
     while !rest.is_empty() {
@@ -112,6 +114,9 @@ pub(super) fn parse(path: &Path, content: &[u8], progress: &mut Progress) -> Res
     parser.finish()
 }
 
+/// Colour of a position without one.
+const WHITE: [f32; 3] = [1.0; 3];
+
 /// The largest index a kind of element was asked for, and where.
 #[derive(Clone, Copy, Default)]
 struct Reach {
@@ -131,11 +136,25 @@ struct Parser<'a> {
     short_faces: usize,
     /// Positions with a weight other than 1.
     weights: usize,
+    /// Colours of the `#MRGB` lines since the last other statement.
+    paint: Vec<[f32; 3]>,
 }
 
 impl Parser<'_> {
     fn statement(&mut self, line: &[u8]) -> Result<(), SceneError> {
         let (keyword, rest) = split_word(line);
+        match keyword {
+            b"#MRGB" => self.paint.extend(vertex_colors::painted(rest)),
+            [] | [b'#', ..] => {}
+            _ => {
+                self.paint_positions();
+                self.take(keyword, rest)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, keyword: &[u8], rest: &[u8]) -> Result<(), SceneError> {
         match keyword {
             b"v" => self.position(rest)?,
             b"vt" => self.texcoord(rest),
@@ -143,9 +162,29 @@ impl Parser<'_> {
             b"f" | b"fo" => self.face(rest)?,
             b"usemtl" => self.use_material(rest),
             b"mtllib" if !rest.is_empty() => self.obj.libraries.push(rest.to_vec()),
-            _ => {}
+            _ if is_keyword(keyword) => {}
+            _ if is_keyword(&keyword.to_ascii_lowercase()) => {
+                return self.take(&keyword.to_ascii_lowercase(), rest);
+            }
+            _ => {
+                let keyword = readable_bytes(keyword);
+                self.warn("statements", &format!("`{keyword}` is no statement of OBJ; the line is ignored"));
+            }
         }
         Ok(())
+    }
+
+    /// Gives the colours of `#MRGB` lines to as many of the last positions, as ZBrush and Blender do.
+    fn paint_positions(&mut self) {
+        if self.paint.is_empty() {
+            return;
+        }
+        let count = self.obj.positions.len();
+        let colors = &mut self.obj.colors;
+        colors.resize(count, WHITE);
+        let painted = self.paint.len().min(count);
+        colors[count - painted..].copy_from_slice(&self.paint[..painted]);
+        self.paint.clear();
     }
 
     /// A position, and behind it a weight, or a colour of three numbers.
@@ -181,7 +220,6 @@ impl Parser<'_> {
 
     /// Keeps the colour of the position that is pushed next. A position without one is white.
     fn color(&mut self, numbers: Option<&[Number; 3]>) {
-        const WHITE: [f32; 3] = [1.0; 3];
         let colors = &mut self.obj.colors;
         match numbers.map(|numbers| numbers.map(Number::finite_f32)) {
             Some([Some(red), Some(green), Some(blue)]) => {
@@ -246,8 +284,7 @@ impl Parser<'_> {
             if kind > 0 && text.is_empty() {
                 continue;
             }
-            let index = std::str::from_utf8(text).ok().and_then(|text| text.parse().ok());
-            *place = self.resolve(kind, index.ok_or_else(|| self.no_corner(word))?)?;
+            *place = self.resolve(kind, index(text).ok_or_else(|| self.no_corner(word))?)?;
         }
         match parts.next() {
             None => Ok(corner),
@@ -282,6 +319,7 @@ impl Parser<'_> {
     }
 
     fn finish(mut self) -> Result<ObjText, SceneError> {
+        self.paint_positions();
         for kind in 0..3 {
             let Reach { highest, index, line } = self.reach[kind];
             if highest > self.count(kind) {
@@ -337,6 +375,13 @@ impl Parser<'_> {
         let (what, count) = (KINDS[kind], self.count(kind));
         SceneError::IndexOutOfRange { path: self.path.into(), line, what, index, count }
     }
+}
+
+/// A whole number. Scripts that write all numbers alike give it decimals, which are zeros (`12.000000`).
+fn index(text: &[u8]) -> Option<i64> {
+    let text = std::str::from_utf8(text).ok()?;
+    let whole = || text.split_once('.').filter(|(_, decimals)| decimals.bytes().all(|digit| digit == b'0'));
+    text.parse().ok().or_else(|| whole()?.0.parse().ok())
 }
 
 #[cfg(test)]

@@ -63,22 +63,38 @@ pub(super) fn decoded(content: &[u8]) -> Cow<'_, [u8]> {
     };
     let little = |bytes: &[u8]| bytes.as_chunks().0.iter().map(|unit| u16::from_le_bytes(*unit)).collect();
     let big = |bytes: &[u8]| bytes.as_chunks().0.iter().map(|unit| u16::from_be_bytes(*unit)).collect();
-    match content {
+    let text = match content {
         [0xef, 0xbb, 0xbf, rest @ ..] => Cow::Borrowed(rest),
         [0xff, 0xfe, rest @ ..] => text(little(rest)),
         [0xfe, 0xff, rest @ ..] => text(big(rest)),
         [1..=0xff, 0, 1..=0xff, 0, ..] => text(little(content)),
         [0, 1..=0xff, 0, 1..=0xff, ..] => text(big(content)),
         _ => Cow::Borrowed(content),
+    };
+    match text {
+        Cow::Borrowed(bytes) => Cow::Borrowed(without_padding(bytes)),
+        Cow::Owned(mut bytes) => {
+            bytes.truncate(without_padding(&bytes).len());
+            Cow::Owned(bytes)
+        }
     }
 }
 
-/// The first line and what follows it. A line ends at a line feed, a carriage return or both.
+/// The text without the zeros and the end marks of DOS (Ctrl-Z) that old programs fill the last block of a file with.
+fn without_padding(text: &[u8]) -> &[u8] {
+    let last = text.iter().rposition(|byte| !matches!(byte, 0 | 0x1a));
+    &text[..last.map_or(0, |last| last + 1)]
+}
+
+/// The first line and what follows it. A line ends at a line feed, a carriage return or both, or at the two carriage returns
+/// and line feed that writing text twice as text makes on Windows.
 pub(super) fn split_line(content: &[u8]) -> (&[u8], &[u8]) {
     let Some(end) = content.iter().position(|byte| matches!(byte, b'\n' | b'\r')) else {
         return (content, &[]);
     };
-    let length = if content[end..].starts_with(b"\r\n") { 2 } else { 1 };
+    let ends: [&[u8]; 2] = [b"\r\r\n", b"\r\n"];
+    let length =
+        ends.into_iter().find(|end_of_line| content[end..].starts_with(end_of_line)).map_or(1, <[u8]>::len);
     (&content[..end], &content[end + length..])
 }
 
@@ -92,9 +108,10 @@ pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// The first word and what follows it, both without blanks around them.
+/// The first word and what follows it, both without blanks around them, and without the byte order mark that stands in a
+/// file put together from several.
 pub(super) fn split_word(text: &[u8]) -> (&[u8], &[u8]) {
-    let text = text.trim_ascii();
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text).trim_ascii();
     let end = text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
     (&text[..end], text[end..].trim_ascii_start())
 }
@@ -154,7 +171,12 @@ fn may_continue(line: &[u8]) -> bool {
 
 fn begins_statement(line: &[u8]) -> bool {
     let (keyword, _) = split_word(line);
-    keyword.starts_with(b"#") || KEYWORDS.contains(&keyword)
+    keyword.starts_with(b"#") || is_keyword(keyword)
+}
+
+/// True if OBJ has such a statement.
+pub(super) fn is_keyword(word: &[u8]) -> bool {
+    KEYWORDS.contains(&word)
 }
 
 #[cfg(test)]
@@ -209,7 +231,7 @@ mod tests {
 
     #[test]
     fn lines_end_as_on_any_system() {
-        for end in ["\n", "\r\n", "\r"] {
+        for end in ["\n", "\r\n", "\r\r\n", "\r"] {
             let text = ["a", "", "b"].join(end);
             assert_eq!(lines(text.as_bytes()).collect::<Vec<_>>(), [b"a".as_slice(), b"", b"b"]);
         }
@@ -228,6 +250,8 @@ mod tests {
         }
         assert_eq!(decoded(&marked(b"\xef\xbb\xbf", text.as_bytes())), text.as_bytes());
         assert_eq!(decoded(b"caf\xe9"), b"caf\xe9".as_slice());
+        assert_eq!(decoded(b"v 1\n\x1a\0\0"), b"v 1\n".as_slice());
+        assert_eq!(decoded(b"v\0 1"), b"v\0 1".as_slice());
         assert_eq!(decoded(b"\xff\xfeo\0\0"), b"o".as_slice(), "half a letter is left out");
     }
 }

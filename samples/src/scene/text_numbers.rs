@@ -18,7 +18,7 @@ impl Number {
             Ok(Ok(value)) if value.is_finite() => Self::Finite(value),
             Ok(Ok(_)) => Self::NotFinite,
             _ if is_spelled_out(word) => Self::NotFinite,
-            _ => Self::Unreadable,
+            _ => foreign(word).map_or(Self::Unreadable, Self::Finite),
         }
     }
 
@@ -29,6 +29,21 @@ impl Number {
             _ => None,
         }
     }
+}
+
+/// The value of a number with a decimal comma (`0,5`), or with the exponent of Fortran (`1.5D+03`).
+fn foreign(word: &[u8]) -> Option<f64> {
+    let count = |letter: u8| word.iter().filter(|byte| **byte == letter).count();
+    let is_numeric = word.iter().all(|byte| byte.is_ascii_digit() || b"+-.,dD".contains(byte));
+    if !is_numeric || count(b',') + count(b'.') > 1 {
+        return None;
+    }
+    let usual = |byte: &u8| match byte {
+        b',' => '.',
+        b'd' | b'D' => 'e',
+        other => char::from(*other),
+    };
+    word.iter().map(usual).collect::<String>().parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 /// True if C libraries write infinity or NaN so.
@@ -94,10 +109,14 @@ mod tests {
             assert_eq!(Number::from_word(word.as_bytes()), Number::NotFinite, "{word}");
             assert_eq!(words(word.as_bytes()).collect::<Vec<_>>(), [word.as_bytes()]);
         }
-        for word in ["x", "", "1,5", "1.#INFO", "#", "nano", "1.5mm"] {
+        for word in ["x", "", "1,234.5", "1,2,3", ",", "d", "1d", "0x10", "1.#INFO", "#", "nano", "1.5mm"] {
             assert_eq!(Number::from_word(word.as_bytes()), Number::Unreadable, "{word}");
         }
         assert_eq!(Number::from_word(b"-1.5e3"), Number::Finite(-1500.0));
+        for (word, value) in [("0,5", 0.5), ("-1,25", -1.25), ("1,", 1.0), ("1.5D+03", 1500.0), ("2d-1", 0.2)]
+        {
+            assert_eq!(Number::from_word(word.as_bytes()), Number::Finite(value), "{word}");
+        }
         assert_eq!(Number::from_word(b"1e39").finite_f32(), None);
         assert_eq!(Number::from_word(b"1e38").finite_f32(), Some(1e38));
     }

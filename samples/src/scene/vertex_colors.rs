@@ -22,6 +22,17 @@ pub(super) fn linear(mut colors: Vec<[f32; 3]>, warnings: &mut Warnings) -> Vec<
     colors
 }
 
+/// The colours of a `#MRGB` line of ZBrush: eight hexadecimal digits each, mask, red, green and blue. 0 to 1, sRGB.
+pub(super) fn painted(text: &[u8]) -> Vec<[f32; 3]> {
+    let digits = text.trim_ascii().as_chunks::<8>().0;
+    let color = |digits: &[u8; 8]| {
+        let value = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
+        let [_, red, green, blue] = value.to_be_bytes();
+        Some([red, green, blue].map(|channel| f32::from(channel) / 255.0))
+    };
+    digits.iter().map_while(color).collect()
+}
+
 /// The linear value of an sRGB-encoded one (IEC 61966-2-1), both 0 to 1.
 fn decode_srgb(encoded: f32) -> f32 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
@@ -46,6 +57,13 @@ mod tests {
         for byte in 0..=255_u8 {
             assert_eq!(encode_srgb(decode_srgb(f32::from(byte) / 255.0)), byte);
         }
+    }
+
+    #[test]
+    fn painted_colors_are_hexadecimal() {
+        assert_eq!(painted(b" ffff0000000080ff \r"), [[1.0, 0.0, 0.0], [0.0, 128.0 / 255.0, 1.0]]);
+        assert_eq!(painted(b"ffFF0000 00ff00"), [[1.0, 0.0, 0.0]]);
+        assert_eq!(painted(b"block of colours"), [[0.0; 3]; 0]);
     }
 
     #[test]
