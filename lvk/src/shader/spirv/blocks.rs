@@ -1,10 +1,10 @@
 //! The blocks of a module whose bytes the application writes: push constants, shader records and buffer references.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use ::spirv::{Decoration, StorageClass};
 
-use super::parsed::{MAX_NESTING, ParsedModule, Type};
+use super::parsed::{KnownSizes, MAX_NESTING, ParsedModule, Type};
 
 /// The blocks of an entry point, and the structs in them.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -25,7 +25,7 @@ pub(crate) struct Block {
 }
 
 /// Kind of a block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum BlockKind {
     PushConstants,
     ShaderRecord,
@@ -62,6 +62,7 @@ impl Blocks {
     /// Returns the blocks that the entry point with this index uses. Buffer references belong to the whole module.
     pub(crate) fn from_module(module: &ParsedModule, entry: usize) -> Self {
         let mut blocks = Self::default();
+        let mut collector = BlockCollector { module, blocks: &mut blocks, seen: HashSet::new(), known: KnownSizes::new() };
         for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
             let kind = match variable.storage {
                 class if class == StorageClass::PushConstant as u32 => BlockKind::PushConstants,
@@ -69,11 +70,11 @@ impl Blocks {
                 _ => continue,
             };
             if let Some(Type::Pointer { target }) = module.types.get(&variable.ty) {
-                blocks.add(module, kind, *target);
+                collector.add(kind, *target);
             }
         }
         for target in &module.buffer_references {
-            blocks.add(module, BlockKind::BufferReference, *target);
+            collector.add(BlockKind::BufferReference, *target);
         }
         blocks
     }
@@ -102,29 +103,41 @@ impl Blocks {
         members.iter().map(|member| member.offset.saturating_add(member.bytes)).max()
     }
 
-    fn add(&mut self, module: &ParsedModule, kind: BlockKind, ty: u32) {
-        if !matches!(module.types.get(&ty), Some(Type::Struct { .. })) {
+}
+
+/// Collects blocks, each once: a module may have many variables and pointers of one type, whose names can be long.
+struct BlockCollector<'a> {
+    module: &'a ParsedModule,
+    blocks: &'a mut Blocks,
+    seen: HashSet<(BlockKind, u32)>,
+    known: KnownSizes,
+}
+
+impl BlockCollector<'_> {
+    fn add(&mut self, kind: BlockKind, ty: u32) {
+        let module = self.module;
+        if !matches!(module.types.get(&ty), Some(Type::Struct { .. })) || !self.seen.insert((kind, ty)) {
             return;
         }
         let name = module.names.get(&ty).cloned().unwrap_or_default();
-        self.list.push(Block { kind, name, ty });
+        self.blocks.list.push(Block { kind, name, ty });
         let mut waiting = vec![ty];
         while let Some(ty) = waiting.pop() {
-            if self.structs.contains_key(&ty) {
+            if self.blocks.structs.contains_key(&ty) {
                 continue;
             }
-            let members = struct_members(module, ty);
+            let members = struct_members(module, ty, &mut self.known);
             let nested = members.iter().flatten().filter_map(|member| match member.shape {
                 MemberShape::Structs { ty, .. } => Some(ty),
                 MemberShape::Plain { .. } | MemberShape::Unsized => None,
             });
             waiting.extend(nested);
-            self.structs.insert(ty, members);
+            self.blocks.structs.insert(ty, members);
         }
     }
 }
 
-fn struct_members(module: &ParsedModule, ty: u32) -> BlockStruct {
+fn struct_members(module: &ParsedModule, ty: u32, known: &mut KnownSizes) -> BlockStruct {
     let Some(Type::Struct { members }) = module.types.get(&ty) else {
         return Err("its type is no struct".to_owned());
     };
@@ -135,7 +148,7 @@ fn struct_members(module: &ParsedModule, ty: u32) -> BlockStruct {
         let (shape, bytes) = match member_shape(module, ty, index, *member) {
             shape @ (MemberShape::Unsized | MemberShape::Structs { count: None, .. }) => (shape, 0),
             shape => {
-                let size = module.member_size(ty, index, *member);
+                let size = module.member_size(ty, index, *member, known);
                 (shape, size.map_err(|why| format!("its member '{name}': {why}"))?)
             }
         };
