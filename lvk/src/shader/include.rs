@@ -296,3 +296,53 @@ fn without_pragma_once(text: &str) -> (String, bool) {
     }
     (out, once)
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test")]
+    use super::*;
+
+    /// Requests a name and, of each text, the names in its lines, as the compiler does. Returns the failures.
+    fn requested(listed: &[(&str, &str)], name: &str) -> Vec<String> {
+        fn request(includes: &mut Includes<'_>, name: &str, depth: usize) {
+            let found = includes.include(IncludeType::System, name, "", depth);
+            let text = found.map(|found| found.data).unwrap_or_default();
+            text.lines().for_each(|name| request(includes, name, depth + 1));
+        }
+        let mut includes = Includes::new(listed, &[], None);
+        request(&mut includes, name, 1);
+        includes.into_failures()
+    }
+
+    #[test]
+    fn texts_that_include_the_next_twice_end_with_a_remedy() {
+        let texts: Vec<_> = (1..60).map(|next| (format!("{}", next - 1), format!("{next}\n{next}"))).collect();
+        let listed: Vec<_> = texts.iter().map(|(name, text)| (&**name, &**text)).collect();
+        let failures = requested(&listed, "0");
+        let told = failures.iter().filter(|text| text.contains("more than 4096 files; put #pragma once")).count();
+        assert!(told > 0 && failures.len() < 3 * MAX_DIRECTIVES, "{told} of {}", failures.len());
+    }
+
+    #[test]
+    fn included_bytes_are_counted_each_time() {
+        let long = "// a comment\n".repeat(MAX_GLSL_BYTES as usize / 13);
+        let listed = [("long", &*long)];
+        let mut includes = Includes::new(&listed, &[], None);
+        let given = (0..6).filter(|_| includes.include(IncludeType::System, "long", "", 1).is_some()).count();
+        assert_eq!(given, 4);
+        assert!(includes.into_failures()[0].starts_with("the module includes more than 67108864 bytes; put"));
+    }
+
+    #[test]
+    fn many_failures_have_short_reasons() {
+        let names: Vec<String> = (0..1_000).map(|number| format!("name-{number}")).collect();
+        let missing: String = (0..1_000).map(|number| format!("m{number}\n")).collect();
+        let mut listed: Vec<_> = names.iter().map(|name| (&**name, "")).collect();
+        listed.push(("start", &missing));
+        let failures = requested(&listed, "start");
+        assert_eq!(failures.len(), 1_000);
+        assert!(failures[0].contains("name-31, ...)") && !failures[0].contains("name-32"), "{}", failures[0]);
+        assert!(failures[0].ends_with("(included by start)"), "{}", failures[0]);
+        assert_eq!(failures[999], "'m999' cannot be included either");
+    }
+}

@@ -55,7 +55,7 @@ impl Target {
         static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
         let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         let start = Instant::now();
-        let most = self.memory.of(bytes.len());
+        let most = self.memory.bytes_for(bytes.len());
         let peak = memory::peak_of(most, || (self.read)(bytes));
         let cost = Cost { bytes: peak, time: start.elapsed() };
         assert!(

@@ -15,7 +15,7 @@ pub struct MemoryBound {
 impl MemoryBound {
     /// Returns the bound of an input of `bytes` bytes.
     #[must_use]
-    pub fn of(self, bytes: usize) -> usize {
+    pub fn bytes_for(self, bytes: usize) -> usize {
         self.fixed.saturating_add(self.multiple.saturating_mul(bytes))
     }
 }

@@ -188,3 +188,21 @@ fn member_shape(module: &ParsedModule, block: u32, index: u32, member: u32) -> M
     }
     if count.is_none() { MemberShape::Unsized } else { MemberShape::Plain { stride } }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shader::spirv::parsed::Variable;
+
+    #[test]
+    fn a_block_of_many_variables_and_pointers_is_listed_once() {
+        let mut module = ParsedModule::default();
+        module.types.insert(1, Type::Struct { members: Vec::new() });
+        module.types.insert(2, Type::Pointer { target: 1 });
+        let storage = StorageClass::PushConstant as u32;
+        module.variables = (10..20).map(|id| Variable { id, ty: 2, storage }).collect();
+        module.buffer_references = vec![1; 10];
+        let kinds: Vec<_> = Blocks::from_module(&module, 0).list.iter().map(|block| block.kind).collect();
+        assert_eq!(kinds, [BlockKind::PushConstants, BlockKind::BufferReference]);
+    }
+}

@@ -419,3 +419,24 @@ fn parse_image_type(i: &Instruction<'_>) -> Type {
         _ => Type::Opaque(Op::TypeImage),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nested_structs_with_matrix_layouts_are_sized_once_each() {
+        let mut module = ParsedModule::default();
+        module.types.insert(1, Type::Number { bytes: 4, numbers: NumericFormat::Float });
+        for id in 2..60 {
+            module.types.insert(id, Type::Struct { members: vec![id - 1; 3] });
+            for index in 0..3 {
+                module.member_decorations.insert((id, index, Decoration::Offset as u32), 0);
+                module.member_decorations.insert((id, index, Decoration::MatrixStride as u32), 16);
+            }
+        }
+        let mut known = KnownSizes::new();
+        assert_eq!(module.size_of(59, &mut known), Ok(4));
+        assert_eq!(known.len(), 59);
+    }
+}

@@ -133,6 +133,16 @@ mod tests {
     }
 
     #[test]
+    fn numbers_wider_than_any_scalar_count_as_the_largest() {
+        let mut module = ParsedModule::default();
+        let numbers = crate::format::NumericFormat::Float;
+        module.types.insert(1, Type::Number { bytes: 8, numbers });
+        module.types.insert(2, Type::Number { bytes: 9, numbers });
+        assert_eq!(type_bytes(&module, 1, &mut KnownExtents::new()), 8);
+        assert_eq!(type_bytes(&module, 2, &mut KnownExtents::new()), u32::MAX);
+    }
+
+    #[test]
     fn a_type_that_contains_itself_counts_as_the_largest() {
         let mut module = ParsedModule::default();
         module.types.insert(1, Type::Struct { members: vec![1, 1] });

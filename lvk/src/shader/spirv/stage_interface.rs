@@ -250,6 +250,49 @@ mod tests {
         assert_eq!(places(&found.inputs), [(0, 0, 2, false), (1, 0, 4, true)]);
     }
 
+    /// Returns the words of an instruction.
+    fn code(op: ::spirv::Op, operands: &[u32]) -> Vec<u32> {
+        [&[(operands.len() as u32 + 1) << 16 | op as u32], operands].concat()
+    }
+
+    #[test]
+    fn nested_values_without_locations_end() {
+        use ::spirv::Op;
+        let output = StorageClass::Output as u32;
+        let start = [
+            vec![::spirv::MAGIC_NUMBER, 0x0001_0000, 0, 200, 0],
+            code(Op::Decorate, &[100, Decoration::Location as u32, 0]),
+            code(Op::TypeBool, &[1]),
+            code(Op::TypeInt, &[2, 32, 0]),
+            code(Op::Constant, &[2, 3, u32::MAX]),
+        ];
+        let arrays = (10..60).map(|id| code(Op::TypeArray, &[id, if id == 10 { 1 } else { id - 1 }, 3]));
+        let matrices = (10..60).map(|id| code(Op::TypeMatrix, &[id, if id == 10 { 1 } else { id - 1 }, u32::MAX]));
+        let structs = (10..60).map(|id| code(Op::TypeStruct, &[id, if id == 10 { 1 } else { id - 1 }, 1, id - 1]));
+        let end = [code(Op::TypePointer, &[99, output, 59]), code(Op::Variable, &[99, 100, output])].concat();
+        for nested in [arrays.collect::<Vec<_>>(), matrices.collect(), structs.collect()] {
+            let words = [start.concat(), nested.concat(), end.clone()].concat();
+            let module = ParsedModule::parse(&words).unwrap();
+            let found = StageInterface::from_module(ShaderStage::Vertex, &module, 0);
+            assert_eq!(found, StageInterface::default());
+        }
+    }
+
+    #[test]
+    fn values_of_any_size_are_compared_and_described() {
+        let value = LocationValue {
+            location: 0,
+            component: u32::MAX,
+            count: u32::MAX,
+            bytes: u32::MAX.div_ceil(8),
+            numbers: NumericFormat::Uint,
+            is_patch: false,
+            name: "".into(),
+        };
+        assert!(value.overlaps(&value));
+        assert_eq!(value.description(), "4294967295 4294967296-bit integers");
+    }
+
     #[test]
     fn narrower_inputs_of_the_same_kind_are_accepted() {
         let value = |count, numbers, bytes| LocationValue {
