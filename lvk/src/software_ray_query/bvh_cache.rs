@@ -71,8 +71,8 @@ impl BvhCache {
             Err(error) => log::warn!("the tree '{}' cannot be read: {error}", readable_name(&path)),
         }
         let blob = build();
-        let kept =
-            std::fs::create_dir_all(&self.folder).and_then(|()| replace_file(&path, &encode_file(&blob.bytes)));
+        let kept = std::fs::create_dir_all(&self.folder)
+            .and_then(|()| replace_file(&path, &encode_file(&blob.bytes)));
         if let Err(error) = kept {
             log::warn!("the tree '{}' cannot be kept: {error}", readable_name(&path));
         }

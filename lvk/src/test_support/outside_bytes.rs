@@ -48,11 +48,6 @@ fn run_passes(words: &[u32]) {
     drop(with_checked_indices(words, &plan));
     let stripped = strip_unused_bindings(words.to_vec());
     drop(merge_sampled_images(strip_primitive_culling(&stripped)));
-    #[cfg(feature = "glsl")]
-    {
-        let texts = [("a.glsl".to_owned(), "void main() {}".to_owned())];
-        drop(crate::shader::spirv::debug_source::embed_source(words, &texts));
-    }
 }
 
 /// Reads a reflection as checks of modules and pipelines do.
@@ -73,7 +68,8 @@ fn use_reflection(stage: ShaderStage, module: &Reflection) {
     let checked = check_stage("outside", stage, &features)
         .and_then(|()| check_capabilities("outside", stage, module, &features, &[]));
     drop(checked.map_err(|error| error.to_string()));
-    let constants: HashMap<u32, u32> = module.specialization.iter().map(|(id, bytes)| (*id, *bytes)).collect();
+    let constants: HashMap<u32, u32> =
+        module.specialization.iter().map(|(id, bytes)| (*id, *bytes)).collect();
     _ = module.shared_memory.bytes(&constants);
     _ = module.blocks.record_bytes();
     for block in module.blocks.list.iter().take(4) {
@@ -132,7 +128,8 @@ pub fn example_spirv() -> Vec<(u8, Vec<u32>)> {
 /// Reads a pipeline cache file up to the data that the driver gets: the whole file, or the file around such data.
 pub fn read_pipeline_cache(is_sealed: bool, bytes: &[u8]) {
     // The owner is that of the data, else its checks would end there.
-    let word = |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map_or(0, u32::from_le_bytes);
+    let word =
+        |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map_or(0, u32::from_le_bytes);
     let uuid = bytes.get(16..32).and_then(|uuid| uuid.try_into().ok()).unwrap_or_default();
     let owner = CacheOwner { vendor: word(8), device: word(12), cache_uuid: uuid, ..CacheOwner::default() };
     for owner in [owner, CacheOwner::default()] {
@@ -213,7 +210,11 @@ mod software {
 
     /// Returns BVHs of each encoding, with `is_aabbs` and the counts of [`read_tree`].
     pub fn example_trees() -> Vec<(bool, Vec<u32>, Vec<u8>)> {
-        let mut all = vec![(true, vec![12], encode_blas(&boxes(12), BvhSettings { low_memory: false, refit: false }).bytes)];
+        let mut all = vec![(
+            true,
+            vec![12],
+            encode_blas(&boxes(12), BvhSettings { low_memory: false, refit: false }).bytes,
+        )];
         for [low_memory, refit] in [[false, false], [true, false], [true, true]] {
             let settings = BvhSettings { low_memory, refit };
             let mut mesh = strip(9);

@@ -216,7 +216,10 @@ fn a_file_too_short_for_its_header_is_refused_in_every_format() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |name: &str, bytes: &[u8]| {
         let error = read(&stored(folder.path(), name, bytes), &Bounds::default()).unwrap_err();
-        assert!(matches!(error, PictureError::TooFewBytes { width: 10_000, height: 10_000, .. }), "{name}: {error}");
+        assert!(
+            matches!(error, PictureError::TooFewBytes { width: 10_000, height: 10_000, .. }),
+            "{name}: {error}"
+        );
     };
     let side = 10_000_u32;
     let mut png = png_file([4, 4], ColorType::Grayscale, BitDepth::One);

@@ -22,8 +22,26 @@ const NUMBERS: [u32; 14] = [
 ];
 /// Words of text formats.
 const WORDS: [&str; 20] = [
-    "\n", " ", "-1", "0", "nan", "inf", "1e39", "4294967296", "9223372036854775808", "\\\n", "#", "//", "/*", "\"",
-    "#include \"a\"\n", "f 1 2 3\n", "usemtl a\n", "newmtl a\n", "map_Kd t.bmp\n", "\0",
+    "\n",
+    " ",
+    "-1",
+    "0",
+    "nan",
+    "inf",
+    "1e39",
+    "4294967296",
+    "9223372036854775808",
+    "\\\n",
+    "#",
+    "//",
+    "/*",
+    "\"",
+    "#include \"a\"\n",
+    "f 1 2 3\n",
+    "usemtl a\n",
+    "newmtl a\n",
+    "map_Kd t.bmp\n",
+    "\0",
 ];
 
 impl Random {

@@ -21,8 +21,16 @@ pub const TARGETS: &[Target] = &[
     Target { name: "image", memory: MemoryBound { fixed: 256 * KIB, multiple: 16 << 14 }, read: read_image },
     Target { name: "spirv", memory: MemoryBound { fixed: 64 * KIB, multiple: 128 }, read: read_spirv },
     Target { name: "glsl", memory: MemoryBound { fixed: 512 * KIB, multiple: 64 }, read: read_glsl },
-    Target { name: "pipeline_cache", memory: MemoryBound { fixed: KIB, multiple: 4 }, read: read_pipeline_cache },
-    Target { name: "shader_cache", memory: MemoryBound { fixed: 64 * KIB, multiple: 128 }, read: read_shader_cache },
+    Target {
+        name: "pipeline_cache",
+        memory: MemoryBound { fixed: KIB, multiple: 4 },
+        read: read_pipeline_cache,
+    },
+    Target {
+        name: "shader_cache",
+        memory: MemoryBound { fixed: 64 * KIB, multiple: 128 },
+        read: read_shader_cache,
+    },
     Target { name: "blas", memory: MemoryBound { fixed: 16 * KIB, multiple: 32 }, read: read_blas },
     Target { name: "tree", memory: MemoryBound { fixed: 16 * KIB, multiple: 32 }, read: read_tree },
 ];
@@ -55,7 +63,9 @@ fn check_scene(scene: &Scene) {
     assert!(scene.triangle_materials.iter().all(|material| (*material as usize) < scene.materials.len()));
     assert!(scene.positions.iter().flatten().all(|x| x.is_finite()));
     let textures = scene.textures.len() as u32;
-    assert!(scene.materials.iter().filter_map(|material| material.albedo_texture).all(|used| used < textures));
+    assert!(
+        scene.materials.iter().filter_map(|material| material.albedo_texture).all(|used| used < textures)
+    );
 }
 
 /// An OBJ file. Libraries and images that it names are not there.
@@ -71,14 +81,19 @@ fn read_mtl(bytes: &[u8]) {
     const IMAGE: &[u8] = b"BM\x3a\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0\0\0\0\0\
         \x04\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x10\x20\x30\0";
     let options = ObjOptions { normal_maps: true, ..ObjOptions::default() };
-    with_files(&[("mesh.obj", MESH), ("a.mtl", bytes), ("t.bmp", IMAGE)], |folder| load_scene(folder, &options));
+    with_files(&[("mesh.obj", MESH), ("a.mtl", bytes), ("t.bmp", IMAGE)], |folder| {
+        load_scene(folder, &options)
+    });
 }
 
 /// A camera file of a scene.
 fn read_cameras(bytes: &[u8]) {
     const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     with_files(&[("mesh.obj", MESH), ("cameras.txt", bytes)], |folder| {
-        load_scene(folder, &ObjOptions { cameras: Some(folder.join("cameras.txt")), ..ObjOptions::default() });
+        load_scene(
+            folder,
+            &ObjOptions { cameras: Some(folder.join("cameras.txt")), ..ObjOptions::default() },
+        );
     });
 }
 

@@ -62,7 +62,8 @@ impl Blocks {
     /// Returns the blocks that the entry point with this index uses. Buffer references belong to the whole module.
     pub(crate) fn from_module(module: &ParsedModule, entry: usize) -> Self {
         let mut blocks = Self::default();
-        let mut collector = BlockCollector { module, blocks: &mut blocks, seen: HashSet::new(), known: KnownSizes::new() };
+        let mut collector =
+            BlockCollector { module, blocks: &mut blocks, seen: HashSet::new(), known: KnownSizes::new() };
         for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
             let kind = match variable.storage {
                 class if class == StorageClass::PushConstant as u32 => BlockKind::PushConstants,
@@ -102,7 +103,6 @@ impl Blocks {
         let members = self.members(record.ty).ok()?;
         members.iter().map(|member| member.offset.saturating_add(member.bytes)).max()
     }
-
 }
 
 /// Collects blocks, each once: a module may have many variables and pointers of one type, whose names can be long.

@@ -249,11 +249,7 @@ fn specialization(module: &ParsedModule) -> Vec<(u32, u32)> {
     found
 }
 
-fn block_bytes(
-    module: &ParsedModule,
-    variable: &Variable,
-    known: &mut KnownSizes,
-) -> Result<u32, String> {
+fn block_bytes(module: &ParsedModule, variable: &Variable, known: &mut KnownSizes) -> Result<u32, String> {
     let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else {
         return Err("the push constants have no pointer type".to_owned());
     };

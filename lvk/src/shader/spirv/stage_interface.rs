@@ -267,8 +267,10 @@ mod tests {
             code(Op::Constant, &[2, 3, u32::MAX]),
         ];
         let arrays = (10..60).map(|id| code(Op::TypeArray, &[id, if id == 10 { 1 } else { id - 1 }, 3]));
-        let matrices = (10..60).map(|id| code(Op::TypeMatrix, &[id, if id == 10 { 1 } else { id - 1 }, u32::MAX]));
-        let structs = (10..60).map(|id| code(Op::TypeStruct, &[id, if id == 10 { 1 } else { id - 1 }, 1, id - 1]));
+        let matrices =
+            (10..60).map(|id| code(Op::TypeMatrix, &[id, if id == 10 { 1 } else { id - 1 }, u32::MAX]));
+        let structs =
+            (10..60).map(|id| code(Op::TypeStruct, &[id, if id == 10 { 1 } else { id - 1 }, 1, id - 1]));
         let end = [code(Op::TypePointer, &[99, output, 59]), code(Op::Variable, &[99, 100, output])].concat();
         for nested in [arrays.collect::<Vec<_>>(), matrices.collect(), structs.collect()] {
             let words = [start.concat(), nested.concat(), end.clone()].concat();
