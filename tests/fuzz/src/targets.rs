@@ -15,9 +15,9 @@ const KIB: usize = 1 << 10;
 
 /// All targets, in the order of `docs/reliability.md`.
 pub const TARGETS: &[Target] = &[
-    Target { name: "obj", memory: MemoryBound { fixed: 64 * KIB, multiple: 512 }, read: read_obj },
-    Target { name: "mtl", memory: MemoryBound { fixed: 64 * KIB, multiple: 256 }, read: read_mtl },
-    Target { name: "cameras", memory: MemoryBound { fixed: 64 * KIB, multiple: 64 }, read: read_cameras },
+    Target { name: "obj", memory: MemoryBound { fixed: 2048 * KIB, multiple: 256 }, read: read_obj },
+    Target { name: "mtl", memory: MemoryBound { fixed: 2048 * KIB, multiple: 256 }, read: read_mtl },
+    Target { name: "cameras", memory: MemoryBound { fixed: 2048 * KIB, multiple: 64 }, read: read_cameras },
     Target { name: "image", memory: MemoryBound { fixed: 256 * KIB, multiple: 16 << 14 }, read: read_image },
     Target { name: "spirv", memory: MemoryBound { fixed: 64 * KIB, multiple: 128 }, read: read_spirv },
     Target { name: "glsl", memory: MemoryBound { fixed: 512 * KIB, multiple: 64 }, read: read_glsl },
