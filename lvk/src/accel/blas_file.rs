@@ -98,15 +98,13 @@ pub(crate) enum BlasFileError {
 
 const MAGIC: [u8; 8] = *b"\x89lvkblas";
 const VERSION: u32 = 2;
-const HEADER_BYTES: usize = 28;
+pub(crate) const HEADER_BYTES: usize = 28;
 const GEOMETRY_WORDS: usize = 7;
 
 /// Encodes a BLAS as bytes.
 pub(crate) fn encode_blas_file(blob: &BlasFile) -> Vec<u8> {
     let mut body = Vec::with_capacity(encoded_bytes(blob));
-    body.extend(MAGIC);
-    body.extend(VERSION.to_le_bytes());
-    body.extend([0; HEADER_BYTES - 12]);
+    body.extend([0; HEADER_BYTES]);
     body.extend(blob.flags.to_le_bytes());
     body.extend((blob.geometries.len() as u32).to_le_bytes());
     for geometry in &blob.geometries {
@@ -120,10 +118,24 @@ pub(crate) fn encode_blas_file(blob: &BlasFile) -> Vec<u8> {
         body.extend_from_slice(&part.driver);
         body.extend(part.map.iter().flatten().flat_map(|number| number.to_le_bytes()));
     }
-    let (length, sum) = (body.len() as u64, checksum(&body[HEADER_BYTES..]));
-    body[12..20].copy_from_slice(&length.to_le_bytes());
-    body[20..28].copy_from_slice(&sum.to_le_bytes());
+    write_header(&mut body);
     body
+}
+
+/// Writes the header of a file over the first [`HEADER_BYTES`] of `file`, which the body follows.
+fn write_header(file: &mut [u8]) {
+    let (header, body) = file.split_at_mut(HEADER_BYTES);
+    let (length, sum) = ((HEADER_BYTES + body.len()) as u64, checksum(body));
+    let parts = [&MAGIC[..], &VERSION.to_le_bytes(), &length.to_le_bytes(), &sum.to_le_bytes()];
+    header.copy_from_slice(&parts.concat());
+}
+
+/// Prepends a valid header to any body, as damage that the checksum does not detect.
+#[cfg(any(test, feature = "test-hooks"))]
+pub(crate) fn sealed(body: &[u8]) -> Vec<u8> {
+    let mut file = [&[0; HEADER_BYTES][..], body].concat();
+    write_header(&mut file);
+    file
 }
 
 /// Decodes the output of [`encode_blas_file`]. Any other bytes are an error.
@@ -289,14 +301,6 @@ mod tests {
         let part = (driver, map).prop_map(|(driver, map)| BlasFilePart { driver, map });
         (any::<u32>(), prop::collection::vec(geometry, 0..4), prop::collection::vec(part, 0..4))
             .prop_map(|(flags, geometries, parts)| BlasFile { flags, geometries, parts })
-    }
-
-    /// Prepends a valid header to any body.
-    fn sealed(body: &[u8]) -> Vec<u8> {
-        let length = (HEADER_BYTES + body.len()) as u64;
-        let header =
-            [&MAGIC[..], &VERSION.to_le_bytes(), &length.to_le_bytes(), &checksum(body).to_le_bytes()];
-        [&header.concat(), body].concat()
     }
 
     fn words(words: &[u32]) -> Vec<u8> {

@@ -205,12 +205,7 @@ impl Context {
     fn check_driver(&self, part: &BlasFilePart) -> Result<u64, String> {
         let damaged = || "the driver's header is damaged".to_owned();
         let version = part.version_data().ok_or_else(damaged)?;
-        let number = |at: usize| {
-            let bytes = part.driver.get(at..at + 8)?.try_into().ok()?;
-            Some(u64::from_le_bytes(bytes))
-        };
-        let head = number(32).zip(number(40)).zip(number(48));
-        let ((written, structure), handles) = head.ok_or_else(damaged)?;
+        let structure = driver_structure_bytes(part);
         let info = vk::AccelerationStructureVersionInfoKHR::default().version_data(version);
         let gpu = &self.device_state().gpu;
         let ext = gpu.accel_functions().map_err(|error| error.to_string())?;
@@ -222,11 +217,7 @@ impl Context {
                 gpu.caps.device_name
             ));
         }
-        let is_bottom_level = handles == 0;
-        if written != part.driver.len() as u64 || structure == 0 || !is_bottom_level {
-            return Err(damaged());
-        }
-        Ok(structure)
+        structure.ok_or_else(damaged)
     }
 
     /// # Safety
@@ -326,9 +317,18 @@ impl Context {
     }
 }
 
+/// Returns the size in bytes of the acceleration structure that the driver's header states. Returns `None` for a header
+/// that contradicts the data, or is not that of a BLAS.
+pub(crate) fn driver_structure_bytes(part: &BlasFilePart) -> Option<u64> {
+    let number = |at: usize| Some(u64::from_le_bytes(part.driver.get(at..at + 8)?.try_into().ok()?));
+    let (written, structure, handles) = (number(32)?, number(40)?, number(48)?);
+    let is_bottom_level = handles == 0;
+    (written == part.driver.len() as u64 && structure != 0 && is_bottom_level).then_some(structure)
+}
+
 /// Returns the primitives of each part, or `None` for a part that is the unchanged mesh. Returns `None` if the parts do
 /// not make up the mesh.
-fn part_plans_from_file(blob: &BlasFile, counts: &[u32]) -> Option<Vec<Option<PartPlan>>> {
+pub(crate) fn part_plans_from_file(blob: &BlasFile, counts: &[u32]) -> Option<Vec<Option<PartPlan>>> {
     if let [BlasFilePart { map: None, .. }] = &blob.parts[..] {
         return Some(vec![None]);
     }

@@ -19,8 +19,7 @@ pub(super) fn check_interfaces(name: &str, modules: &RenderModules) -> Result<()
 
 fn check_pair(name: &str, from: &ShaderModule, to: &ShaderModule) -> Result<()> {
     let (outputs, inputs) = (&from.reflection.interface.outputs, &to.reflection.interface.inputs);
-    let difference = inputs.iter().find_map(|input| difference(input, outputs));
-    difference.map_or(Ok(()), |(input, output)| {
+    interface_difference(inputs, outputs).map_or(Ok(()), |(input, output)| {
         let variable = match &*input.name {
             "" => String::new(),
             known => format!(" ('{known}')"),
@@ -42,6 +41,14 @@ fn check_pair(name: &str, from: &ShaderModule, to: &ShaderModule) -> Result<()> 
         );
         Err(Error::usage(name, message))
     })
+}
+
+/// Returns the first input that no output matches, with the output of another type at its place.
+pub(crate) fn interface_difference<'a>(
+    inputs: &'a [LocationValue],
+    outputs: &'a [LocationValue],
+) -> Option<(&'a LocationValue, Option<&'a LocationValue>)> {
+    inputs.iter().find_map(|input| difference(input, outputs))
 }
 
 /// Returns an input that no output matches, with the output of another type at its place.

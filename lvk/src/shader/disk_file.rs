@@ -13,10 +13,10 @@ const MAX_NAME_BYTES: usize = 1 << 16;
 
 /// Two checksums. Inputs are different if one of the checksums differs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Fingerprint(pub(super) [u64; 2]);
+pub(crate) struct Fingerprint(pub(super) [u64; 2]);
 
 impl Fingerprint {
-    pub(super) fn from_bytes(bytes: &[u8]) -> Self {
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
         Self([1, 2].map(|seed| fingerprint(bytes, seed)))
     }
 
@@ -34,7 +34,7 @@ impl Fingerprint {
 
 /// An `#include` that the compiler requested.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Included {
+pub(crate) struct Included {
     /// True if the directive has quotes, false if it has angle brackets.
     pub(super) local: bool,
     /// Nesting depth of the directive: 1 in the module's own text.
@@ -47,27 +47,31 @@ pub(super) struct Included {
 
 /// The content of a cache file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(super) struct CachedModule {
+pub(crate) struct CachedModule {
     /// The includes, in the order of the compiler's requests.
     pub(super) included: Vec<Included>,
-    pub(super) words: Vec<u32>,
+    pub(crate) words: Vec<u32>,
 }
 
 /// Returns the file of a module that was compiled from `key`.
 pub(super) fn encode_file(key: Fingerprint, entry: &CachedModule) -> Vec<u8> {
-    let body = encode_body(entry);
+    sealed(key, &encode_body(entry))
+}
+
+/// Prepends the header to a body.
+pub(crate) fn sealed(key: Fingerprint, body: &[u8]) -> Vec<u8> {
     let mut file = Vec::with_capacity(HEADER_BYTES + body.len());
     file.extend(MAGIC);
     file.extend(VERSION.to_le_bytes());
     file.extend([0; 4]);
     file.extend(key.0.iter().flat_map(|half| half.to_le_bytes()));
-    file.extend(checksum(key, &body).to_le_bytes());
+    file.extend(checksum(key, body).to_le_bytes());
     file.extend(body);
     file
 }
 
 /// Returns the content of the file, if the file is complete and was compiled from `key`.
-pub(super) fn decode_file(key: Fingerprint, file: &[u8]) -> Result<CachedModule, &'static str> {
+pub(crate) fn decode_file(key: Fingerprint, file: &[u8]) -> Result<CachedModule, &'static str> {
     if !file.starts_with(&MAGIC) {
         return Err("it is no compiled shader");
     }

@@ -1,6 +1,6 @@
 //! Resolves `#include` directives.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
@@ -13,10 +13,21 @@ use crate::regular_file;
 
 /// Maximum nesting of includes. The compiler recurses on them, so deeper nesting is an error.
 const MAX_DEPTH: usize = 64;
+/// Maximum directives that one compilation resolves. Files that include the next one twice multiply with each level.
+const MAX_DIRECTIVES: usize = 4096;
+/// Maximum bytes of all texts that one compilation includes, counted each time.
+const MAX_INCLUDED_BYTES: u64 = 4 * MAX_GLSL_BYTES;
+/// Number of failed directives with a full reason. Reasons name files and places, so their text can be far longer than the
+/// directive.
+const MAX_FULL_REASONS: usize = 16;
+/// Number of listed includes that a reason names.
+const MAX_NAMES: usize = 32;
 
 /// Resolves the compiler's `#include` directives from the caller's list, folders, and the library's own files.
 pub(super) struct Includes<'a> {
     listed: &'a [(&'a str, &'a str)],
+    /// The listed texts by their normalized names; the first of a name counts.
+    by_name: HashMap<String, &'a str>,
     dirs: &'a [&'a Path],
     open: Vec<IncludeOrigin>,
     once: HashSet<IncludeOrigin>,
@@ -27,6 +38,8 @@ pub(super) struct Includes<'a> {
     texts: Vec<(String, String)>,
     /// Depth and name of the directive that failed last, if it has quotes.
     refused: Option<(usize, String)>,
+    /// Bytes of all included texts, counted each time.
+    bytes: u64,
     /// Called with each path at which an include is searched, before the search.
     on_search: Option<&'a dyn Fn(&Path)>,
 }
@@ -45,8 +58,15 @@ impl<'a> Includes<'a> {
         dirs: &'a [&'a Path],
         on_search: Option<&'a dyn Fn(&Path)>,
     ) -> Self {
+        let mut by_name = HashMap::new();
+        for (name, text) in listed {
+            if let Some(name) = normalize_path(name) {
+                by_name.entry(name).or_insert(*text);
+            }
+        }
         Self {
             listed,
+            by_name,
             dirs,
             open: Vec::new(),
             once: HashSet::new(),
@@ -54,6 +74,7 @@ impl<'a> Includes<'a> {
             included: Vec::new(),
             texts: Vec::new(),
             refused: None,
+            bytes: 0,
             on_search,
         }
     }
@@ -82,6 +103,9 @@ impl<'a> Includes<'a> {
         if self.open.len() >= MAX_DEPTH {
             return Err(format!("includes are nested deeper than {MAX_DEPTH} files"));
         }
+        if self.included.len() >= MAX_DIRECTIVES {
+            return Err(format!("the module includes more than {MAX_DIRECTIVES} files; {REPEATED}"));
+        }
         let (place, text) = self.resolve(local, name)?;
         let shown = place.display_path();
         if self.once.contains(&place) {
@@ -92,6 +116,10 @@ impl<'a> Includes<'a> {
         let (data, once) = without_pragma_once(&text);
         if once {
             self.once.insert(place.clone());
+        }
+        self.bytes += data.len() as u64;
+        if self.bytes > MAX_INCLUDED_BYTES {
+            return Err(format!("the module includes more than {MAX_INCLUDED_BYTES} bytes; {REPEATED}"));
         }
         // A file may include itself once: its include guard makes the second text empty.
         if self.open.iter().filter(|open| **open == place).count() > 1 {
@@ -130,8 +158,7 @@ impl<'a> Includes<'a> {
             _ => None,
         };
         [normalize_path(name), beside].into_iter().flatten().find_map(|wanted| {
-            let same = |listed: &&(&str, &str)| normalize_path(listed.0).as_deref() == Some(wanted.as_str());
-            let text = self.listed.iter().find(same)?.1.to_owned();
+            let text = (*self.by_name.get(&wanted)?).to_owned();
             Some((IncludeOrigin::Listed(wanted), text))
         })
     }
@@ -144,7 +171,10 @@ impl<'a> Includes<'a> {
         }
         let mut places: Vec<String> = Vec::new();
         if !self.listed.is_empty() {
-            let names: Vec<_> = self.listed.iter().map(|(name, _)| *name).collect();
+            let mut names: Vec<_> = self.listed.iter().take(MAX_NAMES).map(|(name, _)| *name).collect();
+            if self.listed.len() > MAX_NAMES {
+                names.push("...");
+            }
             places.push(format!("the listed includes ({})", names.join(", ")));
         }
         places.extend(
@@ -192,13 +222,19 @@ impl IncludeHandler for Includes<'_> {
                 Some(result)
             }
             Err(reason) => {
-                self.failures.push(reason + &self.include_chain());
+                self.failures.push(match self.failures.len() < MAX_FULL_REASONS {
+                    true => reason + &self.include_chain(),
+                    false => format!("'{name}' cannot be included either"),
+                });
                 self.refused = local.then(|| (depth, name.to_owned()));
                 None
             }
         }
     }
 }
+
+/// Remedy for a compilation that includes too much.
+const REPEATED: &str = "put #pragma once into files that several others include";
 
 impl IncludeOrigin {
     fn display_path(&self) -> String {
@@ -259,4 +295,56 @@ fn without_pragma_once(text: &str) -> (String, bool) {
         });
     }
     (out, once)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test")]
+    use super::*;
+
+    /// Requests a name and, of each text, the names in its lines, as the compiler does. Returns the failures.
+    fn requested(listed: &[(&str, &str)], name: &str) -> Vec<String> {
+        fn request(includes: &mut Includes<'_>, name: &str, depth: usize) {
+            let found = includes.include(IncludeType::System, name, "", depth);
+            let text = found.map(|found| found.data).unwrap_or_default();
+            text.lines().for_each(|name| request(includes, name, depth + 1));
+        }
+        let mut includes = Includes::new(listed, &[], None);
+        request(&mut includes, name, 1);
+        includes.into_failures()
+    }
+
+    #[test]
+    fn texts_that_include_the_next_twice_end_with_a_remedy() {
+        let texts: Vec<_> =
+            (1..60).map(|next| (format!("{}", next - 1), format!("{next}\n{next}"))).collect();
+        let listed: Vec<_> = texts.iter().map(|(name, text)| (&**name, &**text)).collect();
+        let failures = requested(&listed, "0");
+        let told =
+            failures.iter().filter(|text| text.contains("more than 4096 files; put #pragma once")).count();
+        assert!(told > 0 && failures.len() < 3 * MAX_DIRECTIVES, "{told} of {}", failures.len());
+    }
+
+    #[test]
+    fn included_bytes_are_counted_each_time() {
+        let long = "// a comment\n".repeat(MAX_GLSL_BYTES as usize / 13);
+        let listed = [("long", &*long)];
+        let mut includes = Includes::new(&listed, &[], None);
+        let given = (0..6).filter(|_| includes.include(IncludeType::System, "long", "", 1).is_some()).count();
+        assert_eq!(given, 4);
+        assert!(includes.into_failures()[0].starts_with("the module includes more than 67108864 bytes; put"));
+    }
+
+    #[test]
+    fn many_failures_have_short_reasons() {
+        let names: Vec<String> = (0..1_000).map(|number| format!("name-{number}")).collect();
+        let missing: String = (0..1_000).map(|number| format!("m{number}\n")).collect();
+        let mut listed: Vec<_> = names.iter().map(|name| (&**name, "")).collect();
+        listed.push(("start", &missing));
+        let failures = requested(&listed, "start");
+        assert_eq!(failures.len(), 1_000);
+        assert!(failures[0].contains("name-31, ...)") && !failures[0].contains("name-32"), "{}", failures[0]);
+        assert!(failures[0].ends_with("(included by start)"), "{}", failures[0]);
+        assert_eq!(failures[999], "'m999' cannot be included either");
+    }
 }

@@ -8,13 +8,15 @@ mod diagnostics;
 #[cfg_attr(not(any(feature = "glsl", test)), expect(dead_code, reason = "only what is compiled is kept"))]
 mod disk_cache;
 #[cfg_attr(not(any(feature = "glsl", test)), expect(dead_code, reason = "only what is compiled is kept"))]
-mod disk_file;
+pub(crate) mod disk_file;
 #[cfg(feature = "glsl")]
 mod front_end;
 #[cfg(feature = "glsl")]
 mod include;
 pub(crate) mod layout_comparison;
 mod options;
+#[cfg(all(feature = "glsl", feature = "test-hooks"))]
+pub(crate) mod outside_text;
 #[cfg(feature = "glsl")]
 mod preamble;
 #[cfg(feature = "glsl")]

@@ -182,7 +182,8 @@ pub enum ShaderSource<'a> {
 ///
 /// `#include "name"` is looked up in [`includes`](Self::includes), then beside the including file, then in
 /// [`include_dirs`](Self::include_dirs). `#include <name>` does not look beside the including file. Names that start
-/// with `lvk/` belong to the library. `#pragma once` and include guards both work.
+/// with `lvk/` belong to the library. `#pragma once` and include guards both work. A module includes at most 4,096 files and
+/// 64 MiB, each counted as often as it is included.
 #[derive(Debug, Clone, Copy)]
 pub struct ShaderModuleDesc<'a> {
     /// The stage the module is for. Default: [`ShaderStage::Vertex`].

@@ -71,8 +71,8 @@ impl BvhCache {
             Err(error) => log::warn!("the tree '{}' cannot be read: {error}", readable_name(&path)),
         }
         let blob = build();
-        let kept =
-            std::fs::create_dir_all(&self.folder).and_then(|()| replace_file(&path, &encode_file(&blob)));
+        let kept = std::fs::create_dir_all(&self.folder)
+            .and_then(|()| replace_file(&path, &encode_file(&blob.bytes)));
         if let Err(error) = kept {
             log::warn!("the tree '{}' cannot be kept: {error}", readable_name(&path));
         }
@@ -80,18 +80,20 @@ impl BvhCache {
     }
 }
 
-fn encode_file(blob: &BlasBlob) -> Vec<u8> {
-    let mut file = Vec::with_capacity(HEADER_BYTES + blob.bytes.len());
+/// Returns the file of a tree with these bytes.
+pub(crate) fn encode_file(blob: &[u8]) -> Vec<u8> {
+    let mut file = Vec::with_capacity(HEADER_BYTES + blob.len());
     file.extend(MAGIC);
     file.extend(VERSION.to_le_bytes());
     file.extend([0; 4]);
-    file.extend((blob.bytes.len() as u64).to_le_bytes());
-    file.extend(fingerprint(&blob.bytes, 0).to_le_bytes());
-    file.extend(&blob.bytes);
+    file.extend((blob.len() as u64).to_le_bytes());
+    file.extend(fingerprint(blob, 0).to_le_bytes());
+    file.extend(blob);
     file
 }
 
-fn decode_file(file: &[u8], expected: &ExpectedMesh) -> Result<BlasBlob, &'static str> {
+/// Returns the tree of a file, if it can be a tree of `expected`.
+pub(crate) fn decode_file(file: &[u8], expected: &ExpectedMesh) -> Result<BlasBlob, &'static str> {
     let (header, bytes) = file.split_at_checked(HEADER_BYTES).ok_or("it is cut off")?;
     if header[..8] != MAGIC || header[8..12] != VERSION.to_le_bytes() {
         return Err("another version of the library wrote it");
@@ -131,7 +133,7 @@ mod tests {
     fn a_file_is_read_from_bytes_of_any_alignment() {
         let mesh = mesh(50);
         let built = encode_blas::encode_blas(&mesh, QUALITY);
-        let file = encode_file(&built);
+        let file = encode_file(&built.bytes);
         for offset in 0..16 {
             let shifted = [&vec![0; offset][..], &file].concat();
             assert_eq!(decode_file(&shifted[offset..], &ExpectedMesh::from_mesh(&mesh)), Ok(built.clone()));
@@ -165,8 +167,8 @@ mod tests {
         let node = circle.header().nodes as usize * 16;
         circle.bytes[node + 15] = 1;
         circle.bytes[node + 16..node + 20].copy_from_slice(&[0; 4]);
-        for nonsense in [BlasBlob { bytes: Vec::new(), ..built.clone() }, circle] {
-            std::fs::write(&path, encode_file(&nonsense)).unwrap();
+        for nonsense in [&[][..], &circle.bytes] {
+            std::fs::write(&path, encode_file(nonsense)).unwrap();
             assert_eq!(get(), built);
             assert_eq!(get(), built);
         }

@@ -36,7 +36,7 @@ use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::software_ray_query::validate_blob;
 
 /// Marks serialized BVHs that no driver wrote. It is as long as the UUIDs that blobs of drivers begin with.
-const SOFTWARE_BLOB_UUID: [u8; 32] = *b"lvk software structure, form 3\0\0";
+pub(crate) const SOFTWARE_BLOB_UUID: [u8; 32] = *b"lvk software structure, form 3\0\0";
 
 impl Context {
     /// Builds the BVHs of meshes on all CPU cores; `None` for those that the GPU builds, and for all if the device

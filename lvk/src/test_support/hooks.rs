@@ -10,6 +10,8 @@ use crate::error::Result;
 use crate::kernels::Kernel;
 use crate::test_support::fault_injection;
 use crate::test_support::null_commands::with_null_commands;
+#[cfg(feature = "test-hooks")]
+pub use crate::test_support::outside_bytes;
 #[cfg(feature = "software-ray-query")]
 pub use crate::test_support::software_ray_query::hooks::*;
 use crate::test_support::submit_hook;

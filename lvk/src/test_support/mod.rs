@@ -6,6 +6,8 @@ pub mod hooks;
 #[cfg(test)]
 pub(crate) mod micromap_functions;
 pub(crate) mod null_commands;
+#[cfg(feature = "test-hooks")]
+pub mod outside_bytes;
 #[cfg(test)]
 pub(crate) mod scattered_bounds;
 #[cfg(feature = "software-ray-query")]

@@ -8,6 +8,9 @@ pub const MAX_SOURCE_SIDE: u32 = 1 << 17;
 pub const MAX_SOURCE_TEXELS: u64 = 1 << 30;
 /// Most bytes that a decoder of whole images makes of a file.
 pub const MAX_DECODED_BYTES: u64 = 512 << 20;
+/// Most texels for each byte of a file. A header can state any size, and readers reserve memory for it. No format packs as many
+/// texels: PNG has 8,256 at most, where one bit is a texel.
+const MAX_TEXELS_PER_BYTE: u64 = 1 << 14;
 
 /// Sizes beyond which images are shrunk or refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +64,17 @@ impl Bounds {
     }
 }
 
+/// Checks that a file of `file_bytes` bytes can have as many texels as its header states.
+///
+/// # Errors
+/// [`PictureError::TooFewBytes`].
+pub(super) fn check_file_bytes([width, height]: [u32; 2], file_bytes: u64) -> Result<(), PictureError> {
+    match texels([width, height]) <= file_bytes.saturating_mul(MAX_TEXELS_PER_BYTE) {
+        true => Ok(()),
+        false => Err(PictureError::TooFewBytes { width, height, bytes: file_bytes }),
+    }
+}
+
 /// Returns the number of texels of an image.
 pub(super) fn texels([width, height]: [u32; 2]) -> u64 {
     u64::from(width) * u64::from(height)
@@ -109,6 +123,15 @@ mod tests {
             assert_eq!(bounds.fit(size).unwrap(), fitted);
         }
         assert_eq!(Bounds::unshrunk().fit([32_768, 32_768]).unwrap(), [32_768; 2]);
+    }
+
+    #[test]
+    fn the_bytes_of_a_file_bound_its_texels() {
+        assert!(check_file_bytes([16_384, 100], 100).is_ok());
+        let error = check_file_bytes([16_384, 101], 100).unwrap_err();
+        let text = "the file has 100 bytes, too few for the 16384x101 texels that it states: it is cut off or damaged";
+        assert_eq!(error.to_string(), text);
+        assert!(check_file_bytes([MAX_SOURCE_SIDE, MAX_SOURCE_SIDE], u64::MAX).is_ok());
     }
 
     #[test]

@@ -67,6 +67,18 @@ pub enum PictureError {
         /// Bytes of the decoded image.
         bytes: u64,
     },
+    /// The header states more texels than a file of this length can have.
+    #[error(
+        "the file has {bytes} bytes, too few for the {width}x{height} texels that it states: it is cut off or damaged"
+    )]
+    TooFewBytes {
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Bytes of the file.
+        bytes: u64,
+    },
     /// The images of a scene have more texels than it may have.
     #[error(
         "its {bytes} bytes of texels are more than the {left} that are left of {all} for all pictures of a scene; shrink \
@@ -104,7 +116,9 @@ pub enum PictureError {
 /// # Errors
 /// [`PictureError`].
 pub fn read(path: &Path, bounds: &Bounds) -> Result<Picture, PictureError> {
-    let file = BufReader::new(input_file::open(path, FileKind::Picture)?);
+    let file = input_file::open(path, FileKind::Picture)?;
+    let file_bytes = file.metadata()?.len();
+    let file = BufReader::new(file);
     let mut reader = ImageReader::new(file);
     if let Ok(format) = ImageFormat::from_path(path) {
         reader.set_format(format);
@@ -115,11 +129,11 @@ pub fn read(path: &Path, bounds: &Bounds) -> Result<Picture, PictureError> {
     let picture = match format {
         Some(ImageFormat::Png) => {
             let mut file = reader.into_inner();
-            match png_scanlines::read(&mut file, bounds)? {
+            match png_scanlines::read(&mut file, file_bytes, bounds)? {
                 Some(picture) => picture,
                 None => {
                     file.rewind()?;
-                    whole::read(ImageReader::with_format(file, ImageFormat::Png), bounds)?
+                    whole::read(ImageReader::with_format(file, ImageFormat::Png), file_bytes, bounds)?
                 }
             }
         }
@@ -131,9 +145,9 @@ pub fn read(path: &Path, bounds: &Bounds) -> Result<Picture, PictureError> {
                 warnings.push(warning.to_owned());
             }
             file.rewind()?;
-            whole::read(ImageReader::with_format(file, ImageFormat::Jpeg), bounds)?
+            whole::read(ImageReader::with_format(file, ImageFormat::Jpeg), file_bytes, bounds)?
         }
-        _ => whole::read(reader, bounds)?,
+        _ => whole::read(reader, file_bytes, bounds)?,
     };
     warnings.extend(picture.warnings);
     Ok(Picture { warnings, ..picture })

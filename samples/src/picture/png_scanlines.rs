@@ -4,14 +4,19 @@ use std::io::{BufRead, Seek};
 
 use png::{BitDepth, Decoder, Limits, Transformations};
 
+use super::bounds::check_file_bytes;
 use super::scanlines::{ScanlineSink, eight_bits};
 use super::{Bounds, Picture, PictureError};
 
 /// Most bytes of what the decoder keeps beside a row.
 const DECODER_BYTES: usize = 64 << 20;
 
-/// Reads a PNG from its start. `None` for an interlaced one, whose rows come in seven passes.
-pub(super) fn read(file: impl BufRead + Seek, bounds: &Bounds) -> Result<Option<Picture>, PictureError> {
+/// Reads a PNG of `file_bytes` bytes from its start. `None` for an interlaced one, whose rows come in seven passes.
+pub(super) fn read(
+    file: impl BufRead + Seek,
+    file_bytes: u64,
+    bounds: &Bounds,
+) -> Result<Option<Picture>, PictureError> {
     let mut decoder = Decoder::new_with_limits(file, Limits { bytes: DECODER_BYTES });
     decoder.set_transformations(Transformations::EXPAND);
     decoder.set_ignore_text_chunk(true);
@@ -19,6 +24,7 @@ pub(super) fn read(file: impl BufRead + Seek, bounds: &Bounds) -> Result<Option<
     let header = decoder.read_header_info()?;
     let (from, interlaced) = ([header.width, header.height], header.interlaced);
     let to = bounds.fit(from)?;
+    check_file_bytes(from, file_bytes)?;
     if interlaced {
         return Ok(None);
     }

@@ -212,6 +212,39 @@ fn sizes_beyond_the_bounds_are_refused_before_anything_is_decoded() {
 }
 
 #[test]
+fn a_file_too_short_for_its_header_is_refused_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |name: &str, bytes: &[u8]| {
+        let error = read(&stored(folder.path(), name, bytes), &Bounds::default()).unwrap_err();
+        assert!(
+            matches!(error, PictureError::TooFewBytes { width: 10_000, height: 10_000, .. }),
+            "{name}: {error}"
+        );
+    };
+    let side = 10_000_u32;
+    let mut png = png_file([4, 4], ColorType::Grayscale, BitDepth::One);
+    for interlaced in [0, 1] {
+        png[16..24].copy_from_slice(&[side, side].map(u32::to_be_bytes).concat());
+        png[28] = interlaced;
+        let checksum = crc32(&png[12..29]);
+        png[29..33].copy_from_slice(&checksum.to_be_bytes());
+        refused("a.png", &png);
+    }
+    let short = (side as u16).to_le_bytes();
+    let tga = [&[0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0][..], &short, &short, &[24, 0]].concat();
+    refused("a.tga", &tga);
+    let mut bmp = b"BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0".to_vec();
+    bmp.extend([side, side].map(u32::to_le_bytes).concat());
+    bmp.extend([1, 0, 24, 0]);
+    bmp.extend([0; 24]);
+    refused("a.bmp", &bmp);
+    let (_, mut jpeg) = encoded().swap_remove(1);
+    let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+    jpeg[frame + 5..frame + 9].copy_from_slice(&[side as u16; 2].map(u16::to_be_bytes).concat());
+    refused("a.jpg", &jpeg);
+}
+
+#[test]
 fn files_that_are_no_images_say_so() {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in

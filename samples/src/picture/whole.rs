@@ -4,13 +4,14 @@ use std::io::{BufRead, Seek};
 
 use image::{DynamicImage, ImageDecoder as _, ImageReader, Limits};
 
-use super::bounds::MAX_DECODED_BYTES;
+use super::bounds::{MAX_DECODED_BYTES, check_file_bytes};
 use super::scanlines::{ScanlineSink, eight_bits};
 use super::{Bounds, Picture, PictureError};
 
-/// Decodes the image and shrinks it where it must be.
+/// Decodes the image of a file of `file_bytes` bytes and shrinks it where it must be.
 pub(super) fn read<R: BufRead + Seek>(
     mut reader: ImageReader<R>,
+    file_bytes: u64,
     bounds: &Bounds,
 ) -> Result<Picture, PictureError> {
     let mut limits = Limits::no_limits();
@@ -24,6 +25,7 @@ pub(super) fn read<R: BufRead + Seek>(
     if bytes > MAX_DECODED_BYTES {
         return Err(PictureError::TooManyBytes { width, height, bytes });
     }
+    check_file_bytes(from, file_bytes)?;
     let image = DynamicImage::from_decoder(decoder)?;
     match from == to {
         true => Ok(Picture { width, height, rgba: image.into_rgba8().into_raw(), warnings: Vec::new() }),

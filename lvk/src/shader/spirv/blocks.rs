@@ -1,10 +1,10 @@
 //! The blocks of a module whose bytes the application writes: push constants, shader records and buffer references.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use ::spirv::{Decoration, StorageClass};
 
-use super::parsed::{MAX_NESTING, ParsedModule, Type};
+use super::parsed::{KnownSizes, MAX_NESTING, ParsedModule, Type};
 
 /// The blocks of an entry point, and the structs in them.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -25,7 +25,7 @@ pub(crate) struct Block {
 }
 
 /// Kind of a block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum BlockKind {
     PushConstants,
     ShaderRecord,
@@ -62,6 +62,8 @@ impl Blocks {
     /// Returns the blocks that the entry point with this index uses. Buffer references belong to the whole module.
     pub(crate) fn from_module(module: &ParsedModule, entry: usize) -> Self {
         let mut blocks = Self::default();
+        let mut collector =
+            BlockCollector { module, blocks: &mut blocks, seen: HashSet::new(), known: KnownSizes::new() };
         for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
             let kind = match variable.storage {
                 class if class == StorageClass::PushConstant as u32 => BlockKind::PushConstants,
@@ -69,11 +71,11 @@ impl Blocks {
                 _ => continue,
             };
             if let Some(Type::Pointer { target }) = module.types.get(&variable.ty) {
-                blocks.add(module, kind, *target);
+                collector.add(kind, *target);
             }
         }
         for target in &module.buffer_references {
-            blocks.add(module, BlockKind::BufferReference, *target);
+            collector.add(BlockKind::BufferReference, *target);
         }
         blocks
     }
@@ -101,30 +103,41 @@ impl Blocks {
         let members = self.members(record.ty).ok()?;
         members.iter().map(|member| member.offset.saturating_add(member.bytes)).max()
     }
+}
 
-    fn add(&mut self, module: &ParsedModule, kind: BlockKind, ty: u32) {
-        if !matches!(module.types.get(&ty), Some(Type::Struct { .. })) {
+/// Collects blocks, each once: a module may have many variables and pointers of one type, whose names can be long.
+struct BlockCollector<'a> {
+    module: &'a ParsedModule,
+    blocks: &'a mut Blocks,
+    seen: HashSet<(BlockKind, u32)>,
+    known: KnownSizes,
+}
+
+impl BlockCollector<'_> {
+    fn add(&mut self, kind: BlockKind, ty: u32) {
+        let module = self.module;
+        if !matches!(module.types.get(&ty), Some(Type::Struct { .. })) || !self.seen.insert((kind, ty)) {
             return;
         }
         let name = module.names.get(&ty).cloned().unwrap_or_default();
-        self.list.push(Block { kind, name, ty });
+        self.blocks.list.push(Block { kind, name, ty });
         let mut waiting = vec![ty];
         while let Some(ty) = waiting.pop() {
-            if self.structs.contains_key(&ty) {
+            if self.blocks.structs.contains_key(&ty) {
                 continue;
             }
-            let members = struct_members(module, ty);
+            let members = struct_members(module, ty, &mut self.known);
             let nested = members.iter().flatten().filter_map(|member| match member.shape {
                 MemberShape::Structs { ty, .. } => Some(ty),
                 MemberShape::Plain { .. } | MemberShape::Unsized => None,
             });
             waiting.extend(nested);
-            self.structs.insert(ty, members);
+            self.blocks.structs.insert(ty, members);
         }
     }
 }
 
-fn struct_members(module: &ParsedModule, ty: u32) -> BlockStruct {
+fn struct_members(module: &ParsedModule, ty: u32, known: &mut KnownSizes) -> BlockStruct {
     let Some(Type::Struct { members }) = module.types.get(&ty) else {
         return Err("its type is no struct".to_owned());
     };
@@ -135,7 +148,7 @@ fn struct_members(module: &ParsedModule, ty: u32) -> BlockStruct {
         let (shape, bytes) = match member_shape(module, ty, index, *member) {
             shape @ (MemberShape::Unsized | MemberShape::Structs { count: None, .. }) => (shape, 0),
             shape => {
-                let size = module.member_size(ty, index, *member);
+                let size = module.member_size(ty, index, *member, known);
                 (shape, size.map_err(|why| format!("its member '{name}': {why}"))?)
             }
         };
@@ -174,4 +187,22 @@ fn member_shape(module: &ParsedModule, block: u32, index: u32, member: u32) -> M
         }
     }
     if count.is_none() { MemberShape::Unsized } else { MemberShape::Plain { stride } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shader::spirv::parsed::Variable;
+
+    #[test]
+    fn a_block_of_many_variables_and_pointers_is_listed_once() {
+        let mut module = ParsedModule::default();
+        module.types.insert(1, Type::Struct { members: Vec::new() });
+        module.types.insert(2, Type::Pointer { target: 1 });
+        let storage = StorageClass::PushConstant as u32;
+        module.variables = (10..20).map(|id| Variable { id, ty: 2, storage }).collect();
+        module.buffer_references = vec![1; 10];
+        let kinds: Vec<_> = Blocks::from_module(&module, 0).list.iter().map(|block| block.kind).collect();
+        assert_eq!(kinds, [BlockKind::PushConstants, BlockKind::BufferReference]);
+    }
 }

@@ -13,6 +13,9 @@ const ADDRESS_BYTES: u64 = 8;
 /// Maximum nesting of types. A module with deeper nesting is invalid.
 pub(crate) const MAX_NESTING: u32 = 64;
 
+/// Bytes of the types whose size is known, by id. One list for all questions about a module bounds their time.
+pub(crate) type KnownSizes = HashMap<u32, u64>;
+
 /// Declarations by id. An id may refer to anything, so every look-up can fail.
 #[derive(Debug, Default)]
 pub(crate) struct ParsedModule {
@@ -23,7 +26,7 @@ pub(crate) struct ParsedModule {
     pub(crate) names: HashMap<u32, String>,
     /// Names of members, by the id of the struct and the index of the member.
     pub(crate) member_names: HashMap<(u32, u32), String>,
-    /// Structs that buffer references point to, in order, each once.
+    /// Structs that buffer references point to, in order, once for each pointer type.
     pub(crate) buffer_references: Vec<u32>,
     pub(crate) types: HashMap<u32, Type>,
     pub(crate) constants: HashMap<u32, Constant>,
@@ -187,14 +190,19 @@ impl ParsedModule {
     }
 
     /// Returns the bytes of a type that its offset and stride decorations lay out.
-    pub(crate) fn size_of(&self, ty: u32) -> Result<u64, String> {
-        let mut known = HashMap::new();
-        self.size(ty, None, MAX_NESTING, &mut known)
+    pub(crate) fn size_of(&self, ty: u32, known: &mut KnownSizes) -> Result<u64, String> {
+        self.size(ty, None, MAX_NESTING, known)
     }
 
     /// Returns the bytes of a member of a struct.
-    pub(crate) fn member_size(&self, ty: u32, index: u32, member: u32) -> Result<u64, String> {
-        self.size(member, self.matrix_layout(ty, index), MAX_NESTING, &mut HashMap::new())
+    pub(crate) fn member_size(
+        &self,
+        ty: u32,
+        index: u32,
+        member: u32,
+        known: &mut KnownSizes,
+    ) -> Result<u64, String> {
+        self.size(member, self.matrix_layout(ty, index), MAX_NESTING, known)
     }
 
     /// Returns the matrix stride of a member, and true if the member is row-major.
@@ -210,13 +218,16 @@ impl ParsedModule {
         ty: u32,
         matrix: Option<(u32, bool)>,
         nesting: u32,
-        known: &mut HashMap<u32, u64>,
+        known: &mut KnownSizes,
     ) -> Result<u64, String> {
+        let nesting = nesting.checked_sub(1).ok_or("the types are nested too deeply")?;
+        let found = self.types.get(&ty).ok_or("a type is missing")?;
+        // Other types have no matrix layout, so their size is computed once, whatever decorates the member.
+        let matrix = matrix.filter(|_| matches!(found, Type::Matrix { .. } | Type::Array { .. }));
         if let (Some(bytes), None) = (known.get(&ty), matrix) {
             return Ok(*bytes);
         }
-        let nesting = nesting.checked_sub(1).ok_or("the types are nested too deeply")?;
-        let bytes = match self.types.get(&ty).ok_or("a type is missing")? {
+        let bytes = match found {
             Type::Number { bytes, .. } => u64::from(*bytes),
             Type::Pointer { .. } => ADDRESS_BYTES,
             Type::Vector { element, count } => {
@@ -248,7 +259,7 @@ impl ParsedModule {
         columns: u32,
         layout: Option<(u32, bool)>,
         nesting: u32,
-        known: &mut HashMap<u32, u64>,
+        known: &mut KnownSizes,
     ) -> Result<u64, String> {
         let rows = match self.types.get(&column) {
             Some(Type::Vector { count, .. }) => *count,
@@ -266,7 +277,7 @@ impl ParsedModule {
         ty: u32,
         members: &[u32],
         nesting: u32,
-        known: &mut HashMap<u32, u64>,
+        known: &mut KnownSizes,
     ) -> Result<u64, String> {
         let mut end = 0;
         for (index, member) in (0..).zip(members) {
@@ -381,7 +392,7 @@ impl ParsedModule {
     fn add_buffer_reference(&mut self, storage: u32, target: u32) {
         let is_block = storage == StorageClass::PhysicalStorageBuffer as u32
             && self.decoration(target, Decoration::Block).is_some();
-        if is_block && !self.buffer_references.contains(&target) {
+        if is_block {
             self.buffer_references.push(target);
         }
     }
@@ -406,5 +417,26 @@ fn parse_image_type(i: &Instruction<'_>) -> Type {
         SAMPLED => Type::Image { storage: false },
         STORAGE => Type::Image { storage: true },
         _ => Type::Opaque(Op::TypeImage),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nested_structs_with_matrix_layouts_are_sized_once_each() {
+        let mut module = ParsedModule::default();
+        module.types.insert(1, Type::Number { bytes: 4, numbers: NumericFormat::Float });
+        for id in 2..60 {
+            module.types.insert(id, Type::Struct { members: vec![id - 1; 3] });
+            for index in 0..3 {
+                module.member_decorations.insert((id, index, Decoration::Offset as u32), 0);
+                module.member_decorations.insert((id, index, Decoration::MatrixStride as u32), 16);
+            }
+        }
+        let mut known = KnownSizes::new();
+        assert_eq!(module.size_of(59, &mut known), Ok(4));
+        assert_eq!(known.len(), 59);
     }
 }

@@ -18,12 +18,13 @@ pub(crate) struct RayInterface {
 impl RayInterface {
     /// Returns the sizes that the module declares. An unknown size counts as the largest.
     pub(crate) fn from_module(module: &ParsedModule) -> Self {
-        let largest = |classes: &[StorageClass]| {
+        let mut known = KnownExtents::new();
+        let mut largest = |classes: &[StorageClass]| {
             let variables = module.variables.iter();
             let ours =
                 variables.filter(|variable| classes.iter().any(|class| *class as u32 == variable.storage));
             let bytes = ours.map(|variable| match module.types.get(&variable.ty) {
-                Some(Type::Pointer { target }) => type_bytes(module, *target),
+                Some(Type::Pointer { target }) => type_bytes(module, *target, &mut known),
                 _ => u32::MAX,
             });
             bytes.max().unwrap_or(0)
@@ -37,14 +38,18 @@ impl RayInterface {
 
 /// Size and largest scalar of a type, in bytes.
 type Extent = (u64, u64);
+/// Extents by type and alignment. One list for all variables of a module bounds their time.
+type KnownExtents = HashMap<(u32, u64), Extent>;
+/// Bytes of the largest scalar there is. Each alignment is one of few.
+const MAX_SCALAR_BYTES: u32 = 8;
 
 /// Returns the size of a type without offsets by Vulkan's rule: every member is aligned to the type's largest scalar
 /// (`VkRayTracingPipelineInterfaceCreateInfoKHR`).
-fn type_bytes(module: &ParsedModule, ty: u32) -> u32 {
-    let Some((_, scalar)) = type_extent(module, ty, 1, MAX_NESTING, &mut HashMap::new()) else {
+fn type_bytes(module: &ParsedModule, ty: u32, known: &mut KnownExtents) -> u32 {
+    let Some((_, scalar)) = type_extent(module, ty, 1, MAX_NESTING, known) else {
         return u32::MAX;
     };
-    let whole = type_extent(module, ty, scalar, MAX_NESTING, &mut HashMap::new());
+    let whole = type_extent(module, ty, scalar, MAX_NESTING, known);
     whole.and_then(|(bytes, _)| u32::try_from(bytes).ok()).unwrap_or(u32::MAX)
 }
 
@@ -54,11 +59,11 @@ fn type_extent(
     ty: u32,
     alignment: u64,
     nesting: u32,
-    known: &mut HashMap<u32, Extent>,
+    known: &mut KnownExtents,
 ) -> Option<Extent> {
     const BOOL_BYTES: u64 = 4;
     const ADDRESS_BYTES: u64 = 8;
-    if let Some(extent) = known.get(&ty) {
+    if let Some(extent) = known.get(&(ty, alignment)) {
         return Some(*extent);
     }
     let nesting = nesting.checked_sub(1)?;
@@ -66,6 +71,7 @@ fn type_extent(
     let times = |(bytes, scalar): Extent, count: u32| (bytes.saturating_mul(count.into()), scalar);
     let found = match module.types.get(&ty)? {
         Type::Bool => (BOOL_BYTES, BOOL_BYTES),
+        Type::Number { bytes, .. } if *bytes > MAX_SCALAR_BYTES => return None,
         Type::Number { bytes, .. } => (u64::from(*bytes), u64::from(*bytes)),
         Type::Pointer { .. } => (ADDRESS_BYTES, ADDRESS_BYTES),
         Type::Vector { element, count } => times(of(*element)?, *count),
@@ -80,7 +86,7 @@ fn type_extent(
             return None;
         }
     };
-    known.insert(ty, found);
+    known.insert((ty, alignment), found);
     Some(found)
 }
 
@@ -127,10 +133,20 @@ mod tests {
     }
 
     #[test]
+    fn numbers_wider_than_any_scalar_count_as_the_largest() {
+        let mut module = ParsedModule::default();
+        let numbers = crate::format::NumericFormat::Float;
+        module.types.insert(1, Type::Number { bytes: 8, numbers });
+        module.types.insert(2, Type::Number { bytes: 9, numbers });
+        assert_eq!(type_bytes(&module, 1, &mut KnownExtents::new()), 8);
+        assert_eq!(type_bytes(&module, 2, &mut KnownExtents::new()), u32::MAX);
+    }
+
+    #[test]
     fn a_type_that_contains_itself_counts_as_the_largest() {
         let mut module = ParsedModule::default();
         module.types.insert(1, Type::Struct { members: vec![1, 1] });
-        assert_eq!(type_bytes(&module, 1), u32::MAX);
-        assert_eq!(type_bytes(&module, 2), u32::MAX);
+        assert_eq!(type_bytes(&module, 1, &mut KnownExtents::new()), u32::MAX);
+        assert_eq!(type_bytes(&module, 2, &mut KnownExtents::new()), u32::MAX);
     }
 }

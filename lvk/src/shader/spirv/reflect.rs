@@ -5,7 +5,7 @@ use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, Storage
 use super::atomics::{Atomic, find_atomics};
 use super::blocks::Blocks;
 use super::input_attachments::{InputRead, output_locations, read_input_attachment};
-use super::parsed::{Mode, ParsedModule, Type, Variable};
+use super::parsed::{KnownSizes, Mode, ParsedModule, Type, Variable};
 use super::ray_interface::RayInterface;
 use super::stage_interface::StageInterface;
 use super::words;
@@ -85,9 +85,10 @@ fn reflect_words(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String
     let (local_size, local_size_ids) = local_size(&module, function);
     let (mut bindings, mut inputs, mut input_reads) = (Vec::new(), Vec::new(), Vec::new());
     let (mut push_constant_bytes, mut second_output, mut colors) = (0, false, 0);
+    let mut known = KnownSizes::new();
     for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
         if variable.storage == StorageClass::PushConstant as u32 {
-            push_constant_bytes = push_constant_bytes.max(block_bytes(&module, variable)?);
+            push_constant_bytes = push_constant_bytes.max(block_bytes(&module, variable, &mut known)?);
         } else if let Some(read) = read_input_attachment(&module, variable)? {
             input_reads.push(read);
         } else if is_descriptor(variable) {
@@ -248,11 +249,11 @@ fn specialization(module: &ParsedModule) -> Vec<(u32, u32)> {
     found
 }
 
-fn block_bytes(module: &ParsedModule, variable: &Variable) -> Result<u32, String> {
+fn block_bytes(module: &ParsedModule, variable: &Variable, known: &mut KnownSizes) -> Result<u32, String> {
     let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else {
         return Err("the push constants have no pointer type".to_owned());
     };
-    let bytes = module.size_of(*target).map_err(|why| format!("push constants: {why}"))?;
+    let bytes = module.size_of(*target, known).map_err(|why| format!("push constants: {why}"))?;
     u32::try_from(bytes).ok().and_then(|bytes| bytes.checked_next_multiple_of(4)).ok_or_else(|| {
         format!("the push constants take {bytes} bytes; put the data into a buffer and push its address")
     })

@@ -1,5 +1,7 @@
 //! Inputs and outputs that shader stages pass to each other by location.
 
+use std::sync::Arc;
+
 use ::spirv::{Decoration, StorageClass};
 
 use super::parsed::{MAX_NESTING, ParsedModule, Type, Variable};
@@ -8,6 +10,8 @@ use crate::shader::ShaderStage;
 
 /// Most locations of a stage. Modules with more are refused elsewhere, so further ones are ignored.
 const MAX_LOCATIONS: usize = 1024;
+/// Most types that are visited for the locations of a stage. Nested arrays and structs of values without a location multiply.
+const MAX_VISITS: u32 = 1 << 16;
 
 /// A scalar or vector at a location.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,7 +27,7 @@ pub(crate) struct LocationValue {
     /// True for a value of a whole patch.
     pub(crate) is_patch: bool,
     /// Name of the variable; empty without debug names.
-    pub(crate) name: String,
+    pub(crate) name: Arc<str>,
 }
 
 /// The values that a stage takes from the stage before it, and those that it passes on.
@@ -36,11 +40,12 @@ pub(crate) struct StageInterface {
 impl StageInterface {
     pub(crate) fn from_module(stage: ShaderStage, module: &ParsedModule, entry: usize) -> Self {
         let mut found = Self::default();
+        let mut visits = MAX_VISITS;
         for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
             if variable.storage == StorageClass::Input as u32 {
-                collect(module, variable, has_array_inputs(stage), &mut found.inputs);
+                collect(module, variable, has_array_inputs(stage), &mut visits, &mut found.inputs);
             } else if variable.storage == StorageClass::Output as u32 {
-                collect(module, variable, has_array_outputs(stage), &mut found.outputs);
+                collect(module, variable, has_array_outputs(stage), &mut visits, &mut found.outputs);
             }
         }
         found
@@ -54,7 +59,7 @@ impl LocationValue {
             NumericFormat::Float => "floats",
             NumericFormat::Uint | NumericFormat::Sint => "integers",
         };
-        format!("{} {}-bit {numbers}", self.count, self.bytes * 8)
+        format!("{} {}-bit {numbers}", self.count, u64::from(self.bytes) * 8)
     }
 
     /// True if a stage that takes `self` can read it from `output`, which has the same location and component.
@@ -65,11 +70,14 @@ impl LocationValue {
 
     /// True if the values share words of a location.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        let end = |value: &Self| value.component + value.count * value.bytes.div_ceil(4);
+        let end = |value: &Self| {
+            let words = u64::from(value.count) * u64::from(value.bytes.div_ceil(4));
+            u64::from(value.component) + words
+        };
         self.is_patch == other.is_patch
             && self.location == other.location
-            && self.component < end(other)
-            && other.component < end(self)
+            && u64::from(self.component) < end(other)
+            && u64::from(other.component) < end(self)
     }
 }
 
@@ -84,7 +92,13 @@ fn has_array_outputs(stage: ShaderStage) -> bool {
 }
 
 /// Adds the values of a variable. Built-ins have no locations.
-fn collect(module: &ParsedModule, variable: &Variable, is_array: bool, out: &mut Vec<LocationValue>) {
+fn collect(
+    module: &ParsedModule,
+    variable: &Variable,
+    is_array: bool,
+    visits: &mut u32,
+    out: &mut Vec<LocationValue>,
+) {
     let decoration = |of| module.decoration(variable.id, of);
     let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { return };
     if decoration(Decoration::BuiltIn).is_some() || decoration(Decoration::PerVertexKHR).is_some() {
@@ -95,9 +109,9 @@ fn collect(module: &ParsedModule, variable: &Variable, is_array: bool, out: &mut
         Some(Type::Array { element, .. }) if is_array && !is_patch => element,
         _ => target,
     };
-    let name = module.names.get(&variable.id).cloned().unwrap_or_default();
+    let name = module.names.get(&variable.id).map_or("", String::as_str).into();
     let component = decoration(Decoration::Component).unwrap_or(0);
-    let mut collector = LocationCollector { module, out, is_patch, name };
+    let mut collector = LocationCollector { module, out, visits, is_patch, name };
     match (module.types.get(ty), decoration(Decoration::Location)) {
         (Some(Type::Struct { members }), location) => collector.block(*ty, members, location),
         (_, Some(location)) => _ = collector.value(*ty, location, component, 0),
@@ -108,8 +122,10 @@ fn collect(module: &ParsedModule, variable: &Variable, is_array: bool, out: &mut
 struct LocationCollector<'a> {
     module: &'a ParsedModule,
     out: &'a mut Vec<LocationValue>,
+    /// Types that may still be visited.
+    visits: &'a mut u32,
     is_patch: bool,
-    name: String,
+    name: Arc<str>,
 }
 
 impl LocationCollector<'_> {
@@ -129,9 +145,10 @@ impl LocationCollector<'_> {
 
     /// Adds the values of a type from `location` on. Returns the location that follows.
     fn value(&mut self, ty: u32, location: u32, component: u32, depth: u32) -> u32 {
-        if depth > MAX_NESTING || self.out.len() > MAX_LOCATIONS {
+        if depth > MAX_NESTING || self.out.len() > MAX_LOCATIONS || *self.visits == 0 {
             return location;
         }
+        *self.visits -= 1;
         match self.module.types.get(&ty) {
             Some(Type::Number { bytes, numbers }) => self.leaf(location, component, 1, *bytes, *numbers),
             Some(Type::Vector { element, count }) => match self.module.types.get(element) {
@@ -141,7 +158,8 @@ impl LocationCollector<'_> {
                 _ => location,
             },
             Some(Type::Matrix { column, count }) => {
-                (0..*count).fold(location, |next, _| self.value(*column, next, component, depth + 1))
+                let count = (*count).min(MAX_LOCATIONS as u32);
+                (0..count).fold(location, |next, _| self.value(*column, next, component, depth + 1))
             }
             Some(Type::Array { element, length }) => {
                 let length = self.module.array_length(*length).unwrap_or(0).min(MAX_LOCATIONS as u64);
@@ -155,7 +173,7 @@ impl LocationCollector<'_> {
     }
 
     fn leaf(&mut self, location: u32, component: u32, count: u32, bytes: u32, numbers: NumericFormat) -> u32 {
-        let (is_patch, name) = (self.is_patch, self.name.clone());
+        let (is_patch, name) = (self.is_patch, Arc::clone(&self.name));
         self.out.push(LocationValue { location, component, count, bytes, numbers, is_patch, name });
         // Vectors of more than two 64-bit numbers take two locations.
         location.saturating_add(if bytes == 8 && count > 2 { 2 } else { 1 })
@@ -232,6 +250,51 @@ mod tests {
         assert_eq!(places(&found.inputs), [(0, 0, 2, false), (1, 0, 4, true)]);
     }
 
+    /// Returns the words of an instruction.
+    fn code(op: ::spirv::Op, operands: &[u32]) -> Vec<u32> {
+        [&[(operands.len() as u32 + 1) << 16 | op as u32], operands].concat()
+    }
+
+    #[test]
+    fn nested_values_without_locations_end() {
+        use ::spirv::Op;
+        let output = StorageClass::Output as u32;
+        let start = [
+            vec![::spirv::MAGIC_NUMBER, 0x0001_0000, 0, 200, 0],
+            code(Op::Decorate, &[100, Decoration::Location as u32, 0]),
+            code(Op::TypeBool, &[1]),
+            code(Op::TypeInt, &[2, 32, 0]),
+            code(Op::Constant, &[2, 3, u32::MAX]),
+        ];
+        let arrays = (10..60).map(|id| code(Op::TypeArray, &[id, if id == 10 { 1 } else { id - 1 }, 3]));
+        let matrices =
+            (10..60).map(|id| code(Op::TypeMatrix, &[id, if id == 10 { 1 } else { id - 1 }, u32::MAX]));
+        let structs =
+            (10..60).map(|id| code(Op::TypeStruct, &[id, if id == 10 { 1 } else { id - 1 }, 1, id - 1]));
+        let end = [code(Op::TypePointer, &[99, output, 59]), code(Op::Variable, &[99, 100, output])].concat();
+        for nested in [arrays.collect::<Vec<_>>(), matrices.collect(), structs.collect()] {
+            let words = [start.concat(), nested.concat(), end.clone()].concat();
+            let module = ParsedModule::parse(&words).unwrap();
+            let found = StageInterface::from_module(ShaderStage::Vertex, &module, 0);
+            assert_eq!(found, StageInterface::default());
+        }
+    }
+
+    #[test]
+    fn values_of_any_size_are_compared_and_described() {
+        let value = LocationValue {
+            location: 0,
+            component: u32::MAX,
+            count: u32::MAX,
+            bytes: u32::MAX.div_ceil(8),
+            numbers: NumericFormat::Uint,
+            is_patch: false,
+            name: "".into(),
+        };
+        assert!(value.overlaps(&value));
+        assert_eq!(value.description(), "4294967295 4294967296-bit integers");
+    }
+
     #[test]
     fn narrower_inputs_of_the_same_kind_are_accepted() {
         let value = |count, numbers, bytes| LocationValue {
@@ -241,7 +304,7 @@ mod tests {
             bytes,
             numbers,
             is_patch: false,
-            name: String::new(),
+            name: "".into(),
         };
         let (float, sint, uint) = (NumericFormat::Float, NumericFormat::Sint, NumericFormat::Uint);
         assert!(value(2, float, 4).accepts(&value(3, float, 4)));

@@ -1,0 +1,81 @@
+//! Fuzz targets: each reads bytes from outside as `lvk` or its samples do, and must neither panic, nor run long, nor take more
+//! memory than a multiple of the bytes.
+//!
+//! [`TARGETS`] lists them. libFuzzer drives them through the programs in `fuzz_targets`, which `.ci/fuzz` builds and runs; the
+//! test `mutations` drives them over the corpus and over mutations of it, as a part of `cargo test`.
+
+mod input;
+mod memory;
+pub mod mutation;
+mod targets;
+
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+pub use memory::{Counting, MemoryBound};
+pub use targets::TARGETS;
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Longest time of one input. An input of a few KiB takes milliseconds.
+pub const MOST_TIME: Duration = Duration::from_secs(10);
+
+/// A reader of bytes from outside.
+pub struct Target {
+    /// Name of the target, of its program and of its corpus.
+    pub name: &'static str,
+    /// Most memory that the reader takes.
+    pub memory: MemoryBound,
+    /// Reads an input.
+    pub read: fn(&[u8]),
+}
+
+/// The memory and the time that an input took.
+#[derive(Debug, Clone, Copy)]
+pub struct Cost {
+    /// Most bytes of the heap at one time.
+    pub bytes: usize,
+    /// Time of the read.
+    pub time: Duration,
+}
+
+impl Target {
+    /// Returns the target of this name.
+    #[must_use]
+    pub fn find(name: &str) -> Option<&'static Self> {
+        TARGETS.iter().find(|target| target.name == name)
+    }
+
+    /// Reads an input. One input is read at a time, in all threads, since memory is counted for the whole process.
+    ///
+    /// # Panics
+    /// If the reader panics, or takes more memory than its bound or longer than [`MOST_TIME`].
+    pub fn run(&self, bytes: &[u8]) -> Cost {
+        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+        let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+        let start = Instant::now();
+        let most = self.memory.bytes_for(bytes.len());
+        let peak = memory::peak_of(most, || (self.read)(bytes));
+        let cost = Cost { bytes: peak, time: start.elapsed() };
+        assert!(
+            cost.bytes <= most,
+            "target '{}' took {} bytes for an input of {}, more than {most}",
+            self.name,
+            cost.bytes,
+            bytes.len()
+        );
+        assert!(cost.time <= MOST_TIME, "target '{}' took {:?}", self.name, cost.time);
+        cost
+    }
+}
+
+/// Reads an input by the target of this name, for the programs of libFuzzer.
+///
+/// # Panics
+/// As [`Target::run`], and for an unknown name.
+pub fn run(name: &str, bytes: &[u8]) {
+    let target = Target::find(name);
+    assert!(target.is_some(), "no target '{name}'");
+    target.into_iter().for_each(|target| _ = target.run(bytes));
+}

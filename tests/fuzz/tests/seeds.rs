@@ -1,0 +1,54 @@
+//! Writes the inputs of the corpus that code makes: `cargo test --test seeds -- --ignored`. Other inputs are kept.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::{DynamicImage, ImageFormat, RgbaImage};
+use lvk::test_hooks::outside_bytes;
+
+/// Choices that begin an input of the target `image`: the name of the file, and small bounds.
+const PNG: u8 = 0;
+const JPEG: u8 = 1;
+const BMP: u8 = 2;
+const TGA: u8 = 3;
+const SMALL: u8 = 0x80;
+
+fn write(target: &str, name: &str, parts: &[&[u8]]) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join(name), parts.concat()).unwrap();
+}
+
+#[test]
+#[ignore = "writes files"]
+fn write_seeds() {
+    write_images();
+    for (number, (choice, words)) in outside_bytes::example_spirv().into_iter().enumerate() {
+        let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        write("spirv", &format!("seed-{number}"), &[&[choice, 0, 0, 0], &words]);
+    }
+    for (number, (is_aabbs, counts, tree)) in outside_bytes::example_trees().into_iter().enumerate() {
+        let choice = 1 | u8::from(is_aabbs) << 1 | (counts.len() as u8) << 2;
+        let counts: Vec<u8> = counts.iter().flat_map(|count| (*count as u16).to_le_bytes()).collect();
+        write("tree", &format!("seed-{number}"), &[&[choice], &counts, &tree]);
+    }
+    write("blas", "seed-0", &[&[1], &outside_bytes::example_blas()]);
+}
+
+fn write_images() {
+    let texel = |x: u32, y: u32| image::Rgba([x as u8 * 5, y as u8 * 5, 99, 255 - x as u8]);
+    let image = DynamicImage::from(RgbaImage::from_fn(45, 7, texel));
+    let kinds = [
+        ("rgba.png", PNG, ImageFormat::Png, image.clone()),
+        ("grey16.png", PNG | SMALL, ImageFormat::Png, image.to_luma16().into()),
+        ("rgb.jpg", JPEG, ImageFormat::Jpeg, image.to_rgb8().into()),
+        ("grey.jpg", JPEG | SMALL, ImageFormat::Jpeg, image.to_luma8().into()),
+        ("rgb.bmp", BMP, ImageFormat::Bmp, image.to_rgb8().into()),
+        ("rgba.tga", TGA | SMALL, ImageFormat::Tga, image),
+    ];
+    for (name, choice, format, image) in kinds {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        write("image", name, &[&[choice], bytes.get_ref()]);
+    }
+}
