@@ -132,8 +132,6 @@ pub enum BlasGeometry {
     Aabbs(Aabbs),
 }
 
-/// The identity transform, in rows.
-
 /// A geometry in Vulkan's form, with its number of primitives.
 #[derive(Clone, Copy)]
 pub(crate) struct VulkanGeometry {
