@@ -3,19 +3,17 @@
 use glslang::include::{IncludeHandler as _, IncludeType};
 
 use super::include::Includes;
-use super::options::CompileOptions;
-use super::{ShaderStage, diagnostics, preamble, sanitize};
+use super::{diagnostics, sanitize};
 
 /// Prepares `text` for the compiler, requests its includes from `listed` and from the library as the compiler does, and
 /// reads `log` as the compiler's log.
 ///
-/// Directives count wherever they stand, also in comments and in branches that the preprocessor leaves out.
+/// Directives count wherever they stand, also in comments and in branches that the preprocessor leaves out. Texts of the
+/// library have guards against repetition, so their own directives are left out.
 pub fn read_glsl(text: &str, listed: &[(&str, &str)], log: &str) {
     let mut includes = Includes::new(listed, &[], None);
     if let Ok(text) = sanitize::to_ascii(text).and_then(|text| sanitize::without_version(&text)) {
-        let defines = [("LVK_OUTSIDE", "1")];
-        let preamble = preamble::preamble(ShaderStage::Compute, &CompileOptions::default(), &defines);
-        request_includes(&mut includes, &format!("{preamble}{text}"), 1);
+        request_includes(&mut includes, &text, 1);
     }
     drop(diagnostics::warnings(log));
     drop(diagnostics::errors(log, includes.into_failures()));
@@ -33,7 +31,7 @@ fn request_includes(includes: &mut Includes<'_>, text: &str, depth: usize) {
         let Some((name, _)) = in_quotes.or(in_brackets) else { continue };
         let local = in_quotes.and_then(|_| includes.include(IncludeType::Local, name, "", depth));
         let found = local.or_else(|| includes.include(IncludeType::System, name, "", depth));
-        if let Some(found) = found {
+        if let Some(found) = found.filter(|found| !found.name.starts_with("lvk/")) {
             request_includes(includes, &found.data, depth + 1);
         }
     }
