@@ -100,7 +100,10 @@ pub struct ContextDesc<'a> {
     ///
     /// A file that is damaged, or of another device or driver, is ignored with a warning to the `log` crate, and is
     /// never an error. Drivers trust its contents, so keep it in a folder that only the program can write to.
-    /// Default: none.
+    ///
+    /// Caches are written under temporary names and then renamed. Files that a killed process has left are removed an hour
+    /// later, at the start of a context with the same cache. Under a limit of file sizes (`ulimit -f`), a program must
+    /// handle or ignore the signal SIGXFSZ; else it ends the process in the middle of a write. Default: none.
     pub pipeline_cache: Option<&'a Path>,
     /// A folder that keeps the SPIR-V of GLSL modules between runs. The key of a file is a checksum of the source, the
     /// defines, the library's preamble for the device and the compiler version. Included sources are compared in full

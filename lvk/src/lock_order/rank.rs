@@ -1,6 +1,6 @@
 //! The order of all locks of the library.
 
-/// Rank of a lock. The ranks down to [`AccelBlocks`](Self::AccelBlocks) are ordered: while a lock of one of
+/// Rank of a lock. The ranks down to [`PipelineCacheFile`](Self::PipelineCacheFile) are ordered: while a lock of one of
 /// them is held, locks of later ranks may be taken. All other ranks are leaves. While a leaf is held, no lock
 /// may be taken except [`ValidationMessages`](Self::ValidationMessages), which any Vulkan call may take.
 ///
@@ -26,6 +26,8 @@ pub(crate) enum Rank {
     Bindless,
     /// Memory shared by acceleration structures, which are created and destroyed under any lock above.
     AccelBlocks,
+    /// The file of a pipeline cache, which is written under the lock.
+    PipelineCacheFile,
     /// Frames in flight. The first leaf.
     Frames,
     /// Mapped buffers that are not in use.
@@ -50,10 +52,10 @@ pub(crate) enum Rank {
     BufferBytes,
     /// A pipeline of the library, which is created under the lock.
     Kernels,
-    /// The file of a pipeline cache.
-    PipelineCacheFile,
     /// The folder of compiled shaders.
     ShaderCacheFolder,
+    /// Temporary files that are being written.
+    TemporaryFiles,
     /// Times of the files that shaders were read from.
     #[cfg_attr(not(feature = "glsl"), allow(dead_code, reason = "only GLSL is read from files"))]
     ShaderFiles,
@@ -87,7 +89,7 @@ pub(crate) enum Rank {
 #[cfg(debug_assertions)]
 impl Rank {
     /// All ranks, in their order.
-    pub(super) const ALL: [Self; 35] = [
+    pub(super) const ALL: [Self; 36] = [
         Self::Swapchain,
         Self::Compactions,
         Self::Pending,
@@ -96,6 +98,7 @@ impl Rank {
         Self::Submitter,
         Self::Bindless,
         Self::AccelBlocks,
+        Self::PipelineCacheFile,
         Self::Frames,
         Self::SpareBuffers,
         Self::Staging,
@@ -108,8 +111,8 @@ impl Rank {
         Self::QueryResetState,
         Self::BufferBytes,
         Self::Kernels,
-        Self::PipelineCacheFile,
         Self::ShaderCacheFolder,
+        Self::TemporaryFiles,
         Self::ShaderFiles,
         Self::Profiler,
         Self::RecordingStates,

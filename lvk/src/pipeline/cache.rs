@@ -7,12 +7,13 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::cache_file::{CacheOwner, decode_file, encode_file};
-use crate::cache_file::{MAX_BYTES, checksum, remove_leftovers, replace_file};
+use crate::cache_file::{MAX_BYTES, checksum};
 use crate::error::readable::readable_name;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
 use crate::regular_file;
+use crate::temporary_file::{remove_replacements, replace_file};
 
 /// The pipeline cache of a context that has a cache file. The file is written and the cache destroyed on drop.
 pub(crate) struct PipelineCache {
@@ -32,7 +33,9 @@ impl PipelineCache {
     pub(crate) fn new(gpu: &Arc<Gpu>, path: &Path) -> Result<Self> {
         let owner = cache_owner(gpu);
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        remove_leftovers(folder.unwrap_or(Path::new(".")), |cache| path.file_name() == Some(cache.as_ref()));
+        remove_replacements(folder.unwrap_or(Path::new(".")), |cache| {
+            path.file_name() == Some(cache.as_ref())
+        });
         let file = read_if_present(path);
         let data = file.as_deref().and_then(|file| match decode_file(&owner, file) {
             Ok(data) => Some(data),

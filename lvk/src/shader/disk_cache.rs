@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
 use super::disk_file::{CachedModule, Fingerprint, Included, decode_file, encode_file};
-use crate::cache_file::{is_temporary, remove_leftovers, replace_file};
 use crate::error::readable::readable_name;
 use crate::lock_order::{Mutex, Rank};
 use crate::regular_file;
+use crate::temporary_file::{is_replacement, remove_replacements, replace_file};
 
 /// Maximum size of a cache folder in bytes. If a folder exceeds it, the least recently used files are removed until the
 /// folder is three quarters full.
@@ -41,7 +41,7 @@ pub(crate) struct ShaderCache {
 impl ShaderCache {
     /// Creates a cache in `folder`, which need not exist.
     pub(crate) fn new(folder: &Path) -> Self {
-        remove_leftovers(folder, is_module_name);
+        remove_replacements(folder, is_module_name);
         Self {
             folder: folder.to_owned(),
             most_bytes: MAX_BYTES,
@@ -138,7 +138,7 @@ fn cache_files(folder: &Path) -> Vec<CacheFile> {
 
 /// True if the name is that of a compiled shader, or of a temporary file that a crash left behind.
 fn is_ours(name: &std::ffi::OsStr) -> bool {
-    name.to_str().is_some_and(is_module_name) || is_temporary(name, is_module_name)
+    name.to_str().is_some_and(is_module_name) || is_replacement(name, is_module_name)
 }
 
 /// True if the name is that of a compiled shader.

@@ -7,9 +7,10 @@ use super::bvh::primitives::{Mesh, MeshPrimitives};
 use super::bvh::settings::BvhSettings;
 use super::expected_mesh::ExpectedMesh;
 use super::validate_blob;
-use crate::cache_file::{fingerprint, remove_leftovers, replace_file};
+use crate::cache_file::fingerprint;
 use crate::error::readable::readable_name;
 use crate::regular_file;
+use crate::temporary_file::{remove_replacements, replace_file};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 const EXTENSION: &str = ".tree";
@@ -49,7 +50,7 @@ impl BvhKey {
 impl BvhCache {
     /// Creates a cache in `folder`, which need not exist.
     pub(crate) fn new(folder: &Path) -> Self {
-        remove_leftovers(folder, |cache| cache.ends_with(EXTENSION));
+        remove_replacements(folder, |cache| cache.ends_with(EXTENSION));
         Self { folder: folder.to_owned() }
     }
 

@@ -80,6 +80,18 @@ pub enum DriverError {
         /// Bytes that the driver needs.
         needed: u64,
     },
+    /// The files of the process are limited to less than the software driver needs.
+    #[error(
+        "files of this process are limited to {} MiB, and the software driver needs {} MiB for the memory of its objects: \
+         without them it would end the process; raise the limit (`ulimit -f unlimited`)",
+        limit >> 20, needed >> 20
+    )]
+    FileSize {
+        /// The limit, in bytes.
+        limit: u64,
+        /// Bytes that the driver needs.
+        needed: u64,
+    },
     /// A downloaded file cannot be used.
     #[error("the downloaded {} cannot be used: {reason}; {}", lvk::readable_name(path), remedy(reason))]
     Broken {

@@ -14,7 +14,6 @@
 //! | `LVK_VULKAN_DIR=path` | the folder for downloaded files |
 //! | `VK_DRIVER_FILES`, `VK_ICD_FILENAMES` | drivers chosen by the user, used unchanged |
 
-mod address_space;
 mod apt;
 mod cache_folder;
 mod display;
@@ -31,6 +30,7 @@ mod library_preload;
 mod library_preload_disabled;
 mod loader_environment;
 mod platform;
+mod process_limits;
 mod settings;
 mod system_vulkan;
 
@@ -222,7 +222,7 @@ impl DriverSource {
         if self == Self::UserDrivers {
             return Ok(Driver { loader, origin: DriverOrigin::System, system: None });
         }
-        address_space::check()?;
+        process_limits::check()?;
         library_preload::preload(&folder, &Manifest::read(&folder).unwrap_or_default().preload)?;
         Ok(Driver { loader, origin: DriverOrigin::Downloaded { folder }, system: None })
     }

@@ -23,7 +23,7 @@ use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
 use super::sequence::{RenderReport, RenderRequest, render_frames};
-use super::{library_warnings, png, print_line, print_message, window};
+use super::{file_size_limit, library_warnings, png, print_line, print_message, window};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::rtx::RtxConfig;
 use crate::scene::Scene;
@@ -137,7 +137,9 @@ fn run_with<S: SampleInfo>(args: &CommandLine<S::Args>, event_loop: &mut EventLo
         return ExitCode::SUCCESS;
     }
     library_warnings::print();
-    match attempt(event_loop, S::NAME, &args.run, |setup| S::open(&args.sample, setup)) {
+    file_size_limit::report_as_error();
+    let interrupt = Interrupt::listen();
+    match attempt(event_loop, S::NAME, &args.run, &interrupt, |setup| S::open(&args.sample, setup)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             print_message("error", &error);
@@ -261,6 +263,7 @@ fn attempt<S: Sample>(
     event_loop: &mut EventLoopBuilder<()>,
     name: &str,
     args: &RunArgs,
+    interrupt: &Interrupt,
     make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 ) -> Result<(), RunError> {
     if args.list_devices {
@@ -289,12 +292,9 @@ fn attempt<S: Sample>(
         request.warm_up = 0;
         request.frames = args.frames.clone().unwrap_or(Frames::Still(1));
     }
-    let played = render_frames(
-        &mut Headless::new(&mut sample),
-        &request,
-        &mut Progress::visible(),
-        &Interrupt::listen(),
-    );
+    interrupt.defer();
+    let played =
+        render_frames(&mut Headless::new(&mut sample), &request, &mut Progress::visible(), interrupt);
     let remark = sample.remark();
     drop(sample);
     context.wait_idle()?;

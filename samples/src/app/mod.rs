@@ -6,6 +6,7 @@ pub(crate) mod array_buffer;
 pub mod caches;
 pub mod cli;
 pub mod device;
+pub(crate) mod file_size_limit;
 pub mod fly_camera;
 pub mod frame;
 pub mod frame_name;

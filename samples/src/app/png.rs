@@ -1,10 +1,9 @@
 //! Writes pictures so that a file is either complete or not there.
 
 use std::ffi::OsStr;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use lvk::temporary_file::{self, is_unique_part, unique_part};
+use lvk::temporary_file::{self, TemporaryFile, is_unique_part, unique_part};
 use lvk::{readable_name, regular_file};
 
 /// Errors of writing an image.
@@ -84,7 +83,7 @@ pub fn check_writable(path: &Path) -> Result<(), PngError> {
         return Err(PngError::NotPng { path: path.into() });
     }
     remove_leftovers(path);
-    Partial::create(path).map(drop).map_err(unwritable)
+    create_partial(path).map(drop).map_err(unwritable)
 }
 
 /// Writes `width` x `height` pixels of 4 bytes (RGBA, sRGB, rows from the top) as a PNG. An earlier file at `path` is
@@ -110,7 +109,7 @@ pub fn write(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), Pn
     let encoded = encoded.into_inner();
     let written = is_null_device(path).and_then(|is_null| match is_null {
         true => Ok(()),
-        false => Partial::create(path).and_then(|partial| partial.complete(&encoded, path)),
+        false => create_partial(path).and_then(|partial| partial.complete(&encoded, path)),
     });
     written.map_err(|source| PngError::Unwritable { path: path.into(), source })
 }
@@ -134,31 +133,9 @@ fn is_null_device(path: &Path) -> std::io::Result<bool> {
     }
 }
 
-/// A file beside the final one, removed unless it is completed.
-struct Partial {
-    path: PathBuf,
-    file: std::fs::File,
-}
-
-impl Partial {
-    fn create(target: &Path) -> std::io::Result<Self> {
-        let path = target.with_file_name(partial_name());
-        let file = std::fs::File::create_new(&path)?;
-        Ok(Self { path, file })
-    }
-
-    fn complete(mut self, content: &[u8], target: &Path) -> std::io::Result<()> {
-        self.file.write_all(content)?;
-        self.file.sync_all()?;
-        std::fs::rename(&self.path, target)
-    }
-}
-
-impl Drop for Partial {
-    fn drop(&mut self) {
-        // After the renaming there is nothing left to remove.
-        let _ = std::fs::remove_file(&self.path);
-    }
+/// Creates the file in part beside the final one.
+fn create_partial(target: &Path) -> std::io::Result<TemporaryFile> {
+    TemporaryFile::create(target.with_file_name(partial_name()))
 }
 
 /// Returns a name that no other process uses.
@@ -173,8 +150,8 @@ fn is_partial(name: &OsStr) -> bool {
     unique.is_some_and(is_unique_part)
 }
 
-/// Removes the files in part that killed processes left beside `target`.
-fn remove_leftovers(target: &Path) {
+/// Removes the files in part that killed processes left beside `target` more than an hour ago.
+pub(super) fn remove_leftovers(target: &Path) {
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
     temporary_file::remove_leftovers(folder.unwrap_or(Path::new(".")), is_partial);
 }

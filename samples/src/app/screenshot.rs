@@ -64,6 +64,7 @@ impl Screenshot {
         for pixel in pixels.as_chunks_mut().0 {
             *pixel = self.texels.rgba(*pixel);
         }
+        png::remove_leftovers(path);
         Ok(png::write(path, self.extent[0], self.extent[1], &pixels)?)
     }
 }

@@ -1,13 +1,17 @@
 //! Built bottom-level structures, kept in a folder from one start to the next.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
+use lvk::temporary_file::{remove_replacements, replace_file};
 use lvk::{BuildFlags, Capabilities, readable_name};
 
 use super::world::{Piece, World};
 use crate::app::input_file::{self, FileKind};
+
+/// Extension of the files.
+const EXTENSION: &str = ".blas";
 
 /// A folder of built structures, each in a file named after what it was built from.
 pub(super) struct StructureCache {
@@ -40,14 +44,16 @@ impl StructureKey {
 }
 
 impl StructureCache {
-    /// Creates a cache in a folder, which need not exist.
+    /// Creates a cache in a folder, which need not exist. Temporary files that killed processes left there more than an hour ago
+    /// are removed.
     pub(super) fn new(folder: &Path) -> Self {
+        remove_replacements(folder, |name| name.ends_with(EXTENSION));
         Self { folder: folder.to_owned() }
     }
 
     /// Path of the cached structure.
     pub(super) fn path(&self, StructureKey(key): StructureKey) -> PathBuf {
-        self.folder.join(format!("{key:016x}.blas"))
+        self.folder.join(format!("{key:016x}{EXTENSION}"))
     }
 
     /// The bytes of an earlier start, if there are any. A file that cannot be read is warned of.
@@ -66,23 +72,16 @@ impl StructureCache {
     /// Keeps the bytes for the next start, or warns.
     pub(super) fn store(&self, key: StructureKey, bytes: &[u8]) {
         let path = self.path(key);
-        if let Err(error) = self.replace(&path, bytes) {
+        if let Err(error) = std::fs::create_dir_all(&self.folder).and_then(|()| replace_file(&path, bytes)) {
             log::warn!("the structure '{}' cannot be kept: {error}", readable_name(&path));
         }
-    }
-
-    /// Replaces a file atomically: a reader finds the old bytes or the new ones.
-    fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
-        std::fs::create_dir_all(&self.folder)?;
-        let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
-        file.write_all(bytes)?;
-        file.persist(path)?;
-        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::{Duration, SystemTime};
+
     use super::*;
     use crate::app::progress::Progress;
 
@@ -126,5 +125,22 @@ mod tests {
             assert_eq!(cache.read(key).as_deref(), Some(bytes));
         }
         assert_eq!(std::fs::read_dir(folder.path().join("made")).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn only_old_leftovers_of_killed_processes_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let create = |name: &str, seconds: u64| {
+            let file = std::fs::File::create(folder.path().join(name)).unwrap();
+            file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
+        };
+        create("0000000000000007.blas.12-3.tmp", 9000);
+        create("0000000000000007.blas.12-4.tmp", 60);
+        create("mine.tmp", 9000);
+        let _cache = StructureCache::new(folder.path());
+        let entries = std::fs::read_dir(folder.path()).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["0000000000000007.blas.12-4.tmp", "mine.tmp"]);
     }
 }

@@ -35,6 +35,7 @@ pub(crate) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> 
     }
     let started = Instant::now();
     let interrupt = Interrupt::listen();
+    interrupt.defer();
     let mut progress = Progress::visible();
     let mut experiment: Option<Experiment> = None;
     let mut title = String::new();

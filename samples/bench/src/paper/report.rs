@@ -1,10 +1,10 @@
 //! Writes the report folder: a Markdown page, CSV files, plots and images.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 
 use lvk::Capabilities;
+use lvk::temporary_file::{remove_replacements, replace_file};
 
 use super::error::PaperError;
 use super::measure::{ExperimentPlan, SceneResult};
@@ -81,8 +81,9 @@ impl Experiment {
             ("report.md".to_owned(), self.page()),
         ]);
         for (name, text) in files {
-            let path = folder.join(name);
-            write_atomically(&path, &text).map_err(PaperError::write(&path))?;
+            let path = folder.join(&name);
+            remove_replacements(folder, |file| file == name);
+            replace_file(&path, text.as_bytes()).map_err(PaperError::write(&path))?;
         }
         Ok(())
     }
@@ -176,16 +177,6 @@ average are averages over the cameras, as in the paper. The paper rendered 1280x
 the same models, the kitchen replaces its gallery, and its camera positions are unknown, so the columns are similar, not equal.
 
 ";
-
-/// Writes a file through a temporary file and a rename, so that readers see the old or the new content.
-fn write_atomically(path: &Path, text: &str) -> std::io::Result<()> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".part");
-    // An earlier run may have left one, and opening a pipe of that name would wait for its reader.
-    let _ = std::fs::remove_file(&partial);
-    std::fs::File::create_new(&partial)?.write_all(text.as_bytes())?;
-    std::fs::rename(&partial, path)
-}
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,74 @@
+//! Processes that are killed (SIGKILL): what they leave is whole, and the next start works.
+
+use std::time::Instant;
+
+use crate::moment::{Moment, moments, wait_for};
+use crate::program::{Desk, Task, has_device};
+
+/// Counts of kills.
+#[derive(Debug, Default)]
+struct Tally {
+    killed: usize,
+    /// Processes that ended before their moment had come.
+    ended_before: usize,
+    /// Kills that left temporary files.
+    with_leftovers: usize,
+    leftovers: usize,
+}
+
+/// Kills a process at `moment`, checks the files, and starts again. Where `is_aged`, the temporary files that are left look old, and
+/// must be gone afterwards; else the next start must leave them alone.
+fn kill_at(desk: &Desk, moment: Moment, is_aged: bool, tally: &mut Tally) {
+    let mut child = desk.start(0);
+    if wait_for(moment, desk, &mut child) {
+        child.kill().unwrap();
+        tally.killed += 1;
+    } else {
+        tally.ended_before += 1;
+    }
+    desk.wait(child, 0);
+    desk.assert_whole();
+    let left = desk.leftovers();
+    tally.with_leftovers += usize::from(!left.is_empty());
+    tally.leftovers += left.len();
+    if is_aged {
+        desk.age_leftovers();
+    }
+    desk.assert_next_start();
+    let expected = if is_aged { Vec::new() } else { left };
+    assert_eq!(desk.leftovers(), expected, "after the next start");
+}
+
+/// Kills `count` processes of a task, each on cold caches.
+fn kill_many(task: Task, seed: u64, count: usize) {
+    let expected = task.expected();
+    let start = Instant::now();
+    let mut tally = Tally::default();
+    for (index, moment) in moments(seed, count, expected.length, expected.files).into_iter().enumerate() {
+        eprintln!("{task:?}, kill {index}: {moment:?}");
+        kill_at(&Desk::new(task), moment, index % 2 == 1, &mut tally);
+    }
+    eprintln!("{task:?}, seed {seed}: {tally:?} in {:.0} s", start.elapsed().as_secs_f32());
+    assert_eq!(tally.killed + tally.ended_before, count);
+}
+
+#[test]
+fn a_killed_process_leaves_whole_files_and_the_next_start_works() {
+    if !has_device() {
+        return;
+    }
+    for (task, count) in [(Task::Small, 8), (Task::Sequence, 8), (Task::Hybrid, 2), (Task::Structures, 2)] {
+        kill_many(task, 1, count);
+    }
+}
+
+/// `LVK_KILLS=N` kills N processes in place of 300, `LVK_KILLS_SEED` chooses other moments.
+#[test]
+#[ignore = "minutes to hours: `.ci/slow processes`"]
+fn many_killed_processes_leave_whole_files_and_the_next_start_works() {
+    let number = |name, usual| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
+    let (count, seed) = (number("LVK_KILLS", 300), number("LVK_KILLS_SEED", 100));
+    for task in Task::ALL {
+        kill_many(task, seed, (count as usize).div_ceil(Task::ALL.len()));
+    }
+}

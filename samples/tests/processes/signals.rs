@@ -1,0 +1,86 @@
+//! Processes that are asked to end (SIGTERM, SIGINT): their status, their files, and the time that this takes.
+
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::moment::{moments, wait_for};
+use crate::program::{Desk, Task, has_device};
+
+/// Longest time from the signal to the end of the process, on a busy machine. The small frames of these tests take far less.
+const LONGEST: Duration = Duration::from_secs(20);
+
+/// Counts of signalled processes.
+#[derive(Debug, Default)]
+struct Tally {
+    interrupted: usize,
+    /// Processes that had done their work when the signal came, or nearly.
+    completed: usize,
+    /// Processes that did not listen yet, and had written nothing.
+    not_listening: usize,
+    longest: Duration,
+}
+
+fn signal_many(task: Task, seed: u64, count: usize) {
+    let expected = task.expected();
+    let mut tally = Tally::default();
+    for (index, moment) in moments(seed, count, expected.length, expected.files).into_iter().enumerate() {
+        let signal = if index / 2 % 2 == 0 { Signal::TERM } else { Signal::INT };
+        let desk = Desk::new(task);
+        let mut child = desk.start(0);
+        let begun = wait_for(moment, &desk, &mut child).then(|| {
+            kill_process(Pid::from_child(&child), signal).unwrap();
+            Instant::now()
+        });
+        let ended = desk.wait(child, 0);
+        let taken = begun.map_or(Duration::ZERO, |begun| begun.elapsed());
+        eprintln!("{task:?}, {signal:?} {index}: {moment:?}: {:?} in {taken:?}", ended.status);
+        assert!(taken < LONGEST, "{taken:?}");
+        tally.longest = tally.longest.max(taken);
+        desk.assert_whole();
+        assert!(desk.leftovers().is_empty(), "{:?} {}", desk.leftovers(), ended.err);
+        let says: Vec<_> = ended.err.lines().filter(|line| !line.starts_with('[')).collect();
+        match ended.status.code() {
+            Some(130) => {
+                tally.interrupted += 1;
+                let is_plain = says.iter().all(|line| line.starts_with("error: interrupted after "));
+                assert!(says.len() <= 1 && is_plain, "{}", ended.err);
+            }
+            Some(0) => {
+                tally.completed += 1;
+                assert!(says.is_empty(), "{}", ended.err);
+                desk.assert_complete();
+            }
+            _ => {
+                tally.not_listening += 1;
+                assert!(ended.is_by_signal(signal.as_raw()), "{:?}: {}", ended.status, ended.err);
+                let is_untouched = std::fs::read_dir(desk.output()).unwrap().next().is_none()
+                    && std::fs::read_dir(desk.cache()).unwrap().next().is_none();
+                assert!(is_untouched && says.is_empty(), "it did not listen: {}", ended.err);
+            }
+        }
+        desk.assert_next_start();
+    }
+    eprintln!("{task:?}, seed {seed}: {tally:?}");
+}
+
+#[test]
+fn a_process_that_is_asked_to_end_does_so_and_leaves_nothing_in_part() {
+    if !has_device() {
+        return;
+    }
+    for (task, count) in [(Task::Small, 6), (Task::Sequence, 6), (Task::Hybrid, 2), (Task::Structures, 1)] {
+        signal_many(task, 2, count);
+    }
+}
+
+/// Variables as those of the long test of kills.
+#[test]
+#[ignore = "minutes to hours: `.ci/slow processes`"]
+fn many_processes_that_are_asked_to_end_do_so() {
+    let number = |name, usual| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
+    let (count, seed) = (number("LVK_KILLS", 300), number("LVK_KILLS_SEED", 200));
+    for task in Task::ALL {
+        signal_many(task, seed, (count as usize).div_ceil(Task::ALL.len()));
+    }
+}
