@@ -1,4 +1,5 @@
 //! Writes the inputs of the corpus that code makes: `cargo test --test seeds -- --ignored`. Other inputs are kept.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::io::Cursor;
 use std::path::Path;
