@@ -37,8 +37,8 @@ bitflags! {
 /// One instance of a BLAS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TlasInstance {
-    /// Object-to-world transform: 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`). [`rows_from_columns`]
-    /// converts matrices that are stored by columns.
+    /// Object-to-world transform: 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`).
+    /// [`rows_from_columns`](crate::rows_from_columns) converts matrices that are stored by columns.
     pub transform: [f32; 12],
     /// The BLAS.
     pub blas: AccelStructHandle,
