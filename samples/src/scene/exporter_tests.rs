@@ -245,7 +245,7 @@ fn materials_of_exporters_look_as_in_the_exporter() {
 }
 
 #[test]
-fn images_are_found_where_archives_have_them() {
+fn images_come_from_where_archives_have_them() {
     let expected = with_image("map_Kd t.png", "t.png");
     for (map, place) in [
         ("map_Kd C:\\Users\\me\\3dsMax\\sceneassets\\images\\T.PNG", "t.png"),
@@ -276,7 +276,7 @@ fn images_are_found_where_archives_have_them() {
 }
 
 #[test]
-fn renamed_libraries_are_found() {
+fn renamed_libraries_are_read() {
     let library = format!("newmtl m\n{PAINT}");
     let expected = with_material(PAINT);
     let renamed = with_library(painted().replace("a.mtl", "untitled.mtl"), &library);
