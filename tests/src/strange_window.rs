@@ -9,7 +9,7 @@ use lvk::raw_window_handle::{
 };
 use lvk::{Error, WindowHandles};
 
-/// What is strange about a window.
+/// The mistake of a window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Strange {
     /// The window library answers no handle.

@@ -571,7 +571,7 @@ fn numbers_queues_and_contexts_that_do_not_fit_are_refused() {
     foreign(other.suspend_swapchain(*swapchain));
     foreign(other.resume_swapchain(*swapchain, &(window.clone() as Arc<_>), [1, 1]));
     foreign(other.present(other.acquire_command_buffer().unwrap(), image).map(drop));
-    // What was refused is presented right afterwards.
+    // The swapchain goes on after a refusal.
     let image = ctx.next_image(*swapchain).unwrap().unwrap();
     let told = message(ctx.present(ctx.acquire_command_buffer_on(Queue::Compute).unwrap(), image));
     assert!(told.contains("swapchain") && told.contains("belong to the graphics queue"), "{told}");
