@@ -79,3 +79,35 @@ pub fn run(name: &str, bytes: &[u8]) {
     assert!(target.is_some(), "no target '{name}'");
     target.into_iter().for_each(|target| _ = target.run(bytes));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOUND: MemoryBound = MemoryBound { fixed: 100, multiple: 10 };
+
+    #[test]
+    fn a_reader_within_its_bound_passes() {
+        let target =
+            Target { name: "little", memory: BOUND, read: |bytes| drop(vec![0_u8; 10 * bytes.len()]) };
+        assert_eq!(target.run(&[0; 50]).bytes, 500);
+    }
+
+    #[test]
+    #[should_panic(expected = "target 'much' took 2000 bytes for an input of 50, more than 600")]
+    fn a_reader_beyond_its_bound_fails() {
+        let target = Target { name: "much", memory: BOUND, read: |bytes| drop(vec![0_u8; 40 * bytes.len()]) };
+        _ = target.run(&[0; 50]);
+    }
+
+    #[test]
+    fn names_of_targets_differ() {
+        for target in TARGETS {
+            assert!(
+                Target::find(target.name).is_some_and(|found| std::ptr::eq(found, target)),
+                "{}",
+                target.name
+            );
+        }
+    }
+}
