@@ -9,7 +9,6 @@ mod memory;
 pub mod mutation;
 mod targets;
 
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 pub use memory::{Counting, MemoryBound};
@@ -47,13 +46,11 @@ impl Target {
         TARGETS.iter().find(|target| target.name == name)
     }
 
-    /// Reads an input. One input is read at a time, in all threads, since memory is counted for the whole process.
+    /// Reads an input.
     ///
     /// # Panics
     /// If the reader panics, or takes more memory than its bound or longer than [`MOST_TIME`].
     pub fn run(&self, bytes: &[u8]) -> Cost {
-        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-        let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         let start = Instant::now();
         let most = self.memory.bytes_for(bytes.len());
         let peak = memory::peak_of(most, || (self.read)(bytes));
