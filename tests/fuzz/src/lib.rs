@@ -9,7 +9,6 @@ mod memory;
 pub mod mutation;
 mod targets;
 
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 pub use memory::{Counting, MemoryBound};
@@ -47,13 +46,11 @@ impl Target {
         TARGETS.iter().find(|target| target.name == name)
     }
 
-    /// Reads an input. One input is read at a time, in all threads, since memory is counted for the whole process.
+    /// Reads an input.
     ///
     /// # Panics
     /// If the reader panics, or takes more memory than its bound or longer than [`MOST_TIME`].
     pub fn run(&self, bytes: &[u8]) -> Cost {
-        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-        let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         let start = Instant::now();
         let most = self.memory.bytes_for(bytes.len());
         let peak = memory::peak_of(most, || (self.read)(bytes));
@@ -78,4 +75,36 @@ pub fn run(name: &str, bytes: &[u8]) {
     let target = Target::find(name);
     assert!(target.is_some(), "no target '{name}'");
     target.into_iter().for_each(|target| _ = target.run(bytes));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOUND: MemoryBound = MemoryBound { fixed: 100, multiple: 10 };
+
+    #[test]
+    fn a_reader_within_its_bound_passes() {
+        let target =
+            Target { name: "little", memory: BOUND, read: |bytes| drop(vec![0_u8; 10 * bytes.len()]) };
+        assert_eq!(target.run(&[0; 50]).bytes, 500);
+    }
+
+    #[test]
+    #[should_panic(expected = "target 'much' took 2000 bytes for an input of 50, more than 600")]
+    fn a_reader_beyond_its_bound_fails() {
+        let target = Target { name: "much", memory: BOUND, read: |bytes| drop(vec![0_u8; 40 * bytes.len()]) };
+        _ = target.run(&[0; 50]);
+    }
+
+    #[test]
+    fn names_of_targets_differ() {
+        for target in TARGETS {
+            assert!(
+                Target::find(target.name).is_some_and(|found| std::ptr::eq(found, target)),
+                "{}",
+                target.name
+            );
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Memory of the heap: an allocator that counts, and bounds in terms of the bytes of an input.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::cell::Cell;
 
 /// Most memory of a reader: a fixed part, for what every input takes, and a multiple of the bytes of the input.
 #[derive(Debug, Clone, Copy)]
@@ -20,41 +20,62 @@ impl MemoryBound {
     }
 }
 
-/// The allocator of the system, with counts for the whole process. It refuses memory far beyond the bound of an input, so that a
-/// defect does not take the memory of the machine.
+/// The allocator of the system, with counts for each thread: no reader has threads of its own, and tests run side by side. It
+/// refuses memory far beyond the bound of an input, so that a defect does not take the memory of the machine.
 pub struct Counting;
 
 /// Bytes beyond the bound of an input that are still given, so that the reader can end and be told of.
-const BEYOND: usize = 1 << 30;
+const BEYOND: isize = 1 << 30;
 
-static HELD: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-static REFUSED_FROM: AtomicUsize = AtomicUsize::new(usize::MAX);
+/// What a thread holds. Less than zero where it frees what other threads have allocated.
+struct Counts {
+    held: Cell<isize>,
+    peak: Cell<isize>,
+    /// From here on, requests are refused.
+    refused_from: Cell<isize>,
+}
 
-/// Runs a reader, and returns the most bytes that the process has held meanwhile beyond those it held before. Requests that were
+thread_local! {
+    static COUNTS: Counts = const {
+        Counts { held: Cell::new(0), peak: Cell::new(0), refused_from: Cell::new(isize::MAX) }
+    };
+}
+
+/// Runs a reader, and returns the most bytes that this thread has held meanwhile beyond those it held before. Requests that were
 /// refused count, too. `bound` bounds what is given.
 pub(crate) fn peak_of(bound: usize, read: impl FnOnce()) -> usize {
-    let before = HELD.load(Ordering::Relaxed);
-    PEAK.store(before, Ordering::Relaxed);
-    REFUSED_FROM.store(before.saturating_add(bound).saturating_add(BEYOND), Ordering::Relaxed);
+    let bound = isize::try_from(bound).unwrap_or(isize::MAX);
+    let before = COUNTS.with(|counts| {
+        let before = counts.held.get();
+        counts.peak.set(before);
+        counts.refused_from.set(before.saturating_add(bound).saturating_add(BEYOND));
+        before
+    });
     read();
-    REFUSED_FROM.store(usize::MAX, Ordering::Relaxed);
-    PEAK.load(Ordering::Relaxed).saturating_sub(before)
+    let peak = COUNTS.with(|counts| {
+        counts.refused_from.set(isize::MAX);
+        counts.peak.get()
+    });
+    usize::try_from(peak.saturating_sub(before)).unwrap_or_default()
 }
 
 /// Counts a request. Returns false if it must be refused.
 fn take(bytes: usize) -> bool {
-    let held = HELD.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
-    PEAK.fetch_max(held, Ordering::Relaxed);
-    let is_given = held < REFUSED_FROM.load(Ordering::Relaxed);
-    if !is_given {
-        give_back(bytes);
-    }
-    is_given
+    let count = |counts: &Counts| {
+        let held = counts.held.get().saturating_add_unsigned(bytes);
+        counts.peak.set(held.max(counts.peak.get()));
+        let is_given = held < counts.refused_from.get();
+        if is_given {
+            counts.held.set(held);
+        }
+        is_given
+    };
+    // At the end of a thread there are no counts.
+    COUNTS.try_with(count).unwrap_or(true)
 }
 
 fn give_back(bytes: usize) {
-    HELD.fetch_sub(bytes, Ordering::Relaxed);
+    _ = COUNTS.try_with(|counts| counts.held.set(counts.held.get().saturating_sub_unsigned(bytes)));
 }
 
 // SAFETY: each method passes its arguments to the system's allocator, or returns null, which stands for a failure.
@@ -109,7 +130,7 @@ mod tests {
 
     #[test]
     fn far_more_than_the_bound_is_refused_and_counts() {
-        let huge = 2 * BEYOND;
+        let huge = 2 * BEYOND.unsigned_abs();
         let peak = peak_of(0, || assert!(Vec::<u8>::new().try_reserve_exact(huge).is_err()));
         assert!(peak >= huge);
     }
