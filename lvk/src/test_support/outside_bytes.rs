@@ -48,6 +48,11 @@ fn run_passes(words: &[u32]) {
     drop(with_checked_indices(words, &plan));
     let stripped = strip_unused_bindings(words.to_vec());
     drop(merge_sampled_images(strip_primitive_culling(&stripped)));
+    #[cfg(feature = "glsl")]
+    {
+        let texts = [("a.glsl".to_owned(), "void main() {}".to_owned())];
+        drop(crate::shader::spirv::debug_source::embed_source(words, &texts));
+    }
 }
 
 /// Reads a reflection as checks of modules and pipelines do.

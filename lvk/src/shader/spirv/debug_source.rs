@@ -25,14 +25,15 @@ pub(crate) fn embed_source(words: &[u32], texts: &[(String, String)]) -> Vec<u32
     out
 }
 
-/// Appends the texts. Every `OpString` precedes every `OpSource`.
+/// Appends the texts, unless the module has no ids left for them. Every `OpString` precedes every `OpSource`.
 fn push_texts(out: &mut Vec<u32>, language: [u32; 2], texts: &[(String, String)]) {
     let first = out[BOUND];
-    out[BOUND] += texts.len() as u32;
-    for (id, (name, _)) in (first..).zip(texts) {
+    let Some(bound) = first.checked_add(texts.len() as u32) else { return };
+    out[BOUND] = bound;
+    for (id, (name, _)) in (first..bound).zip(texts) {
         push_text(out, Op::String, &[id], name);
     }
-    for (id, (_, text)) in (first..).zip(texts) {
+    for (id, (_, text)) in (first..bound).zip(texts) {
         let most = (MAX_WORDS - 5) * 4;
         let (head, mut rest) = text.split_at(text.len().min(most));
         push_text(out, Op::Source, &[language[0], language[1], id], head);
@@ -57,6 +58,16 @@ fn push_text(out: &mut Vec<u32>, op: Op, operands: &[u32], text: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_module_without_ids_gets_no_texts() {
+        let mut words =
+            vec![0x0723_0203, 0x0001_0600, 0, u32::MAX - 1, 0, 3 << 16 | Op::Source as u32, 2, 460];
+        let texts = [("a".to_owned(), "b".to_owned()), ("c".to_owned(), "d".to_owned())];
+        assert_eq!(embed_source(&words, &texts), words[..HEADER_WORDS]);
+        words[BOUND] -= 1;
+        assert_eq!(embed_source(&words, &texts)[BOUND], u32::MAX);
+    }
 
     #[test]
     fn texts_longer_than_an_instruction_are_continued() {
