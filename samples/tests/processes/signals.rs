@@ -7,8 +7,9 @@ use rustix::process::{Pid, Signal, kill_process};
 use crate::moment::{moments, wait_for};
 use crate::program::{Desk, Task, has_device};
 
-/// Longest time from the signal to the end of the process, on a busy machine. The small frames of these tests take far less.
-const LONGEST: Duration = Duration::from_secs(20);
+/// Longest time from the signal to the end of the process, on a machine whose cores and disks are busy. A frame under way is
+/// completed, and no process ends while it waits for the disk.
+const LONGEST: Duration = Duration::from_secs(60);
 
 /// Counts of signalled processes.
 #[derive(Debug, Default)]
@@ -80,7 +81,7 @@ fn a_process_that_is_asked_to_end_does_so_and_leaves_nothing_in_part() {
 fn many_processes_that_are_asked_to_end_do_so() {
     let number = |name, usual| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
     let (count, seed) = (number("LVK_KILLS", 300), number("LVK_KILLS_SEED", 200));
-    for task in Task::ALL {
-        signal_many(task, seed, (count as usize).div_ceil(Task::ALL.len()));
+    for (task, count) in Task::shares(count as usize) {
+        signal_many(task, seed, count);
     }
 }
