@@ -96,6 +96,7 @@ mod tests {
     use std::sync::Barrier;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::mpsc::channel;
+    use std::time::{Duration, Instant};
 
     use super::*;
 
@@ -127,7 +128,12 @@ mod tests {
         let (start, finish) = (Arc::clone(&started), Arc::clone(&finished));
         jobs.submit(Box::new(move || {
             start.wait();
-            std::thread::sleep(std::time::Duration::from_millis(50));
+            // Until the drop has discarded the others; else this thread may take them before the drop begins.
+            let end = Instant::now() + Duration::from_secs(20);
+            while Arc::strong_count(&finish) > 2 && Instant::now() < end {
+                std::thread::yield_now();
+            }
+            std::thread::sleep(Duration::from_millis(50));
             finish.fetch_add(1, Ordering::SeqCst);
         }));
         for _ in 0..10 {
