@@ -18,6 +18,7 @@ pub mod meshes;
 pub mod noise;
 pub mod oit_reference;
 pub mod pipelines;
+pub mod process;
 pub mod queues;
 pub mod radv;
 pub mod random;

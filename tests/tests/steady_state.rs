@@ -16,6 +16,7 @@ use lvk::{
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::vulkan;
+use lvk_tests::process::{heap_bytes, resident_bytes};
 use lvk_tests::raster::render_pipeline;
 use lvk_tests::{device, device_with};
 
@@ -226,26 +227,6 @@ fn frames_that_create_and_destroy_keep_no_memory() {
         |budget: &lvk::MemoryBudget| budget.heaps.iter().map(|heap| heap.object_bytes).collect::<Vec<_>>();
     assert_eq!(bytes(&early.0), bytes(&late.0));
     assert_eq!(early.1, late.1);
-}
-
-/// Returns the bytes on the heap of the process, the driver's included; `None` where the C library does not report
-/// them as glibc does.
-fn heap_bytes() -> Option<i64> {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    {
-        // SAFETY: no preconditions; it locks each arena while it counts.
-        let heap = unsafe { libc::mallinfo2() };
-        Some(heap.uordblks as i64 + heap.hblkhd as i64)
-    }
-    #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-    None
-}
-
-/// Returns the resident bytes of the process; `None` on systems that do not report them as Linux does.
-fn resident_bytes() -> Option<i64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
-    Some(1024 * line.split_whitespace().nth(1)?.parse::<i64>().ok()?)
 }
 
 /// Returns the bytes of all heaps that the process uses, by the driver's report. Software drivers report the memory

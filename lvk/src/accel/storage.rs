@@ -57,10 +57,15 @@ impl AccelStorage {
         self.reserve(name, bytes)?;
         // Validation in shaders knows the end of a buffer, but not the end of an acceleration structure inside it.
         let alone = bytes > MAX_SHARED_BYTES || gpu.instance.gpu_assisted;
+        let alone_in_buffer = || new_buffer(gpu, name, bytes).map(|buffer| (Arc::new(buffer), 0, false));
         let made = if alone {
-            new_buffer(gpu, name, bytes).map(|buffer| (Arc::new(buffer), 0, false))
+            alone_in_buffer()
         } else {
-            self.alloc_shared(gpu, bytes).map(|(buffer, offset)| (buffer, offset, true))
+            match self.alloc_shared(gpu, bytes) {
+                // Less may be free than a shared buffer has.
+                Err(Error::OutOfDeviceMemory { .. }) => alone_in_buffer(),
+                made => made.map(|(buffer, offset)| (buffer, offset, true)),
+            }
         };
         let (buffer, offset, shared) = made.inspect_err(|_| self.pool.unreserve(bytes))?;
         Ok(StorageRange { buffer, offset, bytes, shared, pool: Arc::clone(&self.pool) })

@@ -85,6 +85,12 @@ impl Slots {
         self.capacity
     }
 
+    /// Returns the number of slots that are taken, without slot 0.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(crate) fn taken_count(&self) -> usize {
+        self.marks.iter().skip(1).filter(|mark| mark.taken).count()
+    }
+
     fn grow(&mut self) -> Option<u32> {
         let slot = u32::try_from(self.marks.len()).ok().filter(|slot| *slot < self.capacity)?;
         self.marks.push(SlotMark::default());
@@ -154,6 +160,7 @@ mod tests {
                     }
                 }
                 prop_assert_eq!(slots.is_clean(), dirty.is_empty());
+                prop_assert_eq!(slots.taken_count(), taken.len());
                 prop_assert!((0..14).all(|slot| slot == 0 || slots.is_taken(slot) == taken.contains(&slot)));
             }
         }

@@ -347,6 +347,15 @@ impl Bindless {
             .descriptor_type(layout::descriptor_type(binding))
     }
 
+    /// Returns the numbers of taken slots of textures, samplers, TLAS and Y'CbCr textures, without default descriptors.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(crate) fn taken_counts(&self) -> [usize; 4] {
+        let entries = self.lock();
+        let arrays = [&entries.textures.slots, &entries.samplers.slots, &entries.tlas.slots];
+        let [textures, samplers, tlas] = arrays.map(Slots::taken_count);
+        [textures, samplers, tlas, entries.yuv.taken_count()]
+    }
+
     fn lock(&self) -> Guard<'_, BindlessState> {
         self.entries.lock()
     }

@@ -145,6 +145,12 @@ impl YuvSlots {
         self.ranges.iter().all(|range| range.textures.slots.is_clean())
     }
 
+    /// Returns the number of slots that are taken, without default descriptors.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(super) fn taken_count(&self) -> usize {
+        self.ranges.iter().map(|range| range.textures.slots.taken_count()).sum()
+    }
+
     /// Returns the slots to write with their views, in ascending order.
     pub(super) fn take_dirty(&mut self) -> Vec<(u32, vk::ImageView)> {
         let mut dirty = Vec::new();

@@ -77,7 +77,9 @@ impl Context {
         }
         let is_read = |(_, (plan, _)): &(&BlasDesc<'_>, &(BlasPlan, _))| *plan != BlasPlan::Whole;
         let read: Vec<_> = descs.iter().zip(&plans).filter(is_read).map(|(desc, _)| desc).collect();
-        let mut bounds = self.read_bounds(&read)?.into_iter();
+        let first = read.first().map_or("", |desc| desc.debug_name);
+        let bounds = self.read_bounds(&read).map_err(|error| error.with_owner(first))?;
+        let mut bounds = bounds.into_iter();
         let mut inputs = Vec::with_capacity(descs.len());
         for ((desc, (transforms, input)), (plan, sizes)) in descs.iter().zip(converted).zip(plans) {
             let bounds = if plan == BlasPlan::Whole { None } else { bounds.next() }.unwrap_or_default();

@@ -76,6 +76,7 @@ impl Context {
         drop(found);
         let copy = BufferCopy { source_offset: range.start, target_offset: 0, size };
         self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]))
+            .map_err(|error| if let Ok(found) = find() { error.with_owner(&found.name) } else { error })
     }
 
     /// Starts a copy of texels to the host, tightly packed, row by row and layer by layer, after everything submitted
@@ -87,6 +88,7 @@ impl Context {
         let find = || self.device_state().store.textures.get(texture);
         let size = find()?.resolve_region(region)?.bytes();
         self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&find()?, region, target, 0))
+            .map_err(|error| if let Ok(found) = find() { error.with_owner(&found.name) } else { error })
     }
 
     /// Submits a copy into a new buffer. `record` looks up its source by handle, or the caller keeps the source alive

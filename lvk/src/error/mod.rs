@@ -336,6 +336,16 @@ impl Error {
         }
     }
 
+    /// Adds the name of the object for which the library could not create a buffer of its own.
+    pub(crate) fn with_owner(self, owner: &str) -> Self {
+        match self {
+            Self::OutOfDeviceMemory { call, object: Some(part), bytes } => {
+                Self::OutOfDeviceMemory { call, object: Some(format!("{part} of {owner}")), bytes }
+            }
+            other => other,
+        }
+    }
+
     /// Returns the error for a mistake of the caller about `object`.
     pub(crate) fn usage(object: impl Into<String>, message: impl Into<String>) -> Self {
         Self::InvalidUsage { object: object.into(), message: message.into() }
@@ -540,5 +550,10 @@ mod tests {
         assert_eq!(text(Error::usage("grass", "is green")), "grass: is green", "it has a name");
         let lost = Error::device_lost("vkQueueSubmit2");
         assert!(matches!(lost.with_object("water"), Error::DeviceLost { .. }));
+        let part =
+            Error::allocating("readback", 8)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY).with_owner("water");
+        let expected = "out of device memory in vkAllocateMemory for 'readback of water' (8 bytes)";
+        assert_eq!(part.to_string(), expected);
+        assert!(matches!(Error::usage("grass", "is green").with_owner("water"), Error::InvalidUsage { .. }));
     }
 }

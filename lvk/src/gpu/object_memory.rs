@@ -4,6 +4,8 @@ use ash::vk;
 use gpu_allocator::AllocationError;
 
 use super::device::Gpu;
+#[cfg(any(test, feature = "test-hooks"))]
+use super::memory::allocator::DeviceMemory;
 use super::memory::allocator::{MemoryKind, ObjectMemory};
 use crate::error::{Error, Result, check_limit};
 
@@ -61,6 +63,12 @@ impl Gpu {
         // SAFETY: the physical device belongs to the instance.
         let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) };
         memory.memory_types_as_slice().to_vec()
+    }
+
+    /// Returns the number of live `VkDeviceMemory` objects of the allocator and their bytes.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(crate) fn memory_blocks(&self) -> (usize, u64) {
+        self.memory().as_ref().map_or((0, 0), DeviceMemory::blocks)
     }
 
     /// Frees memory.

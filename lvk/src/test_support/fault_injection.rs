@@ -1,6 +1,7 @@
 //! Fault injection: devices that can refuse a submission or an allocation, to test the library's error handling.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
 use std::ffi::{CStr, c_char};
 
 use ash::vk;
@@ -15,6 +16,11 @@ thread_local! {
     static FAILURE: Cell<vk::Result> = const { Cell::new(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) };
     static ALLOCATE: Cell<Option<vk::PFN_vkAllocateMemory>> = const { Cell::new(None) };
     static IS_OUT_OF_MEMORY: Cell<bool> = const { Cell::new(false) };
+    static FREE: Cell<Option<vk::PFN_vkFreeMemory>> = const { Cell::new(None) };
+    /// Bytes that all devices of this thread may have allocated at a time.
+    static HEAP_BYTES: Cell<u64> = const { Cell::new(u64::MAX) };
+    /// Bytes of each live allocation.
+    static ALLOCATED: RefCell<HashMap<(vk::Device, vk::DeviceMemory), u64>> = RefCell::default();
 }
 
 /// Runs `make`. Queues and allocations of the device that it creates can fail on this thread, until this function
@@ -35,6 +41,17 @@ pub(crate) fn fail_after(submissions: u32, failure: vk::Result) {
 /// Makes all allocations of device memory by this thread fail, or succeed again.
 pub(crate) fn set_out_of_memory(is_out_of_memory: bool) {
     IS_OUT_OF_MEMORY.set(is_out_of_memory);
+}
+
+/// Emulates one heap of `heap_bytes` bytes, which all devices of this thread that can fail share. Allocations beyond it
+/// fail; `u64::MAX` emulates none.
+pub(crate) fn set_heap_bytes(heap_bytes: u64) {
+    HEAP_BYTES.set(heap_bytes);
+}
+
+/// Returns the bytes that the devices of this thread that can fail have allocated.
+pub(crate) fn allocated_bytes() -> u64 {
+    ALLOCATED.with_borrow(|allocated| allocated.values().sum())
 }
 
 /// Returns the instance unchanged, or one whose devices can fail.
@@ -60,6 +77,10 @@ unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk
             SUBMIT.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkQueueSubmit2>>(found));
             return Some(std::mem::transmute::<vk::PFN_vkQueueSubmit2, unsafe extern "system" fn()>(submit));
         }
+        if name == c"vkFreeMemory" {
+            FREE.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkFreeMemory>>(found));
+            return Some(std::mem::transmute::<vk::PFN_vkFreeMemory, unsafe extern "system" fn()>(free));
+        }
         if name == c"vkAllocateMemory" {
             ALLOCATE
                 .set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkAllocateMemory>>(found));
@@ -79,10 +100,33 @@ unsafe extern "system" fn allocate(
     callbacks: *const vk::AllocationCallbacks<'_>,
     memory: *mut vk::DeviceMemory,
 ) -> vk::Result {
-    match ALLOCATE.get() {
-        // SAFETY: the caller upholds the contract of `vkAllocateMemory`.
-        Some(real) if !IS_OUT_OF_MEMORY.get() => unsafe { real(device, info, callbacks, memory) },
-        _ => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+    // SAFETY: the caller passes a valid description.
+    let bytes = unsafe { (*info).allocation_size };
+    let fits = allocated_bytes().checked_add(bytes).is_some_and(|all| all <= HEAP_BYTES.get());
+    let Some(real) = ALLOCATE.get().filter(|_| fits && !IS_OUT_OF_MEMORY.get()) else {
+        return vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
+    };
+    // SAFETY: the caller upholds the contract of `vkAllocateMemory`.
+    let result = unsafe { real(device, info, callbacks, memory) };
+    if result == vk::Result::SUCCESS {
+        // SAFETY: the call has succeeded, so it has written the handle.
+        let memory = unsafe { *memory };
+        ALLOCATED.with_borrow_mut(|allocated| allocated.insert((device, memory), bytes));
+    }
+    result
+}
+
+/// # Safety
+/// As `vkFreeMemory`, on the thread that created the device.
+unsafe extern "system" fn free(
+    device: vk::Device,
+    memory: vk::DeviceMemory,
+    callbacks: *const vk::AllocationCallbacks<'_>,
+) {
+    ALLOCATED.with_borrow_mut(|allocated| allocated.remove(&(device, memory)));
+    if let Some(real) = FREE.get() {
+        // SAFETY: the caller upholds the contract of `vkFreeMemory`.
+        unsafe { real(device, memory, callbacks) }
     }
 }
 

@@ -51,6 +51,17 @@ pub fn set_out_of_memory(is_out_of_memory: bool) {
     fault_injection::set_out_of_memory(is_out_of_memory);
 }
 
+/// Emulates one heap of `heap_bytes` bytes of device memory, which all contexts of this thread share that
+/// [`with_fault_injection`] creates. Allocations beyond it fail; `u64::MAX` emulates none.
+pub fn set_heap_bytes(heap_bytes: u64) {
+    fault_injection::set_heap_bytes(heap_bytes);
+}
+
+/// Returns the bytes of device memory that those contexts have allocated, on the thread that created them.
+pub fn allocated_bytes() -> u64 {
+    fault_injection::allocated_bytes()
+}
+
 /// Runs `hook` on this thread right before it acquires its next command buffer, in place of another thread.
 ///
 /// Locks may be held then: `hook` may destroy objects, but must not submit.
@@ -72,6 +83,16 @@ pub fn staging_bytes(ctx: &Context) -> u64 {
 pub fn waiting_objects(ctx: &Context) -> Result<usize> {
     ctx.device_state().collect()?;
     Ok(ctx.device_state().submitter.deferred_count())
+}
+
+/// Returns the numbers of bindless slots that are taken by textures, samplers, TLAS and Y'CbCr textures.
+pub fn descriptor_slots(ctx: &Context) -> [usize; 4] {
+    ctx.device_state().bindless.taken_counts()
+}
+
+/// Returns the number of live `VkDeviceMemory` objects of the allocator and their bytes.
+pub fn memory_blocks(ctx: &Context) -> (usize, u64) {
+    ctx.device_state().gpu.memory_blocks()
 }
 
 /// Compiles every kernel. Calls `on_kernel` with the kernel's name first.

@@ -272,9 +272,17 @@ impl DeviceMemory {
         };
         unused.map_or(Ok(()), |allocation| self.allocator.free(allocation))
     }
+
+    /// Returns the number of live `VkDeviceMemory` objects and their bytes.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(crate) fn blocks(&self) -> (usize, u64) {
+        (self.allocator.generate_report().blocks.len(), self.allocator.capacity())
+    }
 }
 
-/// Allocates dedicated memory. The allocator copies the name, which only its own reports contain.
+/// Allocates memory of the allocator's blocks. If no further block fits on the device, the memory gets an allocation of
+/// exactly its size: a block has up to 256 MiB, and less may be free. The allocator copies the name, which only its own
+/// reports contain.
 fn allocate_dedicated(
     allocator: &mut Allocator,
     name: &str,
@@ -282,13 +290,21 @@ fn allocate_dedicated(
     memory: MemoryKind,
     linear: bool,
 ) -> Allocated<Allocation> {
-    let made = allocator.allocate(&AllocationCreateDesc {
+    let mut desc = AllocationCreateDesc {
         name,
         requirements,
         location: memory.location(),
         linear,
         allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-    })?;
+    };
+    let made = match allocator.allocate(&desc) {
+        Err(AllocationError::OutOfMemory) => {
+            // A dedicated allocation for no buffer is one for any objects.
+            desc.allocation_scheme = AllocationScheme::DedicatedBuffer(vk::Buffer::null());
+            allocator.allocate(&desc)?
+        }
+        made => made?,
+    };
     if made.mapped_ptr().is_some_and(|start| !is_mapping(start.addr().get(), made.offset(), made.size())) {
         allocator.free(made)?;
         return Err(AllocationError::FailedToMap("the driver returned no address".to_owned()));

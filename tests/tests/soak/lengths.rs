@@ -1,0 +1,88 @@
+//! The tests: a short run under validation, an hour of frames, and a leak that must be found.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use lvk_tests::subprocess::output_of_subprocess;
+
+use super::run::{Report, Soak};
+use super::scene::CYCLE;
+
+/// An hour at 60 frames a second.
+const HOUR: u32 = 216_000;
+
+/// Actions that every run must have done, as a loop that does nothing is flat as well.
+const ACTIONS: [&str; 22] = [
+    "frames",
+    "draws",
+    "dispatches that trace rays",
+    "BLAS refits",
+    "TLAS updates",
+    "TLAS created and destroyed",
+    "BLAS created and destroyed",
+    "compactions",
+    "textures created",
+    "textures unloaded",
+    "mips streamed",
+    "uploads on the graphics queue",
+    "uploads on the compute queue",
+    "uploads on the transfer queue",
+    "readbacks compared",
+    "pictures compared with the first",
+    "resizes of targets",
+    "hot reloads",
+    "stale handles refused",
+    "transient heaps created and destroyed",
+    "frames with the profiler",
+    "compute pipelines compiled in the background and destroyed",
+];
+
+fn check(report: &Report) {
+    report.print();
+    for action in ACTIONS {
+        assert!(report.tally.of(action) > 0, "not done: {action}");
+    }
+    let violations = report.samples.violations(report.warm_up);
+    assert!(violations.is_empty(), "{}", violations.join("\n"));
+}
+
+/// In a process of its own, as threads and files of other tests would count.
+#[test]
+fn counts_are_flat_under_validation() {
+    let output = output_of_subprocess(counts_are_flat_under_validation, &[], || {
+        let soak = Soak { frames: 8 * CYCLE, sample_every: CYCLE, validation: true, leak_every: None };
+        if let Some(report) = soak.run() {
+            check(&report.unwrap());
+        }
+    });
+    if let Some(output) = output {
+        println!("{output}");
+    }
+}
+
+/// One buffer in 500 frames, of thousands of objects that come and go.
+#[test]
+fn a_leak_on_purpose_is_found() {
+    output_of_subprocess(a_leak_on_purpose_is_found, &[], || {
+        let (frames, leak_every) = (8 * CYCLE, Some(2 * CYCLE));
+        let soak = Soak { frames, sample_every: CYCLE, validation: false, leak_every };
+        let Some(report) = soak.run() else { return };
+        let report = report.unwrap();
+        assert_eq!(report.tally.of("buffers leaked on purpose"), 4);
+        let violations = report.samples.violations(report.warm_up);
+        for name in ["live: buffer: ", "bytes: objects in heap"] {
+            assert!(violations.iter().any(|line| line.starts_with(name)), "{name} in {violations:#?}");
+        }
+    });
+}
+
+/// As many frames as `LVK_SOAK_FRAMES` says, an hour of them by default.
+#[test]
+#[ignore = "takes many minutes: .ci/slow soak"]
+fn an_hour_of_frames() {
+    let frames = std::env::var("LVK_SOAK_FRAMES").ok().map_or(HOUR, |text| text.parse().unwrap());
+    // About 72 samples, at least eight.
+    let sample_every = CYCLE * (frames / CYCLE / 72).max(1);
+    let soak = Soak { frames, sample_every, validation: false, leak_every: None };
+    if let Some(report) = soak.run() {
+        check(&report.unwrap());
+    }
+}
