@@ -1,11 +1,11 @@
 //! Processes that start at once on shared cold caches.
 
-use crate::moment::{Moment, wait_for};
+use crate::kill_point::{KillPoint, wait_for};
 use crate::program::{Desk, Task, assert_complete_in, assert_whole_in, has_device};
 
 /// Starts `count` processes with one cache folder, and kills the first of them at `kill`. Each writes pictures of its own, or all
 /// write the same files.
-fn start_at_once(task: Task, count: usize, shares_pictures: bool, kill: Option<Moment>) {
+fn start_at_once(task: Task, count: usize, shares_pictures: bool, kill: Option<KillPoint>) {
     let desk = Desk::new(task);
     let folder = |number: usize| match shares_pictures {
         true => desk.output(),
@@ -17,7 +17,7 @@ fn start_at_once(task: Task, count: usize, shares_pictures: bool, kill: Option<M
         desk.start_command(desk.command(&words), number)
     };
     let mut children: Vec<_> = (0..count).map(start).collect();
-    let is_killed = kill.is_some_and(|moment| wait_for(moment, &desk, &mut children[0]));
+    let is_killed = kill.is_some_and(|point| wait_for(point, &desk, &mut children[0]));
     if is_killed {
         children[0].kill().unwrap();
     }
@@ -46,8 +46,8 @@ fn start_all_at_once(round: usize) {
     for task in Task::ALL {
         start_at_once(task, 2, false, None);
         start_at_once(task, 4, true, None);
-        start_at_once(task, 2, true, Some(Moment::Completed(round % task.expected().files + 1)));
-        start_at_once(task, 4, false, Some(Moment::Temporary(round % task.expected().files + 1)));
+        start_at_once(task, 2, true, Some(KillPoint::Completed(round % task.expected().files + 1)));
+        start_at_once(task, 4, false, Some(KillPoint::Temporary(round % task.expected().files + 1)));
     }
 }
 
@@ -58,7 +58,7 @@ fn processes_at_once_share_cold_caches() {
     }
     start_at_once(Task::Small, 2, false, None);
     start_at_once(Task::Sequence, 4, true, None);
-    start_at_once(Task::Small, 2, true, Some(Moment::Temporary(3)));
+    start_at_once(Task::Small, 2, true, Some(KillPoint::Temporary(3)));
 }
 
 /// `LVK_KILLS=N` makes N / 30 rounds of 16 sets of processes.

@@ -5,7 +5,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Command;
 
-use crate::moment::{Moment, wait_for};
+use crate::kill_point::{KillPoint, wait_for};
 use crate::program::{Desk, Ended, Task, has_device};
 
 /// Runs `words` without the right to write where the permissions forbid it, which the superuser has. `None`, loudly, where that
@@ -104,7 +104,7 @@ fn a_cache_folder_that_is_removed_while_the_program_runs_is_no_obstacle() {
     for number in [1, 3] {
         let desk = Desk::new(Task::Small);
         let mut child = desk.start(0);
-        assert!(wait_for(Moment::Completed(number), &desk, &mut child), "the caches stayed empty");
+        assert!(wait_for(KillPoint::Completed(number), &desk, &mut child), "the caches stayed empty");
         // Files that appear meanwhile keep the folder from being removed.
         while fs::remove_dir_all(desk.cache()).is_err() && desk.cache().exists() {}
         let ended = desk.wait(child, 0);

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::moment::{Moment, moments, wait_for};
+use crate::kill_point::{KillPoint, kill_points, wait_for};
 use crate::program::{Desk, Task, has_device};
 
 /// Counts of kills.
@@ -16,11 +16,11 @@ struct Tally {
     leftovers: usize,
 }
 
-/// Kills a process at `moment`, checks the files, and starts again. Where `is_aged`, the temporary files that are left look old, and
+/// Kills a process at `point`, checks the files, and starts again. Where `is_aged`, the temporary files that are left look old, and
 /// must be gone afterwards; else the next start must leave them alone.
-fn kill_at(desk: &Desk, moment: Moment, is_aged: bool, tally: &mut Tally) {
+fn kill_at(desk: &Desk, point: KillPoint, is_aged: bool, tally: &mut Tally) {
     let mut child = desk.start(0);
-    if wait_for(moment, desk, &mut child) {
+    if wait_for(point, desk, &mut child) {
         child.kill().unwrap();
         tally.killed += 1;
     } else {
@@ -44,9 +44,9 @@ fn kill_many(task: Task, seed: u64, count: usize) {
     let expected = task.expected();
     let start = Instant::now();
     let mut tally = Tally::default();
-    for (index, moment) in moments(seed, count, expected.length, expected.files).into_iter().enumerate() {
-        eprintln!("{task:?}, kill {index}: {moment:?}");
-        kill_at(&Desk::new(task), moment, index % 2 == 1, &mut tally);
+    for (index, point) in kill_points(seed, count, expected.length, expected.files).into_iter().enumerate() {
+        eprintln!("{task:?}, kill {index}: {point:?}");
+        kill_at(&Desk::new(task), point, index % 2 == 1, &mut tally);
     }
     eprintln!("{task:?}, seed {seed}: {tally:?} in {:.0} s", start.elapsed().as_secs_f32());
     assert_eq!(tally.killed + tally.ended_before, count);

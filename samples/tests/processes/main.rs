@@ -5,7 +5,7 @@
 
 mod at_once;
 mod folders;
+mod kill_point;
 mod kills;
-mod moment;
 mod program;
 mod signals;

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::moment::{moments, wait_for};
+use crate::kill_point::{kill_points, wait_for};
 use crate::program::{Desk, Task, has_device};
 
 /// Longest time from the signal to the end of the process, on a machine whose cores and disks are busy. A frame under way is
@@ -25,17 +25,17 @@ struct Tally {
 fn signal_many(task: Task, seed: u64, count: usize) {
     let expected = task.expected();
     let mut tally = Tally::default();
-    for (index, moment) in moments(seed, count, expected.length, expected.files).into_iter().enumerate() {
+    for (index, point) in kill_points(seed, count, expected.length, expected.files).into_iter().enumerate() {
         let signal = if index / 2 % 2 == 0 { Signal::TERM } else { Signal::INT };
         let desk = Desk::new(task);
         let mut child = desk.start(0);
-        let begun = wait_for(moment, &desk, &mut child).then(|| {
+        let begun = wait_for(point, &desk, &mut child).then(|| {
             kill_process(Pid::from_child(&child), signal).unwrap();
             Instant::now()
         });
         let ended = desk.wait(child, 0);
         let taken = begun.map_or(Duration::ZERO, |begun| begun.elapsed());
-        eprintln!("{task:?}, {signal:?} {index}: {moment:?}: {:?} in {taken:?}", ended.status);
+        eprintln!("{task:?}, {signal:?} {index}: {point:?}: {:?} in {taken:?}", ended.status);
         assert!(taken < LONGEST, "{taken:?}");
         tally.longest = tally.longest.max(taken);
         desk.assert_whole();

@@ -217,7 +217,7 @@ fn every_call_with_a_handle_is_tried_with_destroyed_and_foreign_ones() {
 }
 
 #[test]
-fn rows_that_do_not_hold_are_noticed() {
+fn wrong_entries_are_noticed() {
     let row = |call, error, test| Row { calls: vec![call], errors: vec![error], tests: vec![test] };
     let right = row(
         "Context::buffer_address",

@@ -15,7 +15,7 @@ use super::scene::{CYCLE, FrameConstants, Scene, WORDS, extent_of, instances, sh
 pub struct Sampled {
     /// The texture.
     pub texture: lvk::TextureHandle,
-    /// Its bindless index.
+    /// Bindless index.
     pub index: u32,
     /// Finest mip that is there.
     pub finest_mip: u32,

@@ -153,7 +153,7 @@ fn a_full_heap_refuses_politely_and_loses_nothing() {
     life.cycle();
     life.cycle();
     assert_eq!(life.refused, 0, "a fifth of the heap is enough for small frames");
-    let content: Vec<u8> = (0..LARGE).map(|at| (at * 31 >> 3) as u8).collect();
+    let content: Vec<u8> = (0..LARGE).map(|at| ((at * 31) >> 3) as u8).collect();
     let kept = ctx.create_buffer(&BufferDesc { data: Some(&content), ..Default::default() }).unwrap();
     let corners: Vec<f32> = (0..9 * TRIANGLES).map(|at| (at % 97) as f32).collect();
     let usage = BufferUsage::ACCEL_INPUT;

@@ -11,10 +11,10 @@ use lvk_tests::windows::desktop;
 use super::churn::Churn;
 use super::flat::{Rule, Samples, Series};
 use super::frame::Frames;
+#[cfg(target_os = "linux")]
+use super::presentation::Presentation;
 use super::sample::sample;
 use super::scene::{CYCLE, Scene};
-#[cfg(target_os = "linux")]
-use super::shown::Shown;
 
 /// Counts of each action.
 #[derive(Debug, Default)]
@@ -77,14 +77,14 @@ impl Soak {
             }
         })?;
         #[cfg(target_os = "linux")]
-        let mut shown = match window.map(|window| Shown::new(&ctx, window)).transpose() {
-            Ok(shown) => shown,
+        let mut presentation = match window.map(|window| Presentation::new(&ctx, window)).transpose() {
+            Ok(presentation) => presentation,
             Err(error) => return Some(Err(error)),
         };
         let present = |phase: u32, tally: &mut Tally| {
             #[cfg(target_os = "linux")]
-            if let Some(shown) = &mut shown {
-                shown.frame(&ctx, phase, tally)?;
+            if let Some(presentation) = &mut presentation {
+                presentation.frame(&ctx, phase, tally)?;
             }
             Ok(())
         };

@@ -9,7 +9,7 @@ use crate::program::{Desk, is_temporary, paths};
 
 /// A moment in the run of a process.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Moment {
+pub(crate) enum KillPoint {
     /// A time after the start.
     After(Duration),
     /// The moment when the temporary file of this number is seen, counted from 1.
@@ -18,34 +18,34 @@ pub(crate) enum Moment {
     Completed(usize),
 }
 
-/// Returns `count` moments, equal for equal seeds: half of them at times spread over a run of `length`, the other half when one of
-/// `files` files appears under its temporary or under its final name.
-pub(crate) fn moments(seed: u64, count: usize, length: Duration, files: usize) -> Vec<Moment> {
+/// Returns `count` points, equal for equal seeds: half of them at times spread over a run of `length`, the other half when one
+/// of `files` files appears under its temporary or under its final name.
+pub(crate) fn kill_points(seed: u64, count: usize, length: Duration, files: usize) -> Vec<KillPoint> {
     let mut random = Random(seed);
     let by_time = count.div_ceil(2);
-    let moment = |index: usize| match index % 4 {
-        0 | 2 => Moment::After(length.mul_f64((index as f64 / 2.0 + random.share()) / by_time as f64)),
-        1 => Moment::Temporary(1 + random.below(files)),
-        _ => Moment::Completed(1 + random.below(files)),
+    let point = |index: usize| match index % 4 {
+        0 | 2 => KillPoint::After(length.mul_f64((index as f64 / 2.0 + random.share()) / by_time as f64)),
+        1 => KillPoint::Temporary(1 + random.below(files)),
+        _ => KillPoint::Completed(1 + random.below(files)),
     };
-    (0..count).map(moment).collect()
+    (0..count).map(point).collect()
 }
 
 /// Waits until the moment has come. False if the process has ended before.
-pub(crate) fn wait_for(moment: Moment, desk: &Desk, child: &mut Child) -> bool {
+pub(crate) fn wait_for(point: KillPoint, desk: &Desk, child: &mut Child) -> bool {
     let start = Instant::now();
     let folders = [desk.cache(), desk.output()];
     let mut seen = BTreeSet::new();
     loop {
-        let has_come = match moment {
-            Moment::After(delay) => start.elapsed() >= delay,
-            Moment::Temporary(number) => count(&folders, &mut seen, true) >= number,
-            Moment::Completed(number) => count(&folders, &mut seen, false) >= number,
+        let has_come = match point {
+            KillPoint::After(delay) => start.elapsed() >= delay,
+            KillPoint::Temporary(number) => count(&folders, &mut seen, true) >= number,
+            KillPoint::Completed(number) => count(&folders, &mut seen, false) >= number,
         };
         if has_come || child.try_wait().unwrap().is_some() {
             return has_come;
         }
-        if let Moment::After(delay) = moment {
+        if let KillPoint::After(delay) = point {
             std::thread::sleep(delay.saturating_sub(start.elapsed()).min(Duration::from_millis(2)));
         }
     }
@@ -84,16 +84,18 @@ impl Random {
 }
 
 #[test]
-fn moments_cover_the_whole_run_and_repeat_for_a_seed() {
+fn kill_points_cover_the_whole_run_and_repeat_for_a_seed() {
     let length = Duration::from_secs(10);
-    let all = moments(7, 40, length, 12);
-    assert_eq!(all, moments(7, 40, length, 12));
-    assert_ne!(all, moments(8, 40, length, 12));
+    let all = kill_points(7, 40, length, 12);
+    assert_eq!(all, kill_points(7, 40, length, 12));
+    assert_ne!(all, kill_points(8, 40, length, 12));
     let mut seconds = Vec::new();
-    for moment in all {
-        match moment {
-            Moment::After(delay) => seconds.push(delay.as_secs_f64()),
-            Moment::Temporary(number) | Moment::Completed(number) => assert!((1..=12).contains(&number)),
+    for point in all {
+        match point {
+            KillPoint::After(delay) => seconds.push(delay.as_secs_f64()),
+            KillPoint::Temporary(number) | KillPoint::Completed(number) => {
+                assert!((1..=12).contains(&number))
+            }
         }
     }
     assert_eq!(seconds.len(), 20);

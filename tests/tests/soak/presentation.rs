@@ -9,13 +9,13 @@ use lvk_tests::windows::{TestWindow, present_color};
 use super::run::Tally;
 
 /// A window and its swapchain.
-pub struct Shown {
+pub struct Presentation {
     window: Arc<TestWindow>,
     /// None only while it is made anew.
     swapchain: Option<Holder<SwapchainHandle>>,
 }
 
-impl Shown {
+impl Presentation {
     /// Creates the swapchain.
     pub fn new(ctx: &Context, window: Arc<TestWindow>) -> Result<Self> {
         let swapchain = Some(create(ctx, &window)?);
