@@ -168,9 +168,9 @@ fn a_full_heap_refuses_politely_and_loses_nothing() {
     }
     ctx.wait_idle().unwrap();
     assert_eq!((ctx.live_objects().len(), allocated_bytes()), (objects, bytes), "a refusal leaves something");
-    let drawn = life.tally.of("frames");
+    let drawn = life.tally.count_of("frames");
     life.cycle();
-    let drawn = life.tally.of("frames") - drawn;
+    let drawn = life.tally.count_of("frames") - drawn;
     eprintln!("a full heap: {drawn} frames drawn, {} refused", life.refused);
     assert!(drawn >= u64::from(CYCLE) / 2, "{drawn} frames need no new memory");
     // Others end, and everything can be created again.

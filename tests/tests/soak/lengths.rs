@@ -37,7 +37,7 @@ const ACTIONS: [&str; 22] = [
 fn check(report: &Report) {
     report.print();
     for action in ACTIONS {
-        assert!(report.tally.of(action) > 0, "not done: {action}");
+        assert!(report.tally.count_of(action) > 0, "not done: {action}");
     }
     let violations = report.samples.violations(report.warm_up);
     assert!(violations.is_empty(), "{}", violations.join("\n"));
@@ -65,7 +65,7 @@ fn a_leak_on_purpose_is_detected() {
         let soak = Soak { frames, sample_every: CYCLE, validation: false, leak_every };
         let Some(report) = soak.run() else { return };
         let report = report.unwrap();
-        assert_eq!(report.tally.of("buffers leaked on purpose"), 4);
+        assert_eq!(report.tally.count_of("buffers leaked on purpose"), 4);
         let violations = report.samples.violations(report.warm_up);
         for name in ["live: buffer: ", "bytes: objects in heap"] {
             assert!(violations.iter().any(|line| line.starts_with(name)), "{name} in {violations:#?}");

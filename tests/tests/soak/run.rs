@@ -27,7 +27,7 @@ impl Tally {
     }
 
     /// Returns how often an action was done.
-    pub fn of(&self, action: &str) -> u64 {
+    pub fn count_of(&self, action: &str) -> u64 {
         self.0.get(action).copied().unwrap_or(0)
     }
 }
