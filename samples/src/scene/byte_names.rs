@@ -1,8 +1,11 @@
 //! Names in scene files: bytes of any encoding, which a comment may follow, and which may name a file.
 
-use std::ffi::OsStr;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::ffi::{OsStr, OsString};
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
+use std::rc::Rc;
 
 use crate::app::input_file::{self, FileKind};
 
@@ -24,30 +27,82 @@ pub(super) fn unquoted(text: &[u8]) -> &[u8] {
     rest.split(|byte| *byte == b'"').next().unwrap_or_default().trim_ascii()
 }
 
-/// Finds the regular file that a scene file means by `name`, which is relative to one of `folders`: as written (backslashes are
-/// separators), with other capitals, with `%20` and the like decoded, or, if the folders of the name do not exist on this
-/// machine, by its last part in one of `folders` or of their `subfolders`. Bytes that are no UTF-8 are those of the file's name,
-/// or Latin-1 for it.
-pub(super) fn find_file(folders: &[&Path], name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
-    let name: Vec<u8> = name.iter().map(|byte| if *byte == b'\\' { b'/' } else { *byte }).collect();
-    let decoded = percent_decoded(&name);
-    std::iter::once(name).chain(decoded).find_map(|name| find_named(folders, &name, subfolders))
+/// Finds the files that scene files name. Each folder is listed once, whatever the number of names.
+#[derive(Default)]
+pub(super) struct FileFinder {
+    /// The entries of each folder, by their names in small letters.
+    folders: RefCell<HashMap<PathBuf, Rc<HashMap<String, OsString>>>>,
 }
 
-fn find_named(folders: &[&Path], name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
-    let last = name.rsplit(|byte| *byte == b'/').next().unwrap_or_default();
-    if last.is_empty() {
-        return None;
+impl FileFinder {
+    /// Finds the regular file that a scene file means by `name`, which is relative to one of `folders`: as written (backslashes
+    /// are separators), with other capitals, with `%20` and the like decoded, or, if the folders of the name do not exist on
+    /// this machine, by its last part in one of `folders` or of their `subfolders`. Bytes that are no UTF-8 are those of the
+    /// file's name, or Latin-1 for it.
+    pub(super) fn find(&self, folders: &[&Path], name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
+        let name: Vec<u8> = name.iter().map(|byte| if *byte == b'\\' { b'/' } else { *byte }).collect();
+        let decoded = percent_decoded(&name);
+        std::iter::once(name).chain(decoded).find_map(|name| self.find_named(folders, &name, subfolders))
     }
-    let beside =
-        subfolders.iter().flat_map(|subfolder| folders.iter().map(move |folder| folder.join(subfolder)));
-    let all: Vec<PathBuf> = folders.iter().map(|folder| folder.to_path_buf()).chain(beside).collect();
-    let whole =
-        folders.iter().flat_map(|folder| paths(name).into_iter().map(|path| (folder.to_path_buf(), path)));
-    let by_last = all.iter().flat_map(|folder| paths(last).into_iter().map(|path| (folder.clone(), path)));
-    let candidates: Vec<(PathBuf, PathBuf)> = whole.chain(by_last).collect();
-    let exact = candidates.iter().map(|(folder, path)| folder.join(path)).find(|path| path.is_file());
-    exact.or_else(|| candidates.iter().find_map(|(folder, path)| with_other_capitals(folder, path)))
+
+    fn find_named(&self, folders: &[&Path], name: &[u8], subfolders: &[&str]) -> Option<PathBuf> {
+        let last = name.rsplit(|byte| *byte == b'/').next().unwrap_or_default();
+        if last.is_empty() {
+            return None;
+        }
+        let beside =
+            subfolders.iter().flat_map(|subfolder| folders.iter().map(move |folder| folder.join(subfolder)));
+        let all: Vec<PathBuf> = folders.iter().map(|folder| folder.to_path_buf()).chain(beside).collect();
+        let whole = folders
+            .iter()
+            .flat_map(|folder| paths(name).into_iter().map(|path| (folder.to_path_buf(), path)));
+        let by_last =
+            all.iter().flat_map(|folder| paths(last).into_iter().map(|path| (folder.clone(), path)));
+        let candidates: Vec<(PathBuf, PathBuf)> = whole.chain(by_last).collect();
+        let exact = candidates.iter().map(|(folder, path)| folder.join(path)).find(|path| path.is_file());
+        exact.or_else(|| candidates.iter().find_map(|(folder, path)| self.with_other_capitals(folder, path)))
+    }
+
+    /// The file at `path` in `folder`, where names may differ in capitals, or in whether they are UTF-8 or Latin-1.
+    fn with_other_capitals(&self, folder: &Path, path: &Path) -> Option<PathBuf> {
+        let mut found = folder.to_path_buf();
+        for component in path.components() {
+            found = match component {
+                Component::Normal(name) => {
+                    let entry = self.entry_with_other_capitals(&found, name);
+                    let as_written = found.join(component);
+                    if as_written.exists() { as_written } else { entry? }
+                }
+                _ => found.join(component),
+            };
+        }
+        found.is_file().then_some(found)
+    }
+
+    fn entry_with_other_capitals(&self, folder: &Path, name: &OsStr) -> Option<PathBuf> {
+        let mut folders = self.folders.borrow_mut();
+        let entries = match folders.get(folder) {
+            Some(entries) => entries,
+            None => folders.entry(folder.into()).or_insert(Rc::new(entries_of(folder))),
+        };
+        entries.get(&folded(name)).map(|name| folder.join(name))
+    }
+}
+
+/// The entries of a folder by their names in small letters; of names that differ in capitals, the first. Empty if the folder
+/// cannot be read.
+fn entries_of(folder: &Path) -> HashMap<String, OsString> {
+    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let mut names: Vec<OsString> =
+        std::fs::read_dir(listed).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
+    names.sort_unstable_by(|a, b| b.cmp(a));
+    names.into_iter().map(|name| (folded(&name), name)).collect()
+}
+
+/// The name in small letters, as text.
+fn folded(name: &OsStr) -> String {
+    let bytes = name.as_encoded_bytes();
+    std::str::from_utf8(bytes).map_or_else(|_| latin_1(bytes), str::to_owned).to_lowercase()
 }
 
 /// The name with the bytes that `%` and two hexadecimal digits stand for, as in addresses; `None` if it has none.
@@ -71,7 +126,7 @@ pub(super) fn path_of(name: &[u8]) -> PathBuf {
     paths(name).into_iter().next().unwrap_or_default()
 }
 
-/// Why [`find_file`] found no file at `path`: there is none, or something that is no regular file.
+/// Why a [`FileFinder`] found no file at `path`: there is none, or something that is no regular file.
 pub(super) fn why_absent(path: &Path, kind: FileKind) -> String {
     match input_file::open(path, kind) {
         Err(error) if error.kind() != ErrorKind::NotFound => error.to_string(),
@@ -103,30 +158,6 @@ fn latin_1(name: &[u8]) -> String {
     name.iter().map(|byte| char::from(*byte)).collect()
 }
 
-/// The file at `path` in `folder`, where names may differ in capitals, or in whether they are UTF-8 or Latin-1.
-fn with_other_capitals(folder: &Path, path: &Path) -> Option<PathBuf> {
-    let mut found = folder.to_path_buf();
-    for component in path.components() {
-        let next = found.join(component);
-        found = match component {
-            Component::Normal(name) if !next.exists() => entry_with_other_capitals(&found, name)?,
-            _ => next,
-        };
-    }
-    found.is_file().then_some(found)
-}
-
-fn entry_with_other_capitals(folder: &Path, name: &OsStr) -> Option<PathBuf> {
-    let folded = |name: &OsStr| {
-        let bytes = name.as_encoded_bytes();
-        std::str::from_utf8(bytes).map_or_else(|_| latin_1(bytes), str::to_owned).to_lowercase()
-    };
-    let wanted = folded(name);
-    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let entries = std::fs::read_dir(listed).ok()?.flatten().map(|entry| entry.file_name());
-    entries.filter(|name| folded(name) == wanted).min().map(|name| folder.join(name))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,15 +184,39 @@ mod tests {
         for name in
             ["textures/Wood.PNG", "textures\\Wood.PNG", "C:\\art\\Wood.PNG", "wood.png", "Textures/wood.png"]
         {
-            let found = find_file(&[folder.path()], name.as_bytes(), &["textures"]).unwrap();
+            let found = FileFinder::default().find(&[folder.path()], name.as_bytes(), &["textures"]).unwrap();
             assert_eq!(found.canonicalize().unwrap(), wood, "{name}");
         }
         for name in ["stone.png", "", "textures", "textures/", "."] {
-            assert_eq!(find_file(&[folder.path()], name.as_bytes(), &["textures"]), None, "{name}");
+            assert_eq!(
+                FileFinder::default().find(&[folder.path()], name.as_bytes(), &["textures"]),
+                None,
+                "{name}"
+            );
         }
-        assert_eq!(find_file(&[folder.path()], b"wood.png", &[]), None);
+        assert_eq!(FileFinder::default().find(&[folder.path()], b"wood.png", &[]), None);
         let others = [Path::new("/nowhere"), folder.path()];
-        assert!(find_file(&others, b"TEXTURES\\wood.png", &[]).is_some(), "a folder with other capitals");
+        assert!(
+            FileFinder::default().find(&others, b"TEXTURES\\wood.png", &[]).is_some(),
+            "a folder with other capitals"
+        );
+    }
+
+    /// The folder is listed once: a file that comes later is not known by other capitals.
+    #[test]
+    fn a_folder_is_listed_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let finder = FileFinder::default();
+        let find = |name: &str| finder.find(&[folder.path()], name.as_bytes(), &[]);
+        assert_eq!(find("WOOD.png"), None);
+        std::fs::write(folder.path().join("wood.png"), b"").unwrap();
+        assert_eq!(find("WOOD.png"), None);
+        assert!(find("wood.png").is_some());
+        for name in ["B.png", "b.PNG"] {
+            std::fs::write(folder.path().join(name), b"").unwrap();
+        }
+        let first = FileFinder::default().find(&[folder.path()], b"b.png", &[]).unwrap();
+        assert!(first.ends_with("B.png") || first.ends_with("b.PNG"));
     }
 
     #[test]
@@ -170,7 +225,7 @@ mod tests {
         for name in ["my wood.png", "a%20b.png", "a b.png"] {
             std::fs::write(folder.path().join(name), b"").unwrap();
         }
-        let found = |name: &str| find_file(&[folder.path()], name.as_bytes(), &[]);
+        let found = |name: &str| FileFinder::default().find(&[folder.path()], name.as_bytes(), &[]);
         assert_eq!(found("my%20wood.png"), Some(folder.path().join("my wood.png")));
         assert_eq!(found("file:///C:/x/My%20Wood.png"), Some(folder.path().join("my wood.png")));
         assert_eq!(found("a%20b.png"), Some(folder.path().join("a%20b.png")));
@@ -187,9 +242,13 @@ mod tests {
         for name in
             ["Größe.png".as_bytes(), b"Gr\xf6\xdfe.png", b"gr\xf6\xdfe.PNG", b"D:\\x\\GR\xd6\xdfE.png"]
         {
-            assert!(find_file(&[folder.path()], name, &[]).is_some(), "{}", lvk::readable_bytes(name));
+            assert!(
+                FileFinder::default().find(&[folder.path()], name, &[]).is_some(),
+                "{}",
+                lvk::readable_bytes(name)
+            );
         }
-        assert_eq!(find_file(&[folder.path()], b"Gr\xfc\xdfe.png", &[]), None);
+        assert_eq!(FileFinder::default().find(&[folder.path()], b"Gr\xfc\xdfe.png", &[]), None);
     }
 
     /// macOS takes no such names.
@@ -200,7 +259,9 @@ mod tests {
         for (name, content) in [(&b"M\xe4.mtl"[..], "a"), (b"M\xf6.mtl", "b")] {
             std::fs::write(folder.path().join(path_of_bytes(name).unwrap()), content).unwrap();
         }
-        let content = |name: &[u8]| std::fs::read(find_file(&[folder.path()], name, &[]).unwrap()).unwrap();
+        let content = |name: &[u8]| {
+            std::fs::read(FileFinder::default().find(&[folder.path()], name, &[]).unwrap()).unwrap()
+        };
         assert_eq!(
             (content(b"M\xe4.mtl"), content(b"M\xf6.mtl"), content(b"m\xd6.MTL")),
             (b"a".to_vec(), b"b".to_vec(), b"b".to_vec())

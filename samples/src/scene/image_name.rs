@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use super::byte_names::{find_file, names_in, path_of, unquoted, why_absent};
+use super::byte_names::{FileFinder, names_in, path_of, unquoted, why_absent};
 use crate::app::input_file::FileKind;
 
 /// Folders beside a library that hold its images, where the library names folders of another machine. Archives of models
@@ -15,6 +15,7 @@ const IMAGE_FOLDERS: &[&str] = &["textures", "../textures"];
 pub(super) struct Image {
     /// The folder of the library, then that of the OBJ file.
     folders: Rc<[PathBuf; 2]>,
+    finder: Rc<FileFinder>,
     /// The rest of the line.
     name: Vec<u8>,
 }
@@ -29,14 +30,14 @@ pub(super) struct Absence {
 }
 
 impl Image {
-    pub(super) fn new(folders: &Rc<[PathBuf; 2]>, name: &[u8]) -> Self {
-        Self { folders: folders.clone(), name: name.into() }
+    pub(super) fn new(folders: &Rc<[PathBuf; 2]>, finder: &Rc<FileFinder>, name: &[u8]) -> Self {
+        Self { folders: folders.clone(), finder: finder.clone(), name: name.into() }
     }
 
     /// The file that the name means.
     pub(super) fn find(&self) -> Result<PathBuf, Absence> {
         let folders = self.folders.each_ref().map(|folder| folder.as_path());
-        let named = |name| find_file(&folders, unquoted(name), IMAGE_FOLDERS);
+        let named = |name| self.finder.find(&folders, unquoted(name), IMAGE_FOLDERS);
         names_in(&self.name).find_map(named).ok_or_else(|| {
             let name: Vec<u8> =
                 unquoted(&self.name).iter().map(|b| if *b == b'\\' { b'/' } else { *b }).collect();

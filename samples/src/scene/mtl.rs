@@ -7,7 +7,7 @@ use std::rc::Rc;
 use lvk::{readable_bytes, readable_name};
 
 use super::Material;
-use super::byte_names::{find_file, names_in, path_of, unquoted, why_absent};
+use super::byte_names::{FileFinder, names_in, path_of, unquoted, why_absent};
 use super::image_name::{Absence, Image};
 use super::mtl_text::{self, MapOptions, MtlEntry};
 use super::texcoord_mapping::Mapping;
@@ -35,6 +35,7 @@ pub(super) struct Library {
     warnings: Warnings,
     /// The folder of the OBJ file.
     folder: PathBuf,
+    finder: Rc<FileFinder>,
 }
 
 /// Result of [`Library::select`].
@@ -64,11 +65,12 @@ impl Library {
     /// Reads the libraries that the OBJ file at `obj_path` names. A missing library is a warning.
     pub(super) fn read(obj_path: &Path, arguments: &[Vec<u8>]) -> Self {
         let folder = obj_path.parent().unwrap_or(Path::new(""));
-        let mut library = Self { folder: folder.into(), ..Self::default() };
+        let finder = Rc::new(FileFinder::default());
+        let mut library = Self { folder: folder.into(), finder: finder.clone(), ..Self::default() };
         let mut seen = HashSet::new();
         let mut is_missing = false;
-        for name in arguments.iter().flat_map(|argument| library_names(folder, argument)) {
-            let found = find_file(&[folder], &name, &[]);
+        for name in arguments.iter().flat_map(|argument| library_names(&finder, folder, argument)) {
+            let found = finder.find(&[folder], &name, &[]);
             if !seen.insert(found.clone().unwrap_or_else(|| folder.join(path_of(&name)))) {
                 continue;
             }
@@ -136,7 +138,8 @@ impl Library {
         }
         let folders = Rc::new([path.parent().unwrap_or(Path::new("")).to_path_buf(), self.folder.clone()]);
         let mut material = convert(entry);
-        let image = |name: &Option<Vec<u8>>| name.as_ref().map(|name| Image::new(&folders, name));
+        let image =
+            |name: &Option<Vec<u8>>| name.as_ref().map(|name| Image::new(&folders, &self.finder, name));
         let relief = image(&entry.relief_map);
         let (image, mask) = (image(&entry.diffuse_map), image(&entry.dissolve_map));
         // Exporters often leave Kd black beside a texture, meaning the texture alone.
@@ -253,6 +256,12 @@ impl Library {
         names_in(name).find_map(whole)
     }
 
+    /// True if a name leads to a definition only where a comment is taken off both.
+    fn is_guessed(&self, name: &[u8]) -> bool {
+        let is_whole = names_in(name).any(|name| self.materials.contains_key(name));
+        !is_whole && !self.shortened.contains_key(name.trim_ascii())
+    }
+
     fn material(&mut self, name: &[u8]) -> Material {
         let Some(definition) = self.definition(name).cloned() else {
             let name = readable_bytes(name);
@@ -260,6 +269,12 @@ impl Library {
             self.warnings.push("materials", line);
             return Material::stand_in(&name);
         };
+        if self.is_guessed(name) {
+            let (name, taken) = (readable_bytes(name), &definition.material.name);
+            let line =
+                format!("material `{name}` is not defined; `{taken}` is taken, which is equal up to a `#`");
+            self.warnings.push("materials", line);
+        }
         let Definition { material, image, mask, relief, .. } = definition;
         for option in definition.ignored_options {
             let line = format!("material `{}`: the option `{option}` of its image is ignored", material.name);
@@ -280,8 +295,8 @@ fn file_identity(path: &Path) -> PathBuf {
 }
 
 /// The names that a `mtllib` argument holds: one, which may hold blanks, or several.
-fn library_names(folder: &Path, argument: &[u8]) -> Vec<Vec<u8>> {
-    let exists = |name: &&[u8]| find_file(&[folder], unquoted(name), &[]).is_some();
+fn library_names(finder: &FileFinder, folder: &Path, argument: &[u8]) -> Vec<Vec<u8>> {
+    let exists = |name: &&[u8]| finder.find(&[folder], unquoted(name), &[]).is_some();
     let is_as_written = |name: &[u8]| folder.join(path_of(unquoted(name))).is_file();
     let parts: Vec<&[u8]> = words(argument).map(unquoted).collect();
     let owned = |parts: &[&[u8]]| parts.iter().map(|part| part.to_vec()).collect();

@@ -263,9 +263,14 @@ mod tests {
         let near = "v 0 0 0\nv 1 0 0\nv 0 1 0.5\n";
         let far = "v 500000 5000000 100\nv 500001 5000000 100\nv 500000 5000001 100.5\n";
         let used = load_text(format!("{near}f 1 2 3\n"), &[]).unwrap();
-        for unused in
-            ["", "v 0 0 0\n", "v nan inf -1.#IND00\n", "v 1e300 0 0\n", "v 0 0 0\nf 4 4 4\nf 4 1 4\n"]
-        {
+        for unused in [
+            "",
+            "v 0 0 0\n",
+            "v nan inf -1.#IND00\n",
+            "v 1e300 0 0\n",
+            "v 0 0 0\nf 4 4 4\nf 4 1 4\n",
+            "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 4 5 6\n",
+        ] {
             let found = load_text(format!("{far}{unused}f 1 2 3\n"), &[]).unwrap();
             let size = |scene: &Scene| {
                 let (low, high) = scene.bounds();

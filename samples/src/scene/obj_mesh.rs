@@ -44,15 +44,22 @@ pub(super) fn check(path: &Path, obj: &mut ObjText) -> Result<Extent, SceneError
     Ok(extent)
 }
 
-/// Adds the corners of a face, unless they are at fewer than three places, so that it has no area.
+/// Adds the corners of a face, unless they lie on one line, so that it has no area.
 fn add_face(extent: &mut Extent, obj: &ObjText, face: usize) {
     let corners = &obj.corners[obj.faces[face].start..obj.face_end(face)];
-    let places = || corners.iter().map(|corner| obj.positions[corner[0] as usize]);
-    let first = places().next();
-    let second = places().find(|place| Some(*place) != first);
-    if places().any(|place| second.is_some() && Some(place) != first && Some(place) != second) {
-        places().for_each(|place| extent.add(place));
+    let places = || corners.iter().map(|corner| glam::DVec3::from(obj.positions[corner[0] as usize]));
+    let mut edges = places().skip(1).zip(places()).map(|(end, start)| end - start);
+    let along = edges.find(|edge| *edge != glam::DVec3::ZERO).map_or(glam::DVec3::ZERO, direction);
+    // Within the rounding of numbers with seven digits.
+    let has_area = edges.any(|edge| along.cross(direction(edge)).length() > 1e-7);
+    if has_area || places().any(|place| !place.is_finite()) {
+        places().for_each(|place| extent.add(place.into()));
     }
+}
+
+/// The unit vector along an edge of any length, however small or large; zero for none.
+fn direction(edge: glam::DVec3) -> glam::DVec3 {
+    (edge / edge.abs().max_element()).normalize_or_zero()
 }
 
 /// The triangles of the faces in scene units. Corners that agree in everything share a vertex. `colors` are linear; empty, or

@@ -11,7 +11,7 @@ use lvk::{readable_bytes, readable_name};
 use super::SceneError;
 use super::text_lines::{is_keyword, next_logical_line, split_word};
 use super::text_numbers::{Number, words};
-use super::vertex_colors;
+use super::vertex_colors::{self, UNCOLORED};
 use super::warnings::Warnings;
 use crate::app::progress::Progress;
 
@@ -23,7 +23,7 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) struct ObjText {
     /// Positions in file units; all NaN where the file has a number that is not finite.
     pub positions: Vec<[f64; 3]>,
-    /// Colours as in the file; empty, or as many as positions.
+    /// Colours as in the file, [`UNCOLORED`] for positions without one; empty, or as many as positions.
     pub colors: Vec<[f32; 3]>,
     /// Texture coordinates, `v` up.
     pub texcoords: Vec<[f32; 2]>,
@@ -114,9 +114,6 @@ pub(super) fn parse(path: &Path, content: &[u8], progress: &mut Progress) -> Res
     parser.finish()
 }
 
-/// Colour of a position without one.
-const WHITE: [f32; 3] = [1.0; 3];
-
 /// The largest index a kind of element was asked for, and where.
 #[derive(Clone, Copy, Default)]
 struct Reach {
@@ -181,7 +178,7 @@ impl Parser<'_> {
         }
         let count = self.obj.positions.len();
         let colors = &mut self.obj.colors;
-        colors.resize(count, WHITE);
+        colors.resize(count, UNCOLORED);
         let painted = self.paint.len().min(count);
         colors[count - painted..].copy_from_slice(&self.paint[..painted]);
         self.paint.clear();
@@ -223,10 +220,10 @@ impl Parser<'_> {
         let colors = &mut self.obj.colors;
         match numbers.map(|numbers| numbers.map(Number::finite_f32)) {
             Some([Some(red), Some(green), Some(blue)]) => {
-                colors.resize(self.obj.positions.len(), WHITE);
+                colors.resize(self.obj.positions.len(), UNCOLORED);
                 colors.push([red, green, blue]);
             }
-            _ if !colors.is_empty() => colors.push(WHITE),
+            _ if !colors.is_empty() => colors.push(UNCOLORED),
             _ => {}
         }
     }
@@ -501,7 +498,9 @@ mod tests {
         let obj =
             parsed(format!("v 0 0 0\nv 1 0 0 0.1 0.2 0.3\nv 0 1 0 1 0 0 0.5\nv 1 1 1 1 0 nan\n{faces}"))
                 .unwrap();
-        assert_eq!(obj.colors, [[1.0; 3], [0.1, 0.2, 0.3], [1.0, 0.0, 0.0], [1.0; 3]]);
+        let has_color: Vec<bool> = obj.colors.iter().map(|color| !color[0].is_nan()).collect();
+        assert_eq!(has_color, [false, true, true, false]);
+        assert_eq!(obj.colors[1..3], [[0.1, 0.2, 0.3], [1.0, 0.0, 0.0]]);
         let weighted = format!("v 0 0 0 1\nv 1 0 0 1.0\nv 0 1 0 0.5\nv 9 9 9 1 1\n{faces}");
         assert!(parsed(&weighted).unwrap().colors.is_empty());
         assert_eq!(warnings(&weighted), ["weights of 1 vertices (`v x y z w`) were ignored"]);

@@ -65,7 +65,16 @@ fn fan_has_area(corners: &[[f64; 3]]) -> bool {
 fn is_convex(points: &[[f64; 2]]) -> bool {
     let count = points.len();
     let turn = |i: usize| turn(points[i], points[(i + 1) % count], points[(i + 2) % count]);
-    (0..count).all(|i| turn(i) >= 0.0)
+    (0..count).all(|i| turn(i) >= 0.0) && is_one_round(points)
+}
+
+/// True if the edges, which all turn to the left, turn by one full circle: a star turns by several.
+fn is_one_round(points: &[[f64; 2]]) -> bool {
+    let edges = points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| [b[0] - a[0], b[1] - a[1]]);
+    let is_upward = |[x, y]: [f64; 2]| y > 0.0 || y == 0.0 && x > 0.0;
+    let halves: Vec<bool> = edges.filter(|edge| *edge != [0.0; 2]).map(is_upward).collect();
+    let changes = halves.iter().zip(halves.iter().cycle().skip(1)).filter(|(a, b)| a != b).count();
+    changes <= 2
 }
 
 /// Twice the signed area of the triangle; positive when counter-clockwise. 0 within rounding.
@@ -126,6 +135,20 @@ mod tests {
             0.5 * (b - a).cross(c - a).length()
         };
         triangles.iter().map(area).sum()
+    }
+
+    #[test]
+    fn a_star_crosses_itself() {
+        let point = |i: usize| {
+            let angle = (i * 2 % 5) as f64 * std::f64::consts::TAU / 5.0;
+            [angle.cos(), angle.sin(), 1.0]
+        };
+        assert_eq!(split(&std::array::from_fn::<_, 5, _>(point)), Split::Crossed);
+        let regular = |count: usize| {
+            let angles = (0..count).map(move |i| i as f64 * std::f64::consts::TAU / count as f64);
+            angles.map(|angle| [angle.cos(), angle.sin(), 1.0]).collect::<Vec<_>>()
+        };
+        assert!((3..40).all(|count| split(&regular(count)) == Split::Fan));
     }
 
     #[test]

@@ -165,13 +165,14 @@ fn before_backslash(line: &[u8]) -> Option<&[u8]> {
 
 fn may_continue(line: &[u8]) -> bool {
     let (keyword, rest) = split_word(line);
-    let has_comment = keyword.starts_with(b"#") || (keyword != b"mtllib" && rest.contains(&b'#'));
-    !has_comment && !NAMING.contains(&keyword)
+    let has_comment =
+        keyword.starts_with(b"#") || (!keyword.eq_ignore_ascii_case(b"mtllib") && rest.contains(&b'#'));
+    !has_comment && !NAMING.contains(&&*keyword.to_ascii_lowercase())
 }
 
 fn begins_statement(line: &[u8]) -> bool {
     let (keyword, _) = split_word(line);
-    keyword.starts_with(b"#") || is_keyword(keyword)
+    keyword.starts_with(b"#") || is_keyword(&keyword.to_ascii_lowercase())
 }
 
 /// True if OBJ has such a statement.
@@ -199,6 +200,13 @@ mod tests {
 
     fn whole(text: &str) -> (String, usize, bool) {
         (text.to_owned(), 1, false)
+    }
+
+    #[test]
+    fn capitals_do_not_matter_to_continuations() {
+        let line = |text: &str, is_cut| (text.to_owned(), 1, is_cut);
+        assert_eq!(statements("G PARTS\\\nF 1 2 3"), [line("G PARTS\\", false), line("F 1 2 3", false)]);
+        assert_eq!(statements("v 1 0 1\\\nV 2 0 1"), [line("v 1 0 1", true), line("V 2 0 1", false)]);
     }
 
     #[test]

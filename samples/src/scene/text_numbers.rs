@@ -53,13 +53,26 @@ fn is_spelled_out(word: &[u8]) -> bool {
 }
 
 /// True if the word without its sign is one of `1.#IND`, `1.#QNAN`, `1.#SNAN`, `1.#NAN`, `1.#INF` and the rounded `1.#J` and
-/// `1.#R`, whatever digits follow.
+/// `1.#R`, whatever digits and exponent follow.
 fn is_spelled_by_windows(word: &[u8]) -> bool {
     let Some(rest) = word.strip_prefix(b"1.#") else { return false };
     ["ind", "qnan", "snan", "nan", "inf", "j", "r"].iter().any(|name| {
         rest.get(..name.len()).is_some_and(|start| start.eq_ignore_ascii_case(name.as_bytes()))
-            && rest[name.len()..].iter().all(u8::is_ascii_digit)
+            && is_digits_and_exponent(&rest[name.len()..])
     })
+}
+
+/// True for digits, or none, that an exponent may follow: `00`, `0e+000`.
+fn is_digits_and_exponent(text: &[u8]) -> bool {
+    let is_digits = |text: &[u8]| text.iter().all(u8::is_ascii_digit);
+    match text.iter().position(|byte| matches!(byte, b'e' | b'E')) {
+        Some(at) => {
+            let power = &text[at + 1..];
+            let unsigned = power.strip_prefix(b"+").or(power.strip_prefix(b"-")).unwrap_or(power);
+            is_digits(&text[..at]) && !unsigned.is_empty() && is_digits(unsigned)
+        }
+        None => is_digits(text),
+    }
 }
 
 /// The words in front of a comment. `#` begins one, but for the `#` in `1.#INF`.
@@ -104,12 +117,16 @@ mod tests {
             "1.#INF",
             "-1.#INF00",
             "1.#inf",
+            "-1.#IND00e+000",
+            "1.#QNAN0E+00",
             "+1.#J",
         ] {
             assert_eq!(Number::from_word(word.as_bytes()), Number::NotFinite, "{word}");
             assert_eq!(words(word.as_bytes()).collect::<Vec<_>>(), [word.as_bytes()]);
         }
-        for word in ["x", "", "1,234.5", "1,2,3", ",", "d", "1d", "0x10", "1.#INFO", "#", "nano", "1.5mm"] {
+        for word in
+            ["x", "", "1,234.5", "1,2,3", ",", "d", "1d", "0x10", "1.#INFO", "1.#INFe", "#", "nano", "1.5mm"]
+        {
             assert_eq!(Number::from_word(word.as_bytes()), Number::Unreadable, "{word}");
         }
         assert_eq!(Number::from_word(b"-1.5e3"), Number::Finite(-1500.0));

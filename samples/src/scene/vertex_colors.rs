@@ -2,23 +2,40 @@
 
 use super::warnings::Warnings;
 
+/// Stands for the colour of a vertex that has none. Such a vertex is white.
+pub(super) const UNCOLORED: [f32; 3] = [f32::NAN; 3];
+
+/// Highest channel of colours in the unit range that are too bright; beyond it the range is another one.
+const BRIGHT: f32 = 8.0;
+
 /// The colours as linear light with Rec. 709 primaries, 0 to 1; none if all are white.
 ///
-/// Files hold sRGB, as Blender, MeshLab and photogrammetry write it and Blender and three.js read it. Some hold 0 to 255.
+/// Files hold sRGB, as Blender, MeshLab and photogrammetry write it and Blender and three.js read it: 0 to 1, some 0 to 255,
+/// a few 0 to 65,535. A warning names any other range than the first.
 pub(super) fn linear(mut colors: Vec<[f32; 3]>, warnings: &mut Warnings) -> Vec<[f32; 3]> {
-    let highest = colors.iter().flatten().fold(0.0_f32, |highest, channel| highest.max(*channel));
-    let is_byte = |channel: &f32| channel.fract() == 0.0 && (0.0..=255.0).contains(channel);
-    let is_bytes = highest > 1.0 && colors.iter().flatten().all(is_byte);
-    if is_bytes {
-        // Positions without a colour are white in the unit range.
-        colors.iter_mut().filter(|color| **color != [1.0; 3]).flatten().for_each(|channel| *channel /= 255.0);
-        let line = format!("vertex colours reach {highest}; they are taken as 0 to 255");
-        warnings.push("vertex colours", line);
+    let channels = || colors.iter().flatten().filter(|channel| !channel.is_nan());
+    let highest = channels().fold(0.0_f32, |highest, channel| highest.max(*channel));
+    let is_whole = channels().all(|channel| channel.fract() == 0.0 && *channel >= 0.0);
+    let full = match highest {
+        ..=1.0 => 1.0,
+        ..=255.0 if is_whole || highest > BRIGHT => 255.0,
+        255.0..=65_535.0 => 65_535.0,
+        _ => 1.0,
+    };
+    if highest > 1.0 {
+        let done = match full {
+            1.0 => "what is beyond 1 is taken as 1".to_owned(),
+            full => format!("they are taken as 0 to {full}"),
+        };
+        warnings.push("vertex colours", format!("vertex colours reach {highest}; {done}"));
     }
-    if colors.iter().flatten().all(|channel| *channel >= 1.0) {
+    let is_white = |color: &[f32; 3]| color.iter().all(|channel| channel.is_nan() || *channel >= full);
+    if colors.iter().all(is_white) {
         return Vec::new();
     }
-    colors.iter_mut().flatten().for_each(|channel| *channel = decode_srgb(channel.clamp(0.0, 1.0)));
+    for channel in colors.iter_mut().flatten() {
+        *channel = if channel.is_nan() { 1.0 } else { decode_srgb((*channel / full).clamp(0.0, 1.0)) };
+    }
     colors
 }
 
@@ -53,7 +70,7 @@ mod tests {
         let (colors, warnings) = found(&[[0.0, 0.5, 1.0], [-1.0, 2.0, 0.02]]);
         assert_eq!((colors[0][0], colors[0][2], colors[1][..2].to_vec()), (0.0, 1.0, vec![0.0, 1.0]));
         assert!((colors[0][1] - 0.214_041).abs() < 1e-5 && (colors[1][2] - 0.02 / 12.92).abs() < 1e-7);
-        assert!(warnings.is_empty());
+        assert_eq!(warnings, ["vertex colours reach 2; what is beyond 1 is taken as 1"]);
         for byte in 0..=255_u8 {
             assert_eq!(encode_srgb(decode_srgb(f32::from(byte) / 255.0)), byte);
         }
@@ -73,12 +90,28 @@ mod tests {
     }
 
     #[test]
-    fn bytes_are_told_by_their_range() {
-        let (colors, warnings) = found(&[[255.0, 128.0, 0.0], [1.0; 3]]);
-        assert_eq!((colors[0][0], colors[0][2], colors[1]), (1.0, 0.0, [1.0; 3]));
+    fn the_range_follows_from_the_highest_number() {
+        let (colors, warnings) = found(&[[255.0, 128.0, 0.0], [1.0; 3], UNCOLORED]);
+        assert_eq!((colors[0][0], colors[0][2], colors[2]), (1.0, 0.0, [1.0; 3]));
         assert!((colors[0][1] - 0.215_86).abs() < 1e-5);
+        assert!(
+            colors[1].iter().all(|channel| (0.0..0.001).contains(channel)),
+            "a dark byte: {:?}",
+            colors[1]
+        );
         assert_eq!(warnings, ["vertex colours reach 255; they are taken as 0 to 255"]);
-        let (bright, _) = found(&[[1.5, 0.5, 0.0]]);
-        assert_eq!(bright[0][0], 1.0, "a number beyond the range is clamped");
+        let (dark, _) = found(&[[1.0; 3], [2.0, 1.0, 1.0]]);
+        assert!(dark.iter().flatten().all(|channel| *channel < 0.001), "{dark:?}");
+        let (averaged, warnings) = found(&[[254.5, 9.5, 9.5]]);
+        assert!(averaged[0][0] > 0.99 && averaged[0][1] < 0.01 && warnings.len() == 1, "{averaged:?}");
+        let (deep, warnings) = found(&[[65_535.0, 0.0, 300.0]]);
+        assert_eq!((deep[0][0], deep[0][1]), (1.0, 0.0));
+        assert_eq!(warnings, ["vertex colours reach 65535; they are taken as 0 to 65535"]);
+        let (bright, warnings) = found(&[[1.5, 0.5, 0.0]]);
+        assert_eq!((bright[0][0], warnings.len()), (1.0, 1), "a number beyond the range is clamped");
+        assert_eq!(
+            found(&[[1e9, 0.0, 0.0]]).1,
+            ["vertex colours reach 1000000000; what is beyond 1 is taken as 1"]
+        );
     }
 }

@@ -40,7 +40,9 @@ fn signal_many(task: Task, seed: u64, count: usize) {
         tally.longest = tally.longest.max(taken);
         desk.assert_whole();
         assert!(desk.leftovers().is_empty(), "{:?} {}", desk.leftovers(), ended.err);
-        let says: Vec<_> = ended.err.lines().filter(|line| !line.starts_with('[')).collect();
+        // Beside the lines of progress, and that of `--rt auto`.
+        let is_usual = |line: &str| line.starts_with('[') || line.starts_with("note: ");
+        let says: Vec<_> = ended.err.lines().filter(|line| !is_usual(line)).collect();
         match ended.status.code() {
             Some(130) => {
                 tally.interrupted += 1;
