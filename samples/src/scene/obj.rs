@@ -344,6 +344,25 @@ mod tests {
         }
     }
 
+    /// `wall #3` may be another material, or `wall` with a comment.
+    #[test]
+    fn names_that_are_equal_only_without_comments_are_warned_of() {
+        let mtl = b"newmtl wall #1\nKd 1 0 0\nnewmtl door\nKd 0 1 0\n";
+        let with = |name: &str| {
+            let text = format!("mtllib a.mtl\n{TRIANGLE}usemtl {name}\nf 1 2 3\n");
+            let scene = load_text(text, &[("a.mtl", mtl)]).unwrap();
+            (scene.materials[0].albedo, scene.warnings)
+        };
+        for (name, albedo) in
+            [("wall #1", [1.0, 0.0, 0.0]), ("wall", [1.0, 0.0, 0.0]), ("door # oak", [0.0, 1.0, 0.0])]
+        {
+            assert_eq!(with(name), (albedo, Vec::new()), "{name}");
+        }
+        let (albedo, warnings) = with("wall #3");
+        assert_eq!(albedo, [1.0, 0.0, 0.0]);
+        assert!(warnings[0].contains("`wall #3` is not defined; `wall #1` is taken"), "{warnings:?}");
+    }
+
     #[test]
     fn names_of_materials_and_libraries_are_bytes() {
         let mtl = b"newmtl M\xe4\nKd 1 0 0\nnewmtl M\xf6\nKd 0 1 0\n";
