@@ -165,14 +165,13 @@ fn a_device_that_finds_no_visible_triangles_traces_everything() {
         Outcome::from_command(command)
             .assert_error(1, &["SwiftShader", "64-bit atomics", "--method standalone"]);
     }
-    for rt in ["auto", "software"] {
-        let Some(command) = desk.without_ray_tracing(&["--scene", &scene, "--rt", rt]) else { return };
-        let Outcome { status, out, err } = Outcome::from_command(command);
-        assert_eq!(status, Some(0), "{out}{err}");
-        assert!(out.contains("stand-alone ray tracing") && out.contains("in software"), "{out}");
-        assert!(err.contains("warning: SwiftShader") && err.contains("--method standalone"), "{err}");
-        assert_eq!(desk.image_size(), (WIDTH, HEIGHT));
-    }
+    // The device compiles for minutes, so `auto` alone, which takes the path of `software`.
+    let Some(command) = desk.without_ray_tracing(&["--scene", &scene, "--rt", "auto"]) else { return };
+    let Outcome { status, out, err } = Outcome::from_command(command);
+    assert_eq!(status, Some(0), "{out}{err}");
+    assert!(out.contains("stand-alone ray tracing") && out.contains("in software"), "{out}");
+    assert!(err.contains("warning: SwiftShader") && err.contains("--method standalone"), "{err}");
+    assert_eq!(desk.image_size(), (WIDTH, HEIGHT));
 }
 
 #[test]
