@@ -81,13 +81,13 @@ impl Soak {
             Ok(presentation) => presentation,
             Err(error) => return Some(Err(error)),
         };
-        let present = |phase: u32, tally: &mut Tally| {
-            #[cfg(target_os = "linux")]
-            if let Some(presentation) = &mut presentation {
-                presentation.frame(&ctx, phase, tally)?;
-            }
-            Ok(())
+        #[cfg(target_os = "linux")]
+        let present = |phase: u32, tally: &mut Tally| match &mut presentation {
+            Some(presentation) => presentation.frame(&ctx, phase, tally),
+            None => Ok(()),
         };
+        #[cfg(not(target_os = "linux"))]
+        let present = |_: u32, _: &mut Tally| Ok(());
         Some(self.frames(&ctx, present))
     }
 
