@@ -336,7 +336,7 @@ impl PresentBackend for LiveBackend<'_> {
         let submitter = &self.ctx.device_state().submitter;
         // Only the graphics queue uses images of windows, so background work of other queues delays nothing.
         let completed = submitter.timeline(0).query_completed()?;
-        self.resources.destroy_finished(completed);
+        self.resources.destroy_finished(completed)?;
         let Some(current) = &self.resources.current else { return Err(Failure::OutOfDate) };
         let (chain, ids) = (Arc::clone(&current.chain), current.ids());
         let semaphore = self.resources.take_semaphore(completed, self.name)?;

@@ -7,6 +7,7 @@ use ash::vk;
 use super::debug::label::Label;
 use super::debug::messenger::c_name;
 use super::device::Gpu;
+use super::start::driver_workarounds::with_shared_loader_lock;
 use crate::queue::Queue;
 
 impl Gpu {
@@ -20,8 +21,10 @@ impl Gpu {
         let Some(ext) = &self.debug_utils else { return };
         let name = c_name(name);
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
-        // SAFETY: the object is alive and belongs to this device. A failure only loses a name.
-        let _ = unsafe { ext.set_debug_utils_object_name(&info) };
+        // SAFETY: the object is alive and belongs to this device.
+        let named = with_shared_loader_lock(|| unsafe { ext.set_debug_utils_object_name(&info) });
+        // A failure only loses a name.
+        let _ = named;
     }
 
     /// Begins a labelled range in a command buffer.

@@ -1,8 +1,10 @@
 //! The order of all locks of the library.
 
 /// Rank of a lock. The ranks down to [`PipelineCacheFile`](Self::PipelineCacheFile) are ordered: while a lock of one of
-/// them is held, locks of later ranks may be taken. All other ranks are leaves. While a leaf is held, no lock
-/// may be taken except [`ValidationMessages`](Self::ValidationMessages), which any Vulkan call may take.
+/// them is held, locks of later ranks may be taken. The ranks from [`Frames`](Self::Frames) to
+/// [`DeviceLifetime`](Self::DeviceLifetime) are leaves. While a leaf is held, no lock
+/// may be taken except [`LoaderLists`](Self::LoaderLists), for which a call to Vulkan is enough, and
+/// [`ValidationMessages`](Self::ValidationMessages), which any Vulkan call may take.
 ///
 /// No lock may be taken again by its holder, nor together with another lock of the same rank, not even for
 /// reading twice. A waiting writer would block the second read, while the first read blocks the writer.
@@ -82,6 +84,9 @@ pub(crate) enum Rank {
     /// Creation and destruction of devices and ray tracing pipelines, on a driver that deadlocks if they are
     /// concurrent.
     DeviceLifetime,
+    /// The loader's lists of instances and devices, which are searched where an object gets its name, under any other
+    /// lock.
+    LoaderLists,
     /// Messages of the validation layer, which arrive during Vulkan calls, under any other lock.
     ValidationMessages,
 }
@@ -89,7 +94,7 @@ pub(crate) enum Rank {
 #[cfg(debug_assertions)]
 impl Rank {
     /// All ranks, in their order.
-    pub(super) const ALL: [Self; 36] = [
+    pub(super) const ALL: [Self; 37] = [
         Self::Swapchain,
         Self::Compactions,
         Self::Pending,
@@ -125,17 +130,19 @@ impl Rank {
         Self::Queue,
         Self::Memory,
         Self::DeviceLifetime,
+        Self::LoaderLists,
         Self::ValidationMessages,
     ];
 
     const FIRST_LEAF: u8 = Self::Frames as u8;
+    const LAST_LEAF: u8 = Self::DeviceLifetime as u8;
     const LAST: u8 = Self::ValidationMessages as u8;
 
     /// Returns the lowest rank whose lock must not be held when this one is taken. For leaves this is the
     /// first leaf.
     pub(super) const fn first_in_the_way(self) -> u8 {
         let own = self as u8;
-        if own < Self::FIRST_LEAF || own == Self::LAST { own } else { Self::FIRST_LEAF }
+        if own < Self::FIRST_LEAF || own > Self::LAST_LEAF { own } else { Self::FIRST_LEAF }
     }
 }
 

@@ -49,7 +49,7 @@ impl Locks {
 fn may_follow(first: Rank, second: Rank) -> bool {
     let is_leaf = |rank: Rank| rank as u8 >= Rank::Frames as u8;
     match second {
-        Rank::ValidationMessages => first != Rank::ValidationMessages,
+        Rank::LoaderLists | Rank::ValidationMessages => (first as u8) < second as u8,
         second if is_leaf(second) => !is_leaf(first),
         second => (first as u8) < second as u8,
     }

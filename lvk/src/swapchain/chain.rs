@@ -13,6 +13,7 @@ use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
+use crate::gpu::start::driver_workarounds::with_shared_loader_lock;
 
 /// Creation parameters of a Vulkan swapchain.
 #[derive(Debug, Clone)]
@@ -65,7 +66,7 @@ impl Chain {
             info = info.push_next(&mut changing);
         }
         // SAFETY: the surface supports the plan's parameters; the old swapchain is of the same surface and locked.
-        let raw = unsafe { functions.swapchain.create_swapchain(&info, None) }
+        let raw = with_shared_loader_lock(|| unsafe { functions.swapchain.create_swapchain(&info, None) })
             .map_err(Failure::from_result("vkCreateSwapchainKHR"))?;
         gpu.name(raw, name);
         Ok(Self { raw, surface: Arc::clone(surface) })
@@ -184,13 +185,20 @@ impl PresentSync {
         unsafe { self.gpu.device.reset_fences(&[fence]) }.map_err(Error::vulkan("vkResetFences"))
     }
 
+    /// True if the completion of the last present is known or can be queried.
+    pub(crate) fn reports_completion(&self) -> bool {
+        !self.presented || self.present_fence.is_some()
+    }
+
     /// Returns true if the presents are finished; `None` if the device cannot tell.
-    pub(crate) fn is_done(&self) -> Option<bool> {
+    pub(crate) fn is_done(&self) -> Result<Option<bool>> {
         if !self.presented {
-            return Some(true);
+            return Ok(Some(true));
         }
-        // SAFETY: the fence is alive. A lost device has no presents.
-        self.present_fence.map(|fence| unsafe { self.gpu.device.get_fence_status(fence) }.unwrap_or(true))
+        let Some(fence) = self.present_fence else { return Ok(None) };
+        // SAFETY: the fence is alive.
+        let status = unsafe { self.gpu.device.get_fence_status(fence) };
+        status.map(Some).map_err(Error::vulkan("vkGetFenceStatus"))
     }
 
     /// Waits at most `timeout_ns` nanoseconds until the presents are finished, if the device can tell. Returns true if

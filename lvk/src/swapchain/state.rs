@@ -144,9 +144,17 @@ impl SwapchainResources {
         }
     }
 
-    /// Destroys replaced swapchains whose presents are finished.
-    pub(crate) fn destroy_finished(&mut self, completed: u64) {
-        self.retired.retain(|retired| !retired.is_done(completed));
+    /// Destroys replaced swapchains whose presents are finished. On failure, the others are kept.
+    pub(crate) fn destroy_finished(&mut self, completed: u64) -> Result<()> {
+        let mut all = Ok(());
+        self.retired.retain(|retired| match retired.is_done(completed) {
+            Ok(done) => !done,
+            Err(error) => {
+                all = Err(error);
+                true
+            }
+        });
+        all
     }
 
     /// Waits until all presents are finished, but at most for the timeout.
@@ -155,7 +163,7 @@ impl SwapchainResources {
         let retired = self.retired.iter().flat_map(|retired| &retired.syncs);
         let mut told = true;
         let given_up = wait_for_all(current.chain(retired), |sync, timeout_ns| {
-            told &= sync.is_done().is_some();
+            told &= sync.reports_completion();
             sync.wait(timeout_ns)
         })?;
         if given_up > 0 {
@@ -178,12 +186,15 @@ impl SwapchainResources {
 }
 
 impl RetiredChain {
-    fn is_done(&self, completed: u64) -> bool {
-        let fences: Option<Vec<bool>> = self.syncs.iter().map(PresentSync::is_done).collect();
-        match fences {
-            Some(over) => over.into_iter().all(|over| over),
-            None => self.over_at.is_some_and(|value| value <= completed),
+    fn is_done(&self, completed: u64) -> Result<bool> {
+        for sync in &self.syncs {
+            match sync.is_done()? {
+                Some(true) => {}
+                Some(false) => return Ok(false),
+                None => return Ok(self.over_at.is_some_and(|value| value <= completed)),
+            }
         }
+        Ok(true)
     }
 }
 

@@ -23,6 +23,6 @@ pub fn stall_present(ctx: &Context, swapchain: SwapchainHandle) -> Result<bool> 
     let presented = images.map(|image| &mut image.sync).find(|sync| sync.presented);
     Ok(presented.is_some_and(|sync| {
         sync.stalls = true;
-        sync.is_done().is_some()
+        sync.reports_completion()
     }))
 }

@@ -311,3 +311,16 @@ fn a_context_without_validation_is_silent() {
     expect_drawing(&ctx);
     assert!(ctx.validation().is_empty());
 }
+
+/// For each name, the loader searches the devices of all instances of the process.
+#[test]
+fn objects_are_named_while_other_contexts_come_and_go() {
+    let Some(ctx) = device() else { return };
+    let desc = BufferDesc { size_bytes: 256, debug_name: "named", ..Default::default() };
+    std::thread::scope(|scope| {
+        let others = scope.spawn(|| (0..20).for_each(|_| drop(start(|_| ()).unwrap())));
+        while !others.is_finished() {
+            drop(ctx.create_buffer(&desc).unwrap());
+        }
+    });
+}

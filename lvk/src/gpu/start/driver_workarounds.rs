@@ -1,8 +1,12 @@
-//! Serialises driver calls that deadlock when they run concurrently, across all devices of the process.
+//! Serialises Vulkan calls that a driver or the loader cannot run concurrently, across all devices of the process.
 //!
 //! NVIDIA's driver (580.159.04) deadlocks if one thread creates or destroys a device while another thread
 //! creates or destroys a ray tracing pipeline. Each thread then waits for a driver lock that the other one
 //! holds. On that driver, creation and destruction of a device therefore exclude both.
+//!
+//! The loader (1.3.239) searches its list of all devices of all instances in `vkSetDebugUtilsObjectNameEXT` and
+//! `vkCreateSwapchainKHR`, and takes no lock for the devices in it. If another thread destroys a device at that time, the
+//! search reads freed memory. Creation and destruction of devices and instances therefore exclude both calls.
 
 use ash::vk;
 
@@ -10,16 +14,30 @@ use crate::lock_order::{Rank, RwLock};
 
 static DEVICE_LIFETIME: RwLock<()> = RwLock::new(Rank::DeviceLifetime, ());
 
-/// Runs `change`, which creates or destroys a device of this driver, under the exclusive lock.
+static LOADER_LISTS: RwLock<()> = RwLock::new(Rank::LoaderLists, ());
+
+/// Runs `change`, which creates or destroys a device of this driver, under both exclusive locks.
 pub(crate) fn with_exclusive_device_lock<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
     let _alone = needs_device_lock(driver).then(|| DEVICE_LIFETIME.write());
-    change()
+    with_exclusive_loader_lock(change)
 }
 
 /// Runs `change`, which creates or destroys a ray tracing pipeline of this driver, under the shared lock.
 pub(crate) fn with_shared_device_lock<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
     let _beside_others = needs_device_lock(driver).then(|| DEVICE_LIFETIME.read());
     change()
+}
+
+/// Runs `change`, which creates or destroys an instance or a device, while no thread searches the loader's lists.
+pub(crate) fn with_exclusive_loader_lock<R>(change: impl FnOnce() -> R) -> R {
+    let _alone = LOADER_LISTS.write();
+    change()
+}
+
+/// Runs `search`, a call in which the loader searches its lists, while no instance or device is created or destroyed.
+pub(crate) fn with_shared_loader_lock<R>(search: impl FnOnce() -> R) -> R {
+    let _beside_others = LOADER_LISTS.read();
+    search()
 }
 
 /// True if the driver needs the lock. With debug assertions every driver takes it, so that tests check the
@@ -44,6 +62,25 @@ mod tests {
         thread::scope(|scope| {
             for _ in 0..2 {
                 scope.spawn(|| with_shared_device_lock(NVIDIA, || together.wait()));
+            }
+        });
+    }
+
+    #[test]
+    fn no_list_is_searched_while_a_device_or_an_instance_comes_or_goes() {
+        let searches = AtomicU32::new(0);
+        let search = || {
+            searches.fetch_add(1, Ordering::SeqCst);
+            thread::yield_now();
+            searches.fetch_sub(1, Ordering::SeqCst);
+        };
+        thread::scope(|scope| {
+            for _ in 0..3 {
+                scope.spawn(|| (0..500).for_each(|_| with_shared_loader_lock(search)));
+            }
+            for _ in 0..500 {
+                assert_eq!(with_exclusive_loader_lock(|| searches.load(Ordering::SeqCst)), 0);
+                assert_eq!(with_exclusive_device_lock(NVIDIA, || searches.load(Ordering::SeqCst)), 0);
             }
         });
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::driver_workarounds::with_exclusive_loader_lock;
 use super::window::{WindowExtensions, WindowRef};
 use crate::error::driver_report::{DriverReport, LoaderReport};
 use crate::error::{Error, Result};
@@ -63,7 +64,7 @@ impl Instance {
             && let Err(result) = messenger.install(&entry, &raw)
         {
             // SAFETY: the instance was created above and nothing uses it.
-            unsafe { raw.destroy_instance(None) };
+            with_exclusive_loader_lock(|| unsafe { raw.destroy_instance(None) });
             return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
         }
         let gpu_assisted = desc.validation == ValidationMode::GpuAssisted;
@@ -155,7 +156,7 @@ impl Drop for Instance {
             return;
         }
         // SAFETY: the device is destroyed first, as `Gpu` declares it first.
-        unsafe { self.raw.destroy_instance(None) };
+        with_exclusive_loader_lock(|| unsafe { self.raw.destroy_instance(None) });
     }
 }
 
@@ -342,7 +343,7 @@ fn create_instance(
         info = info.push_next(&mut settings);
     }
     // SAFETY: every pointer in `info` lives until the end of this function.
-    let made = unsafe { entry.create_instance(&info, None) };
+    let made = with_exclusive_loader_lock(|| unsafe { entry.create_instance(&info, None) });
     #[cfg(any(test, feature = "test-hooks"))]
     let made = made
         .map(crate::test_support::null_commands::wrap_null_commands)

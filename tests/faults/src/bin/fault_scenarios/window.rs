@@ -13,6 +13,7 @@ use lvk::raw_window_handle::{
 use lvk::{ColorAttachment, Context, ContextDesc, RenderPassDesc, SwapchainDesc, SwapchainHandle};
 use lvk_dev_driver::{DriverRequest, prepare};
 use x11rb::connection::Connection;
+use x11rb::protocol::composite::{ConnectionExt as _, Redirect};
 use x11rb::protocol::xproto::{ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass};
 use x11rb::xcb_ffi::{XCBConnection, load_libxcb};
 
@@ -82,6 +83,9 @@ impl XWindow {
             root.root_visual,
             &aux,
         )?;
+        // Windows of other processes on the same display may cover this one: its pixels are kept apart.
+        connection.composite_query_version(0, 4)?.reply()?;
+        connection.composite_redirect_window(id, Redirect::AUTOMATIC)?;
         connection.map_window(id)?;
         let window = Self { connection, screen: *screen, id };
         window.sync()?;
