@@ -2,25 +2,25 @@
 #ifndef REFLECTIONS_TRACE_QUERY
 #define REFLECTIONS_TRACE_QUERY
 
+#define LVK_CANDIDATE_FUNCTION confirmSolid
 #include <lvk/ray_query.glsl>
 
 #include "reflections/masks.glsl"
 #include "reflections/surface.glsl"
 
-bool isSolidCandidate(LvkRayQuery query) {
+void confirmSolid(LvkRayQueryParameter query) {
     uint instance = uint(lvkRayQueryInstanceCustomIndex(query, LVK_CANDIDATE));
     uint geometry = uint(lvkRayQueryGeometryIndex(query, LVK_CANDIDATE));
     uint primitive = uint(lvkRayQueryPrimitiveIndex(query, LVK_CANDIDATE, frame.tlas));
-    return isSolid(instance, geometry, primitive, lvkRayQueryBarycentrics(query, LVK_CANDIDATE));
+    if (isSolid(instance, geometry, primitive, lvkRayQueryBarycentrics(query, LVK_CANDIDATE))) {
+        lvkRayQueryConfirmIntersection(query);
+    }
 }
 
 Hit traceClosest(vec3 origin, vec3 direction, float range) {
     LvkRayQuery query;
     lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_NONE, kMaskAll, origin, 0.0, direction, range);
     while (lvkRayQueryProceed(query)) {
-        if (isSolidCandidate(query)) {
-            lvkRayQueryConfirmIntersection(query);
-        }
     }
     Hit hit = Hit(kNothing, 0u, 0u, vec2(0.0), 0.0);
     if (lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE) {
@@ -39,9 +39,6 @@ float traceOccluder(vec3 origin, vec3 direction, float range) {
     lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT, kMaskOpaque, origin, 0.0, direction,
                           range);
     while (lvkRayQueryProceed(query)) {
-        if (isSolidCandidate(query)) {
-            lvkRayQueryConfirmIntersection(query);
-        }
     }
     bool isBlocked = lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
     return isBlocked ? lvkRayQueryT(query, LVK_COMMITTED) : -1.0;

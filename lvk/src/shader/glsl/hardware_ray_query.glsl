@@ -11,12 +11,29 @@
 #include <lvk/tlas.glsl>
 
 #define LvkRayQuery rayQueryEXT
+#define LvkRayQueryParameter rayQueryEXT
+
+#ifdef LVK_CANDIDATE_FUNCTION
+void LVK_CANDIDATE_FUNCTION(LvkRayQueryParameter rq);
+
+// Traverses to the end, and calls the function of the module for each candidate. Returns false.
+bool lvkJudgeCandidates(LvkRayQueryParameter rq) {
+    while (rayQueryProceedEXT(rq)) {
+        LVK_CANDIDATE_FUNCTION(rq);
+    }
+    return false;
+}
+#endif
 
 // Starts a query: void (LvkRayQuery, uint tlasIndex, uint flags, uint cullMask, vec3 origin, float tMin, vec3 direction, float tMax).
 #define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
     rayQueryInitializeEXT(rq, kTLAS[nonuniformEXT(tlasIndex)], (flags) | LVK_RAY_FLAGS_ALWAYS, mask, origin, tMin, direction, tMax)
 // Steps to the next candidate that the shader must judge; false when the traversal is over.
+#ifdef LVK_CANDIDATE_FUNCTION
+#define lvkRayQueryProceed(rq) lvkJudgeCandidates(rq)
+#else
 #define lvkRayQueryProceed(rq) rayQueryProceedEXT(rq)
+#endif
 // Ends the traversal; the committed hit stays.
 #define lvkRayQueryTerminate(rq) rayQueryTerminateEXT(rq)
 // Commits the candidate AABB at distance `t`, within the remaining range.

@@ -19,6 +19,19 @@
 // A module whose rays treat triangles as opaque and meet no AABBs can define LVK_OPAQUE_TRIANGLES_ONLY before the
 // include. All its rays have LVK_RAY_FLAG_OPAQUE, without candidates. The library's own traversal is much faster then.
 //
+// A module can define LVK_CANDIDATE_FUNCTION before the include, as the name of a function that judges candidates in
+// place of the loop:
+//
+//     #define LVK_CANDIDATE_FUNCTION confirmSolid
+//     #include <lvk/ray_query.glsl>
+//     void confirmSolid(LvkRayQueryParameter rq) {
+//         if (isSolid(lvkRayQueryInstanceCustomIndex(rq, LVK_CANDIDATE))) { lvkRayQueryConfirmIntersection(rq); }
+//     }
+//
+// lvkRayQueryProceed then calls the function for each candidate of every ray of the module, and returns false. The
+// function may use LVK_CANDIDATE and LVK_COMMITTED, confirm, generate and terminate, but trace no ray. The library's own
+// traversal calls the function without leaving its loops, which is much faster.
+//
 // The context chooses the traversal when it compiles the module: `rayQueryEXT`, or the library's own traversal if
 // LVK_SOFTWARE_RAY_QUERY is defined (Capabilities::ray_query_path).
 

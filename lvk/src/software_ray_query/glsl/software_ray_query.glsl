@@ -5,8 +5,9 @@
 #include <lvk/software_traversal.glsl>
 #include <lvk/tlas_table.glsl>
 
-// A query: its state, and its stack entries while it waits with a candidate, if the module has candidates.
-#ifdef LVK_OPAQUE_TRIANGLES_ONLY
+// A query: its state, and its stack entries while it waits with a candidate, if queries of the module ever wait.
+#if defined(LVK_OPAQUE_TRIANGLES_ONLY) || defined(LVK_CANDIDATE_FUNCTION)
+#define LVK_SOFT_NEVER_WAITS
 struct LvkRayQuery {
     LvkSoftState state;
 };
@@ -15,6 +16,18 @@ struct LvkRayQuery {
     LvkSoftState state;
     uvec2 stack[LVK_SOFT_STACK_ENTRIES];
 };
+#endif
+
+#define LvkRayQueryParameter inout LvkRayQuery
+
+#ifdef LVK_CANDIDATE_FUNCTION
+void LVK_CANDIDATE_FUNCTION(LvkRayQueryParameter rq);
+
+void lvkSoftCallCandidateFunction(inout LvkSoftState state) {
+    LvkRayQuery rq = LvkRayQuery(state);
+    LVK_CANDIDATE_FUNCTION(rq);
+    state = rq.state;
+}
 #endif
 
 void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask, vec3 origin, float tMin,
@@ -115,7 +128,7 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 #define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
     lvkSoftInitialize((rq).state, tlasIndex, flags, mask, origin, tMin, direction, tMax)
 // Steps to the next candidate that the shader must judge; false when the traversal is over.
-#ifdef LVK_OPAQUE_TRIANGLES_ONLY
+#ifdef LVK_SOFT_NEVER_WAITS
 #define lvkRayQueryProceed(rq) lvkSoftProceed((rq).state)
 #else
 #define lvkRayQueryProceed(rq) \

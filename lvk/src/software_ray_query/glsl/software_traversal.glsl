@@ -78,6 +78,11 @@ const bool kLvkSoftHasCandidates = false;
 const bool kLvkSoftHasCandidates = true;
 #endif
 
+#ifdef LVK_CANDIDATE_FUNCTION
+// Calls the function of the module. The cursor of the state may be finished afterwards.
+void lvkSoftCallCandidateFunction(inout LvkSoftState state);
+#endif
+
 // lavapipe drops writes of helper invocations to their own arrays (mesa 25.0), so helper invocations have no stack.
 #if defined(LVK_STAGE_FRAGMENT) && defined(LVK_HELPERS_LOSE_ARRAYS)
 #define LVK_SOFT_IS_STACKLESS gl_HelperInvocation
@@ -337,7 +342,20 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHi
     return (level.cull & lvkSoftCulling(hit.front)) == 0u;
 }
 
-// Tests the next primitive. Returns true if it is a candidate that the shader must judge.
+// Hands the candidate to the shader: to its function if it has one, else by ending the call to lvkSoftProceed. Returns
+// true for the latter.
+bool lvkSoftHandOver(inout LvkSoftState state, inout LvkSoftCursor cursor) {
+#ifdef LVK_CANDIDATE_FUNCTION
+    state.cursor = cursor;
+    lvkSoftCallCandidateFunction(state);
+    cursor = state.cursor;
+    return false;
+#else
+    return true;
+#endif
+}
+
+// Tests the next primitive. Returns true if it is a candidate that waits for the shader.
 bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
     uint primitive = cursor.leaves.x + uint(findLSB(cursor.leaves.y));
     cursor.leaves.y &= cursor.leaves.y - 1u;
@@ -363,7 +381,7 @@ bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLe
     }
     state.candidate = hit;
     state.candidate.kind = isBox ? LVK_SOFT_CANDIDATE_BOX : LVK_SOFT_CANDIDATE_TRIANGLE;
-    return true;
+    return lvkSoftHandOver(state, cursor);
 }
 
 // Returns the next reference of the TLAS; LVK_SOFT_NONE if none is left.
