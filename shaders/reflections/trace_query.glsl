@@ -1,7 +1,8 @@
-// traceClosest(), traceOccluder() and traceOccluded() by ray queries. A candidate is a leaf: nothing else is not opaque.
+// traceClosest() and traceBlocker() by ray queries. A candidate is a leaf: nothing else is not opaque.
 #ifndef REFLECTIONS_TRACE_QUERY
 #define REFLECTIONS_TRACE_QUERY
 
+#define LVK_TRIANGLES_ONLY
 #define LVK_CANDIDATE_FUNCTION confirmSolid
 #include <lvk/ray_query.glsl>
 
@@ -33,19 +34,14 @@ Hit traceClosest(vec3 origin, vec3 direction, float range) {
     return hit;
 }
 
-// Distance of something that blocks the way, not the nearest; below 0 where nothing does.
-float traceOccluder(vec3 origin, vec3 direction, float range) {
+// Distance of what blocks the way, the nearest unless `flags` end the ray before; below 0 where nothing does.
+float traceBlocker(vec3 origin, vec3 direction, float range, uint flags) {
     LvkRayQuery query;
-    lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT, kMaskOpaque, origin, 0.0, direction,
-                          range);
+    lvkRayQueryInitialize(query, frame.tlas, flags, kMaskOpaque, origin, 0.0, direction, range);
     while (lvkRayQueryProceed(query)) {
     }
     bool isBlocked = lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
     return isBlocked ? lvkRayQueryT(query, LVK_COMMITTED) : -1.0;
-}
-
-bool traceOccluded(vec3 origin, vec3 direction, float range) {
-    return traceOccluder(origin, direction, range) >= 0.0;
 }
 
 #endif

@@ -1,20 +1,29 @@
-// The counts of candidates by ray query.
+// The counts of candidates by ray query. With FUNCTION, the traversal calls the function that judges them.
+#ifdef FUNCTION
+#define LVK_TRIANGLES_ONLY
+#define LVK_CANDIDATE_FUNCTION judge
+#endif
 #include "ray_query_start.glsl"
 #include "any_hit_payload.glsl"
 
-void main() {
-    START_RAY_QUERY;
-    Seen seen = Seen(kNoHit, 0, 0);
-    while (lvkRayQueryProceed(rq)) {
-        seen.count += 1;
-        seen.sum += tagOf(lvkRayQueryInstanceId(rq, LVK_CANDIDATE, tlas), lvkRayQueryGeometryIndex(rq, LVK_CANDIDATE),
-                          lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE, tlas));
+Seen seen = Seen(kNoHit, 0, 0);
+
+void judge(LvkRayQueryParameter rq) {
+    seen.count += 1;
+    seen.sum += tagOf(lvkRayQueryInstanceId(rq, LVK_CANDIDATE, tlas), lvkRayQueryGeometryIndex(rq, LVK_CANDIDATE),
+                      lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE, tlas));
 #if !defined(IGNORE)
-        lvkRayQueryConfirmIntersection(rq);
+    lvkRayQueryConfirmIntersection(rq);
 #endif
 #if defined(TERMINATE)
-        lvkRayQueryTerminate(rq);
+    lvkRayQueryTerminate(rq);
 #endif
+}
+
+void main() {
+    START_RAY_QUERY;
+    while (lvkRayQueryProceed(rq)) {
+        judge(rq);
     }
     if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
         seen.record.t = lvkRayQueryT(rq, LVK_COMMITTED);

@@ -20,7 +20,6 @@ pub(super) const BLEND_FRAGMENT: SampleStage = shader!("reflections", "blend.fra
 pub(super) const OPAQUE_RAYS: SampleStage = shader!("reflections", "opaque.rgen");
 pub(super) const TRANSPARENT_RAYS: SampleStage = shader!("reflections", "transparent.rgen");
 pub(super) const CLOSEST_MISS: SampleStage = shader!("reflections", "closest.rmiss");
-pub(super) const SHADOW_MISS: SampleStage = shader!("reflections", "shadow.rmiss");
 pub(super) const CLOSEST_HIT: SampleStage = shader!("reflections", "closest.rchit");
 pub(super) const LEAF_ANY_HIT: SampleStage = shader!("reflections", "leaf.rahit");
 
@@ -33,7 +32,7 @@ pub(super) fn pipelines() -> Vec<SamplePipeline> {
         raster("reflections: transparent surfaces", TRANSPARENT_FRAGMENT, SURFACE_FORMAT, Some(DEPTH_FORMAT)),
         SamplePipeline {
             name: "reflections: rays by pipeline",
-            stages: vec![OPAQUE_RAYS, TRANSPARENT_RAYS, CLOSEST_MISS, SHADOW_MISS, CLOSEST_HIT, LEAF_ANY_HIT],
+            stages: vec![OPAQUE_RAYS, TRANSPARENT_RAYS, CLOSEST_MISS, CLOSEST_HIT, LEAF_ANY_HIT],
             color: Vec::new(),
             depth: None,
         },

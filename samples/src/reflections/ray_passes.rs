@@ -9,8 +9,7 @@ use lvk::{
 use super::animation::compute;
 use super::frame::Push;
 use super::pipelines::{
-    CLOSEST_HIT, CLOSEST_MISS, LEAF_ANY_HIT, OPAQUE_QUERY, OPAQUE_RAYS, SHADOW_MISS, TRANSPARENT_QUERY,
-    TRANSPARENT_RAYS,
+    CLOSEST_HIT, CLOSEST_MISS, LEAF_ANY_HIT, OPAQUE_QUERY, OPAQUE_RAYS, TRANSPARENT_QUERY, TRANSPARENT_RAYS,
 };
 use super::targets::{Targets, step};
 use crate::hybrid::RayPath;
@@ -88,14 +87,14 @@ impl RayPasses {
 }
 
 fn tracing_pipeline(ctx: &Context) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let stages = [OPAQUE_RAYS, TRANSPARENT_RAYS, CLOSEST_MISS, SHADOW_MISS, CLOSEST_HIT, LEAF_ANY_HIT];
+    let stages = [OPAQUE_RAYS, TRANSPARENT_RAYS, CLOSEST_MISS, CLOSEST_HIT, LEAF_ANY_HIT];
     let modules = stages.map(|stage| stage.create(ctx, "reflections"));
-    let [opaque, transparent, closest_miss, shadow_miss, closest_hit, leaf] = modules;
+    let [opaque, transparent, closest_miss, closest_hit, leaf] = modules;
     let (closest_hit, leaf) = (closest_hit?, leaf?);
     let solid = HitGroup { closest_hit: Some(*closest_hit), ..HitGroup::default() };
     ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &[*opaque?, *transparent?],
-        miss: &[*closest_miss?, *shadow_miss?],
+        miss: &[*closest_miss?],
         hit_groups: &[solid, HitGroup { any_hit: Some(*leaf), ..solid }],
         max_recursion: 1,
         debug_name: "reflections",

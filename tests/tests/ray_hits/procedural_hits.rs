@@ -11,14 +11,20 @@ use lvk_tests::ray_scene::{Placed, instances};
 use lvk_tests::ray_tracer::{How, MISSED, RayTracer, requires_ray_queries, shader_with};
 use lvk_tests::rays::Ray;
 
-/// Generates hits at two distances in turn.
+/// Generates hits at two distances in turn. With FUNCTION, the traversal calls the function that does so.
 const TEXT: &str = r#"
+    #ifdef FUNCTION
+    #define LVK_CANDIDATE_FUNCTION generate
+    #endif
     #include "ray_query_start.glsl"
+    void generate(LvkRayQueryParameter rq) {
+        lvkRayQueryGenerateIntersection(rq, FIRST);
+        lvkRayQueryGenerateIntersection(rq, SECOND);
+    }
     void main() {
         START_RAY_QUERY;
         while (lvkRayQueryProceed(rq)) {
-            lvkRayQueryGenerateIntersection(rq, FIRST);
-            lvkRayQueryGenerateIntersection(rq, SECOND);
+            generate(rq);
         }
         HitRecord record = kNoHit;
         if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_GENERATED) {
@@ -29,10 +35,17 @@ const TEXT: &str = r#"
     }"#;
 
 /// Returns the hits of rays with these intervals, in an AABB in which hits are generated at `reports`, one after the
-/// other.
+/// other. A loop and a candidate function must generate the same.
 fn hits(ctx: &Context, reports: [f32; 2], ends: &[(f32, f32)]) -> Result<Vec<Option<f32>>> {
     let [first, second] = reports.map(|t| format!("{t:?}"));
-    let module = shader_with(ctx, ShaderStage::Compute, TEXT, &[("FIRST", &first), ("SECOND", &second)])?;
+    let defines = [("FIRST", first.as_str()), ("SECOND", &second), ("FUNCTION", "")];
+    let by_loop = hits_of_module(ctx, &defines[..2], ends)?;
+    assert_eq!(hits_of_module(ctx, &defines, ends)?, by_loop, "by a candidate function, by a loop");
+    Ok(by_loop)
+}
+
+fn hits_of_module(ctx: &Context, defines: &[(&str, &str)], ends: &[(f32, f32)]) -> Result<Vec<Option<f32>>> {
+    let module = shader_with(ctx, ShaderStage::Compute, TEXT, defines)?;
     let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
     let tracer = RayTracer::from_query(ctx, ctx.create_compute_pipeline(&desc)?);
     let corners = [[-1.0, -1.0, 0.0], [1.0, 1.0, 20.0_f32]];

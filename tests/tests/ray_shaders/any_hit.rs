@@ -32,13 +32,38 @@ impl Verdict {
     }
 }
 
-/// Shaders that count candidates, see `shaders/any_hit.rgen.glsl`.
-fn counter(ctx: &Context, method: Method, verdict: Verdict) -> Result<RayTracer> {
-    let defines = &[verdict.define()];
-    if method == Method::Query {
-        let text = include_str!("../../shaders/any_hit_query.comp.glsl");
-        return RayTracer::from_query_text(ctx, text, defines);
+/// The place of the shaders' decision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Judge {
+    AnyHitShader,
+    QueryLoop,
+    CandidateFunction,
+}
+
+impl Judge {
+    fn available(ctx: &Context) -> Vec<Self> {
+        let of_method = |method| match method {
+            Method::Pipeline => [Self::AnyHitShader].as_slice(),
+            Method::Query => &[Self::QueryLoop, Self::CandidateFunction],
+        };
+        Method::available(ctx).into_iter().flat_map(of_method).copied().collect()
     }
+}
+
+/// Shaders that count candidates, see `shaders/any_hit.rgen.glsl`.
+fn counter(ctx: &Context, judge: Judge, verdict: Verdict) -> Result<RayTracer> {
+    let query = include_str!("../../shaders/any_hit_query.comp.glsl");
+    match judge {
+        Judge::AnyHitShader => any_hit_counter(ctx, verdict),
+        Judge::QueryLoop => RayTracer::from_query_text(ctx, query, &[verdict.define()]),
+        Judge::CandidateFunction => {
+            RayTracer::from_query_text(ctx, query, &[verdict.define(), ("FUNCTION", "")])
+        }
+    }
+}
+
+fn any_hit_counter(ctx: &Context, verdict: Verdict) -> Result<RayTracer> {
+    let defines = &[verdict.define()];
     let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../../shaders/any_hit.rgen.glsl"))?;
     let miss = shader(ctx, ShaderStage::Miss, include_str!("../../shaders/any_hit_keep.rmiss.glsl"))?;
     let closest = shader(ctx, ShaderStage::ClosestHit, include_str!("../../shaders/any_hit.rchit.glsl"))?;
@@ -113,10 +138,10 @@ fn every_candidate_is_seen_once_where_that_is_asked() -> Result<()> {
     Ok(())
 }
 
-/// A scene on a device, and a method to trace it.
+/// A scene on a device, and a way to judge candidates of its rays.
 struct Case<'a> {
     ctx: &'a Context,
-    method: Method,
+    judge: Judge,
     gpu: &'a GpuScene,
     reference: &'a Reference,
     rays: &'a [Ray],
@@ -124,11 +149,11 @@ struct Case<'a> {
 
 impl Case<'_> {
     fn count(&self, verdict: Verdict, how: How) -> Result<Vec<HitRecord>> {
-        counter(self.ctx, self.method, verdict)?.trace(&self.gpu.tlas, self.rays, how)
+        counter(self.ctx, self.judge, verdict)?.trace(&self.gpu.tlas, self.rays, how)
     }
 }
 
-/// Runs a test of whole and of split meshes, whose two geometries have these flags, by each method.
+/// Runs a test of whole and of split meshes, whose two geometries have these flags, in each way to judge.
 fn for_each_case(flags: [GeometryFlags; 2], test: impl Fn(&Case<'_>) -> Result<()>) -> Result<()> {
     whole_and_split(50).iter().try_for_each(|ctx| for_each_method_of(ctx, &scene(flags), &test))
 }
@@ -136,8 +161,8 @@ fn for_each_case(flags: [GeometryFlags; 2], test: impl Fn(&Case<'_>) -> Result<(
 fn for_each_method_of(ctx: &Context, scene: &RayScene, test: impl Fn(&Case<'_>) -> Result<()>) -> Result<()> {
     let (gpu, reference) = (scene.upload(ctx)?, scene.reference());
     let rays = rays_for(&reference);
-    let case = |method| Case { ctx, method, gpu: &gpu, reference: &reference, rays: &rays };
-    Method::available(ctx).into_iter().try_for_each(|method| test(&case(method)))
+    let case = |judge| Case { ctx, judge, gpu: &gpu, reference: &reference, rays: &rays };
+    Judge::available(ctx).into_iter().try_for_each(|judge| test(&case(judge)))
 }
 
 fn candidates_are_seen_once(case: &Case<'_>) -> Result<()> {
@@ -145,7 +170,7 @@ fn candidates_are_seen_once(case: &Case<'_>) -> Result<()> {
     for (record, hits) in certain(case.reference, case.rays, &case.count(Verdict::Ignore, how)?, how) {
         let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
         let expected = [hits.len() as f32, sum as f32];
-        assert_eq!(record.barycentrics, expected, "{:?}: {hits:?}", case.method);
+        assert_eq!(record.barycentrics, expected, "{:?}: {hits:?}", case.judge);
         assert_eq!(record.kind, MISSED, "all were ignored");
     }
     Ok(())
@@ -155,13 +180,13 @@ fn candidates_are_seen_once(case: &Case<'_>) -> Result<()> {
 #[test]
 fn every_candidate_is_seen_at_least_once() -> Result<()> {
     for_each_case([GeometryFlags::empty(); 2], |case| {
-        let method = case.method;
+        let judge = case.judge;
         let how = How::default();
         let records = case.count(Verdict::Ignore, how)?;
         for (record, hits) in certain(case.reference, case.rays, &records, how) {
             let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
             let [seen, seen_sum] = record.barycentrics;
-            assert!(seen >= hits.len() as f32 && seen_sum >= sum as f32, "{method:?}: {seen} of {hits:?}");
+            assert!(seen >= hits.len() as f32 && seen_sum >= sum as f32, "{judge:?}: {seen} of {hits:?}");
             assert!(hits.is_empty() == (seen == 0.0));
         }
         Ok(())
@@ -172,17 +197,17 @@ fn every_candidate_is_seen_at_least_once() -> Result<()> {
 #[test]
 fn accepted_candidates_leave_the_closest() -> Result<()> {
     for_each_case([GeometryFlags::empty(), GeometryFlags::OPAQUE], |case| {
-        let method = case.method;
+        let judge = case.judge;
         for flags in [0, OPAQUE] {
             let how = How { flags, ..How::default() };
             let records = case.count(Verdict::Accept, how)?;
             HitComparison::of_shapes(case.rays, &records, |ray| case.reference.closest_by(ray, how))
-                .assert(&format!("all accepted by {method:?}, flags {flags}"));
+                .assert(&format!("all accepted by {judge:?}, flags {flags}"));
             for (record, hits) in certain(case.reference, case.rays, &records, how) {
                 let least = hits.first().is_some_and(|hit| !hit.is_opaque);
                 let most = hits.iter().filter(|hit| !hit.is_opaque).count();
                 let seen = record.barycentrics[0] as usize;
-                assert!(usize::from(least) <= seen && seen <= most, "{method:?}: {seen} of {hits:?}");
+                assert!(usize::from(least) <= seen && seen <= most, "{judge:?}: {seen} of {hits:?}");
             }
         }
         Ok(())
@@ -193,7 +218,7 @@ fn accepted_candidates_leave_the_closest() -> Result<()> {
 #[test]
 fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
     for_each_case([GeometryFlags::empty(); 2], |case| {
-        let method = case.method;
+        let judge = case.judge;
         for (verdict, flags) in [(Verdict::Terminate, 0), (Verdict::Accept, TERMINATE_ON_FIRST_HIT)] {
             let how = How { flags, ..How::default() };
             let records = case.count(verdict, how)?;
@@ -202,9 +227,9 @@ fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
                     assert_eq!((record.kind, record.barycentrics), (MISSED, [0.0; 2]));
                     continue;
                 };
-                assert_eq!(record.barycentrics[0], 1.0, "{method:?}: one candidate was judged");
+                assert_eq!(record.barycentrics[0], 1.0, "{judge:?}: one candidate was judged");
                 let hit = hits.iter().find(|hit| hit.ids == ids(record));
-                let hit = hit.unwrap_or_else(|| unreachable!("{method:?}: {record:?} is none of {hits:?}"));
+                let hit = hit.unwrap_or_else(|| unreachable!("{judge:?}: {record:?} is none of {hits:?}"));
                 let error = (f64::from(record.t) - hit.t).abs();
                 assert!(error <= 1e-5 * hit.t.max(1.0) && hit.t >= first.t, "{record:?}, {hit:?}");
                 assert_eq!(record.barycentrics[1], tag(&hit.ids) as f32);
@@ -218,16 +243,16 @@ fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
 #[test]
 fn ignored_hits_hide_nothing() -> Result<()> {
     for_each_case([GeometryFlags::empty(), GeometryFlags::OPAQUE], |case| {
-        let method = case.method;
+        let judge = case.judge;
         let how = How::default();
         let records = case.count(Verdict::Ignore, how)?;
         HitComparison::of_shapes(case.rays, &records, |ray| {
             case.reference.closest_by_where(ray, how, |hit| hit.is_opaque)
         })
-        .assert(&format!("behind the ignored by {method:?}"));
+        .assert(&format!("behind the ignored by {judge:?}"));
         for (record, hits) in certain(case.reference, case.rays, &records, how) {
             let before = hits.iter().take_while(|hit| !hit.is_opaque).count();
-            assert!(record.barycentrics[0] >= before as f32, "{method:?}: {record:?} of {hits:?}");
+            assert!(record.barycentrics[0] >= before as f32, "{judge:?}: {record:?} of {hits:?}");
         }
         Ok(())
     })

@@ -18,6 +18,7 @@
 //
 // A module whose rays treat triangles as opaque and meet no AABBs can define LVK_OPAQUE_TRIANGLES_ONLY before the
 // include. All its rays have LVK_RAY_FLAG_OPAQUE, without candidates. The library's own traversal is much faster then.
+// A module whose rays meet no AABBs, but candidate triangles, can define LVK_TRIANGLES_ONLY.
 //
 // A module can define LVK_CANDIDATE_FUNCTION before the include, as the name of a function that judges candidates in
 // place of the loop:
@@ -36,6 +37,8 @@
 // LVK_SOFTWARE_RAY_QUERY is defined (Capabilities::ray_query_path).
 
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
+#undef LVK_TRIANGLES_ONLY
+#define LVK_TRIANGLES_ONLY
 #define LVK_RAY_FLAGS_ALWAYS LVK_RAY_FLAG_OPAQUE
 #else
 #define LVK_RAY_FLAGS_ALWAYS LVK_RAY_FLAG_NONE

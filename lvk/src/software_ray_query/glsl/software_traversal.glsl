@@ -71,11 +71,16 @@ struct LvkSoftLevel {
 #define LVK_SOFT_ONE_NODE 0x80000000u
 #define LVK_SOFT_ANY_NODE 0x01000000u
 
-// Constants, so that compilers remove the code that a module without candidates does not need.
+// Constants, so that compilers remove the code that a module without candidates or without AABBs does not need.
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
 const bool kLvkSoftHasCandidates = false;
 #else
 const bool kLvkSoftHasCandidates = true;
+#endif
+#ifdef LVK_TRIANGLES_ONLY
+const bool kLvkSoftHasBoxes = false;
+#else
+const bool kLvkSoftHasBoxes = true;
 #endif
 
 #ifdef LVK_CANDIDATE_FUNCTION
@@ -182,7 +187,7 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     level.shear = lvkSoftShearOf(direction);
     bool isBox = level.kind == LVK_SOFT_BOXES;
     uint skip = isBox ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
-    bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftHasCandidates);
+    bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftHasBoxes);
     bool culled = level.opacity != LVK_SOFT_EACH && lvkSoftIsCulled(state.flags, level.opacity == LVK_SOFT_OPAQUE);
     // The entry point is a part of the BLAS. A moved BLAS has other parts, and is entered at its root.
     uint start = entry != 0u && level.structure == numbers.xy ? entry : head.z;
@@ -359,7 +364,7 @@ bool lvkSoftHandOver(inout LvkSoftState state, inout LvkSoftCursor cursor) {
 bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
     uint primitive = cursor.leaves.x + uint(findLSB(cursor.leaves.y));
     cursor.leaves.y &= cursor.leaves.y - 1u;
-    bool isBox = kLvkSoftHasCandidates && level.kind == LVK_SOFT_BOXES;
+    bool isBox = kLvkSoftHasBoxes && level.kind == LVK_SOFT_BOXES;
     LvkSoftHit hit = lvkSoftNoHit(0.0);
     hit.instance = cursor.instance;
     hit.primitive = primitive;
