@@ -327,7 +327,7 @@ mistakes! {
         "reflections/skin.comp.glsl": "serpent at rest": "= dot(row, p);" => "= v.position[axis];";
         "reflections/skin.comp.glsl": "serpent's normals at rest": "= dot(row.xyz, v.normal);" => "= v.normal[axis];";
         "reflections/leaves.comp.glsl": "leaves elsewhere": "return place + " => "return place + 0.7 + ";
-        "reflections/closest.rmiss.glsl": "no lights": "payload.instance = kNothing;" => "payload.instance = 0u;";
+        "reflections/closest.rmiss.glsl": "all rays are blocked": "payload.instance = kNothing;" => "payload = Hit(0u, 0u, 0u, vec2(0.2), 1.0);";
         "reflections/opaque.rgen.glsl": "only the sky in mirrors": HALL_RAYS => NO_HALL_RAYS;
         "reflections/transparent.rgen.glsl": "only the sky in glass": HALL_RAYS => NO_HALL_RAYS;
         "reflections/closest.rchit.glsl": "hits elsewhere": "= barycentrics;" => "= barycentrics.yx;";
