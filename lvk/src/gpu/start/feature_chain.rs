@@ -87,6 +87,7 @@ impl FeatureChain {
             info.p_enabled_features = &raw const self.core;
         }
         let mut new_links = missing_extension_structures(&mut self.ext, &merged, &present, &names);
+        let mut promoted = Vec::new();
         for version in [Version::V11, Version::V12, Version::V13] {
             if present.contains(&version.structure_type()) {
                 continue;
@@ -100,11 +101,13 @@ impl FeatureChain {
                 });
                 continue;
             }
-            new_links.extend(self.promoted.missing(version, &merged, &present));
+            promoted.push((version, merged));
             if version == Version::V12 {
                 names.extend(substitutes(&self.wanted, &self.substitutes)?);
             }
         }
+        // At once: a further reference to all places would end what was pointed to before.
+        new_links.extend(self.promoted.missing(&promoted, &present));
         for link in new_links {
             // SAFETY: the structure lies in `self`, and no reference to it is in use.
             unsafe { (*link).p_next = info.p_next.cast_mut().cast() };
@@ -388,15 +391,15 @@ macro_rules! promoted_structures {
         }
 
         impl Promoted {
-            /// Stores the structures of a version that are not present and have a feature on, and returns them as links.
+            /// Stores the structures of some versions that are not present and have one of the version's features on, and
+            /// returns them as links.
             fn missing(
                 &mut self,
-                version: Version,
-                all: &Features,
+                versions: &[(Version, Features)],
                 present: &[StructureType],
             ) -> Vec<*mut vk::BaseOutStructure<'static>> {
                 let mut links = Vec::new();
-                $(if version == Version::$version
+                $(if let Some((_, all)) = versions.iter().find(|(version, _)| *version == Version::$version)
                     && !present.contains(&<vk::$type<'_>>::STRUCTURE_TYPE)
                     && ($(all.$features.$field)|+) == vk::TRUE
                 {

@@ -29,10 +29,10 @@ bool lvkJudgeCandidates(LvkRayQueryParameter rq) {
 #define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
     rayQueryInitializeEXT(rq, kTLAS[nonuniformEXT(tlasIndex)], (flags) | LVK_RAY_FLAGS_ALWAYS, mask, origin, tMin, direction, tMax)
 // Steps to the next candidate that the shader must judge; false when the traversal is over.
-#ifdef LVK_CANDIDATE_FUNCTION
-#define lvkRayQueryProceed(rq) lvkJudgeCandidates(rq)
-#else
+#ifndef LVK_CANDIDATE_FUNCTION
 #define lvkRayQueryProceed(rq) rayQueryProceedEXT(rq)
+#else
+#define lvkRayQueryProceed(rq) lvkJudgeCandidates(rq)
 #endif
 // Ends the traversal; the committed hit stays.
 #define lvkRayQueryTerminate(rq) rayQueryTerminateEXT(rq)
