@@ -103,20 +103,39 @@ void pushBranches(Ray ray, Encounter met) {
     }
 }
 
-// `color` and the light along all waiting rays.
-vec3 followWaiting(vec3 color) {
-    while (waitingCount > 0u) {
-        Ray ray = waiting[--waitingCount];
-        Hit hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
-        if (hit.triangle != kNoTriangle) {
-            Encounter met = encounterAt(ray, surfaceOf(hit, ray));
+// Adds the light along a ray, whose surface is `point` if `isMet`, and along all waiting rays. All trace in one place: in ray
+// queries without hardware, each place is a traversal of its own.
+void addLightAlong(Ray ray, bool isMet, SurfacePoint point, inout vec3 color) {
+    while (true) {
+        if (!isMet) {
+            Hit hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
+            isMet = hit.triangle != kNoTriangle;
+            if (isMet) {
+                point = surfaceOf(hit, ray);
+            }
+        }
+        if (isMet) {
+            Encounter met = encounterAt(ray, point);
             color += localLight(ray, met);
             pushBranches(ray, met);
         } else {
             color += ray.weight * skyColor(ray.direction);
         }
+        if (waitingCount == 0u) {
+            return;
+        }
+        ray = waiting[--waitingCount];
+        isMet = false;
     }
-    return color;
+}
+
+// Adds the light along the rays that go on from a surface.
+void addLightBeyond(Ray ray, SurfacePoint point, inout vec3 color) {
+    waitingCount = 0u;
+    pushBranches(ray, encounterAt(ray, point));
+    if (waitingCount > 0u) {
+        addLightAlong(waiting[--waitingCount], false, point, color);
+    }
 }
 
 #endif

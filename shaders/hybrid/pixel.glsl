@@ -55,7 +55,8 @@ Ray primaryRay(uvec2 pixel) {
 
 #if defined(HYBRID_GBUFFER)
 // The triangle that the paper's geometry pass left in the G-buffer.
-Hit primaryHit(uvec2 pixel, Ray ray) {
+Hit primaryHit(uvec2 pixel, Ray ray, out bool isKnown) {
+    isKnown = true;
     return Hit(textureBindlessFetchU2D(frame.gbufferSurface, ivec2(pixel), 0).w, vec2(0.0));
 }
 
@@ -77,23 +78,24 @@ SurfacePoint primarySurface(uvec2 pixel, Ray ray, Hit hit) {
 #if defined(HYBRID_VISIBILITY)
 #include "hybrid/hardware_visibility.glsl"
 
-// Intersection of the pixel's ray with the triangle that the visibility pass found.
-Hit primaryHit(uvec2 pixel, Ray ray) {
+// Intersection of the pixel's ray with the triangle that the visibility pass found; unknown where that is in doubt.
+Hit primaryHit(uvec2 pixel, Ray ray, out bool isKnown) {
     bool isInDoubt;
     bool byHardware = frame.visibility.image != kNoImage;
     uint triangle = byHardware ? hardwareTriangle(ivec2(pixel), ray.direction, isInDoubt)
                                : visibleTriangle(pixel, isInDoubt);
+    isKnown = !isInDoubt;
     Hit hit = Hit(triangle, vec2(0.0));
-    if (isInDoubt) {
-        hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
-    } else if (hit.triangle != kNoTriangle) {
+    if (isKnown && hit.triangle != kNoTriangle) {
         hit.barycentrics = barycentricsAlong(hit.triangle, ray.origin, ray.direction);
     }
     return hit;
 }
 #else
-Hit primaryHit(uvec2 pixel, Ray ray) {
-    return traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
+// Unknown until the pixel's ray is traced.
+Hit primaryHit(uvec2 pixel, Ray ray, out bool isKnown) {
+    isKnown = false;
+    return Hit(kNoTriangle, vec2(0.0));
 }
 #endif
 
@@ -128,32 +130,48 @@ void renderBounces(uint index) {
     uvec2 pixel = uvec2(queued.place & 0xffffu, queued.place >> 16);
     Ray ray = primaryRay(pixel);
     SurfacePoint point = primarySurface(pixel, ray, Hit(queued.triangle, queued.barycentrics));
-    waitingCount = 0u;
-    pushBranches(ray, encounterAt(ray, point));
-    finishPixel(pixel, followWaiting(queued.color));
+    vec3 color = queued.color;
+    addLightBeyond(ray, point, color);
+    finishPixel(pixel, color);
 }
-#else
-// Renders the pixel, or its first surface alone where the rest is queued.
+#elif defined(HYBRID_QUEUE)
+// Renders the pixel, or its first surface alone where there is more: the rest is queued.
 void renderPixel(uvec2 pixel) {
     Ray ray = primaryRay(pixel);
-    Hit hit = primaryHit(pixel, ray);
+    bool isKnown;
+    Hit hit = primaryHit(pixel, ray, isKnown);
+    if (!isKnown) {
+        hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
+    }
     if (hit.triangle == kNoTriangle) {
         finishPixel(pixel, skyColor(ray.direction));
         return;
     }
     Encounter met = encounterAt(ray, primarySurface(pixel, ray, hit));
     vec3 color = localLight(ray, met);
-#if defined(HYBRID_QUEUE)
     if (goesOn(met.branches)) {
         uint place = takeBouncePlace();
         frame.bounces.pixels.at[place] = BouncePixel(pixel.x | pixel.y << 16, hit.triangle, hit.barycentrics, color);
         return;
     }
+    finishPixel(pixel, color);
+}
 #else
+void renderPixel(uvec2 pixel) {
+    Ray ray = primaryRay(pixel);
+    bool isKnown;
+    Hit hit = primaryHit(pixel, ray, isKnown);
+    if (isKnown && hit.triangle == kNoTriangle) {
+        finishPixel(pixel, skyColor(ray.direction));
+        return;
+    }
+    SurfacePoint point;
+    if (isKnown) {
+        point = primarySurface(pixel, ray, hit);
+    }
+    vec3 color = vec3(0.0);
     waitingCount = 0u;
-    pushBranches(ray, met);
-    color = followWaiting(color);
-#endif
+    addLightAlong(ray, isKnown, point, color);
     finishPixel(pixel, color);
 }
 #endif

@@ -160,6 +160,31 @@ fn some_calls_of_a_window_fail() {
     assert_no_flaws("window", &program, &SweepPlan { errors, ..some(12) }, SAMPLE);
 }
 
+/// Asserts that a fault is reached, and has no flaws.
+fn assert_told(program: &Program, fault: &str) {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (clean, _) = run(program, &layer, caches.path(), None).unwrap();
+    let parsed = fault.parse().unwrap();
+    let (outcome, _) = run(program, &layer, caches.path(), Some(&parsed)).unwrap();
+    assert!(outcome.reached, "{fault}");
+    assert_eq!(flaws(Some(&parsed), &outcome, &clean), [], "{fault}: {}", outcome.stderr);
+}
+
+/// Faults that a whole sweep found once (docs/reliability.md).
+#[test]
+fn faults_that_had_flaws_have_none() {
+    assert_told(&program("queues"), "vkQueueWaitIdle 1 device-memory stays");
+    assert_told(&program("blas"), "vkGetQueryPoolResults 1 device-lost once");
+    let Some((_connection, _display, program)) = in_window() else { return };
+    for fault in [
+        "vkGetFenceStatus 1 device-lost once",
+        "vkGetPhysicalDeviceSurfaceSupportKHR 1 host-memory once",
+        "vkCreateXcbSurfaceKHR 1 host-memory once",
+    ] {
+        assert_told(&program, fault);
+    }
+}
+
 /// The layer sees objects that are not destroyed.
 #[test]
 fn a_forgotten_fence_is_a_leak() {

@@ -10,7 +10,7 @@ const PAGE: &str = include_str!("../../../docs/bad-input.md");
 const INTERFACE: &str = include_str!("../../../lvk/public-api.txt");
 const ERRORS: &str = include_str!("../../../lvk/src/error/mod.rs");
 /// Handles of objects. A submission has none.
-const HANDLES: [&str; 11] = [
+const HANDLES: [&str; 12] = [
     "AccelStructHandle",
     "BufferHandle",
     "ComputePipelineHandle",
@@ -22,6 +22,7 @@ const HANDLES: [&str; 11] = [
     "SamplerHandle",
     "ShaderModuleHandle",
     "SwapchainHandle",
+    "TextureHandle",
 ];
 
 /// Functions of the harness that expect an error of a variant.

@@ -43,7 +43,7 @@ pub struct SweepReport {
     pub reached: usize,
     /// Runs that ended with an error.
     pub refused: usize,
-    /// Runs that ended with success.
+    /// Runs in which the fault was reached, and that ended with success.
     pub succeeded: usize,
     /// Runs with flaws.
     pub flawed: Vec<FlawedRun>,
@@ -75,7 +75,7 @@ impl SweepReport {
         self.runs += 1;
         self.reached += usize::from(outcome.reached);
         match outcome.ending {
-            Ending::Status(0) => self.succeeded += 1,
+            Ending::Status(0) => self.succeeded += usize::from(outcome.reached),
             Ending::Status(_) => self.refused += 1,
             _ => {}
         }
