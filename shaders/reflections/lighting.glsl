@@ -9,7 +9,7 @@
 // Share of the ambient light that the reflected surroundings let through: no ray counts it there.
 const float kAmbientOffScreen = 0.6;
 
-// `visibility`: a channel for each light, 1 where nothing blocks it.
+// `visibility`: a channel for each light, 1 where nothing blocks it, or where the light is too dim for a ray.
 vec3 lightDirectly(LitPoint point, vec4 visibility) {
     vec3 color = vec3(0.0);
     for (uint i = 0u; i < frame.lightCount; ++i) {

@@ -18,7 +18,8 @@
 //
 // A module whose rays treat triangles as opaque and meet no AABBs can define LVK_OPAQUE_TRIANGLES_ONLY before the
 // include. All its rays have LVK_RAY_FLAG_OPAQUE, without candidates. The library's own traversal is much faster then.
-// A module whose rays meet no AABBs, but candidate triangles, can define LVK_TRIANGLES_ONLY.
+// A module that has candidate triangles, but whose rays meet no AABBs, can define LVK_TRIANGLES_ONLY, a promise: where a
+// ray does meet an AABB, the library's own traversal misses it, and a device does not.
 //
 // A module can define LVK_CANDIDATE_FUNCTION before the include, as the name of a function that judges candidates in
 // place of the loop:
