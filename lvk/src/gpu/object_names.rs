@@ -21,10 +21,8 @@ impl Gpu {
         let Some(ext) = &self.debug_utils else { return };
         let name = c_name(name);
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
-        // SAFETY: the object is alive and belongs to this device.
-        let named = with_shared_loader_lock(|| unsafe { ext.set_debug_utils_object_name(&info) });
-        // A failure only loses a name.
-        let _ = named;
+        // SAFETY: the object is alive and belongs to this device. A failure only loses a name.
+        let _ = with_shared_loader_lock(|| unsafe { ext.set_debug_utils_object_name(&info) });
     }
 
     /// Begins a labelled range in a command buffer.

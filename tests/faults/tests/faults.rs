@@ -12,7 +12,7 @@ use lvk_faults::fault::FaultError;
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
 use lvk_faults::sweep::run::{LayerFolder, Program, run};
-use lvk_faults::sweep::verdict::{Flaw, flaws};
+use lvk_faults::sweep::verdict::{Flaw, RunOutcome, flaws};
 use x11rb::rust_connection::RustConnection;
 
 /// Time of a full sweep.
@@ -160,14 +160,15 @@ fn some_calls_of_a_window_fail() {
     assert_no_flaws("window", &program, &SweepPlan { errors, ..some(12) }, SAMPLE);
 }
 
-/// Asserts that a fault is reached, and has no flaws.
-fn assert_told(program: &Program, fault: &str) {
+/// Asserts that a fault is reached, and has no flaws. Returns what was found with the fault, and without.
+fn assert_told(program: &Program, fault: &str) -> [RunOutcome; 2] {
     let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
     let (clean, _) = run(program, &layer, caches.path(), None).unwrap();
     let parsed = fault.parse().unwrap();
     let (outcome, _) = run(program, &layer, caches.path(), Some(&parsed)).unwrap();
     assert!(outcome.reached, "{fault}");
     assert_eq!(flaws(Some(&parsed), &outcome, &clean), [], "{fault}: {}", outcome.stderr);
+    [outcome, clean]
 }
 
 /// Faults that a whole sweep found once (docs/reliability.md).
@@ -209,10 +210,6 @@ fn a_fault_at_the_creation_of_the_device_is_told() {
 /// The layer stays loaded, so that a fault that is to happen once does not hit the second try.
 #[test]
 fn a_fault_happens_once_in_a_process() {
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let (clean, _) = run(&program("queues"), &layer, caches.path(), None).unwrap();
-    let fault = "vkQueueSubmit2 2 device-lost once".parse().unwrap();
-    let (outcome, _) = run(&program("queues"), &layer, caches.path(), Some(&fault)).unwrap();
-    assert_eq!(flaws(Some(&fault), &outcome, &clean), [], "{}", outcome.stderr);
+    let [outcome, clean] = assert_told(&program("queues"), "vkQueueSubmit2 2 device-lost once");
     assert_eq!((outcome.result, outcome.second_result), (None, clean.result));
 }

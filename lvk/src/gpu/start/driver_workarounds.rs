@@ -66,40 +66,46 @@ mod tests {
         });
     }
 
-    #[test]
-    fn no_list_is_searched_while_a_device_or_an_instance_comes_or_goes() {
-        let searches = AtomicU32::new(0);
-        let search = || {
-            searches.fetch_add(1, Ordering::SeqCst);
+    /// A call under a shared lock, which another one must not meet.
+    struct SharedCall(AtomicU32);
+
+    impl SharedCall {
+        fn run(&self) {
+            self.0.fetch_add(1, Ordering::SeqCst);
             thread::yield_now();
-            searches.fetch_sub(1, Ordering::SeqCst);
-        };
+            self.0.fetch_sub(1, Ordering::SeqCst);
+        }
+
+        fn running(&self) -> u32 {
+            self.0.load(Ordering::SeqCst)
+        }
+    }
+
+    /// Asserts that none of three threads is inside of a call by `shared` when `exclusive` counts the calls.
+    fn assert_excluded(shared: impl Fn(&SharedCall) + Sync, exclusive: impl Fn(&SharedCall) -> u32) {
+        let call = SharedCall(AtomicU32::new(0));
         thread::scope(|scope| {
             for _ in 0..3 {
-                scope.spawn(|| (0..500).for_each(|_| with_shared_loader_lock(search)));
+                scope.spawn(|| (0..500).for_each(|_| shared(&call)));
             }
             for _ in 0..500 {
-                assert_eq!(with_exclusive_loader_lock(|| searches.load(Ordering::SeqCst)), 0);
-                assert_eq!(with_exclusive_device_lock(NVIDIA, || searches.load(Ordering::SeqCst)), 0);
+                assert_eq!(exclusive(&call), 0);
             }
         });
     }
 
     #[test]
+    fn no_list_is_searched_while_a_device_or_an_instance_comes_or_goes() {
+        let search = |call: &SharedCall| with_shared_loader_lock(|| call.run());
+        assert_excluded(search, |call| with_exclusive_loader_lock(|| call.running()));
+        assert_excluded(search, |call| with_exclusive_device_lock(NVIDIA, || call.running()));
+    }
+
+    #[test]
     fn no_pipeline_is_made_while_a_device_comes_or_goes() {
-        let made = AtomicU32::new(0);
-        let make = || {
-            made.fetch_add(1, Ordering::SeqCst);
-            thread::yield_now();
-            made.fetch_sub(1, Ordering::SeqCst);
-        };
-        thread::scope(|scope| {
-            for _ in 0..3 {
-                scope.spawn(|| (0..500).for_each(|_| with_shared_device_lock(NVIDIA, make)));
-            }
-            for _ in 0..500 {
-                assert_eq!(with_exclusive_device_lock(NVIDIA, || made.load(Ordering::SeqCst)), 0);
-            }
-        });
+        assert_excluded(
+            |call| with_shared_device_lock(NVIDIA, || call.run()),
+            |call| with_exclusive_device_lock(NVIDIA, || call.running()),
+        );
     }
 }
