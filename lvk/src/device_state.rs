@@ -21,6 +21,7 @@ use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::gpu::caps::queues::IdleFailure;
 use crate::handle::AccelStructHandle;
 use crate::kernels::Kernels;
 use crate::leak_report;
@@ -341,10 +342,10 @@ impl Drop for DeviceState {
     fn drop(&mut self) {
         let idle = persistent_wait(|| self.gpu.queues.wait_idle(&self.gpu.device), std::thread::sleep);
         // The caller has the report of a loss.
-        if let Err(result) = idle
+        if let Err(failure) = idle
             && self.submitter.loss().get().is_none()
         {
-            log::error!("vkQueueWaitIdle returned {result} at the end of a context");
+            log::error!("the end of a context: {}", failure.into_error());
         }
         drop(self.submitter.drain());
         self.free_leaked_objects();
@@ -354,16 +355,14 @@ impl Drop for DeviceState {
 /// Waits for the queues. A wait that fails for want of memory is tried again for about a second: objects that the device
 /// still uses must not be destroyed, and the work that is under way ends in the meantime.
 fn persistent_wait(
-    mut wait: impl FnMut() -> Result<(), vk::Result>,
+    mut wait: impl FnMut() -> Result<(), IdleFailure>,
     mut pause: impl FnMut(Duration),
-) -> Result<(), vk::Result> {
+) -> Result<(), IdleFailure> {
     const PAUSE: Duration = Duration::from_millis(20);
     const TRIES: usize = 50;
     for _ in 0..TRIES {
         match wait() {
-            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) => {
-                pause(PAUSE)
-            }
+            Err(failure) if failure.lacks_memory() => pause(PAUSE),
             ended => return ended,
         }
     }
@@ -373,9 +372,10 @@ fn persistent_wait(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::queue::Queue;
 
     /// Returns the results of the wait, and the number of pauses, for a wait that gives these results, the last for good.
-    fn waited(results: &[Result<(), vk::Result>]) -> (Result<(), vk::Result>, usize) {
+    fn waited(results: &[Result<(), IdleFailure>]) -> (Result<(), IdleFailure>, usize) {
         let (mut calls, mut pauses) = (0, 0);
         let wait = || {
             calls += 1;
@@ -386,12 +386,13 @@ mod tests {
 
     #[test]
     fn a_wait_that_lacks_memory_is_tried_again() {
-        let (host, device) =
-            (Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY), Err(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY));
+        let failed = |result| Err(IdleFailure { queue: Queue::Graphics, result });
+        let host = failed(vk::Result::ERROR_OUT_OF_HOST_MEMORY);
+        let device = failed(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         assert_eq!(waited(&[Ok(())]), (Ok(()), 0));
         assert_eq!(waited(&[host, device, Ok(())]), (Ok(()), 2));
         assert_eq!(waited(&[host]), (host, 50));
-        let lost = Err(vk::Result::ERROR_DEVICE_LOST);
+        let lost = failed(vk::Result::ERROR_DEVICE_LOST);
         assert_eq!(waited(&[device, lost]), (lost, 1), "no wait brings a lost device back");
     }
 }

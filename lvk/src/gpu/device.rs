@@ -463,15 +463,15 @@ fn create_with_fallback(
     };
     let required = request.pipeline == FeatureRequest::Required || request.query.requires_hardware();
     if required || !caps.hardware_acceleration_structures() {
-        return Err(Error::vulkan("vkCreateDevice")(first));
+        return Err(Error::vulkan("vkCreateDevice", &caps.device_name)(first));
     }
     caps.limits.max_bindless_tlas = 0;
     caps.ray_query = false;
     caps.choose_ray_tracing(FeatureRequest::Off, request.query);
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing returned {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it returned {first}", caps.device_name);
-    let (device, features) =
-        create(instance, chosen, &caps, &request.extra).map_err(Error::vulkan("vkCreateDevice"))?;
+    let (device, features) = create(instance, chosen, &caps, &request.extra)
+        .map_err(Error::vulkan("vkCreateDevice", &caps.device_name))?;
     Ok((device, caps, features))
 }
 

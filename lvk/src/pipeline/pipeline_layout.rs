@@ -43,7 +43,7 @@ impl PipelineLayout {
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&ranges);
         // SAFETY: the set layouts are alive and the range is within the limit.
         let raw = unsafe { gpu.device.create_pipeline_layout(&info, None) }
-            .map_err(Error::creating("vkCreatePipelineLayout", "pipeline layout"))?;
+            .map_err(Error::vulkan("vkCreatePipelineLayout", "pipeline layout"))?;
         Ok(Self { raw, push_constant_bytes: bytes, inputs, gpu: Arc::clone(gpu) })
     }
 }

@@ -127,7 +127,7 @@ impl RayTracingPipeline {
                 bytes,
             )
         }
-        .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR"))
+        .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR", &self.name))
     }
 
     /// Returns the regions of the shader binding table for a trace from ray generation shader `index`.

@@ -63,7 +63,7 @@ impl ShaderModule {
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the words are a complete module for a stage and features of this device.
         let raw = unsafe { gpu.device.create_shader_module(&info, None) }
-            .map_err(Error::creating("vkCreateShaderModule", desc.debug_name))?;
+            .map_err(Error::vulkan("vkCreateShaderModule", desc.debug_name))?;
         gpu.name(raw, desc.debug_name);
         let name = desc.debug_name.to_owned();
         Ok(Self { raw, stage: desc.stage, reflection, name, gpu: Arc::clone(gpu) })

@@ -161,15 +161,16 @@ mod tests {
         let at = FaultAddress { kind: FaultKind::FaultingInstruction, address: 0x77, range: 0x77..0x78 };
         assert_eq!(fault.addresses, [read, at]);
         assert_eq!(fault.vendor, [VendorFault { description: "unit 7".to_owned(), code: 0xab, data: 3 }]);
-        let report = DeviceLossReport { call: "vkQueueSubmit2", fault: Some(fault), queues: Vec::new() };
+        let (call, object) = ("vkQueueSubmit2", "graphics queue".to_owned());
+        let report = DeviceLossReport { call, object, fault: Some(fault), queues: Vec::new() };
         let error = Error::DeviceLost { report: Arc::new(report) }.to_string();
         assert_eq!(
             error,
-            "the device was lost in vkQueueSubmit2 (page fault; InvalidRead at 0x12000 to 0x12fff; FaultingInstruction \
+            "the device was lost in vkQueueSubmit2 for 'graphics queue' (page fault; InvalidRead at 0x12000 to 0x12fff; FaultingInstruction \
              at 0x77 to 0x77; unit 7 (code 0xab, data 0x3)); create a new context"
         );
-        let error = Error::device_lost("vkQueueSubmit2").to_string();
-        assert_eq!(error, "the device was lost in vkQueueSubmit2; create a new context");
+        let error = Error::device_lost("vkQueueSubmit2", "graphics queue").to_string();
+        assert_eq!(error, "the device was lost in vkQueueSubmit2 for 'graphics queue'; create a new context");
     }
 
     #[test]
