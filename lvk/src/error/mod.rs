@@ -337,14 +337,15 @@ impl Error {
         }
     }
 
-    /// Adds the name of the object that a buffer of the library serves, if the error is that of a Vulkan call about this
-    /// buffer.
-    pub(crate) fn with_owner(mut self, owner: &str) -> Self {
+    /// Adds the name of the object that `part`, a buffer of the library, serves. Errors about other objects stay as they
+    /// are.
+    pub(crate) fn with_owner(mut self, part: &str, owner: &str) -> Self {
         if let Self::OutOfDeviceMemory { object, .. }
         | Self::OutOfHostMemory { object, .. }
         | Self::Vulkan { object, .. } = &mut self
+            && object == part
         {
-            *object = format!("{object} of {owner}");
+            *object = format!("{part} of {owner}");
         }
         self
     }
@@ -563,13 +564,15 @@ mod tests {
 
     #[test]
     fn buffers_of_the_library_have_the_name_of_their_owner_too() {
-        let owned = |error: Error| error.with_owner("water").to_string();
+        let owned = |error: Error| error.with_owner("readback", "water").to_string();
         let memory = Error::allocating("readback", 8)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         let expected = "out of device memory in vkAllocateMemory for 'readback of water' (8 bytes)";
         assert_eq!(owned(memory), expected);
         let host = Error::vulkan("vkMapMemory", "readback");
         let expected = "out of host memory in vkMapMemory for 'readback of water'";
         assert_eq!(owned(host(vk::Result::ERROR_OUT_OF_HOST_MEMORY)), expected);
+        let waits = Error::vulkan("vkWaitSemaphores", "timeline")(vk::Result::ERROR_OUT_OF_HOST_MEMORY);
+        assert_eq!(owned(waits.clone()), waits.to_string(), "of another object");
         assert_eq!(owned(Error::usage("grass", "is green")), "grass: is green");
     }
 

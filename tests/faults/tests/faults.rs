@@ -186,6 +186,25 @@ fn faults_that_had_flaws_have_none() {
     }
 }
 
+/// Objects of calls that create nothing: recording, submission and waits.
+#[test]
+fn errors_of_recording_submission_and_waits_name_the_object() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    for (command, object) in [
+        ("vkResetCommandPool", "command buffer of the graphics queue"),
+        ("vkBeginCommandBuffer", "command buffer of the graphics queue"),
+        ("vkEndCommandBuffer", "uploads and builds"),
+        ("vkQueueSubmit2", "graphics queue"),
+        ("vkWaitSemaphores", "timeline semaphore of the graphics queue"),
+        ("vkEnumeratePhysicalDevices", "instance"),
+    ] {
+        let fault = format!("{command} 1 host-memory stays").parse().unwrap();
+        let (outcome, _) = run(&program("hot_reload"), &layer, caches.path(), Some(&fault)).unwrap();
+        let expected = format!("error: out of host memory in {command} for '{object}'\n");
+        assert!(outcome.reached && outcome.stderr.contains(&expected), "{fault}: {}", outcome.stderr);
+    }
+}
+
 /// The layer sees objects that are not destroyed.
 #[test]
 fn a_forgotten_fence_is_a_leak() {

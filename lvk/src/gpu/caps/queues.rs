@@ -283,6 +283,18 @@ mod tests {
     }
 
     #[test]
+    fn failed_waits_name_the_first_queue_that_uses_the_vulkan_queue() {
+        let raw = |handle, family| (vk::Queue::from_raw(handle), family);
+        let queues = Queues::new([raw(1, 0), raw(2, 1), raw(1, 0)], QueueRequest::OwnHardware);
+        let text = |place| {
+            let result = vk::Result::ERROR_OUT_OF_HOST_MEMORY;
+            IdleFailure { queue: queues.first_user(place), result }.into_error().to_string()
+        };
+        assert_eq!(text(0), "out of host memory in vkQueueWaitIdle for 'graphics queue'");
+        assert_eq!(text(1), "out of host memory in vkQueueWaitIdle for 'compute queue'");
+    }
+
+    #[test]
     fn own_hardware_is_not_shared() {
         let own = |indices: [u32; 3]| {
             let locations = indices.map(|index| QueueLocation { family: 0, index });
