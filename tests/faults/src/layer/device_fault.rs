@@ -320,7 +320,6 @@ mod tests {
         let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default();
         let mut other = vk::PhysicalDeviceVulkan12Features::default();
         let mut last = vk::PhysicalDeviceVulkan13Features::default();
-        last.p_next = std::ptr::null_mut();
         fault.p_next = (&raw mut last).cast();
         other.p_next = (&raw mut fault).cast();
         let mut chain: *mut std::ffi::c_void = (&raw mut other).cast();
