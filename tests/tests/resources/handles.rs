@@ -333,7 +333,7 @@ fn a_context_ends_well_with_released_objects_and_uploads_that_never_ran() {
 }
 
 #[test]
-fn buffers_are_found_by_their_addresses() {
+fn buffers_are_listed_by_their_addresses() {
     let Some(ctx) = device() else { return };
     let create = |debug_name| {
         ctx.create_buffer(&BufferDesc { size_bytes: 64, debug_name, ..Default::default() }).unwrap()
