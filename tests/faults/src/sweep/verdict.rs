@@ -25,6 +25,8 @@ pub struct RunOutcome {
     pub stderr: String,
     /// True if the fault was reached.
     pub reached: bool,
+    /// Commands that told other threads of the loss of a device.
+    pub told_others: BTreeSet<String>,
     /// Live objects at the end, by type.
     pub live: BTreeMap<String, i64>,
     /// The result of the first try, a picture or values. `None` if it was not written.
@@ -130,7 +132,9 @@ fn judge_result(
     let errors: Vec<&str> = found.stderr.lines().filter(|line| line.starts_with("error: ")).collect();
     match *errors {
         [error] => {
-            if fault.is_some_and(|fault| !names_cause(error, fault)) {
+            // A device is lost for all threads, and the first that notices it makes the report.
+            let names_other = found.told_others.iter().any(|command| error.contains(command));
+            if fault.is_some_and(|fault| !names_other && !names_cause(error, fault)) {
                 flaws.push(Flaw::UnnamedCommand(error.to_owned()));
             } else if !names_object(error) {
                 flaws.push(Flaw::UnnamedObject(error.to_owned()));
@@ -199,6 +203,7 @@ mod tests {
             ending: Ending::Status(0),
             stderr: String::new(),
             reached: false,
+            told_others: BTreeSet::new(),
             live: BTreeMap::new(),
             result: Some(b"picture".to_vec()),
             second_result: None,
@@ -228,7 +233,10 @@ mod tests {
     #[test]
     fn the_right_result_and_a_polite_refusal_pass() {
         let other_shader = RunOutcome { files: BTreeSet::from(["caches/3.spirv".to_owned()]), ..clean() };
-        for outcome in [clean(), refused(), other_shader] {
+        let told_others = BTreeSet::from(["vkWaitSemaphores".to_owned()]);
+        let stderr = "error: the device was lost in vkWaitSemaphores".to_owned();
+        let by_other_thread = RunOutcome { told_others, stderr, ..refused() };
+        for outcome in [clean(), refused(), other_shader, by_other_thread] {
             assert_eq!(found(&outcome), []);
         }
         let twice = RunOutcome { second_result: None, stderr: refused().stderr.repeat(2), ..refused() };
