@@ -1,5 +1,29 @@
 //! Lowers the shaders of a ray tracing pipeline to one compute shader, which traverses in software or by ray queries.
 
+mod assemble;
+mod block_pointers;
+mod calls;
+mod control_flow;
+mod demote;
+mod donor;
+mod emit;
+mod flatten;
+mod inline;
+mod instruction;
+mod judges;
+mod linker;
+mod liveness;
+mod module;
+mod prune;
+mod shaders;
+mod stage;
+mod traces;
+
+use self::assemble::Assembly;
+use self::donor::Donor;
+use self::linker::Linker;
+use self::shaders::Shaders;
+use self::traces::{Passed, TraceVariables};
 use crate::shader::ShaderStage;
 
 /// The implementation of the traversal in a lowered pipeline.
@@ -11,6 +35,8 @@ pub(crate) enum Traversal {
     SoftwareGpu,
     /// The library's own traversal for devices that are CPUs.
     SoftwareCpu,
+    /// As [`SoftwareCpu`](Self::SoftwareCpu), where gathers of 64 bits are as fast as those of 32.
+    SoftwareCpuPairs,
 }
 
 /// One shader of the pipeline.
@@ -21,6 +47,8 @@ pub(crate) struct StageModule<'a> {
     pub(crate) stage: ShaderStage,
     /// SPIR-V with the entry point `main`, validated and reflected.
     pub(crate) words: &'a [u32],
+    /// Ids and bits of specialization constants.
+    pub(crate) specialization: &'a [(u32, u64)],
 }
 
 /// The shaders of a hit group, as indices in [`Lowering::modules`].
@@ -47,8 +75,6 @@ pub(crate) struct Lowering<'a> {
     pub(crate) callable: &'a [usize],
     /// Distances between the records of the table in bytes: of miss shaders, hit groups and callable shaders.
     pub(crate) strides: [u32; 3],
-    /// Ids and bits of the specialization constants of all modules.
-    pub(crate) specialization: &'a [(u32, u64)],
     pub(crate) max_recursion: u32,
     pub(crate) max_callable_depth: u32,
 }
@@ -90,6 +116,34 @@ impl Launch {
 /// Returns the words of a compute shader with the entry point `main`, which does all that the pipeline does for a launch
 /// of one ray generation shader. Specialization constants have their values.
 pub(crate) fn lower(lowering: &Lowering<'_>) -> Result<Vec<u32>, LoweringError> {
-    let shader = lowering.modules[lowering.ray_gen].name.to_owned();
-    Err(LoweringError { shader, message: "not yet".to_owned() })
+    let ray_gen = lowering.modules.get(lowering.ray_gen).map_or("", |module| module.name);
+    let failed = |message| LoweringError { shader: ray_gen.to_owned(), message };
+    let mut linker = Linker::new(VERSION_1_6);
+    let mut shaders = Shaders::link(&mut linker, lowering)?;
+    let needs = shaders.needs(&linker, lowering);
+    let donor = Donor::link(&mut linker, lowering.traversal, needs).map_err(failed)?;
+    linker.module.memory_model = memory_model();
+    let uint = linker.uint();
+    let callable_index = linker.private(uint);
+    let mut variables = TraceVariables {
+        donor: &donor,
+        payloads: Passed::default(),
+        callables: Passed::default(),
+        callable_index,
+    };
+    let mut attributes = Passed::default();
+    shaders.rewrite(&mut linker, lowering, &mut variables, &mut attributes)?;
+    let main = Assembly::new(&mut linker, lowering, &shaders, variables, attributes).assemble()?;
+    Ok(prune::finish(linker, main).words())
 }
+
+/// Version word of SPIR-V 1.6.
+const VERSION_1_6: u32 = 0x0001_0600;
+
+/// Returns the operands of the memory model, with 64-bit addresses.
+fn memory_model() -> Vec<u32> {
+    vec![::spirv::AddressingModel::PhysicalStorageBuffer64 as u32, ::spirv::MemoryModel::GLSL450 as u32]
+}
+
+#[cfg(all(test, feature = "glsl", feature = "software-ray-query"))]
+mod tests;
