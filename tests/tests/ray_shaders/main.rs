@@ -6,5 +6,6 @@ mod invocation_reorder;
 mod pipelines;
 mod query_getters;
 mod query_stages;
+mod random_pipelines;
 mod swiftshader;
 mod which_runs;

@@ -88,8 +88,11 @@ impl<'a> Assembly<'a> {
     fn needs_machine(&self) -> bool {
         let ray_gen = self.lowering.ray_gen;
         let others = self.shaders.linked.keys().any(|index| *index != ray_gen && self.shaders.waits(*index));
-        let places =
-            self.shaders.linked.get(&ray_gen).map_or(0, |shader| self.shaders.wait_count(self.linker, shader.entry));
+        let places = self
+            .shaders
+            .linked
+            .get(&ray_gen)
+            .map_or(0, |shader| self.shaders.wait_count(self.linker, shader.entry));
         others || places > 1 || self.shaders.callables_wait
     }
 
@@ -168,7 +171,11 @@ impl<'a> Assembly<'a> {
         let shared: Vec<(u32, u32)> = {
             let committed = &mut self.committed_attributes;
             let linker = &mut *self.linker;
-            self.candidate_attributes.all().into_iter().map(|from| (from, committed.variable(linker, from))).collect()
+            self.candidate_attributes
+                .all()
+                .into_iter()
+                .map(|from| (from, committed.variable(linker, from)))
+                .collect()
         };
         let mut code = Vec::new();
         let mut emitter = Emitter::new(self.linker, &mut code);
@@ -197,7 +204,11 @@ impl<'a> Assembly<'a> {
                 self.lowering.miss.iter().enumerate().for_each(|(at, shader)| add(Some(*shader), false, at));
             }
             Situation::Callable => {
-                self.lowering.callable.iter().enumerate().for_each(|(at, shader)| add(Some(*shader), false, at));
+                self.lowering
+                    .callable
+                    .iter()
+                    .enumerate()
+                    .for_each(|(at, shader)| add(Some(*shader), false, at));
             }
             _ => {
                 for (at, group) in self.lowering.hit.iter().enumerate() {
@@ -340,12 +351,14 @@ impl<'a> Assembly<'a> {
     /// Replaces the bare instructions that no function waits at by calls.
     fn call_in_place(&mut self, trace: u32, callable: u32) {
         let void = self.linker.void();
-        let new_ids: usize = self.linker.module.functions.iter().map(|function| function.code().count()).sum();
+        let new_ids: usize =
+            self.linker.module.functions.iter().map(|function| function.code().count()).sum();
         let mut next = self.linker.module.bound;
         self.linker.module.bound = next.saturating_add(new_ids as u32);
         let pieces = self.pieces.iter_mut().flat_map(|pieces| &mut pieces.blocks);
         let in_pieces = pieces.flat_map(|block| &mut block.code);
-        let in_functions = self.linker.module.functions.iter_mut().flat_map(super::module::Function::code_mut);
+        let in_functions =
+            self.linker.module.functions.iter_mut().flat_map(super::module::Function::code_mut);
         for inst in in_functions.chain(in_pieces) {
             let function = match inst.op {
                 Op::TraceRayKHR => trace,
@@ -426,8 +439,7 @@ impl<'a> Assembly<'a> {
         }
         first.push(jump(outer));
         let outer_end = self.linker.new_id();
-        let outer_head =
-            vec![Inst::new(Op::LoopMerge, &[outer_end, outer_next, 0]), jump(inner)];
+        let outer_head = vec![Inst::new(Op::LoopMerge, &[outer_end, outer_next, 0]), jump(inner)];
         let inner_head = vec![Inst::new(Op::LoopMerge, &[idle, machine.next, 0]), jump(check)];
         let mut of_check = Vec::new();
         let mut emitter = Emitter::new(self.linker, &mut of_check);
@@ -454,7 +466,8 @@ impl<'a> Assembly<'a> {
         let variables = pieces.iter_mut().flat_map(|pieces| std::mem::take(&mut pieces.variables));
         start.code.splice(0..0, variables);
         let plain = |(label, code)| Block { label, code };
-        let head = [(body, first), (outer, outer_head), (inner, inner_head), (check, of_check), (run, of_run)];
+        let head =
+            [(body, first), (outer, outer_head), (inner, inner_head), (check, of_check), (run, of_run)];
         let tail = [(ran, vec![jump(machine.next)]), (machine.next, vec![jump(inner)]), (idle, of_idle)];
         let last = [
             (outer_next, vec![jump(outer)]),

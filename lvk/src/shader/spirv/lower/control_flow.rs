@@ -29,7 +29,8 @@ pub(super) struct ControlFlow {
 impl ControlFlow {
     pub(super) fn of(function: &Function) -> Self {
         let blocks = &function.blocks;
-        let index: HashMap<u32, usize> = blocks.iter().enumerate().map(|(at, block)| (block.label, at)).collect();
+        let index: HashMap<u32, usize> =
+            blocks.iter().enumerate().map(|(at, block)| (block.label, at)).collect();
         let targets = |block: &Block| -> Vec<usize> {
             let labels = block.terminator().map(branch_targets).unwrap_or_default();
             labels.iter().filter_map(|label| index.get(label).copied()).collect()
@@ -120,7 +121,8 @@ impl ControlFlow {
         is_cut: &dyn Fn(usize) -> bool,
     ) -> bool {
         let inside: HashSet<usize> = construct.members.iter().copied().chain([header]).collect();
-        let is_loop = |block: usize| function.blocks[block].merge().is_some_and(|inst| inst.op == Op::LoopMerge);
+        let is_loop =
+            |block: usize| function.blocks[block].merge().is_some_and(|inst| inst.op == Op::LoopMerge);
         let stays = |block: usize, inside: &HashSet<usize>, merge: usize| {
             self.successors[block].iter().all(|to| *to == merge || inside.contains(to))
         };
@@ -140,11 +142,17 @@ impl ControlFlow {
             let is_branch = function.blocks[*block].terminator().is_some_and(|inst| inst.op == Op::Branch);
             is_branch || stays(*block, &inside, construct.merge)
         });
-        let is_closed = construct.members.iter().all(|block| {
-            self.predecessors[*block].iter().all(|from| inside.contains(from))
-        });
-        let enters_once = !is_loop(header) || self.predecessors[header].iter().filter(|from| !inside.contains(from)).count() <= 1;
-        !inside.iter().any(|block| is_cut(*block)) && loops_stay && only_branches_leave && is_closed && enters_once
+        let is_closed = construct
+            .members
+            .iter()
+            .all(|block| self.predecessors[*block].iter().all(|from| inside.contains(from)));
+        let enters_once = !is_loop(header)
+            || self.predecessors[header].iter().filter(|from| !inside.contains(from)).count() <= 1;
+        !inside.iter().any(|block| is_cut(*block))
+            && loops_stay
+            && only_branches_leave
+            && is_closed
+            && enters_once
     }
 }
 

@@ -144,7 +144,10 @@ impl<'a> Demotion<'a> {
                     | Op::ImageTexelPointer
             );
             if !repeats {
-                return Err(format!("Op{:?} has a result that cannot be kept while a ray is traced", definition.op));
+                return Err(format!(
+                    "Op{:?} has a result that cannot be kept while a ray is traced",
+                    definition.op
+                ));
             }
             let mut again = definition;
             for used in used_ids(&again, &self.linker.module.wide) {
@@ -168,7 +171,8 @@ impl<'a> Demotion<'a> {
         for block in &mut function.blocks {
             let mut out = Vec::with_capacity(block.code.len());
             for inst in std::mem::take(&mut block.code) {
-                let variable = inst.result().and_then(|id| self.variables.get(&id).map(|variable| (id, *variable)));
+                let variable =
+                    inst.result().and_then(|id| self.variables.get(&id).map(|variable| (id, *variable)));
                 out.push(inst);
                 if let Some((id, variable)) = variable {
                     out.push(Inst::new(Op::Store, &[variable, id]));

@@ -97,11 +97,8 @@ impl Donor {
         module.functions.retain(|function| Some(function.id()) != main);
         let flags = [(HAS_CANDIDATES, needs.candidates), (HAS_BOXES, needs.boxes)];
         freeze_constants(&mut module, &flags.map(|(id, is_set)| (id, u64::from(is_set))));
-        let optional = [
-            ("ObjectRay", needs.object_ray),
-            ("Matrices", needs.matrices),
-            ("Positions", needs.positions),
-        ];
+        let optional =
+            [("ObjectRay", needs.object_ray), ("Matrices", needs.matrices), ("Positions", needs.positions)];
         for (what, _) in optional.iter().filter(|(_, is_needed)| !is_needed) {
             for which in ["lvkCandidate", "lvkCommitted"] {
                 empty_function(&mut module, &format!("{which}{what}"));

@@ -49,9 +49,8 @@ impl<'a> Emitter<'a> {
         if from == to {
             return value;
         }
-        let is_aggregate = |ty| {
-            self.linker.global(ty).is_some_and(|inst| matches!(inst.op, Op::TypeStruct | Op::TypeArray))
-        };
+        let is_aggregate =
+            |ty| self.linker.global(ty).is_some_and(|inst| matches!(inst.op, Op::TypeStruct | Op::TypeArray));
         let op = if is_aggregate(from) { Op::CopyLogical } else { Op::Bitcast };
         self.value(op, to, &[value])
     }

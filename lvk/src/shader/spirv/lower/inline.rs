@@ -21,9 +21,11 @@ pub(super) fn inline_calls(linker: &mut Linker, function: &mut Function, wanted:
 
 fn find_call(function: &Function, wanted: &HashSet<u32>) -> Option<(usize, usize)> {
     let is_call = |inst: &Inst| inst.op == Op::FunctionCall && wanted.contains(&inst.operand(2));
-    function.blocks.iter().enumerate().find_map(|(block, Block { code, .. })| {
-        code.iter().position(is_call).map(|place| (block, place))
-    })
+    function
+        .blocks
+        .iter()
+        .enumerate()
+        .find_map(|(block, Block { code, .. })| code.iter().position(is_call).map(|place| (block, place)))
 }
 
 fn inline_call(
@@ -89,7 +91,8 @@ fn rename_ids(linker: &mut Linker, callee: &mut Function, call: &Inst) {
 /// Moves the variables of the callee to the start of the caller. Their initial values are stored where the call was.
 fn move_variables(function: &mut Function, callee: &mut Function, block: usize) {
     let Some(first) = callee.blocks.first_mut() else { return };
-    let (variables, rest) = std::mem::take(&mut first.code).into_iter().partition(|inst| inst.op == Op::Variable);
+    let (variables, rest) =
+        std::mem::take(&mut first.code).into_iter().partition(|inst| inst.op == Op::Variable);
     first.code = rest;
     let variables: Vec<Inst> = variables;
     for mut variable in variables.into_iter() {
@@ -119,6 +122,11 @@ fn return_to(block: &mut Block, behind: u32, result: Option<u32>) {
 /// Makes phis name the block `new`, which now ends as the block `old` did.
 fn rename_predecessor(function: &mut Function, old: u32, new: u32) {
     for inst in function.code_mut().filter(|inst| inst.op == Op::Phi) {
-        inst.operands.iter_mut().skip(3).step_by(2).filter(|label| **label == old).for_each(|label| *label = new);
+        inst.operands
+            .iter_mut()
+            .skip(3)
+            .step_by(2)
+            .filter(|label| **label == old)
+            .for_each(|label| *label = new);
     }
 }

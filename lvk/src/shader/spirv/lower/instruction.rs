@@ -142,7 +142,9 @@ impl Form {
             Op::FunctionEnd | Op::Nop | Op::Return | Op::Unreachable | Op::Kill => (0, Ids),
             Op::IgnoreIntersectionKHR | Op::TerminateRayKHR => (0, Ids),
             Op::Label => (1, Ids),
-            Op::Branch | Op::ReturnValue | Op::ControlBarrier | Op::MemoryBarrier | Op::AtomicStore => (0, Ids),
+            Op::Branch | Op::ReturnValue | Op::ControlBarrier | Op::MemoryBarrier | Op::AtomicStore => {
+                (0, Ids)
+            }
             Op::LoopMerge => (0, IdsThenLiterals(2)),
             Op::SelectionMerge => (0, IdsThenLiterals(1)),
             Op::BranchConditional => (0, IdsThenLiterals(3)),

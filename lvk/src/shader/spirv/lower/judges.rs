@@ -60,8 +60,11 @@ fn rewrite_function(
     function: &mut Function,
 ) -> Result<(), String> {
     let result = function.head.operand(0);
-    let definitions: HashMap<u32, Inst> =
-        function.code().chain(&function.parameters).filter_map(|inst| inst.result().map(|id| (id, inst.clone()))).collect();
+    let definitions: HashMap<u32, Inst> = function
+        .code()
+        .chain(&function.parameters)
+        .filter_map(|inst| inst.result().map(|id| (id, inst.clone())))
+        .collect();
     let mut checks = Vec::new();
     for block in &mut function.blocks {
         let mut out = Vec::with_capacity(block.code.len());
@@ -117,12 +120,19 @@ fn report(
 }
 
 /// Returns from the function if the shader has ended in the call with the result `call`.
-fn check_behind(linker: &mut Linker, donor: &Donor, function: &mut Function, call: u32) -> Result<(), String> {
+fn check_behind(
+    linker: &mut Linker,
+    donor: &Donor,
+    function: &mut Function,
+    call: u32,
+) -> Result<(), String> {
     let result = function.head.operand(0);
     let is_call = |inst: &Inst| inst.result() == Some(call);
-    let place = function.blocks.iter().enumerate().find_map(|(at, block)| {
-        block.code.iter().position(is_call).map(|place| (at, place))
-    });
+    let place = function
+        .blocks
+        .iter()
+        .enumerate()
+        .find_map(|(at, block)| block.code.iter().position(is_call).map(|place| (at, place)));
     let Some((at, place)) = place else { return Ok(()) };
     let at = leave_loop_header(linker, function, at)?;
     check_continue(function, at)?;
@@ -147,7 +157,8 @@ fn check_behind(linker: &mut Linker, donor: &Donor, function: &mut Function, cal
 
 /// True for the load and store of the limit behind a report.
 fn is_update(inst: &Inst, donor: &Donor) -> bool {
-    (inst.op == Op::Load && inst.operand(2) == donor.limit) || inst.op == Op::Store && inst.operands.len() == 2
+    (inst.op == Op::Load && inst.operand(2) == donor.limit)
+        || inst.op == Op::Store && inst.operands.len() == 2
 }
 
 /// Moves the code of a loop's header to a block of its own, whose index is the result. Other blocks stay.

@@ -108,7 +108,12 @@ impl Linker {
         Ok(())
     }
 
-    fn map_ids(&mut self, inst: &mut Inst, wide: &HashSet<u32>, ids: &mut IdMap) -> Result<(), UnknownOpcode> {
+    fn map_ids(
+        &mut self,
+        inst: &mut Inst,
+        wide: &HashSet<u32>,
+        ids: &mut IdMap,
+    ) -> Result<(), UnknownOpcode> {
         for_each_id(inst, wide, |id| *id = self.map_id(*id, ids))
     }
 
@@ -327,8 +332,8 @@ fn unique_key(inst: &Inst) -> (u32, Vec<u32>) {
 fn is_type(op: Op) -> bool {
     use Op::{
         TypeAccelerationStructureKHR, TypeArray, TypeBool, TypeFloat, TypeFunction, TypeImage, TypeInt,
-        TypeMatrix, TypePointer, TypeRayQueryKHR, TypeRuntimeArray, TypeSampledImage, TypeSampler, TypeStruct,
-        TypeVector, TypeVoid,
+        TypeMatrix, TypePointer, TypeRayQueryKHR, TypeRuntimeArray, TypeSampledImage, TypeSampler,
+        TypeStruct, TypeVector, TypeVoid,
     };
     matches!(
         op,

@@ -90,8 +90,7 @@ fn mentioned_by_functions(linker: &Linker, variables: &HashSet<u32>) -> HashMap<
     while has_changed {
         has_changed = false;
         for (caller, ids) in &calls {
-            let more: HashSet<u32> =
-                ids.iter().filter_map(|id| found.get(id)).flatten().copied().collect();
+            let more: HashSet<u32> = ids.iter().filter_map(|id| found.get(id)).flatten().copied().collect();
             if let Some(own) = found.get_mut(caller) {
                 let before = own.len();
                 own.extend(more);

@@ -91,10 +91,12 @@ fn finish_capabilities(module: &mut Module) {
     };
     let has_query = module.globals.iter().any(|inst| inst.op == Op::TypeRayQueryKHR);
     let fetches = uses(&[Op::RayQueryGetIntersectionTriangleVertexPositionsKHR]);
-    let culls = has_query && module.capabilities.contains(&(Capability::RayTraversalPrimitiveCullingKHR as u32));
-    let uses_push = module.globals.iter().any(|inst| {
-        inst.op == Op::Variable && inst.operand(2) == StorageClass::PushConstant as u32
-    });
+    let culls =
+        has_query && module.capabilities.contains(&(Capability::RayTraversalPrimitiveCullingKHR as u32));
+    let uses_push = module
+        .globals
+        .iter()
+        .any(|inst| inst.op == Op::Variable && inst.operand(2) == StorageClass::PushConstant as u32);
     debug_assert!(uses_push, "the launch is read by its address");
     let of_pipelines = [
         Capability::RayTracingKHR,

@@ -114,7 +114,8 @@ fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<u32, String> {
     let entries = std::mem::take(&mut module.entry_points);
     module.modes.clear();
     let is_main = |entry: &&Inst| {
-        entry.operand(0) == model as u32 && entry.operands.get(2..4) == Some(&[u32::from_le_bytes(*b"main"), 0])
+        entry.operand(0) == model as u32
+            && entry.operands.get(2..4) == Some(&[u32::from_le_bytes(*b"main"), 0])
     };
     let entry = entries.iter().find(is_main).ok_or("there is no entry point 'main' of the stage")?;
     Ok(entry.operand(1))
@@ -122,9 +123,7 @@ fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<u32, String> {
 
 /// Gives specialization constants their values, after which they are plain constants.
 pub(super) fn freeze_constants(module: &mut Module, values: &[(u32, u64)]) {
-    let is_spec_id = |inst: &Inst| {
-        inst.op == Op::Decorate && inst.operand(1) == Decoration::SpecId as u32
-    };
+    let is_spec_id = |inst: &Inst| inst.op == Op::Decorate && inst.operand(1) == Decoration::SpecId as u32;
     let given: HashMap<u32, u64> = module
         .decorations
         .iter()
@@ -174,9 +173,7 @@ fn roles(module: &Module) -> Vec<(u32, Role)> {
             (Some(StorageClass::ShaderRecordBufferKHR), _) => Role::Record,
             (Some(StorageClass::PushConstant), _) => Role::Push,
             (
-                Some(
-                    StorageClass::RayPayloadKHR | StorageClass::CallableDataKHR | StorageClass::Private,
-                ),
+                Some(StorageClass::RayPayloadKHR | StorageClass::CallableDataKHR | StorageClass::Private),
                 _,
             ) => Role::Own,
             (Some(StorageClass::StorageBuffer), _)
@@ -242,9 +239,8 @@ fn convert_storage(module: &mut Module) {
             *storage = converted_storage(*storage);
         }
     }
-    let is_private = |inst: &&Inst| {
-        inst.op == Op::Variable && inst.operand(2) != StorageClass::UniformConstant as u32
-    };
+    let is_private =
+        |inst: &&Inst| inst.op == Op::Variable && inst.operand(2) != StorageClass::UniformConstant as u32;
     let converted: HashSet<u32> = module
         .globals
         .iter()

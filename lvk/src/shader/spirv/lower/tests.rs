@@ -6,8 +6,12 @@ use crate::shader::{ShaderModuleDesc, ShaderSource, compile};
 
 /// Compiles a shader.
 fn compiled(stage: ShaderStage, text: &str, options: &CompileOptions) -> Vec<u32> {
-    let desc =
-        ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), debug_name: "shader", ..Default::default() };
+    let desc = ShaderModuleDesc {
+        stage,
+        source: ShaderSource::Glsl(text),
+        debug_name: "shader",
+        ..Default::default()
+    };
     compile(&desc, options, CompileFiles::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -20,7 +24,11 @@ fn donors() -> [(&'static str, Traversal, CompileOptions); 4] {
         ("query.spv", Traversal::Query, options),
         ("software_gpu.spv", Traversal::SoftwareGpu, software),
         ("software_cpu.spv", Traversal::SoftwareCpu, cpu),
-        ("software_cpu_pairs.spv", Traversal::SoftwareCpuPairs, CompileOptions { gathers_pairs: true, ..cpu }),
+        (
+            "software_cpu_pairs.spv",
+            Traversal::SoftwareCpuPairs,
+            CompileOptions { gathers_pairs: true, ..cpu },
+        ),
     ]
 }
 
@@ -35,7 +43,10 @@ fn the_kernels_of_lowered_pipelines_are_those_of_their_source() {
         if std::env::var("LVK_UPDATE_KERNELS").is_ok() {
             std::fs::write(folder.join(file), bytes).unwrap();
         } else {
-            assert!(std::fs::read(folder.join(file)).unwrap() == bytes, "{file}: set LVK_UPDATE_KERNELS=1 once");
+            assert!(
+                std::fs::read(folder.join(file)).unwrap() == bytes,
+                "{file}: set LVK_UPDATE_KERNELS=1 once"
+            );
         }
     }
 }
@@ -241,9 +252,7 @@ fn busy(callables: [&'static str; 2]) -> Pipeline {
 
 #[test]
 fn every_kind_of_pipeline_is_lowered() {
-    for (index, pipeline) in
-        [simple(), busy([CALLABLE; 2]), busy([CALLABLE, CALLING])].iter().enumerate()
-    {
+    for (index, pipeline) in [simple(), busy([CALLABLE; 2]), busy([CALLABLE, CALLING])].iter().enumerate() {
         for (traversal, words) in lowered(pipeline).into_iter().enumerate() {
             let words = words.unwrap();
             crate::shader::spirv::words::validate(&words).unwrap();

@@ -201,9 +201,8 @@ fn remove_structures(linker: &Linker, function: &mut Function) {
 
 /// Makes the shaders see no hit remap table: the library's own traversal finds the application's own ids.
 pub(super) fn hide_remap_table(linker: &mut Linker, function: &mut Function, tables: &[u32]) {
-    let is_zero = |id: u32| {
-        linker.global(id).is_some_and(|inst| inst.op == Op::Constant && inst.operand(2) == 0)
-    };
+    let is_zero =
+        |id: u32| linker.global(id).is_some_and(|inst| inst.op == Op::Constant && inst.operand(2) == 0);
     let is_rows = |inst: &&Inst| {
         matches!(inst.op, Op::AccessChain | Op::InBoundsAccessChain)
             && tables.contains(&inst.operand(2))
