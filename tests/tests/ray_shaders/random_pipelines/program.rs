@@ -100,8 +100,8 @@ impl Pipeline {
         let mut random = Random::new(seed);
         let few = |random: &mut Random, most: u64| 1 + random.bits() % most;
         // Few pipelines have traces or calls in all kinds of shaders.
-        let inner = Allowed { traces: random.bits() % 3 > 0, callables: random.bits() % 2 > 0 };
-        let nested = Allowed { traces: false, callables: random.bits() % 2 > 0 };
+        let inner = Allowed { traces: !one_in(&mut random, 3), callables: !one_in(&mut random, 2) };
+        let nested = Allowed { traces: false, callables: !one_in(&mut random, 2) };
         let outer = Allowed { traces: true, callables: true };
         let shaders = |random: &mut Random, most, allowed| {
             let count = few(random, most);
@@ -153,12 +153,12 @@ fn statement(
         0 if nesting > 0 => {
             let condition = condition(random);
             let yes = inner(random);
-            let no = if random.bits() % 2 == 0 { inner(random) } else { Vec::new() };
+            let no = if one_in(random, 2) { inner(random) } else { Vec::new() };
             Statement::If(condition, yes, no)
         }
         1 if nesting > 0 => {
             let body = inner(random);
-            let maybe = |random: &mut Random| (random.bits() % 3 == 0).then(|| condition(random));
+            let maybe = |random: &mut Random| one_in(random, 3).then(|| condition(random));
             Statement::Loop(1 + (random.bits() % 2) as u32, body, maybe(random), maybe(random))
         }
         2 if nesting > 0 => Statement::Switch(variable, [inner(random), inner(random), inner(random)]),
@@ -178,6 +178,11 @@ fn statement(
         }
         _ => Statement::Set(variable, operation(random), operand(random)),
     }
+}
+
+/// Returns true once in `count` times.
+fn one_in(random: &mut Random, count: u64) -> bool {
+    random.bits().is_multiple_of(count)
 }
 
 fn condition(random: &mut Random) -> Condition {

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, HashMap};
 use ::spirv::Op;
 
 use super::calls::{Call, RecordPlace, Shared, Situation};
-use super::donor::Donor;
 use super::emit::Emitter;
 use super::flatten::{Pieces, ShaderFrame, StateMachine, element, flatten, state};
 use super::inline::inline_calls;

@@ -263,7 +263,7 @@ impl Flattener<'_> {
     fn emit_block(&mut self, block: usize) -> Option<usize> {
         let Block { label, code } = self.function.blocks[block].clone();
         let mut code = without_variables(code);
-        let Some(last) = code.pop() else { return None };
+        let last = code.pop()?;
         if self.function.blocks[block].merge().is_some() {
             code.pop();
         }

@@ -1,5 +1,7 @@
 //! Unit tests of lowered pipelines.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
+
 use super::*;
 use crate::shader::options::{CompileFiles, CompileOptions};
 use crate::shader::{ShaderModuleDesc, ShaderSource, compile};
