@@ -21,6 +21,8 @@ pub(crate) struct StageModule<'a> {
     pub(crate) stage: ShaderStage,
     /// SPIR-V with the entry point `main`, validated and reflected.
     pub(crate) words: &'a [u32],
+    /// Ids and bits of specialization constants. Ids that the module does not declare have no effect.
+    pub(crate) specialization: &'a [(u32, u64)],
 }
 
 /// The shaders of a hit group, as indices in [`Lowering::modules`].
@@ -35,7 +37,7 @@ pub(crate) struct HitShaders {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lowering<'a> {
     pub(crate) traversal: Traversal,
-    /// All shaders, without duplicates.
+    /// All shaders, without duplicates of the same words and constants.
     pub(crate) modules: &'a [StageModule<'a>],
     /// The ray generation shader, as an index in `modules`.
     pub(crate) ray_gen: usize,
@@ -47,8 +49,6 @@ pub(crate) struct Lowering<'a> {
     pub(crate) callable: &'a [usize],
     /// Distances between the records of the table in bytes: of miss shaders, hit groups and callable shaders.
     pub(crate) strides: [u32; 3],
-    /// Ids and bits of the specialization constants of all modules.
-    pub(crate) specialization: &'a [(u32, u64)],
     pub(crate) max_recursion: u32,
     pub(crate) max_callable_depth: u32,
 }
