@@ -50,6 +50,8 @@ pub(crate) struct DeviceState {
     pub(crate) kernels: Kernels,
     /// Mapped buffers for lists of instances that outlive their command buffer.
     pub(crate) instance_buffers: BufferRecycler,
+    /// Launches of indirect traces of lowered pipelines.
+    pub(crate) launch_buffers: BufferRecycler,
     /// The addresses of the hit remap table and of the software TLAS of each TLAS; `None` without acceleration
     /// structures.
     pub(crate) tlas_table: Option<Arc<Buffer>>,
@@ -116,6 +118,8 @@ pub(crate) enum DeferredObject {
     /// A reference to a buffer that a command buffer uses. There may be other references; the creation of its owner may
     /// fail.
     BufferRef(Arc<Buffer>),
+    /// A launch of an indirect trace, to be recycled.
+    LaunchBuffer(Arc<Buffer>),
     /// As [`BufferRef`](Self::BufferRef), for one of the textures that
     /// [share](crate::resource::image::Image::add_texture) an image.
     TextureRef(Arc<Texture>),
@@ -221,6 +225,10 @@ impl DeviceState {
                 if let Some(unused) = Arc::into_inner(buffer) {
                     self.submitter.forget(unused.id);
                 }
+            }
+            DeferredObject::LaunchBuffer(buffer) => {
+                self.submitter.forget(buffer.id);
+                self.launch_buffers.recycle(buffer);
             }
             DeferredObject::TextureRef(texture) => {
                 if texture.image.remove_texture() {

@@ -57,6 +57,8 @@ kernels! {
         Gather = "kernels/gather", "gather.comp";
         /// Writes addresses and hit remap entries of instances.
         Instances = "kernels/instances", "instances.comp";
+        /// Writes the size of a lowered trace, and its workgroup counts.
+        TraceSize = "kernels/trace_size", "trace_size.comp";
     }
     #[cfg(feature = "software-ray-query")] {
         /// Resets the scratch memory after an earlier build.
@@ -146,6 +148,22 @@ pub(crate) struct InstancesPushConstants {
     pub(crate) entry_count: u32,
     pub(crate) user_count: u32,
     pub(crate) keep_active: u32,
+    /// Pads the block to the alignment of its addresses.
+    pub(crate) unused: u32,
+}
+
+/// Push constants of [`Kernel::TraceSize`].
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct TraceSizePushConstants {
+    /// Address of the caller's width, height and depth.
+    pub(crate) arguments: u64,
+    /// Address at which the workgroup counts are written, three `u32`.
+    pub(crate) workgroups: u64,
+    /// Address at which the size is written, three `u32`.
+    pub(crate) size: u64,
+    /// Largest workgroup count along x.
+    pub(crate) max_workgroups: u32,
     /// Pads the block to the alignment of its addresses.
     pub(crate) unused: u32,
 }

@@ -3,6 +3,7 @@
 
 mod any_hit;
 mod invocation_reorder;
+mod lowered;
 mod pipelines;
 mod query_getters;
 mod query_stages;
