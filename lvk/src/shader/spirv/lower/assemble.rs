@@ -424,7 +424,7 @@ impl<'a> Assembly<'a> {
     /// a trace or a call, and an outer loop traces.
     fn write_loop(&mut self, trace: u32, callable: u32) -> u32 {
         let Some(machine) = self.machine.clone() else { return 0 };
-        let [body, end, outer, outer_next, inner, check, run, ran, idle, wait] =
+        let [body, end, outer, outer_next, inner, inner_next, check, run, idle, wait] =
             [(); 10].map(|()| self.linker.new_id());
         let jump = |to: u32| Inst::new(Op::Branch, &[to]);
         let bool = self.linker.bool();
@@ -439,7 +439,7 @@ impl<'a> Assembly<'a> {
         first.push(jump(outer));
         let outer_end = self.linker.new_id();
         let outer_head = vec![Inst::new(Op::LoopMerge, &[outer_end, outer_next, 0]), jump(inner)];
-        let inner_head = vec![Inst::new(Op::LoopMerge, &[idle, machine.next, 0]), jump(check)];
+        let inner_head = vec![Inst::new(Op::LoopMerge, &[idle, inner_next, 0]), jump(check)];
         let mut of_check = Vec::new();
         let mut emitter = Emitter::new(self.linker, &mut of_check);
         let now = emitter.load(machine.state);
@@ -449,10 +449,10 @@ impl<'a> Assembly<'a> {
         let mut of_run = Vec::new();
         let mut emitter = Emitter::new(self.linker, &mut of_run);
         let now = emitter.load(machine.state);
-        let mut operands = vec![now, ran];
+        let mut operands = vec![now, machine.next];
         let cases = self.pieces.iter().flat_map(|pieces| &pieces.cases);
         operands.extend(cases.flat_map(|(state, label)| [*state, *label]));
-        emitter.push(Op::SelectionMerge, &[ran, 0]);
+        emitter.push(Op::SelectionMerge, &[machine.next, 0]);
         emitter.push(Op::Switch, &operands);
         let mut of_idle = Vec::new();
         let mut emitter = Emitter::new(self.linker, &mut of_idle);
@@ -467,7 +467,7 @@ impl<'a> Assembly<'a> {
         let plain = |(label, code)| Block { label, code };
         let head =
             [(body, first), (outer, outer_head), (inner, inner_head), (check, of_check), (run, of_run)];
-        let tail = [(ran, vec![jump(machine.next)]), (machine.next, vec![jump(inner)]), (idle, of_idle)];
+        let tail = [(machine.next, vec![jump(inner_next)]), (inner_next, vec![jump(inner)]), (idle, of_idle)];
         let last = [
             (outer_next, vec![jump(outer)]),
             (outer_end, vec![jump(end)]),

@@ -112,7 +112,7 @@ impl ControlFlow {
         Some(Construct { merge, members })
     }
 
-    /// True if nothing leaves the construct but plain branches of a selection and the way to its merge block.
+    /// True if the construct is entered at its header only, and left to its merge block only.
     fn is_whole(
         &self,
         function: &Function,
@@ -121,38 +121,14 @@ impl ControlFlow {
         is_cut: &dyn Fn(usize) -> bool,
     ) -> bool {
         let inside: HashSet<usize> = construct.members.iter().copied().chain([header]).collect();
-        let is_loop =
-            |block: usize| function.blocks[block].merge().is_some_and(|inst| inst.op == Op::LoopMerge);
-        let stays = |block: usize, inside: &HashSet<usize>, merge: usize| {
-            self.successors[block].iter().all(|to| *to == merge || inside.contains(to))
-        };
-        let returns = |block: usize| {
+        let stays = |block: usize| {
             let last = function.blocks[block].terminator();
-            last.is_none_or(|inst| matches!(inst.op, Op::Return | Op::ReturnValue))
+            let returns = last.is_none_or(|inst| matches!(inst.op, Op::Return | Op::ReturnValue));
+            let mut targets = self.successors[block].iter();
+            !returns && !is_cut(block) && targets.all(|to| *to == construct.merge || inside.contains(to))
         };
-        // Loops, the construct itself or inside of it, must not be left in any other way.
-        let loops = inside.iter().copied().filter(|block| is_loop(*block));
-        let loops_stay = loops.into_iter().all(|header| {
-            self.construct(function, header).is_some_and(|inner| {
-                let inside: HashSet<usize> = inner.members.iter().copied().chain([header]).collect();
-                inside.iter().all(|block| stays(*block, &inside, inner.merge) && !returns(*block))
-            })
-        });
-        let only_branches_leave = inside.iter().all(|block| {
-            let is_branch = function.blocks[*block].terminator().is_some_and(|inst| inst.op == Op::Branch);
-            is_branch || stays(*block, &inside, construct.merge)
-        });
-        let is_closed = construct
-            .members
-            .iter()
-            .all(|block| self.predecessors[*block].iter().all(|from| inside.contains(from)));
-        let enters_once = !is_loop(header)
-            || self.predecessors[header].iter().filter(|from| !inside.contains(from)).count() <= 1;
-        !inside.iter().any(|block| is_cut(*block))
-            && loops_stay
-            && only_branches_leave
-            && is_closed
-            && enters_once
+        let is_entered_once = |block: &usize| self.predecessors[*block].iter().all(|from| inside.contains(from));
+        inside.iter().all(|block| stays(*block)) && construct.members.iter().all(is_entered_once)
     }
 }
 

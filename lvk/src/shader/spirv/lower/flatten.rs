@@ -35,7 +35,7 @@ pub(super) struct StateMachine {
     pub(super) resume: u32,
     /// Most functions that may wait. The array of states has one element more.
     pub(super) max_depth: u32,
-    /// Label of the block that goes on with the next piece.
+    /// Label of the block behind the switch over the pieces.
     pub(super) next: u32,
     /// The number of the next piece.
     pub(super) next_state: u32,
@@ -212,16 +212,7 @@ impl Flattener<'_> {
         let first = self.blocks.len();
         for block in std::iter::once(header).chain(construct.members.iter().copied()) {
             let Block { label, code } = self.function.blocks[block].clone();
-            let mut code = without_variables(code);
-            let leaves = self.flow.successors[block].iter().find(|to| !inside.contains(to)).copied();
-            let returns = code.last().is_some_and(|inst| inst.op == Op::Return);
-            if leaves.is_some() || returns {
-                code.pop();
-                match leaves {
-                    Some(to) => self.go_to(to, &mut code),
-                    None => self.emit_return(&mut code),
-                }
-            }
+            let code = without_variables(code);
             self.blocks.push(Block { label, code });
         }
         if !self.is_entered_from_outside(construct.merge, &inside) {
@@ -314,15 +305,15 @@ impl Flattener<'_> {
         emitter.push(Op::Branch, &[next]);
     }
 
-    /// Writes a switch whose cases are other pieces.
+    /// Writes a switch whose cases choose other pieces.
     fn emit_switch(&mut self, label: u32, mut code: Vec<Inst>, switch: Inst) {
-        let merge = self.linker.new_id();
+        let end = self.linker.new_id();
         let mut labels: HashMap<u32, u32> = HashMap::new();
-        let mut targets = Vec::new();
+        let mut cases = Vec::new();
         for target in branch_targets(&switch) {
             labels.entry(target).or_insert_with(|| {
                 let new = self.linker.new_id();
-                targets.push((target, new));
+                cases.push((target, new));
                 new
             });
         }
@@ -331,16 +322,20 @@ impl Flattener<'_> {
         for place in places.collect::<Vec<_>>() {
             switch.operands[place] = labels[&switch.operands[place]];
         }
-        code.push(Inst::new(Op::SelectionMerge, &[merge, 0]));
+        code.push(Inst::new(Op::SelectionMerge, &[end, 0]));
         code.push(switch);
         self.blocks.push(Block { label, code });
-        for (target, label) in targets {
-            let mut code = Vec::new();
+        let variable = self.machine.state;
+        for (target, label) in cases {
             let block = self.flow.index_of(target).unwrap_or(0);
-            self.go_to(block, &mut code);
+            let state = self.state_of(block);
+            let mut code = Vec::new();
+            let mut emitter = Emitter::new(self.linker, &mut code);
+            emitter.store_number(variable, state);
+            emitter.push(Op::Branch, &[end]);
             self.blocks.push(Block { label, code });
         }
-        self.blocks.push(Block { label: merge, code: vec![Inst::new(Op::Unreachable, &[])] });
+        self.blocks.push(Block { label: end, code: vec![Inst::new(Op::Branch, &[self.machine.next])] });
     }
 
     /// Ends a piece at a return of the function.
