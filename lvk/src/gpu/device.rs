@@ -17,7 +17,7 @@ use super::caps::optional_features::OptionalFeature;
 use super::caps::portability::{PortabilityNeed, first_missing};
 use super::caps::queues::{QueueLocation, QueueRequest, Queues};
 use super::caps::ray_query_path::RayQueryRequest;
-use super::caps::ray_tracing_pipeline_path::{RayTracingPipelinePath, RayTracingPipelineRequest};
+use super::caps::ray_tracing_pipeline_path::RayTracingPipelineRequest;
 use super::caps::shading_rate::ShadingRates;
 use super::checkpoints::Checkpoints;
 use super::debug::debugger::has_debugger;
@@ -154,8 +154,7 @@ impl Gpu {
         if request.query.prefers_hardware() && !raw.ray_query {
             caps.ray_query_reason = "the engine's device has no ray queries enabled";
         }
-        let is_hardware = caps.ray_tracing_pipeline_path == RayTracingPipelinePath::Hardware;
-        if request.pipeline.prefers_hardware() && !is_hardware && !raw.ray_tracing_pipeline {
+        if request.pipeline.prefers_hardware() && !raw.ray_tracing_pipeline {
             caps.ray_tracing_pipeline_reason = "the engine's device has no ray tracing pipelines enabled";
         }
         let mut instance =

@@ -37,7 +37,8 @@ impl DeviceNeeds {
 }
 
 /// Opens the device the user names, or the best one; where that is a CPU or has no ray tracing, rays, if any, are traced by
-/// queries in software, and a pipeline that the user names is lowered to compute shaders. Messages of the validation layer, where it is asked for, go into `sink`.
+/// queries in software, and a pipeline that the user names is lowered to compute shaders. Messages of the validation layer,
+/// where it is asked for, go into `sink`.
 pub(super) fn open(
     name: &str,
     args: &RunArgs,
@@ -46,7 +47,7 @@ pub(super) fn open(
     needs: &DeviceNeeds,
     window: Option<Arc<dyn WindowHandles>>,
 ) -> Result<Context, RunError> {
-    use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
+    use RayQueryRequest::{Hardware, HardwareIfPresent, Software};
     use RayTracingPipelineRequest::{HardwareIfPresent as PipelineIfPresent, Off};
     let caches = Caches::open(name, args);
     let with = |ray_tracing_pipeline, ray_query| {
@@ -70,23 +71,37 @@ pub(super) fn open(
         None => Ok(with(Off, RayQueryRequest::Off)?),
         Some(RayTracing::Pipeline) => {
             let chosen = with(RayTracingPipelineRequest::Auto, HardwareIfPresent)?;
-            if chosen.capabilities().ray_tracing_pipeline_path.is_lowered() {
-                eprintln!("note: --rt pipeline takes a {}", pipeline_text(chosen.capabilities()));
-            }
+            note_lowering(chosen.capabilities());
             Ok(chosen)
         }
         Some(RayTracing::Query) => with(PipelineIfPresent, Hardware).map_err(without_queries),
         Some(RayTracing::Software) => Ok(with(Off, Software)?),
-        // A profile rehearses the device's own paths. These keep no structures for software beside theirs.
-        Some(RayTracing::Auto) => {
-            let best = with(PipelineIfPresent, HardwareIfPresent)?;
-            let caps = best.capabilities();
-            let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
-            let is_slow = caps.is_cpu && args.profile.is_none();
-            let chosen = if can_trace && !is_slow { best } else { with(Off, Auto)? };
-            eprintln!("note: --rt auto takes {}", choice(chosen.capabilities()));
-            Ok(chosen)
-        }
+        Some(RayTracing::Auto) => Ok(open_best(args, with)?),
+    }
+}
+
+/// Opens the device for the best path. A profile rehearses the device's own paths, which keep no structures for software
+/// beside theirs.
+fn open_best(
+    args: &RunArgs,
+    open: impl Fn(RayTracingPipelineRequest, RayQueryRequest) -> lvk::Result<Context>,
+) -> lvk::Result<Context> {
+    let best = open(RayTracingPipelineRequest::HardwareIfPresent, RayQueryRequest::HardwareIfPresent)?;
+    let caps = best.capabilities();
+    let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
+    let is_slow = caps.is_cpu && args.profile.is_none();
+    let chosen = match can_trace && !is_slow {
+        true => best,
+        false => open(RayTracingPipelineRequest::Off, RayQueryRequest::Auto)?,
+    };
+    eprintln!("note: --rt auto takes {}", choice(chosen.capabilities()));
+    Ok(chosen)
+}
+
+/// Notes on standard error where pipelines are lowered to compute shaders.
+fn note_lowering(capabilities: &Capabilities) {
+    if capabilities.ray_tracing_pipeline_path.is_lowered() {
+        eprintln!("note: --rt pipeline takes a {}", pipeline_text(capabilities));
     }
 }
 
