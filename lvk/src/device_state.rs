@@ -137,7 +137,8 @@ impl DeviceState {
     /// Returns the layout and the cache for new pipelines.
     pub(crate) fn pipeline_base(&self) -> PipelineBase {
         let cache = self.pipeline_cache.as_ref().map_or(vk::PipelineCache::null(), |cache| cache.raw);
-        PipelineBase { layout: self.layout.raw, cache, max_threads: core_count() }
+        let PipelineLayout { raw: layout, push_constant_bytes, .. } = self.layout;
+        PipelineBase { layout, push_constant_bytes, cache, max_threads: core_count() }
     }
 
     /// Destroys an object once no command buffer can use it.

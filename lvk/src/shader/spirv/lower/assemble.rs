@@ -164,7 +164,7 @@ impl<'a> Assembly<'a> {
             if situation == Situation::AnyHit {
                 Emitter::new(self.linker, &mut code).store(donor.ignores, no);
             }
-            let blocks = self.switch(code, donor.hit_group, cases);
+            let blocks = self.switch(code, donor.hit_group, self.lowering.hit.len(), cases);
             self.replace_function(function, blocks);
         }
         let shared: Vec<(u32, u32)> = {
@@ -223,7 +223,7 @@ impl<'a> Assembly<'a> {
         found
     }
 
-    /// Returns the code for the records of a situation, and the number of all records.
+    /// Returns the code for the records of a situation.
     fn cases(&mut self, situation: Situation) -> Vec<Case> {
         let donor = *self.variables.donor;
         let [miss, hit, callable] = self.lowering.strides;
@@ -268,10 +268,17 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Returns a function's blocks: `code`, and then the case of the selector.
-    fn switch(&mut self, mut code: Vec<Inst>, selector: u32, cases: Vec<Case>) -> Vec<Block> {
+    /// Returns a function's blocks: `code`, and then the case of the selector, which has `count` values.
+    fn switch(&mut self, mut code: Vec<Inst>, selector: u32, count: usize, cases: Vec<Case>) -> Vec<Block> {
         let label = self.linker.new_id();
         let end = self.linker.new_id();
+        if let [only] = cases.as_slice()
+            && only.values.len() == count
+        {
+            code.extend(only.code.iter().cloned());
+            code.push(Inst::new(Op::Return, &[]));
+            return vec![Block { label, code }];
+        }
         let returns = Block { label: end, code: vec![Inst::new(Op::Return, &[])] };
         let mut emitter = Emitter::new(self.linker, &mut code);
         let value = emitter.load(selector);
@@ -294,13 +301,13 @@ impl<'a> Assembly<'a> {
     /// Writes the function that calls the miss, closest-hit or callable shader of a record, and returns it.
     fn write_shading(&mut self, situation: Situation) -> u32 {
         let donor = *self.variables.donor;
-        let selector = match situation {
-            Situation::Miss => donor.ray_miss,
-            Situation::Callable => self.variables.callable_index,
-            _ => donor.hit_group,
+        let (selector, count) = match situation {
+            Situation::Miss => (donor.ray_miss, self.lowering.miss.len()),
+            Situation::Callable => (self.variables.callable_index, self.lowering.callable.len()),
+            _ => (donor.hit_group, self.lowering.hit.len()),
         };
         let cases = self.cases(situation);
-        let blocks = self.switch(Vec::new(), selector, cases);
+        let blocks = self.switch(Vec::new(), selector, count, cases);
         let function = self.linker.new_id();
         self.linker.push_function(function, blocks);
         function

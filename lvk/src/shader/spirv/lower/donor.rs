@@ -12,6 +12,8 @@ use super::stage::freeze_constants;
 /// Ids of the variables and functions of `donor/lowered_pipeline.comp.glsl` in the linked module.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Donor {
+    /// The donor's own block of push constants.
+    pub(super) push: u32,
     pub(super) launch_id: u32,
     pub(super) launch_size: u32,
     pub(super) push_constants: u32,
@@ -130,7 +132,8 @@ fn empty_function(module: &mut Module, name: &str) {
 type Field = fn(&mut Donor) -> &mut u32;
 
 /// Names in the donor, with the fields of their ids.
-const NAMES: [(&str, Field); 42] = [
+const NAMES: [(&str, Field); 43] = [
+    ("lvkPush", |d| &mut d.push),
     ("lvkLaunchId", |d| &mut d.launch_id),
     ("lvkLaunchSize", |d| &mut d.launch_size),
     ("lvkPushConstants", |d| &mut d.push_constants),

@@ -11,6 +11,7 @@ use super::instruction::{Inst, for_each_id};
 use super::linker::Linker;
 use super::liveness::live_behind_blocks;
 use super::module::{Block, Function};
+use super::split_structs::split_structs;
 
 /// Values of the state that are no pieces of functions.
 pub(super) mod state {
@@ -73,6 +74,9 @@ pub(super) fn flatten(
         return Err("OpSwitch over 64 bits cannot be lowered here".to_owned());
     }
     let cuts = split_at_traces(linker, &mut function);
+    if !frame.runs_once {
+        split_structs(linker, &mut function);
+    }
     demote_values(linker, &mut function)?;
     let flow = ControlFlow::of(&function);
     let is_cut = |block: usize| cuts.contains(&function.blocks[block].label);

@@ -9,6 +9,7 @@ use super::donor::{Donor, Needs};
 use super::instruction::Inst;
 use super::judges::rewrite_judge;
 use super::linker::Linker;
+use super::push_constants::merge_push_constants;
 use super::stage::{Shader, link_stage};
 use super::traces::{Passed, TraceVariables, hide_remap_table, is_trace, rewrite_traces};
 use super::{HitShaders, Lowering, LoweringError, Traversal};
@@ -98,16 +99,16 @@ impl Shaders {
         let donor: Donor = *variables.donor;
         let mut indices: Vec<usize> = self.linked.keys().copied().collect();
         indices.sort_unstable();
+        let shaders: Vec<&Shader> = indices.iter().filter_map(|index| self.linked.get(index)).collect();
+        merge_push_constants(linker, lowering, &donor, &shaders)
+            .map_err(|(shader, message)| LoweringError { shader, message })?;
         for index in indices {
             let shader = &self.linked[&index];
             let failed = |message| LoweringError { shader: shader.name.clone(), message };
-            if let Some(block) = shader.push {
-                read_block_by_address(linker, &shader.functions, block, donor.push_constants);
-            }
             if let Some(block) = shader.record {
                 let pair = linker.uvec2();
                 let address = linker.private(pair);
-                read_block_by_address(linker, &shader.functions, block, address);
+                read_block_by_address(linker, &shader.functions, block, address).map_err(failed)?;
                 self.records.insert(index, address);
             }
             let stage = lowering.modules[index].stage;
