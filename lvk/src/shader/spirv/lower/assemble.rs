@@ -13,11 +13,12 @@ use super::linker::Linker;
 use super::module::Block;
 use super::shaders::Shaders;
 use super::stage::Shader;
-use super::traces::{Passed, TraceVariables};
+use super::traces::{Passed, RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables};
 use super::{Lowering, LoweringError};
 
-/// A ray that hits does not run its closest-hit shader.
-const RAY_FLAG_SKIP_CLOSEST_HIT: u32 = 0x8;
+/// Most places of a ray generation shader that trace without a loop over states. Each place has a copy of the traversal,
+/// with the constants of the place. Two copies are faster than the loop, on GPUs and on CPUs; a third is not.
+const MOST_PLACES: u32 = 2;
 
 /// Code for some values of a selector.
 struct Case {
@@ -33,7 +34,7 @@ pub(super) struct Assembly<'a> {
     pub(super) variables: TraceVariables<'a>,
     pub(super) candidate_attributes: Passed,
     pub(super) committed_attributes: Passed,
-    /// `None` if the launch traces from one place of its ray generation shader only.
+    /// `None` if the launch traces from few places of its ray generation shader only.
     machine: Option<StateMachine>,
     /// First states of shaders that wait.
     entries: HashMap<usize, u32>,
@@ -83,7 +84,7 @@ impl<'a> Assembly<'a> {
         Ok(if needs_machine { self.write_loop(trace, callable) } else { self.write_plain_main() })
     }
 
-    /// True unless the ray generation shader alone waits, at one place at most.
+    /// True unless the ray generation shader alone waits, at few places.
     fn needs_machine(&self) -> bool {
         let ray_gen = self.lowering.ray_gen;
         let others = self.shaders.linked.keys().any(|index| *index != ray_gen && self.shaders.waits(*index));
@@ -92,7 +93,7 @@ impl<'a> Assembly<'a> {
             .linked
             .get(&ray_gen)
             .map_or(0, |shader| self.shaders.wait_count(self.linker, shader.entry));
-        others || places > 1 || self.shaders.callables_wait
+        others || places > MOST_PLACES || self.shaders.callables_wait
     }
 
     fn declare_machine(&mut self) {
@@ -126,7 +127,8 @@ impl<'a> Assembly<'a> {
             let own = self.own_variables(index, shader);
             let results = self.results(shader);
             let runs_once = index == self.lowering.ray_gen;
-            let frame = ShaderFrame { runs_once, own: &own, results: &results };
+            let misses_wait = self.lowering.miss.iter().any(|index| self.shaders.waits(*index));
+            let frame = ShaderFrame { runs_once, own: &own, misses_wait, results: &results };
             let Some(machine) = &mut self.machine else { continue };
             let pieces = flatten(self.linker, machine, function, &frame).map_err(failed)?;
             self.entries.insert(index, pieces.entry);

@@ -66,11 +66,17 @@ pub(super) struct Needs {
     pub(super) object_ray: bool,
     pub(super) matrices: bool,
     pub(super) positions: bool,
+    /// Flags that all rays have.
+    pub(super) flags_always: u32,
+    /// Flags that rays may have.
+    pub(super) flags_possible: u32,
 }
 
 /// Ids of the specialization constants of the donor.
 const HAS_CANDIDATES: u32 = 0;
 const HAS_BOXES: u32 = 1;
+const FLAGS_ALWAYS: u32 = 2;
+const FLAGS_POSSIBLE: u32 = 3;
 
 /// Returns the words of the donor for a traversal.
 fn donor_words(traversal: Traversal) -> &'static [u8] {
@@ -97,8 +103,13 @@ impl Donor {
         module.modes.clear();
         let main = module.function_named("main");
         module.functions.retain(|function| Some(function.id()) != main);
-        let flags = [(HAS_CANDIDATES, needs.candidates), (HAS_BOXES, needs.boxes)];
-        freeze_constants(&mut module, &flags.map(|(id, is_set)| (id, u64::from(is_set))));
+        let constants = [
+            (HAS_CANDIDATES, needs.candidates.into()),
+            (HAS_BOXES, needs.boxes.into()),
+            (FLAGS_ALWAYS, needs.flags_always.into()),
+            (FLAGS_POSSIBLE, needs.flags_possible.into()),
+        ];
+        freeze_constants(&mut module, &constants);
         let optional =
             [("ObjectRay", needs.object_ray), ("Matrices", needs.matrices), ("Positions", needs.positions)];
         for (what, _) in optional.iter().filter(|(_, is_needed)| !is_needed) {

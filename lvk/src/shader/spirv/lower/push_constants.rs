@@ -47,7 +47,10 @@ fn common_block(linker: &Linker, shaders: &[&Shader]) -> Option<u32> {
     for block in shaders.iter().filter_map(|shader| block_of(linker, shader)) {
         *counts.entry(block).or_default() += 1;
     }
-    counts.into_iter().max_by_key(|(block, count)| (*count, std::cmp::Reverse(*block))).map(|(block, _)| block)
+    counts
+        .into_iter()
+        .max_by_key(|(block, count)| (*count, std::cmp::Reverse(*block)))
+        .map(|(block, _)| block)
 }
 
 /// True if the shader reads single members of its block only, which stay what they are in a longer block.

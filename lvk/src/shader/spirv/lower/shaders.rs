@@ -64,13 +64,17 @@ impl Shaders {
         };
         let boxes = lowering.hit.iter().any(|group| group.intersection.is_some());
         let judges = lowering.hit.iter().any(|group| group.any_hit.is_some());
+        // Flags that are no constant may be any.
         let flags = self.ray_flags(linker);
-        let knows = |test: fn(u32) -> bool| flags.iter().all(|flags| flags.is_some_and(test));
-        let ignores_opacity = knows(|flags| flags & RAY_FLAGS_OF_OPACITY == 0);
-        let all_opaque = knows(|flags| flags & RAY_FLAG_OPAQUE != 0);
+        let always = flags.iter().fold(u32::MAX, |all, flags| all & flags.unwrap_or(0));
+        let possible = flags.iter().fold(0, |all, flags| all | flags.unwrap_or(u32::MAX));
+        let all_opaque = always & RAY_FLAG_OPAQUE != 0;
+        let candidates = boxes || possible & RAY_FLAGS_OF_OPACITY != 0 || (judges && !all_opaque);
         Needs {
-            candidates: boxes || !ignores_opacity || (judges && !all_opaque),
+            candidates,
             boxes,
+            flags_always: always & possible | if candidates { 0 } else { RAY_FLAG_OPAQUE },
+            flags_possible: possible,
             object_ray: reads(&[BuiltIn::ObjectRayOriginKHR, BuiltIn::ObjectRayDirectionKHR]),
             matrices: reads(&[BuiltIn::ObjectToWorldKHR, BuiltIn::WorldToObjectKHR]),
             positions: reads(&[BuiltIn::HitTriangleVertexPositionsKHR]),
