@@ -58,8 +58,7 @@ fn create_pipeline(ctx: &Context) -> Result<Holder<RayTracingPipelineHandle>> {
 }
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let ray_tracing_pipeline = FeatureRequest::Required;
-    let ctx = Context::new(&ContextDesc { ray_tracing_pipeline, ..Default::default() })?;
+    let ctx = Context::new(&ContextDesc::default())?;
     let pipeline = create_pipeline(&ctx)?;
     let positions = [[-0.4_f32, 0.4, 0.0], [0.4, 0.4, 0.0], [0.0, -0.4, 0.0]];
     let vertices = ctx.create_buffer(&BufferDesc {

@@ -51,6 +51,8 @@ pub(crate) struct DeviceState {
     pub(crate) kernels: Kernels,
     /// Mapped buffers for lists of instances that outlive their command buffer.
     pub(crate) instance_buffers: BufferRecycler,
+    /// Launches of indirect traces of lowered pipelines.
+    pub(crate) launch_buffers: BufferRecycler,
     /// The addresses of the hit remap table and of the software TLAS of each TLAS; `None` without acceleration
     /// structures.
     pub(crate) tlas_table: Option<Arc<Buffer>>,
@@ -117,6 +119,8 @@ pub(crate) enum DeferredObject {
     /// A reference to a buffer that a command buffer uses. There may be other references; the creation of its owner may
     /// fail.
     BufferRef(Arc<Buffer>),
+    /// A launch of an indirect trace, to be recycled.
+    LaunchBuffer(Arc<Buffer>),
     /// As [`BufferRef`](Self::BufferRef), for one of the textures that
     /// [share](crate::resource::image::Image::add_texture) an image.
     TextureRef(Arc<Texture>),
@@ -134,7 +138,8 @@ impl DeviceState {
     /// Returns the layout and the cache for new pipelines.
     pub(crate) fn pipeline_base(&self) -> PipelineBase {
         let cache = self.pipeline_cache.as_ref().map_or(vk::PipelineCache::null(), |cache| cache.raw);
-        PipelineBase { layout: self.layout.raw, cache, max_threads: core_count() }
+        let PipelineLayout { raw: layout, push_constant_bytes, .. } = self.layout;
+        PipelineBase { layout, push_constant_bytes, cache, max_threads: core_count() }
     }
 
     /// Destroys an object once no command buffer can use it.
@@ -222,6 +227,10 @@ impl DeviceState {
                 if let Some(unused) = Arc::into_inner(buffer) {
                     self.submitter.forget(unused.id);
                 }
+            }
+            DeferredObject::LaunchBuffer(buffer) => {
+                self.submitter.forget(buffer.id);
+                self.launch_buffers.recycle(buffer);
             }
             DeferredObject::TextureRef(texture) => {
                 if texture.image.remove_texture() {
@@ -344,6 +353,8 @@ impl Drop for DeviceState {
         // The caller has the report of a loss.
         if let Err(failure) = idle
             && self.submitter.loss().get().is_none()
+            && !(failure.lacks_memory()
+                && wait_by_polling(|| self.submitter.is_all_done(), std::thread::sleep))
         {
             log::error!("the end of a context: {}", failure.into_error());
         }
@@ -369,10 +380,41 @@ fn persistent_wait(
     wait()
 }
 
+/// Waits for a minute at most until `is_done`, where a wait of the device fails for want of memory. Returns false if it
+/// never was, or cannot be known.
+fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl FnMut(Duration)) -> bool {
+    const PAUSE: Duration = Duration::from_millis(20);
+    const TRIES: usize = 3_000;
+    for _ in 0..TRIES {
+        match is_done() {
+            Ok(false) => pause(PAUSE),
+            ended => return ended.unwrap_or(false),
+        }
+    }
+    false
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
     use crate::queue::Queue;
+
+    #[test]
+    fn polling_ends_with_the_work_or_with_an_error() {
+        let polled = |answers: &[Option<bool>]| {
+            let (mut calls, mut pauses) = (0, 0);
+            let is_done = || {
+                calls += 1;
+                answers[(calls - 1).min(answers.len() - 1)].ok_or_else(|| Error::usage("test", "fails"))
+            };
+            (wait_by_polling(is_done, |_| pauses += 1), pauses)
+        };
+        assert_eq!(polled(&[Some(true)]), (true, 0));
+        assert_eq!(polled(&[Some(false), Some(false), Some(true)]), (true, 2));
+        assert_eq!(polled(&[Some(false), None]), (false, 1));
+        assert_eq!(polled(&[Some(false)]), (false, 3_000));
+    }
 
     /// Returns the results of the wait, and the number of pauses, for a wait that gives these results, the last for good.
     fn waited(results: &[Result<(), IdleFailure>]) -> (Result<(), IdleFailure>, usize) {

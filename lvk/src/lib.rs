@@ -107,8 +107,9 @@
 //! * `glsl` compiles GLSL at run time. It needs a C++17 compiler when the library is built. Without it, modules take
 //!   only SPIR-V words, and [`ShaderSource::Glsl`] is [`Error::Unsupported`].
 //! * `software-ray-query` contains the library's own BVH builders and traversal, for devices without ray queries.
-//!   Without it, such devices have no ray queries: [`RayQueryRequest::Auto`] selects hardware or nothing,
-//!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
+//!   Without it, such devices have neither ray queries nor ray tracing pipelines: [`RayQueryRequest::Auto`] and
+//!   [`RayTracingPipelineRequest::Auto`] select the device's features or nothing, [`RayQueryRequest::Software`] and
+//!   [`RayTracingPipelineRequest::Software`] are [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
 //! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
 //!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
 //!
@@ -232,12 +233,13 @@ pub use error::readable::{readable_bytes, readable_line, readable_name, readable
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;
-pub use gpu::caps::capabilities::{Capabilities, FeatureRequest};
+pub use gpu::caps::capabilities::Capabilities;
 pub use gpu::caps::limits::{Limits, MicromapLimits};
 pub use gpu::caps::mesh_limits::MeshLimits;
 pub use gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 pub use gpu::caps::queues::{QueueInfo, QueueRequest};
 pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
+pub use gpu::caps::ray_tracing_pipeline_path::{RayTracingPipelinePath, RayTracingPipelineRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
 pub use gpu::caps::subgroup_limits::SubgroupLimits;

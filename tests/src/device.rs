@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use lvk::ash::{Entry, vk};
-use lvk::{Context, ContextDesc, RayQueryRequest, ValidationMode, ValidationSink};
+use lvk::{Context, ContextDesc, RayQueryRequest, RayTracingPipelineRequest, ValidationMode, ValidationSink};
 use lvk_dev_driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Its drop fails the test on any message, those of the
@@ -77,6 +77,7 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
         validation: validation(),
         validation_sink: Some(sink.clone()),
         ray_query: ray_query(),
+        ray_tracing_pipeline: ray_tracing_pipeline(),
         check_indices: is_set("LVK_TEST_CHECK_INDICES"),
         ..Default::default()
     };
@@ -87,11 +88,12 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
     }
 }
 
-/// As [`device_with`], without software BVHs, whatever `LVK_TEST_RAY_QUERY` says: for tests of the driver's memory
-/// and time.
+/// As [`device_with`], without software BVHs, whatever `LVK_TEST_RAY_QUERY` and `LVK_TEST_RAY_PIPELINE` say: for tests of
+/// the driver's memory and time.
 pub fn without_software<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<TestDevice> {
     device_with(|desc| {
         desc.ray_query = RayQueryRequest::HardwareIfPresent;
+        desc.ray_tracing_pipeline = RayTracingPipelineRequest::HardwareIfPresent;
         adjust(desc);
     })
 }
@@ -103,6 +105,16 @@ fn ray_query() -> RayQueryRequest {
         Ok("software") => RayQueryRequest::Software,
         Ok("auto") => RayQueryRequest::Auto,
         _ => RayQueryRequest::HardwareIfPresent,
+    }
+}
+
+/// Returns the implementation of ray tracing pipelines for tests that do not choose one: the device's where it has them,
+/// or the value of `LVK_TEST_RAY_PIPELINE` (`hardware`, `query`, `software`).
+fn ray_tracing_pipeline() -> RayTracingPipelineRequest {
+    match std::env::var("LVK_TEST_RAY_PIPELINE").as_deref() {
+        Ok("query") => RayTracingPipelineRequest::Query,
+        Ok("software") => RayTracingPipelineRequest::Software,
+        _ => RayTracingPipelineRequest::HardwareIfPresent,
     }
 }
 

@@ -2,7 +2,7 @@
 #![expect(clippy::expect_used, reason = "a test whose sample cannot render has failed")]
 
 use image::RgbaImage;
-use lvk::{Context, FeatureRequest, RayQueryRequest};
+use lvk::{Context, RayQueryRequest, RayTracingPipelineRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::app::sample_error::SampleError;
@@ -31,7 +31,8 @@ pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
 /// Returns a context that has ray queries in software alone.
 pub fn software_device() -> Option<TestDevice> {
     device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
+        (desc.ray_tracing_pipeline, desc.ray_query) =
+            (RayTracingPipelineRequest::Off, RayQueryRequest::Software);
     })
 }
 

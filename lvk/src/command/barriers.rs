@@ -155,7 +155,7 @@ fn use_buffer(accesses: &mut CommandAccesses, host_reads: &mut Vec<ResourceId>, 
 
 /// Returns the accesses of shaders in `stages` that trace rays.
 fn accel_struct_reads(shared: &DeviceState, queue_index: usize, stages: Stages) -> [(ResourceId, Use); 4] {
-    let read = match shared.gpu.caps.software_ray_query() {
+    let read = match shared.gpu.caps.builds_software_structures() {
         true => Use::software_traversal(stages),
         false => Use::accel_read(stages),
     };

@@ -60,21 +60,28 @@ impl CommandBuffer {
         name: &Arc<str>,
         push_constant_bytes: u32,
     ) {
-        let (shared, raw) = (&self.shared, self.raw());
-        // SAFETY: the pipeline and the set are alive and share one layout.
-        unsafe {
-            shared.gpu.device.cmd_bind_pipeline(raw, point, pipeline);
-            if !self.state.sets_bound.contains(&point) {
-                let sets = [shared.bindless.set];
-                shared.gpu.device.cmd_bind_descriptor_sets(raw, point, shared.layout.raw, 0, &sets, &[]);
-                self.state.sets_bound.push(point);
-            }
+        // SAFETY: the pipeline is alive.
+        unsafe { self.shared.gpu.device.cmd_bind_pipeline(self.raw(), point, pipeline) };
+        self.bind_set(point);
+        self.expect_push_block(name, push_constant_bytes);
+    }
+
+    /// Binds the bindless set on the first use of a bind point.
+    pub(super) fn bind_set(&mut self, point: vk::PipelineBindPoint) {
+        if self.state.sets_bound.contains(&point) {
+            return;
         }
-        self.state.push_constants.expect_block(
-            name,
-            push_constant_bytes,
-            self.shared.layout.push_constant_bytes,
-        );
+        let (shared, raw) = (&self.shared, self.raw());
+        let sets = [shared.bindless.set];
+        // SAFETY: the set is alive, and has the layout of every pipeline.
+        unsafe { shared.gpu.device.cmd_bind_descriptor_sets(raw, point, shared.layout.raw, 0, &sets, &[]) };
+        self.state.sets_bound.push(point);
+    }
+
+    /// Records that the push constants are those of a pipeline with a block of this size.
+    pub(super) fn expect_push_block(&mut self, name: &Arc<str>, push_constant_bytes: u32) {
+        let layout_bytes = self.shared.layout.push_constant_bytes;
+        self.state.push_constants.expect_block(name, push_constant_bytes, layout_bytes);
     }
 
     /// True if all these 4-byte words were pushed; see [`word_mask`](super::push_constants::word_mask).

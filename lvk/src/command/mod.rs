@@ -26,6 +26,7 @@ pub(crate) mod render;
 mod subresource_accesses;
 mod tlas_table;
 pub(crate) mod trace;
+mod trace_lowered;
 pub(crate) mod transfer;
 mod transient_steps;
 pub(crate) mod update_tlas;

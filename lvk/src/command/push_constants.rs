@@ -26,7 +26,7 @@ impl Default for PushConstants {
 
 impl PushConstants {
     /// Most push constant bytes that a pipeline layout has.
-    const MAX_BYTES: usize = 256;
+    pub(super) const MAX_BYTES: usize = 256;
 
     /// Rust structs are padded to their alignment, while GLSL blocks end with their last member. 16 bytes is the
     /// largest alignment.

@@ -7,15 +7,17 @@ use ash::vk;
 use super::CommandBuffer;
 use super::compute::check_arguments;
 use super::dependencies::Dependencies;
+use super::trace_lowered::LoweredTrace;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::caps::limits::Limits;
 use crate::handle::{BufferHandle, RayTracingPipelineHandle};
 use crate::pipeline::RayTracingPipeline;
-use crate::pipeline::ray_tracing::TraceRegions;
+use crate::pipeline::ray_tracing::{PipelineCode, TraceRegions};
 
 impl CommandBuffer {
-    /// Binds a ray tracing pipeline for the traces that follow (`vkCmdBindPipeline`).
+    /// Binds a ray tracing pipeline for the traces that follow (`vkCmdBindPipeline`). A lowered pipeline is bound by each
+    /// trace, and the bound compute pipeline stays.
     ///
     /// # Errors
     /// [`WrongQueue`](Error::WrongQueue) on the transfer queue; [`StaleHandle`](Error::StaleHandle).
@@ -24,16 +26,25 @@ impl CommandBuffer {
         let pipeline = self.shared.store.ray_tracing_pipelines.get(pipeline)?;
         // A pass that was forgotten instead of dropped is still open, and Vulkan sets no stack size in a pass.
         self.end_rendering();
-        let point = vk::PipelineBindPoint::RAY_TRACING_KHR;
-        self.bind_pipeline(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
-        let ext = self.shared.gpu.ray_tracing_functions()?;
-        // SAFETY: the command buffer is being recorded outside of a pass, and the size is that of the pipeline just bound.
-        unsafe { ext.cmd_set_ray_tracing_pipeline_stack_size(self.raw(), pipeline.stack_bytes) };
+        match &pipeline.code {
+            PipelineCode::Hardware(hardware) => {
+                let point = vk::PipelineBindPoint::RAY_TRACING_KHR;
+                self.bind_pipeline(point, hardware.raw, &pipeline.name, pipeline.push_constant_bytes);
+                let ext = self.shared.gpu.ray_tracing_functions()?;
+                // SAFETY: the command buffer is being recorded outside of a pass, and the size is that of the pipeline just
+                // bound.
+                unsafe { ext.cmd_set_ray_tracing_pipeline_stack_size(self.raw(), hardware.stack_bytes) };
+            }
+            PipelineCode::Lowered(_) => {
+                self.expect_push_block(&pipeline.name, pipeline.push_constant_bytes);
+            }
+        }
         self.ray_tracing = Some(pipeline);
         Ok(())
     }
 
-    /// Runs the first ray generation shader `size[0] * size[1] * size[2]` times (`vkCmdTraceRaysKHR`).
+    /// Runs the first ray generation shader `size[0] * size[1] * size[2]` times (`vkCmdTraceRaysKHR`). The shader of a
+    /// lowered pipeline runs by `vkCmdDispatch`.
     pub fn trace_rays(&mut self, size: [u32; 3], dependencies: &Dependencies<'_>) -> Result<()> {
         self.trace_rays_with(0, size, dependencies)
     }
@@ -46,11 +57,15 @@ impl CommandBuffer {
         dependencies: &Dependencies<'_>,
     ) -> Result<()> {
         let (pipeline, regions) = self.check_trace(ray_gen)?;
+        if let PipelineCode::Lowered(lowered) = &pipeline.code {
+            let trace = LoweredTrace::new(&pipeline, lowered, &regions, ray_gen)?;
+            return self.trace_lowered(&trace, size, dependencies);
+        }
         check_size(&self.shared.gpu.caps.limits, &pipeline.name, size)?;
         if size.contains(&0) {
             return Ok(());
         }
-        self.flush_barriers_after(|cmd| cmd.use_trace(&pipeline, dependencies))?;
+        self.flush_barriers_after(|cmd| cmd.use_trace(&pipeline, Stages::RAY_TRACING, dependencies))?;
         let ext = self.shared.gpu.ray_tracing_functions()?;
         // SAFETY: a ray tracing pipeline is bound, the regions are its own, and the size is within the limit.
         unsafe {
@@ -69,7 +84,8 @@ impl CommandBuffer {
     }
 
     /// Runs the ray generation shader at index `ray_gen` with a size from a buffer (`vkCmdTraceRaysIndirectKHR`). Three
-    /// `u32` at `offset` in `arguments` hold the width, height and depth, of which any may be 0.
+    /// `u32` at `offset` in `arguments` hold the width, height and depth, of which any may be 0. For a lowered pipeline a
+    /// kernel reads them, and `vkCmdDispatchIndirect` runs the shader.
     ///
     /// `arguments` needs [`INDIRECT`](crate::BufferUsage::INDIRECT); `offset` is a multiple of 4. The caller keeps the
     /// size in the buffer within the device's limits.
@@ -91,9 +107,13 @@ impl CommandBuffer {
         let (pipeline, regions) = self.check_trace(ray_gen)?;
         let buffer = self.shared.store.buffers.get(arguments)?;
         check_arguments(&buffer, offset, ARGUMENT_BYTES)?;
+        if let PipelineCode::Lowered(lowered) = &pipeline.code {
+            let trace = LoweredTrace::new(&pipeline, lowered, &regions, ray_gen)?;
+            return self.trace_lowered_indirect(&trace, &buffer, offset, dependencies);
+        }
         self.flush_barriers_after(|cmd| {
             cmd.use_buffer(&buffer, Use::indirect());
-            cmd.use_trace(&pipeline, dependencies)
+            cmd.use_trace(&pipeline, Stages::RAY_TRACING, dependencies)
         })?;
         let ext = self.shared.gpu.ray_tracing_functions()?;
         // SAFETY: a ray tracing pipeline is bound, the regions are its own, and the arguments lie inside the buffer.
@@ -121,10 +141,16 @@ impl CommandBuffer {
         Ok((pipeline, regions))
     }
 
-    fn use_trace(&mut self, pipeline: &RayTracingPipeline, dependencies: &Dependencies<'_>) -> Result<()> {
-        self.use_accel_structs(Stages::RAY_TRACING);
-        self.use_buffer(&pipeline.table, Use::shader_read(Stages::RAY_TRACING));
-        self.use_dependencies(dependencies, Stages::RAY_TRACING)
+    /// Declares what a trace uses, whose shaders run in `stages`.
+    pub(super) fn use_trace(
+        &mut self,
+        pipeline: &RayTracingPipeline,
+        stages: Stages,
+        dependencies: &Dependencies<'_>,
+    ) -> Result<()> {
+        self.use_accel_structs(stages);
+        self.use_buffer(&pipeline.table, Use::shader_read(stages));
+        self.use_dependencies(dependencies, stages)
     }
 }
 

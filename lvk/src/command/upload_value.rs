@@ -38,8 +38,10 @@ impl CommandBuffer {
         self.upload_bytes(bytemuck::cast_slice(values), align_of::<T>() as u64)
     }
 
+    /// Copies bytes to memory of the command buffer at an address with this alignment, a power of two. Returns the
+    /// address.
     #[inline]
-    fn upload_bytes(&mut self, bytes: &[u8], align: u64) -> Result<u64> {
+    pub(super) fn upload_bytes(&mut self, bytes: &[u8], align: u64) -> Result<u64> {
         let staging = &self.shared.staging;
         let (size, limit) = (bytes.len() as u64, staging.kept_bytes());
         if size > limit {

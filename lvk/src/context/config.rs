@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::gpu::caps::capabilities::FeatureRequest;
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::gpu::caps::queues::QueueRequest;
 use crate::gpu::caps::ray_query_path::RayQueryRequest;
+use crate::gpu::caps::ray_tracing_pipeline_path::RayTracingPipelineRequest;
 use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
 use crate::gpu::start::profile::DeviceProfile;
 use crate::gpu::start::user_extensions::UserExtensions;
@@ -45,8 +45,10 @@ pub struct ContextDesc<'a> {
     /// pipelines are compiled again in every run. See the manual's page on [debugging](crate::manual::debugging).
     /// Default: false.
     pub check_indices: bool,
-    /// Request for ray tracing pipelines. Default: [`FeatureRequest::Optional`].
-    pub ray_tracing_pipeline: FeatureRequest,
+    /// Request for ray tracing pipelines, and for the path of their implementation: the device's own pipelines, or
+    /// compute shaders that the library makes of them. [`Capabilities`](crate::Capabilities) reports the chosen path and
+    /// the reason. Default: [`RayTracingPipelineRequest::Auto`].
+    pub ray_tracing_pipeline: RayTracingPipelineRequest,
     /// Request for ray queries in any shader stage, and for the hardware or software path of their traversal.
     /// [`Capabilities`](crate::Capabilities) reports the chosen path and the reason.
     /// Default: [`RayQueryRequest::Auto`].
@@ -135,7 +137,7 @@ impl Default for ContextDesc<'_> {
             debug_names: None,
             checkpoints: false,
             check_indices: false,
-            ray_tracing_pipeline: FeatureRequest::Optional,
+            ray_tracing_pipeline: RayTracingPipelineRequest::Auto,
             ray_query: RayQueryRequest::default(),
             queues: QueueRequest::default(),
             required_features: &[],

@@ -14,11 +14,14 @@ use crate::pipeline::{RayTracingLibrary, RayTracingPipeline};
 
 impl Context {
     /// Creates a ray tracing pipeline with its shader binding table (`vkCreateRayTracingPipelinesKHR`). It is compiled
-    /// on as many cores as the driver uses.
+    /// on as many cores as the driver uses. A pipeline that is lowered
+    /// ([`ray_tracing_pipeline_path`](crate::Capabilities::ray_tracing_pipeline_path)) becomes a compute pipeline for each
+    /// ray generation shader (`vkCreateComputePipelines`).
     ///
     /// # Errors
     /// [`Unsupported`](Error::Unsupported) without [`ray_tracing_pipeline`](crate::Capabilities::ray_tracing_pipeline);
     /// [`LimitExceeded`](Error::LimitExceeded) for a recursion depth or a shader record beyond the device's limit;
+    /// [`Lowering`](Error::Lowering) for a shader that cannot be lowered;
     /// [`InvalidUsage`](Error::InvalidUsage) for a module of another stage, more records than shaders, or a library
     /// that does not match the pipeline.
     pub fn create_ray_tracing_pipeline(
@@ -52,7 +55,8 @@ impl Context {
     }
 
     /// Compiles shaders that several ray tracing pipelines share (`vkCreateRayTracingPipelinesKHR` with
-    /// `VK_PIPELINE_CREATE_LIBRARY_BIT_KHR`).
+    /// `VK_PIPELINE_CREATE_LIBRARY_BIT_KHR`). Where pipelines are lowered, the library keeps its shaders, and each pipeline
+    /// compiles them.
     ///
     /// # Errors
     /// [`Unsupported`](Error::Unsupported) without [`pipeline_libraries`](crate::Capabilities::pipeline_libraries);
@@ -70,9 +74,10 @@ impl Context {
     }
 
     /// Returns the bytes of stack that each ray of a pipeline needs. They are set when the pipeline is bound
-    /// (`vkCmdSetRayTracingPipelineStackSizeKHR`). Code that binds the raw pipeline must set them as well.
+    /// (`vkCmdSetRayTracingPipelineStackSizeKHR`). Code that binds the raw pipeline must set them as well. Lowered
+    /// pipelines need 0 bytes.
     pub fn ray_tracing_stack_bytes(&self, pipeline: RayTracingPipelineHandle) -> Result<u32> {
-        Ok(self.device_state().store.ray_tracing_pipelines.get(pipeline)?.stack_bytes)
+        Ok(self.device_state().store.ray_tracing_pipelines.get(pipeline)?.stack_bytes())
     }
 
     /// Writes all pipelines compiled so far to the file of

@@ -49,10 +49,12 @@ impl Context {
     /// [`InvalidUsage`](crate::Error::InvalidUsage), whose object is the field of `raw`, for null handles, a physical
     /// device that is not of the instance, features that the device cannot have, extensions that a feature or the window
     /// needs and that are not listed, queue families that lack a capability, and one queue with two families;
-    /// [`Unsupported`](crate::Error::Unsupported) for [`RayQueryRequest::Software`](crate::RayQueryRequest::Software)
-    /// without the feature `software-ray-query`.
+    /// [`Unsupported`](crate::Error::Unsupported) for [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) and
+    /// [`RayTracingPipelineRequest::Software`](crate::RayTracingPipelineRequest::Software) without the feature
+    /// `software-ray-query`.
     pub unsafe fn from_raw(raw: RawContext<'_>, desc: &ContextDesc<'_>) -> Result<Self> {
         desc.ray_query.check()?;
+        desc.ray_tracing_pipeline.check()?;
         // SAFETY: by the caller's promise.
         let gpu = unsafe { Gpu::from_raw(raw, &external_request(desc))? };
         Self::with_gpu(Arc::new(gpu), desc)

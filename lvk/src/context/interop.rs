@@ -4,11 +4,12 @@ use ash::vk;
 
 use super::Context;
 use crate::accel::accel_struct::AccelKind;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle,
     SamplerHandle, TextureHandle,
 };
+use crate::pipeline::ray_tracing::PipelineCode;
 use crate::queue::Queue;
 use crate::resource::texture_desc::TextureUsage;
 
@@ -111,8 +112,19 @@ impl Context {
     }
 
     /// Returns the ray tracing pipeline behind a handle.
+    ///
+    /// # Errors
+    /// [`Unsupported`](Error::Unsupported) for a pipeline that is lowered to compute shaders.
     pub fn raw_ray_tracing_pipeline(&self, pipeline: RayTracingPipelineHandle) -> Result<vk::Pipeline> {
-        Ok(self.device_state().store.ray_tracing_pipelines.get(pipeline)?.raw)
+        let pipeline = self.device_state().store.ray_tracing_pipelines.get(pipeline)?;
+        match &pipeline.code {
+            PipelineCode::Hardware(hardware) => Ok(hardware.raw),
+            PipelineCode::Lowered(_) => {
+                let what = format!("the Vulkan pipeline of '{}'", pipeline.name);
+                let why = "it is lowered to compute shaders; request RayTracingPipelineRequest::Hardware";
+                Err(Error::unsupported(what, why))
+            }
+        }
     }
 
     /// Returns the Vulkan acceleration structures behind a handle: one, or the parts of a split mesh. Compaction

@@ -33,7 +33,7 @@ use crate::lock_order::{Mutex, Rank};
 use crate::parallel::core_count;
 use crate::pipeline::{GraphicsParts, PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
-use crate::resource::buffer::{BufferDesc, InternalUsage};
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shader::ShaderCache;
 use crate::store::Store;
 use crate::submit::Submitter;
@@ -47,10 +47,12 @@ impl Context {
     /// [`NoVulkan`](crate::Error::NoVulkan) with the reason for each driver when there is no loader, driver or device;
     /// [`NoDevice`](crate::Error::NoDevice) with the reason for each device when no device is suitable; [`Unsupported`](crate::Error::Unsupported) when validation is
     /// required and its layer is missing, the instance has no extension of [`ContextDesc::user_extensions`], or
-    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) is requested without the feature
-    /// `software-ray-query`.
+    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) or
+    /// [`RayTracingPipelineRequest::Software`](crate::RayTracingPipelineRequest::Software) is requested without the
+    /// feature `software-ray-query`.
     pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
         desc.ray_query.check()?;
+        desc.ray_tracing_pipeline.check()?;
         let sink = desc.validation_sink.clone().unwrap_or_default();
         let instance = Instance::new(&InstanceDesc {
             application_name: desc.application_name,
@@ -185,7 +187,8 @@ fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: RayQueryStages::default(),
         kernels: Kernels::new(),
-        instance_buffers: BufferRecycler::new(),
+        instance_buffers: BufferRecycler::new(BufferUsage::STORAGE),
+        launch_buffers: BufferRecycler::new(BufferUsage::STORAGE | BufferUsage::INDIRECT),
         tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,

@@ -208,8 +208,8 @@ fn attach_opacity(shared: &DeviceState, desc: &BlasDesc<'_>, input: &mut BuildIn
     }
     let what = format!("opacity micromaps of BLAS '{}'", desc.debug_name);
     shared.gpu.require(OptionalFeature::OpacityMicromaps, &what)?;
-    if shared.gpu.caps.software_ray_query() {
-        return Err(Error::unsupported(what, "software ray queries do not read them; leave them out"));
+    if shared.gpu.caps.builds_software_structures() {
+        return Err(Error::unsupported(what, "the traversal in software does not read them; leave them out"));
     }
     for (index, handle) in desc.opacity.iter().enumerate() {
         if let Some(handle) = handle {

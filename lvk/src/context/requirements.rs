@@ -48,6 +48,7 @@ impl Context {
         desc: &ContextDesc<'_>,
     ) -> Result<DeviceRequirements<'a>> {
         desc.ray_query.check()?;
+        desc.ray_tracing_pipeline.check()?;
         let request = external_request(desc);
         // SAFETY: by the caller's promise.
         unsafe { DeviceRequirements::query(entry, instance, instance_extensions, physical_device, &request) }

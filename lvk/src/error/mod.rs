@@ -40,7 +40,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 ///   [`UploadTooLarge`](Error::UploadTooLarge);
 /// * missing support by the device or its driver: [`NoVulkan`](Error::NoVulkan),
 ///   [`NoDevice`](Error::NoDevice), [`Unsupported`](Error::Unsupported),
-///   [`LimitExceeded`](Error::LimitExceeded);
+///   [`Lowering`](Error::Lowering), [`LimitExceeded`](Error::LimitExceeded);
 /// * failures at run time: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory),
 ///   [`OutOfHostMemory`](Error::OutOfHostMemory), [`File`](Error::File), [`DeviceLost`](Error::DeviceLost),
 ///   [`Vulkan`](Error::Vulkan). Those of a Vulkan call name the call and its object.
@@ -205,6 +205,22 @@ pub enum Error {
         name: String,
         /// Output of the compiler, with the line numbers of the caller's source.
         log: String,
+    },
+    /// A shader of a ray tracing pipeline cannot be lowered to a compute shader.
+    #[error(
+        "pipeline '{}': shader '{}' cannot be lowered to a compute shader: {}; change the shader, or use a device with \
+         ray tracing pipelines of its own",
+        readable_name(pipeline),
+        readable_name(shader),
+        readable_line(why)
+    )]
+    Lowering {
+        /// Debug name of the pipeline.
+        pipeline: String,
+        /// Debug name of the shader module.
+        shader: String,
+        /// The instruction, and the reason why it cannot be lowered.
+        why: String,
     },
     /// A file could not be read or written.
     #[error("file '{}': {}", readable_name(path), readable_line(message))]

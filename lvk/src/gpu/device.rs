@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicU32;
 use ash::vk;
 
 use super::calibrated_timestamps::ClockReader;
-use super::caps::capabilities::{Capabilities, FeatureRequest};
+use super::caps::capabilities::Capabilities;
 use super::caps::descriptor_limits::DescriptorLimits;
 use super::caps::features::Features;
 use super::caps::format_features::FormatFeatureCache;
@@ -17,6 +17,7 @@ use super::caps::optional_features::OptionalFeature;
 use super::caps::portability::{PortabilityNeed, first_missing};
 use super::caps::queues::{QueueLocation, QueueRequest, Queues};
 use super::caps::ray_query_path::RayQueryRequest;
+use super::caps::ray_tracing_pipeline_path::RayTracingPipelineRequest;
 use super::caps::shading_rate::ShadingRates;
 use super::checkpoints::Checkpoints;
 use super::debug::debugger::has_debugger;
@@ -42,7 +43,7 @@ use crate::lock_order::{Guard, Mutex, Rank};
 pub(crate) struct DeviceRequest<'a> {
     /// Index, or part of the name.
     pub(crate) wish: Option<&'a str>,
-    pub(crate) pipeline: FeatureRequest,
+    pub(crate) pipeline: RayTracingPipelineRequest,
     pub(crate) query: RayQueryRequest,
     /// Required optional features. Devices that lack one are not considered.
     pub(crate) required: &'a [OptionalFeature],
@@ -153,6 +154,9 @@ impl Gpu {
         if request.query.prefers_hardware() && !raw.ray_query {
             caps.ray_query_reason = "the engine's device has no ray queries enabled";
         }
+        if request.pipeline.prefers_hardware() && !raw.ray_tracing_pipeline {
+            caps.ray_tracing_pipeline_reason = "the engine's device has no ray tracing pipelines enabled";
+        }
         let mut instance =
             Instance::external(raw.entry.clone(), raw.instance.clone(), raw.instance_extensions);
         if request.validation != ValidationMode::Off {
@@ -181,14 +185,14 @@ impl Gpu {
     ) -> Self {
         let DeviceParts { device, mut caps, features, memory, queues, is_external } = made;
         let raw = &instance.raw;
-        let structures = caps.hardware_acceleration_structures();
+        let structures = caps.builds_device_structures();
         let host_copies = HostImageCopy::new(raw, &device, physical, &caps);
         caps.host_image_copy = host_copies.is_some();
         Self {
             queues,
             accel: structures.then(|| ash::khr::acceleration_structure::Device::new(raw, &device)),
             ray_tracing: caps
-                .ray_tracing_pipeline
+                .device_pipelines()
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             micromaps: caps
                 .has(OptionalFeature::OpacityMicromaps)
@@ -256,7 +260,7 @@ impl Gpu {
 
     /// True if acceleration structures exist, built by the device or by the library.
     pub(crate) fn has_acceleration_structures(&self) -> bool {
-        self.accel.is_some() || self.caps.software_ray_query()
+        self.accel.is_some() || self.caps.builds_software_structures()
     }
 
     /// Returns an error unless acceleration structures of either kind exist.
@@ -271,6 +275,11 @@ impl Gpu {
     /// Returns the functions of `VK_KHR_ray_tracing_pipeline`, or an error that names the missing feature.
     pub(crate) fn ray_tracing_functions(&self) -> Result<&ash::khr::ray_tracing_pipeline::Device> {
         self.ray_tracing.as_ref().ok_or_else(|| self.unsupported("ray tracing pipelines"))
+    }
+
+    /// Returns an error unless ray tracing pipelines work, by the device or lowered.
+    pub(crate) fn check_ray_tracing_pipelines(&self) -> Result<()> {
+        if self.caps.ray_tracing_pipeline { Ok(()) } else { Err(self.unsupported("ray tracing pipelines")) }
     }
 
     /// Returns the functions of `VK_EXT_mesh_shader`, or an error that names the missing feature.
@@ -417,10 +426,10 @@ pub(super) fn candidate(index: usize, device: &mut PhysicalDevice, request: &Dev
             missing.push(missing_requirement(name, request.profile.filter(|_| found)));
         }
     };
-    if request.pipeline == FeatureRequest::Required {
+    if request.pipeline.requires_pipelines() {
         demand("ray tracing pipelines", found.ray_tracing_pipeline, left.ray_tracing_pipeline);
     }
-    if request.query.requires_hardware() {
+    if request.query.requires_hardware() || request.pipeline.requires_queries() {
         demand("ray queries", found.ray_query, left.ray_query);
     }
     let swapchain = request.window.map(|_| OptionalFeature::Swapchain);
@@ -431,8 +440,8 @@ pub(super) fn candidate(index: usize, device: &mut PhysicalDevice, request: &Dev
         demand(&name.to_string_lossy(), false, device.has_extension(name));
     }
     let wanted = [
-        request.pipeline.is_requested() && left.ray_tracing_pipeline,
-        request.query.prefers_hardware() && left.ray_query,
+        request.pipeline.prefers_hardware() && left.ray_tracing_pipeline,
+        (request.query.prefers_hardware() || request.pipeline.requires_queries()) && left.ray_query,
     ];
     Candidate {
         device: DeviceCandidate { missing, ..device.candidate(index) },
@@ -461,13 +470,14 @@ fn create_with_fallback(
         Ok((device, features)) => return Ok((device, caps, features)),
         Err(error) => error,
     };
-    let required = request.pipeline == FeatureRequest::Required || request.query.requires_hardware();
-    if required || !caps.hardware_acceleration_structures() {
+    let pipelines = request.pipeline.requires_pipelines() || request.pipeline.requires_queries();
+    if pipelines || request.query.requires_hardware() || !caps.builds_device_structures() {
         return Err(Error::vulkan("vkCreateDevice", &caps.device_name)(first));
     }
+    caps = chosen.capabilities.clone();
+    caps.limit_ray_tracing(false, false);
     caps.limits.max_bindless_tlas = 0;
-    caps.ray_query = false;
-    caps.choose_ray_tracing(FeatureRequest::Off, request.query);
+    caps.choose_ray_tracing(request.pipeline, request.query);
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing returned {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it returned {first}", caps.device_name);
     let (device, features) = create(instance, chosen, &caps, &request.extra)
@@ -524,7 +534,7 @@ pub(super) fn queue_infos<'a>(
 /// out-of-bounds access if the driver makes it harmless.
 pub(super) fn enabled_features(chosen: &PhysicalDevice, caps: &Capabilities, gpu_assisted: bool) -> Features {
     let mut features = Features::supported_subset(&chosen.features, caps.optional);
-    features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
+    features.limit_ray_tracing(caps.device_pipelines(), caps.device_ray_queries());
     features.ext.position_fetch.ray_tracing_position_fetch &= vk::Bool32::from(caps.position_fetch);
     features.limit_mesh_shaders(caps.mesh_shader);
     if gpu_assisted {

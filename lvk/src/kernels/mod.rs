@@ -57,6 +57,8 @@ kernels! {
         Gather = "kernels/gather", "gather.comp";
         /// Writes addresses and hit remap entries of instances.
         Instances = "kernels/instances", "instances.comp";
+        /// Writes the size of a lowered trace, and its workgroup counts.
+        TraceSize = "kernels/trace_size", "trace_size.comp";
     }
     #[cfg(feature = "software-ray-query")] {
         /// Resets the scratch memory after an earlier build.
@@ -150,6 +152,22 @@ pub(crate) struct InstancesPushConstants {
     pub(crate) unused: u32,
 }
 
+/// Push constants of [`Kernel::TraceSize`].
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct TraceSizePushConstants {
+    /// Address of the caller's width, height and depth.
+    pub(crate) arguments: u64,
+    /// Address at which the workgroup counts are written, three `u32`.
+    pub(crate) workgroups: u64,
+    /// Address at which the size is written, three `u32`.
+    pub(crate) size: u64,
+    /// Largest workgroup count along x.
+    pub(crate) max_workgroups: u32,
+    /// Pads the block to the alignment of its addresses.
+    pub(crate) unused: u32,
+}
+
 /// The pipelines of the kernels, each created at its first use.
 pub(crate) struct Kernels {
     pipelines: [Mutex<Option<Arc<ComputePipeline>>>; Kernel::ALL.len()],
@@ -198,7 +216,9 @@ impl Kernel {
         let module =
             ShaderModule::new(gpu, &desc, CompileFiles::default(), None, layout.push_constant_bytes)?;
         let desc = ComputePipelineDesc { debug_name: self.name(), ..Default::default() };
-        ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache, max_threads: 1 }, &desc, &module)
+        let push_constant_bytes = layout.push_constant_bytes;
+        let base = PipelineBase { layout: layout.raw, push_constant_bytes, cache, max_threads: 1 };
+        ComputePipeline::new(gpu, base, &desc, &module)
     }
 }
 

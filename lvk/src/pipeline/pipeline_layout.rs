@@ -15,6 +15,8 @@ use crate::gpu::Gpu;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PipelineBase {
     pub(crate) layout: vk::PipelineLayout,
+    /// Bytes of push constants of the layout.
+    pub(crate) push_constant_bytes: u32,
     /// The pipeline cache; null if the context has none.
     pub(crate) cache: vk::PipelineCache,
     /// Most threads that one creation uses, the calling thread included.

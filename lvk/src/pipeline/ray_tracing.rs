@@ -4,38 +4,41 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::lowered::LoweredPipeline;
+use super::lowered_groups::LoweredPart;
 use super::pipeline_layout::PipelineBase;
-use super::ray_tracing_compile::{LinkedLibraries, check_interface, compile_groups};
+use super::ray_tracing_compile::check_interface;
 use super::ray_tracing_desc::RayTracingPipelineDesc;
+use super::ray_tracing_hardware::HardwarePipeline;
 use super::ray_tracing_library::RayTracingLibrary;
-use super::ray_tracing_stack::StackSizes;
 use super::sbt::{GroupHandles, SbtLimits, SbtPlan, SbtRegion, plan_sbt, sbt_buffer_bytes, write_sbt};
 use super::sbt_order::{PerRegion, sbt_order};
 use super::shader_groups::{CompiledGroups, ShaderGroups};
 use super::shader_module::ModuleLookup;
 use crate::cpu_scope::cpu_scope;
-use crate::error::limit_origin::LimitOrigin;
-use crate::error::{Error, Result, check_limit_of};
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
-use crate::gpu::start::driver_workarounds::with_shared_device_lock;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
-use crate::shader::ShaderStage;
 
 /// A ray tracing pipeline with its shader binding table, destroyed on drop.
 pub(crate) struct RayTracingPipeline {
-    pub(crate) raw: vk::Pipeline,
+    pub(crate) code: PipelineCode,
     pub(crate) push_constant_bytes: u32,
-    /// Stack size of one ray, in bytes.
-    pub(crate) stack_bytes: u32,
     pub(crate) name: Arc<str>,
     pub(crate) table: Arc<Buffer>,
-    _libraries: Vec<Arc<RayTracingLibrary>>,
     plan: SbtPlan,
     /// Address of the first region: the address of the table's buffer, rounded up to the base alignment.
     base: u64,
-    gpu: Arc<Gpu>,
+}
+
+/// The compiled shaders of a pipeline.
+pub(crate) enum PipelineCode {
+    /// A pipeline of the device.
+    Hardware(HardwarePipeline),
+    /// Compute shaders that the library made of the shaders. The table holds records without handles.
+    Lowered(LoweredPipeline),
 }
 
 /// Regions of the shader binding table that a trace passes to Vulkan.
@@ -63,7 +66,7 @@ impl RayTracingPipeline {
     ) -> Result<(Self, SbtContents)> {
         cpu_scope!("create ray tracing pipeline");
         let name = desc.debug_name;
-        let ext = gpu.ray_tracing_functions()?;
+        gpu.check_ray_tracing_pipelines()?;
         check_interface(gpu, desc)?;
         libraries.iter().try_for_each(|library| library.check_interface(desc))?;
         let groups = ShaderGroups::collect(desc, find)?;
@@ -78,56 +81,35 @@ impl RayTracingPipeline {
         let records = linked_records(&parts);
         let plan = plan_sbt(name, &limits, &records)?;
         let table = create_sbt_buffer(gpu, name, sbt_buffer_bytes(&plan, limits.base_alignment))?;
-        let raw = compile_groups(
-            gpu,
-            base,
-            desc,
-            &groups,
-            &linked_libraries(libraries),
-            vk::PipelineCreateFlags::empty(),
-        )?;
-        gpu.name(raw, name);
-        let mut pipeline = Self {
-            raw,
+        let code = PipelineCode::new(gpu, base, desc, &groups, libraries, &plan)?;
+        let order = sbt_order(&counts);
+        let handles = match &code {
+            PipelineCode::Hardware(pipeline) => {
+                pipeline.handles(name, order.len() as u32, limits.handle_bytes)?
+            }
+            PipelineCode::Lowered(_) => Vec::new(),
+        };
+        let mut bytes = vec![0; plan.bytes as usize];
+        write_sbt(&plan, &limits, &GroupHandles { bytes: &handles, order: &order }, &records, &mut bytes);
+        let start = table.address.next_multiple_of(limits.base_alignment.into());
+        let offset = start - table.address;
+        let pipeline = Self {
+            code,
             push_constant_bytes: parts.iter().map(|part| part.push_constant_bytes).max().unwrap_or(0),
-            stack_bytes: 0,
             name: name.into(),
-            base: table.address.next_multiple_of(limits.base_alignment.into()),
+            base: start,
             table: Arc::new(table),
             plan,
-            gpu: Arc::clone(gpu),
-            _libraries: libraries.to_vec(),
         };
-        pipeline.set_stack_size(stack_sizes(ext, raw, &parts), desc)?;
-        let order = sbt_order(&counts);
-        let handles = pipeline.handles(order.len() as u32, limits.handle_bytes)?;
-        let mut bytes = vec![0; pipeline.plan.bytes as usize];
-        let handles = GroupHandles { bytes: &handles, order: &order };
-        write_sbt(&pipeline.plan, &limits, &handles, &records, &mut bytes);
-        let offset = pipeline.base - pipeline.table.address;
         Ok((pipeline, SbtContents { offset, bytes }))
     }
 
-    fn set_stack_size(&mut self, sizes: StackSizes, desc: &RayTracingPipelineDesc<'_>) -> Result<()> {
-        let bytes = sizes.pipeline_bytes(desc.max_recursion, desc.max_callable_depth);
-        let what = "stack of one ray in bytes (max_recursion, max_callable_depth)";
-        check_limit_of(LimitOrigin::Vulkan, &self.name, what, bytes, u32::MAX.into())?;
-        self.stack_bytes = bytes as u32;
-        Ok(())
-    }
-
-    fn handles(&self, group_count: u32, handle_bytes: u32) -> Result<Vec<u8>> {
-        let bytes = group_count as usize * handle_bytes as usize;
-        // SAFETY: the pipeline has these groups, and the size is that of their handles.
-        unsafe {
-            self.gpu.ray_tracing_functions()?.get_ray_tracing_shader_group_handles(
-                self.raw,
-                0,
-                group_count,
-                bytes,
-            )
+    /// Returns the stack size of one ray in bytes; 0 if the pipeline is lowered.
+    pub(crate) fn stack_bytes(&self) -> u32 {
+        match &self.code {
+            PipelineCode::Hardware(pipeline) => pipeline.stack_bytes,
+            PipelineCode::Lowered(_) => 0,
         }
-        .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR", &self.name))
     }
 
     /// Returns the regions of the shader binding table for a trace from ray generation shader `index`.
@@ -151,18 +133,26 @@ impl RayTracingPipeline {
     }
 }
 
-impl Drop for RayTracingPipeline {
-    fn drop(&mut self) {
-        // SAFETY: the owner has waited until the GPU is done with the pipeline.
-        let destroy = || unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
-        with_shared_device_lock(self.gpu.caps.driver_id, destroy);
-    }
-}
-
-fn linked_libraries(libraries: &[Arc<RayTracingLibrary>]) -> LinkedLibraries {
-    LinkedLibraries {
-        raw: libraries.iter().map(|library| library.raw).collect(),
-        ray_gen: libraries.iter().find_map(|library| library.ray_gen.clone()),
+impl PipelineCode {
+    /// Compiles the groups of a pipeline and of its libraries.
+    fn new(
+        gpu: &Arc<Gpu>,
+        base: PipelineBase,
+        desc: &RayTracingPipelineDesc<'_>,
+        groups: &ShaderGroups,
+        libraries: &[Arc<RayTracingLibrary>],
+        plan: &SbtPlan,
+    ) -> Result<Self> {
+        if !gpu.caps.lowered_pipelines() {
+            return Ok(Self::Hardware(HardwarePipeline::new(gpu, base, desc, groups, libraries)?));
+        }
+        if !libraries.is_empty() {
+            groups.check_sizes(desc)?;
+        }
+        let own = LoweredPart::new(desc, groups)?;
+        let of_libraries = libraries.iter().filter_map(|library| library.lowered());
+        let parts: Vec<&LoweredPart> = std::iter::once(&own).chain(of_libraries).collect();
+        Ok(Self::Lowered(LoweredPipeline::new(gpu, base, desc, &parts, plan)?))
     }
 }
 
@@ -179,32 +169,6 @@ fn linked_records<'a>(parts: &[&'a CompiledGroups]) -> PerRegion<Vec<&'a [u8]>> 
     }
 }
 
-/// Returns the largest stack size of each kind of shader. Only shaders that a group contains are queried.
-fn stack_sizes(
-    ext: &ash::khr::ray_tracing_pipeline::Device,
-    pipeline: vk::Pipeline,
-    parts: &[&CompiledGroups],
-) -> StackSizes {
-    let mut sizes = StackSizes::default();
-    let mut first = 0;
-    for part in parts {
-        for (group, stage) in &part.shaders {
-            let shader = match stage {
-                ShaderStage::ClosestHit => vk::ShaderGroupShaderKHR::CLOSEST_HIT,
-                ShaderStage::AnyHit => vk::ShaderGroupShaderKHR::ANY_HIT,
-                ShaderStage::Intersection => vk::ShaderGroupShaderKHR::INTERSECTION,
-                _ => vk::ShaderGroupShaderKHR::GENERAL,
-            };
-            // SAFETY: the pipeline has the group, and the group has the shader.
-            let bytes =
-                unsafe { ext.get_ray_tracing_shader_group_stack_size(pipeline, first + group, shader) };
-            sizes.add(*stage, bytes);
-        }
-        first += part.len() as u32;
-    }
-    sizes
-}
-
 fn sbt_limits(limits: &Limits) -> SbtLimits {
     SbtLimits {
         handle_bytes: limits.sbt_handle_bytes,
@@ -215,11 +179,10 @@ fn sbt_limits(limits: &Limits) -> SbtLimits {
 }
 
 fn create_sbt_buffer(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
-    let desc = BufferDesc {
-        size_bytes: bytes.max(1),
-        usage: BufferUsage::empty(),
-        debug_name: name,
-        ..Default::default()
+    let (usage, internal) = match gpu.caps.lowered_pipelines() {
+        true => (BufferUsage::STORAGE, InternalUsage::NONE),
+        false => (BufferUsage::empty(), InternalUsage::SHADER_BINDING_TABLE),
     };
-    Buffer::new(gpu, &desc, InternalUsage::SHADER_BINDING_TABLE)
+    let desc = BufferDesc { size_bytes: bytes.max(1), usage, debug_name: name, ..Default::default() };
+    Buffer::new(gpu, &desc, internal)
 }

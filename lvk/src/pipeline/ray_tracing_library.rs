@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::block_layout::BlockLayout;
+use super::lowered_groups::LoweredPart;
 use super::pipeline_layout::PipelineBase;
 use super::ray_tracing_compile::{LinkedLibraries, check_interface, compile_groups};
 use super::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc};
@@ -97,12 +98,24 @@ impl<'a> RayTracingLibraryDesc<'a> {
 
 /// A ray tracing library, destroyed on drop.
 pub(crate) struct RayTracingLibrary {
-    pub(crate) raw: vk::Pipeline,
+    code: LibraryCode,
     pub(crate) groups: CompiledGroups,
-    /// A ray generation shader of the library.
-    pub(super) ray_gen: Option<Arc<ShaderModule>>,
     pub(crate) name: Arc<str>,
     interface: LibraryInterface,
+}
+
+/// The shaders of a library.
+enum LibraryCode {
+    Compiled(CompiledLibrary),
+    /// Shaders that are lowered with those of each pipeline.
+    Lowered(LoweredPart),
+}
+
+/// A library of the device, destroyed on drop.
+pub(super) struct CompiledLibrary {
+    pub(super) raw: vk::Pipeline,
+    /// A ray generation shader of the library.
+    pub(super) ray_gen: Option<Arc<ShaderModule>>,
     gpu: Arc<Gpu>,
 }
 
@@ -142,7 +155,7 @@ impl RayTracingLibrary {
         find: ModuleLookup<'_>,
     ) -> Result<Self> {
         let name = desc.debug_name;
-        gpu.ray_tracing_functions()?;
+        gpu.check_ray_tracing_pipelines()?;
         if !gpu.caps.pipeline_libraries {
             return Err(gpu.unsupported(&format!("pipeline libraries, of which '{name}' is one")));
         }
@@ -152,24 +165,30 @@ impl RayTracingLibrary {
         if groups.infos.is_empty() {
             return Err(Error::usage(name, "a library needs at least one shader or hit group"));
         }
-        let raw = compile_groups(
-            gpu,
-            base,
-            desc,
-            &groups,
-            &LinkedLibraries::default(),
-            vk::PipelineCreateFlags::LIBRARY_KHR,
-        )?;
-        gpu.name(raw, name);
-        let ray_gen = groups.modules.iter().find(|module| module.stage == ShaderStage::RayGen).cloned();
-        Ok(Self {
-            raw,
-            groups: groups.list,
-            ray_gen,
-            name: name.into(),
-            interface: LibraryInterface::from_desc(desc),
-            gpu: Arc::clone(gpu),
-        })
+        let code = if gpu.caps.lowered_pipelines() {
+            groups.check_sizes(desc)?;
+            LibraryCode::Lowered(LoweredPart::new(desc, &groups)?)
+        } else {
+            LibraryCode::Compiled(CompiledLibrary::new(gpu, base, desc, &groups)?)
+        };
+        let interface = LibraryInterface::from_desc(desc);
+        Ok(Self { code, groups: groups.list, name: name.into(), interface })
+    }
+
+    /// Returns the library of the device; `None` if the library is lowered with each pipeline.
+    pub(super) fn compiled(&self) -> Option<&CompiledLibrary> {
+        match &self.code {
+            LibraryCode::Compiled(library) => Some(library),
+            LibraryCode::Lowered(_) => None,
+        }
+    }
+
+    /// Returns the shaders to lower; `None` if the device has compiled them.
+    pub(super) fn lowered(&self) -> Option<&LoweredPart> {
+        match &self.code {
+            LibraryCode::Compiled(_) => None,
+            LibraryCode::Lowered(part) => Some(part),
+        }
     }
 
     /// Fails unless the pipeline has the interface of the library.
@@ -184,7 +203,22 @@ impl RayTracingLibrary {
     }
 }
 
-impl Drop for RayTracingLibrary {
+impl CompiledLibrary {
+    fn new(
+        gpu: &Arc<Gpu>,
+        base: PipelineBase,
+        desc: &RayTracingPipelineDesc<'_>,
+        groups: &ShaderGroups,
+    ) -> Result<Self> {
+        let flags = vk::PipelineCreateFlags::LIBRARY_KHR;
+        let raw = compile_groups(gpu, base, desc, groups, &LinkedLibraries::default(), flags)?;
+        gpu.name(raw, desc.debug_name);
+        let ray_gen = groups.modules.iter().find(|module| module.stage == ShaderStage::RayGen).cloned();
+        Ok(Self { raw, ray_gen, gpu: Arc::clone(gpu) })
+    }
+}
+
+impl Drop for CompiledLibrary {
     fn drop(&mut self) {
         // SAFETY: pipelines linked from the library hold it.
         let destroy = || unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };

@@ -6,7 +6,7 @@ use crate::error::{Result, check_limit};
 /// Limits of shader binding tables (`VkPhysicalDeviceRayTracingPipelinePropertiesKHR`), in bytes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SbtLimits {
-    /// Size of a shader group handle.
+    /// Size of a shader group handle; 0 in a table of records only.
     pub(crate) handle_bytes: u32,
     /// Alignment of every record.
     pub(crate) handle_alignment: u32,
@@ -66,7 +66,7 @@ impl SbtPlan {
     }
 }
 
-/// Computes the position of all records. Strides are multiples of the handle alignment; regions start at multiples of
+/// Computes the position of all records. Strides are multiples of the handle alignment, and never 0; regions start at multiples of
 /// the base alignment.
 ///
 /// `records` holds the caller's bytes, which follow the handle of each group.
@@ -81,7 +81,7 @@ pub(crate) fn plan_sbt(
 ) -> Result<SbtPlan> {
     let stride = |records: &Vec<&[u8]>| {
         let longest = records.iter().map(|record| record.len()).max().unwrap_or(0) as u64;
-        align_up(longest.saturating_add(limits.handle_bytes.into()), limits.handle_alignment)
+        align_up(longest.saturating_add(limits.handle_bytes.into()).max(1), limits.handle_alignment)
     };
     let strides = records.as_ref().map(stride);
     let names =
@@ -119,7 +119,7 @@ pub(crate) fn write_sbt(
     out: &mut [u8],
 ) {
     out.fill(0);
-    let handle_bytes = limits.handle_bytes.max(1) as usize;
+    let handle_bytes = limits.handle_bytes as usize;
     let records = records.as_ref().into_array().into_iter().flatten();
     for (((start, stride), group), record) in plan.records().zip(handles.order).zip(records) {
         let first = group.saturating_mul(handle_bytes);
@@ -159,12 +159,14 @@ mod tests {
     fn limits() -> impl Strategy<Value = SbtLimits> {
         let handle = prop::sample::select(vec![16_u32, 32, 64]);
         let base = prop::sample::select(vec![32_u32, 64, 128, 256]);
-        (8..=64_u32, handle, base).prop_map(|(handle_bytes, handle_alignment, base_alignment)| SbtLimits {
-            handle_bytes,
-            handle_alignment,
-            base_alignment,
-            max_stride: 4096,
-        })
+        (prop_oneof![Just(0), 8..=64_u32], handle, base).prop_map(
+            |(handle_bytes, handle_alignment, base_alignment)| SbtLimits {
+                handle_bytes,
+                handle_alignment,
+                base_alignment,
+                max_stride: 4096,
+            },
+        )
     }
 
     /// Records of the groups of all four regions; no byte is 0.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use ::spirv::Capability;
 use ash::vk;
 
 use crate::bindless::Bindless;
@@ -10,6 +11,7 @@ use crate::error::limit_origin::LimitOrigin;
 use crate::error::readable::readable_name;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::gpu::caps::capabilities::Capabilities;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::spirv::reflect::reflect;
 use crate::shader::{CompileFiles, CompileOptions, Reflection, ShaderModuleDesc, ShaderStage};
@@ -20,7 +22,10 @@ pub(crate) type ModuleLookup<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<
 
 /// A compiled module, destroyed on drop.
 pub(crate) struct ShaderModule {
+    /// Null if the module has `words`.
     pub(crate) raw: vk::ShaderModule,
+    /// SPIR-V of a shader that is lowered with the others of its pipeline.
+    pub(crate) words: Option<Arc<[u32]>>,
     pub(crate) stage: ShaderStage,
     pub(crate) reflection: Reflection,
     pub(crate) name: String,
@@ -40,8 +45,13 @@ impl ShaderModule {
         let words = compile(desc, &CompileOptions::from_capabilities(&gpu.caps), files)?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
-        let extra = &gpu.extra_capabilities;
-        check_capabilities(desc.debug_name, desc.stage, &reflection, &gpu.features, extra)?;
+        let is_lowered = desc.stage.is_ray_tracing() && gpu.caps.lowered_pipelines();
+        let stage = if is_lowered { ShaderStage::Compute } else { desc.stage };
+        let mut extra = gpu.extra_capabilities.clone();
+        if is_lowered {
+            extra.extend(lowered_capabilities(&gpu.caps));
+        }
+        check_capabilities(desc.debug_name, stage, &reflection, &gpu.features, &extra)?;
         if let Some(last) = reflection.input_reads.last() {
             let (what, limit) = ("place of an input attachment", gpu.caps.limits.max_input_attachments);
             check_limit(desc.debug_name, what, u64::from(last.input.index()) + 1, limit.into())?;
@@ -60,13 +70,21 @@ impl ShaderModule {
             Some(plan) => with_index_checks(gpu, desc, words, &plan),
             None => words,
         };
-        let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words are a complete module for a stage and features of this device.
-        let raw = unsafe { gpu.device.create_shader_module(&info, None) }
-            .map_err(Error::vulkan("vkCreateShaderModule", desc.debug_name))?;
-        gpu.name(raw, desc.debug_name);
+        let (raw, words) = match is_lowered {
+            true => (vk::ShaderModule::null(), Some(words.into())),
+            false => (create_raw(gpu, desc.debug_name, &words)?, None),
+        };
         let name = desc.debug_name.to_owned();
-        Ok(Self { raw, stage: desc.stage, reflection, name, gpu: Arc::clone(gpu) })
+        Ok(Self { raw, words, stage: desc.stage, reflection, name, gpu: Arc::clone(gpu) })
+    }
+
+    /// Creates the compute shader that a ray tracing pipeline was lowered to. Its words may use ray queries of the
+    /// device where shaders of the caller may not.
+    pub(crate) fn from_lowered(gpu: &Arc<Gpu>, name: &str, words: &[u32]) -> Result<Self> {
+        let stage = ShaderStage::Compute;
+        let reflection = reflect(name, stage, words)?;
+        let raw = create_raw(gpu, name, words)?;
+        Ok(Self { raw, words: None, stage, reflection, name: name.to_owned(), gpu: Arc::clone(gpu) })
     }
 
     /// Fails unless the module has the stage `stage`.
@@ -81,9 +99,25 @@ impl ShaderModule {
 
 impl Drop for ShaderModule {
     fn drop(&mut self) {
-        // SAFETY: pipelines do not need their modules after creation.
+        // SAFETY: pipelines do not need their modules after creation; null is ignored.
         unsafe { self.gpu.device.destroy_shader_module(self.raw, None) };
     }
+}
+
+fn create_raw(gpu: &Gpu, name: &str, words: &[u32]) -> Result<vk::ShaderModule> {
+    let info = vk::ShaderModuleCreateInfo::default().code(words);
+    // SAFETY: the words are a complete module for a stage and features of this device.
+    let raw = unsafe { gpu.device.create_shader_module(&info, None) }
+        .map_err(Error::vulkan("vkCreateShaderModule", name))?;
+    gpu.name(raw, name);
+    Ok(raw)
+}
+
+/// Returns the capabilities of ray tracing stages that need no feature of the device if pipelines are lowered.
+fn lowered_capabilities(device: &Capabilities) -> impl Iterator<Item = u32> {
+    let fetch = device.position_fetch.then_some(Capability::RayTracingPositionFetchKHR);
+    let always = [Capability::RayTracingKHR, Capability::RayTraversalPrimitiveCullingKHR];
+    always.into_iter().chain(fetch).map(|capability| capability as u32)
 }
 
 /// Returns the module with index checks. If the checks cannot be added, logs a warning and returns the module

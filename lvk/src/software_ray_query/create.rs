@@ -39,10 +39,10 @@ use crate::software_ray_query::validate_blob;
 pub(crate) const SOFTWARE_BLOB_UUID: [u8; 32] = *b"lvk software structure, form 3\0\0";
 
 impl Context {
-    /// Builds the BVHs of meshes on all CPU cores; `None` for those that the GPU builds, and for all if the device
-    /// traces ray queries itself. Waits for the GPU to read the inputs back.
+    /// Builds the BVHs of meshes on all CPU cores; `None` for those that the GPU builds, and for all if no ray is
+    /// traced in software. Waits for the GPU to read the inputs back.
     pub(crate) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<BlasBlob>>> {
-        if !self.device_state().gpu.caps.software_ray_query() {
+        if !self.device_state().gpu.caps.builds_software_structures() {
             return Ok(descs.iter().map(|_| None).collect());
         }
         let is_of_cpu = |desc: &&BlasDesc<'_>| !builds_on_gpu(desc.flags);
@@ -69,15 +69,15 @@ impl Context {
         }
     }
 
-    /// Allocates memory for a BVH that the CPU built, or that the GPU is to build; `None` if the device traces ray
-    /// queries itself.
+    /// Allocates memory for a BVH that the CPU built, or that the GPU is to build; `None` if no ray is traced in
+    /// software.
     pub(crate) fn software_blas(
         &self,
         desc: &BlasDesc<'_>,
         blob: Option<&BlasBlob>,
     ) -> Result<Option<SoftwareBlas>> {
         let (shared, name) = (self.device_state(), desc.debug_name);
-        if !shared.gpu.caps.software_ray_query() {
+        if !shared.gpu.caps.builds_software_structures() {
             return Ok(None);
         }
         let plan = gpu_plan(name, desc.geometries, desc.flags)?;
@@ -158,9 +158,9 @@ impl Context {
     }
 }
 
-/// Allocates a software TLAS; `None` if the device traces ray queries itself.
+/// Allocates a software TLAS; `None` if no ray is traced in software.
 pub(crate) fn software_tlas(shared: &DeviceState, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
-    if !shared.gpu.caps.software_ray_query() {
+    if !shared.gpu.caps.builds_software_structures() {
         return Ok(None);
     }
     let plan = GpuBuildPlan::tlas(name, capacity)?;

@@ -75,7 +75,7 @@ fn emit_all(
 /// Returns true if one Vulkan barrier may cover all of the memory barrier.
 #[inline]
 fn is_whole(gpu: &Gpu, memory: &MemoryBarrier) -> bool {
-    gpu.caps.hardware_ray_query() || !memory.dst_access.contains(Access::ACCEL_READ)
+    gpu.caps.device_ray_queries() || !memory.dst_access.contains(Access::ACCEL_READ)
 }
 
 #[inline]

@@ -434,6 +434,16 @@ impl<T> Submitter<T> {
         Ok(self.explain_loss(self.timeline(self.queue_of(value)).query_completed())? >= value)
     }
 
+    /// Returns true if all submissions of all queues are done.
+    pub(crate) fn is_all_done(&self) -> Result<bool> {
+        for timeline in &self.timelines {
+            if !self.explain_loss(timeline.is_done())? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
     /// Returns the value up to which all submissions are done.
     pub(crate) fn completed_up_to(&self) -> Result<u64> {
         let completed = self.completed_values()?;

@@ -73,6 +73,11 @@ impl Timeline {
         Ok(value)
     }
 
+    /// Returns true if all submitted work is done.
+    pub(crate) fn is_done(&self) -> Result<bool> {
+        Ok(self.query_completed()? >= self.sent.load(Ordering::Acquire))
+    }
+
     /// Returns the value that the GPU of a lost device has reached, as far as it is known. A value beyond `submitted`
     /// is none: a lost device may report any.
     pub(crate) fn last_known(&self, submitted: u64) -> u64 {

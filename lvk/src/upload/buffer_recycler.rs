@@ -7,10 +7,11 @@ use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
-use crate::resource::buffer::{BufferDesc, InternalUsage};
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
 /// A few mapped buffers that are not in use.
 pub(crate) struct BufferRecycler {
+    usage: BufferUsage,
     buffers: Mutex<Vec<Arc<Buffer>>>,
 }
 
@@ -20,8 +21,9 @@ impl BufferRecycler {
     /// A buffer more than this many times too large is not reused.
     const MAX_SIZE_RATIO: u64 = 4;
 
-    pub(crate) fn new() -> Self {
-        Self { buffers: Mutex::new(Rank::SpareBuffers, Vec::new()) }
+    /// Creates an empty store of buffers with this usage.
+    pub(crate) fn new(usage: BufferUsage) -> Self {
+        Self { usage, buffers: Mutex::new(Rank::SpareBuffers, Vec::new()) }
     }
 
     /// Returns a mapped buffer of at least `bytes`.
@@ -29,8 +31,8 @@ impl BufferRecycler {
         if let Some(spare) = self.find_spare(bytes) {
             return Ok(spare);
         }
-        let memory = MemoryKind::HostVisible;
-        let desc = BufferDesc { size_bytes: bytes.max(1), memory, debug_name: name, ..Default::default() };
+        let (size_bytes, memory) = (bytes.max(1), MemoryKind::HostVisible);
+        let desc = BufferDesc { size_bytes, usage: self.usage, memory, data: None, debug_name: name };
         Ok(Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?))
     }
 

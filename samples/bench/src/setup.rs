@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use lvk::{
-    Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, ValidationMode, ValidationSink,
+    Context, ContextDesc, DeviceProfile, RayQueryRequest, RayTracingPipelineRequest, ValidationMode,
+    ValidationSink,
 };
 
 use crate::args::{BenchArgs, Benchmark, ImageSizeArgs};
@@ -77,7 +78,7 @@ impl Setup {
     /// Opens the device with these requests for ray tracing pipelines and ray queries, and with this folder as BVH cache.
     pub(super) fn open_tracing(
         &self,
-        ray_tracing_pipeline: FeatureRequest,
+        ray_tracing_pipeline: RayTracingPipelineRequest,
         ray_query: RayQueryRequest,
         tree_cache: Option<&Path>,
     ) -> Result<Context, BenchError> {
@@ -110,10 +111,10 @@ impl Setup {
     }
 
     /// Disables ray tracing pipelines beside software ray queries: the driver's acceleration structures would be unused.
-    fn pipeline(&self) -> FeatureRequest {
+    fn pipeline(&self) -> RayTracingPipelineRequest {
         match self.ray_query {
-            RayQueryRequest::Software => FeatureRequest::Off,
-            _ => ContextDesc::default().ray_tracing_pipeline,
+            RayQueryRequest::Software => RayTracingPipelineRequest::Off,
+            _ => RayTracingPipelineRequest::HardwareIfPresent,
         }
     }
 

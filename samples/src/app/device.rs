@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use lvk::{
-    Capabilities, Context, ContextDesc, DeviceCandidate, DeviceProfile, FeatureRequest, OptionalFeature,
-    RayQueryPath, RayQueryRequest, ValidationSink, WindowHandles, YuvConversion,
+    Capabilities, Context, ContextDesc, DeviceCandidate, DeviceProfile, OptionalFeature, RayQueryPath,
+    RayQueryRequest, RayTracingPipelinePath, RayTracingPipelineRequest, ValidationSink, WindowHandles,
+    YuvConversion,
 };
 
 use super::caches::Caches;
@@ -36,7 +37,8 @@ impl DeviceNeeds {
 }
 
 /// Opens the device the user names, or the best one; where that is a CPU or has no ray tracing, rays, if any, are traced by
-/// queries in software. Messages of the validation layer, where it is asked for, go into `sink`.
+/// queries in software, and a pipeline that the user names is lowered to compute shaders. Messages of the validation layer,
+/// where it is asked for, go into `sink`.
 pub(super) fn open(
     name: &str,
     args: &RunArgs,
@@ -45,8 +47,8 @@ pub(super) fn open(
     needs: &DeviceNeeds,
     window: Option<Arc<dyn WindowHandles>>,
 ) -> Result<Context, RunError> {
-    use FeatureRequest::{Off, Optional, Required};
-    use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
+    use RayQueryRequest::{Hardware, HardwareIfPresent, Software};
+    use RayTracingPipelineRequest::{HardwareIfPresent as PipelineIfPresent, Off};
     let caches = Caches::open(name, args);
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
@@ -67,19 +69,39 @@ pub(super) fn open(
     };
     match needs.rays {
         None => Ok(with(Off, RayQueryRequest::Off)?),
-        Some(RayTracing::Pipeline) => Ok(with(Required, HardwareIfPresent)?),
-        Some(RayTracing::Query) => with(Optional, Hardware).map_err(without_queries),
-        Some(RayTracing::Software) => Ok(with(Off, Software)?),
-        // A profile rehearses the device's own paths. These keep no structures for software beside theirs.
-        Some(RayTracing::Auto) => {
-            let best = with(Optional, HardwareIfPresent)?;
-            let caps = best.capabilities();
-            let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
-            let is_slow = caps.is_cpu && args.profile.is_none();
-            let chosen = if can_trace && !is_slow { best } else { with(Off, Auto)? };
-            eprintln!("note: --rt auto takes {}", choice(chosen.capabilities()));
+        Some(RayTracing::Pipeline) => {
+            let chosen = with(RayTracingPipelineRequest::Auto, HardwareIfPresent)?;
+            note_lowering(chosen.capabilities());
             Ok(chosen)
         }
+        Some(RayTracing::Query) => with(PipelineIfPresent, Hardware).map_err(without_queries),
+        Some(RayTracing::Software) => Ok(with(Off, Software)?),
+        Some(RayTracing::Auto) => Ok(open_best(args, with)?),
+    }
+}
+
+/// Opens the device for the best path. A profile rehearses the device's own paths, which keep no structures for software
+/// beside theirs.
+fn open_best(
+    args: &RunArgs,
+    open: impl Fn(RayTracingPipelineRequest, RayQueryRequest) -> lvk::Result<Context>,
+) -> lvk::Result<Context> {
+    let best = open(RayTracingPipelineRequest::HardwareIfPresent, RayQueryRequest::HardwareIfPresent)?;
+    let caps = best.capabilities();
+    let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
+    let is_slow = caps.is_cpu && args.profile.is_none();
+    let chosen = match can_trace && !is_slow {
+        true => best,
+        false => open(RayTracingPipelineRequest::Off, RayQueryRequest::Auto)?,
+    };
+    eprintln!("note: --rt auto takes {}", choice(chosen.capabilities()));
+    Ok(chosen)
+}
+
+/// Notes on standard error where pipelines are lowered to compute shaders.
+fn note_lowering(capabilities: &Capabilities) {
+    if capabilities.ray_tracing_pipeline_path.is_lowered() {
+        eprintln!("note: --rt pipeline takes a {}", pipeline_text(capabilities));
     }
 }
 
@@ -177,6 +199,21 @@ pub fn query_text(capabilities: &Capabilities, stages: &str) -> String {
             format!("ray queries in {stages}, in software ({})", capabilities.ray_query_reason)
         }
         RayQueryPath::Hardware | RayQueryPath::None => format!("ray queries in {stages}"),
+    }
+}
+
+/// Describes ray tracing pipelines, and the reason where they are lowered to compute shaders.
+#[must_use]
+pub fn pipeline_text(capabilities: &Capabilities) -> String {
+    let reason = capabilities.ray_tracing_pipeline_reason;
+    match capabilities.ray_tracing_pipeline_path {
+        RayTracingPipelinePath::Query => {
+            format!("ray tracing pipeline, lowered to ray queries in a compute shader ({reason})")
+        }
+        RayTracingPipelinePath::Software => {
+            format!("ray tracing pipeline, lowered to software traversal in a compute shader ({reason})")
+        }
+        RayTracingPipelinePath::Hardware | RayTracingPipelinePath::None => "ray tracing pipeline".to_owned(),
     }
 }
 

@@ -15,7 +15,7 @@ pub struct RayArgs {
 pub enum RayTracing {
     /// A ray tracing pipeline if the device supports it, else ray queries; on a CPU software ray queries, the fastest.
     Auto,
-    /// A ray tracing pipeline with a shader binding table.
+    /// A ray tracing pipeline with a shader binding table; on devices without them, lowered to a compute shader.
     Pipeline,
     /// Ray queries of the device in a compute shader; on devices without them, as `software`.
     Query,

@@ -2,7 +2,7 @@
 
 use lvk::Capabilities;
 
-use super::device::{device_text, query_text};
+use super::device::{device_text, pipeline_text, query_text};
 use crate::hybrid::RayPath;
 
 /// The device, and what a sample that only rasterises shows.
@@ -19,7 +19,7 @@ pub(crate) fn ray_summary(capabilities: &Capabilities, path: RayPath, stages: &s
 /// The part of Vulkan that traces rays; `stages` are those with queries.
 pub(crate) fn path_text(capabilities: &Capabilities, path: RayPath, stages: &str) -> String {
     match path {
-        RayPath::Pipeline => "ray tracing pipeline".to_owned(),
+        RayPath::Pipeline => pipeline_text(capabilities),
         RayPath::Query => query_text(capabilities, stages),
     }
 }

@@ -21,11 +21,7 @@ const SIZE: [u32; 2] = [640, 480];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let driver = prepare(&DriverRequest::default())?;
-    let ctx = Context::new(&ContextDesc {
-        vulkan_library: driver.loader.as_deref(),
-        ray_tracing_pipeline: FeatureRequest::Required,
-        ..Default::default()
-    })?;
+    let ctx = Context::new(&ContextDesc { vulkan_library: driver.loader.as_deref(), ..Default::default() })?;
     let vertices = ctx.create_buffer(&BufferDesc {
         usage: BufferUsage::ACCEL_INPUT,
         data: Some(bytemuck::bytes_of(&[[-0.7_f32, 0.6, 0.0], [0.7, 0.6, 0.0], [0.0, -0.7, 0.0]])),

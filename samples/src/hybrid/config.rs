@@ -185,7 +185,7 @@ impl RayPath {
         }
     }
 
-    /// The path to take: `wish`; else the pipeline where there is one, which scenes of all kinds do well by, else the query; on
+    /// The path to take: `wish`; else the pipeline where the device has one, which scenes of all kinds do well by, else the query; on
     /// a CPU queries in software, if those are on, which are faster there for every scene.
     ///
     /// # Errors
@@ -194,6 +194,9 @@ impl RayPath {
         let path = match wish {
             Some(path) => path,
             None if capabilities.is_cpu && capabilities.ray_query_path == RayQueryPath::Software => {
+                Self::Query
+            }
+            None if capabilities.ray_query && capabilities.ray_tracing_pipeline_path.is_lowered() => {
                 Self::Query
             }
             None if capabilities.ray_tracing_pipeline => Self::Pipeline,
@@ -226,7 +229,7 @@ impl RayPath {
 
 #[cfg(test)]
 mod tests {
-    use lvk::Limits;
+    use lvk::{Limits, RayTracingPipelinePath};
 
     use super::*;
 
@@ -253,6 +256,13 @@ mod tests {
         assert_eq!(RayPath::choose(None, &walked).unwrap(), RayPath::Pipeline);
         let cpu = Capabilities { is_cpu: true, ..walked };
         assert_eq!(RayPath::choose(None, &cpu).unwrap(), RayPath::Query);
+        let lowered = Capabilities {
+            ray_tracing_pipeline_path: RayTracingPipelinePath::Software,
+            ..device(true, true)
+        };
+        assert_eq!(RayPath::choose(None, &lowered).unwrap(), RayPath::Query);
+        let alone = Capabilities { ray_query: false, ..lowered };
+        assert_eq!(RayPath::choose(None, &alone).unwrap(), RayPath::Pipeline);
         assert!(matches!(
             RayPath::choose(None, &device(false, false)),
             Err(SampleError::NoRayTracing { .. })

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene, pipelines};
-use crate::app::device::{device_text, query_text};
+use crate::app::device::{device_text, pipeline_text, query_text};
 use crate::app::sample_info::prelude::*;
 use crate::app::scene_args::BuiltInSceneRayArgs;
 use crate::app::value_parsers::whole;
@@ -88,7 +88,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 fn summary(sample: &HybridOit, OitScene { blocks, balls, glass, .. }: &OitScene) -> String {
     let (capabilities, config) = (sample.context().capabilities(), sample.config());
     let path = match config.path {
-        RayPath::Pipeline => "a ray tracing pipeline",
+        RayPath::Pipeline => &format!("a {}", pipeline_text(capabilities)),
         RayPath::Query => &query_text(capabilities, "a compute shader"),
     };
     format!(

@@ -6,7 +6,7 @@ use std::ffi::CStr;
 use lvk::ash::{self, vk};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceCandidate,
-    DeviceProfile, Error, FeatureRequest, FeatureSet, Holder, OptionalFeature, RayQueryRequest,
+    DeviceProfile, Error, FeatureSet, Holder, OptionalFeature, RayQueryRequest, RayTracingPipelineRequest,
     ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc, Triangles, UserExtensions,
 };
 use lvk_tests::accel_backend::requires_device_accel_structs;
@@ -80,14 +80,14 @@ fn a_hidden_feature_cannot_be_required() {
     for (profile, pipeline, query, had, lack) in [
         (
             DeviceProfile::mali_g715(),
-            FeatureRequest::Required,
+            RayTracingPipelineRequest::Hardware,
             RayQueryRequest::HardwareIfPresent,
             real.ray_tracing_pipeline,
             "lacks ray tracing pipelines (hidden by the device profile 'mali-g715')",
         ),
         (
             DeviceProfile::no_ray_query(),
-            FeatureRequest::Optional,
+            RayTracingPipelineRequest::HardwareIfPresent,
             RayQueryRequest::Hardware,
             real.ray_query,
             "lacks ray queries (hidden by the device profile 'no-ray-query')",

@@ -4,8 +4,8 @@
 use lvk::ash::{ext, khr, vk};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, Context, ContextDesc, Dependencies, Error,
-    FeatureRequest, FeatureSet, OptionalFeature, QueueRequest, RawContext, RayQueryPath, RayQueryRequest,
-    TlasDesc, TlasInstance, Triangles,
+    FeatureSet, OptionalFeature, QueueRequest, RawContext, RayQueryPath, RayQueryRequest,
+    RayTracingPipelineRequest, TlasDesc, TlasInstance, Triangles,
 };
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::device_with;
@@ -73,9 +73,9 @@ fn assert_same_as_own(ctx: &Context, adjust: impl FnOnce(&mut ContextDesc<'_>)) 
 #[test]
 fn a_device_of_exactly_the_requirements_answers_ray_queries() {
     for (ray_query, ray_tracing_pipeline) in [
-        (RayQueryRequest::HardwareIfPresent, FeatureRequest::Optional),
-        (RayQueryRequest::HardwareIfPresent, FeatureRequest::Off),
-        (RayQueryRequest::Software, FeatureRequest::Off),
+        (RayQueryRequest::HardwareIfPresent, RayTracingPipelineRequest::HardwareIfPresent),
+        (RayQueryRequest::HardwareIfPresent, RayTracingPipelineRequest::Off),
+        (RayQueryRequest::Software, RayTracingPipelineRequest::Off),
     ] {
         let desc = ContextDesc { ray_query, ray_tracing_pipeline, ..Default::default() };
         let Some(engine) = GuestEngine::new(&desc) else { return };

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use lvk::ash::vk;
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, ContextDesc, Error, FeatureRequest,
-    LoaderReport, ManifestOutcome, RayQueryRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc,
-    Triangles, ValidationMode,
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, ContextDesc, Error, LoaderReport,
+    ManifestOutcome, RayQueryRequest, RayTracingPipelineRequest, ShaderModuleDesc, ShaderSource, ShaderStage,
+    TlasDesc, Triangles, ValidationMode,
 };
 use lvk_tests::compute::words_buffer;
 use lvk_tests::device::vulkan;
@@ -188,7 +188,9 @@ fn features_turned_off_are_missing() {
     unsupported(ray_query_shader(&ctx));
     assert_eq!(ray_gen_shader(&ctx).is_ok(), ctx.capabilities().ray_tracing_pipeline);
     drop(ctx);
-    let Some(ctx) = device_with(|desc| desc.ray_tracing_pipeline = FeatureRequest::Off) else { return };
+    let Some(ctx) = device_with(|desc| desc.ray_tracing_pipeline = RayTracingPipelineRequest::Off) else {
+        return;
+    };
     assert!(!ctx.capabilities().ray_tracing_pipeline);
     unsupported(ray_gen_shader(&ctx));
     assert_eq!(ray_query_shader(&ctx).is_ok(), ctx.capabilities().ray_query);
@@ -211,7 +213,7 @@ fn expect_no_ray_tracing(ctx: &Context) {
 fn everything_else_works_with_ray_tracing_turned_off() {
     let Some(ctx) = device_with(|desc| {
         desc.ray_query = RayQueryRequest::Off;
-        desc.ray_tracing_pipeline = FeatureRequest::Off;
+        desc.ray_tracing_pipeline = RayTracingPipelineRequest::Off;
     }) else {
         return;
     };
@@ -227,8 +229,12 @@ fn a_device_without_ray_tracing_does_everything_else() {
         expect_no_ray_tracing(&ctx);
         expect_drawing(&ctx);
         for (pipeline, query, lack) in [
-            (FeatureRequest::Required, RayQueryRequest::HardwareIfPresent, "lacks ray tracing pipelines"),
-            (FeatureRequest::Off, RayQueryRequest::Hardware, "lacks ray queries"),
+            (
+                RayTracingPipelineRequest::Hardware,
+                RayQueryRequest::HardwareIfPresent,
+                "lacks ray tracing pipelines",
+            ),
+            (RayTracingPipelineRequest::Off, RayQueryRequest::Hardware, "lacks ray queries"),
         ] {
             let required = start(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (pipeline, query));
             match required {

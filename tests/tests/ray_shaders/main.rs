@@ -3,8 +3,10 @@
 
 mod any_hit;
 mod invocation_reorder;
+mod lowered;
 mod pipelines;
 mod query_getters;
 mod query_stages;
+mod random_pipelines;
 mod swiftshader;
 mod which_runs;

@@ -1,9 +1,10 @@
 //! Ray tracing pipelines: shader order, records, stacks, libraries, indirect traces, and errors.
 
 use lvk::{
-    BufferDesc, BufferUsage, ColorAttachment, Context, Dependencies, Error, FeatureRequest, HitGroup, Holder,
-    RayTracingLibraryDesc, RayTracingPipelineDesc, RenderPassDesc, Result, ShaderModuleHandle, ShaderRecord,
-    ShaderStage, SpecializationConstant, SpecializationValue, TextureDesc, TextureUsage, record_bytes,
+    BufferDesc, BufferUsage, ColorAttachment, Context, Dependencies, Error, HitGroup, Holder,
+    RayTracingLibraryDesc, RayTracingPipelineDesc, RayTracingPipelineRequest, RenderPassDesc, Result,
+    ShaderModuleHandle, ShaderRecord, ShaderStage, SpecializationConstant, SpecializationValue, TextureDesc,
+    TextureUsage, record_bytes,
 };
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::random::Random;
@@ -355,7 +356,7 @@ fn indirect_traces_that_cannot_run_are_refused() -> Result<()> {
 
 #[test]
 fn without_pipelines_everything_about_them_is_unsupported() -> Result<()> {
-    let Some(ctx) = device_with(|desc| desc.ray_tracing_pipeline = FeatureRequest::Off) else {
+    let Some(ctx) = device_with(|desc| desc.ray_tracing_pipeline = RayTracingPipelineRequest::Off) else {
         return Ok(());
     };
     let caps = ctx.capabilities();

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
-use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
+use lvk::{Context, DeviceProfile, RayQueryRequest, RayTracingPipelineRequest};
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::Scene;
@@ -114,12 +114,12 @@ fn an_image_is_the_same_each_time() {
 
 #[test]
 fn a_device_with_one_path_renders_by_it_and_names_the_other() {
-    use FeatureRequest::{Off, Optional};
     use RayQueryRequest::{HardwareIfPresent, Off as NoQuery};
+    use RayTracingPipelineRequest::{HardwareIfPresent as PipelineIfPresent, Off};
     let scene = obj_scene();
     let mut images = Vec::new();
     for (pipeline, query, path, missing) in [
-        (Optional, NoQuery, RayPath::Pipeline, RayPath::Query),
+        (PipelineIfPresent, NoQuery, RayPath::Pipeline, RayPath::Query),
         (Off, HardwareIfPresent, RayPath::Query, RayPath::Pipeline),
     ] {
         let Some(ctx) = device_with(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (pipeline, query))

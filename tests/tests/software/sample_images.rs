@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
-use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
+use lvk::{Context, RayQueryPath, RayQueryRequest, RayTracingPipelineRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::{Bounces, HybridConfig, HybridRenderer, Method, RayPath};
@@ -31,7 +31,9 @@ const OTHER_EDGES: Tolerance = Tolerance { psnr: 38.0, ssim: 0.99, differing_sha
 const OTHER_REFLECTIONS: Tolerance = Tolerance { psnr: 33.0, ssim: 0.975, differing_share: 0.3, flip: 0.05 };
 
 fn queries(request: RayQueryRequest) -> Option<TestDevice> {
-    device_with(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, request))
+    device_with(|desc| {
+        (desc.ray_tracing_pipeline, desc.ray_query) = (RayTracingPipelineRequest::Off, request)
+    })
 }
 
 #[test]

@@ -6,26 +6,9 @@ use super::limits::{Limits, MicromapLimits};
 use super::optional_features::{FeatureSet, OF_MESH_SHADERS, OF_RAY_TRACING_PIPELINES, OptionalFeature};
 use super::queues::QueueInfo;
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
+use super::ray_tracing_pipeline_path::{PathInputs, RayTracingPipelinePath, RayTracingPipelineRequest};
 use super::shading_rate::ShadingRateLimits;
 use crate::queue::Queue;
-
-/// Request of the caller for a feature.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum FeatureRequest {
-    /// Only devices that have it are considered.
-    Required,
-    /// Enabled if the device has it.
-    #[default]
-    Optional,
-    /// Disabled even if the device has it.
-    Off,
-}
-
-impl FeatureRequest {
-    pub(crate) fn is_requested(self) -> bool {
-        self != Self::Off
-    }
-}
 
 /// Capabilities of the device of a context.
 #[derive(Debug, Clone, Default)]
@@ -40,11 +23,19 @@ pub struct Capabilities {
     pub api_version: (u32, u32, u32),
     /// True if the device is a CPU: it traces and rasterises in software.
     pub is_cpu: bool,
-    /// Ray tracing pipelines (`VK_KHR_ray_tracing_pipeline`) can be created and traced.
+    /// Ray tracing pipelines can be created and traced.
+    /// [`ray_tracing_pipeline_path`](Self::ray_tracing_pipeline_path) is the implementation. In
+    /// [`Context::devices`](crate::Context::devices), where no path is selected yet, it is true if the device
+    /// itself has pipelines (`VK_KHR_ray_tracing_pipeline`).
     pub ray_tracing_pipeline: bool,
-    /// Trace commands may read their size from a buffer (`rayTracingPipelineTraceRaysIndirect`).
+    /// Implementation of ray tracing pipelines: the device, or compute shaders that the library makes of them.
+    pub ray_tracing_pipeline_path: RayTracingPipelinePath,
+    /// Reason for the selection of that path.
+    pub ray_tracing_pipeline_reason: &'static str,
+    /// Trace commands may read their size from a buffer (`rayTracingPipelineTraceRaysIndirect`). Lowered pipelines
+    /// always can.
     pub trace_rays_indirect: bool,
-    /// Ray tracing pipelines may be linked from libraries (`VK_KHR_pipeline_library`).
+    /// Ray tracing pipelines may be linked from libraries (`VK_KHR_pipeline_library`). Lowered pipelines always can.
     pub pipeline_libraries: bool,
     /// Shaders may use ray queries. [`ray_query_path`](Self::ray_query_path) is the implementation. In
     /// [`Context::devices`](crate::Context::devices), where no path is selected yet, it is true if the device
@@ -132,7 +123,7 @@ impl Capabilities {
             left = left.without(OF_MESH_SHADERS.into_iter().collect());
         }
         self.optional = left.without_unmet_requirements();
-        self.remove_ray_tracing_features(self.hardware_acceleration_structures());
+        self.remove_ray_tracing_features(self.builds_device_structures());
         self.primitive_id = self.has(OptionalFeature::GeometryShader);
         self.formatless_storage_read = self.has(OptionalFeature::StorageImageReadWithoutFormat);
         self.cube_arrays = self.has(OptionalFeature::CubeArrays);
@@ -160,9 +151,12 @@ impl Capabilities {
         }
     }
 
-    /// Removes the ray tracing features that are not to be enabled.
+    /// Removes the ray tracing features of the device that are not to be enabled.
     pub(crate) fn limit_ray_tracing(&mut self, pipeline: bool, query: bool) {
         self.ray_tracing_pipeline &= pipeline;
+        if !self.ray_tracing_pipeline {
+            self.ray_tracing_pipeline_path = RayTracingPipelinePath::None;
+        }
         self.trace_rays_indirect &= pipeline;
         self.pipeline_libraries &= pipeline;
         self.ray_query &= query;
@@ -177,7 +171,7 @@ impl Capabilities {
     /// `structures` is true if the device builds acceleration structures.
     fn remove_ray_tracing_features(&mut self, structures: bool) {
         let mut off = FeatureSet::NONE;
-        if !self.ray_tracing_pipeline {
+        if !self.device_pipelines() {
             off = OF_RAY_TRACING_PIPELINES.into_iter().collect();
         }
         if !structures {
@@ -191,31 +185,121 @@ impl Capabilities {
         self.limits.reorders_invocations &= orders.into_iter().any(|feature| self.has(feature));
     }
 
-    /// True if the device itself performs the traversal of ray queries (`VK_KHR_ray_query`).
+    /// True if ray tracing pipelines are those of the device (`VK_KHR_ray_tracing_pipeline`).
+    pub(crate) fn device_pipelines(&self) -> bool {
+        self.ray_tracing_pipeline_path == RayTracingPipelinePath::Hardware
+    }
+
+    /// True if ray tracing pipelines are lowered to compute shaders.
+    pub(crate) fn lowered_pipelines(&self) -> bool {
+        self.ray_tracing_pipeline_path.is_lowered()
+    }
+
+    /// True if the device itself performs the traversal of ray queries of the caller's shaders (`VK_KHR_ray_query`).
     pub(crate) fn hardware_ray_query(&self) -> bool {
         self.ray_query_path == RayQueryPath::Hardware
     }
 
-    /// True if the library performs the traversal of ray queries.
-    pub(crate) fn software_ray_query(&self) -> bool {
-        self.ray_query_path == RayQueryPath::Software
+    /// True if ray queries of the device run: in the caller's shaders, or in lowered pipelines.
+    pub(crate) fn device_ray_queries(&self) -> bool {
+        self.hardware_ray_query() || self.ray_tracing_pipeline_path == RayTracingPipelinePath::Query
     }
 
     /// True if the device builds acceleration structures, for pipelines or for queries.
-    pub(crate) fn hardware_acceleration_structures(&self) -> bool {
-        self.ray_tracing_pipeline || self.hardware_ray_query()
+    pub(crate) fn builds_device_structures(&self) -> bool {
+        self.device_pipelines() || self.device_ray_queries()
     }
 
-    /// Enables the requested ray tracing features that the device has.
-    pub(crate) fn choose_ray_tracing(&mut self, pipeline: FeatureRequest, query: RayQueryRequest) {
-        let choice = query.choose(self.ray_query, self.is_cpu);
-        self.limit_ray_tracing(pipeline.is_requested(), choice.path == RayQueryPath::Hardware);
-        self.ray_query_path = choice.path;
-        self.ray_query_reason = choice.reason;
-        if self.software_ray_query() {
-            self.ray_query = true;
-            self.limits.enable_software_structures(self.hardware_acceleration_structures());
-            self.position_fetch |= !self.hardware_acceleration_structures();
+    /// True if the library builds BVHs, for pipelines or for queries in software.
+    pub(crate) fn builds_software_structures(&self) -> bool {
+        self.ray_query_path == RayQueryPath::Software
+            || self.ray_tracing_pipeline_path == RayTracingPipelinePath::Software
+    }
+
+    /// Enables the requested ray tracing features, by the device or by the library.
+    pub(crate) fn choose_ray_tracing(&mut self, pipeline: RayTracingPipelineRequest, query: RayQueryRequest) {
+        let queries = query.choose(self.ray_query, self.is_cpu);
+        let pipelines = pipeline.choose(PathInputs {
+            has_pipelines: self.ray_tracing_pipeline,
+            has_queries: self.ray_query,
+            query_path: queries.path,
+            is_cpu: self.is_cpu,
+        });
+        (self.ray_query_path, self.ray_query_reason) = (queries.path, queries.reason);
+        (self.ray_tracing_pipeline_path, self.ray_tracing_pipeline_reason) =
+            (pipelines.path, pipelines.reason);
+        let (device_pipelines, device_queries) = (self.device_pipelines(), self.device_ray_queries());
+        self.limit_ray_tracing(device_pipelines, device_queries);
+        // The limits of the device's features reset the paths that do not need them.
+        (self.ray_query_path, self.ray_tracing_pipeline_path) = (queries.path, pipelines.path);
+        self.ray_query = self.ray_query_path != RayQueryPath::None;
+        if self.lowered_pipelines() {
+            (self.ray_tracing_pipeline, self.trace_rays_indirect, self.pipeline_libraries) =
+                (true, true, true);
+            self.limits.set_lowered_pipelines();
         }
+        if self.builds_software_structures() {
+            self.limits.enable_software_structures(self.builds_device_structures());
+            self.position_fetch |= !self.builds_device_structures();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the capabilities of a device with these features of its own.
+    fn device(pipelines: bool, queries: bool) -> Capabilities {
+        let mut caps = Capabilities {
+            ray_tracing_pipeline: true,
+            ray_tracing_pipeline_path: RayTracingPipelinePath::Hardware,
+            ray_query: true,
+            ray_query_path: RayQueryPath::Hardware,
+            position_fetch: true,
+            ..Capabilities::default()
+        };
+        caps.limits.max_ray_recursion = 1;
+        caps.limit_ray_tracing(pipelines, queries);
+        caps
+    }
+
+    #[test]
+    fn pipelines_lowered_onto_queries_leave_the_queries_of_shaders_off() {
+        let mut caps = device(true, true);
+        caps.choose_ray_tracing(RayTracingPipelineRequest::Query, RayQueryRequest::Off);
+        assert!(caps.ray_tracing_pipeline && !caps.ray_query && !caps.hardware_ray_query());
+        assert!(caps.device_ray_queries() && !caps.device_pipelines());
+        assert!(caps.builds_device_structures() && !caps.builds_software_structures());
+        assert!(caps.trace_rays_indirect && caps.pipeline_libraries && caps.position_fetch);
+        assert_eq!((caps.limits.max_ray_recursion, caps.limits.max_hit_attribute_bytes), (31, 32));
+    }
+
+    #[cfg(feature = "software-ray-query")]
+    #[test]
+    fn structures_of_both_kinds_are_built_where_both_are_used() {
+        for (pipeline, query, expected) in [
+            (RayTracingPipelineRequest::Auto, RayQueryRequest::Software, [true, true]),
+            (RayTracingPipelineRequest::Software, RayQueryRequest::Hardware, [true, true]),
+            (RayTracingPipelineRequest::Software, RayQueryRequest::Off, [false, true]),
+            (RayTracingPipelineRequest::Off, RayQueryRequest::Software, [false, true]),
+            (RayTracingPipelineRequest::Query, RayQueryRequest::Software, [true, true]),
+            (RayTracingPipelineRequest::Off, RayQueryRequest::Off, [false, false]),
+        ] {
+            let mut caps = device(true, true);
+            caps.choose_ray_tracing(pipeline, query);
+            let found = [caps.builds_device_structures(), caps.builds_software_structures()];
+            assert_eq!(found, expected, "{pipeline:?}, {query:?}");
+        }
+    }
+
+    #[cfg(feature = "software-ray-query")]
+    #[test]
+    fn a_device_without_ray_tracing_has_pipelines_in_software() {
+        let mut caps = device(false, false);
+        assert_eq!(caps.ray_tracing_pipeline_path, RayTracingPipelinePath::None);
+        caps.choose_ray_tracing(RayTracingPipelineRequest::Auto, RayQueryRequest::HardwareIfPresent);
+        assert_eq!(caps.ray_tracing_pipeline_path, RayTracingPipelinePath::Software);
+        assert!(caps.ray_tracing_pipeline && !caps.ray_query && caps.position_fetch);
     }
 }

@@ -108,13 +108,15 @@ pub struct Limits {
     pub max_accel_scratch_bytes: u64,
     /// Maximum number of instances in a TLAS (`maxInstanceCount`).
     pub max_tlas_instances: u64,
-    /// Maximum recursion depth of `traceRayEXT` (`maxRayRecursionDepth`).
+    /// Maximum recursion depth of `traceRayEXT` (`maxRayRecursionDepth`); 31 if pipelines are lowered.
     pub max_ray_recursion: u32,
-    /// Maximum number of invocations of one trace command (`maxRayDispatchInvocationCount`).
+    /// Maximum number of invocations of one trace command (`maxRayDispatchInvocationCount`); `u32::MAX` if pipelines are
+    /// lowered.
     pub max_trace_invocations: u32,
-    /// Maximum size of hit attributes in bytes (`maxRayHitAttributeSize`).
+    /// Maximum size of hit attributes in bytes (`maxRayHitAttributeSize`); 32 if pipelines are lowered.
     pub max_hit_attribute_bytes: u32,
-    /// Size of a shader group handle in bytes (`shaderGroupHandleSize`).
+    /// Size of a shader group handle in bytes (`shaderGroupHandleSize`); 0 if pipelines are lowered, whose tables hold
+    /// records only.
     pub sbt_handle_bytes: u32,
     /// Alignment of shader group handles in bytes (`shaderGroupHandleAlignment`).
     pub sbt_handle_alignment: u32,
@@ -205,6 +207,17 @@ impl Limits {
         limits
     }
 
+    /// Replaces the limits of the device's ray tracing pipelines by those of lowered pipelines.
+    pub(crate) fn set_lowered_pipelines(&mut self) {
+        self.max_ray_recursion = lowered::MAX_RECURSION;
+        self.max_trace_invocations = u32::MAX;
+        self.max_hit_attribute_bytes = lowered::MAX_HIT_ATTRIBUTE_BYTES;
+        self.sbt_handle_bytes = 0;
+        self.sbt_handle_alignment = lowered::RECORD_ALIGNMENT;
+        self.sbt_base_alignment = lowered::RECORD_ALIGNMENT;
+        self.sbt_max_stride = lowered::MAX_STRIDE;
+    }
+
     /// Adds the limits of acceleration structures that the library builds itself. They apply only if the
     /// device builds none.
     pub(crate) fn enable_software_structures(&mut self, beside_hardware: bool) {
@@ -218,6 +231,17 @@ impl Limits {
         self.max_accel_structure_bytes = self.max_buffer_bytes;
         self.max_accel_scratch_bytes = self.max_buffer_bytes;
     }
+}
+
+/// Limits of pipelines that are lowered to compute shaders.
+mod lowered {
+    pub(crate) const MAX_RECURSION: u32 = 31;
+    /// The least that devices with ray tracing pipelines support.
+    pub(crate) const MAX_HIT_ATTRIBUTE_BYTES: u32 = 32;
+    /// Alignment of records in bytes; the largest alignment of a member of a record is 16.
+    pub(crate) const RECORD_ALIGNMENT: u32 = 16;
+    /// Largest distance of records in bytes, as of devices with ray tracing pipelines.
+    pub(crate) const MAX_STRIDE: u32 = 4096;
 }
 
 /// Maximum values that node and leaf references can encode; see `accel::software::layout`.

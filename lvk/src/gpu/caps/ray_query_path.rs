@@ -17,8 +17,8 @@ pub enum RayQueryRequest {
     Auto,
     /// Only devices with `VK_KHR_ray_query` are considered.
     Hardware,
-    /// `VK_KHR_ray_query` if the device has it; otherwise ray queries do not work. Devices with ray tracing
-    /// pipelines only then build no acceleration structures for software queries.
+    /// `VK_KHR_ray_query` if the device has it; otherwise ray queries do not work. No acceleration structures are
+    /// built for software queries.
     HardwareIfPresent,
     /// Software, even if the device has hardware queries. Without the feature `software-ray-query`,
     /// [`Context::new`](crate::Context::new) fails with [`Unsupported`](crate::Error::Unsupported).
@@ -47,7 +47,7 @@ pub(crate) struct RayQueryChoice {
 }
 
 /// True if the library is built with its own traversal.
-const HAS_SOFTWARE: bool = cfg!(feature = "software-ray-query");
+pub(super) const HAS_SOFTWARE: bool = cfg!(feature = "software-ray-query");
 
 impl RayQueryRequest {
     /// Returns an error for the software path in a build without it.

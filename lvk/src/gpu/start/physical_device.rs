@@ -14,6 +14,7 @@ use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 use crate::gpu::caps::queues::{QueueFamily, QueueLocation, describe_queues, locate_queues, queue_families};
 use crate::gpu::caps::ray_query_path::RayQueryPath;
+use crate::gpu::caps::ray_tracing_pipeline_path::RayTracingPipelinePath;
 use crate::gpu::caps::shading_rate::ShadingRateLimits;
 use crate::gpu::caps::subgroup_limits::SubgroupLimits;
 
@@ -126,6 +127,9 @@ impl PhysicalDevice {
         (caps.portability_subset, caps.checkpoints) = (portability_subset, checkpoints);
         let ray_tracing = &found.ext.ray_tracing;
         caps.ray_tracing_pipeline = ray_tracing.ray_tracing_pipeline == vk::TRUE;
+        if caps.ray_tracing_pipeline {
+            caps.ray_tracing_pipeline_path = RayTracingPipelinePath::Hardware;
+        }
         caps.trace_rays_indirect = ray_tracing.ray_tracing_pipeline_trace_rays_indirect == vk::TRUE;
         caps.pipeline_libraries = caps.ray_tracing_pipeline && pipeline_library;
         caps.ray_query = found.ext.ray_query.ray_query == vk::TRUE;

@@ -29,9 +29,9 @@ use crate::gpu::caps::optional_features::FeatureSet;
 pub struct DeviceProfile {
     /// Name of the profile, for messages and [`Capabilities::profile`]. Default: `"custom"`.
     pub name: Cow<'static, str>,
-    /// True if ray tracing pipelines may be used. Default: true.
+    /// True if ray tracing pipelines of the device may be used. Default: true.
     pub ray_tracing_pipeline: bool,
-    /// True if ray queries may be used. Default: true.
+    /// True if ray queries of the device may be used. Default: true.
     pub ray_query: bool,
     /// True if vertex positions of hit triangles may be fetched. Default: true.
     pub position_fetch: bool,

@@ -9,6 +9,7 @@ pub(crate) mod debug_source;
 pub(crate) mod hit_builtins;
 pub(crate) mod input_attachments;
 pub(crate) mod link;
+pub(crate) mod lower;
 pub(crate) mod parsed;
 pub(crate) mod passes;
 pub(crate) mod ray_interface;

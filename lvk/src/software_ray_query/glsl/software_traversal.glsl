@@ -72,6 +72,10 @@ struct LvkSoftLevel {
 #define LVK_SOFT_ANY_NODE 0x01000000u
 
 // Constants, so that compilers remove the code that a module without candidates or without AABBs does not need.
+#ifdef LVK_LOWERED_PIPELINE
+const bool kLvkSoftHasCandidates = kLvkHasCandidates;
+const bool kLvkSoftHasBoxes = kLvkHasBoxes;
+#else
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
 const bool kLvkSoftHasCandidates = false;
 #else
@@ -81,6 +85,7 @@ const bool kLvkSoftHasCandidates = true;
 const bool kLvkSoftHasBoxes = false;
 #else
 const bool kLvkSoftHasBoxes = true;
+#endif
 #endif
 
 #ifdef LVK_CANDIDATE_FUNCTION
@@ -475,7 +480,7 @@ bool lvkSoftTraverseLevel(inout LvkSoftState state, inout LvkSoftCursor cursor, 
 }
 
 // With candidates, a separate traversal would take longer to compile than it saves.
-#if defined(LVK_DEVICE_IS_CPU) && defined(LVK_OPAQUE_TRIANGLES_ONLY)
+#if defined(LVK_DEVICE_IS_CPU) && (defined(LVK_OPAQUE_TRIANGLES_ONLY) || defined(LVK_LOWERED_PIPELINE))
 #define LVK_SOFT_HAS_CPU_TRAVERSAL
 #include <lvk/software_cpu_traversal.glsl>
 #endif
@@ -483,7 +488,7 @@ bool lvkSoftTraverseLevel(inout LvkSoftState state, inout LvkSoftCursor cursor, 
 // Traverses the BLAS of the instance. Returns true if a candidate waits that the shader must judge.
 bool lvkSoftTraverse(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
 #ifdef LVK_SOFT_HAS_CPU_TRAVERSAL
-    if (level.wide && level.kind == LVK_SOFT_TRIANGLES) {
+    if (!kLvkSoftHasCandidates && level.wide && level.kind == LVK_SOFT_TRIANGLES) {
         lvkSoftTraverseTriangles(state, cursor, level);
         return false;
     }

@@ -1,6 +1,6 @@
 //! Three contexts of one device: driver and software together, and each alone.
 
-use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
+use lvk::{Context, RayQueryPath, RayQueryRequest, RayTracingPipelineRequest};
 
 use crate::error::BenchError;
 use crate::setup::Setup;
@@ -17,12 +17,12 @@ pub(super) struct Contexts {
 
 impl Contexts {
     pub(super) fn open(setup: &Setup) -> Result<Self, BenchError> {
-        use FeatureRequest::{Off, Optional};
         use RayQueryRequest::{HardwareIfPresent, Software};
+        use RayTracingPipelineRequest::{HardwareIfPresent as PipelineIfPresent, Off};
         Ok(Self {
-            both: setup.open_tracing(Optional, Software, None)?,
+            both: setup.open_tracing(PipelineIfPresent, Software, None)?,
             software: setup.open_tracing(Off, Software, None)?,
-            driver: setup.open_tracing(Optional, HardwareIfPresent, None)?,
+            driver: setup.open_tracing(PipelineIfPresent, HardwareIfPresent, None)?,
         })
     }
 

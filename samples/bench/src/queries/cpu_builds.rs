@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use lvk::{BuildFlags, Context, FeatureRequest, PrimitiveOrder, RayQueryRequest};
+use lvk::{BuildFlags, Context, PrimitiveOrder, RayQueryRequest, RayTracingPipelineRequest};
 
 use crate::error::BenchError;
 use crate::measure::{elapsed_ms, interleave, median_of};
@@ -22,7 +22,8 @@ pub(super) fn add_cpu_builds(
     table: &mut Table,
 ) -> Result<(), BenchError> {
     let folder = tempfile::tempdir()?;
-    let caching = setup.open_tracing(FeatureRequest::Off, RayQueryRequest::Software, Some(folder.path()))?;
+    let caching =
+        setup.open_tracing(RayTracingPipelineRequest::Off, RayQueryRequest::Software, Some(folder.path()))?;
     let buffers = [MeshBuffers::new(software, mesh)?, MeshBuffers::new(&caching, mesh)?];
     build(&caching, &buffers[1], BuildFlags::FAST_TRACE)?;
     let samples: [Vec<_>; 3] = interleave(runs.min(MAX_RUNS), |which| match which {

@@ -1,0 +1,152 @@
+//! Rewrites accesses of shader records and push constants, which lowered shaders read by address.
+
+use std::collections::HashMap;
+
+use ::spirv::{Decoration, MemoryAccess, Op, StorageClass};
+
+use super::emit::Emitter;
+use super::instruction::{Inst, used_ids};
+use super::linker::Linker;
+
+/// Alignment of a block in bytes, which is also the largest that an access claims.
+const BLOCK_ALIGNMENT: u32 = 16;
+
+/// Makes `functions` read the block of `variable` at the address that the variable `address` holds. The error is a
+/// message.
+pub(super) fn read_block_by_address(
+    linker: &mut Linker,
+    functions: &[u32],
+    variable: u32,
+    address: u32,
+) -> Result<(), String> {
+    let layout = Layout::collect(linker);
+    let block = linker.variable_type(variable).unwrap_or(0);
+    let pointer = linker.pointer_to(StorageClass::PhysicalStorageBuffer, block);
+    for id in functions {
+        let Some(mut function) = linker.take_function(*id) else { continue };
+        let mut alignments = HashMap::new();
+        for block in &mut function.blocks {
+            let mut code = Vec::with_capacity(block.code.len());
+            for mut inst in std::mem::take(&mut block.code) {
+                if used_ids(&inst, &linker.module.wide).contains(&variable) {
+                    let mut emitter = Emitter::new(linker, &mut code);
+                    let words = emitter.load(address);
+                    let base = emitter.value(Op::Bitcast, pointer, &[words]);
+                    alignments.insert(base, (BLOCK_ALIGNMENT, pointer));
+                    inst.operands.iter_mut().filter(|id| **id == variable).for_each(|id| *id = base);
+                }
+                convert_pointer(linker, &mut inst, &alignments)?;
+                layout.follow(linker, &inst, &mut alignments);
+                add_alignment(&mut inst, &alignments);
+                code.push(inst);
+            }
+            block.code = code;
+        }
+        linker.module.functions.push(function);
+    }
+    Ok(())
+}
+
+/// Gives a pointer that is made from a pointer to a block its storage class.
+fn convert_pointer(
+    linker: &mut Linker,
+    inst: &mut Inst,
+    pointers: &HashMap<u32, (u32, u32)>,
+) -> Result<(), String> {
+    if !used_ids(inst, &linker.module.wide).iter().any(|id| pointers.contains_key(id)) {
+        return Ok(());
+    }
+    match inst.op {
+        Op::AccessChain | Op::InBoundsAccessChain => {
+            let target = linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target);
+            inst.operands[0] = linker.pointer_to(StorageClass::PhysicalStorageBuffer, target);
+            Ok(())
+        }
+        Op::Load | Op::ArrayLength => Ok(()),
+        op => Err(format!("Op{op:?} of a block of push constants or of a shader record cannot be lowered")),
+    }
+}
+
+/// States the alignment of a read.
+fn add_alignment(inst: &mut Inst, alignments: &HashMap<u32, (u32, u32)>) {
+    let is_read = inst.op == Op::Load && inst.operands.len() == 3;
+    if let (true, Some((alignment, _))) = (is_read, alignments.get(&inst.operand(2))) {
+        inst.operands.extend([MemoryAccess::ALIGNED.bits(), *alignment]);
+    }
+}
+
+/// Offsets and strides of types in bytes.
+struct Layout {
+    offsets: HashMap<(u32, u32), u32>,
+    matrix_strides: HashMap<(u32, u32), u32>,
+    array_strides: HashMap<u32, u32>,
+}
+
+impl Layout {
+    fn collect(linker: &Linker) -> Self {
+        let mut found =
+            Self { offsets: HashMap::new(), matrix_strides: HashMap::new(), array_strides: HashMap::new() };
+        for inst in &linker.module.decorations {
+            let (id, second, third) = (inst.operand(0), inst.operand(1), inst.operand(2));
+            let is = |word: u32, decoration: Decoration| word == decoration as u32;
+            match inst.op {
+                Op::Decorate if is(second, Decoration::ArrayStride) => {
+                    found.array_strides.insert(id, third);
+                }
+                Op::MemberDecorate if is(third, Decoration::Offset) => {
+                    found.offsets.insert((id, second), inst.operand(3));
+                }
+                Op::MemberDecorate if is(third, Decoration::MatrixStride) => {
+                    found.matrix_strides.insert((id, second), inst.operand(3));
+                }
+                _ => {}
+            }
+        }
+        found
+    }
+
+    /// Records the alignment of the pointer that an instruction makes from another pointer to a block.
+    fn follow(&self, linker: &Linker, inst: &Inst, alignments: &mut HashMap<u32, (u32, u32)>) {
+        if !matches!(inst.op, Op::AccessChain | Op::InBoundsAccessChain) {
+            return;
+        }
+        let Some((base, pointer)) = alignments.get(&inst.operand(2)).copied() else { return };
+        let mut alignment = base;
+        let mut ty = linker.pointer(pointer).map_or(0, |(_, target)| target);
+        let mut column_stride = 0;
+        for index in &inst.operands[3..] {
+            let Some(found) = linker.global(ty) else { break };
+            let step = match found.op {
+                Op::TypeStruct => {
+                    let member = linker.global(*index).map_or(0, |constant| constant.operand(2));
+                    column_stride = self.matrix_strides.get(&(ty, member)).copied().unwrap_or(0);
+                    let offset = self.offsets.get(&(ty, member)).copied().unwrap_or(0);
+                    ty = found.operand(1 + member as usize);
+                    offset
+                }
+                Op::TypeArray | Op::TypeRuntimeArray => {
+                    let stride = self.array_strides.get(&ty).copied().unwrap_or(0);
+                    ty = found.operand(1);
+                    stride
+                }
+                Op::TypeMatrix => {
+                    ty = found.operand(1);
+                    column_stride
+                }
+                _ => {
+                    ty = found.operand(1);
+                    linker.global(ty).map_or(4, |scalar| scalar.operand(1) / 8)
+                }
+            };
+            alignment = alignment_behind(alignment, step);
+        }
+        if let Some(result) = inst.result() {
+            alignments.insert(result, (alignment, inst.operand(0)));
+        }
+    }
+}
+
+/// Returns the alignment of an address `step` bytes behind an aligned one.
+fn alignment_behind(alignment: u32, step: u32) -> u32 {
+    if step == 0 { alignment } else { alignment.min(1 << step.trailing_zeros()) }
+}

@@ -1,0 +1,175 @@
+//! Calls of shaders: the values that a shader finds in its variables, and those that it leaves.
+
+use ::spirv::{BuiltIn, Op};
+
+use super::donor::Donor;
+use super::emit::Emitter;
+use super::stage::Shader;
+use super::traces::Passed;
+
+/// The situation in which a shader is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Situation {
+    RayGen,
+    Miss,
+    ClosestHit,
+    AnyHit,
+    Intersection,
+    Callable,
+}
+
+/// The record of a called shader: its region, its index there and the distance between records.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RecordPlace {
+    /// Variable with the address of the region.
+    pub(super) region: u32,
+    /// Variable with the index; `None` for the only record of the region.
+    pub(super) index: Option<u32>,
+    pub(super) stride: u32,
+}
+
+/// Variables that pass values between shaders.
+pub(super) struct Shared<'a> {
+    pub(super) payloads: &'a mut Passed,
+    pub(super) callables: &'a mut Passed,
+    /// Attributes of the candidate that intersection shaders report, and of the closest hit.
+    pub(super) candidate_attributes: &'a mut Passed,
+    pub(super) committed_attributes: &'a mut Passed,
+}
+
+/// A call of a shader.
+pub(super) struct Call<'a> {
+    pub(super) shader: &'a Shader,
+    pub(super) situation: Situation,
+    /// Holds addresses of records for the shader.
+    pub(super) record_variable: Option<u32>,
+    pub(super) place: RecordPlace,
+    /// True for a hit of a triangle, whose attributes are barycentrics.
+    pub(super) is_triangle: bool,
+}
+
+impl Call<'_> {
+    /// Gives the variables of the shader their values.
+    pub(super) fn emit_start(&self, emitter: &mut Emitter<'_>, donor: &Donor, shared: &mut Shared<'_>) {
+        for (variable, value) in &self.shader.initial {
+            emitter.store(*variable, *value);
+        }
+        for (builtin, variable) in &self.shader.builtins {
+            self.emit_builtin(emitter, donor, *builtin, *variable);
+        }
+        if let Some(variable) = self.record_variable {
+            let address = self.emit_record_address(emitter, donor);
+            emitter.store(variable, address);
+        }
+        if let Some(own) = self.shader.incoming_payload {
+            let passed = shared.payloads.variable(emitter.linker, own);
+            emitter.copy(passed, own);
+        }
+        if let Some(own) = self.shader.incoming_callable {
+            let passed = shared.callables.variable(emitter.linker, own);
+            emitter.copy(passed, own);
+        }
+        if let Some(own) = self.shader.attributes {
+            self.emit_attributes(emitter, donor, shared, own);
+        }
+    }
+
+    /// Returns pairs of a variable of the shader and the one that it is copied to when the shader has run.
+    pub(super) fn results(&self, emitter: &mut Emitter<'_>, shared: &mut Shared<'_>) -> Vec<(u32, u32)> {
+        let payload =
+            self.shader.incoming_payload.map(|own| (own, shared.payloads.variable(emitter.linker, own)));
+        let callable =
+            self.shader.incoming_callable.map(|own| (own, shared.callables.variable(emitter.linker, own)));
+        payload.into_iter().chain(callable).collect()
+    }
+
+    /// Calls the entry function between the copies in and out.
+    pub(super) fn emit_whole(&self, emitter: &mut Emitter<'_>, donor: &Donor, shared: &mut Shared<'_>) {
+        self.emit_start(emitter, donor, shared);
+        emitter.call(self.shader.entry);
+        for (own, passed) in self.results(emitter, shared) {
+            emitter.copy(own, passed);
+        }
+    }
+
+    fn emit_attributes(&self, emitter: &mut Emitter<'_>, donor: &Donor, shared: &mut Shared<'_>, own: u32) {
+        let passed = match self.situation {
+            Situation::Intersection => return,
+            Situation::AnyHit => shared.candidate_attributes.variable(emitter.linker, own),
+            _ => shared.committed_attributes.variable(emitter.linker, own),
+        };
+        let types = [own, donor.hit_barycentrics].map(|id| emitter.linker.variable_type(id).unwrap_or(0));
+        if !self.is_triangle {
+            emitter.copy(passed, own);
+        } else if emitter.linker.shape(types[0]) == emitter.linker.shape(types[1]) {
+            emitter.copy(donor.hit_barycentrics, own);
+        } else {
+            self.emit_wrapped_barycentrics(emitter, donor, own);
+        }
+    }
+
+    /// Stores barycentrics in a struct that holds them, as HLSL declares attributes.
+    fn emit_wrapped_barycentrics(&self, emitter: &mut Emitter<'_>, donor: &Donor, own: u32) {
+        let ty = emitter.linker.variable_type(own).unwrap_or(0);
+        let holds_vector = emitter.linker.variable_type(donor.hit_barycentrics).is_some_and(|vector| {
+            emitter.linker.global(ty).is_some_and(|inst| {
+                inst.op == Op::TypeStruct && inst.operands.len() == 2 && inst.operand(1) == vector
+            })
+        });
+        if holds_vector {
+            let value = emitter.load(donor.hit_barycentrics);
+            let whole = emitter.value(Op::CompositeConstruct, ty, &[value]);
+            emitter.store(own, whole);
+        }
+    }
+
+    fn emit_record_address(&self, emitter: &mut Emitter<'_>, donor: &Donor) -> u32 {
+        let base = emitter.load(self.place.region);
+        let Some(index) = self.place.index else { return base };
+        let pair = emitter.linker.uvec2();
+        let stride = emitter.linker.constant(self.place.stride);
+        let index = emitter.load(index);
+        emitter.value(Op::FunctionCall, pair, &[donor.record_address, base, index, stride])
+    }
+
+    fn emit_builtin(&self, emitter: &mut Emitter<'_>, donor: &Donor, builtin: BuiltIn, variable: u32) {
+        let source = self.source(donor, builtin);
+        let types = [source, variable].map(|id| emitter.linker.variable_type(id).unwrap_or(0));
+        let mut value = emitter.load(source);
+        if builtin == BuiltIn::CullMaskKHR {
+            const MASK: u32 = 0xFF;
+            let mask = emitter.linker.constant(MASK);
+            value = emitter.value(Op::BitwiseAnd, types[0], &[value, mask]);
+        }
+        let value = emitter.convert(value, types[0], types[1]);
+        emitter.store(variable, value);
+    }
+
+    /// Returns the donor's variable that holds a built-in value.
+    fn source(&self, donor: &Donor, builtin: BuiltIn) -> u32 {
+        match builtin {
+            BuiltIn::LaunchIdKHR => donor.launch_id,
+            BuiltIn::LaunchSizeKHR => donor.launch_size,
+            BuiltIn::CullMaskKHR => donor.ray_mask,
+            BuiltIn::HitKindKHR => donor.hit_kind,
+            BuiltIn::HitTriangleVertexPositionsKHR => donor.hit_positions,
+            BuiltIn::IncomingRayFlagsKHR => donor.ray_flags,
+            BuiltIn::InstanceCustomIndexKHR => donor.hit_custom_index,
+            BuiltIn::InstanceId => donor.hit_instance,
+            BuiltIn::ObjectRayDirectionKHR => donor.hit_object_direction,
+            BuiltIn::ObjectRayOriginKHR => donor.hit_object_origin,
+            BuiltIn::ObjectToWorldKHR => donor.hit_object_to_world,
+            BuiltIn::WorldToObjectKHR => donor.hit_world_to_object,
+            BuiltIn::PrimitiveId => donor.hit_primitive,
+            BuiltIn::RayGeometryIndexKHR => donor.hit_geometry,
+            BuiltIn::RayTminKHR => donor.ray_t_min,
+            BuiltIn::WorldRayDirectionKHR => donor.ray_direction,
+            BuiltIn::WorldRayOriginKHR => donor.ray_origin,
+            _ => match self.situation {
+                Situation::AnyHit | Situation::ClosestHit => donor.hit_t,
+                Situation::Intersection => donor.limit,
+                _ => donor.ray_t_max,
+            },
+        }
+    }
+}

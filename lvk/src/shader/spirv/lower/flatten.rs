@@ -1,0 +1,468 @@
+//! Takes a function apart at the rays that it traces: each piece becomes a case of a switch over states.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::Op;
+
+use super::control_flow::{Construct, ControlFlow, branch_targets};
+use super::demote::demote_values;
+use super::emit::Emitter;
+use super::instruction::{Inst, for_each_id};
+use super::linker::Linker;
+use super::liveness::live_behind_blocks;
+use super::module::{Block, Function};
+use super::split_structs::split_structs;
+use super::traces::skips_closest_hit;
+
+/// Values of the state that are no pieces of functions.
+pub(super) mod state {
+    /// The invocation is done.
+    pub(in super::super) const DONE: u32 = 0;
+    /// A ray waits to be traced.
+    pub(in super::super) const TRACE: u32 = 1;
+    /// A callable shader waits to be called.
+    pub(in super::super) const CALL: u32 = 2;
+    /// The first piece of a function.
+    pub(in super::super) const FIRST: u32 = 3;
+}
+
+/// The variables and constants of the loop that runs the pieces.
+#[derive(Debug, Clone)]
+pub(super) struct StateMachine {
+    /// The state: see [`state`].
+    pub(super) state: u32,
+    /// Number of functions that wait for a ray or a callable shader.
+    pub(super) depth: u32,
+    /// States that these functions go on with.
+    pub(super) resume: u32,
+    /// Most functions that may wait. The array of states has one element more.
+    pub(super) max_depth: u32,
+    /// Label of the block behind the switch over the pieces.
+    pub(super) next: u32,
+    /// The number of the next piece.
+    pub(super) next_state: u32,
+}
+
+/// The pieces of a function.
+pub(super) struct Pieces {
+    /// The state that the function starts with.
+    pub(super) entry: u32,
+    /// States with the labels of their first blocks.
+    pub(super) cases: Vec<(u32, u32)>,
+    pub(super) blocks: Vec<Block>,
+    /// Variables of the function.
+    pub(super) variables: Vec<Inst>,
+}
+
+/// What the pieces need to know of the shader.
+pub(super) struct ShaderFrame<'a> {
+    /// True for the ray generation shader, which runs once: nothing else writes its variables.
+    pub(super) runs_once: bool,
+    /// Variables of the shader outside of functions.
+    pub(super) own: &'a [u32],
+    /// True if miss shaders wait for rays or callable shaders.
+    pub(super) misses_wait: bool,
+    /// Variables that are read at each return: pairs of a variable of the shader and the variable it is copied to.
+    pub(super) results: &'a [(u32, u32)],
+}
+
+impl ShaderFrame<'_> {
+    /// True for a trace that runs only shaders that do not wait.
+    fn returns_directly(&self, inst: &Inst) -> bool {
+        skips_closest_hit(inst) && !self.misses_wait
+    }
+}
+
+/// Takes `function` apart. The error is a message.
+pub(super) fn flatten(
+    linker: &mut Linker,
+    machine: &mut StateMachine,
+    mut function: Function,
+    frame: &ShaderFrame<'_>,
+) -> Result<Pieces, String> {
+    if function.code().any(|inst| inst.op == Op::Switch && linker.module.wide.contains(&inst.operand(0))) {
+        return Err("OpSwitch over 64 bits cannot be lowered here".to_owned());
+    }
+    let cuts = split_at_traces(linker, &mut function);
+    if !frame.runs_once {
+        split_structs(linker, &mut function);
+    }
+    demote_values(linker, &mut function)?;
+    let flow = ControlFlow::of(&function);
+    let is_cut = |block: usize| cuts.contains(&function.blocks[block].label);
+    let whole = flow.whole_constructs(&function, &is_cut);
+    let live = live_variables(linker, &function, &flow, frame);
+    let mut flattener = Flattener {
+        linker,
+        machine,
+        function: &function,
+        flow: &flow,
+        whole,
+        live,
+        frame,
+        cuts: &cuts,
+        states: HashMap::new(),
+        stacks: HashMap::new(),
+        waiting: Vec::new(),
+        blocks: Vec::new(),
+        cases: Vec::new(),
+    };
+    let entry = flattener.state_of(0);
+    while let Some((block, state)) = flattener.waiting.pop() {
+        flattener.emit_state(block, state);
+    }
+    let (blocks, cases) = (flattener.blocks, flattener.cases);
+    let is_variable = |inst: &&Inst| inst.op == Op::Variable;
+    let variables = function.code().filter(is_variable).cloned().collect();
+    Ok(Pieces { entry, cases, blocks, variables })
+}
+
+/// Ends a block behind each trace, and returns the labels of these blocks.
+fn split_at_traces(linker: &mut Linker, function: &mut Function) -> HashSet<u32> {
+    let mut cuts = HashSet::new();
+    let mut at = 0;
+    while at < function.blocks.len() {
+        let code = &mut function.blocks[at].code;
+        let is_trace = |inst: &Inst| matches!(inst.op, Op::TraceRayKHR | Op::ExecuteCallableKHR);
+        if let Some(place) = code.iter().position(is_trace) {
+            let rest = code.split_off(place + 1);
+            let label = linker.new_id();
+            code.push(Inst::new(Op::Branch, &[label]));
+            let old = function.blocks[at].label;
+            cuts.insert(old);
+            for inst in function.code_mut().filter(|inst| inst.op == Op::Phi) {
+                let labels = inst.operands.iter_mut().skip(3).step_by(2);
+                labels.filter(|own| **own == old).for_each(|own| *own = label);
+            }
+            function.blocks.insert(at + 1, Block { label, code: rest });
+        }
+        at += 1;
+    }
+    cuts
+}
+
+/// Returns the variables to keep at the end of each block, sorted. Nothing else writes the variables of a shader that runs
+/// once.
+fn live_variables(
+    linker: &Linker,
+    function: &Function,
+    flow: &ControlFlow,
+    frame: &ShaderFrame<'_>,
+) -> Vec<Vec<u32>> {
+    if frame.runs_once {
+        return vec![Vec::new(); function.blocks.len()];
+    }
+    let locals = function.code().filter(|inst| inst.op == Op::Variable).filter_map(Inst::result);
+    let variables: HashSet<u32> = locals.chain(frame.own.iter().copied()).collect();
+    let at_return = frame.results.iter().map(|(own, _)| *own).collect();
+    let live = live_behind_blocks(linker, function, flow, &variables, &at_return);
+    // A ray that runs no closest-hit shader cannot lead back to this shader, so the variables stay where they are.
+    let keeps = |block: &Block| !block.code.iter().any(|inst| frame.returns_directly(inst));
+    let sorted = |(block, set): (&Block, HashSet<u32>)| {
+        let mut list: Vec<u32> = if keeps(block) { set.into_iter().collect() } else { Vec::new() };
+        list.sort_unstable();
+        list
+    };
+    function.blocks.iter().zip(live).map(sorted).collect()
+}
+
+struct Flattener<'a> {
+    linker: &'a mut Linker,
+    machine: &'a mut StateMachine,
+    function: &'a Function,
+    flow: &'a ControlFlow,
+    whole: HashMap<usize, Construct>,
+    live: Vec<Vec<u32>>,
+    frame: &'a ShaderFrame<'a>,
+    cuts: &'a HashSet<u32>,
+    /// States of blocks that start a piece.
+    states: HashMap<usize, u32>,
+    /// Arrays that keep variables of waiting functions.
+    stacks: HashMap<u32, u32>,
+    /// Pieces that are not written yet.
+    waiting: Vec<(usize, u32)>,
+    blocks: Vec<Block>,
+    cases: Vec<(u32, u32)>,
+}
+
+impl Flattener<'_> {
+    /// Returns the state that starts with a block.
+    fn state_of(&mut self, block: usize) -> u32 {
+        if let Some(known) = self.states.get(&block) {
+            return *known;
+        }
+        let state = self.machine.next_state;
+        self.machine.next_state += 1;
+        self.states.insert(block, state);
+        self.waiting.push((block, state));
+        state
+    }
+
+    /// Writes the piece that starts with a block.
+    fn emit_state(&mut self, block: usize, state: u32) {
+        let label = self.linker.new_id();
+        self.cases.push((state, label));
+        let mut code = Vec::new();
+        self.restore_if_resumed(block, &mut code);
+        // The block may be the start of a whole loop, whose header must have the label of the block.
+        code.push(Inst::new(Op::Branch, &[self.function.blocks[block].label]));
+        self.blocks.push(Block { label, code });
+        self.emit_chain(block);
+    }
+
+    /// Writes a block and those that follow it in the same piece.
+    fn emit_chain(&mut self, first: usize) {
+        let mut next = Some(first);
+        while let Some(block) = next {
+            next = match self.whole.get(&block).cloned() {
+                Some(construct) => self.emit_construct(block, &construct),
+                None => self.emit_block(block),
+            };
+        }
+    }
+
+    /// Writes a construct in one piece. Returns the block that follows in the same piece.
+    fn emit_construct(&mut self, header: usize, construct: &Construct) -> Option<usize> {
+        let inside: HashSet<usize> =
+            construct.members.iter().copied().chain([header, construct.merge]).collect();
+        let first = self.blocks.len();
+        for block in std::iter::once(header).chain(construct.members.iter().copied()) {
+            let Block { label, code } = self.function.blocks[block].clone();
+            let code = without_variables(code);
+            self.blocks.push(Block { label, code });
+        }
+        if !self.is_entered_from_outside(construct.merge, &inside) {
+            return Some(construct.merge);
+        }
+        // Others branch to the merge block too, so it is a piece. The construct ends in a block that leads there.
+        let end = self.linker.new_id();
+        let merge_label = self.function.blocks[construct.merge].label;
+        for block in &mut self.blocks[first..] {
+            for inst in &mut block.code {
+                let _ = for_each_id(inst, &HashSet::new(), |id| {
+                    if *id == merge_label {
+                        *id = end;
+                    }
+                });
+            }
+        }
+        let mut code = Vec::new();
+        self.go_to(construct.merge, &mut code);
+        self.blocks.push(Block { label: end, code });
+        None
+    }
+
+    /// True if a block is reached from blocks that are not in `inside`.
+    fn is_entered_from_outside(&self, block: usize, inside: &HashSet<usize>) -> bool {
+        self.flow.predecessors[block].iter().any(|from| !inside.contains(from))
+    }
+
+    /// True if only `from` leads to `to`, apart from the way back to the start of a whole loop.
+    fn follows(&self, from: usize, to: usize) -> bool {
+        let members = self.whole.get(&to).map_or(&[][..], |construct| &construct.members);
+        let inside: HashSet<usize> = members.iter().copied().chain([from, to]).collect();
+        self.flow.predecessors[to].contains(&from)
+            && !self.states.contains_key(&to)
+            && !self.is_entered_from_outside(to, &inside)
+    }
+
+    /// Writes a block that is no part of a construct. Returns the block that follows in the same piece.
+    fn emit_block(&mut self, block: usize) -> Option<usize> {
+        let Block { label, code } = self.function.blocks[block].clone();
+        let mut code = without_variables(code);
+        let last = code.pop()?;
+        if self.function.blocks[block].merge().is_some() {
+            code.pop();
+        }
+        let mut follows = None;
+        match last.op {
+            Op::Branch if self.cuts.contains(&label) => self.emit_trace(block, &mut code),
+            Op::Branch => {
+                let to = self.flow.successors[block].first().copied().unwrap_or(0);
+                if self.follows(block, to) {
+                    code.push(last);
+                    follows = Some(to);
+                } else {
+                    self.go_to(to, &mut code);
+                }
+            }
+            Op::BranchConditional => self.emit_choice(&last, &mut code),
+            Op::Switch => {
+                self.emit_switch(label, code, last);
+                return None;
+            }
+            Op::Return => self.emit_return(&mut code),
+            _ => code.push(last),
+        }
+        self.blocks.push(Block { label, code });
+        follows
+    }
+
+    /// Goes on with the piece that starts with a block.
+    fn go_to(&mut self, block: usize, code: &mut Vec<Inst>) {
+        let state = self.state_of(block);
+        let (variable, next) = (self.machine.state, self.machine.next);
+        let mut emitter = Emitter::new(self.linker, code);
+        emitter.store_number(variable, state);
+        emitter.push(Op::Branch, &[next]);
+    }
+
+    fn emit_choice(&mut self, branch: &Inst, code: &mut Vec<Inst>) {
+        let [yes, no] = [1, 2].map(|at| {
+            let block = self.flow.index_of(branch.operand(at)).unwrap_or(0);
+            let state = self.state_of(block);
+            self.linker.constant(state)
+        });
+        let (variable, next) = (self.machine.state, self.machine.next);
+        let uint = self.linker.uint();
+        let mut emitter = Emitter::new(self.linker, code);
+        let state = emitter.value(Op::Select, uint, &[branch.operand(0), yes, no]);
+        emitter.store(variable, state);
+        emitter.push(Op::Branch, &[next]);
+    }
+
+    /// Writes a switch whose cases choose other pieces.
+    fn emit_switch(&mut self, label: u32, mut code: Vec<Inst>, switch: Inst) {
+        let end = self.linker.new_id();
+        let mut labels: HashMap<u32, u32> = HashMap::new();
+        let mut cases = Vec::new();
+        for target in branch_targets(&switch) {
+            labels.entry(target).or_insert_with(|| {
+                let new = self.linker.new_id();
+                cases.push((target, new));
+                new
+            });
+        }
+        let mut switch = switch;
+        let places = std::iter::once(1).chain((3..switch.operands.len()).step_by(2));
+        for place in places.collect::<Vec<_>>() {
+            switch.operands[place] = labels[&switch.operands[place]];
+        }
+        code.push(Inst::new(Op::SelectionMerge, &[end, 0]));
+        code.push(switch);
+        self.blocks.push(Block { label, code });
+        let variable = self.machine.state;
+        for (target, label) in cases {
+            let block = self.flow.index_of(target).unwrap_or(0);
+            let state = self.state_of(block);
+            let mut code = Vec::new();
+            let mut emitter = Emitter::new(self.linker, &mut code);
+            emitter.store_number(variable, state);
+            emitter.push(Op::Branch, &[end]);
+            self.blocks.push(Block { label, code });
+        }
+        self.blocks.push(Block { label: end, code: vec![Inst::new(Op::Branch, &[self.machine.next])] });
+    }
+
+    /// Ends a piece at a return of the function.
+    fn emit_return(&mut self, code: &mut Vec<Inst>) {
+        let machine = self.machine.clone();
+        let uint = self.linker.uint();
+        let mut emitter = Emitter::new(self.linker, code);
+        for (own, result) in self.frame.results {
+            emitter.copy(*own, *result);
+        }
+        if self.frame.runs_once {
+            emitter.store_number(machine.state, state::DONE);
+        } else {
+            let depth = emitter.load(machine.depth);
+            let one = emitter.linker.constant(1);
+            let last = emitter.value(Op::ISub, uint, &[depth, one]);
+            let resumed = element(&mut emitter, machine.resume, uint, last);
+            let state = emitter.value(Op::Load, uint, &[resumed]);
+            emitter.store(machine.state, state);
+        }
+        emitter.push(Op::Branch, &[machine.next]);
+    }
+
+    /// Ends a piece at a trace: keeps what the function needs behind the trace, and the state that goes on there.
+    fn emit_trace(&mut self, block: usize, code: &mut Vec<Inst>) {
+        let is_trace = |inst: Option<Inst>| inst.is_some_and(|inst| inst.op == Op::TraceRayKHR);
+        let waits_for = if is_trace(code.pop()) { state::TRACE } else { state::CALL };
+        let behind = self.flow.successors[block].first().copied().unwrap_or(0);
+        let resumed = self.state_of(behind);
+        let machine = self.machine.clone();
+        let stacks = self.stacks_of(block);
+        let (uint, bool) = (self.linker.uint(), self.linker.bool());
+        let mut emitter = Emitter::new(self.linker, code);
+        let depth = emitter.load(machine.depth);
+        for (variable, stack, ty) in stacks {
+            let value = emitter.value(Op::Load, ty, &[variable]);
+            let place = element(&mut emitter, stack, ty, depth);
+            emitter.store(place, value);
+        }
+        let place = element(&mut emitter, machine.resume, uint, depth);
+        emitter.store_number(place, resumed);
+        let one = emitter.linker.constant(1);
+        let deeper = emitter.value(Op::IAdd, uint, &[depth, one]);
+        emitter.store(machine.depth, deeper);
+        // A trace deeper than the pipeline's limit returns at once.
+        let limit = emitter.linker.constant(machine.max_depth);
+        let fits = emitter.value(Op::ULessThan, bool, &[depth, limit]);
+        let [go, back] = [waits_for, resumed].map(|state| emitter.linker.constant(state));
+        let state = emitter.value(Op::Select, uint, &[fits, go, back]);
+        emitter.store(machine.state, state);
+        emitter.push(Op::Branch, &[machine.next]);
+    }
+
+    /// Restores what the function has kept, at the start of a block behind a trace.
+    fn restore_if_resumed(&mut self, block: usize, code: &mut Vec<Inst>) {
+        let from = self.flow.predecessors[block].first().copied();
+        let Some(from) = from.filter(|from| self.cuts.contains(&self.function.blocks[*from].label)) else {
+            return;
+        };
+        let machine = self.machine.clone();
+        let stacks = self.stacks_of(from);
+        let uint = self.linker.uint();
+        let mut emitter = Emitter::new(self.linker, code);
+        let deeper = emitter.load(machine.depth);
+        let one = emitter.linker.constant(1);
+        let depth = emitter.value(Op::ISub, uint, &[deeper, one]);
+        emitter.store(machine.depth, depth);
+        for (variable, stack, ty) in stacks {
+            let place = element(&mut emitter, stack, ty, depth);
+            let value = emitter.value(Op::Load, ty, &[place]);
+            emitter.store(variable, value);
+        }
+    }
+
+    /// Returns the variables that are kept at the end of a block: each with its array and its type.
+    fn stacks_of(&mut self, block: usize) -> Vec<(u32, u32, u32)> {
+        let live = self.live[block].clone();
+        let length = self.machine.max_depth + 1;
+        let of = |variable: u32| {
+            let ty = self.variable_type(variable);
+            let stack = match self.stacks.get(&variable) {
+                Some(known) => *known,
+                None => {
+                    let array = self.linker.array(ty, length);
+                    let stack = self.linker.private(array);
+                    self.stacks.insert(variable, stack);
+                    stack
+                }
+            };
+            (variable, stack, ty)
+        };
+        live.into_iter().map(of).collect()
+    }
+
+    /// Returns the type of a variable of the function or of the shader.
+    fn variable_type(&self, variable: u32) -> u32 {
+        let is_it = |inst: &&Inst| inst.op == Op::Variable && inst.operand(1) == variable;
+        let local = self.function.blocks.first().and_then(|block| block.code.iter().find(is_it));
+        match local {
+            Some(inst) => self.linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target),
+            None => self.linker.variable_type(variable).unwrap_or(0),
+        }
+    }
+}
+
+/// Returns a pointer to an element of an array of the invocation.
+pub(super) fn element(emitter: &mut Emitter<'_>, array: u32, ty: u32, index: u32) -> u32 {
+    let pointer = emitter.linker.pointer_to(::spirv::StorageClass::Private, ty);
+    emitter.value(Op::AccessChain, pointer, &[array, index])
+}
+
+fn without_variables(code: Vec<Inst>) -> Vec<Inst> {
+    code.into_iter().filter(|inst| inst.op != Op::Variable).collect()
+}

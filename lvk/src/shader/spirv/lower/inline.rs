@@ -1,0 +1,139 @@
+//! Inlines functions into their callers.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::Op;
+
+use super::instruction::{Inst, for_each_id};
+use super::linker::Linker;
+use super::module::{Block, Function};
+
+/// Inlines every call of the functions in `wanted`, and calls within them, into `function`.
+///
+/// Returns of an inlined function branch to the code behind the call, from wherever they stand.
+pub(super) fn inline_calls(linker: &mut Linker, function: &mut Function, wanted: &HashSet<u32>) {
+    while let Some((block, place)) = find_call(function, wanted) {
+        let callee = function.blocks[block].code[place].operand(2);
+        let Some(callee) = linker.function(callee).cloned() else { return };
+        inline_call(linker, function, (block, place), callee);
+    }
+}
+
+fn find_call(function: &Function, wanted: &HashSet<u32>) -> Option<(usize, usize)> {
+    let is_call = |inst: &Inst| inst.op == Op::FunctionCall && wanted.contains(&inst.operand(2));
+    function
+        .blocks
+        .iter()
+        .enumerate()
+        .find_map(|(block, Block { code, .. })| code.iter().position(is_call).map(|place| (block, place)))
+}
+
+fn inline_call(
+    linker: &mut Linker,
+    function: &mut Function,
+    (block, place): (usize, usize),
+    mut callee: Function,
+) {
+    let mut rest = function.blocks[block].code.split_off(place);
+    let call = rest.remove(0);
+    let behind = linker.new_id();
+    rename_predecessor(function, function.blocks[block].label, behind);
+    let result = declare_result(linker, function, &call);
+    rename_ids(linker, &mut callee, &call);
+    let first = callee.blocks.first().map_or(behind, |block| block.label);
+    move_variables(linker, function, &mut callee, block);
+    for part in &mut callee.blocks {
+        return_to(part, behind, result);
+    }
+    function.blocks[block].code.push(Inst::new(Op::Branch, &[first]));
+    if let Some(result) = result {
+        rest.insert(0, Inst::new(Op::Load, &[call.operand(0), call.operand(1), result]));
+    }
+    callee.blocks.push(Block { label: behind, code: rest });
+    function.blocks.splice(block + 1..block + 1, callee.blocks);
+}
+
+/// Declares the variable that holds the result of a call; `None` for a call without one.
+fn declare_result(linker: &mut Linker, function: &mut Function, call: &Inst) -> Option<u32> {
+    if call.operand(0) == linker.void() {
+        return None;
+    }
+    let pointer = linker.pointer_to(::spirv::StorageClass::Function, call.operand(0));
+    let id = linker.new_id();
+    let words = [pointer, id, ::spirv::StorageClass::Function as u32];
+    function.blocks[0].code.insert(0, Inst::new(Op::Variable, &words));
+    Some(id)
+}
+
+/// Gives the callee new ids, and the arguments in place of its parameters.
+fn rename_ids(linker: &mut Linker, callee: &mut Function, call: &Inst) {
+    let mut ids: HashMap<u32, u32> = HashMap::new();
+    for (parameter, argument) in callee.parameters.iter().zip(&call.operands[3..]) {
+        ids.insert(parameter.operand(1), *argument);
+    }
+    for block in &callee.blocks {
+        for id in block.code.iter().filter_map(Inst::result).chain([block.label]) {
+            ids.insert(id, linker.new_id());
+        }
+    }
+    let wide = linker.module.wide.clone();
+    let renamed = |id: u32| ids.get(&id).copied().unwrap_or(id);
+    for block in &mut callee.blocks {
+        block.label = renamed(block.label);
+        for inst in &mut block.code {
+            let _ = for_each_id(inst, &wide, |id| *id = renamed(*id));
+        }
+    }
+    linker.module.wide.extend(wide.iter().filter_map(|id| ids.get(id)));
+    linker.copy_decorations(&ids);
+}
+
+/// Moves the variables of the callee to the start of the caller. Where the call was, they take their initial values, or
+/// undefined ones: nothing that an earlier call has left is read.
+fn move_variables(linker: &mut Linker, function: &mut Function, callee: &mut Function, block: usize) {
+    let Some(first) = callee.blocks.first_mut() else { return };
+    let (variables, rest) =
+        std::mem::take(&mut first.code).into_iter().partition(|inst| inst.op == Op::Variable);
+    first.code = rest;
+    let variables: Vec<Inst> = variables;
+    for mut variable in variables.into_iter() {
+        let initial = match variable.operands.get(3) {
+            Some(initial) => *initial,
+            None => {
+                let ty = linker.pointer(variable.operand(0)).map_or(0, |(_, target)| target);
+                let undefined = linker.new_id();
+                function.blocks[block].code.push(Inst::new(Op::Undef, &[ty, undefined]));
+                undefined
+            }
+        };
+        variable.operands.truncate(3);
+        function.blocks[block].code.push(Inst::new(Op::Store, &[variable.operand(1), initial]));
+        function.blocks[0].code.insert(0, variable);
+    }
+}
+
+/// Makes the returns of a block store the result and branch to `behind`.
+fn return_to(block: &mut Block, behind: u32, result: Option<u32>) {
+    let value = match block.terminator() {
+        Some(inst) if inst.op == Op::Return => None,
+        Some(inst) if inst.op == Op::ReturnValue => Some(inst.operand(0)),
+        _ => return,
+    };
+    block.code.pop();
+    if let (Some(variable), Some(value)) = (result, value) {
+        block.code.push(Inst::new(Op::Store, &[variable, value]));
+    }
+    block.code.push(Inst::new(Op::Branch, &[behind]));
+}
+
+/// Makes phis name the block `new`, which now ends as the block `old` did.
+fn rename_predecessor(function: &mut Function, old: u32, new: u32) {
+    for inst in function.code_mut().filter(|inst| inst.op == Op::Phi) {
+        inst.operands
+            .iter_mut()
+            .skip(3)
+            .step_by(2)
+            .filter(|label| **label == old)
+            .for_each(|label| *label = new);
+    }
+}

@@ -1,0 +1,218 @@
+//! Rewrites shaders that judge candidates: any-hit and intersection shaders, which may end in any of their functions.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::{BuiltIn, Op};
+
+use super::control_flow::ControlFlow;
+use super::donor::Donor;
+use super::emit::Emitter;
+use super::instruction::Inst;
+use super::linker::Linker;
+use super::module::{Block, Function};
+use super::stage::Shader;
+use super::traces::{Passed, value_type};
+
+/// Rewrites the functions of an any-hit or intersection shader. `attributes` pass the attributes of candidates.
+pub(super) fn rewrite_judge(
+    linker: &mut Linker,
+    donor: &Donor,
+    shader: &Shader,
+    attributes: &mut Passed,
+) -> Result<(), String> {
+    let ending = functions_that_end(linker, shader);
+    for id in &shader.functions {
+        let Some(mut function) = linker.take_function(*id) else { continue };
+        let result = rewrite_function(linker, donor, shader, attributes, &ending, &mut function);
+        linker.module.functions.push(function);
+        result?;
+    }
+    Ok(())
+}
+
+/// Returns the functions in which the shader may end, or that call such ones.
+fn functions_that_end(linker: &Linker, shader: &Shader) -> HashSet<u32> {
+    let mut found: HashSet<u32> = HashSet::new();
+    let ends = |inst: &Inst, found: &HashSet<u32>| match inst.op {
+        Op::IgnoreIntersectionKHR | Op::TerminateRayKHR | Op::ReportIntersectionKHR => true,
+        Op::FunctionCall => found.contains(&inst.operand(2)),
+        _ => false,
+    };
+    loop {
+        let functions = shader.functions.iter().filter_map(|id| linker.function(*id));
+        let more: HashSet<u32> = functions
+            .filter(|function| function.code().any(|inst| ends(inst, &found)))
+            .map(Function::id)
+            .collect();
+        if more == found {
+            return found;
+        }
+        found = more;
+    }
+}
+
+fn rewrite_function(
+    linker: &mut Linker,
+    donor: &Donor,
+    shader: &Shader,
+    attributes: &mut Passed,
+    ending: &HashSet<u32>,
+    function: &mut Function,
+) -> Result<(), String> {
+    let result = function.head.operand(0);
+    let definitions: HashMap<u32, Inst> = function
+        .code()
+        .chain(&function.parameters)
+        .filter_map(|inst| inst.result().map(|id| (id, inst.clone())))
+        .collect();
+    let mut checks = Vec::new();
+    for block in &mut function.blocks {
+        let mut out = Vec::with_capacity(block.code.len());
+        for inst in std::mem::take(&mut block.code) {
+            match inst.op {
+                Op::IgnoreIntersectionKHR | Op::TerminateRayKHR => {
+                    let yes = linker.bool_constant(true);
+                    let is_ignored = inst.op == Op::IgnoreIntersectionKHR;
+                    let mut emitter = Emitter::new(linker, &mut out);
+                    emitter.store(if is_ignored { donor.ignores } else { donor.ends }, yes);
+                    emitter.store(donor.unwinds, yes);
+                    emit_return(&mut emitter, result);
+                }
+                Op::ReportIntersectionKHR => {
+                    report(linker, donor, shader, attributes, &definitions, &inst, &mut out);
+                    checks.push(inst.operand(1));
+                }
+                Op::FunctionCall if ending.contains(&inst.operand(2)) => {
+                    checks.push(inst.operand(1));
+                    out.push(inst);
+                }
+                _ => out.push(inst),
+            }
+        }
+        block.code = out;
+    }
+    checks.into_iter().try_for_each(|call| check_behind(linker, donor, function, call))
+}
+
+/// Replaces a report by a call of the donor's function.
+fn report(
+    linker: &mut Linker,
+    donor: &Donor,
+    shader: &Shader,
+    attributes: &mut Passed,
+    definitions: &HashMap<u32, Inst>,
+    inst: &Inst,
+    out: &mut Vec<Inst>,
+) {
+    let kind_type = value_type(linker, definitions, inst.operand(3));
+    let shared = shader.attributes.map(|own| (own, attributes.variable(linker, own)));
+    let uint = linker.uint();
+    let mut emitter = Emitter::new(linker, out);
+    if let Some((own, shared)) = shared {
+        emitter.copy(own, shared);
+    }
+    let kind = emitter.convert(inst.operand(3), kind_type, uint);
+    let words = [inst.operand(0), inst.operand(1), donor.report, inst.operand(2), kind];
+    emitter.push(Op::FunctionCall, &words);
+    for (_, variable) in shader.builtins.iter().filter(|(builtin, _)| *builtin == BuiltIn::RayTmaxKHR) {
+        emitter.copy(donor.limit, *variable);
+    }
+}
+
+/// Returns from the function if the shader has ended in the call with the result `call`.
+fn check_behind(
+    linker: &mut Linker,
+    donor: &Donor,
+    function: &mut Function,
+    call: u32,
+) -> Result<(), String> {
+    let result = function.head.operand(0);
+    let is_call = |inst: &Inst| inst.result() == Some(call);
+    let place = function
+        .blocks
+        .iter()
+        .enumerate()
+        .find_map(|(at, block)| block.code.iter().position(is_call).map(|place| (at, place)));
+    let Some((at, place)) = place else { return Ok(()) };
+    let at = leave_loop_header(linker, function, at)?;
+    check_continue(function, at)?;
+    let place = function.blocks[at].code.iter().position(is_call).unwrap_or(place);
+    // The values of built-ins are stored right behind a report.
+    let stores = function.blocks[at].code[place + 1..].iter();
+    let place = place + stores.take_while(|inst| is_update(inst, donor)).count();
+    let rest = function.blocks[at].code.split_off(place + 1);
+    let (leave, stay) = (linker.new_id(), linker.new_id());
+    let label = function.blocks[at].label;
+    rename_phis(function, label, stay);
+    let mut emitter = Emitter::new(linker, &mut function.blocks[at].code);
+    let unwinds = emitter.load(donor.unwinds);
+    emitter.push(Op::SelectionMerge, &[stay, 0]);
+    emitter.push(Op::BranchConditional, &[unwinds, leave, stay]);
+    let mut code = Vec::new();
+    emit_return(&mut Emitter::new(linker, &mut code), result);
+    let blocks = [Block { label: leave, code }, Block { label: stay, code: rest }];
+    function.blocks.splice(at + 1..at + 1, blocks);
+    Ok(())
+}
+
+/// True for the load and store of the limit behind a report.
+fn is_update(inst: &Inst, donor: &Donor) -> bool {
+    (inst.op == Op::Load && inst.operand(2) == donor.limit)
+        || inst.op == Op::Store && inst.operands.len() == 2
+}
+
+/// Moves the code of a loop's header to a block of its own, whose index is the result. Other blocks stay.
+fn leave_loop_header(linker: &mut Linker, function: &mut Function, at: usize) -> Result<usize, String> {
+    let Some(merge) = function.blocks[at].merge().filter(|inst| inst.op == Op::LoopMerge).cloned() else {
+        return Ok(at);
+    };
+    let label = function.blocks[at].label;
+    let exits = [merge.operand(0), merge.operand(1)];
+    let leaves = function.blocks[at].terminator().is_some_and(|inst| {
+        inst.op == Op::Branch || [1, 2].iter().any(|place| exits.contains(&inst.operand(*place)))
+    });
+    if exits.contains(&label) || !leaves {
+        return Err("a call in the header of a loop cannot be lowered".to_owned());
+    }
+    let code = std::mem::take(&mut function.blocks[at].code);
+    let (phis, mut rest): (Vec<Inst>, Vec<Inst>) = code.into_iter().partition(|inst| inst.op == Op::Phi);
+    rest.retain(|inst| inst.op != Op::LoopMerge);
+    let behind = linker.new_id();
+    function.blocks[at].code = phis;
+    function.blocks[at].code.extend([merge, Inst::new(Op::Branch, &[behind])]);
+    rename_phis(function, label, behind);
+    function.blocks.insert(at + 1, Block { label: behind, code: rest });
+    Ok(at + 1)
+}
+
+/// Fails for a block that only the way back to the start of a loop reaches, from where no return is possible.
+fn check_continue(function: &Function, at: usize) -> Result<(), String> {
+    let flow = ControlFlow::of(function);
+    let merges = function.blocks.iter().filter_map(|block| block.merge().map(|inst| (block, inst)));
+    let mut loops = merges.filter(|(_, inst)| inst.op == Op::LoopMerge);
+    let is_inside = loops.any(|(header, inst)| {
+        let target = flow.index_of(inst.operand(1));
+        inst.operand(1) != header.label && target.is_some_and(|target| flow.dominates(target, at))
+    });
+    if is_inside {
+        return Err("a call in the last expression of a loop cannot be lowered".to_owned());
+    }
+    Ok(())
+}
+
+fn rename_phis(function: &mut Function, old: u32, new: u32) {
+    for inst in function.code_mut().filter(|inst| inst.op == Op::Phi) {
+        let labels = inst.operands.iter_mut().skip(3).step_by(2);
+        labels.filter(|label| **label == old).for_each(|label| *label = new);
+    }
+}
+
+/// Returns from a function with this result type; the result does not matter.
+fn emit_return(emitter: &mut Emitter<'_>, result: u32) {
+    if result == emitter.linker.void() {
+        emitter.push(Op::Return, &[]);
+    } else {
+        let value = emitter.linker.null(result);
+        emitter.push(Op::ReturnValue, &[value]);
+    }
+}

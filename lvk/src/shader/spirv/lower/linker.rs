@@ -1,0 +1,428 @@
+//! Links modules into one, and declares types, constants and variables in it.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::{BuiltIn, Decoration, Op, StorageClass};
+
+use super::instruction::{Inst, UnknownOpcode, for_each_id};
+use super::module::{Block, Function, Module};
+
+/// New ids by the ids of a module that has been linked.
+pub(super) type IdMap = HashMap<u32, u32>;
+
+/// The linked module.
+#[derive(Default)]
+pub(super) struct Linker {
+    pub(super) module: Module,
+    /// Types and constants that are declared once, by opcode, operands without the result, and decorations.
+    unique: HashMap<(u32, Vec<u32>), u32>,
+    /// Types, constants and variables by their ids.
+    globals: HashMap<u32, Inst>,
+    /// Inputs by built-in value and type.
+    inputs: HashMap<(u32, u32), u32>,
+}
+
+impl Linker {
+    pub(super) fn new(version: u32) -> Self {
+        let module = Module { version, bound: 1, ..Module::default() };
+        Self { module, ..Self::default() }
+    }
+
+    /// Adds all of a module but its entry points and their modes. Returns the new ids.
+    pub(super) fn link(&mut self, module: Module) -> Result<IdMap, UnknownOpcode> {
+        let decorations = decoration_words(&module);
+        let wide = module.wide;
+        let mut ids = IdMap::new();
+        let mut shared = HashSet::new();
+        for import in module.imports {
+            self.link_import(import, &mut ids);
+        }
+        for global in module.globals {
+            let old = global.result();
+            if self.link_global(global, &decorations, &wide, &mut ids)? {
+                shared.extend(old);
+            }
+        }
+        for mut function in module.functions {
+            let parts = std::iter::once(&mut function.head).chain(&mut function.parameters);
+            for inst in parts {
+                self.map_ids(inst, &wide, &mut ids)?;
+            }
+            for Block { label, code } in &mut function.blocks {
+                *label = self.map_id(*label, &mut ids);
+                for inst in code {
+                    self.map_ids(inst, &wide, &mut ids)?;
+                }
+            }
+            self.module.functions.push(function);
+        }
+        for mut inst in module.decorations.into_iter().filter(|inst| !shared.contains(&inst.operand(0))) {
+            self.map_ids(&mut inst, &wide, &mut ids)?;
+            self.module.decorations.push(inst);
+        }
+        for (id, name) in module.names {
+            if let Some(id) = ids.get(&id) {
+                self.module.names.insert(*id, name);
+            }
+        }
+        self.module.wide.extend(wide.iter().filter_map(|id| ids.get(id)));
+        add_new(&mut self.module.capabilities, module.capabilities);
+        add_new(&mut self.module.extensions, module.extensions);
+        Ok(ids)
+    }
+
+    fn link_import(&mut self, import: Inst, ids: &mut IdMap) {
+        let name = &import.operands[1..];
+        let known = self.module.imports.iter().find(|own| &own.operands[1..] == name);
+        if let Some(known) = known {
+            ids.insert(import.operand(0), known.operand(0));
+            return;
+        }
+        let mut import = import;
+        let id = self.map_id(import.operand(0), ids);
+        import.set_result(id);
+        self.module.imports.push(import);
+    }
+
+    /// Returns true if the module has the type or constant already.
+    fn link_global(
+        &mut self,
+        mut inst: Inst,
+        decorations: &HashMap<u32, Vec<u32>>,
+        wide: &HashSet<u32>,
+        ids: &mut IdMap,
+    ) -> Result<bool, UnknownOpcode> {
+        let old = inst.result();
+        let is_forward = old.is_some_and(|old| ids.contains_key(&old));
+        self.map_ids(&mut inst, wide, ids)?;
+        let Some(old) = old else {
+            self.module.globals.push(inst);
+            return Ok(false);
+        };
+        let id = ids[&old];
+        // Others may refer to a pointer that was declared before its target.
+        let can_share = is_unique(inst.op) && (!is_forward || self.take_unused_declaration(id));
+        if can_share {
+            let key = unique_key(&inst, decorations.get(&old).map_or(&[][..], Vec::as_slice));
+            if let Some(known) = self.unique.get(&key) {
+                ids.insert(old, *known);
+                return Ok(true);
+            }
+            self.unique.insert(key, id);
+        }
+        self.push_global(inst);
+        Ok(false)
+    }
+
+    /// Removes the forward declaration of a pointer type that nothing refers to. Returns false if something does.
+    fn take_unused_declaration(&mut self, pointer: u32) -> bool {
+        let is_declaration = |inst: &Inst| inst.op == Op::TypeForwardPointer && inst.operand(0) == pointer;
+        let refers = |inst: &Inst| !is_declaration(inst) && inst.operands.contains(&pointer);
+        let Some(at) = self.module.globals.iter().position(is_declaration) else { return false };
+        if self.module.globals[at..].iter().any(refers) {
+            return false;
+        }
+        self.module.globals.remove(at);
+        true
+    }
+
+    fn map_ids(
+        &mut self,
+        inst: &mut Inst,
+        wide: &HashSet<u32>,
+        ids: &mut IdMap,
+    ) -> Result<(), UnknownOpcode> {
+        for_each_id(inst, wide, |id| *id = self.map_id(*id, ids))
+    }
+
+    fn map_id(&mut self, id: u32, ids: &mut IdMap) -> u32 {
+        *ids.entry(id).or_insert_with(|| self.module.new_id())
+    }
+
+    fn push_global(&mut self, inst: Inst) {
+        if let Some(id) = inst.result() {
+            self.globals.insert(id, inst.clone());
+        }
+        self.module.globals.push(inst);
+    }
+
+    pub(super) fn new_id(&mut self) -> u32 {
+        self.module.new_id()
+    }
+
+    /// Returns a type, constant or variable.
+    pub(super) fn global(&self, id: u32) -> Option<&Inst> {
+        self.globals.get(&id)
+    }
+
+    /// Returns the storage class and the target of a pointer type.
+    pub(super) fn pointer(&self, ty: u32) -> Option<(u32, u32)> {
+        let inst = self.global(ty).filter(|inst| inst.op == Op::TypePointer)?;
+        Some((inst.operand(1), inst.operand(2)))
+    }
+
+    /// Returns the type behind the pointer that a variable is.
+    pub(super) fn variable_type(&self, variable: u32) -> Option<u32> {
+        let inst = self.global(variable).filter(|inst| inst.op == Op::Variable)?;
+        self.pointer(inst.operand(0)).map(|(_, target)| target)
+    }
+
+    /// Declares a type or a constant that is declared once. `operands` leave out the result.
+    fn declare(&mut self, op: Op, operands: &[u32]) -> u32 {
+        let key = (op as u32, operands.to_vec());
+        if let Some(known) = self.unique.get(&key) {
+            return *known;
+        }
+        let id = self.new_id();
+        let at = if is_type(op) { 0 } else { 1 };
+        let mut words = operands.to_vec();
+        words.insert(at, id);
+        self.unique.insert(key, id);
+        self.push_global(Inst::new(op, &words));
+        id
+    }
+
+    pub(super) fn void(&mut self) -> u32 {
+        self.declare(Op::TypeVoid, &[])
+    }
+
+    pub(super) fn bool(&mut self) -> u32 {
+        self.declare(Op::TypeBool, &[])
+    }
+
+    pub(super) fn uint(&mut self) -> u32 {
+        self.declare(Op::TypeInt, &[32, 0])
+    }
+
+    pub(super) fn uvec2(&mut self) -> u32 {
+        let uint = self.uint();
+        self.declare(Op::TypeVector, &[uint, 2])
+    }
+
+    pub(super) fn array(&mut self, element: u32, length: u32) -> u32 {
+        let length = self.constant(length);
+        self.declare(Op::TypeArray, &[element, length])
+    }
+
+    pub(super) fn pointer_to(&mut self, storage: StorageClass, target: u32) -> u32 {
+        self.declare(Op::TypePointer, &[storage as u32, target])
+    }
+
+    /// Declares a block for push constants: the members of a block, and a pair of numbers at `offset`. Returns the
+    /// variable, and the index of the pair.
+    pub(super) fn push_block(&mut self, members_of: Option<u32>, offset: u32) -> (u32, u32) {
+        let pair = self.uvec2();
+        let members = members_of.and_then(|ty| self.global(ty)).map_or(&[][..], |inst| &inst.operands[1..]);
+        let mut words = members.to_vec();
+        let index = words.len() as u32;
+        let ty = self.new_id();
+        words.insert(0, ty);
+        words.push(pair);
+        self.push_global(Inst::new(Op::TypeStruct, &words));
+        if let Some(from) = members_of {
+            self.copy_decorations(&IdMap::from([(from, ty)]));
+        } else {
+            self.module.decorations.push(Inst::new(Op::Decorate, &[ty, Decoration::Block as u32]));
+        }
+        let place = [ty, index, Decoration::Offset as u32, offset];
+        self.module.decorations.push(Inst::new(Op::MemberDecorate, &place));
+        let storage = StorageClass::PushConstant;
+        let pointer = self.pointer_to(storage, ty);
+        let variable = self.new_id();
+        self.push_global(Inst::new(Op::Variable, &[pointer, variable, storage as u32]));
+        (variable, index)
+    }
+
+    /// Declares the type of functions without parameters that return nothing.
+    pub(super) fn plain_function_type(&mut self) -> u32 {
+        let void = self.void();
+        self.declare(Op::TypeFunction, &[void])
+    }
+
+    pub(super) fn constant(&mut self, value: u32) -> u32 {
+        let uint = self.uint();
+        self.declare(Op::Constant, &[uint, value])
+    }
+
+    pub(super) fn bool_constant(&mut self, value: bool) -> u32 {
+        let bool = self.bool();
+        self.declare(if value { Op::ConstantTrue } else { Op::ConstantFalse }, &[bool])
+    }
+
+    pub(super) fn null(&mut self, ty: u32) -> u32 {
+        self.declare(Op::ConstantNull, &[ty])
+    }
+
+    /// Declares a variable of the invocation.
+    pub(super) fn private(&mut self, ty: u32) -> u32 {
+        let pointer = self.pointer_to(StorageClass::Private, ty);
+        let id = self.new_id();
+        self.push_global(Inst::new(Op::Variable, &[pointer, id, StorageClass::Private as u32]));
+        self.decorate_pointer_variable(id, ty);
+        id
+    }
+
+    /// Decorates a variable as Vulkan wants it if the variable holds pointers to buffers.
+    pub(super) fn decorate_pointer_variable(&mut self, variable: u32, ty: u32) {
+        if self.holds_buffer_pointers(ty) {
+            let aliased = Decoration::AliasedPointer as u32;
+            self.module.decorations.push(Inst::new(Op::Decorate, &[variable, aliased]));
+        }
+    }
+
+    /// True if variables of the type can be loaded and stored.
+    pub(super) fn can_store(&self, ty: u32) -> bool {
+        let Some(inst) = self.global(ty) else { return false };
+        match inst.op {
+            Op::TypePointer => inst.operand(1) == StorageClass::PhysicalStorageBuffer as u32,
+            Op::TypeImage | Op::TypeSampler | Op::TypeSampledImage => false,
+            Op::TypeAccelerationStructureKHR | Op::TypeRayQueryKHR => false,
+            _ => true,
+        }
+    }
+
+    /// Declares an input of the shader, once for a built-in value and type.
+    pub(super) fn input(&mut self, builtin: BuiltIn, ty: u32) -> u32 {
+        if let Some(known) = self.inputs.get(&(builtin as u32, ty)) {
+            return *known;
+        }
+        let pointer = self.pointer_to(StorageClass::Input, ty);
+        let id = self.new_id();
+        self.push_global(Inst::new(Op::Variable, &[pointer, id, StorageClass::Input as u32]));
+        let decoration = [id, Decoration::BuiltIn as u32, builtin as u32];
+        self.module.decorations.push(Inst::new(Op::Decorate, &decoration));
+        self.inputs.insert((builtin as u32, ty), id);
+        id
+    }
+
+    /// Gives copies of values the decorations of the originals.
+    pub(super) fn copy_decorations(&mut self, copies: &IdMap) {
+        let copied = self.module.decorations.iter().filter_map(|inst| {
+            let copy = copies.get(&inst.operand(0))?;
+            let mut inst = inst.clone();
+            inst.operands[0] = *copy;
+            Some(inst)
+        });
+        let copied: Vec<Inst> = copied.collect();
+        self.module.decorations.extend(copied);
+    }
+
+    /// True for a pointer to a buffer, or an array of them.
+    fn holds_buffer_pointers(&self, ty: u32) -> bool {
+        match self.global(ty) {
+            Some(inst) if inst.op == Op::TypeArray => self.holds_buffer_pointers(inst.operand(1)),
+            Some(inst) => {
+                inst.op == Op::TypePointer && inst.operand(1) == StorageClass::PhysicalStorageBuffer as u32
+            }
+            None => false,
+        }
+    }
+
+    /// Returns a text that two types share if one can be copied to the other.
+    pub(super) fn shape(&self, ty: u32) -> String {
+        let Some(inst) = self.global(ty) else { return format!("?{ty}") };
+        match inst.op {
+            Op::TypeStruct => {
+                let members: Vec<String> =
+                    inst.operands[1..].iter().map(|member| self.shape(*member)).collect();
+                format!("({})", members.join(","))
+            }
+            Op::TypeArray => {
+                let length = self.global(inst.operand(2)).map_or(0, |constant| constant.operand(2));
+                format!("[{};{length}]", self.shape(inst.operand(1)))
+            }
+            _ => ty.to_string(),
+        }
+    }
+
+    /// Adds a function without parameters that returns nothing.
+    pub(super) fn push_function(&mut self, id: u32, blocks: Vec<Block>) {
+        let (void, ty) = (self.void(), self.plain_function_type());
+        let head = Inst::new(Op::Function, &[void, id, 0, ty]);
+        self.module.functions.push(Function { head, parameters: Vec::new(), blocks });
+    }
+
+    pub(super) fn function_mut(&mut self, id: u32) -> Option<&mut Function> {
+        self.module.functions.iter_mut().find(|function| function.id() == id)
+    }
+
+    pub(super) fn function(&self, id: u32) -> Option<&Function> {
+        self.module.functions.iter().find(|function| function.id() == id)
+    }
+
+    /// Takes a function out, to be changed and pushed again.
+    pub(super) fn take_function(&mut self, id: u32) -> Option<Function> {
+        let at = self.module.functions.iter().position(|function| function.id() == id)?;
+        Some(self.module.functions.remove(at))
+    }
+}
+
+/// Adds the items that are not in the list.
+fn add_new<T: PartialEq>(list: &mut Vec<T>, items: Vec<T>) {
+    for item in items {
+        if !list.contains(&item) {
+            list.push(item);
+        }
+    }
+}
+
+/// Returns the words of the decorations of each type and constant, sorted.
+fn decoration_words(module: &Module) -> HashMap<u32, Vec<u32>> {
+    let mut all: HashMap<u32, Vec<Vec<u32>>> = HashMap::new();
+    for inst in &module.decorations {
+        let words = std::iter::once(inst.op as u32).chain(inst.operands.iter().skip(1).copied());
+        all.entry(inst.operand(0)).or_default().push(words.collect());
+    }
+    let joined = |(id, mut list): (u32, Vec<Vec<u32>>)| {
+        list.sort_unstable();
+        (id, list.concat())
+    };
+    all.into_iter().map(joined).collect()
+}
+
+/// Returns the key of a type or constant: its operands without the result, and its decorations.
+fn unique_key(inst: &Inst, decorations: &[u32]) -> (u32, Vec<u32>) {
+    let mut operands = inst.operands.clone();
+    operands.remove(if is_type(inst.op) { 0 } else { 1 });
+    if !decorations.is_empty() {
+        operands.push(u32::MAX);
+        operands.extend(decorations);
+    }
+    (inst.op as u32, operands)
+}
+
+fn is_type(op: Op) -> bool {
+    use Op::{
+        TypeAccelerationStructureKHR, TypeArray, TypeBool, TypeFloat, TypeFunction, TypeImage, TypeInt,
+        TypeMatrix, TypePointer, TypeRayQueryKHR, TypeRuntimeArray, TypeSampledImage, TypeSampler,
+        TypeStruct, TypeVector, TypeVoid,
+    };
+    matches!(
+        op,
+        TypeVoid
+            | TypeBool
+            | TypeInt
+            | TypeFloat
+            | TypeVector
+            | TypeMatrix
+            | TypeImage
+            | TypeSampler
+            | TypeSampledImage
+            | TypeArray
+            | TypeRuntimeArray
+            | TypeStruct
+            | TypePointer
+            | TypeFunction
+            | TypeAccelerationStructureKHR
+            | TypeRayQueryKHR
+    )
+}
+
+/// True for types and constants that are declared once if nothing decorates them.
+fn is_unique(op: Op) -> bool {
+    let is_constant = matches!(
+        op,
+        Op::Constant | Op::ConstantTrue | Op::ConstantFalse | Op::ConstantNull | Op::ConstantComposite
+    );
+    is_type(op) || is_constant
+}

@@ -1,0 +1,116 @@
+//! Variables whose values a function reads after a block.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::Op;
+
+use super::control_flow::ControlFlow;
+use super::instruction::{Inst, used_ids};
+use super::linker::Linker;
+use super::module::Function;
+
+/// Returns, for each block, those of `variables` that may be read behind its end before they are written. `at_return`
+/// are read at each return.
+pub(super) fn live_behind_blocks(
+    linker: &Linker,
+    function: &Function,
+    flow: &ControlFlow,
+    variables: &HashSet<u32>,
+    at_return: &HashSet<u32>,
+) -> Vec<HashSet<u32>> {
+    let mentions = mentioned_by_functions(linker, variables);
+    let effects: Vec<Effects> = function
+        .blocks
+        .iter()
+        .map(|block| Effects::of(linker, &block.code, variables, &mentions, at_return))
+        .collect();
+    let mut at_start: Vec<HashSet<u32>> = vec![HashSet::new(); effects.len()];
+    let mut behind = at_start.clone();
+    let mut has_changed = true;
+    while has_changed {
+        has_changed = false;
+        for block in (0..effects.len()).rev() {
+            let out: HashSet<u32> =
+                flow.successors[block].iter().flat_map(|to| at_start[*to].iter().copied()).collect();
+            let kept = out.difference(&effects[block].written).copied();
+            let now: HashSet<u32> = effects[block].read.iter().copied().chain(kept).collect();
+            has_changed |= now != at_start[block];
+            at_start[block] = now;
+            behind[block] = out;
+        }
+    }
+    behind
+}
+
+/// Variables that a block reads before it writes them, and those that it writes as a whole.
+struct Effects {
+    read: HashSet<u32>,
+    written: HashSet<u32>,
+}
+
+impl Effects {
+    fn of(
+        linker: &Linker,
+        code: &[Inst],
+        variables: &HashSet<u32>,
+        mentions: &HashMap<u32, HashSet<u32>>,
+        at_return: &HashSet<u32>,
+    ) -> Self {
+        let mut found = Self { read: HashSet::new(), written: HashSet::new() };
+        // Pointers into variables, with the variables. Pointers do not leave their block.
+        let mut parts: HashMap<u32, u32> = HashMap::new();
+        for inst in code.iter().filter(|inst| inst.op != Op::Variable) {
+            let root = |id: u32| parts.get(&id).copied().unwrap_or(id);
+            let mut used = used_ids(inst, &linker.module.wide);
+            let mut whole = None;
+            match inst.op {
+                Op::AccessChain | Op::InBoundsAccessChain => {
+                    let base = root(inst.operand(2));
+                    if variables.contains(&base) {
+                        parts.insert(inst.operand(1), base);
+                        used.retain(|id| *id != inst.operand(2));
+                    }
+                }
+                // A write of a part reads nothing, and leaves the other parts.
+                Op::Store => {
+                    used.remove(0);
+                    whole = Some(inst.operand(0)).filter(|id| variables.contains(id));
+                }
+                Op::FunctionCall => used.extend(mentions.get(&inst.operand(2)).into_iter().flatten()),
+                Op::Return | Op::ReturnValue => used.extend(at_return),
+                _ => {}
+            }
+            let read: Vec<u32> = used.into_iter().map(|id| parts.get(&id).copied().unwrap_or(id)).collect();
+            let is_read = |id: &u32| variables.contains(id) && !found.written.contains(id);
+            let read: Vec<u32> = read.into_iter().filter(is_read).collect();
+            found.read.extend(read);
+            found.written.extend(whole);
+        }
+        found
+    }
+}
+
+/// Returns the variables that each function mentions, itself or through its calls.
+fn mentioned_by_functions(linker: &Linker, variables: &HashSet<u32>) -> HashMap<u32, HashSet<u32>> {
+    let mut calls: HashMap<u32, HashSet<u32>> = HashMap::new();
+    let mut found: HashMap<u32, HashSet<u32>> = HashMap::new();
+    for function in &linker.module.functions {
+        let ids: HashSet<u32> =
+            function.code().flat_map(|inst| used_ids(inst, &linker.module.wide)).collect();
+        found.insert(function.id(), ids.intersection(variables).copied().collect());
+        calls.insert(function.id(), ids);
+    }
+    let mut has_changed = true;
+    while has_changed {
+        has_changed = false;
+        for (caller, ids) in &calls {
+            let more: HashSet<u32> = ids.iter().filter_map(|id| found.get(id)).flatten().copied().collect();
+            if let Some(own) = found.get_mut(caller) {
+                let before = own.len();
+                own.extend(more);
+                has_changed |= own.len() != before;
+            }
+        }
+    }
+    found
+}

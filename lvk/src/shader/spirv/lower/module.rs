@@ -1,0 +1,205 @@
+//! A module in sections, with functions in blocks.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::Op;
+
+use super::instruction::{Inst, UnknownOpcode, for_each_id};
+use crate::shader::spirv::words::{HEADER_WORDS, Instruction, instructions};
+
+/// A block of a function: its label, and its code, which ends with a terminator.
+#[derive(Debug, Clone)]
+pub(super) struct Block {
+    pub(super) label: u32,
+    pub(super) code: Vec<Inst>,
+}
+
+impl Block {
+    pub(super) fn terminator(&self) -> Option<&Inst> {
+        self.code.last()
+    }
+
+    /// Returns the merge instruction in front of the terminator.
+    pub(super) fn merge(&self) -> Option<&Inst> {
+        let at = self.code.len().checked_sub(2)?;
+        let inst = self.code.get(at)?;
+        matches!(inst.op, Op::LoopMerge | Op::SelectionMerge).then_some(inst)
+    }
+}
+
+/// A function.
+#[derive(Debug, Clone)]
+pub(super) struct Function {
+    /// `OpFunction`.
+    pub(super) head: Inst,
+    pub(super) parameters: Vec<Inst>,
+    pub(super) blocks: Vec<Block>,
+}
+
+impl Function {
+    pub(super) fn id(&self) -> u32 {
+        self.head.operand(1)
+    }
+
+    pub(super) fn code(&self) -> impl Iterator<Item = &Inst> {
+        self.blocks.iter().flat_map(|block| &block.code)
+    }
+
+    pub(super) fn code_mut(&mut self) -> impl Iterator<Item = &mut Inst> {
+        self.blocks.iter_mut().flat_map(|block| &mut block.code)
+    }
+}
+
+/// A module in sections. Debug information is left out.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Module {
+    pub(super) version: u32,
+    /// Ids are below.
+    pub(super) bound: u32,
+    pub(super) capabilities: Vec<u32>,
+    /// Words of `OpExtension`.
+    pub(super) extensions: Vec<Inst>,
+    pub(super) imports: Vec<Inst>,
+    pub(super) memory_model: Vec<u32>,
+    pub(super) entry_points: Vec<Inst>,
+    /// `OpExecutionMode` and `OpExecutionModeId`.
+    pub(super) modes: Vec<Inst>,
+    pub(super) names: HashMap<u32, String>,
+    pub(super) decorations: Vec<Inst>,
+    /// Types, constants and variables.
+    pub(super) globals: Vec<Inst>,
+    pub(super) functions: Vec<Function>,
+    /// Ids of 64-bit integers, for the literals of switches.
+    pub(super) wide: HashSet<u32>,
+}
+
+/// The start of the names of instruction sets without meaning, which are left out.
+const NON_SEMANTIC: &str = "NonSemantic.";
+/// The set without meaning that is kept.
+const DEBUG_PRINTF: &str = "NonSemantic.DebugPrintf";
+
+impl Module {
+    /// Reads a module whose structure has been validated. The error is a message with the instruction's name.
+    pub(super) fn parse(words: &[u32]) -> Result<Self, String> {
+        let header = words.get(..HEADER_WORDS).ok_or("the header is cut off")?;
+        let mut module = Self { version: header[1], bound: header[3], ..Self::default() };
+        let mut reader = Reader::default();
+        for instruction in instructions(words) {
+            let instruction = instruction?;
+            let Some(op) = instruction.op else {
+                return Err(format!("the opcode {} is not known", instruction.words[0] & 0xFFFF));
+            };
+            module.read(op, &instruction, &mut reader)?;
+        }
+        if reader.function.is_some() {
+            return Err("a function has no end".to_owned());
+        }
+        Ok(module)
+    }
+
+    fn read(&mut self, op: Op, instruction: &Instruction<'_>, reader: &mut Reader) -> Result<(), String> {
+        let inst = Inst::new(op, instruction.operands());
+        match op {
+            Op::Source | Op::SourceContinued | Op::SourceExtension | Op::String | Op::ModuleProcessed => {}
+            Op::MemberName | Op::Line | Op::NoLine | Op::Nop => {}
+            Op::Name => _ = self.names.insert(inst.operand(0), instruction.string(1).0),
+            Op::Capability => self.capabilities.push(inst.operand(0)),
+            Op::Extension => self.extensions.push(inst),
+            Op::ExtInstImport => {
+                let name = instruction.string(1).0;
+                if name.starts_with(NON_SEMANTIC) && !name.starts_with(DEBUG_PRINTF) {
+                    reader.dropped_sets.insert(inst.operand(0));
+                } else {
+                    self.imports.push(inst);
+                }
+            }
+            Op::MemoryModel => self.memory_model = inst.operands,
+            Op::EntryPoint => self.entry_points.push(inst),
+            Op::ExecutionMode | Op::ExecutionModeId => self.modes.push(inst),
+            Op::Decorate | Op::DecorateId | Op::MemberDecorate | Op::DecorateString => {
+                self.decorations.push(inst);
+            }
+            Op::MemberDecorateString => {}
+            Op::ExtInst if reader.dropped_sets.contains(&inst.operand(2)) => {}
+            _ => return self.read_code(inst, reader),
+        }
+        Ok(())
+    }
+
+    fn read_code(&mut self, inst: Inst, reader: &mut Reader) -> Result<(), String> {
+        for_each_id(&mut inst.clone(), &self.wide, |_| {})
+            .map_err(|UnknownOpcode(op)| format!("Op{op:?} cannot be lowered"))?;
+        if let (Some(ty), Some(id)) = (inst.result_type(), inst.result())
+            && reader.wide_types.contains(&ty)
+        {
+            self.wide.insert(id);
+        }
+        if inst.op == Op::TypeInt && inst.operand(1) == 64 {
+            reader.wide_types.insert(inst.operand(0));
+        }
+        let out_of_place = || format!("Op{:?} stands outside of a block", inst.op);
+        match inst.op {
+            Op::Function if reader.function.is_none() => {
+                reader.function = Some(Function { head: inst, parameters: Vec::new(), blocks: Vec::new() });
+            }
+            Op::FunctionEnd => self.functions.push(reader.function.take().ok_or_else(out_of_place)?),
+            _ => match &mut reader.function {
+                None if inst.op == Op::Label => return Err(out_of_place()),
+                None => self.globals.push(inst),
+                Some(function) if inst.op == Op::FunctionParameter => function.parameters.push(inst),
+                Some(function) if inst.op == Op::Label => {
+                    function.blocks.push(Block { label: inst.operand(0), code: Vec::new() });
+                }
+                Some(function) => function.blocks.last_mut().ok_or_else(out_of_place)?.code.push(inst),
+            },
+        }
+        Ok(())
+    }
+
+    pub(super) fn new_id(&mut self) -> u32 {
+        let id = self.bound;
+        self.bound = id.saturating_add(1);
+        id
+    }
+
+    /// Returns the id with this debug name.
+    pub(super) fn named(&self, name: &str) -> Option<u32> {
+        self.names.iter().find(|(_, own)| *own == name).map(|(id, _)| *id)
+    }
+
+    /// Returns the function whose debug name starts with `name` and a parenthesis, as glslang writes it.
+    pub(super) fn function_named(&self, name: &str) -> Option<u32> {
+        let is_it = |own: &str| own.strip_prefix(name).is_some_and(|rest| rest.starts_with('('));
+        self.names.iter().find(|(_, own)| is_it(own)).map(|(id, _)| *id)
+    }
+
+    /// Returns the words of the module.
+    pub(super) fn words(&self) -> Vec<u32> {
+        let mut out = vec![::spirv::MAGIC_NUMBER, self.version, 0, self.bound, 0];
+        for capability in &self.capabilities {
+            Inst::new(Op::Capability, &[*capability]).write(&mut out);
+        }
+        self.extensions.iter().chain(&self.imports).for_each(|inst| inst.write(&mut out));
+        Inst::new(Op::MemoryModel, &self.memory_model).write(&mut out);
+        let rest = self.entry_points.iter().chain(&self.modes).chain(&self.decorations).chain(&self.globals);
+        rest.for_each(|inst| inst.write(&mut out));
+        for function in &self.functions {
+            function.head.write(&mut out);
+            function.parameters.iter().for_each(|inst| inst.write(&mut out));
+            for block in &function.blocks {
+                Inst::new(Op::Label, &[block.label]).write(&mut out);
+                block.code.iter().for_each(|inst| inst.write(&mut out));
+            }
+            Inst::new(Op::FunctionEnd, &[]).write(&mut out);
+        }
+        out
+    }
+}
+
+/// State of the reader.
+#[derive(Default)]
+struct Reader {
+    function: Option<Function>,
+    dropped_sets: HashSet<u32>,
+    wide_types: HashSet<u32>,
+}

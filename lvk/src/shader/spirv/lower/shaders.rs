@@ -1,0 +1,180 @@
+//! The shaders of a pipeline in the linked module, and which of them wait for rays.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::Op;
+
+use super::block_pointers::read_block_by_address;
+use super::donor::{Donor, Needs};
+use super::instruction::Inst;
+use super::judges::rewrite_judge;
+use super::linker::Linker;
+use super::push_constants::merge_push_constants;
+use super::stage::{Shader, link_stage};
+use super::traces::{Passed, TraceVariables, hide_remap_table, is_trace, rewrite_traces};
+use super::{HitShaders, Lowering, LoweringError, Traversal};
+use crate::shader::ShaderStage;
+
+/// The linked shaders, by their index in [`Lowering::modules`]; shaders that no trace reaches are left out.
+pub(super) struct Shaders {
+    pub(super) linked: HashMap<usize, Shader>,
+    /// Variables with the addresses of the shaders' records.
+    pub(super) records: HashMap<usize, u32>,
+    /// Functions that wait for a ray or a callable shader, themselves or through calls.
+    pub(super) waiting: HashSet<u32>,
+    /// True if callable shaders call others.
+    pub(super) callables_wait: bool,
+}
+
+const RAY_FLAG_OPAQUE: u32 = 0x1;
+const RAY_FLAG_NO_OPAQUE: u32 = 0x2;
+/// Flags that tell opaque geometries from others.
+const RAY_FLAGS_OF_OPACITY: u32 = RAY_FLAG_NO_OPAQUE | 0x40 | 0x80;
+
+impl Shaders {
+    /// Links all shaders that the launch may run.
+    pub(super) fn link(linker: &mut Linker, lowering: &Lowering<'_>) -> Result<Self, LoweringError> {
+        let hits = lowering.hit.iter().flat_map(|HitShaders { closest_hit, any_hit, intersection }| {
+            [closest_hit, any_hit, intersection].into_iter().flatten().copied()
+        });
+        let all = [lowering.ray_gen].into_iter().chain(lowering.miss.iter().copied()).chain(hits);
+        let mut linked = HashMap::new();
+        for index in all.chain(lowering.callable.iter().copied()) {
+            let Some(module) = lowering.modules.get(index).filter(|_| !linked.contains_key(&index)) else {
+                continue;
+            };
+            let shader = link_stage(linker, module)
+                .map_err(|message| LoweringError { shader: module.name.to_owned(), message })?;
+            linked.insert(index, shader);
+        }
+        let callables_wait = lowering.callable.iter().any(|index| {
+            linked.get(index).is_some_and(|shader: &Shader| {
+                contains(linker, shader, |inst| inst.op == Op::ExecuteCallableKHR)
+            })
+        });
+        Ok(Self { linked, records: HashMap::new(), waiting: HashSet::new(), callables_wait })
+    }
+
+    /// Returns what the shaders need of the traversal.
+    pub(super) fn needs(&self, linker: &Linker, lowering: &Lowering<'_>) -> Needs {
+        use ::spirv::BuiltIn;
+        let reads = |wanted: &[BuiltIn]| {
+            let builtins = self.linked.values().flat_map(|shader| &shader.builtins);
+            builtins.into_iter().any(|(builtin, _)| wanted.contains(builtin))
+        };
+        let boxes = lowering.hit.iter().any(|group| group.intersection.is_some());
+        let judges = lowering.hit.iter().any(|group| group.any_hit.is_some());
+        // Flags that are no constant may be any.
+        let flags = self.ray_flags(linker);
+        let always = flags.iter().fold(u32::MAX, |all, flags| all & flags.unwrap_or(0));
+        let possible = flags.iter().fold(0, |all, flags| all | flags.unwrap_or(u32::MAX));
+        let all_opaque = always & RAY_FLAG_OPAQUE != 0;
+        let candidates = boxes || possible & RAY_FLAGS_OF_OPACITY != 0 || (judges && !all_opaque);
+        Needs {
+            candidates,
+            boxes,
+            flags_always: always & possible | if candidates { 0 } else { RAY_FLAG_OPAQUE },
+            flags_possible: possible,
+            object_ray: reads(&[BuiltIn::ObjectRayOriginKHR, BuiltIn::ObjectRayDirectionKHR]),
+            matrices: reads(&[BuiltIn::ObjectToWorldKHR, BuiltIn::WorldToObjectKHR]),
+            positions: reads(&[BuiltIn::HitTriangleVertexPositionsKHR]),
+        }
+    }
+
+    /// Returns the flags of all traces; `None` for flags that are no constant.
+    fn ray_flags(&self, linker: &Linker) -> Vec<Option<u32>> {
+        let functions = self.linked.values().flat_map(|shader| &shader.functions);
+        let code = functions.filter_map(|id| linker.function(*id)).flat_map(|function| function.code());
+        let flags = |inst: &Inst| {
+            let constant = linker.global(inst.operand(1)).filter(|inst| inst.op == Op::Constant);
+            constant.map(|inst| inst.operand(2))
+        };
+        code.filter(|inst| is_trace(inst)).map(flags).collect()
+    }
+
+    /// Rewrites the code of all shaders for the linked traversal.
+    pub(super) fn rewrite(
+        &mut self,
+        linker: &mut Linker,
+        lowering: &Lowering<'_>,
+        variables: &mut TraceVariables<'_>,
+        candidate_attributes: &mut Passed,
+    ) -> Result<(), LoweringError> {
+        let donor: Donor = *variables.donor;
+        let mut indices: Vec<usize> = self.linked.keys().copied().collect();
+        indices.sort_unstable();
+        let shaders: Vec<&Shader> = indices.iter().filter_map(|index| self.linked.get(index)).collect();
+        merge_push_constants(linker, lowering, &donor, &shaders)
+            .map_err(|(shader, message)| LoweringError { shader, message })?;
+        for index in indices {
+            let shader = &self.linked[&index];
+            let failed = |message| LoweringError { shader: shader.name.clone(), message };
+            if let Some(block) = shader.record {
+                let pair = linker.uvec2();
+                let address = linker.private(pair);
+                read_block_by_address(linker, &shader.functions, block, address).map_err(failed)?;
+                self.records.insert(index, address);
+            }
+            let stage = lowering.modules[index].stage;
+            if matches!(stage, ShaderStage::AnyHit | ShaderStage::Intersection) {
+                rewrite_judge(linker, &donor, shader, candidate_attributes).map_err(failed)?;
+            }
+            for id in &shader.functions {
+                let Some(mut function) = linker.take_function(*id) else { continue };
+                if lowering.traversal != Traversal::Query {
+                    hide_remap_table(linker, &mut function, &shader.tlas_tables);
+                }
+                let result = rewrite_traces(linker, variables, &mut function);
+                linker.module.functions.push(function);
+                result.map_err(failed)?;
+            }
+        }
+        self.waiting = self.waiting_functions(linker);
+        Ok(())
+    }
+
+    /// True for an instruction at which a function waits.
+    pub(super) fn is_wait(&self, inst: &Inst) -> bool {
+        is_trace(inst) || (self.callables_wait && inst.op == Op::ExecuteCallableKHR)
+    }
+
+    fn waiting_functions(&self, linker: &Linker) -> HashSet<u32> {
+        let mut found: HashSet<u32> = HashSet::new();
+        loop {
+            let waits = |inst: &Inst| {
+                self.is_wait(inst) || (inst.op == Op::FunctionCall && found.contains(&inst.operand(2)))
+            };
+            let functions = linker.module.functions.iter();
+            let more: HashSet<u32> = functions
+                .filter(|function| function.code().any(waits))
+                .map(super::module::Function::id)
+                .collect();
+            if more == found {
+                return found;
+            }
+            found = more;
+        }
+    }
+
+    /// True if the shader waits for rays or callable shaders.
+    pub(super) fn waits(&self, index: usize) -> bool {
+        self.linked.get(&index).is_some_and(|shader| self.waiting.contains(&shader.entry))
+    }
+
+    /// Returns the number of places at which a function and those it calls wait, as if all were inlined.
+    pub(super) fn wait_count(&self, linker: &Linker, function: u32) -> u32 {
+        let Some(function) = linker.function(function) else { return 0 };
+        let of = |inst: &Inst| match inst.op {
+            Op::FunctionCall if self.waiting.contains(&inst.operand(2)) => {
+                self.wait_count(linker, inst.operand(2))
+            }
+            _ => u32::from(self.is_wait(inst)),
+        };
+        function.code().map(of).fold(0, u32::saturating_add)
+    }
+}
+
+fn contains(linker: &Linker, shader: &Shader, is_it: fn(&Inst) -> bool) -> bool {
+    let functions = shader.functions.iter().filter_map(|id| linker.function(*id));
+    functions.into_iter().any(|function| function.code().any(is_it))
+}

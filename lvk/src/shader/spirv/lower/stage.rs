@@ -1,0 +1,283 @@
+//! Links one shader of a pipeline: its variables become those of the invocation, and its roles are collected.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::{BuiltIn, Capability, Decoration, ExecutionModel, Op, StorageClass};
+
+use super::StageModule;
+use super::instruction::Inst;
+use super::linker::Linker;
+use super::module::Module;
+use crate::bindless::layout;
+use crate::shader::ShaderStage;
+
+/// A linked shader.
+#[derive(Debug, Default)]
+pub(super) struct Shader {
+    pub(super) name: String,
+    /// Entry function.
+    pub(super) entry: u32,
+    /// All functions, the entry included.
+    pub(super) functions: Vec<u32>,
+    /// Variables of built-in values.
+    pub(super) builtins: Vec<(BuiltIn, u32)>,
+    /// Other variables that an invocation of the shader has for itself.
+    pub(super) own: Vec<u32>,
+    /// Variables with the constants that they start with.
+    pub(super) initial: Vec<(u32, u32)>,
+    pub(super) incoming_payload: Option<u32>,
+    pub(super) incoming_callable: Option<u32>,
+    pub(super) attributes: Option<u32>,
+    /// The block of the shader record, and the block of push constants: variables that point to memory.
+    pub(super) record: Option<u32>,
+    pub(super) push: Option<u32>,
+    /// The table beside `kTLAS`.
+    pub(super) tlas_tables: Vec<u32>,
+    /// Values of built-ins that do not change in an invocation: the shader's variable, and the input of the module.
+    pub(super) inputs: Vec<(u32, u32)>,
+}
+
+/// The role of a variable, from its storage class and its decorations.
+enum Role {
+    BuiltIn(BuiltIn),
+    Input(BuiltIn),
+    IncomingPayload,
+    IncomingCallable,
+    Attributes,
+    Record,
+    Push,
+    TlasTable,
+    Own,
+    /// Descriptors and the like.
+    Shared,
+}
+
+/// Links a shader. The error is a message.
+pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result<Shader, String> {
+    let mut module = Module::parse(stage.words)?;
+    check_module(&module)?;
+    let entry = take_entry(&mut module, stage.stage)?;
+    freeze_constants(&mut module, stage.specialization);
+    let roles = roles(&module);
+    let initial = take_initial_values(&mut module);
+    convert_storage(&mut module);
+    let own_functions: Vec<u32> = module.functions.iter().map(super::module::Function::id).collect();
+    let ids = linker.link(module).map_err(|unknown| format!("Op{:?} cannot be lowered", unknown.0))?;
+    let of = |id: u32| ids.get(&id).copied().unwrap_or(0);
+    let mut shader = Shader {
+        name: stage.name.to_owned(),
+        entry: of(entry),
+        functions: own_functions.into_iter().map(of).collect(),
+        initial: initial.into_iter().map(|(variable, value)| (of(variable), of(value))).collect(),
+        ..Shader::default()
+    };
+    for (variable, role) in roles {
+        let id = of(variable);
+        match role {
+            Role::BuiltIn(builtin) => shader.builtins.push((builtin, id)),
+            Role::Input(builtin) => shader.inputs.push((id, declare_input(linker, builtin, id))),
+            Role::IncomingPayload => shader.incoming_payload = Some(id),
+            Role::IncomingCallable => shader.incoming_callable = Some(id),
+            Role::Attributes => shader.attributes = Some(id),
+            Role::Record => shader.record = Some(id),
+            Role::Push => shader.push = Some(id),
+            Role::TlasTable => shader.tlas_tables.push(id),
+            Role::Own => shader.own.push(id),
+            Role::Shared => {}
+        }
+    }
+    Ok(shader)
+}
+
+/// Fails for modules that need other hardware of ray tracing pipelines.
+fn check_module(module: &Module) -> Result<(), String> {
+    let refused = [
+        Capability::ShaderInvocationReorderNV,
+        Capability::RayTracingMotionBlurNV,
+        Capability::RayTracingOpacityMicromapEXT,
+        Capability::RayTracingDisplacementMicromapNV,
+    ];
+    let found = refused.iter().find(|capability| module.capabilities.contains(&(**capability as u32)));
+    found.map_or(Ok(()), |capability| Err(format!("OpCapability {capability:?} cannot be lowered")))
+}
+
+/// Takes the entry points and their modes out, and returns the entry function.
+fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<u32, String> {
+    let model = match stage {
+        ShaderStage::RayGen => ExecutionModel::RayGenerationKHR,
+        ShaderStage::Miss => ExecutionModel::MissKHR,
+        ShaderStage::ClosestHit => ExecutionModel::ClosestHitKHR,
+        ShaderStage::AnyHit => ExecutionModel::AnyHitKHR,
+        ShaderStage::Intersection => ExecutionModel::IntersectionKHR,
+        _ => ExecutionModel::CallableKHR,
+    };
+    let entries = std::mem::take(&mut module.entry_points);
+    module.modes.clear();
+    let is_main = |entry: &&Inst| {
+        entry.operand(0) == model as u32
+            && entry.operands.get(2..4) == Some(&[u32::from_le_bytes(*b"main"), 0])
+    };
+    let entry = entries.iter().find(is_main).ok_or("there is no entry point 'main' of the stage")?;
+    Ok(entry.operand(1))
+}
+
+/// Gives specialization constants their values, after which they are plain constants.
+pub(super) fn freeze_constants(module: &mut Module, values: &[(u32, u64)]) {
+    let is_spec_id = |inst: &Inst| inst.op == Op::Decorate && inst.operand(1) == Decoration::SpecId as u32;
+    let given: HashMap<u32, u64> = module
+        .decorations
+        .iter()
+        .filter(|inst| is_spec_id(inst))
+        .filter_map(|inst| {
+            let value = values.iter().find(|(id, _)| *id == inst.operand(2));
+            value.map(|(_, bits)| (inst.operand(0), *bits))
+        })
+        .collect();
+    module.decorations.retain(|inst| !is_spec_id(inst));
+    for inst in &mut module.globals {
+        let value = given.get(&inst.operand(1));
+        match inst.op {
+            Op::SpecConstantTrue | Op::SpecConstantFalse => {
+                let is_true = value.map_or(inst.op == Op::SpecConstantTrue, |bits| *bits != 0);
+                inst.op = if is_true { Op::ConstantTrue } else { Op::ConstantFalse };
+            }
+            Op::SpecConstant => {
+                inst.op = Op::Constant;
+                if let Some(bits) = value {
+                    let words = [*bits as u32, (*bits >> 32) as u32];
+                    inst.operands.iter_mut().skip(2).zip(words).for_each(|(own, word)| *own = word);
+                }
+            }
+            Op::SpecConstantComposite => inst.op = Op::ConstantComposite,
+            _ => {}
+        }
+    }
+}
+
+fn roles(module: &Module) -> Vec<(u32, Role)> {
+    let decoration = |id: u32, which: Decoration| {
+        let is_it = |inst: &&Inst| {
+            inst.op == Op::Decorate && inst.operand(0) == id && inst.operand(1) == which as u32
+        };
+        module.decorations.iter().find(is_it).map(|inst| inst.operand(2))
+    };
+    let role = |inst: &Inst| {
+        let id = inst.operand(1);
+        let builtin = decoration(id, Decoration::BuiltIn).and_then(BuiltIn::from_u32);
+        let role = match (StorageClass::from_u32(inst.operand(2)), builtin) {
+            (Some(StorageClass::Input), Some(builtin)) if is_of_rays(builtin) => Role::BuiltIn(builtin),
+            (Some(StorageClass::Input), Some(builtin)) => Role::Input(builtin),
+            (Some(StorageClass::IncomingRayPayloadKHR), _) => Role::IncomingPayload,
+            (Some(StorageClass::IncomingCallableDataKHR), _) => Role::IncomingCallable,
+            (Some(StorageClass::HitAttributeKHR), _) => Role::Attributes,
+            (Some(StorageClass::ShaderRecordBufferKHR), _) => Role::Record,
+            (Some(StorageClass::PushConstant), _) => Role::Push,
+            (
+                Some(StorageClass::RayPayloadKHR | StorageClass::CallableDataKHR | StorageClass::Private),
+                _,
+            ) => Role::Own,
+            (Some(StorageClass::StorageBuffer), _)
+                if decoration(id, Decoration::DescriptorSet) == Some(layout::SET)
+                    && decoration(id, Decoration::Binding) == Some(layout::TLAS_TABLE) =>
+            {
+                Role::TlasTable
+            }
+            _ => Role::Shared,
+        };
+        (id, role)
+    };
+    module.globals.iter().filter(|inst| inst.op == Op::Variable).map(role).collect()
+}
+
+/// True for values that the library provides; the others are inputs of a compute shader too.
+fn is_of_rays(builtin: BuiltIn) -> bool {
+    matches!(
+        builtin,
+        BuiltIn::CullMaskKHR
+            | BuiltIn::HitKindKHR
+            | BuiltIn::HitTNV
+            | BuiltIn::HitTriangleVertexPositionsKHR
+            | BuiltIn::IncomingRayFlagsKHR
+            | BuiltIn::InstanceCustomIndexKHR
+            | BuiltIn::InstanceId
+            | BuiltIn::LaunchIdKHR
+            | BuiltIn::LaunchSizeKHR
+            | BuiltIn::ObjectRayDirectionKHR
+            | BuiltIn::ObjectRayOriginKHR
+            | BuiltIn::ObjectToWorldKHR
+            | BuiltIn::PrimitiveId
+            | BuiltIn::RayGeometryIndexKHR
+            | BuiltIn::RayTmaxKHR
+            | BuiltIn::RayTminKHR
+            | BuiltIn::WorldRayDirectionKHR
+            | BuiltIn::WorldRayOriginKHR
+            | BuiltIn::WorldToObjectKHR
+    )
+}
+
+/// Takes the initial values of variables out, as a shader starts more than once in an invocation.
+fn take_initial_values(module: &mut Module) -> Vec<(u32, u32)> {
+    let mut taken = Vec::new();
+    for inst in module.globals.iter_mut().filter(|inst| inst.op == Op::Variable) {
+        if inst.operands.len() > 3 {
+            taken.push((inst.operand(1), inst.operand(3)));
+            inst.operands.truncate(3);
+        }
+    }
+    taken
+}
+
+/// Gives pointers and variables the storage classes of the compute shader, and removes what decorated the old ones.
+fn convert_storage(module: &mut Module) {
+    for inst in &mut module.globals {
+        let at = match inst.op {
+            Op::TypePointer => 1,
+            Op::Variable => 2,
+            _ => continue,
+        };
+        if let Some(storage) = inst.operands.get_mut(at) {
+            *storage = converted_storage(*storage);
+        }
+    }
+    let is_private =
+        |inst: &&Inst| inst.op == Op::Variable && inst.operand(2) != StorageClass::UniformConstant as u32;
+    let converted: HashSet<u32> = module
+        .globals
+        .iter()
+        .filter(is_private)
+        .filter(|inst| {
+            let storage = [StorageClass::Private, StorageClass::PhysicalStorageBuffer];
+            storage.iter().any(|class| *class as u32 == inst.operand(2))
+        })
+        .map(|inst| inst.operand(1))
+        .collect();
+    let gone = [Decoration::BuiltIn, Decoration::Location, Decoration::Flat, Decoration::Volatile];
+    module.decorations.retain(|inst| {
+        let is_gone = gone.iter().any(|decoration| *decoration as u32 == inst.operand(1));
+        inst.op != Op::Decorate || !is_gone || !converted.contains(&inst.operand(0))
+    });
+}
+
+fn converted_storage(storage: u32) -> u32 {
+    let private = [
+        StorageClass::Input,
+        StorageClass::RayPayloadKHR,
+        StorageClass::IncomingRayPayloadKHR,
+        StorageClass::HitAttributeKHR,
+        StorageClass::CallableDataKHR,
+        StorageClass::IncomingCallableDataKHR,
+    ];
+    if private.iter().any(|class| *class as u32 == storage) {
+        StorageClass::Private as u32
+    } else if storage == StorageClass::ShaderRecordBufferKHR as u32 {
+        StorageClass::PhysicalStorageBuffer as u32
+    } else {
+        storage
+    }
+}
+
+/// Declares the input of the compute shader from which a variable takes its value.
+fn declare_input(linker: &mut Linker, builtin: BuiltIn, variable: u32) -> u32 {
+    let ty = linker.variable_type(variable).unwrap_or(0);
+    linker.input(builtin, ty)
+}

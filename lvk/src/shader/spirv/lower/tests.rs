@@ -1,0 +1,269 @@
+//! Unit tests of lowered pipelines.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
+
+use super::*;
+use crate::shader::options::{CompileFiles, CompileOptions};
+use crate::shader::{ShaderModuleDesc, ShaderSource, compile};
+
+/// Compiles a shader.
+fn compiled(stage: ShaderStage, text: &str, options: &CompileOptions) -> Vec<u32> {
+    let desc = ShaderModuleDesc {
+        stage,
+        source: ShaderSource::Glsl(text),
+        debug_name: "shader",
+        ..Default::default()
+    };
+    compile(&desc, options, CompileFiles::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The traversals, with the file of each and its options.
+fn donors() -> [(&'static str, Traversal, CompileOptions); 4] {
+    let options = CompileOptions { position_fetch: true, ..CompileOptions::default() };
+    let software = CompileOptions { software_ray_query: true, ..options };
+    let cpu = CompileOptions { is_cpu: true, ..software };
+    [
+        ("query.spv", Traversal::Query, options),
+        ("software_gpu.spv", Traversal::SoftwareGpu, software),
+        ("software_cpu.spv", Traversal::SoftwareCpu, cpu),
+        (
+            "software_cpu_pairs.spv",
+            Traversal::SoftwareCpuPairs,
+            CompileOptions { gathers_pairs: true, ..cpu },
+        ),
+    ]
+}
+
+/// `LVK_UPDATE_KERNELS=1 cargo test -p lvk kernel` rewrites the words.
+#[test]
+fn the_kernels_of_lowered_pipelines_are_those_of_their_source() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/shader/spirv/lower/donor");
+    let text = std::fs::read_to_string(folder.join("lowered_pipeline.comp.glsl")).unwrap();
+    for (file, _, options) in donors() {
+        let words = compiled(ShaderStage::Compute, &text, &options);
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        if std::env::var("LVK_UPDATE_KERNELS").is_ok() {
+            std::fs::write(folder.join(file), bytes).unwrap();
+        } else {
+            assert!(
+                std::fs::read(folder.join(file)).unwrap() == bytes,
+                "{file}: set LVK_UPDATE_KERNELS=1 once"
+            );
+        }
+    }
+}
+
+/// The shaders of a pipeline: stage and text.
+struct Pipeline {
+    shaders: Vec<(ShaderStage, &'static str)>,
+    miss: Vec<usize>,
+    hit: Vec<HitShaders>,
+    callable: Vec<usize>,
+    max_recursion: u32,
+}
+
+/// Lowers a pipeline for each traversal, with the first shader as the ray generation shader.
+fn lowered(pipeline: &Pipeline) -> Vec<Result<Vec<u32>, LoweringError>> {
+    let one = |(_, traversal, options): (&str, Traversal, CompileOptions)| {
+        let words: Vec<Vec<u32>> =
+            pipeline.shaders.iter().map(|(stage, text)| compiled(*stage, text, &options)).collect();
+        let module = |((stage, _), words): (&(ShaderStage, &'static str), &'static [u32])| StageModule {
+            name: "shader",
+            stage: *stage,
+            words,
+            specialization: &[],
+        };
+        let words: Vec<&'static [u32]> = words.into_iter().map(|words| &*words.leak()).collect();
+        let modules: Vec<StageModule<'_>> = pipeline.shaders.iter().zip(words).map(module).collect();
+        lower(&Lowering {
+            traversal,
+            modules: &modules,
+            ray_gen: 0,
+            miss: &pipeline.miss,
+            hit: &pipeline.hit,
+            callable: &pipeline.callable,
+            strides: [16, 32, 16],
+            push_constant_bytes: 100,
+            launch_offset: 248,
+            max_recursion: pipeline.max_recursion,
+            max_callable_depth: 2,
+        })
+    };
+    donors().into_iter().map(one).collect()
+}
+
+const RAY_GEN: &str = "
+    layout(location = 0) rayPayloadEXT vec3 color;
+    layout(push_constant, scalar) uniform Push { uint tlas; vec3 eye; mat4 view; uint image; };
+    void main() {
+        color = vec3(0);
+        vec3 direction = vec3(vec2(gl_LaunchIDEXT.xy) / vec2(gl_LaunchSizeEXT.xy), 1);
+        traceRayEXT(kTLAS[tlas], gl_RayFlagsNoneEXT, 0xFF, 0, 1, 0, (view * vec4(eye, 1)).xyz, 0.0, direction, 100.0, 0);
+        imageStore(kImages2D[image], ivec2(gl_LaunchIDEXT.xy), vec4(color, 1));
+    }";
+
+const MISS: &str = "
+    layout(location = 0) rayPayloadInEXT vec3 color;
+    void main() { color = gl_WorldRayDirectionEXT; }";
+
+const CLOSEST_HIT: &str = "
+    layout(location = 0) rayPayloadInEXT vec3 color;
+    hitAttributeEXT vec2 attributes;
+    layout(shaderRecordEXT, scalar) buffer Record { vec3 albedo; uint index; };
+    void main() {
+        color = albedo * attributes.x * gl_HitTEXT + vec3(gl_InstanceCustomIndexEXT, gl_PrimitiveID, index)
+            + gl_ObjectToWorldEXT * vec4(1);
+    }";
+
+fn simple() -> Pipeline {
+    Pipeline {
+        shaders: vec![
+            (ShaderStage::RayGen, RAY_GEN),
+            (ShaderStage::Miss, MISS),
+            (ShaderStage::ClosestHit, CLOSEST_HIT),
+        ],
+        miss: vec![1],
+        hit: vec![HitShaders { closest_hit: Some(2), ..HitShaders::default() }],
+        callable: vec![],
+        max_recursion: 1,
+    }
+}
+
+/// Traces in loops, in functions and in the branches of a switch.
+const BUSY_RAY_GEN: &str = "
+    struct Payload { vec3 color; float weights[3]; bool done; };
+    layout(location = 0) rayPayloadEXT Payload payload;
+    layout(location = 1) rayPayloadEXT float shadow;
+    layout(location = 0) callableDataEXT vec4 data;
+    layout(push_constant, scalar) uniform Push { uint tlas; uint count; uint image; };
+    float visible(vec3 from, vec3 to) {
+        if (from == to) return 1.0;
+        shadow = 0.0;
+        for (uint i = 0; i < 3; ++i) {
+            if (i == count) return shadow;
+            traceRayEXT(kTLAS[tlas], gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT, 0xFF, 0, 0, 1,
+                from, 0.001, to - from, 1.0, 1);
+        }
+        return shadow;
+    }
+    void main() {
+        vec3 sum = vec3(0);
+        uint i = 0;
+        do {
+            payload = Payload(vec3(0), float[3](1.0, 2.0, 3.0), false);
+            switch (i % 3) {
+                case 0: sum += visible(vec3(i), vec3(1)); break;
+                case 1: sum *= 2.0;
+                default:
+                    traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 1, 0, vec3(i), 0.0, vec3(0, 0, 1), 100.0, 0);
+                    for (int j = 0; j < 3; ++j) { if (payload.weights[j] > 2.0) break; sum += payload.weights[j]; }
+            }
+            if (payload.done) continue;
+            executeCallableEXT(i & 1, 0);
+            sum += payload.color * data.xyz + (i > 4 && visible(sum, vec3(2)) > 0.5 ? 1.0 : 0.0);
+            ++i;
+        } while (i < count);
+        imageStore(kImages2D[image], ivec2(gl_LaunchIDEXT.xy), vec4(sum, 1));
+    }";
+
+const MIRROR: &str = "
+    struct Payload { vec3 color; float weights[3]; bool done; };
+    layout(location = 0) rayPayloadInEXT Payload result;
+    layout(location = 1) rayPayloadEXT Payload inner;
+    hitAttributeEXT vec2 attributes;
+    layout(shaderRecordEXT, scalar) buffer Record { uint tlas; vec3 tint; };
+    vec3 kScale = vec3(0.5);
+    vec3 reflected(vec3 from) {
+        inner.color = vec3(0);
+        traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 1, 0, from, 0.001, reflect(gl_WorldRayDirectionEXT, vec3(0, 1, 0)), 100.0, 1);
+        return inner.color;
+    }
+    void main() {
+        vec3 at = gl_WorldRayOriginEXT + gl_HitTEXT * gl_WorldRayDirectionEXT;
+        vec3 color = tint;
+        if (attributes.x > 0.25) { color *= reflected(at) * kScale; kScale += 1.0; }
+        result.color = color * kScale + attributes.y + float(gl_PrimitiveID);
+        result.weights[1] = inner.weights[2];
+    }";
+
+const STRUCT_MISS: &str = "
+    struct Payload { vec3 color; float weights[3]; bool done; };
+    layout(location = 0) rayPayloadInEXT Payload result;
+    void main() { result.color = vec3(gl_RayTmaxEXT); result.done = true; }";
+
+const SHADOW_MISS: &str = "layout(location = 1) rayPayloadInEXT float shadow; void main() { shadow += 1.0; }";
+
+const ANY_HIT: &str = "
+    hitAttributeEXT vec2 attributes;
+    bool judged(float x) {
+        for (int i = 0; i < 4; ++i) {
+            if (x * float(i) > 1.5) ignoreIntersectionEXT;
+            if (x * float(i) > 1.25) terminateRayEXT;
+        }
+        return x > 0.5;
+    }
+    void main() { if (judged(attributes.x)) { ignoreIntersectionEXT; } }";
+
+const INTERSECTION: &str = "
+    hitAttributeEXT vec3 normal;
+    bool tried(float t) {
+        normal = gl_ObjectRayOriginEXT + t;
+        if (reportIntersectionEXT(t, 7u)) { return gl_RayTmaxEXT > 2.0; }
+        return false;
+    }
+    void main() { if (!tried(1.0)) { tried(2.0); } else { reportIntersectionEXT(0.5, 3u); } }";
+
+const BOX_HIT: &str = "
+    struct Payload { vec3 color; float weights[3]; bool done; };
+    layout(location = 0) rayPayloadInEXT Payload result;
+    hitAttributeEXT vec3 normal;
+    void main() { result.color = normal + float(gl_HitKindEXT); }";
+
+const CALLABLE: &str = "
+    layout(location = 0) callableDataInEXT vec4 data;
+    void main() { data += vec4(1); }";
+
+const CALLING: &str = "
+    layout(location = 0) callableDataInEXT vec4 data;
+    layout(location = 1) callableDataEXT vec4 inner;
+    void main() { float kept = data.x; inner = data * 2.0; executeCallableEXT(0, 1); data += inner * kept; }";
+
+/// A pipeline of everything; `callables` are its callable shaders.
+fn busy(callables: [&'static str; 2]) -> Pipeline {
+    Pipeline {
+        shaders: vec![
+            (ShaderStage::RayGen, BUSY_RAY_GEN),
+            (ShaderStage::Miss, STRUCT_MISS),
+            (ShaderStage::Miss, SHADOW_MISS),
+            (ShaderStage::ClosestHit, MIRROR),
+            (ShaderStage::AnyHit, ANY_HIT),
+            (ShaderStage::Intersection, INTERSECTION),
+            (ShaderStage::ClosestHit, BOX_HIT),
+            (ShaderStage::Callable, callables[0]),
+            (ShaderStage::Callable, callables[1]),
+        ],
+        miss: vec![1, 2],
+        hit: vec![
+            HitShaders { closest_hit: Some(3), any_hit: Some(4), intersection: None },
+            HitShaders { closest_hit: Some(6), any_hit: None, intersection: Some(5) },
+            HitShaders::default(),
+            HitShaders { closest_hit: Some(3), any_hit: None, intersection: None },
+        ],
+        callable: vec![7, 8],
+        max_recursion: 8,
+    }
+}
+
+#[test]
+fn every_kind_of_pipeline_is_lowered() {
+    for (index, pipeline) in [simple(), busy([CALLABLE; 2]), busy([CALLABLE, CALLING])].iter().enumerate() {
+        for (traversal, words) in lowered(pipeline).into_iter().enumerate() {
+            let words = words.unwrap();
+            crate::shader::spirv::words::validate(&words).unwrap();
+            if let Ok(folder) = std::env::var("LVK_DUMP") {
+                let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+                std::fs::write(format!("{folder}/lowered_{index}_{traversal}.spv"), bytes).unwrap();
+            }
+        }
+    }
+}

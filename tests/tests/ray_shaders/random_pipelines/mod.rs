@@ -1,0 +1,128 @@
+//! Random pipelines on every path, against an interpreter: traces and calls in loops, functions and branches, recursion,
+//! records, globals.
+
+mod glsl;
+mod interpreter;
+mod program;
+
+use lvk::glam::{Affine3A, Vec3};
+use lvk::{
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, Dependencies, HitGroup, RayTracingPipelineDesc,
+    Result, ShaderRecord, ShaderStage, TlasDesc, TlasInstance, Triangles, transform_rows,
+};
+use lvk_tests::compute::{read_words, words_buffer};
+use lvk_tests::device;
+use lvk_tests::ray_tracer::{Method, shader};
+
+use self::interpreter::record;
+use self::program::{MAX_CALLABLE_DEPTH, MAX_DEPTH, Pipeline, Shader};
+
+/// Invocations of each pipeline.
+const LAUNCHES: u32 = 70;
+/// Pipelines of the test. `LVK_RANDOM_PIPELINES` sets another number, and `LVK_RANDOM_SEED` another first seed.
+const PIPELINES: u64 = 12;
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::NoUninit)]
+struct Push {
+    results: u64,
+    tlas: u32,
+    hits: u32,
+    misses: u32,
+    pad: u32,
+}
+
+#[test]
+fn random_pipelines_compute_what_the_interpreter_computes() -> Result<()> {
+    let Some(ctx) = device().filter(|ctx| Method::available(ctx).contains(&Method::Pipeline)) else {
+        return Ok(());
+    };
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let first = number("LVK_RANDOM_SEED").unwrap_or(0);
+    for seed in first..first + number("LVK_RANDOM_PIPELINES").unwrap_or(PIPELINES) {
+        let pipeline = Pipeline::random(seed);
+        let expected: Vec<u32> = (0..LAUNCHES).map(|launch| interpreter::run(&pipeline, launch)).collect();
+            eprintln!("{}", glsl_of(&pipeline));
+        }
+        let found = run(&ctx, &pipeline)?;
+        assert_eq!(found, expected, "seed {seed}: {}", glsl_of(&pipeline));
+    }
+    Ok(())
+}
+
+/// Returns the texts of all shaders.
+fn glsl_of(pipeline: &Pipeline) -> String {
+    let callables = pipeline.callables.len();
+    let kinds = [
+        (ShaderStage::RayGen, std::slice::from_ref(&pipeline.ray_gen)),
+        (ShaderStage::Miss, &pipeline.misses),
+        (ShaderStage::ClosestHit, &pipeline.hits),
+        (ShaderStage::Callable, &pipeline.callables),
+    ];
+    let texts = kinds.iter().flat_map(|(stage, shaders)| {
+        shaders.iter().map(move |shader| format!("// {stage:?}\n{}", glsl::text(shader, *stage, callables)))
+    });
+    texts.collect()
+}
+
+/// Returns the results of all invocations on the GPU.
+fn run(ctx: &Context, pipeline: &Pipeline) -> Result<Vec<u32>> {
+    let (hits, misses) = (pipeline.hits.len() as u32, pipeline.misses.len() as u32);
+    let corners = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let vertices = ctx.create_buffer(&BufferDesc {
+        data: Some(bytemuck::cast_slice(&corners)),
+        usage: BufferUsage::ACCEL_INPUT,
+        ..Default::default()
+    })?;
+    let geometries = [BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
+    let model = ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?;
+    let place = |index: u32| TlasInstance {
+        transform: transform_rows(&Affine3A::from_translation(Vec3::X * index as f32)),
+        hit_group_offset: index,
+        ..TlasInstance::new(*model)
+    };
+    let instances: Vec<_> = (0..hits).map(place).collect();
+    let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
+    let results = words_buffer(ctx, &vec![u32::MAX; LAUNCHES as usize]);
+    let compiled = |shaders: &[Shader], stage: ShaderStage| {
+        let text = |one: &Shader| shader(ctx, stage, &glsl::text(one, stage, pipeline.callables.len()));
+        shaders.iter().map(text).collect::<Result<Vec<_>>>()
+    };
+    let ray_gen = compiled(std::slice::from_ref(&pipeline.ray_gen), ShaderStage::RayGen)?;
+    let miss = compiled(&pipeline.misses, ShaderStage::Miss)?;
+    let hit = compiled(&pipeline.hits, ShaderStage::ClosestHit)?;
+    let callable = compiled(&pipeline.callables, ShaderStage::Callable)?;
+    let words =
+        |kind: u32, count: usize| (0..count).map(|index| [0xEE, record(kind, index)]).collect::<Vec<_>>();
+    let tags = [words(0, 1), words(1, miss.len()), words(2, hit.len()), words(3, callable.len())];
+    let records = |kind: usize| -> Vec<ShaderRecord<'_>> {
+        tags[kind].iter().map(|words| ShaderRecord::from_bytes(bytemuck::bytes_of(words))).collect()
+    };
+    let groups: Vec<_> = hit
+        .iter()
+        .zip(records(2))
+        .map(|(module, record)| HitGroup { closest_hit: Some(**module), record, ..Default::default() })
+        .collect();
+    let handles = |modules: &[lvk::Holder<lvk::ShaderModuleHandle>]| -> Vec<_> {
+        modules.iter().map(|module| **module).collect()
+    };
+    let made = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &handles(&ray_gen),
+        miss: &handles(&miss),
+        hit_groups: &groups,
+        callable: &handles(&callable),
+        ray_gen_records: &records(0),
+        miss_records: &records(1),
+        callable_records: &records(3),
+        max_recursion: MAX_DEPTH,
+        max_callable_depth: MAX_CALLABLE_DEPTH,
+        ..Default::default()
+    })?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    cmd.bind_ray_tracing_pipeline(*made)?;
+    let results_address = ctx.buffer_address(*results)?;
+    cmd.push_constants(&Push { results: results_address, tlas: tlas.index(), hits, misses, pad: 0 })?;
+    cmd.trace_rays([LAUNCHES, 1, 1], &Dependencies { buffers: &[*results], ..Default::default() })?;
+    ctx.submit(cmd)?;
+    Ok(read_words(ctx, *results, LAUNCHES as usize))
+}

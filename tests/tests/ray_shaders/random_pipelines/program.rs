@@ -1,0 +1,204 @@
+//! Random pipelines: shaders as statements over four numbers.
+
+use lvk_tests::random::Random;
+
+/// Numbers of variables that each function has.
+pub const VARIABLES: usize = 3;
+/// Deepest recursion of traces.
+pub const MAX_DEPTH: u32 = 4;
+/// Deepest nesting of callable shaders.
+pub const MAX_CALLABLE_DEPTH: u32 = 2;
+
+/// An operand.
+#[derive(Debug, Clone, Copy)]
+pub enum Operand {
+    /// A variable of the function.
+    Variable(usize),
+    /// A constant.
+    Constant(u32),
+    /// A number that differs from launch to launch and from hit to hit.
+    BuiltIn,
+    /// The number in the shader's record.
+    Record,
+    /// The global variable of the shader.
+    Global,
+}
+
+/// An operation on two numbers, which wraps.
+#[derive(Debug, Clone, Copy)]
+pub enum Operation {
+    /// Sum.
+    Add,
+    /// Product.
+    Multiply,
+    /// Exclusive or.
+    Xor,
+}
+
+/// A condition: a variable modulo a number is 0.
+#[derive(Debug, Clone, Copy)]
+pub struct Condition {
+    /// The variable.
+    pub variable: usize,
+    /// The divisor, from 2 on.
+    pub divisor: u32,
+}
+
+/// A statement.
+#[derive(Debug, Clone)]
+pub enum Statement {
+    /// `target = target op operand`.
+    Set(usize, Operation, Operand),
+    /// `global ^= variable`.
+    SetGlobal(usize),
+    /// A selection.
+    If(Condition, Vec<Statement>, Vec<Statement>),
+    /// A loop of a fixed number of iterations, left or continued on conditions.
+    Loop(u32, Vec<Statement>, Option<Condition>, Option<Condition>),
+    /// A switch over a variable modulo 3, whose first case falls through to the second.
+    Switch(usize, [Vec<Statement>; 3]),
+    /// Traces a ray, with the variable as target and payload.
+    Trace(usize),
+    /// Calls a callable shader, with the variable as index and data.
+    Callable(usize),
+    /// Calls a function of the shader, with the variable as argument and result.
+    Call(usize, usize),
+    /// Returns from the function.
+    ReturnIf(Condition),
+}
+
+/// A shader: functions, the last of which is the main function. Functions call earlier ones only.
+#[derive(Debug, Clone)]
+pub struct Shader {
+    /// Bodies of the functions.
+    pub functions: Vec<Vec<Statement>>,
+}
+
+/// A pipeline. Rays hit as many instances as there are shaders in `hits`.
+#[derive(Debug, Clone)]
+pub struct Pipeline {
+    /// The ray generation shader.
+    pub ray_gen: Shader,
+    /// Miss shaders.
+    pub misses: Vec<Shader>,
+    /// Closest-hit shaders.
+    pub hits: Vec<Shader>,
+    /// Callable shaders.
+    pub callables: Vec<Shader>,
+}
+
+/// Calls that a kind of shader may have.
+#[derive(Clone, Copy)]
+struct Allowed {
+    traces: bool,
+    callables: bool,
+}
+
+impl Pipeline {
+    /// Returns the pipeline of a seed.
+    pub fn random(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let few = |random: &mut Random, most: u64| 1 + random.bits() % most;
+        // Few pipelines have traces or calls in all kinds of shaders.
+        let inner = Allowed { traces: !one_in(&mut random, 3), callables: !one_in(&mut random, 2) };
+        let nested = Allowed { traces: false, callables: !one_in(&mut random, 2) };
+        let outer = Allowed { traces: true, callables: true };
+        let shaders = |random: &mut Random, most, allowed| {
+            let count = few(random, most);
+            (0..count).map(|_| shader(random, allowed)).collect()
+        };
+        Self {
+            ray_gen: shader(&mut random, outer),
+            misses: shaders(&mut random, 2, inner),
+            hits: shaders(&mut random, 3, inner),
+            callables: shaders(&mut random, 2, nested),
+        }
+    }
+}
+
+fn shader(random: &mut Random, allowed: Allowed) -> Shader {
+    let count = 1 + (random.bits() % 3) as usize;
+    // Waits multiply along calls and loops, so each function has few.
+    let function = |index| {
+        let mut waits = 2;
+        statements(random, allowed, index, 3, &mut waits)
+    };
+    Shader { functions: (0..count).map(function).collect() }
+}
+
+fn statements(
+    random: &mut Random,
+    allowed: Allowed,
+    callees: usize,
+    nesting: u32,
+    waits: &mut u32,
+) -> Vec<Statement> {
+    let count = 2 + random.bits() % 3;
+    (0..count).map(|_| statement(random, allowed, callees, nesting, waits)).collect()
+}
+
+fn statement(
+    random: &mut Random,
+    allowed: Allowed,
+    callees: usize,
+    nesting: u32,
+    waits: &mut u32,
+) -> Statement {
+    let variable = random.bits() as usize % VARIABLES;
+    let mut inner = |random: &mut Random| match nesting {
+        0 => Vec::new(),
+        _ => statements(random, allowed, callees, nesting - 1, waits),
+    };
+    match random.bits() % 12 {
+        0 if nesting > 0 => {
+            let condition = condition(random);
+            let yes = inner(random);
+            let no = if one_in(random, 2) { inner(random) } else { Vec::new() };
+            Statement::If(condition, yes, no)
+        }
+        1 if nesting > 0 => {
+            let body = inner(random);
+            let maybe = |random: &mut Random| one_in(random, 3).then(|| condition(random));
+            Statement::Loop(1 + (random.bits() % 2) as u32, body, maybe(random), maybe(random))
+        }
+        2 if nesting > 0 => Statement::Switch(variable, [inner(random), inner(random), inner(random)]),
+        3 => Statement::ReturnIf(condition(random)),
+        4 => Statement::SetGlobal(variable),
+        5 | 6 if allowed.traces && *waits > 0 => {
+            *waits -= 1;
+            Statement::Trace(variable)
+        }
+        7 if allowed.callables && *waits > 0 => {
+            *waits -= 1;
+            Statement::Callable(variable)
+        }
+        8 if callees > 0 && *waits > 0 => {
+            *waits -= 1;
+            Statement::Call(random.bits() as usize % callees, variable)
+        }
+        _ => Statement::Set(variable, operation(random), operand(random)),
+    }
+}
+
+/// Returns true once in `count` times.
+fn one_in(random: &mut Random, count: u64) -> bool {
+    random.bits().is_multiple_of(count)
+}
+
+fn condition(random: &mut Random) -> Condition {
+    Condition { variable: random.bits() as usize % VARIABLES, divisor: 2 + (random.bits() % 3) as u32 }
+}
+
+fn operation(random: &mut Random) -> Operation {
+    [Operation::Add, Operation::Multiply, Operation::Xor][random.bits() as usize % 3]
+}
+
+fn operand(random: &mut Random) -> Operand {
+    match random.bits() % 6 {
+        0 | 1 => Operand::Variable(random.bits() as usize % VARIABLES),
+        2 => Operand::BuiltIn,
+        3 => Operand::Record,
+        4 => Operand::Global,
+        _ => Operand::Constant((random.bits() >> 32) as u32),
+    }
+}
