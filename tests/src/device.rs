@@ -61,7 +61,8 @@ pub fn device() -> Option<TestDevice> {
     device_with(|_| {})
 }
 
-/// Creates a context from a description that `adjust` has changed.
+/// Creates a context from a description that `adjust` has changed. Pipelines that are to be lowered onto ray queries are
+/// those of the device if its profile hides the queries.
 ///
 /// Returns `None`, and prints a line, only if there is no device and the user set `LVK_SKIP_GPU_TESTS=1`.
 /// `LVK_REQUIRE_GPU=1` forbids even that.
@@ -82,6 +83,10 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
         ..Default::default()
     };
     adjust(&mut desc);
+    let hides_queries = desc.profile.is_some_and(|profile| !profile.ray_query);
+    if hides_queries && desc.ray_tracing_pipeline == RayTracingPipelineRequest::Query {
+        desc.ray_tracing_pipeline = RayTracingPipelineRequest::HardwareIfPresent;
+    }
     match Context::new(&desc) {
         Ok(context) => Some(TestDevice { context: Some(context), sink }),
         Err(error) => unavailable(&error.to_string()),
