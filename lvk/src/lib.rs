@@ -52,7 +52,7 @@
 //! | draw with task and mesh shaders | [`RenderPipelineDesc::mesh`], [`RenderPass::draw_mesh_tasks`] |
 //! | present to windows | [`manual::windows`], [`Context::create_swapchain`], [`Context::present`] |
 //! | compute | [`CommandBuffer::dispatch`] |
-//! | trace rays with a pipeline | [`RayTracingPipelineDesc`], [`CommandBuffer::trace_rays`] |
+//! | trace rays with a pipeline | [`RayTracingPipelineDesc`], [`CommandBuffer::trace_rays`], [`manual::ray_tracing_pipelines`], [`manual::lowered_pipelines`] |
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |

@@ -4,7 +4,7 @@
 use std::fmt::Debug;
 use std::ops::RangeBounds;
 
-use lvk::{AccelStructHandle, Context, ContextDesc, DeviceProfile, RayQueryPath, RayQueryRequest, Result};
+use lvk::{AccelStructHandle, Context, ContextDesc, DeviceProfile, RayQueryPath, RayQueryRequest, RayTracingPipelinePath, Result};
 
 use crate::{TestDevice, device_with};
 
@@ -34,7 +34,15 @@ pub fn whole_and_split(primitives: u64) -> Vec<TestDevice> {
 /// True if the device builds acceleration structures, whether or not its own ray queries are used.
 pub fn builds_device_accel_structs(ctx: &Context) -> bool {
     let caps = ctx.capabilities();
-    caps.ray_tracing_pipeline || caps.ray_query_path == RayQueryPath::Hardware
+    matches!(caps.ray_tracing_pipeline_path, RayTracingPipelinePath::Hardware | RayTracingPipelinePath::Query)
+        || caps.ray_query_path == RayQueryPath::Hardware
+}
+
+/// True if the library builds BVHs, for ray queries or for pipelines.
+pub fn builds_software_bvhs(ctx: &Context) -> bool {
+    let caps = ctx.capabilities();
+    caps.ray_query_path == RayQueryPath::Software
+        || caps.ray_tracing_pipeline_path == RayTracingPipelinePath::Software
 }
 
 /// As [`builds_device_accel_structs`], for tests that need such a device. Prints what is not tested if it is none.

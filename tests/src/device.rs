@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use lvk::ash::{Entry, vk};
-use lvk::{Context, ContextDesc, RayQueryRequest, RayTracingPipelineRequest, ValidationMode, ValidationSink};
+use lvk::{Context, ContextDesc, Error, RayQueryRequest, RayTracingPipelineRequest, ValidationMode, ValidationSink};
 use lvk_dev_driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Its drop fails the test on any message, those of the
@@ -61,7 +61,8 @@ pub fn device() -> Option<TestDevice> {
     device_with(|_| {})
 }
 
-/// Creates a context from a description that `adjust` has changed.
+/// Creates a context from a description that `adjust` has changed. Pipelines that are to be lowered onto ray queries are
+/// those of the device if it has no queries.
 ///
 /// Returns `None`, and prints a line, only if there is no device and the user set `LVK_SKIP_GPU_TESTS=1`.
 /// `LVK_REQUIRE_GPU=1` forbids even that.
@@ -82,7 +83,14 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
         ..Default::default()
     };
     adjust(&mut desc);
-    match Context::new(&desc) {
+    let made = match Context::new(&desc) {
+        Err(Error::NoDevice { .. }) if desc.ray_tracing_pipeline == RayTracingPipelineRequest::Query => {
+            desc.ray_tracing_pipeline = RayTracingPipelineRequest::HardwareIfPresent;
+            Context::new(&desc)
+        }
+        made => made,
+    };
+    match made {
         Ok(context) => Some(TestDevice { context: Some(context), sink }),
         Err(error) => unavailable(&error.to_string()),
     }

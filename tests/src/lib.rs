@@ -17,6 +17,7 @@ pub mod local_read;
 pub mod meshes;
 pub mod noise;
 pub mod oit_reference;
+pub mod pipeline_paths;
 pub mod pipelines;
 pub mod process;
 pub mod queues;

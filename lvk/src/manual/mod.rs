@@ -21,6 +21,9 @@ pub mod splitting_and_profiles {}
 #[doc = include_str!("ray_tracing_pipelines.md")]
 pub mod ray_tracing_pipelines {}
 
+#[doc = include_str!("lowered_pipelines.md")]
+pub mod lowered_pipelines {}
+
 #[doc = include_str!("shaders.md")]
 pub mod shaders {}
 

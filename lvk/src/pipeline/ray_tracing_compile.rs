@@ -12,6 +12,7 @@ use super::shader_module::ShaderModule;
 use super::stage::{Specialization, stage_info};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::gpu::caps::limits::lowered;
 
 /// The libraries that a pipeline is linked with; the default is none.
 #[derive(Default)]
@@ -28,6 +29,10 @@ pub(super) fn check_interface(gpu: &Gpu, desc: &RayTracingPipelineDesc<'_>) -> R
         return Err(Error::usage(name, "a recursion depth of 0 traces no ray; 1 is the least"));
     }
     check_limit(name, "recursion depth", desc.max_recursion.into(), limits.max_ray_recursion.into())?;
+    if gpu.caps.ray_tracing_pipeline_path.is_lowered() {
+        let (what, most) = ("depth of callable shaders", lowered::MAX_CALLABLE_DEPTH);
+        check_limit(name, what, desc.max_callable_depth.into(), most.into())?;
+    }
     let attributes = desc.max_hit_attribute_bytes.into();
     check_limit(name, "hit attributes in bytes", attributes, limits.max_hit_attribute_bytes.into())
 }

@@ -44,10 +44,10 @@ pub struct RayTracingPipelineDesc<'a> {
     /// Libraries whose shaders are linked into the pipeline. They may be destroyed before the pipeline. Default: empty.
     pub libraries: &'a [RayTracingLibraryHandle],
     /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays. Deeper traces are undefined behaviour,
-    /// which the library does not check. Default: 1.
+    /// which the library does not check; a lowered pipeline returns from them at once. Default: 1.
     pub max_recursion: u32,
     /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others. The stack of a ray grows with it and
-    /// has at most `u32::MAX` bytes. Default: 1.
+    /// has at most `u32::MAX` bytes. A lowered pipeline takes at most 31. Default: 1.
     pub max_callable_depth: u32,
     /// Largest payload of any shader in bytes. Used only with libraries: see
     /// [`RayTracingLibraryDesc`](crate::RayTracingLibraryDesc). Default: 64.

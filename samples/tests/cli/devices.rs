@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use lvk_samples::app::metrics;
+
 use crate::program::{
     Desk, HEIGHT, Outcome, TRIANGLE, WIDTH, assert_names, desk_with_device, has_device, hybrid,
 };
@@ -215,6 +217,8 @@ fn a_profile_decides_the_path_and_is_printed() {
     let parts = ["lacks ray queries", "hidden by the device profile 'no-ray-tracing'"];
     desk.run(&[&wish[..], &["query"]].concat()).assert_error(1, &parts);
     let lowered = desk.run(&[&wish[..], &["pipeline"]].concat());
+    lowered.assert_success();
+    assert_names(&lowered.out, &["validation messages: 0"]);
     let note =
         "note: --rt pipeline takes a ray tracing pipeline, lowered to software traversal in a compute shader";
     assert_names(&lowered.err, &[note]);
@@ -225,6 +229,20 @@ fn a_profile_decides_the_path_and_is_printed() {
         outcome.assert_success();
         assert_names(&outcome.out, &[&format!("in software ({why})"), "validation messages: 0"]);
     }
+}
+
+#[test]
+fn a_pipeline_without_ray_tracing_makes_the_default_picture() {
+    if !has_device() {
+        return;
+    }
+    let [default, lowered] = [&[][..], &["--rt", "pipeline", "--profile", "no-ray-tracing"]].map(|args| {
+        let desk = Desk::new();
+        desk.run(&[&["--frames", "1"], args].concat()).assert_success();
+        image::open(desk.output_path()).unwrap().into_rgba8()
+    });
+    let difference = metrics::compare(&lowered, &default, WIDTH, HEIGHT).unwrap();
+    assert!(difference.psnr >= 60.0, "{difference}");
 }
 
 /// The phone takes the courtyard in parts only, and the picture is made all the same.

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use lvk::{Destroy, Queue};
+use lvk_tests::accel_backend::builds_software_bvhs;
 use lvk_tests::random::Random;
 
 use super::cell::compare;
@@ -161,7 +162,7 @@ impl World<'_> {
     /// True if the submission may be refused: software traces, and a BLAS of the commands was built since they were
     /// recorded. It depends on the builder of the BLAS.
     fn is_overtaken(&self, open: &Open) -> bool {
-        self.ctx().capabilities().ray_query_path == lvk::RayQueryPath::Software
+        builds_software_bvhs(self.ctx())
             && open.blas.iter().any(|(blas, version)| self.memory.blas[*blas].version != *version)
     }
 

@@ -1,38 +1,11 @@
 //! Pipelines that are lowered to compute shaders, on devices whose own pipelines are hidden.
 
 use lvk::{
-    BufferDesc, BufferUsage, Context, Dependencies, DeviceProfile, Error, Holder, RayQueryRequest,
-    RayTracingLibraryDesc, RayTracingPipelineDesc, RayTracingPipelineHandle, RayTracingPipelinePath,
-    RayTracingPipelineRequest, Result, ShaderStage, SpecializationConstant, SpecializationValue,
+    Context, Error, Holder, RayTracingLibraryDesc, RayTracingPipelineDesc, RayTracingPipelineHandle, Result,
+    ShaderModuleDesc, ShaderSource, ShaderStage, SpecializationConstant, SpecializationValue,
 };
-use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
+use lvk_tests::pipeline_paths::lowered_devices;
 use lvk_tests::shader_groups::{Counts, GroupScene, answering, ray_gen};
-use lvk_tests::{TestDevice, device_with};
-
-/// Returns a context for each lowered path that the device has, with the path.
-fn lowered_devices() -> Vec<(RayTracingPipelinePath, TestDevice)> {
-    let no_pipelines = DeviceProfile::no_rt_pipeline();
-    let open = |ray_query, ray_tracing_pipeline| {
-        device_with(|desc| {
-            (desc.ray_query, desc.ray_tracing_pipeline) = (ray_query, ray_tracing_pipeline);
-            desc.profile = Some(&no_pipelines);
-        })
-    };
-    let mut devices = Vec::new();
-    let software = open(RayQueryRequest::Off, RayTracingPipelineRequest::Software);
-    devices.extend(software.map(|ctx| (RayTracingPipelinePath::Software, ctx)));
-    let query = open(RayQueryRequest::Off, RayTracingPipelineRequest::Auto);
-    let query = query.filter(|ctx| {
-        let path = ctx.capabilities().ray_tracing_pipeline_path;
-        let is_query = path == RayTracingPipelinePath::Query;
-        if !is_query {
-            eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
-        }
-        is_query
-    });
-    devices.extend(query.map(|ctx| (RayTracingPipelinePath::Query, ctx)));
-    devices
-}
 
 /// Returns a pipeline with a miss shader that answers 1, and two ray generation shaders of which the second adds 500.
 fn pipeline(ctx: &Context) -> Result<Holder<RayTracingPipelineHandle>> {
@@ -61,72 +34,17 @@ fn lowered_paths_are_reported_with_their_limits() {
 }
 
 #[test]
-fn a_lowered_pipeline_is_created_or_names_its_shader() {
-    for (path, ctx) in lowered_devices() {
-        match pipeline(&ctx) {
-            Ok(_) => {}
-            Err(Error::Lowering { pipeline, shader, why }) => {
-                assert_eq!(pipeline, "two answers");
-                assert!(!shader.is_empty() && !why.is_empty());
-            }
-            Err(other) => unreachable!("{path:?}: {other}"),
-        }
-    }
-}
-
-#[test]
 fn a_lowered_pipeline_traces_without_pipelines_of_the_device() -> Result<()> {
-    for (path, ctx) in lowered_devices() {
+    for (_, ctx) in lowered_devices() {
         let scene = GroupScene::new(&ctx)?;
-        let pipeline = match pipeline(&ctx) {
-            Err(Error::Lowering { why, .. }) => {
-                eprintln!("NOT TESTED, {path:?}: {why}");
-                continue;
-            }
-            made => made?,
-        };
+        let pipeline = pipeline(&ctx)?;
         let counts = Counts { hits: 0, misses: 1, callables: 0 };
         assert_eq!(scene.run(*pipeline, 0, counts)?, [1]);
         assert_eq!(scene.run(*pipeline, 1, counts)?, [501]);
         assert_eq!(ctx.ray_tracing_stack_bytes(*pipeline)?, 0);
         let raw = ctx.raw_ray_tracing_pipeline(*pipeline);
         assert!(matches!(raw, Err(Error::Unsupported { .. })), "{raw:?}");
-        compute_state_outlives_traces(&ctx, &scene, *pipeline)?;
     }
-    Ok(())
-}
-
-/// A direct and an indirect trace run between two dispatches of one compute pipeline, which is bound and gets its push
-/// constants once.
-fn compute_state_outlives_traces(
-    ctx: &Context,
-    scene: &GroupScene,
-    pipeline: RayTracingPipelineHandle,
-) -> Result<()> {
-    let count = compute_pipeline(
-        ctx,
-        "layout(local_size_x = 1) in;
-        layout(buffer_reference, scalar) buffer Words { uint at[]; };
-        layout(push_constant, scalar) uniform Push { Words words; uint unused[4]; };
-        void main() { words.at[0] += 1; }",
-    );
-    let results = words_buffer(ctx, &[7]);
-    let usage = BufferUsage::INDIRECT;
-    let data = Some(bytemuck::bytes_of(&[1_u32; 3]));
-    let arguments = ctx.create_buffer(&BufferDesc { usage, data, ..Default::default() })?;
-    let writes = Dependencies { buffers: &[*results], ..Default::default() };
-    let counts = Counts { hits: 0, misses: 1, callables: 0 };
-    let mut cmd = ctx.acquire_command_buffer()?;
-    cmd.bind_compute_pipeline(*count)?;
-    // Both blocks begin with the address of the results.
-    scene.bind(&mut cmd, pipeline, counts, *results)?;
-    cmd.dispatch([1, 1, 1], &writes)?;
-    cmd.trace_rays([1, 1, 1], &writes)?;
-    cmd.dispatch([1, 1, 1], &writes)?;
-    cmd.trace_rays_indirect(1, *arguments, 0, &writes)?;
-    cmd.dispatch([1, 1, 1], &writes)?;
-    ctx.submit(cmd)?;
-    assert_eq!(read_words(ctx, *results, 1), [502]);
     Ok(())
 }
 
@@ -142,6 +60,69 @@ fn a_library_that_is_to_be_lowered_checks_its_constants() -> Result<()> {
         });
         let Err(Error::InvalidUsage { message, .. }) = library.map(drop) else { unreachable!() };
         assert!(message.contains("no shader declares the specialization constant 3"), "{message}");
+    }
+    Ok(())
+}
+
+/// Ray generation shaders that no lowering can run, with words of the error.
+const NOT_LOWERED: [(&str, &str); 3] = [
+    (
+        "layout(location = 0) rayPayloadEXT uint value;
+         layout(push_constant, scalar) uniform Push { uvec2 scene; };
+         void main() {
+             traceRayEXT(accelerationStructureEXT(scene), 0, 0xff, 0, 0, 0, vec3(0), 0.0, vec3(1), 9.0, 0);
+         }",
+        "OpTraceRayKHR",
+    ),
+    (
+        "#extension GL_EXT_shader_invocation_reorder : require
+         layout(location = 0) rayPayloadEXT uint value;
+         void main() {
+             hitObjectEXT hit;
+             hitObjectTraceRayEXT(hit, kTLAS[0], 0, 0xff, 0, 0, 0, vec3(0), 0.0, vec3(1), 9.0, 0);
+             reorderThreadEXT(hit);
+             hitObjectExecuteShaderEXT(hit, 0);
+         }",
+        "ShaderInvocationReorder",
+    ),
+    (
+        "#extension GL_NV_shader_invocation_reorder : require
+         void main() { reorderThreadNV(gl_LaunchIDEXT.x & 1, 1); }",
+        "ShaderInvocationReorder",
+    ),
+];
+
+/// The module is refused where the device lacks the feature of the shader, and the pipeline elsewhere.
+#[test]
+fn shaders_that_cannot_be_lowered_are_refused_by_name() -> Result<()> {
+    for (path, ctx) in lowered_devices() {
+        let miss = answering(&ctx, ShaderStage::Miss, "", "1u")?;
+        for (text, words) in NOT_LOWERED {
+            let module = ctx.create_shader_module(&ShaderModuleDesc {
+                stage: ShaderStage::RayGen,
+                source: ShaderSource::Glsl(text),
+                debug_name: "odd camera",
+                ..Default::default()
+            });
+            let made = module.and_then(|module| {
+                ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+                    ray_gen: &[*module],
+                    miss: &[*miss],
+                    debug_name: "odd",
+                    ..Default::default()
+                })
+            });
+            match made.map(drop) {
+                Err(Error::Lowering { pipeline, shader, why }) => {
+                    assert_eq!((&*pipeline, &*shader), ("odd", "odd camera"));
+                    assert!(why.contains(words), "{path:?}: {why}");
+                }
+                Err(Error::Unsupported { what, .. }) => {
+                    assert!(what.contains("odd camera"), "{path:?}: {what}")
+                }
+                other => unreachable!("{path:?}: {other:?} for {text}"),
+            }
+        }
     }
     Ok(())
 }

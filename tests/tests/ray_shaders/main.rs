@@ -3,10 +3,12 @@
 
 mod any_hit;
 mod invocation_reorder;
+mod launches;
 mod lowered;
 mod pipelines;
 mod query_getters;
 mod query_stages;
 mod random_pipelines;
+mod recursion;
 mod swiftshader;
 mod which_runs;

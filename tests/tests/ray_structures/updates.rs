@@ -3,7 +3,7 @@
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
-    BlasDesc, BlasGeometry, BuildFlags, BuildMode, Context, Error, PrimitiveOrder, Result, TlasDesc,
+    BlasDesc, BlasGeometry, BuildFlags, BuildMode, Context, Error, PrimitiveOrder, RayQueryPath, Result, TlasDesc,
     Triangles,
 };
 use lvk_tests::accel_backend::{requires_device_accel_structs, software_alone};
@@ -306,7 +306,8 @@ fn cancelled_builds_do_not_count_as_wear() -> Result<()> {
     else {
         return Ok(());
     };
-    let tracer = RayTracer::new(&ctx, Method::available(&ctx)[0])?;
+    let queries = ctx.capabilities().ray_query_path == RayQueryPath::Hardware;
+    let tracer = RayTracer::new(&ctx, if queries { Method::Query } else { Method::Pipeline })?;
     let ring = Mesh::torus(10);
     let count = ring.triangles.len();
     let triangles = (0..count).map(|index| ring.triangles[index * 211 % count]).collect();

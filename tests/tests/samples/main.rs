@@ -14,6 +14,7 @@ mod obj_files;
 mod omni_shadows;
 mod panels;
 mod paper;
+mod pipeline_paths;
 mod profiles;
 mod reflections;
 mod render_to_cube_map;

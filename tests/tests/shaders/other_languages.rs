@@ -16,6 +16,7 @@ use lvk::{
     TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
+use lvk_tests::pipeline_paths::lowered_devices;
 use lvk_tests::ray_scene::RayScene;
 use lvk_tests::ray_tracer::{
     CULL_BACK, How, MISSED, Method, NO_OPAQUE, OPAQUE, RayTracer, requires_ray_queries,
@@ -264,15 +265,16 @@ fn ray_queries_hit_what_those_of_glsl_hit() -> Result<()> {
 /// Devices without ray queries trace too: DXC declares the capability of queries in every ray generation shader.
 #[test]
 fn ray_tracing_pipelines_hit_what_those_of_glsl_hit() -> Result<()> {
-    for ray_query in [RayQueryRequest::HardwareIfPresent, RayQueryRequest::Off] {
-        for ctx in whole_and_split(ray_query) {
-            if !Method::available(&ctx).contains(&Method::Pipeline) {
-                continue;
-            }
-            let glsl = RayTracer::new(&ctx, Method::Pipeline)?;
-            for shaders in &PIPELINES {
-                assert_same_hits(&ctx, &ray_tracer(&ctx, shaders)?, &glsl, shaders[0].name)?;
-            }
+    let own =
+        [RayQueryRequest::HardwareIfPresent, RayQueryRequest::Off].into_iter().flat_map(whole_and_split);
+    let lowered = lowered_devices().into_iter().map(|(_, ctx)| ctx);
+    for ctx in own.chain(lowered) {
+        if !Method::available(&ctx).contains(&Method::Pipeline) {
+            continue;
+        }
+        let glsl = RayTracer::new(&ctx, Method::Pipeline)?;
+        for shaders in &PIPELINES {
+            assert_same_hits(&ctx, &ray_tracer(&ctx, shaders)?, &glsl, shaders[0].name)?;
         }
     }
     Ok(())

@@ -234,8 +234,10 @@ impl Limits {
 }
 
 /// Limits of pipelines that are lowered to compute shaders.
-mod lowered {
+pub(crate) mod lowered {
     pub(crate) const MAX_RECURSION: u32 = 31;
+    /// Deepest nesting of callable shaders.
+    pub(crate) const MAX_CALLABLE_DEPTH: u32 = 31;
     /// The least that devices with ray tracing pipelines support.
     pub(crate) const MAX_HIT_ATTRIBUTE_BYTES: u32 = 32;
     /// Alignment of records in bytes; the largest alignment of a member of a record is 16.
