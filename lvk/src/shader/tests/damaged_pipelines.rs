@@ -87,6 +87,8 @@ fn lowered(damaged: usize, words: &[u32]) -> bool {
         ],
         callable: &[5],
         strides: [16, 32, 16],
+        push_constant_bytes: 128,
+        launch_offset: 248,
         max_recursion: 4,
         max_callable_depth: 1,
     });
