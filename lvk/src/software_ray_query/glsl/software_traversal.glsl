@@ -75,9 +75,11 @@ struct LvkSoftLevel {
 #ifdef LVK_LOWERED_PIPELINE
 const bool kLvkSoftHasCandidates = kLvkHasCandidates;
 const bool kLvkSoftHasBoxes = kLvkHasBoxes;
+#define LVK_SOFT_MAY_LACK_CANDIDATES
 #else
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
 const bool kLvkSoftHasCandidates = false;
+#define LVK_SOFT_MAY_LACK_CANDIDATES
 #else
 const bool kLvkSoftHasCandidates = true;
 #endif
@@ -480,7 +482,7 @@ bool lvkSoftTraverseLevel(inout LvkSoftState state, inout LvkSoftCursor cursor, 
 }
 
 // With candidates, a separate traversal would take longer to compile than it saves.
-#if defined(LVK_DEVICE_IS_CPU) && (defined(LVK_OPAQUE_TRIANGLES_ONLY) || defined(LVK_LOWERED_PIPELINE))
+#if defined(LVK_DEVICE_IS_CPU) && defined(LVK_SOFT_MAY_LACK_CANDIDATES)
 #define LVK_SOFT_HAS_CPU_TRAVERSAL
 #include <lvk/software_cpu_traversal.glsl>
 #endif

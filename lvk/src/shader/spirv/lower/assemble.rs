@@ -120,7 +120,7 @@ impl<'a> Assembly<'a> {
             let shader = &self.shaders.linked[&index];
             let failed = |message| LoweringError { shader: shader.name.clone(), message };
             let Some(mut function) = self.linker.function(shader.entry).cloned() else { continue };
-            inline_calls(self.linker, &mut function, &self.shaders.waiting);
+            inline_calls(self.linker, &mut function, &self.shaders.waiting).map_err(failed)?;
             if !self.shaders.callables_wait {
                 hide_calls(&mut function);
             }

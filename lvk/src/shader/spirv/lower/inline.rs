@@ -11,13 +11,29 @@ use super::module::{Block, Function};
 /// Inlines every call of the functions in `wanted`, and calls within them, into `function`.
 ///
 /// Returns of an inlined function branch to the code behind the call, from wherever they stand.
-pub(super) fn inline_calls(linker: &mut Linker, function: &mut Function, wanted: &HashSet<u32>) {
+///
+/// The error is a message.
+pub(super) fn inline_calls(
+    linker: &mut Linker,
+    function: &mut Function,
+    wanted: &HashSet<u32>,
+) -> Result<(), String> {
     while let Some((block, place)) = find_call(function, wanted) {
         let callee = function.blocks[block].code[place].operand(2);
-        let Some(callee) = linker.function(callee).cloned() else { return };
+        let Some(callee) = linker.function(callee).cloned() else { break };
         inline_call(linker, function, (block, place), callee);
+        let blocks = function.blocks.len();
+        if blocks > MOST_BLOCKS {
+            return Err(format!(
+                "functions that trace rays call each other too often: OpFunctionCall in place makes more than {MOST_BLOCKS} blocks"
+            ));
+        }
     }
+    Ok(())
 }
+
+/// Most blocks of a function with its calls in place.
+const MOST_BLOCKS: usize = 16_384;
 
 fn find_call(function: &Function, wanted: &HashSet<u32>) -> Option<(usize, usize)> {
     let is_call = |inst: &Inst| inst.op == Op::FunctionCall && wanted.contains(&inst.operand(2));

@@ -49,6 +49,24 @@ impl Inst {
     }
 }
 
+impl Inst {
+    /// True for an instruction that ends a block.
+    pub(super) fn is_terminator(&self) -> bool {
+        matches!(
+            self.op,
+            Op::Branch
+                | Op::BranchConditional
+                | Op::Switch
+                | Op::Return
+                | Op::ReturnValue
+                | Op::Unreachable
+                | Op::Kill
+                | Op::IgnoreIntersectionKHR
+                | Op::TerminateRayKHR
+        )
+    }
+}
+
 /// The operands of an opcode behind its results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Rest {
@@ -172,6 +190,23 @@ impl Form {
             _ => return None,
         };
         Some((2, rest))
+    }
+}
+
+/// Returns the least number of operands that an instruction has, results included.
+pub(super) fn least_operands(op: Op) -> usize {
+    match op {
+        Op::TypeVoid | Op::TypeBool | Op::TypeStruct | Op::Label | Op::Branch | Op::ReturnValue => 1,
+        Op::ExtInstImport | Op::Capability | Op::Extension => 1,
+        Op::TypeInt | Op::TypeFunction | Op::TypeRuntimeArray | Op::Phi | Op::Store => 2,
+        Op::TypeForwardPointer | Op::SelectionMerge | Op::Switch | Op::ExecuteCallableKHR => 2,
+        Op::Decorate | Op::MemoryModel | Op::FunctionParameter => 2,
+        Op::TypeVector | Op::TypeMatrix | Op::TypeArray | Op::TypePointer | Op::Variable | Op::Load => 3,
+        Op::AccessChain | Op::InBoundsAccessChain | Op::FunctionCall | Op::LoopMerge => 3,
+        Op::BranchConditional | Op::Constant | Op::SpecConstant | Op::MemberDecorate | Op::EntryPoint => 3,
+        Op::Function | Op::ReportIntersectionKHR | Op::ExtInst => 4,
+        Op::TraceRayKHR => 11,
+        _ => Form::of(op).map_or(0, |form| form.results),
     }
 }
 

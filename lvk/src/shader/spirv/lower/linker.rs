@@ -6,6 +6,7 @@ use ::spirv::{BuiltIn, Decoration, Op, StorageClass};
 
 use super::instruction::{Inst, UnknownOpcode, for_each_id};
 use super::module::{Block, Function, Module};
+use crate::shader::spirv::parsed::MAX_NESTING;
 
 /// New ids by the ids of a module that has been linked.
 pub(super) type IdMap = HashMap<u32, u32>;
@@ -18,6 +19,9 @@ pub(super) struct Linker {
     unique: HashMap<(u32, Vec<u32>), u32>,
     /// Types, constants and variables by their ids.
     globals: HashMap<u32, Inst>,
+    /// Shapes of structs and arrays, and the types that stand for them.
+    shapes: HashMap<u32, u32>,
+    shape_keys: HashMap<Vec<u32>, u32>,
     /// Inputs by built-in value and type.
     inputs: HashMap<(u32, u32), u32>,
 }
@@ -99,7 +103,7 @@ impl Linker {
             self.module.globals.push(inst);
             return Ok(false);
         };
-        let id = ids[&old];
+        let Some(id) = ids.get(&old).copied() else { return Err(UnknownOpcode(inst.op)) };
         // Others may refer to a pointer that was declared before its target.
         let can_share = is_unique(inst.op) && (!is_forward || self.take_unused_declaration(id));
         if can_share {
@@ -309,30 +313,41 @@ impl Linker {
 
     /// True for a pointer to a buffer, or an array of them.
     fn holds_buffer_pointers(&self, ty: u32) -> bool {
-        match self.global(ty) {
-            Some(inst) if inst.op == Op::TypeArray => self.holds_buffer_pointers(inst.operand(1)),
-            Some(inst) => {
-                inst.op == Op::TypePointer && inst.operand(1) == StorageClass::PhysicalStorageBuffer as u32
+        let mut element = ty;
+        for _ in 0..MAX_NESTING {
+            match self.global(element) {
+                Some(inst) if inst.op == Op::TypeArray => element = inst.operand(1),
+                _ => break,
             }
-            None => false,
         }
+        self.pointer(element)
+            .is_some_and(|(storage, _)| storage == StorageClass::PhysicalStorageBuffer as u32)
     }
 
-    /// Returns a text that two types share if one can be copied to the other.
-    pub(super) fn shape(&self, ty: u32) -> String {
-        let Some(inst) = self.global(ty) else { return format!("?{ty}") };
-        match inst.op {
-            Op::TypeStruct => {
-                let members: Vec<String> =
-                    inst.operands[1..].iter().map(|member| self.shape(*member)).collect();
-                format!("({})", members.join(","))
-            }
+    /// Returns a type that two types share if one can be copied to the other: the first with the same members.
+    pub(super) fn shape(&mut self, ty: u32) -> u32 {
+        self.nested_shape(ty, MAX_NESTING)
+    }
+
+    fn nested_shape(&mut self, ty: u32, nesting: u32) -> u32 {
+        if let Some(known) = self.shapes.get(&ty) {
+            return *known;
+        }
+        let Some(inst) = self.global(ty).filter(|_| nesting > 0) else { return ty };
+        let (op, elements, length) = match inst.op {
+            Op::TypeStruct => (inst.op, inst.operands[1..].to_vec(), 0),
             Op::TypeArray => {
                 let length = self.global(inst.operand(2)).map_or(0, |constant| constant.operand(2));
-                format!("[{};{length}]", self.shape(inst.operand(1)))
+                (inst.op, vec![inst.operand(1)], length)
             }
-            _ => ty.to_string(),
-        }
+            _ => return ty,
+        };
+        let mut key: Vec<u32> =
+            elements.into_iter().map(|element| self.nested_shape(element, nesting - 1)).collect();
+        key.extend([length, op as u32]);
+        let shape = *self.shape_keys.entry(key).or_insert(ty);
+        self.shapes.insert(ty, shape);
+        shape
     }
 
     /// Adds a function without parameters that returns nothing.

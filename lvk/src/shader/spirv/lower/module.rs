@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::Op;
 
-use super::instruction::{Inst, UnknownOpcode, for_each_id};
+use super::instruction::{Inst, UnknownOpcode, for_each_id, least_operands};
 use crate::shader::spirv::words::{HEADER_WORDS, Instruction, instructions};
 
 /// A block of a function: its label, and its code, which ends with a terminator.
@@ -94,11 +94,43 @@ impl Module {
         if reader.function.is_some() {
             return Err("a function has no end".to_owned());
         }
+        module.check_functions()?;
         Ok(module)
+    }
+
+    /// Fails for functions without blocks, blocks without a terminator, and functions that call each other in a circle.
+    fn check_functions(&self) -> Result<(), String> {
+        let is_whole = |block: &Block| block.terminator().is_some_and(Inst::is_terminator);
+        if self.functions.iter().any(|function| function.blocks.is_empty()) {
+            return Err("OpFunction has no blocks".to_owned());
+        }
+        if !self.functions.iter().flat_map(|function| &function.blocks).all(is_whole) {
+            return Err("OpLabel starts a block without a terminator".to_owned());
+        }
+        // Functions are done once all that they call are done.
+        let mut done: HashSet<u32> = HashSet::new();
+        let known: HashSet<u32> = self.functions.iter().map(Function::id).collect();
+        loop {
+            let ready = |function: &&Function| {
+                let calls = function.code().filter(|inst| inst.op == Op::FunctionCall);
+                let mut callees = calls.map(|inst| inst.operand(2)).filter(|id| known.contains(id));
+                callees.all(|id| done.contains(&id))
+            };
+            let now: HashSet<u32> = self.functions.iter().filter(ready).map(Function::id).collect();
+            if now.len() == done.len() {
+                break;
+            }
+            done = now;
+        }
+        let is_done = done.len() == known.len();
+        if is_done { Ok(()) } else { Err("OpFunctionCall calls its own function in a circle".to_owned()) }
     }
 
     fn read(&mut self, op: Op, instruction: &Instruction<'_>, reader: &mut Reader) -> Result<(), String> {
         let inst = Inst::new(op, instruction.operands());
+        if inst.operands.len() < least_operands(op) {
+            return Err(format!("Op{op:?} is cut off"));
+        }
         match op {
             Op::Source | Op::SourceContinued | Op::SourceExtension | Op::String | Op::ModuleProcessed => {}
             Op::MemberName | Op::Line | Op::NoLine | Op::Nop => {}

@@ -9,6 +9,7 @@ use super::donor::{Donor, Needs};
 use super::instruction::Inst;
 use super::judges::rewrite_judge;
 use super::linker::Linker;
+use super::module::Function;
 use super::push_constants::merge_push_constants;
 use super::stage::{Shader, link_stage};
 use super::traces::{Passed, TraceVariables, hide_remap_table, is_trace, rewrite_traces};
@@ -145,10 +146,8 @@ impl Shaders {
                 self.is_wait(inst) || (inst.op == Op::FunctionCall && found.contains(&inst.operand(2)))
             };
             let functions = linker.module.functions.iter();
-            let more: HashSet<u32> = functions
-                .filter(|function| function.code().any(waits))
-                .map(super::module::Function::id)
-                .collect();
+            let more: HashSet<u32> =
+                functions.filter(|function| function.code().any(waits)).map(Function::id).collect();
             if more == found {
                 return found;
             }
@@ -163,14 +162,18 @@ impl Shaders {
 
     /// Returns the number of places at which a function and those it calls wait, as if all were inlined.
     pub(super) fn wait_count(&self, linker: &Linker, function: u32) -> u32 {
-        let Some(function) = linker.function(function) else { return 0 };
-        let of = |inst: &Inst| match inst.op {
-            Op::FunctionCall if self.waiting.contains(&inst.operand(2)) => {
-                self.wait_count(linker, inst.operand(2))
-            }
-            _ => u32::from(self.is_wait(inst)),
-        };
-        function.code().map(of).fold(0, u32::saturating_add)
+        let mut counts: HashMap<u32, u32> = HashMap::new();
+        // Each round counts functions whose callees were counted in the round before.
+        for _ in 0..=self.waiting.len() {
+            let of = |inst: &Inst| match inst.op {
+                Op::FunctionCall => counts.get(&inst.operand(2)).copied().unwrap_or(0),
+                _ => u32::from(self.is_wait(inst)),
+            };
+            let functions = self.waiting.iter().filter_map(|id| linker.function(*id));
+            let count = |function: &Function| function.code().map(of).fold(0, u32::saturating_add);
+            counts = functions.map(|function| (function.id(), count(function))).collect();
+        }
+        counts.get(&function).copied().unwrap_or(0)
     }
 }
 

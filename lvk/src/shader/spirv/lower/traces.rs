@@ -13,7 +13,7 @@ use super::module::Function;
 /// Variables that pass payloads or data between shaders, one for each shape of a type.
 #[derive(Debug, Default)]
 pub(super) struct Passed {
-    by_shape: HashMap<String, u32>,
+    by_shape: HashMap<u32, u32>,
 }
 
 impl Passed {
