@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
 mod damage;
-mod damaged_pipelines;
 #[cfg(feature = "software-ray-query")]
 mod glsl_names;
 #[cfg(feature = "software-ray-query")]
