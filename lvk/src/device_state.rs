@@ -21,6 +21,7 @@ use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::gpu::caps::queues::IdleFailure;
 use crate::handle::AccelStructHandle;
 use crate::kernels::Kernels;
 use crate::leak_report;
@@ -137,7 +138,8 @@ impl DeviceState {
     /// Returns the layout and the cache for new pipelines.
     pub(crate) fn pipeline_base(&self) -> PipelineBase {
         let cache = self.pipeline_cache.as_ref().map_or(vk::PipelineCache::null(), |cache| cache.raw);
-        PipelineBase { layout: self.layout.raw, cache, max_threads: core_count() }
+        let PipelineLayout { raw: layout, push_constant_bytes, .. } = self.layout;
+        PipelineBase { layout, push_constant_bytes, cache, max_threads: core_count() }
     }
 
     /// Destroys an object once no command buffer can use it.
@@ -349,10 +351,12 @@ impl Drop for DeviceState {
     fn drop(&mut self) {
         let idle = persistent_wait(|| self.gpu.queues.wait_idle(&self.gpu.device), std::thread::sleep);
         // The caller has the report of a loss.
-        if let Err(result) = idle
+        if let Err(failure) = idle
             && self.submitter.loss().get().is_none()
+            && !(failure.lacks_memory()
+                && wait_by_polling(|| self.submitter.is_all_done(), std::thread::sleep))
         {
-            log::error!("vkQueueWaitIdle returned {result} at the end of a context");
+            log::error!("the end of a context: {}", failure.into_error());
         }
         drop(self.submitter.drain());
         self.free_leaked_objects();
@@ -362,28 +366,58 @@ impl Drop for DeviceState {
 /// Waits for the queues. A wait that fails for want of memory is tried again for about a second: objects that the device
 /// still uses must not be destroyed, and the work that is under way ends in the meantime.
 fn persistent_wait(
-    mut wait: impl FnMut() -> Result<(), vk::Result>,
+    mut wait: impl FnMut() -> Result<(), IdleFailure>,
     mut pause: impl FnMut(Duration),
-) -> Result<(), vk::Result> {
+) -> Result<(), IdleFailure> {
     const PAUSE: Duration = Duration::from_millis(20);
     const TRIES: usize = 50;
     for _ in 0..TRIES {
         match wait() {
-            Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) => {
-                pause(PAUSE)
-            }
+            Err(failure) if failure.lacks_memory() => pause(PAUSE),
             ended => return ended,
         }
     }
     wait()
 }
 
+/// Waits for a minute at most until `is_done`, where a wait of the device fails for want of memory. Returns false if it
+/// never was, or cannot be known.
+fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl FnMut(Duration)) -> bool {
+    const PAUSE: Duration = Duration::from_millis(20);
+    const TRIES: usize = 3_000;
+    for _ in 0..TRIES {
+        match is_done() {
+            Ok(false) => pause(PAUSE),
+            ended => return ended.unwrap_or(false),
+        }
+    }
+    false
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
+    use crate::queue::Queue;
+
+    #[test]
+    fn polling_ends_with_the_work_or_with_an_error() {
+        let polled = |answers: &[Option<bool>]| {
+            let (mut calls, mut pauses) = (0, 0);
+            let is_done = || {
+                calls += 1;
+                answers[(calls - 1).min(answers.len() - 1)].ok_or_else(|| Error::usage("test", "fails"))
+            };
+            (wait_by_polling(is_done, |_| pauses += 1), pauses)
+        };
+        assert_eq!(polled(&[Some(true)]), (true, 0));
+        assert_eq!(polled(&[Some(false), Some(false), Some(true)]), (true, 2));
+        assert_eq!(polled(&[Some(false), None]), (false, 1));
+        assert_eq!(polled(&[Some(false)]), (false, 3_000));
+    }
 
     /// Returns the results of the wait, and the number of pauses, for a wait that gives these results, the last for good.
-    fn waited(results: &[Result<(), vk::Result>]) -> (Result<(), vk::Result>, usize) {
+    fn waited(results: &[Result<(), IdleFailure>]) -> (Result<(), IdleFailure>, usize) {
         let (mut calls, mut pauses) = (0, 0);
         let wait = || {
             calls += 1;
@@ -394,12 +428,13 @@ mod tests {
 
     #[test]
     fn a_wait_that_lacks_memory_is_tried_again() {
-        let (host, device) =
-            (Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY), Err(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY));
+        let failed = |result| Err(IdleFailure { queue: Queue::Graphics, result });
+        let host = failed(vk::Result::ERROR_OUT_OF_HOST_MEMORY);
+        let device = failed(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         assert_eq!(waited(&[Ok(())]), (Ok(()), 0));
         assert_eq!(waited(&[host, device, Ok(())]), (Ok(()), 2));
         assert_eq!(waited(&[host]), (host, 50));
-        let lost = Err(vk::Result::ERROR_DEVICE_LOST);
+        let lost = failed(vk::Result::ERROR_DEVICE_LOST);
         assert_eq!(waited(&[device, lost]), (lost, 1), "no wait brings a lost device back");
     }
 }

@@ -4,7 +4,10 @@
 use std::fmt::Debug;
 use std::ops::RangeBounds;
 
-use lvk::{AccelStructHandle, Context, ContextDesc, DeviceProfile, RayQueryPath, RayQueryRequest, RayTracingPipelinePath, Result};
+use lvk::{
+    AccelStructHandle, Context, ContextDesc, DeviceProfile, RayQueryPath, RayQueryRequest,
+    RayTracingPipelinePath, Result,
+};
 
 use crate::{TestDevice, device_with};
 

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use lvk::ash::{Entry, vk};
-use lvk::{Context, ContextDesc, Error, RayQueryRequest, RayTracingPipelineRequest, ValidationMode, ValidationSink};
+use lvk::{
+    Context, ContextDesc, Error, RayQueryRequest, RayTracingPipelineRequest, ValidationMode, ValidationSink,
+};
 use lvk_dev_driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Its drop fails the test on any message, those of the

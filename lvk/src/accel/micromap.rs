@@ -148,7 +148,7 @@ impl Micromap {
         let made = unsafe {
             (functions.create_micromap_ext)(gpu.device.handle(), &info, std::ptr::null(), &mut raw)
         };
-        made.result().map_err(Error::creating("vkCreateMicromapEXT", name))?;
+        made.result().map_err(Error::vulkan("vkCreateMicromapEXT", name))?;
         gpu.name(raw, name);
         Ok(Self {
             raw,

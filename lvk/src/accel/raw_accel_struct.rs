@@ -35,7 +35,7 @@ impl RawAccelStruct {
             .ty(ty);
         // SAFETY: the range lies inside a buffer with the usage, and its offset is a multiple of 256.
         let raw = unsafe { ext.create_acceleration_structure(&info, None) }
-            .map_err(Error::creating("vkCreateAccelerationStructureKHR", name))?;
+            .map_err(Error::vulkan("vkCreateAccelerationStructureKHR", name))?;
         gpu.name(raw, name);
         let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw);
         // SAFETY: the acceleration structure is alive.

@@ -131,7 +131,7 @@ impl InputAttachmentLayout {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: the count is within the device's limits.
         let raw = unsafe { gpu.device.create_descriptor_set_layout(&info, None) }
-            .map_err(Error::creating("vkCreateDescriptorSetLayout", "input attachments"))?;
+            .map_err(Error::vulkan("vkCreateDescriptorSetLayout", "input attachments"))?;
         gpu.name(raw, "layout of input attachments");
         Ok(Some(Self { raw, count, gpu: Arc::clone(gpu) }))
     }

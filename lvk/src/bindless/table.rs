@@ -441,7 +441,7 @@ fn create_layout(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> Res
     // SAFETY: the counts, including all other descriptors of `DescriptorCounts`, are within the descriptor limits, and
     // the device supports the layout.
     with_layout_info(counts, yuv, |info| unsafe { gpu.device.create_descriptor_set_layout(info, None) })
-        .map_err(Error::creating("vkCreateDescriptorSetLayout", "bindless layout"))
+        .map_err(Error::vulkan("vkCreateDescriptorSetLayout", "bindless layout"))
 }
 
 /// Calls `then` with the description of the layout.
@@ -511,7 +511,7 @@ fn create_set(
         .pool_sizes(&sizes);
     // SAFETY: the description is valid.
     let pool = unsafe { gpu.device.create_descriptor_pool(&info, None) }
-        .map_err(Error::creating("vkCreateDescriptorPool", "bindless pool"))?;
+        .map_err(Error::vulkan("vkCreateDescriptorPool", "bindless pool"))?;
     let layouts = [layout];
     let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
     // SAFETY: the pool is new and has room for this one set.
@@ -525,7 +525,7 @@ fn create_set(
         Err(result) => {
             // SAFETY: nothing was allocated from the pool.
             unsafe { gpu.device.destroy_descriptor_pool(pool, None) };
-            Err(Error::creating("vkAllocateDescriptorSets", "bindless set")(result))
+            Err(Error::vulkan("vkAllocateDescriptorSets", "bindless set")(result))
         }
     }
 }

@@ -134,17 +134,22 @@ impl CommandBuffer {
 
     /// Restores the caller's compute pipeline and push constants after kernels.
     pub(crate) fn restore_compute(&self) {
+        if let Some(own) = &self.compute {
+            let (device, raw) = (&self.shared.gpu.device, self.raw());
+            // SAFETY: the pipeline is alive.
+            unsafe { device.cmd_bind_pipeline(raw, vk::PipelineBindPoint::COMPUTE, own.raw) };
+        }
+        self.restore_push_constants();
+    }
+
+    /// Restores the caller's push constants after kernels.
+    pub(crate) fn restore_push_constants(&self) {
         let (device, raw) = (&self.shared.gpu.device, self.raw());
-        // SAFETY: the pipeline is alive, and the bytes lie inside the push constants of the layout.
-        unsafe {
-            if let Some(own) = &self.compute {
-                device.cmd_bind_pipeline(raw, vk::PipelineBindPoint::COMPUTE, own.raw);
-            }
-            let pushed = self.state.push_constants.pushed_bytes();
-            if !pushed.is_empty() {
-                let stages = vk::ShaderStageFlags::ALL;
-                device.cmd_push_constants(raw, self.shared.layout.raw, stages, 0, pushed);
-            }
+        let pushed = self.state.push_constants.pushed_bytes();
+        if !pushed.is_empty() {
+            let stages = vk::ShaderStageFlags::ALL;
+            // SAFETY: the bytes lie inside the push constants of the layout.
+            unsafe { device.cmd_push_constants(raw, self.shared.layout.raw, stages, 0, pushed) };
         }
     }
 }

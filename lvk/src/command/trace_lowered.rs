@@ -11,7 +11,7 @@ use crate::barrier::{Stages, Use};
 use crate::device_state::DeferredObject;
 use crate::error::{Error, Result, check_limit};
 use crate::kernels::{Kernel, TraceSizePushConstants};
-use crate::pipeline::lowered::LoweredPipeline;
+use crate::pipeline::lowered::{LoweredPipeline, launch_offset};
 use crate::pipeline::ray_tracing::TraceRegions;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::resource::Buffer;
@@ -113,6 +113,7 @@ impl CommandBuffer {
         self.state.accesses.add_buffer(&launch, Use::indirect());
         self.state.accesses.add_buffer(&launch, Use::shader_read(Stages::COMPUTE));
         self.flush_barriers();
+        self.restore_push_constants();
         self.bind_lowered(trace, size);
         // SAFETY: a compute pipeline is bound, and the counts lie at the start of the buffer.
         unsafe { self.shared.gpu.device.cmd_dispatch_indirect(self.raw(), launch.raw, 0) };
@@ -148,11 +149,12 @@ impl CommandBuffer {
     fn bind_lowered(&mut self, trace: &LoweredTrace<'_>, launch: u64) {
         let (point, stages) = (vk::PipelineBindPoint::COMPUTE, vk::ShaderStageFlags::ALL);
         self.bind_set(point);
-        let (device, layout, raw) = (&self.shared.gpu.device, self.shared.layout.raw, self.raw());
+        let (device, layout, raw) = (&self.shared.gpu.device, &self.shared.layout, self.raw());
+        let offset = launch_offset(layout.push_constant_bytes);
         // SAFETY: the pipeline is alive and has the layout, whose push constants contain the address.
         unsafe {
             device.cmd_bind_pipeline(raw, point, trace.shader.raw);
-            device.cmd_push_constants(raw, layout, stages, 0, bytemuck::bytes_of(&launch));
+            device.cmd_push_constants(raw, layout.raw, stages, offset, bytemuck::bytes_of(&launch));
         }
     }
 }

@@ -99,7 +99,7 @@ impl Context {
         let (shared, image) = (self.device_state(), &texture.image);
         let range = image.barrier_image().range(image.shape.all_subresources());
         // SAFETY: guaranteed by the caller.
-        unsafe { host_copy::fill_from_host(&shared.gpu, image.raw, range, contents) }?;
+        unsafe { host_copy::fill_from_host(&shared.gpu, image.raw, &texture.name, range, contents) }?;
         shared.submitter.mark_host_written(image.id, image.shape);
         Ok(())
     }

@@ -76,7 +76,7 @@ impl Context {
             || Error::usage(&texture.name, "create the texture by create_exportable_texture to export it");
         let image = &texture.image;
         let (memory, fd_type) = image.shared_memory().ok_or_else(refused)?;
-        let layout = || drm_layout(&shared.gpu, image.raw, image.format.raw());
+        let layout = || drm_layout(&shared.gpu, image.raw, image.format.raw(), &texture.name);
         Ok(MemoryFd {
             fd: shared.gpu.export_memory(&texture.name, memory, fd_type)?,
             fd_type,

@@ -114,7 +114,7 @@ impl Context {
                 "semaphore",
                 "the file descriptor is no semaphore of its type that this device can import",
             ),
-            other => Error::creating("vkImportSemaphoreFdKHR", "semaphore")(other),
+            other => Error::vulkan("vkImportSemaphoreFdKHR", "semaphore")(other),
         })?;
         // The driver owns the file descriptor now.
         let _ = fd.into_raw_fd();
@@ -138,7 +138,7 @@ impl SharedSemaphore {
         }
         // SAFETY: the description is valid, and the handle type is checked.
         let raw = unsafe { gpu.device.create_semaphore(&info, None) }
-            .map_err(Error::creating("vkCreateSemaphore", "semaphore"))?;
+            .map_err(Error::vulkan("vkCreateSemaphore", "semaphore"))?;
         Ok(Self { raw, kind, fd_type, exportable, gpu: Arc::clone(gpu) })
     }
 
@@ -171,7 +171,7 @@ impl SharedSemaphore {
         let info = vk::SemaphoreGetFdInfoKHR::default().semaphore(self.raw).handle_type(self.fd_type.raw());
         // SAFETY: the semaphore was created for export as this type; the caller promises the rest.
         let fd = unsafe { functions(&self.gpu).get_semaphore_fd(&info) }
-            .map_err(Error::creating("vkGetSemaphoreFdKHR", "semaphore"))?;
+            .map_err(Error::vulkan("vkGetSemaphoreFdKHR", "semaphore"))?;
         // SAFETY: Vulkan gives the caller a new file descriptor.
         Ok(unsafe { OwnedFd::from_raw_fd(fd) })
     }

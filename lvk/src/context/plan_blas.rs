@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Context;
+use super::readback::READBACK;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::{Blas, BlasPart, BlasStructures};
@@ -78,7 +79,7 @@ impl Context {
         let is_read = |(_, (plan, _)): &(&BlasDesc<'_>, &(BlasPlan, _))| *plan != BlasPlan::Whole;
         let read: Vec<_> = descs.iter().zip(&plans).filter(is_read).map(|(desc, _)| desc).collect();
         let first = read.first().map_or("", |desc| desc.debug_name);
-        let bounds = self.read_bounds(&read).map_err(|error| error.with_owner(first))?;
+        let bounds = self.read_bounds(&read).map_err(|error| error.with_owner(READBACK, first))?;
         let mut bounds = bounds.into_iter();
         let mut inputs = Vec::with_capacity(descs.len());
         for ((desc, (transforms, input)), (plan, sizes)) in descs.iter().zip(converted).zip(plans) {

@@ -14,6 +14,9 @@ use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::resource::region::TextureRegion;
 use crate::submit::SubmitHandle;
 
+/// Name, in errors, of the buffers that readbacks copy into.
+pub(super) const READBACK: &str = "readback";
+
 /// Bytes that the GPU copies to the host, from [`Context::read_buffer_later`] and [`Context::read_texture_later`].
 ///
 /// The contents are those at the time of the call: later submissions do not change them. Dropping the object discards
@@ -75,8 +78,9 @@ impl Context {
         found.check_range(range.start, size)?;
         drop(found);
         let copy = BufferCopy { source_offset: range.start, target_offset: 0, size };
-        self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]))
-            .map_err(|error| if let Ok(found) = find() { error.with_owner(&found.name) } else { error })
+        self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy])).map_err(
+            |error| if let Ok(found) = find() { error.with_owner(READBACK, &found.name) } else { error },
+        )
     }
 
     /// Starts a copy of texels to the host, tightly packed, row by row and layer by layer, after everything submitted
@@ -88,7 +92,9 @@ impl Context {
         let find = || self.device_state().store.textures.get(texture);
         let size = find()?.resolve_region(region)?.bytes();
         self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&find()?, region, target, 0))
-            .map_err(|error| if let Ok(found) = find() { error.with_owner(&found.name) } else { error })
+            .map_err(
+                |error| if let Ok(found) = find() { error.with_owner(READBACK, &found.name) } else { error },
+            )
     }
 
     /// Submits a copy into a new buffer. `record` looks up its source by handle, or the caller keeps the source alive
@@ -108,7 +114,7 @@ impl Context {
             usage: BufferUsage::empty(),
             memory: MemoryKind::Readback,
             data: None,
-            debug_name: "readback",
+            debug_name: READBACK,
         };
         let target = Arc::new(Buffer::new(&self.device_state().gpu, &desc, InternalUsage::NONE)?);
         let mut cmd = self.acquire_command_buffer()?;

@@ -133,7 +133,8 @@ impl Context {
         cmd.write_size_properties(object, body, &pool, 0, ty)?;
         self.device_state().free_later(DeferredObject::QueryPool(Arc::clone(&pool)));
         self.wait(self.submit(cmd)?)?;
-        let sizes: Option<Vec<_>> = pool.values(0, count)?.into_iter().collect();
+        let values = self.device_state().submitter.explain_loss(pool.values(0, count))?;
+        let sizes: Option<Vec<_>> = values.into_iter().collect();
         sizes.ok_or_else(|| Error::usage(&object.name, "the device returned no size for a serialised BLAS"))
     }
 

@@ -4,6 +4,7 @@ use std::ptr::NonNull;
 use std::sync::Arc;
 
 use super::Context;
+use super::readback::READBACK;
 use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
@@ -74,7 +75,7 @@ impl Context {
         let size = bytes.len() as u64;
         let copy = BufferCopy { source_offset: offset, target_offset: 0, size };
         self.read_back(size, bytes, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]))
-            .map_err(|error| error.with_owner(&found.name))
+            .map_err(|error| error.with_owner(READBACK, &found.name))
     }
 
     /// Writes texels, tightly packed, row by row and layer by layer, before the next submission.

@@ -70,7 +70,8 @@ impl Context {
         let swapchain = shared.store.swapchains.get(handle)?;
         let mut guard = swapchain.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
-        lifecycle.prepare(name, &mut LiveBackend { ctx: self, name: &swapchain.name, resources })?;
+        let mut live = LiveBackend { ctx: self, name: &swapchain.name, resources };
+        shared.submitter.explain_loss(lifecycle.prepare(name, &mut live))?;
         drop(guard);
         Ok(holder)
     }
@@ -182,7 +183,9 @@ impl Context {
             return Ok(());
         }
         let surface = resources.surface.as_ref().map(Arc::downgrade);
-        lifecycle.suspend(&object.name, &mut LiveBackend { ctx: self, name: &object.name, resources })?;
+        let mut live = LiveBackend { ctx: self, name: &object.name, resources };
+        let suspended = lifecycle.suspend(&object.name, &mut live);
+        self.device_state().submitter.explain_loss(suspended)?;
         if surface.is_some_and(|surface| surface.strong_count() > 0) {
             let message = "views of its images, or command buffers that were not submitted, keep its surface; drop \
                            them before its window goes";
@@ -211,7 +214,9 @@ impl Context {
         let SwapchainInner { lifecycle, resources } = &mut *guard;
         resources.window = Arc::clone(window);
         resources.config.extent = extent;
-        lifecycle.resume(&object.name, &mut LiveBackend { ctx: self, name: &object.name, resources })
+        let mut live = LiveBackend { ctx: self, name: &object.name, resources };
+        let resumed = lifecycle.resume(&object.name, &mut live);
+        self.device_state().submitter.explain_loss(resumed)
     }
 
     /// Sets the present mode to the first supported mode of `wishes`, or to [`PresentMode::Fifo`]. If the device cannot

@@ -60,17 +60,49 @@ pub struct VendorFault {
     pub data: u64,
 }
 
+/// Most addresses, and most codes, that the text lists.
+const MAX_LISTED: usize = 8;
+
 impl fmt::Display for DeviceFault {
-    /// Formats the report in one line, for messages.
+    /// Formats the report in one line, for messages. Long lists are cut.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(&readable_line(&self.description))?;
-        for FaultAddress { kind, range, .. } in &self.addresses {
+        for FaultAddress { kind, range, .. } in self.addresses.iter().take(MAX_LISTED) {
             write!(out, "; {kind:?} at {:#x} to {:#x}", range.start, range.end.saturating_sub(1))?;
         }
-        for VendorFault { description, code, data } in &self.vendor {
+        write_rest(out, self.addresses.len(), "addresses")?;
+        for VendorFault { description, code, data } in self.vendor.iter().take(MAX_LISTED) {
             let description = readable_line(description);
             write!(out, "; {description} (code {code:#x}, data {data:#x})")?;
         }
-        Ok(())
+        write_rest(out, self.vendor.len(), "codes")
+    }
+}
+
+fn write_rest(out: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
+    match count.saturating_sub(MAX_LISTED) {
+        0 => Ok(()),
+        rest => write!(out, "; {rest} more {what}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_lists_the_first_addresses_and_codes() {
+        let address =
+            |address| FaultAddress { kind: FaultKind::InvalidRead, address, range: address..address + 1 };
+        let code = |code| VendorFault { description: "unit".to_owned(), code, data: 0 };
+        let fault = |count| DeviceFault {
+            description: "fault".to_owned(),
+            addresses: (0..count).map(address).collect(),
+            vendor: (0..count).map(code).collect(),
+        };
+        let text = fault(40).to_string();
+        assert_eq!((text.matches("InvalidRead").count(), text.matches("unit").count()), (8, 8), "{text}");
+        assert!(text.contains("; 32 more addresses; unit") && text.ends_with("; 32 more codes"), "{text}");
+        assert!(!fault(8).to_string().contains("more"));
     }
 }

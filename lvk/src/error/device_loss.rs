@@ -14,6 +14,8 @@ use crate::queue::Queue;
 pub struct DeviceLossReport {
     /// The Vulkan command that reported the loss first.
     pub call: &'static str,
+    /// Debug name of the object of that command.
+    pub object: String,
     /// Fault report of the driver, where it has `VK_EXT_device_fault`.
     pub fault: Option<DeviceFault>,
     /// The queues with unfinished submissions, in the order of [`Queue::ALL`]. Queues that share a Vulkan queue with
@@ -80,7 +82,7 @@ const MAX_NAMED_LABELS: usize = 4;
 
 impl fmt::Display for DeviceLossReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "the device was lost in {}", self.call)?;
+        write!(out, "the device was lost in {} for '{}'", self.call, readable_name(&self.object))?;
         if out.alternate() {
             self.fault.iter().try_for_each(|fault| write!(out, "\nfault: {fault}"))?;
             return self.queues.iter().try_for_each(|queue| queue.write_lines(out));
@@ -191,13 +193,15 @@ mod tests {
 
     fn report(unfinished: Vec<UnfinishedCommands>) -> DeviceLossReport {
         let queue = QueueLossReport { queue: Queue::Graphics, completed: 6, submitted: 9, unfinished };
-        DeviceLossReport { call: "vkWaitSemaphores", fault: None, queues: vec![queue] }
+        let object = "timeline".to_owned();
+        DeviceLossReport { call: "vkWaitSemaphores", object, fault: None, queues: vec![queue] }
     }
 
     #[test]
     fn a_report_without_submissions_is_the_call() {
-        let report = DeviceLossReport { call: "vkQueuePresentKHR", ..Default::default() };
-        assert_eq!(report.to_string(), "the device was lost in vkQueuePresentKHR");
+        let (call, object) = ("vkQueuePresentKHR", "main window".to_owned());
+        let report = DeviceLossReport { call, object, ..Default::default() };
+        assert_eq!(report.to_string(), "the device was lost in vkQueuePresentKHR for 'main window'");
         assert_eq!(format!("{report:#}"), report.to_string());
     }
 
@@ -214,12 +218,12 @@ mod tests {
         report.fault = Some(DeviceFault { description: "page fault".to_owned(), ..Default::default() });
         assert_eq!(
             report.to_string(),
-            "the device was lost in vkWaitSemaphores (page fault); the graphics queue had not finished submission 7 \
-             'frame 3' in its labels 'shade', 'lights', nor 1 after it"
+            "the device was lost in vkWaitSemaphores for 'timeline' (page fault); the graphics queue had not finished \
+             submission 7 'frame 3' in its labels 'shade', 'lights', nor 1 after it"
         );
         assert_eq!(
             format!("{report:#}"),
-            "the device was lost in vkWaitSemaphores\nfault: page fault\n\
+            "the device was lost in vkWaitSemaphores for 'timeline'\nfault: page fault\n\
              graphics queue: done up to 6, submitted up to 9\n  \
              submission 7 'frame 3'\n    \
              ended      shadow\n    \

@@ -43,7 +43,9 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 ///   [`Lowering`](Error::Lowering), [`LimitExceeded`](Error::LimitExceeded);
 /// * failures at run time: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory),
 ///   [`OutOfHostMemory`](Error::OutOfHostMemory), [`File`](Error::File), [`DeviceLost`](Error::DeviceLost),
-///   [`Vulkan`](Error::Vulkan); [`Creation`](Error::Creation) adds the name of an object to one of these.
+///   [`Vulkan`](Error::Vulkan). Those of a Vulkan call name the call and its object.
+///
+/// [`Creation`](Error::Creation) adds to a [`StaleHandle`](Error::StaleHandle) the name of what was to be created.
 ///
 /// The texts show names of objects and files without control characters, and long ones shortened; the fields have them
 /// as they are. `Debug` has the text of `Display`, as programs whose `main` returns an error print it by `Debug`.
@@ -123,7 +125,7 @@ pub enum Error {
     },
     /// The window of a swapchain is gone (`VK_ERROR_SURFACE_LOST_KHR`, also for another surface of the window).
     #[error(
-        "{}: its window is gone; suspend the swapchain, and resume it in another window, or destroy it before its window",
+        "swapchain '{}': its window is gone; suspend the swapchain, and resume it in another window, or destroy it before its window",
         readable_name(swapchain)
     )]
     SurfaceLost {
@@ -265,20 +267,22 @@ pub enum Error {
         limit: u64,
     },
     /// Device memory is exhausted.
-    #[error("out of device memory in {call}{}", memory_request(object.as_deref(), *bytes))]
+    #[error("out of device memory in {call} for '{}'{}", readable_name(object), memory_request(*bytes))]
     OutOfDeviceMemory {
         /// The Vulkan command that failed.
         call: &'static str,
-        /// Debug name of the object that was being created. `None` if none was.
-        object: Option<String>,
+        /// Debug name of the object of the call.
+        object: String,
         /// Requested bytes, if the command allocates memory.
         bytes: Option<u64>,
     },
     /// Host memory is exhausted.
-    #[error("out of host memory in {call}")]
+    #[error("out of host memory in {call} for '{}'", readable_name(object))]
     OutOfHostMemory {
         /// The Vulkan command that failed.
         call: &'static str,
+        /// Debug name of the object of the call.
+        object: String,
     },
     /// The device is lost, and the context cannot be used any more.
     #[error("{report}; create a new context")]
@@ -287,7 +291,7 @@ pub enum Error {
         /// context's submissions and waits has the report of the first.
         report: Arc<DeviceLossReport>,
     },
-    /// The creation of an object failed with an error that does not name the object.
+    /// The creation of an object failed because of a stale handle, whose error names another object.
     #[error("{}: {source}", readable_name(object))]
     Creation {
         /// Debug name of the object.
@@ -296,10 +300,12 @@ pub enum Error {
         source: Box<Self>,
     },
     /// Any other error of the driver.
-    #[error("{call} failed: {result}")]
+    #[error("{call} failed for '{}': {result}", readable_name(object))]
     Vulkan {
         /// The Vulkan command that failed.
         call: &'static str,
+        /// Debug name of the object of the call.
+        object: String,
         /// The returned error.
         #[source]
         result: vk::Result,
@@ -307,26 +313,25 @@ pub enum Error {
 }
 
 impl Error {
-    /// Converts the result of `call` to an error.
-    pub(crate) fn vulkan(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
-        move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => Self::device_lost(call),
-            vk::Result::ERROR_OUT_OF_HOST_MEMORY => Self::OutOfHostMemory { call },
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
-                Self::OutOfDeviceMemory { call, object: None, bytes: None }
+    /// Converts the result of `call` to an error that names `object`: the object that the call creates, records, waits for
+    /// or asks.
+    pub(crate) fn vulkan(call: &'static str, object: impl fmt::Display) -> impl FnOnce(vk::Result) -> Self {
+        move |result| {
+            let object = object.to_string();
+            match result {
+                vk::Result::ERROR_DEVICE_LOST => Self::device_lost(call, object),
+                vk::Result::ERROR_OUT_OF_HOST_MEMORY => Self::OutOfHostMemory { call, object },
+                vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
+                    Self::OutOfDeviceMemory { call, object, bytes: None }
+                }
+                result => Self::Vulkan { call, object, result },
             }
-            result => Self::Vulkan { call, result },
         }
-    }
-
-    /// Converts the result of `call`, which creates `object`, to an error.
-    pub(crate) fn creating(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> Self {
-        move |result| Self::vulkan(call)(result).with_object(object)
     }
 
     /// Converts the result of `vkAllocateMemory` for `object` to an error.
     pub(crate) fn allocating(object: &str, bytes: u64) -> impl FnOnce(vk::Result) -> Self {
-        move |result| match Self::creating("vkAllocateMemory", object)(result) {
+        move |result| match Self::vulkan("vkAllocateMemory", object)(result) {
             Self::OutOfDeviceMemory { call, object, .. } => {
                 Self::OutOfDeviceMemory { call, object, bytes: Some(bytes) }
             }
@@ -334,32 +339,31 @@ impl Error {
         }
     }
 
-    /// Returns the error for the loss of the device in `call`, of which no more is known yet.
-    pub(crate) fn device_lost(call: &'static str) -> Self {
-        Self::DeviceLost { report: Arc::new(DeviceLossReport { call, ..DeviceLossReport::default() }) }
+    /// Returns the error for the loss of the device in `call` about `object`, of which no more is known yet.
+    pub(crate) fn device_lost(call: &'static str, object: impl Into<String>) -> Self {
+        let report = DeviceLossReport { call, object: object.into(), ..DeviceLossReport::default() };
+        Self::DeviceLost { report: Arc::new(report) }
     }
 
-    /// Adds the name of the object whose creation failed, if the error has no name of its own.
+    /// Adds the name of the object whose creation failed because of a stale handle. Other errors have a name of their own.
     pub(crate) fn with_object(self, object: &str) -> Self {
         match self {
-            Self::OutOfDeviceMemory { call, object: None, bytes } => {
-                Self::OutOfDeviceMemory { call, object: Some(object.to_owned()), bytes }
-            }
-            Self::Vulkan { .. } | Self::OutOfHostMemory { .. } | Self::StaleHandle { .. } => {
-                Self::Creation { object: object.to_owned(), source: Box::new(self) }
-            }
+            Self::StaleHandle { .. } => Self::Creation { object: object.to_owned(), source: Box::new(self) },
             named => named,
         }
     }
 
-    /// Adds the name of the object for which the library could not create a buffer of its own.
-    pub(crate) fn with_owner(self, owner: &str) -> Self {
-        match self {
-            Self::OutOfDeviceMemory { call, object: Some(part), bytes } => {
-                Self::OutOfDeviceMemory { call, object: Some(format!("{part} of {owner}")), bytes }
-            }
-            other => other,
+    /// Adds the name of the object that `part`, a buffer of the library, serves. Errors about other objects stay as they
+    /// are.
+    pub(crate) fn with_owner(mut self, part: &str, owner: &str) -> Self {
+        if let Self::OutOfDeviceMemory { object, .. }
+        | Self::OutOfHostMemory { object, .. }
+        | Self::Vulkan { object, .. } = &mut self
+            && object == part
+        {
+            *object = format!("{part} of {owner}");
         }
+        self
     }
 
     /// Returns the error for a mistake of the caller about `object`.
@@ -387,10 +391,8 @@ impl fmt::Debug for Error {
     }
 }
 
-fn memory_request(object: Option<&str>, bytes: Option<u64>) -> String {
-    let object = object.map(|object| format!(" for '{}'", readable_name(object))).unwrap_or_default();
-    let bytes = bytes.map(|bytes| format!(" ({bytes} bytes)")).unwrap_or_default();
-    object + &bytes
+fn memory_request(bytes: Option<u64>) -> String {
+    bytes.map(|bytes| format!(" ({bytes} bytes)")).unwrap_or_default()
 }
 
 fn stale_object(kind: &str, name: &Option<String>) -> String {
@@ -451,7 +453,12 @@ mod tests {
         let queue =
             device_loss::QueueLossReport { queue: Queue::Graphics, completed: 0, submitted: 1, unfinished };
         let fault = device_fault::DeviceFault { description: text(), ..Default::default() };
-        let report = DeviceLossReport { call: "vkQueueSubmit2", fault: Some(fault), queues: vec![queue] };
+        let report = DeviceLossReport {
+            call: "vkQueueSubmit2",
+            object: text(),
+            fault: Some(fault),
+            queues: vec![queue],
+        };
         let kind = device_candidate::DeviceKind::Cpu;
         let candidates = vec![DeviceCandidate {
             index: 0,
@@ -487,7 +494,9 @@ mod tests {
             Error::File { path: name.into(), message: text() },
             Error::Serialized { object: text(), reason: text() },
             Error::OverBudget { object: text(), bytes: 2, used: 1, budget: 1 },
-            Error::OutOfDeviceMemory { call: "vkAllocateMemory", object: Some(text()), bytes: Some(1) },
+            Error::OutOfDeviceMemory { call: "vkAllocateMemory", object: text(), bytes: Some(1) },
+            Error::OutOfHostMemory { call: "vkAllocateMemory", object: text() },
+            Error::Vulkan { call: "vkMapMemory", object: text(), result: vk::Result::ERROR_UNKNOWN },
             Error::DeviceLost { report: Arc::new(report) },
             Error::Creation { object: text(), source: Box::new(Error::usage(text(), text())) },
             Error::Shader { name: text(), log: "line 1".to_owned() },
@@ -553,23 +562,40 @@ mod tests {
     }
 
     #[test]
-    fn errors_without_a_name_get_that_of_the_object() {
-        let text = |error: Error| error.with_object("water").to_string();
-        let failed = Error::vulkan("vkCreateGraphicsPipelines");
-        assert_eq!(
-            text(failed(vk::Result::ERROR_UNKNOWN)),
-            format!("water: vkCreateGraphicsPipelines failed: {}", vk::Result::ERROR_UNKNOWN)
-        );
-        let memory = Error::vulkan("vkCreateGraphicsPipelines")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
-        assert_eq!(text(memory), "out of device memory in vkCreateGraphicsPipelines for 'water'");
-        assert!(text(Error::OutOfHostMemory { call: "vkCreateShaderModule" }).starts_with("water: out of"));
-        assert_eq!(text(Error::usage("grass", "is green")), "grass: is green", "it has a name");
-        let lost = Error::device_lost("vkQueueSubmit2");
-        assert!(matches!(lost.with_object("water"), Error::DeviceLost { .. }));
-        let part =
-            Error::allocating("readback", 8)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY).with_owner("water");
+    fn errors_of_vulkan_calls_name_the_object() {
+        let text = |result| Error::vulkan("vkEndCommandBuffer", "shadows")(result).to_string();
+        let unknown = vk::Result::ERROR_UNKNOWN;
+        assert_eq!(text(unknown), format!("vkEndCommandBuffer failed for 'shadows': {unknown}"));
+        for (result, start) in [
+            (vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, "out of device memory"),
+            (vk::Result::ERROR_OUT_OF_HOST_MEMORY, "out of host memory"),
+            (vk::Result::ERROR_DEVICE_LOST, "the device was lost"),
+        ] {
+            let told = text(result);
+            assert!(told.starts_with(&format!("{start} in vkEndCommandBuffer for 'shadows'")), "{told}");
+        }
+        let gone = Error::SurfaceLost { swapchain: "main".to_owned() }.to_string();
+        assert!(gone.starts_with("swapchain 'main': its window is gone"), "{gone}");
+    }
+
+    #[test]
+    fn buffers_of_the_library_have_the_name_of_their_owner_too() {
+        let owned = |error: Error| error.with_owner("readback", "water").to_string();
+        let memory = Error::allocating("readback", 8)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         let expected = "out of device memory in vkAllocateMemory for 'readback of water' (8 bytes)";
-        assert_eq!(part.to_string(), expected);
-        assert!(matches!(Error::usage("grass", "is green").with_owner("water"), Error::InvalidUsage { .. }));
+        assert_eq!(owned(memory), expected);
+        let host = Error::vulkan("vkMapMemory", "readback");
+        let expected = "out of host memory in vkMapMemory for 'readback of water'";
+        assert_eq!(owned(host(vk::Result::ERROR_OUT_OF_HOST_MEMORY)), expected);
+        let waits = Error::vulkan("vkWaitSemaphores", "timeline")(vk::Result::ERROR_OUT_OF_HOST_MEMORY);
+        assert_eq!(owned(waits.clone()), waits.to_string(), "of another object");
+        assert_eq!(owned(Error::usage("grass", "is green")), "grass: is green");
+    }
+
+    #[test]
+    fn stale_handles_get_the_name_of_what_was_to_be_created() {
+        let stale = Error::StaleHandle { kind: "shader module", name: None }.with_object("water");
+        assert!(stale.to_string().starts_with("water: stale shader module handle"), "{stale}");
+        assert_eq!(Error::usage("grass", "is green").with_object("water").to_string(), "grass: is green");
     }
 }

@@ -126,7 +126,8 @@ impl ClockReader {
                 Functions::Khr(device) => device.get_calibrated_timestamps(&infos),
             }
         };
-        let (values, deviation) = read.map_err(Error::vulkan("vkGetCalibratedTimestamps"))?;
+        let (values, deviation) =
+            read.map_err(Error::vulkan("vkGetCalibratedTimestamps", "clocks of device and host"))?;
         Ok((values[0], values[1], deviation))
     }
 }

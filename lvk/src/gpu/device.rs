@@ -472,7 +472,7 @@ fn create_with_fallback(
     };
     let pipelines = request.pipeline.requires_pipelines() || request.pipeline.requires_queries();
     if pipelines || request.query.requires_hardware() || !caps.builds_device_structures() {
-        return Err(Error::vulkan("vkCreateDevice")(first));
+        return Err(Error::vulkan("vkCreateDevice", &caps.device_name)(first));
     }
     caps = chosen.capabilities.clone();
     caps.limit_ray_tracing(false, false);
@@ -480,8 +480,8 @@ fn create_with_fallback(
     caps.choose_ray_tracing(request.pipeline, request.query);
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing returned {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it returned {first}", caps.device_name);
-    let (device, features) =
-        create(instance, chosen, &caps, &request.extra).map_err(Error::vulkan("vkCreateDevice"))?;
+    let (device, features) = create(instance, chosen, &caps, &request.extra)
+        .map_err(Error::vulkan("vkCreateDevice", &caps.device_name))?;
     Ok((device, caps, features))
 }
 

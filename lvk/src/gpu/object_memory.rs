@@ -97,9 +97,7 @@ fn allocation_error(name: &str, bytes: u64, error: AllocationError) -> Error {
     use vk::Result as Code;
     match error {
         AllocationError::OutOfMemory => Error::allocating(name, bytes)(Code::ERROR_OUT_OF_DEVICE_MEMORY),
-        AllocationError::FailedToMap(_) => {
-            Error::creating("vkMapMemory", name)(Code::ERROR_OUT_OF_HOST_MEMORY)
-        }
+        AllocationError::FailedToMap(_) => Error::vulkan("vkMapMemory", name)(Code::ERROR_OUT_OF_HOST_MEMORY),
         AllocationError::Internal(text) if text.contains("OUT_OF_HOST_MEMORY") => {
             Error::allocating(name, bytes)(Code::ERROR_OUT_OF_HOST_MEMORY)
         }
@@ -136,15 +134,15 @@ mod tests {
         );
         assert_eq!(
             text(AllocationError::FailedToMap(String::new())),
-            "sky: out of host memory in vkMapMemory"
+            "out of host memory in vkMapMemory for 'sky'"
         );
         let of_driver =
             |code: &str| AllocationError::Internal(format!("Unexpected error in vkAllocateMemory: {code}"));
         assert_eq!(
             text(of_driver("ERROR_OUT_OF_HOST_MEMORY")),
-            "sky: out of host memory in vkAllocateMemory"
+            "out of host memory in vkAllocateMemory for 'sky'"
         );
-        assert!(text(of_driver("ERROR_TOO_MANY_OBJECTS")).starts_with("sky: vkAllocateMemory failed"));
+        assert!(text(of_driver("ERROR_TOO_MANY_OBJECTS")).starts_with("vkAllocateMemory failed for 'sky': "));
         assert!(
             text(AllocationError::NoCompatibleMemoryTypeFound).starts_with("not supported: memory for 'sky'")
         );

@@ -26,31 +26,35 @@ impl Gpu {
         format_properties(&self.instance.raw, self.physical(), format).buffer_features
     }
 
-    /// Returns the limits of an image of this description. `None` if the driver does not support it.
+    /// Returns the limits of an image of this description. `name` is the object in the error. `None` if the driver does not support it.
     pub(crate) fn image_limits(
         &self,
         info: &vk::ImageCreateInfo<'_>,
+        name: &str,
     ) -> Result<Option<vk::ImageFormatProperties>> {
         match self.image_limits.image_limits(&self.instance.raw, self.physical(), info) {
             Ok(limits) => Ok(Some(limits)),
             Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED) => Ok(None),
-            Err(shortage) => Err(Error::vulkan("vkGetPhysicalDeviceImageFormatProperties")(shortage)),
+            Err(shortage) => Err(Error::vulkan("vkGetPhysicalDeviceImageFormatProperties", name)(shortage)),
         }
     }
 
     /// Returns the sample counts that a plain render target of `format` may have. Empty if the format cannot
-    /// be a target.
+    /// be a target. `name` is the object in the error.
     pub(crate) fn target_samples(
         &self,
         format: vk::Format,
         usage: vk::ImageUsageFlags,
+        name: &str,
     ) -> Result<vk::SampleCountFlags> {
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(format)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(usage);
-        Ok(self.image_limits(&info)?.map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts))
+        Ok(self
+            .image_limits(&info, name)?
+            .map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts))
     }
 
     /// True if the host can write images of this description without making sampling on the device slower.

@@ -216,7 +216,9 @@ impl Kernel {
         let module =
             ShaderModule::new(gpu, &desc, CompileFiles::default(), None, layout.push_constant_bytes)?;
         let desc = ComputePipelineDesc { debug_name: self.name(), ..Default::default() };
-        ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache, max_threads: 1 }, &desc, &module)
+        let push_constant_bytes = layout.push_constant_bytes;
+        let base = PipelineBase { layout: layout.raw, push_constant_bytes, cache, max_threads: 1 };
+        ComputePipeline::new(gpu, base, &desc, &module)
     }
 }
 

@@ -66,7 +66,7 @@ impl PipelineCache {
     fn write(&self, always: bool) -> Result<()> {
         // SAFETY: the cache is alive.
         let data = unsafe { self.gpu.device.get_pipeline_cache_data(self.raw) }
-            .map_err(Error::vulkan("vkGetPipelineCacheData"))?;
+            .map_err(Error::vulkan("vkGetPipelineCacheData", self.path.display()))?;
         let sum = checksum(&[&data]);
         let mut on_disk = self.on_disk.lock();
         if !always && *on_disk == Some(sum) && self.path.exists() {
@@ -110,13 +110,14 @@ fn read_if_present(path: &Path) -> Option<Vec<u8>> {
 fn create_from<'a>(gpu: &Gpu, path: &Path, data: &'a [u8]) -> Result<(vk::PipelineCache, &'a [u8])> {
     match create_cache(gpu, data) {
         Ok(raw) => Ok((raw, data)),
-        Err(result) if data.is_empty() => Err(Error::vulkan("vkCreatePipelineCache")(result)),
+        Err(result) if data.is_empty() => Err(Error::vulkan("vkCreatePipelineCache", path.display())(result)),
         Err(result) => {
             log::warn!(
                 "the pipeline cache '{}' is dropped: the driver returns {result}",
                 readable_name(path)
             );
-            let raw = create_cache(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache"))?;
+            let raw =
+                create_cache(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache", path.display()))?;
             Ok((raw, &[]))
         }
     }

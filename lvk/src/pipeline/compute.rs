@@ -94,7 +94,7 @@ impl ComputePipeline {
         let info = vk::ComputePipelineCreateInfo::default().layout(base.layout).stage(stage);
         // SAFETY: the module and the layout are alive and fit each other, and the device takes the subgroups.
         let made = unsafe { gpu.device.create_compute_pipelines(base.cache, &[info], None) };
-        let raw = made.map_err(|(_, result)| Error::creating("vkCreateComputePipelines", name)(result))?[0];
+        let raw = made.map_err(|(_, result)| Error::vulkan("vkCreateComputePipelines", name)(result))?[0];
         gpu.name(raw, name);
         Ok(Self {
             raw,

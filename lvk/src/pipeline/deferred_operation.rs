@@ -11,7 +11,7 @@ use crate::gpu::Gpu;
 use crate::gpu::start::driver_workarounds::with_shared_device_lock;
 use crate::parallel::run_on_threads;
 
-/// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`). The number of threads is limited by the driver and by
+/// Creates the pipeline `name` (`vkCreateRayTracingPipelinesKHR`). The number of threads is limited by the driver and by
 /// `base.max_threads`.
 ///
 /// # Safety
@@ -19,10 +19,11 @@ use crate::parallel::run_on_threads;
 pub(crate) unsafe fn compile(
     gpu: &Gpu,
     base: PipelineBase,
+    name: &str,
     info: &vk::RayTracingPipelineCreateInfoKHR<'_>,
 ) -> Result<vk::Pipeline> {
     // NVIDIA's driver 580 crashes after a deferred creation that compiles no shader and only links libraries.
-    let operation = if info.stage_count > 0 { Some(DeferredOperation::new(gpu)?) } else { None };
+    let operation = if info.stage_count > 0 { Some(DeferredOperation::new(gpu, name)?) } else { None };
     let deferred = operation.as_ref().map_or(vk::DeferredOperationKHR::null(), |operation| operation.raw);
     let ext = gpu.ray_tracing_functions()?;
     let create = ext.fp().create_ray_tracing_pipelines_khr;
@@ -39,7 +40,7 @@ pub(crate) unsafe fn compile(
     if let Err(error) = result.result() {
         // SAFETY: null, or a pipeline that was made before the operation failed, and that is used nowhere.
         unsafe { gpu.device.destroy_pipeline(raw, None) };
-        return Err(Error::vulkan("vkCreateRayTracingPipelinesKHR")(error));
+        return Err(Error::vulkan("vkCreateRayTracingPipelinesKHR", name)(error));
     }
     Ok(raw)
 }
@@ -51,11 +52,11 @@ struct DeferredOperation {
 }
 
 impl DeferredOperation {
-    fn new(gpu: &Gpu) -> Result<Self> {
+    fn new(gpu: &Gpu, name: &str) -> Result<Self> {
         let ext = Device::new(&gpu.instance.raw, &gpu.device);
         // SAFETY: the extension is on wherever ray tracing is.
         let raw = unsafe { ext.create_deferred_operation(None) }
-            .map_err(Error::vulkan("vkCreateDeferredOperationKHR"))?;
+            .map_err(Error::vulkan("vkCreateDeferredOperationKHR", name))?;
         Ok(Self { raw, ext })
     }
 

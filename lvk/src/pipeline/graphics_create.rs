@@ -67,7 +67,7 @@ pub(super) fn create_pipeline(
     }
     // SAFETY: the modules and the layout are alive; everything `info` points to lives until the call returns.
     let made = unsafe { gpu.device.create_graphics_pipelines(base.cache, &[info], None) };
-    Ok(made.map_err(|(_, result)| Error::creating("vkCreateGraphicsPipelines", desc.debug_name)(result))?[0])
+    Ok(made.map_err(|(_, result)| Error::vulkan("vkCreateGraphicsPipelines", desc.debug_name)(result))?[0])
 }
 
 /// Returns the creation flags. Pipelines with a shading rate may be used in passes with a shading rate attachment.

@@ -70,7 +70,7 @@ impl GraphicsParts {
         // SAFETY: the parts are alive, complete each other, and have the same layout, views and samples.
         let made = unsafe { gpu.device.create_graphics_pipelines(base.cache, &[info], None) };
         let linked = made
-            .map_err(|(_, result)| Error::creating("vkCreateGraphicsPipelines", desc.debug_name)(result))?[0];
+            .map_err(|(_, result)| Error::vulkan("vkCreateGraphicsPipelines", desc.debug_name)(result))?[0];
         Ok((linked, parts))
     }
 

@@ -76,6 +76,8 @@ impl LoweringJob<'_> {
             hit: &linked.hit,
             callable: &linked.callable,
             strides: [&plan.miss, &plan.hit, &plan.callable].map(|region| region.stride as u32),
+            push_constant_bytes: linked.push_constant_bytes(),
+            launch_offset: launch_offset(self.base.push_constant_bytes),
             max_recursion: desc.max_recursion,
             max_callable_depth: desc.max_callable_depth,
         };
@@ -97,6 +99,11 @@ impl LoweringJob<'_> {
             _ => self.desc.debug_name.to_owned(),
         }
     }
+}
+
+/// Returns the offset of the launch's address in push constants of `bytes`: the address comes last.
+pub(crate) fn launch_offset(bytes: u32) -> u32 {
+    bytes.saturating_sub(size_of::<u64>() as u32)
 }
 
 /// Returns the traversal of lowered pipelines.

@@ -69,6 +69,14 @@ impl<M> LinkedGroups<'_, M> {
     }
 }
 
+impl LinkedGroups<'_, Arc<ShaderModule>> {
+    /// Returns the bytes of push constants that the shaders read.
+    pub(super) fn push_constant_bytes(&self) -> u32 {
+        let bytes = self.modules.iter().map(|(module, _)| module.reflection.push_constant_bytes);
+        bytes.max().unwrap_or(0)
+    }
+}
+
 /// Links the parts of a pipeline: its own first, then its libraries, region by region as in the shader binding table.
 pub(super) fn link<'a, M>(
     parts: &[&'a LoweredPart<M>],

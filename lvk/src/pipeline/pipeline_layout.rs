@@ -15,6 +15,8 @@ use crate::gpu::Gpu;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PipelineBase {
     pub(crate) layout: vk::PipelineLayout,
+    /// Bytes of push constants of the layout.
+    pub(crate) push_constant_bytes: u32,
     /// The pipeline cache; null if the context has none.
     pub(crate) cache: vk::PipelineCache,
     /// Most threads that one creation uses, the calling thread included.
@@ -43,7 +45,7 @@ impl PipelineLayout {
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&ranges);
         // SAFETY: the set layouts are alive and the range is within the limit.
         let raw = unsafe { gpu.device.create_pipeline_layout(&info, None) }
-            .map_err(Error::creating("vkCreatePipelineLayout", "pipeline layout"))?;
+            .map_err(Error::vulkan("vkCreatePipelineLayout", "pipeline layout"))?;
         Ok(Self { raw, push_constant_bytes: bytes, inputs, gpu: Arc::clone(gpu) })
     }
 }

@@ -84,7 +84,9 @@ impl RayTracingPipeline {
         let code = PipelineCode::new(gpu, base, desc, &groups, libraries, &plan)?;
         let order = sbt_order(&counts);
         let handles = match &code {
-            PipelineCode::Hardware(pipeline) => pipeline.handles(order.len() as u32, limits.handle_bytes)?,
+            PipelineCode::Hardware(pipeline) => {
+                pipeline.handles(name, order.len() as u32, limits.handle_bytes)?
+            }
             PipelineCode::Lowered(_) => Vec::new(),
         };
         let mut bytes = vec![0; plan.bytes as usize];

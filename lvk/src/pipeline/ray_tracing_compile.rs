@@ -71,7 +71,7 @@ pub(super) fn compile_groups(
     }
     // SAFETY: modules, layout and libraries are alive, the recursion depth is within the limit, and the libraries were
     // created with the same layout and agree on the interface.
-    unsafe { compile(gpu, base, &info) }.map_err(|error| error.with_object(desc.debug_name))
+    unsafe { compile(gpu, base, desc.debug_name, &info) }
 }
 
 /// Returns the flag without which rays of a pipeline may not meet triangles with opacity micromaps.

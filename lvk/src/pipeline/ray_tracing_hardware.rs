@@ -47,8 +47,8 @@ impl HardwarePipeline {
         Ok(pipeline)
     }
 
-    /// Returns the handles of the first `group_count` groups, in Vulkan's order.
-    pub(super) fn handles(&self, group_count: u32, handle_bytes: u32) -> Result<Vec<u8>> {
+    /// Returns the handles of the first `group_count` groups, in Vulkan's order. `name` is that of the pipeline.
+    pub(super) fn handles(&self, name: &str, group_count: u32, handle_bytes: u32) -> Result<Vec<u8>> {
         let bytes = group_count as usize * handle_bytes as usize;
         // SAFETY: the pipeline has these groups, and the size is that of their handles.
         unsafe {
@@ -59,7 +59,7 @@ impl HardwarePipeline {
                 bytes,
             )
         }
-        .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR"))
+        .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR", name))
     }
 }
 

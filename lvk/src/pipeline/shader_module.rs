@@ -108,7 +108,7 @@ fn create_raw(gpu: &Gpu, name: &str, words: &[u32]) -> Result<vk::ShaderModule> 
     let info = vk::ShaderModuleCreateInfo::default().code(words);
     // SAFETY: the words are a complete module for a stage and features of this device.
     let raw = unsafe { gpu.device.create_shader_module(&info, None) }
-        .map_err(Error::creating("vkCreateShaderModule", name))?;
+        .map_err(Error::vulkan("vkCreateShaderModule", name))?;
     gpu.name(raw, name);
     Ok(raw)
 }

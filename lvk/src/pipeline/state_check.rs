@@ -69,7 +69,7 @@ fn check_samples(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
     let color = desc.color.iter().map(|target| (target.format, vk::ImageUsageFlags::COLOR_ATTACHMENT));
     let depth = desc.depth.map(|depth| (depth.format, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT));
     for (format, usage) in color.chain(depth) {
-        let most = gpu.target_samples(format.raw(), usage).map_err(|error| error.with_object(name))?;
+        let most = gpu.target_samples(format.raw(), usage, name)?;
         if samples > 1 && !most.contains(vk::SampleCountFlags::from_raw(samples)) {
             let what = format!("{samples} samples a pixel of {format:?} in pipeline '{name}'");
             return Err(Error::unsupported(what, format!("the device has {most:?}")));

@@ -169,7 +169,7 @@ impl Buffer {
         }
         // SAFETY: the description is valid: the size is checked, the usage belongs to enabled features.
         let raw = unsafe { gpu.device.create_buffer(&info, None) }
-            .map_err(Error::creating("vkCreateBuffer", name))?;
+            .map_err(Error::vulkan("vkCreateBuffer", name))?;
         Ok(Self {
             raw,
             id: ResourceId::next(),
@@ -229,7 +229,7 @@ impl Buffer {
         // SAFETY: the memory was allocated for this buffer's requirements and is bound once.
         let bound = unsafe { device.bind_buffer_memory(self.raw, memory.raw, memory.offset) };
         self.allocation = Some(memory);
-        bound.map_err(Error::creating("vkBindBufferMemory", &self.name))?;
+        bound.map_err(Error::vulkan("vkBindBufferMemory", &self.name))?;
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
         // SAFETY: the buffer has memory and the device-address usage.
         self.address = unsafe { device.get_buffer_device_address(&info) };

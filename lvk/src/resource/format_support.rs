@@ -59,6 +59,6 @@ fn samples(gpu: &Gpu, format: Format) -> u32 {
         .tiling(vk::ImageTiling::OPTIMAL)
         .usage(raw_usage(TextureUsage::TARGET, format));
     // Lack of memory is no answer; the next query may have one.
-    let limits = gpu.image_limits(&info).ok().flatten();
+    let limits = gpu.image_limits(&info, "texture").ok().flatten();
     limits.map_or(0, |limits| limits.sample_counts.as_raw())
 }

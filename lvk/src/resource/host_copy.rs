@@ -30,13 +30,14 @@ fn is_plain(desc: &TextureDesc<'_>) -> bool {
         && planes == 1
 }
 
-/// Writes the initial contents of a new image for which [`can_fill_from_host`] is true. `range` is the whole image.
+/// Writes the initial contents of the new image `name`, for which [`can_fill_from_host`] is true. `range` is the whole image.
 ///
 /// # Safety
 /// The image is new and has the usage for host copies. The regions are different mips of it, each with all of its bytes.
 pub(crate) unsafe fn fill_from_host(
     gpu: &Gpu,
     image: vk::Image,
+    name: &str,
     range: vk::ImageSubresourceRange,
     contents: &[(Region, &[u8])],
 ) -> Result<()> {
@@ -52,7 +53,7 @@ pub(crate) unsafe fn fill_from_host(
     };
     let copies_to_make: Vec<_> = contents.iter().map(copy).collect();
     // SAFETY: guaranteed by the caller.
-    unsafe { copies.write_image(image, range, &copies_to_make) }
+    unsafe { copies.write_image(image, name, range, &copies_to_make) }
 }
 
 #[cfg(test)]

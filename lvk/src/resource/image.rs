@@ -118,7 +118,7 @@ impl Image {
         }
         // SAFETY: the description is checked against the limits of its format.
         let raw = unsafe { gpu.device.create_image(&info, None) }
-            .map_err(Error::creating("vkCreateImage", desc.debug_name))?;
+            .map_err(Error::vulkan("vkCreateImage", desc.debug_name))?;
         let mut image = Self::from_raw(gpu, desc, &plan, raw, false);
         image.host_filled = host_filled;
         gpu.name(raw, desc.debug_name);
@@ -253,7 +253,7 @@ impl Image {
         self.memory = Some(memory);
         // SAFETY: the memory was allocated for this image's requirements and is bound once.
         let bound = unsafe { self.gpu.device.bind_image_memory(self.raw, raw, offset) };
-        bound.map_err(Error::creating("vkBindImageMemory", name))
+        bound.map_err(Error::vulkan("vkBindImageMemory", name))
     }
 
     /// True if several textures show the image.
@@ -391,7 +391,7 @@ fn create_shared(
         info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
     }
     // SAFETY: the description is checked against the limits of its format, and the driver shares such images.
-    unsafe { gpu.device.create_image(&info, None) }.map_err(Error::creating("vkCreateImage", desc.debug_name))
+    unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage", desc.debug_name))
 }
 
 /// True if all queues may use the image without an ownership transfer. An image that is only copied and sampled loses

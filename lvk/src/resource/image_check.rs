@@ -233,8 +233,7 @@ fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> Result<vk::ImageCreate
             if layers >= 6 && desc.extent[0] == desc.extent[1] && desc.samples == 1 =>
         {
             let small = desc.extent[0] <= gpu.caps.limits.max_texture_cube;
-            let limits = gpu.image_limits(&image_info(desc, mips).flags(cube));
-            let limits = limits.map_err(|error| error.with_object(desc.debug_name))?;
+            let limits = gpu.image_limits(&image_info(desc, mips).flags(cube), desc.debug_name)?;
             let allowed = limits.is_some_and(|limits| limits.max_array_layers >= layers);
             if small && allowed { cube } else { formats }
         }
@@ -280,7 +279,7 @@ fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_
     if gpu.format_features(desc.format).is_empty() {
         return Err(refused());
     }
-    let limits = gpu.image_limits(info).map_err(|error| error.with_object(name))?.ok_or_else(refused)?;
+    let limits = gpu.image_limits(info, name)?.ok_or_else(refused)?;
     let formats = [desc.format].into_iter().chain(desc.view_formats.iter().copied());
     let usages: TextureUsage =
         formats.map(|format| usage_from_features(gpu.format_features(format))).collect();

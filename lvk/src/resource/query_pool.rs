@@ -197,7 +197,7 @@ impl QueryPool {
         }
         // SAFETY: the description is valid.
         let raw = unsafe { gpu.device.create_query_pool(&info, None) }
-            .map_err(Error::creating("vkCreateQueryPool", desc.debug_name))?;
+            .map_err(Error::vulkan("vkCreateQueryPool", desc.debug_name))?;
         // SAFETY: `hostQueryReset` is on and no command uses the new pool.
         unsafe { gpu.device.reset_query_pool(raw, 0, desc.count) };
         gpu.name(raw, desc.debug_name);
@@ -305,7 +305,7 @@ impl QueryPool {
         // SAFETY: the queries exist, and a `T` holds the numbers and the availability of one query.
         match unsafe { self.gpu.device.get_query_pool_results(self.raw, first, raw, flags) } {
             Ok(()) | Err(vk::Result::NOT_READY) => Ok(()),
-            Err(result) => Err(Error::vulkan("vkGetQueryPoolResults")(result)),
+            Err(result) => Err(Error::vulkan("vkGetQueryPoolResults", &self.name)(result)),
         }
     }
 

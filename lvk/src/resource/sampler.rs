@@ -232,7 +232,7 @@ impl Sampler {
         }
         // SAFETY: the description is valid, and the features it needs are on.
         let raw = unsafe { gpu.device.create_sampler(&info, None) }
-            .map_err(Error::creating("vkCreateSampler", desc.debug_name))?;
+            .map_err(Error::vulkan("vkCreateSampler", desc.debug_name))?;
         gpu.name(raw, desc.debug_name);
         let name = desc.debug_name.to_owned();
         Ok(Self { raw, slot, name, _custom_border: custom_border, gpu: Arc::clone(gpu) })

@@ -161,13 +161,13 @@ pub(crate) fn plane_layouts(layout: &DrmLayout) -> Vec<vk::SubresourceLayout> {
     layout.planes.iter().map(raw).collect()
 }
 
-/// Returns the layout of an image in a dma-buf (`vkGetImageDrmFormatModifierPropertiesEXT`).
-pub(crate) fn drm_layout(gpu: &Gpu, image: vk::Image, format: vk::Format) -> Result<DrmLayout> {
+/// Returns the layout of the image `name` in a dma-buf (`vkGetImageDrmFormatModifierPropertiesEXT`).
+pub(crate) fn drm_layout(gpu: &Gpu, image: vk::Image, format: vk::Format, name: &str) -> Result<DrmLayout> {
     let functions = ash::ext::image_drm_format_modifier::Device::new(&gpu.instance.raw, &gpu.device);
     let mut found = vk::ImageDrmFormatModifierPropertiesEXT::default();
     // SAFETY: the image belongs to the device and was created with a modifier.
     unsafe { functions.get_image_drm_format_modifier_properties(image, &mut found) }
-        .map_err(Error::vulkan("vkGetImageDrmFormatModifierPropertiesEXT"))?;
+        .map_err(Error::vulkan("vkGetImageDrmFormatModifierPropertiesEXT", name))?;
     let modifier = found.drm_format_modifier;
     let all = format_modifiers(gpu, format);
     let known = all.iter().find(|known| known.drm_format_modifier == modifier);

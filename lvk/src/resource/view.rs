@@ -113,7 +113,7 @@ impl ViewCache {
         }
         // SAFETY: the image is alive, the range lies inside it, and it allows the kind, the format and the usage.
         let view = unsafe { self.gpu.device.create_image_view(&create, None) }
-            .map_err(Error::creating("vkCreateImageView", name))?;
+            .map_err(Error::vulkan("vkCreateImageView", name))?;
         self.gpu.name(view, name);
         Ok(view)
     }

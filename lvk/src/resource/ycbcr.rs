@@ -132,7 +132,7 @@ impl YuvSampler {
         let device = &gpu.device;
         // SAFETY: the device has the format with this filter and these chroma locations, and the feature is on.
         let conversion = unsafe { device.create_sampler_ycbcr_conversion(&desc.info(), None) }
-            .map_err(Error::creating("vkCreateSamplerYcbcrConversion", "yuv sampler"))?;
+            .map_err(Error::vulkan("vkCreateSamplerYcbcrConversion", "yuv sampler"))?;
         let descriptors = descriptor_count(gpu, desc.format);
         let mut made = Self { conversion, sampler: vk::Sampler::null(), descriptors, gpu: Arc::clone(gpu) };
         let mut chain = vk::SamplerYcbcrConversionInfo::default().conversion(conversion);
@@ -147,7 +147,7 @@ impl YuvSampler {
             .push_next(&mut chain);
         // SAFETY: the description suits the conversion.
         made.sampler = unsafe { device.create_sampler(&info, None) }
-            .map_err(Error::creating("vkCreateSampler", "yuv sampler"))?;
+            .map_err(Error::vulkan("vkCreateSampler", "yuv sampler"))?;
         gpu.name(made.sampler, "yuv sampler");
         Ok(Ok(made))
     }

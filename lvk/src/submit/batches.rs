@@ -5,6 +5,7 @@ use ash::vk;
 use crate::cpu_scope::cpu_scope;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::queue::Queue;
 
 /// One or two batches. A batch begins once all of its waits are satisfied, and the last one signals. The lists are
 /// cleared and reused, so that submissions do not allocate on the heap.
@@ -61,7 +62,9 @@ impl Batches {
         let submits = if self.second.is_some() { &both[..] } else { &both[1..] };
         let queue = gpu.queues.raw(queue_index);
         // SAFETY: the command buffers are complete and used once; the queue is locked.
-        unsafe { gpu.device.queue_submit2(*queue, submits, vk::Fence::null()) }
-            .map_err(Error::vulkan("vkQueueSubmit2"))
+        unsafe { gpu.device.queue_submit2(*queue, submits, vk::Fence::null()) }.map_err(Error::vulkan(
+            "vkQueueSubmit2",
+            format_args!("{} queue", Queue::ALL[queue_index].label()),
+        ))
     }
 }

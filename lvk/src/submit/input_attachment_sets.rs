@@ -44,14 +44,14 @@ impl InputSets {
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(Self::BATCH as u32).pool_sizes(&sizes);
         // SAFETY: the description is valid.
         let pool = unsafe { gpu.device.create_descriptor_pool(&info, None) }
-            .map_err(Error::creating("vkCreateDescriptorPool", "input attachments"))?;
+            .map_err(Error::vulkan("vkCreateDescriptorPool", "input attachments"))?;
         self.pools.push(pool);
         gpu.name(pool, "input attachments of a command buffer");
         let layouts = [layout; Self::BATCH];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         // SAFETY: the pool is new and has capacity for these sets.
         let sets = unsafe { gpu.device.allocate_descriptor_sets(&info) }
-            .map_err(Error::creating("vkAllocateDescriptorSets", "input attachments"))?;
+            .map_err(Error::vulkan("vkAllocateDescriptorSets", "input attachments"))?;
         self.sets.extend(sets);
         Ok(())
     }

@@ -43,7 +43,7 @@ impl<T> Submitter<T> {
         let complete = || {
             let fault = report.fault.clone().or_else(|| self.gpu().query_fault());
             let queues = self.unfinished_queues(ring, last);
-            Arc::new(DeviceLossReport { call: report.call, fault, queues })
+            Arc::new(DeviceLossReport { call: report.call, object: report.object.clone(), fault, queues })
         };
         Error::DeviceLost { report: Arc::clone(self.loss().get_or_init(complete)) }
     }

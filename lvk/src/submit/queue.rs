@@ -18,6 +18,7 @@ use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::device_loss::DeviceLossReport;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::caps::queues::IdleFailure;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
 
@@ -94,8 +95,11 @@ pub(crate) struct Finished<T> {
 
 impl<T> Submitter<T> {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
-        const NAMES: [&str; QUEUE_COUNT] =
-            ["queue timeline", "compute queue timeline", "transfer queue timeline"];
+        const NAMES: [&str; QUEUE_COUNT] = [
+            "timeline semaphore of the graphics queue",
+            "timeline semaphore of the compute queue",
+            "timeline semaphore of the transfer queue",
+        ];
         let has_several = gpu.queues.has_several();
         let count = if has_several { QUEUE_COUNT } else { 1 };
         let timelines =
@@ -221,7 +225,7 @@ impl<T> Submitter<T> {
         submission: &mut Submission,
         prepare: impl FnOnce(),
     ) -> Result<u64> {
-        submission.recordings().try_for_each(|part| end_commands(&self.gpu, part.commands))?;
+        submission.recordings().try_for_each(|part| end_commands(&self.gpu, part.commands, part.name()))?;
         if inner.queue_sync.is_multi_queue() && submission.recordings().next().is_some() {
             prepare();
             return self.submit_to_several(inner, submission);
@@ -244,9 +248,9 @@ impl<T> Submitter<T> {
             let barriers = inner.queue_sync.submit_single_queue(&recording.tracker);
             if !barriers.is_empty() {
                 let prologue = recording.prologue(&self.gpu)?;
-                begin_commands(&self.gpu, prologue)?;
+                begin_commands(&self.gpu, prologue, recording.name())?;
                 emit(&self.gpu, prologue, &barriers, &recording.images, &mut LastBarrier::default());
-                end_commands(&self.gpu, prologue)?;
+                end_commands(&self.gpu, prologue, recording.name())?;
                 inner.batches.push(prologue);
             }
             inner.batches.push(recording.commands);
@@ -284,12 +288,12 @@ impl<T> Submitter<T> {
     fn record_prologue(&self, recording: &mut Recording, plan: &SubmitPlan) -> Result<vk::CommandBuffer> {
         let commands = recording.prologue(&self.gpu)?;
         let images = &recording.images;
-        begin_commands(&self.gpu, commands)?;
+        begin_commands(&self.gpu, commands, recording.name())?;
         if !plan.acquires.is_empty() {
             emit_ownership_transfers(&self.gpu, commands, &plan.acquires, images, Side::Acquire);
         }
         emit(&self.gpu, commands, &plan.barriers, images, &mut LastBarrier::default());
-        end_commands(&self.gpu, commands)?;
+        end_commands(&self.gpu, commands, recording.name())?;
         Ok(commands)
     }
 
@@ -304,7 +308,7 @@ impl<T> Submitter<T> {
         let sequence = ticket.sequence;
         let mut recording = ticket.begin(&self.gpu).inspect_err(|_| inner.ring.end_recording(sequence))?;
         recording.labels.set_name("ownership transfer");
-        let sent = self.record_transfers(inner, release, recording.commands, images);
+        let sent = self.record_transfers(inner, release, &recording, images);
         recording.value = if sent.is_ok() { release.value } else { 0 };
         inner.file_recording(recording);
         sent
@@ -314,11 +318,12 @@ impl<T> Submitter<T> {
         &self,
         inner: &mut SubmitterState<T>,
         release: &OwnershipRelease,
-        commands: vk::CommandBuffer,
+        recording: &Recording,
         images: &Images,
     ) -> Result<()> {
+        let commands = recording.commands;
         emit_ownership_transfers(&self.gpu, commands, &release.parts, images, Side::Release);
-        end_commands(&self.gpu, commands)?;
+        end_commands(&self.gpu, commands, recording.name())?;
         inner.batches.wait(self.queue_waits(&release.waits));
         inner.batches.push(commands);
         self.submit_batches(inner, release.queue_index, release.value)
@@ -419,7 +424,7 @@ impl<T> Submitter<T> {
     pub(crate) fn wait_for_semaphores(&self) -> Result<()> {
         if self.uses_external_semaphores.load(Ordering::Relaxed) {
             let idle = self.gpu.queues.wait_idle(&self.gpu.device);
-            self.explain_loss(idle.map_err(Error::vulkan("vkQueueWaitIdle")))?;
+            self.explain_loss(idle.map_err(IdleFailure::into_error))?;
         }
         Ok(())
     }
@@ -427,6 +432,16 @@ impl<T> Submitter<T> {
     /// Returns true if the submission of this value is done.
     pub(crate) fn is_done(&self, value: u64) -> Result<bool> {
         Ok(self.explain_loss(self.timeline(self.queue_of(value)).query_completed())? >= value)
+    }
+
+    /// Returns true if all submissions of all queues are done.
+    pub(crate) fn is_all_done(&self) -> Result<bool> {
+        for timeline in &self.timelines {
+            if !self.explain_loss(timeline.is_done())? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Returns the value up to which all submissions are done.

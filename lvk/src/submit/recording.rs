@@ -1,5 +1,7 @@
 //! Command buffers with their tracker: recorded, run by the GPU, and recorded again with all their memory.
 
+use std::fmt;
+
 use ash::vk;
 
 use super::emit_barriers::Images;
@@ -9,6 +11,7 @@ use super::last_access::{QueueAccess, TimelineVector};
 use crate::barrier::{ResourceId, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::queue::Queue;
 
 /// A command buffer that is being recorded, submitted, or free.
 pub(crate) struct Recording {
@@ -46,11 +49,11 @@ impl Recording {
             .queue_family_index(gpu.queues.family(queue_index));
         // SAFETY: the queue family is the device's own.
         let pool = unsafe { gpu.device.create_command_pool(&info, None) }
-            .map_err(Error::creating("vkCreateCommandPool", "command pool"))?;
+            .map_err(Error::vulkan("vkCreateCommandPool", CommandsName { debug_name: "", queue_index }))?;
         gpu.name(pool, "command pool");
         // SAFETY: where there is no command buffer, the pool is unused.
-        let commands =
-            allocate(gpu, pool).inspect_err(|_| unsafe { gpu.device.destroy_command_pool(pool, None) })?;
+        let commands = allocate(gpu, pool, CommandsName { debug_name: "", queue_index })
+            .inspect_err(|_| unsafe { gpu.device.destroy_command_pool(pool, None) })?;
         Ok(Box::new(Self {
             sequence: 0,
             commands,
@@ -70,7 +73,7 @@ impl Recording {
 
     /// Begins recording again. Neither the GPU nor other code uses the command buffer. On failure it is destroyed.
     pub(super) fn begin(mut self: Box<Self>, gpu: &Gpu) -> Result<Box<Self>> {
-        match self.reset(gpu).and_then(|()| begin_commands(gpu, self.commands)) {
+        match self.reset(gpu).and_then(|()| begin_commands(gpu, self.commands, self.name())) {
             Ok(()) => Ok(self),
             Err(error) => {
                 self.destroy(gpu);
@@ -89,13 +92,18 @@ impl Recording {
         self.inputs.reset();
         // SAFETY: the command buffers of the pool are not in use.
         unsafe { gpu.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
-            .map_err(Error::vulkan("vkResetCommandPool"))
+            .map_err(Error::vulkan("vkResetCommandPool", self.name()))
     }
 
     /// Sets the name in reports and in debuggers, until the command buffer is recorded again.
     pub(crate) fn set_name(&mut self, gpu: &Gpu, name: &str) {
         self.labels.set_name(name);
         gpu.name(self.commands, name);
+    }
+
+    /// Returns the name of the command buffer in errors.
+    pub(super) fn name(&self) -> CommandsName<'_> {
+        CommandsName { debug_name: self.labels.name(), queue_index: self.queue_index }
     }
 
     fn clear_labels(&mut self, gpu: &Gpu) {
@@ -133,7 +141,7 @@ impl Recording {
         if let Some(made) = self.prologue {
             return Ok(made);
         }
-        let made = allocate(gpu, self.pool)?;
+        let made = allocate(gpu, self.pool, self.name())?;
         gpu.name(made, "barriers before a command buffer");
         self.prologue = Some(made);
         Ok(made)
@@ -147,23 +155,54 @@ impl Recording {
     }
 }
 
-fn allocate(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
+/// The name of a command buffer in errors: its debug name, or its queue where it has none.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CommandsName<'a> {
+    /// Name given by [`set_name`](Recording::set_name); empty without one.
+    debug_name: &'a str,
+    queue_index: usize,
+}
+
+impl fmt::Display for CommandsName<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.debug_name {
+            "" => write!(out, "command buffer of the {} queue", Queue::ALL[self.queue_index].label()),
+            name => out.write_str(name),
+        }
+    }
+}
+
+fn allocate(gpu: &Gpu, pool: vk::CommandPool, name: CommandsName<'_>) -> Result<vk::CommandBuffer> {
     let info = vk::CommandBufferAllocateInfo::default()
         .command_pool(pool)
         .level(vk::CommandBufferLevel::PRIMARY)
         .command_buffer_count(1);
     // SAFETY: the pool is alive, and no other thread uses it.
     let made = unsafe { gpu.device.allocate_command_buffers(&info) };
-    made.map(|buffers| buffers[0]).map_err(Error::creating("vkAllocateCommandBuffers", "command buffer"))
+    made.map(|buffers| buffers[0]).map_err(Error::vulkan("vkAllocateCommandBuffers", name))
 }
 
-pub(super) fn begin_commands(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
+pub(super) fn begin_commands(gpu: &Gpu, commands: vk::CommandBuffer, name: CommandsName<'_>) -> Result<()> {
     let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
     // SAFETY: the command buffer is new or was reset with its pool.
-    unsafe { gpu.device.begin_command_buffer(commands, &info) }.map_err(Error::vulkan("vkBeginCommandBuffer"))
+    unsafe { gpu.device.begin_command_buffer(commands, &info) }
+        .map_err(Error::vulkan("vkBeginCommandBuffer", name))
 }
 
-pub(super) fn end_commands(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
+pub(super) fn end_commands(gpu: &Gpu, commands: vk::CommandBuffer, name: CommandsName<'_>) -> Result<()> {
     // SAFETY: the command buffer is being recorded, outside of a render pass.
-    unsafe { gpu.device.end_command_buffer(commands) }.map_err(Error::vulkan("vkEndCommandBuffer"))
+    unsafe { gpu.device.end_command_buffer(commands) }.map_err(Error::vulkan("vkEndCommandBuffer", name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_buffers_without_a_debug_name_have_that_of_their_queue() {
+        let name = |debug_name, queue_index| CommandsName { debug_name, queue_index }.to_string();
+        assert_eq!(name("shadows", 0), "shadows");
+        assert_eq!(name("", 0), "command buffer of the graphics queue");
+        assert_eq!(name("", 2), "command buffer of the transfer queue");
+    }
 }

@@ -33,20 +33,21 @@ impl SubmitHandle {
 /// A timeline semaphore with the last value seen, and the last value submitted.
 pub(crate) struct Timeline {
     pub(crate) raw: vk::Semaphore,
+    name: &'static str,
     seen: AtomicU64,
     sent: AtomicU64,
     gpu: Arc<Gpu>,
 }
 
 impl Timeline {
-    pub(crate) fn new(gpu: &Arc<Gpu>, name: &str) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, name: &'static str) -> Result<Self> {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: the feature `timelineSemaphore` is enabled.
         let raw = unsafe { gpu.device.create_semaphore(&info, None) }
-            .map_err(Error::creating("vkCreateSemaphore", name))?;
+            .map_err(Error::vulkan("vkCreateSemaphore", name))?;
         gpu.name(raw, name);
-        Ok(Self { raw, seen: AtomicU64::new(0), sent: AtomicU64::new(0), gpu: Arc::clone(gpu) })
+        Ok(Self { raw, name, seen: AtomicU64::new(0), sent: AtomicU64::new(0), gpu: Arc::clone(gpu) })
     }
 
     /// Returns the last value that the GPU is known to have reached, without a query.
@@ -67,9 +68,14 @@ impl Timeline {
         }
         // SAFETY: the semaphore is alive and a timeline.
         let value = unsafe { self.gpu.device.get_semaphore_counter_value(self.raw) }
-            .map_err(Error::vulkan("vkGetSemaphoreCounterValue"))?;
+            .map_err(Error::vulkan("vkGetSemaphoreCounterValue", self.name))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(value)
+    }
+
+    /// Returns true if all submitted work is done.
+    pub(crate) fn is_done(&self) -> Result<bool> {
+        Ok(self.query_completed()? >= self.sent.load(Ordering::Acquire))
     }
 
     /// Returns the value that the GPU of a lost device has reached, as far as it is known. A value beyond `submitted`
@@ -91,7 +97,7 @@ impl Timeline {
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore is alive and a timeline; `value` was submitted, so the wait ends.
         unsafe { self.gpu.device.wait_semaphores(&info, u64::MAX) }
-            .map_err(Error::vulkan("vkWaitSemaphores"))?;
+            .map_err(Error::vulkan("vkWaitSemaphores", self.name))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(())
     }

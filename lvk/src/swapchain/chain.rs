@@ -67,7 +67,7 @@ impl Chain {
         }
         // SAFETY: the surface supports the plan's parameters; the old swapchain is of the same surface and locked.
         let raw = with_shared_loader_lock(|| unsafe { functions.swapchain.create_swapchain(&info, None) })
-            .map_err(Failure::from_result("vkCreateSwapchainKHR"))?;
+            .map_err(Failure::from_result("vkCreateSwapchainKHR", name))?;
         gpu.name(raw, name);
         Ok(Self { raw, surface: Arc::clone(surface) })
     }
@@ -77,7 +77,7 @@ impl Chain {
         let functions = &self.gpu().window_functions()?.swapchain;
         // SAFETY: the swapchain is alive.
         unsafe { functions.get_swapchain_images(self.raw) }
-            .map_err(Failure::from_result("vkGetSwapchainImagesKHR"))
+            .map_err(Failure::from_result("vkGetSwapchainImagesKHR", &self.surface.name))
     }
 
     /// Sets the HDR metadata of the images (`vkSetHdrMetadataEXT`), if the device supports it.
@@ -101,7 +101,7 @@ impl Chain {
         match answer {
             Ok((index, suboptimal)) => Ok(Acquired::Image { index, suboptimal }),
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(Acquired::NotYet),
-            Err(result) => Err(Failure::from_result("vkAcquireNextImageKHR")(result)),
+            Err(result) => Err(Failure::from_result("vkAcquireNextImageKHR", &self.surface.name)(result)),
         }
     }
 
@@ -124,7 +124,7 @@ impl Chain {
         // SAFETY: the image was acquired, a submission that signals the semaphore is pending, the fence is not in use,
         // and swapchain and queue are locked.
         unsafe { functions.swapchain.queue_present(*queue, &info) }
-            .map_err(Failure::from_result("vkQueuePresentKHR"))
+            .map_err(Failure::from_result("vkQueuePresentKHR", &self.surface.name))
     }
 
     fn gpu(&self) -> &Arc<Gpu> {
@@ -152,6 +152,8 @@ pub(crate) struct PresentSync {
     /// True if the presentation engine never finishes the image's presents, as far as the library can tell. For tests.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) stalls: bool,
+    /// Debug name of the swapchain.
+    name: Box<str>,
     gpu: Arc<Gpu>,
 }
 
@@ -164,12 +166,13 @@ impl PresentSync {
             presented: false,
             #[cfg(any(test, feature = "test-hooks"))]
             stalls: false,
+            name: name.into(),
             gpu: Arc::clone(gpu),
         };
         if gpu.window_functions()?.maintenance.is_some() {
             // SAFETY: no preconditions.
             let fence = unsafe { gpu.device.create_fence(&vk::FenceCreateInfo::default(), None) };
-            sync.present_fence = Some(fence.map_err(Error::creating("vkCreateFence", name))?);
+            sync.present_fence = Some(fence.map_err(Error::vulkan("vkCreateFence", name))?);
         }
         Ok(sync)
     }
@@ -179,10 +182,10 @@ impl PresentSync {
     pub(crate) fn reset(&self) -> Result<()> {
         let Some(fence) = self.present_fence.filter(|_| self.presented) else { return Ok(()) };
         if !self.wait(PRESENT_TIMEOUT_NS)? {
-            return Err(Error::vulkan("vkWaitForFences")(vk::Result::TIMEOUT));
+            return Err(Error::vulkan("vkWaitForFences", &self.name)(vk::Result::TIMEOUT));
         }
         // SAFETY: the fence is alive and no longer in use.
-        unsafe { self.gpu.device.reset_fences(&[fence]) }.map_err(Error::vulkan("vkResetFences"))
+        unsafe { self.gpu.device.reset_fences(&[fence]) }.map_err(Error::vulkan("vkResetFences", &self.name))
     }
 
     /// True if the completion of the last present is known or can be queried.
@@ -198,7 +201,7 @@ impl PresentSync {
         let Some(fence) = self.present_fence else { return Ok(None) };
         // SAFETY: the fence is alive.
         let status = unsafe { self.gpu.device.get_fence_status(fence) };
-        status.map(Some).map_err(Error::vulkan("vkGetFenceStatus"))
+        status.map(Some).map_err(Error::vulkan("vkGetFenceStatus", &self.name))
     }
 
     /// Waits at most `timeout_ns` nanoseconds until the presents are finished, if the device can tell. Returns true if
@@ -211,7 +214,7 @@ impl PresentSync {
             Ok(()) if self.stalls => Ok(false),
             Ok(()) => Ok(true),
             Err(vk::Result::TIMEOUT) => Ok(false),
-            Err(result) => Err(Error::vulkan("vkWaitForFences")(result)),
+            Err(result) => Err(Error::vulkan("vkWaitForFences", &self.name)(result)),
         }
     }
 }
@@ -231,7 +234,7 @@ impl Drop for PresentSync {
 pub(crate) fn new_semaphore(gpu: &Gpu, name: &str) -> Result<vk::Semaphore> {
     // SAFETY: no preconditions.
     let raw = unsafe { gpu.device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }
-        .map_err(Error::creating("vkCreateSemaphore", name))?;
+        .map_err(Error::vulkan("vkCreateSemaphore", name))?;
     gpu.name(raw, name);
     Ok(raw)
 }

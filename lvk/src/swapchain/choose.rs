@@ -85,8 +85,8 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// Returns the failure for a result of `call`.
-    pub(crate) fn from_result(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
+    /// Returns the failure for a result of `call` about the swapchain `name`.
+    pub(crate) fn from_result(call: &'static str, name: &str) -> impl FnOnce(vk::Result) -> Self {
         move |result| match result {
             vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
                 Self::OutOfDate
@@ -97,7 +97,7 @@ impl Failure {
                     "the window has another swapchain, or another program draws to it; destroy that first";
                 Self::Other(Error::usage("window", message))
             }
-            result => Self::Other(Error::vulkan(call)(result)),
+            result => Self::Other(Error::vulkan(call, name)(result)),
         }
     }
 }
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn answers_mean_another_swapchain_another_surface_or_an_error() {
-        let of = |result| Failure::from_result("vkAcquireNextImageKHR")(result);
+        let of = |result| Failure::from_result("vkAcquireNextImageKHR", "main window")(result);
         assert!(matches!(of(vk::Result::ERROR_OUT_OF_DATE_KHR), Failure::OutOfDate));
         assert!(matches!(of(vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT), Failure::OutOfDate));
         assert!(matches!(of(vk::Result::ERROR_SURFACE_LOST_KHR), Failure::SurfaceLost));

@@ -554,7 +554,7 @@ mod tests {
     fn a_failure_that_no_swapchain_helps_with_is_answered_once() {
         let (mut state, mut backend) = (SwapchainState::new(), Scripted::new(Vec::new()));
         state.acquire_image("window", &mut backend).unwrap();
-        let lost = Error::device_lost("vkQueuePresentKHR");
+        let lost = Error::device_lost("vkQueuePresentKHR", "main window");
         assert!(matches!(state.record_present(Err(Failure::Other(lost))), Err(Error::DeviceLost { .. })));
     }
 }

@@ -176,7 +176,8 @@ impl SwapchainResources {
         }
         let queue = self.gpu.graphics_queue();
         // SAFETY: the queue is locked.
-        unsafe { self.gpu.device.queue_wait_idle(*queue) }.map_err(Error::vulkan("vkQueueWaitIdle"))
+        unsafe { self.gpu.device.queue_wait_idle(*queue) }
+            .map_err(Error::vulkan("vkQueueWaitIdle", "graphics queue"))
     }
 
     /// Destroys all replaced swapchains. Their presents are finished or abandoned.

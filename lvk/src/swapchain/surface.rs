@@ -16,6 +16,8 @@ pub(crate) struct Surface {
     pub(crate) raw: vk::SurfaceKHR,
     pub(crate) gpu: Arc<Gpu>,
     pub(crate) window: Arc<dyn WindowHandles>,
+    /// Debug name of its swapchain.
+    pub(crate) name: Box<str>,
 }
 
 /// Properties of a surface that swapchain creation needs.
@@ -28,13 +30,13 @@ impl Surface {
     /// Creates the surface of a window that the context's queue can present to.
     pub(crate) fn new(gpu: &Arc<Gpu>, window: &Arc<dyn WindowHandles>, name: &str) -> Result<Self> {
         let functions = gpu.window_functions()?;
-        let raw = create_surface(&gpu.instance, window.as_ref())?;
-        let surface = Self { raw, gpu: Arc::clone(gpu), window: Arc::clone(window) };
+        let raw = create_surface(&gpu.instance, window.as_ref(), name)?;
+        let surface = Self { raw, gpu: Arc::clone(gpu), window: Arc::clone(window), name: name.into() };
         // SAFETY: the surface belongs to the instance of the device.
         let presents = unsafe {
             functions.surface.get_physical_device_surface_support(gpu.physical(), gpu.queues.family(0), raw)
         };
-        if presents.map_err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR"))? {
+        if presents.map_err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR", name))? {
             gpu.name(raw, name);
             return Ok(surface);
         }
@@ -47,7 +49,7 @@ impl Surface {
         // SAFETY: the surface belongs to the instance of the device.
         let raw =
             unsafe { functions.get_physical_device_surface_capabilities(self.gpu.physical(), self.raw) }
-                .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceCapabilitiesKHR"))?;
+                .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", &self.name))?;
         let size = |extent: vk::Extent2D| [extent.width, extent.height];
         let limits = SurfaceLimits {
             min_images: raw.min_image_count,
@@ -64,7 +66,7 @@ impl Surface {
         let functions = &self.functions()?.surface;
         // SAFETY: as above.
         unsafe { functions.get_physical_device_surface_formats(self.gpu.physical(), self.raw) }
-            .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceFormatsKHR"))
+            .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceFormatsKHR", &self.name))
     }
 
     /// Queries the present modes that the library supports.
@@ -73,7 +75,7 @@ impl Surface {
         // SAFETY: as above.
         let modes =
             unsafe { functions.get_physical_device_surface_present_modes(self.gpu.physical(), self.raw) }
-                .map_err(Failure::from_result("vkGetPhysicalDeviceSurfacePresentModesKHR"))?;
+                .map_err(Failure::from_result("vkGetPhysicalDeviceSurfacePresentModesKHR", &self.name))?;
         Ok(modes.into_iter().filter_map(PresentMode::from_raw).collect())
     }
 
@@ -90,7 +92,7 @@ impl Surface {
         unsafe {
             functions.get_physical_device_surface_capabilities2(self.gpu.physical(), &info, &mut capabilities)
         }
-        .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceCapabilities2KHR"))?;
+        .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceCapabilities2KHR", &self.name))?;
         let count = (compatible.present_mode_count as usize).min(raw.len());
         let others = raw[..count].iter().filter_map(|raw| PresentMode::from_raw(*raw));
         Ok([mode].into_iter().chain(others.filter(|other| *other != mode)).collect())

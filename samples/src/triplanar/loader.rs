@@ -40,7 +40,10 @@ impl Loader {
             }
         };
         let spawned = thread::Builder::new().name("textures".to_owned()).spawn(work);
-        let thread = spawned.map_err(|_| Error::OutOfHostMemory { call: "std::thread::Builder::spawn" })?;
+        let thread = spawned.map_err(|_| Error::OutOfHostMemory {
+            call: "std::thread::Builder::spawn",
+            object: "textures".to_owned(),
+        })?;
         Ok(Self { requests: Some(requests), answers, thread: Some(thread) })
     }
 

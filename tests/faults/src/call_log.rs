@@ -1,6 +1,6 @@
 //! The log that the layer writes: calls, the fault, and live objects.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::fault::FaultError;
 
@@ -20,6 +20,8 @@ pub struct CallLog {
     pub calls: Vec<Call>,
     /// True if the call that was to fail was reached.
     pub reached: bool,
+    /// Commands that told other threads of the loss of a device, which these may report first.
+    pub told_others: BTreeSet<String>,
     /// Objects that were alive at the end, by type. An instance among them says that others may be, too.
     pub live: BTreeMap<String, i64>,
 }
@@ -37,6 +39,7 @@ impl CallLog {
                     errors: words.filter_map(FaultError::named).collect(),
                 })),
                 Some("fault") => log.reached = true,
+                Some("told") => log.told_others.extend(words.next().map(str::to_owned)),
                 Some("live") => log.live = words.filter_map(live_count).collect(),
                 _ => {}
             }
@@ -60,6 +63,11 @@ pub(crate) fn fault_line(command: &str) -> String {
     format!("fault {command}")
 }
 
+/// Returns the line for a call on a lost device, by another thread than that of the fault.
+pub(crate) fn told_line(command: &str) -> String {
+    format!("told {command}")
+}
+
 /// Returns the line for the live objects, at the creation and at the end of an instance.
 pub(crate) fn live_line(live: &BTreeMap<&'static str, i64>) -> String {
     let counts = live.iter().filter(|(_, count)| **count != 0);
@@ -77,12 +85,15 @@ mod tests {
             call_line("vkQueueSubmit2", &errors),
             live_line(&BTreeMap::from([("VkInstance", 1)])),
             fault_line("vkCreateBuffer"),
+            told_line("vkWaitSemaphores"),
+            told_line("vkWaitSemaphores"),
             live_line(&BTreeMap::from([("VkInstance", 0), ("VkBuffer", 2)])),
             "ca".to_owned(),
         ];
         let expected = CallLog {
             calls: vec![Call { command: "vkQueueSubmit2".into(), errors: errors.to_vec() }],
             reached: true,
+            told_others: BTreeSet::from(["vkWaitSemaphores".to_owned()]),
             live: BTreeMap::from([("VkBuffer".to_owned(), 2)]),
         };
         assert_eq!(CallLog::parse(&text.join("\n")), expected);

@@ -7,5 +7,6 @@
 
 pub mod call_log;
 pub mod fault;
+pub mod fault_report;
 pub mod layer;
 pub mod sweep;

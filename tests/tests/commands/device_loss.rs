@@ -96,8 +96,8 @@ fn unfinished_command_buffers_are_reported_with_their_names_and_labels() {
     assert_eq!(
         text,
         format!(
-            "the device was lost in vkQueueSubmit2; the graphics queue had not finished submission {} 'frame' with the \
-             labels 'shadow', 'shade', nor 1 after it; create a new context",
+            "the device was lost in vkQueueSubmit2 for 'graphics queue'; the graphics queue had not finished \
+             submission {} 'frame' with the labels 'shadow', 'shade', nor 1 after it; create a new context",
             values[0]
         )
     );
@@ -143,11 +143,11 @@ fn names_and_labels_end_with_their_command_buffer() {
 }
 
 #[test]
-fn a_loss_without_unfinished_work_names_the_call_alone() {
+fn a_loss_without_unfinished_work_names_the_call_and_its_queue_alone() {
     let Some(ctx) = context(QueueRequest::Shared) else { return };
     ctx.wait_idle().unwrap();
     let report = lose(&ctx);
-    assert_eq!(report.to_string(), "the device was lost in vkQueueSubmit2");
+    assert_eq!(report.to_string(), "the device was lost in vkQueueSubmit2 for 'graphics queue'");
     assert!(report.queues.is_empty());
 }
 

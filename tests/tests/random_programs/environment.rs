@@ -1,5 +1,7 @@
 //! A context, the pipelines of the programs, and another context whose handles are foreign.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context,
     Holder, QueueRequest, SubmitHandle, TextureDesc, TextureHandle, Triangles, ValidationSink,
@@ -64,8 +66,10 @@ pub struct Environment {
     sinks: [ValidationSink; 2],
     /// Bytes of acceleration structures before any program.
     own_bytes: u64,
-    /// True if the model is wrong on purpose: fills write another value than the model expects.
-    pub lies: bool,
+    /// Number of threads from which on the model is wrong on purpose: fills write another value than it expects.
+    pub lies_from: Option<usize>,
+    /// Number of threads of the program that runs.
+    threads: AtomicUsize,
 }
 
 impl Environment {
@@ -78,12 +82,30 @@ impl Environment {
         let foreign = Foreign::new(other);
         let (Ok(kit), Ok(foreign)) = (kit, foreign) else { unreachable!("the set-up of the programs fails") };
         let own_bytes = ctx.accel_memory().structure_bytes;
-        Some(Self { own_bytes, kit, foreign, ctx, sinks: [sink, other_sink], lies: false })
+        Some(Self {
+            own_bytes,
+            kit,
+            foreign,
+            ctx,
+            sinks: [sink, other_sink],
+            lies_from: None,
+            threads: AtomicUsize::new(1),
+        })
     }
 
     /// Returns the context.
     pub fn ctx(&self) -> &Context {
         &self.ctx
+    }
+
+    /// Sets the number of threads of the program that is run next.
+    pub fn set_threads(&self, threads: usize) {
+        self.threads.store(threads, Ordering::Relaxed);
+    }
+
+    /// True if the model is wrong about fills.
+    pub fn lies(&self) -> bool {
+        self.lies_from.is_some_and(|threads| self.threads.load(Ordering::Relaxed) >= threads)
     }
 
     /// Fails if the validation layer sent a message since the last call.

@@ -1,13 +1,14 @@
 //! Random programs: sequences of calls, right and wrong, against a model of their outcomes and of every byte.
 //!
 //! `op` lists the operations, `world` holds the objects and judges outcomes, `memory` models contents, `plan` and
-//! `calls` say what each operation must do, `run` runs a program, `shrink` makes failing ones small, and `seeds` are
-//! the tests.
+//! `calls` say what each operation must do, `run` runs a program, `threads` runs programs on several threads, `shrink`
+//! makes failing ones small, and `seeds` and `kept` are the tests: of generated programs, and of those that have failed.
 
 mod calls;
 mod cell;
 mod environment;
 mod image;
+mod kept;
 mod kit;
 mod memory;
 mod op;
@@ -17,4 +18,6 @@ mod plan_textures;
 mod run;
 mod seeds;
 mod shrink;
+mod threads;
+mod watchdog;
 mod world;

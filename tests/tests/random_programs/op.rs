@@ -1,6 +1,9 @@
 //! Operations of a program: a kind, and small numbers that are taken modulo the choices there are. Any list of
 //! operations is therefore a program, and so is any part of it.
 
+use std::fmt;
+use std::str::FromStr;
+
 use lvk_tests::random::Random;
 
 /// Kind of an operation.
@@ -132,21 +135,72 @@ const CALLED: [(Kind, u16); 33] = [
 /// An operation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Op {
+    /// Thread that runs it; 0 in programs of one thread.
+    pub thread: u8,
     /// Kind.
     pub kind: Kind,
     /// Numbers that choose objects, ranges and mistakes.
     pub n: [u16; 6],
 }
 
-/// Returns an operation, in the form in which failures print it.
+/// Returns an operation of the first thread.
 pub fn op(kind: Kind, n: [u16; 6]) -> Op {
-    Op { kind, n }
+    Op { thread: 0, kind, n }
 }
 
-impl std::fmt::Debug for Op {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(out, "op(Kind::{:?}, {:?})", self.kind, self.n)
+impl fmt::Display for Op {
+    /// Writes `FillBuffer 3 0 12`, and `FillBuffer@1 3 0 12` for another thread than the first. Zeros at the end are left
+    /// out.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{:?}", self.kind)?;
+        if self.thread > 0 {
+            write!(out, "@{}", self.thread)?;
+        }
+        let length = self.n.iter().rposition(|number| *number > 0).map_or(0, |last| last + 1);
+        self.n[..length].iter().try_for_each(|number| write!(out, " {number}"))
     }
+}
+
+impl fmt::Debug for Op {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, out)
+    }
+}
+
+impl FromStr for Op {
+    type Err = String;
+
+    fn from_str(line: &str) -> Result<Self, String> {
+        let error = |what: &str| format!("'{line}' {what}; write KIND or KIND@THREAD, and up to six numbers");
+        let mut words = line.split_whitespace();
+        let head = words.next().unwrap_or_default();
+        let (name, thread) = head.split_once('@').unwrap_or((head, "0"));
+        let mut kinds = RECORDED.iter().chain(&CALLED).map(|(kind, _)| *kind);
+        let kind =
+            kinds.find(|kind| format!("{kind:?}") == name).ok_or_else(|| error("has no known kind"))?;
+        let thread = thread.parse().map_err(|_| error("has no number of a thread"))?;
+        let mut op = Self { thread, ..op(kind, [0; 6]) };
+        let mut places = op.n.iter_mut();
+        for word in words {
+            let place = places.next().ok_or_else(|| error("has more than six numbers"))?;
+            *place = word.parse().map_err(|_| error("has a number that does not fit 16 bits"))?;
+        }
+        Ok(op)
+    }
+}
+
+/// Returns the text of a program, an operation a line.
+pub fn write_program(ops: &[Op]) -> String {
+    ops.iter().map(|op| format!("{op}\n")).collect()
+}
+
+/// Returns the program of a text. Empty lines and those that start with `#` do not count.
+///
+/// # Errors
+/// The first line that is no operation.
+pub fn parse_program(text: &str) -> Result<Vec<Op>, String> {
+    let lines = text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
+    lines.map(str::parse).collect()
 }
 
 impl Op {
@@ -155,13 +209,13 @@ impl Op {
         let called = total(&CALLED);
         let at = (random.bits() % u64::from(called + total(&RECORDED))) as u16;
         let kind = if at < called { kind_at(&CALLED, at) } else { kind_at(&RECORDED, at - called) };
-        Self { kind, n: numbers(random) }
+        op(kind, numbers(random))
     }
 
     /// Returns a random operation that records a command.
     pub fn random_recorded(random: &mut Random) -> Self {
         let at = (random.bits() % u64::from(total(&RECORDED))) as u16;
-        Self { kind: kind_at(&RECORDED, at), n: numbers(random) }
+        op(kind_at(&RECORDED, at), numbers(random))
     }
 }
 
@@ -197,4 +251,23 @@ fn a_seed_is_one_program_with_every_kind() {
     assert_eq!(ops, program(3, 5_000));
     let kinds: std::collections::HashSet<Kind> = ops.iter().map(|op| op.kind).collect();
     assert_eq!(kinds.len(), RECORDED.len() + CALLED.len());
+}
+
+#[test]
+fn programs_come_back_from_their_text() {
+    let mut ops = program(3, 5_000);
+    ops.iter_mut().zip((0..5).cycle()).for_each(|(op, thread)| (op.thread, op.n[5]) = (thread, 0));
+    assert_eq!(parse_program(&write_program(&ops)), Ok(ops));
+    let text = "# two operations\n\nFillBuffer 3 0 12\nWaitIdle@2\n";
+    let ops = [op(Kind::FillBuffer, [3, 0, 12, 0, 0, 0]), Op { thread: 2, ..op(Kind::WaitIdle, [0; 6]) }];
+    assert_eq!(parse_program(text), Ok(ops.to_vec()));
+    assert_eq!(write_program(&ops), "FillBuffer 3 0 12\nWaitIdle@2\n");
+}
+
+#[test]
+fn lines_that_are_no_operations_are_refused() {
+    for line in ["Fly 1", "Label@", "Label@256", "Label x", "Label 65536", "Label 1 2 3 4 5 6 7", "@1"] {
+        let error = parse_program(&format!("WaitIdle\n{line}\n"));
+        assert!(error.is_err_and(|error| error.starts_with(&format!("'{line}' has "))), "{line}");
+    }
 }

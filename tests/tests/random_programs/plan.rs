@@ -179,7 +179,7 @@ impl World<'_> {
         }
         debug_assert!(!inside || fits);
         let word = pattern_word(n[4], 0);
-        let expected = if self.env.lies { pattern_word(n[4] + 1, 0) } else { word };
+        let expected = if self.env.lies() { pattern_word(n[4] + 1, 0) } else { word };
         let effects = match buffer.live {
             Some(number) if problems.is_empty() => {
                 let bytes = expected.repeat(size as usize / 4);

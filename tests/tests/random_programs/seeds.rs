@@ -1,87 +1,24 @@
-//! The tests: seeds of the bounded tests, kept programs, programs on several threads, and the long run.
+//! The tests: seeds of the bounded tests, programs on several threads, and the long run.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Instant;
 
 use super::environment::Environment;
 use super::op::{Kind, Op, program};
 use super::plan::QUEUES;
 use super::run::{Failure, run};
 use super::shrink::shrink;
+use super::threads::{TRIES, report, run_and_check};
+use super::watchdog::Watchdog;
 use super::world::Tally;
 
 /// Operations of a program.
 const LENGTH: usize = 400;
 /// Programs of the bounded tests, for each kind of queues.
 const BOUNDED_SEEDS: u64 = 400;
-/// Most runs of a failing program while it is shrunk.
-const TRIES: usize = 400;
 /// Programs after which objects and memory are counted.
 const CHECKED_EVERY: u64 = 16;
-/// A program that takes longer hangs.
-const HANG: Duration = Duration::from_secs(120);
-
-/// Seeds whose programs have failed, by a mistake of the library or of the model. They are always replayed.
-const KEPT_SEEDS: [u64; 7] = [5, 22, 30, 1_000_026, 20_000_381, 20_009_249, 100_001_171];
-
-/// Ends the process if the count of finished programs stands still.
-struct Watchdog {
-    finished: AtomicU64,
-    is_over: AtomicBool,
-}
-
-impl Watchdog {
-    /// Runs `work` under the watch.
-    fn watch<T>(work: impl FnOnce(&Self) -> T) -> T {
-        let dog = Self { finished: AtomicU64::new(0), is_over: AtomicBool::new(false) };
-        std::thread::scope(|scope| {
-            scope.spawn(|| dog.wait_for_hang());
-            let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&dog)));
-            dog.is_over.store(true, Ordering::Relaxed);
-            result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        })
-    }
-
-    fn wait_for_hang(&self) {
-        let (mut seen, mut since) = (u64::MAX, Instant::now());
-        while !self.is_over.load(Ordering::Relaxed) {
-            std::thread::sleep(Duration::from_millis(50));
-            let finished = self.finished.load(Ordering::Relaxed);
-            if finished != seen {
-                (seen, since) = (finished, Instant::now());
-            } else if since.elapsed() > HANG {
-                eprintln!("a program hangs after {finished} finished ones");
-                std::process::abort();
-            }
-        }
-    }
-}
-
-/// Returns the text of a failing program of a seed, shrunk.
-fn report((seed, queues): (u64, lvk::QueueRequest), ops: &[Op], failure: &Failure, dog: &Watchdog) -> String {
-    eprintln!("seed {seed}, {queues:?} fails and is shrunk: {failure:?}");
-    let fails = |ops: &[Op]| {
-        dog.finished.fetch_add(1, Ordering::Relaxed);
-        Environment::new(queues).is_some_and(|env| run_and_check(&env, ops).is_err())
-    };
-    let end = (failure.at + 1).min(ops.len());
-    let begin = if fails(&ops[..end]) { &ops[..end] } else { ops };
-    let small = shrink(begin, TRIES, fails);
-    let outcome = Environment::new(queues).map(|env| run_and_check(&env, &small));
-    format!(
-        "seed {seed}, {queues:?}, operation {}: {}\nshrunk to {small:#?}\nwhich ends with {outcome:?}",
-        failure.at, failure.message
-    )
-}
-
-/// Runs a program alone on a context, and checks that nothing is left.
-fn run_and_check(env: &Environment, ops: &[Op]) -> Result<(), Failure> {
-    run(env, ops)?;
-    let gone = env.check_all_gone().and_then(|()| env.check_messages());
-    gone.map_err(|message| Failure { at: ops.len(), message })
-}
-
 /// Runs the programs of seeds one after the other. Returns what they have done.
 ///
 /// # Panics
@@ -100,9 +37,9 @@ fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &
         });
         match outcome {
             Ok(done) => total += done,
-            Err(failure) => unreachable!("{}", report((seed, queues), &ops, &failure, dog)),
+            Err(failure) => unreachable!("seed {seed}, {}", report(queues, &ops, &failure, dog)),
         }
-        dog.finished.fetch_add(1, Ordering::Relaxed);
+        dog.program_ended();
     }
     assert_eq!(env.check_all_gone(), Ok(()));
     assert_eq!(env.check_messages(), Ok(()));
@@ -112,31 +49,55 @@ fn run_seeds(queues: lvk::QueueRequest, seeds: impl Iterator<Item = u64>, dog: &
 /// Runs the programs of seeds on several threads of one context. Returns what they have done.
 ///
 /// # Panics
-/// When one of them fails.
+/// When one of them fails. It is shrunk together with those that ran beside it.
 fn run_on_threads(queues: lvk::QueueRequest, seeds: &[u64], threads: usize, dog: &Watchdog) -> Option<Tally> {
     let env = Environment::new(queues)?;
     let (next, total) = (AtomicU64::new(0), Mutex::new(Tally::default()));
-    let work = || {
-        while let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize) {
+    let running: Vec<Mutex<Option<u64>>> = (0..threads).map(|_| Mutex::default()).collect();
+    let failed: OnceLock<(Vec<u64>, Failure)> = OnceLock::new();
+    let work = |thread: usize| {
+        let set_running = |seed| *running[thread].lock().unwrap_or_else(PoisonError::into_inner) = seed;
+        while failed.get().is_none()
+            && let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize)
+        {
+            set_running(Some(*seed));
             match run(&env, &program(*seed, LENGTH)) {
-                Ok(done) => *total.lock().unwrap_or_else(std::sync::PoisonError::into_inner) += done,
-                Err(failure) => unreachable!("seed {seed}, {queues:?}, {threads} threads: {failure:?}"),
-            };
-            dog.finished.fetch_add(1, Ordering::Relaxed);
+                Ok(done) => *total.lock().unwrap_or_else(PoisonError::into_inner) += done,
+                Err(failure) => drop(failed.set((beside(*seed, &running), failure))),
+            }
+            set_running(None);
+            dog.program_ended();
         }
     };
-    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
+    std::thread::scope(|scope| {
+        (0..threads).for_each(|thread| drop(scope.spawn(move || work(thread))));
+    });
+    if let Some((seeds, failure)) = failed.get() {
+        drop(env);
+        let ops: Vec<Op> = (0..).zip(seeds).flat_map(|(thread, seed)| on_thread(*seed, thread)).collect();
+        unreachable!("seeds {seeds:?} side by side, {}", report(queues, &ops, failure, dog));
+    }
     assert_eq!(env.check_all_gone(), Ok(()));
     assert_eq!(env.check_messages(), Ok(()));
     total.into_inner().ok()
+}
+
+/// Returns a seed, and those whose programs run beside it.
+fn beside(seed: u64, running: &[Mutex<Option<u64>>]) -> Vec<u64> {
+    let seeds = running.iter().filter_map(|seed| *seed.lock().unwrap_or_else(PoisonError::into_inner));
+    std::iter::once(seed).chain(seeds.filter(|other| *other != seed)).collect()
+}
+
+/// Returns the program of a seed, for a thread.
+fn on_thread(seed: u64, thread: u8) -> impl Iterator<Item = Op> {
+    program(seed, LENGTH).into_iter().map(move |op| Op { thread, ..op })
 }
 
 #[test]
 fn random_programs_do_what_the_model_says() {
     Watchdog::watch(|dog| {
         for queues in QUEUES {
-            let seeds = KEPT_SEEDS.into_iter().chain(0..BOUNDED_SEEDS);
-            let Some(total) = run_seeds(queues, seeds, dog) else { return };
+            let Some(total) = run_seeds(queues, 0..BOUNDED_SEEDS, dog) else { return };
             eprintln!("{queues:?}: {total}");
             let programs = BOUNDED_SEEDS;
             assert!(total.executed > programs * LENGTH as u64 / 2, "most operations find nothing to work on");
@@ -166,14 +127,14 @@ fn an_empty_program_leaves_nothing() {
 #[test]
 fn a_wrong_model_is_detected_and_the_program_shrunk() {
     let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
-    env.lies = true;
+    env.lies_from = Some(1);
     let failing = (0..).map(|seed| program(seed, LENGTH)).find(|ops| run(&env, ops).is_err());
     let Some(ops) = failing else { return };
     let small = shrink(&ops, TRIES, |ops| run(&env, ops).is_err());
     assert!(small.len() <= 3, "{small:#?}");
     assert!(small.iter().any(|op| op.kind == Kind::FillBuffer), "{small:#?}");
     assert!(small.iter().any(|op| op.kind == Kind::CreateBuffer), "{small:#?}");
-    env.lies = false;
+    env.lies_from = None;
     assert!(run(&env, &small).is_ok(), "the library itself is right");
 }
 

@@ -1,10 +1,7 @@
 //! Rebuilds that move the software BVH of a BLAS that the CPU built: later refits use the new memory. On a device that
 //! traces in hardware, the same commands give the same hits.
 
-use lvk::{
-    BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryRequest, Result, TlasDesc,
-    TlasInstance,
-};
+use lvk::{BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryRequest, Result, TlasDesc, TlasInstance};
 use lvk_tests::accel_backend::builds_software_bvhs;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;

@@ -3,8 +3,8 @@
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
-    BlasDesc, BlasGeometry, BuildFlags, BuildMode, Context, Error, PrimitiveOrder, RayQueryPath, Result, TlasDesc,
-    Triangles,
+    BlasDesc, BlasGeometry, BuildFlags, BuildMode, Context, Error, PrimitiveOrder, RayQueryPath, Result,
+    TlasDesc, Triangles,
 };
 use lvk_tests::accel_backend::{requires_device_accel_structs, software_alone};
 use lvk_tests::device;

@@ -333,6 +333,28 @@ fn a_context_ends_well_with_released_objects_and_uploads_that_never_ran() {
 }
 
 #[test]
+fn buffers_are_listed_by_their_addresses() {
+    let Some(ctx) = device() else { return };
+    let create = |debug_name| {
+        ctx.create_buffer(&BufferDesc { size_bytes: 64, debug_name, ..Default::default() }).unwrap()
+    };
+    let (first, second) = (create("first"), create("second"));
+    let names = |range: std::ops::Range<u64>| {
+        ctx.buffers_at(&range).into_iter().map(|found| (found.kind, found.name)).collect::<Vec<_>>()
+    };
+    let address = ctx.buffer_address(*first).unwrap();
+    let expected = [("buffer", "first".to_owned())];
+    assert_eq!(names(address..address + 1), expected);
+    assert_eq!(names(address + 63..address + 64), expected);
+    assert_eq!(names(0..u64::MAX).len(), 2);
+    assert_eq!((names(address..address), names(0..16)), (Vec::new(), Vec::new()));
+    drop(first);
+    assert_eq!(names(address..address + 1), []);
+    assert_eq!(names(0..u64::MAX), [("buffer", "second".to_owned())]);
+    drop(second);
+}
+
+#[test]
 fn live_objects_are_listed_and_reported_by_name() {
     lvk_tests::warnings::capture_warnings();
     let Some(ctx) = device() else { return };

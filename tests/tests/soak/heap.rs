@@ -67,7 +67,7 @@ fn fill(ctx: &Context) -> Vec<Holder<BufferHandle>> {
 
 fn assert_refused(error: &Error, name: &str, least: u64) {
     match error {
-        Error::OutOfDeviceMemory { call: "vkAllocateMemory", object: Some(object), bytes: Some(bytes) } => {
+        Error::OutOfDeviceMemory { call: "vkAllocateMemory", object, bytes: Some(bytes) } => {
             assert!(object.contains(name), "'{object}' does not name '{name}'");
             assert!(*bytes >= least, "{bytes} of {least} bytes: {error}");
         }

@@ -26,7 +26,7 @@ impl HostImageCopy {
         is_wanted.then(|| Self { device: ash::ext::host_image_copy::Device::new(instance, device) })
     }
 
-    /// Writes the first contents of an image. Afterwards `range` is ready to be sampled.
+    /// Writes the first contents of the image `name`. Afterwards `range` is ready to be sampled.
     ///
     /// # Safety
     /// The image is new and was created with [`vk::ImageUsageFlags::HOST_TRANSFER_EXT`], and `range` covers
@@ -35,6 +35,7 @@ impl HostImageCopy {
     pub(crate) unsafe fn write_image(
         &self,
         image: vk::Image,
+        name: &str,
         range: vk::ImageSubresourceRange,
         regions: &[vk::MemoryToImageCopyEXT<'_>],
     ) -> Result<()> {
@@ -45,13 +46,14 @@ impl HostImageCopy {
             .subresource_range(range);
         // SAFETY: the image is new, so its layout is undefined and the GPU does not use it.
         unsafe { self.device.transition_image_layout(&[transition]) }
-            .map_err(Error::vulkan("vkTransitionImageLayoutEXT"))?;
+            .map_err(Error::vulkan("vkTransitionImageLayoutEXT", name))?;
         let copy = vk::CopyMemoryToImageInfoEXT::default()
             .dst_image(image)
             .dst_image_layout(LAYOUT)
             .regions(regions);
         // SAFETY: guaranteed by the caller; the device supports writes in this layout.
-        unsafe { self.device.copy_memory_to_image(&copy) }.map_err(Error::vulkan("vkCopyMemoryToImageEXT"))
+        unsafe { self.device.copy_memory_to_image(&copy) }
+            .map_err(Error::vulkan("vkCopyMemoryToImageEXT", name))
     }
 }
 

@@ -4,9 +4,31 @@ use std::sync::atomic::AtomicU32;
 
 use ash::vk;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
+
+/// A failed wait for a Vulkan queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct IdleFailure {
+    /// The first queue that uses the Vulkan queue.
+    pub(crate) queue: Queue,
+    /// The error of the driver.
+    pub(crate) result: vk::Result,
+}
+
+impl IdleFailure {
+    /// True if the wait failed for want of memory.
+    pub(crate) fn lacks_memory(self) -> bool {
+        use vk::Result as Code;
+        matches!(self.result, Code::ERROR_OUT_OF_HOST_MEMORY | Code::ERROR_OUT_OF_DEVICE_MEMORY)
+    }
+
+    /// Returns the error, which names the queue.
+    pub(crate) fn into_error(self) -> Error {
+        Error::vulkan("vkQueueWaitIdle", format_args!("{} queue", self.queue.label()))(self.result)
+    }
+}
 
 /// Mapping of the library's queues to Vulkan queues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -173,11 +195,20 @@ impl Queues {
 
     /// Waits until each Vulkan queue is idle (`vkQueueWaitIdle`). Unlike a wait for the device, this needs no exclusive
     /// access to other queues, which the engine of an external device uses.
-    pub(crate) fn wait_idle(&self, device: &ash::Device) -> Result<(), vk::Result> {
-        // SAFETY: the queue is locked.
-        let waits = self.raw.iter().map(|queue| unsafe { device.queue_wait_idle(*queue.lock()) });
+    pub(crate) fn wait_idle(&self, device: &ash::Device) -> Result<(), IdleFailure> {
+        let waits = self.raw.iter().enumerate().map(|(place, raw)| {
+            // SAFETY: the queue is locked.
+            let idle = unsafe { device.queue_wait_idle(*raw.lock()) };
+            idle.map_err(|result| IdleFailure { queue: self.first_user(place), result })
+        });
         // A queue whose wait fails does not keep the others from being waited for.
         waits.fold(Ok(()), Result::and)
+    }
+
+    /// Returns the first queue that uses the Vulkan queue at `place`.
+    fn first_user(&self, place: usize) -> Queue {
+        let uses = |queue: &Queue| self.raw_index[queue.index()] == place;
+        Queue::ALL.into_iter().find(uses).unwrap_or_default()
     }
 
     /// Returns the family of a queue index.
@@ -249,6 +280,18 @@ mod tests {
         assert_eq!(locate(&[(COMPUTE, 2), (ALL, 1)], 1), [(1, 0), (0, 0), (0, 1)]);
         assert_eq!(locate(&[(ALL, 1), (COMPUTE, 1)], 0), [(0, 0), (1, 0), (0, 0)]);
         assert_eq!(locate(&[(ALL, 1), (COPIES, 1)], 0), [(0, 0), (0, 0), (1, 0)]);
+    }
+
+    #[test]
+    fn failed_waits_name_the_first_queue_that_uses_the_vulkan_queue() {
+        let raw = |handle, family| (vk::Queue::from_raw(handle), family);
+        let queues = Queues::new([raw(1, 0), raw(2, 1), raw(1, 0)], QueueRequest::OwnHardware);
+        let text = |place| {
+            let result = vk::Result::ERROR_OUT_OF_HOST_MEMORY;
+            IdleFailure { queue: queues.first_user(place), result }.into_error().to_string()
+        };
+        assert_eq!(text(0), "out of host memory in vkQueueWaitIdle for 'graphics queue'");
+        assert_eq!(text(1), "out of host memory in vkQueueWaitIdle for 'compute queue'");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use ash::vk;
 use crate::error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 
 /// Maximum length of a list. A driver that has just failed may report nonsense, and longer lists are cut.
-const MAX_ENTRIES: u32 = 1 << 16;
+const MAX_ENTRIES: u32 = 1 << 12;
 
 /// Queries the fault of a lost device. `None` if the query fails.
 pub(crate) fn query_fault(
@@ -32,8 +32,8 @@ fn read_fault(
     counts.vendor_binary_size = 0; // read only by the driver's own tools, and behind a separate feature
     counts.address_info_count = counts.address_info_count.min(MAX_ENTRIES);
     counts.vendor_info_count = counts.vendor_info_count.min(MAX_ENTRIES);
-    let mut addresses = vec![vk::DeviceFaultAddressInfoEXT::default(); counts.address_info_count as usize];
-    let mut vendor = vec![vk::DeviceFaultVendorInfoEXT::default(); counts.vendor_info_count as usize];
+    let mut addresses: Vec<vk::DeviceFaultAddressInfoEXT> = empty_list(counts.address_info_count)?;
+    let mut vendor: Vec<vk::DeviceFaultVendorInfoEXT> = empty_list(counts.vendor_info_count)?;
     let mut info = vk::DeviceFaultInfoEXT {
         p_address_infos: addresses.as_mut_ptr(),
         p_vendor_infos: vendor.as_mut_ptr(),
@@ -47,6 +47,14 @@ fn read_fault(
     addresses.truncate(counts.address_info_count as usize);
     vendor.truncate(counts.vendor_info_count as usize);
     Some(decode(&info.description, &addresses, &vendor))
+}
+
+/// Returns a list of this length. `None` if the host has no memory for it, which must not hide the loss.
+fn empty_list<T: Clone + Default>(count: u32) -> Option<Vec<T>> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(count as usize).ok()?;
+    list.resize(count as usize, T::default());
+    Some(list)
 }
 
 fn decode(
@@ -161,15 +169,16 @@ mod tests {
         let at = FaultAddress { kind: FaultKind::FaultingInstruction, address: 0x77, range: 0x77..0x78 };
         assert_eq!(fault.addresses, [read, at]);
         assert_eq!(fault.vendor, [VendorFault { description: "unit 7".to_owned(), code: 0xab, data: 3 }]);
-        let report = DeviceLossReport { call: "vkQueueSubmit2", fault: Some(fault), queues: Vec::new() };
+        let (call, object) = ("vkQueueSubmit2", "graphics queue".to_owned());
+        let report = DeviceLossReport { call, object, fault: Some(fault), queues: Vec::new() };
         let error = Error::DeviceLost { report: Arc::new(report) }.to_string();
         assert_eq!(
             error,
-            "the device was lost in vkQueueSubmit2 (page fault; InvalidRead at 0x12000 to 0x12fff; FaultingInstruction \
+            "the device was lost in vkQueueSubmit2 for 'graphics queue' (page fault; InvalidRead at 0x12000 to 0x12fff; FaultingInstruction \
              at 0x77 to 0x77; unit 7 (code 0xab, data 0x3)); create a new context"
         );
-        let error = Error::device_lost("vkQueueSubmit2").to_string();
-        assert_eq!(error, "the device was lost in vkQueueSubmit2; create a new context");
+        let error = Error::device_lost("vkQueueSubmit2", "graphics queue").to_string();
+        assert_eq!(error, "the device was lost in vkQueueSubmit2 for 'graphics queue'; create a new context");
     }
 
     #[test]

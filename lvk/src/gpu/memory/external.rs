@@ -221,7 +221,7 @@ impl Gpu {
         let info = vk::MemoryGetFdInfoKHR::default().memory(memory.raw).handle_type(fd_type.raw());
         // SAFETY: the memory was allocated for export as this type.
         let fd =
-            unsafe { functions.get_memory_fd(&info) }.map_err(Error::creating("vkGetMemoryFdKHR", name))?;
+            unsafe { functions.get_memory_fd(&info) }.map_err(Error::vulkan("vkGetMemoryFdKHR", name))?;
         // SAFETY: Vulkan gives the caller a new file descriptor.
         Ok(unsafe { OwnedFd::from_raw_fd(fd) })
     }

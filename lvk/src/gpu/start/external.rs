@@ -271,7 +271,7 @@ pub(crate) fn check_physical_device(
     }
     // SAFETY: the caller of the public function promises a valid instance.
     let devices = unsafe { instance.enumerate_physical_devices() }
-        .map_err(Error::vulkan("vkEnumeratePhysicalDevices"))?;
+        .map_err(Error::vulkan("vkEnumeratePhysicalDevices", "instance"))?;
     if devices.contains(&device) {
         return Ok(());
     }

@@ -65,7 +65,9 @@ impl Instance {
         {
             // SAFETY: the instance was created above and nothing uses it.
             with_exclusive_loader_lock(|| unsafe { raw.destroy_instance(None) });
-            return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
+            return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT", "messages of the validation layer")(
+                result,
+            ));
         }
         let gpu_assisted = desc.validation == ValidationMode::GpuAssisted;
         let validated = layer.is_some();
@@ -109,7 +111,7 @@ impl Instance {
         self.messenger = Messenger::new(sink);
         self.messenger
             .install(&self.entry, &self.raw)
-            .map_err(Error::vulkan("vkCreateDebugUtilsMessengerEXT"))?;
+            .map_err(Error::vulkan("vkCreateDebugUtilsMessengerEXT", "messages of the validation layer"))?;
         self.validated = true;
         Ok(())
     }
@@ -135,7 +137,7 @@ impl Instance {
             Err(result @ vk::Result::ERROR_INITIALIZATION_FAILED) => {
                 (Vec::new(), format!("returned {result:?}"))
             }
-            Err(result) => return Err(Error::vulkan(CALL)(result)),
+            Err(result) => return Err(Error::vulkan(CALL, "instance")(result)),
         };
         if !devices.is_empty() {
             return Ok(devices);
@@ -179,7 +181,7 @@ pub(crate) fn external_extensions(
 ) -> Result<Vec<&'static CStr>> {
     // SAFETY: no preconditions.
     let list = unsafe { entry.enumerate_instance_extension_properties(None) }
-        .map_err(Error::vulkan("vkEnumerateInstanceExtensionProperties"))?;
+        .map_err(Error::vulkan("vkEnumerateInstanceExtensionProperties", "Vulkan loader"))?;
     let has = |name: &CStr| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
     let windows = window.map(|window| WindowExtensions::query(window, &has)).transpose()?;
     let debug_utils = ash::ext::debug_utils::NAME;
@@ -205,7 +207,7 @@ fn load_entry(library: Option<&Path>) -> Result<ash::Entry, ash::LoadingError> {
 fn loader_version(entry: &ash::Entry) -> Result<(u32, u32, u32)> {
     // SAFETY: no preconditions.
     let version = unsafe { entry.try_enumerate_instance_version() }
-        .map_err(Error::vulkan("vkEnumerateInstanceVersion"))?
+        .map_err(Error::vulkan("vkEnumerateInstanceVersion", "Vulkan loader"))?
         .unwrap_or(vk::API_VERSION_1_0);
     Ok((vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)))
 }
@@ -244,7 +246,7 @@ fn find_layer(entry: &ash::Entry, validation: ValidationMode) -> Result<Option<&
     }
     // SAFETY: no preconditions.
     let layers = unsafe { entry.enumerate_instance_layer_properties() }
-        .map_err(Error::vulkan("vkEnumerateInstanceLayerProperties"))?;
+        .map_err(Error::vulkan("vkEnumerateInstanceLayerProperties", "Vulkan loader"))?;
     if layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
         return Ok(Some(VALIDATION_LAYER));
     }
@@ -277,7 +279,7 @@ impl<'a> Extensions<'a> {
         for source in [None, layer].into_iter().take(if layer.is_some() { 2 } else { 1 }) {
             // SAFETY: the layer, if any, was found above.
             let list = unsafe { entry.enumerate_instance_extension_properties(source) }
-                .map_err(Error::vulkan("vkEnumerateInstanceExtensionProperties"))?;
+                .map_err(Error::vulkan("vkEnumerateInstanceExtensionProperties", "Vulkan loader"))?;
             let has = |name: &CStr| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
             found.debug_utils |= has(ash::ext::debug_utils::NAME);
             found.layer_settings |= has(ash::ext::layer_settings::NAME);
@@ -353,7 +355,7 @@ fn create_instance(
         vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
             no_vulkan(entry, desc.library, Some(format!("vkCreateInstance returned {result:?}")))
         }
-        result => Error::vulkan("vkCreateInstance")(result),
+        result => Error::vulkan("vkCreateInstance", "instance")(result),
     })
 }
 

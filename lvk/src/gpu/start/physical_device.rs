@@ -42,7 +42,7 @@ impl PhysicalDevice {
         let plain = unsafe { instance.get_physical_device_properties(raw) };
         // SAFETY: as above.
         let extensions = unsafe { instance.enumerate_device_extension_properties(raw) }
-            .map_err(Error::vulkan("vkEnumerateDeviceExtensionProperties"))?;
+            .map_err(Error::vulkan("vkEnumerateDeviceExtensionProperties", device_name(&plain)))?;
         let names = extensions.iter().filter_map(|extension| extension.extension_name_as_c_str().ok());
         let families = queue_families(instance, raw);
         let everything = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;

@@ -38,6 +38,9 @@ impl WindowFunctions {
     }
 }
 
+/// Name of a window in errors, before it has a swapchain.
+const PROBED_WINDOW: &str = "window";
+
 /// Surface of a window while a device is selected. Destroyed on drop.
 pub(crate) struct SurfaceProbe<'a> {
     functions: ash::khr::surface::Instance,
@@ -48,7 +51,7 @@ pub(crate) struct SurfaceProbe<'a> {
 impl<'a> SurfaceProbe<'a> {
     pub(crate) fn new(instance: &'a Instance, window: WindowRef<'_>) -> Result<Self> {
         Ok(Self {
-            raw: create_surface(instance, window)?,
+            raw: create_surface(instance, window, PROBED_WINDOW)?,
             functions: ash::khr::surface::Instance::new(&instance.entry, &instance.raw),
             instance: &instance.raw,
         })
@@ -72,7 +75,7 @@ impl<'a> SurfaceProbe<'a> {
     pub(crate) fn presents(&self, device: vk::PhysicalDevice, family: u32) -> Result<bool> {
         // SAFETY: device and surface belong to the instance.
         unsafe { self.functions.get_physical_device_surface_support(device, family, self.raw) }
-            .map_err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR"))
+            .map_err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR", PROBED_WINDOW))
     }
 }
 
@@ -83,8 +86,13 @@ impl Drop for SurfaceProbe<'_> {
     }
 }
 
-/// Creates a surface (`vkCreateXcbSurfaceKHR` and the like). The window must outlive it.
-pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) -> Result<vk::SurfaceKHR> {
+/// Creates a surface (`vkCreateXcbSurfaceKHR` and the like). The window must outlive it. `name` is
+/// the object in errors.
+pub(crate) fn create_surface(
+    instance: &Instance,
+    window: &dyn WindowHandles,
+    name: &str,
+) -> Result<vk::SurfaceKHR> {
     let (display, window) = (display(window)?, raw_window(window)?);
     let enabled = instance.windows.as_ref().map_or(&[][..], |windows| windows.system());
     if let Some(name) = required_extensions(display)?.iter().find(|name| !enabled.contains(name)) {
@@ -98,5 +106,5 @@ pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) ->
     }
     // SAFETY: the extensions of the window system are enabled, the handles belong together, and the caller
     // keeps the window alive.
-    unsafe { window_system::create_surface(&instance.entry, &instance.raw, display, window) }
+    unsafe { window_system::create_surface(&instance.entry, &instance.raw, display, window, name) }
 }

@@ -45,6 +45,7 @@ pub(super) unsafe fn create_surface(
     instance: &ash::Instance,
     display: RawDisplayHandle,
     window: RawWindowHandle,
+    name: &str,
 ) -> Result<vk::SurfaceKHR> {
     let incomplete = || Error::usage("window", "its handle names no display, connection or program");
     let (made, call): (VkResult<vk::SurfaceKHR>, _) = match (display, window) {
@@ -97,7 +98,7 @@ pub(super) unsafe fn create_surface(
         }
         _ => return Err(Error::usage("window", "its two handles are of different window systems")),
     };
-    made.map_err(Error::vulkan(call))
+    made.map_err(Error::vulkan(call, name))
 }
 
 /// Returns the Metal layer of a view, or puts one into the view, which then keeps it.

@@ -203,6 +203,7 @@ commands! {
         PFN_vkGetPhysicalDeviceCalibrateableTimeDomainsKHR three alias "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT";
         PFN_vkGetCalibratedTimestampsKHR five alias "vkGetCalibratedTimestampsEXT";
         PFN_vkWaitSemaphores three [LOST] alias "vkWaitSemaphoresKHR";
+        PFN_vkGetSemaphoreCounterValue three [LOST] alias "vkGetSemaphoreCounterValueKHR";
         PFN_vkSignalSemaphore two alias "vkSignalSemaphoreKHR";
         PFN_vkGetPhysicalDeviceToolProperties three alias "vkGetPhysicalDeviceToolPropertiesEXT";
         PFN_vkWaitForPresentKHR four [LOST | SURFACE | DATED];

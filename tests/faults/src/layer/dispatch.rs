@@ -31,6 +31,10 @@ pub(super) struct Table {
     pub(super) destroy: usize,
     /// `vkDeviceWaitIdle` of the next layer, and the device.
     pub(super) finish: Option<(vk::PFN_vkDeviceWaitIdle, vk::Device)>,
+    /// `vkGetPhysicalDeviceFeatures2` of the next layer, for an instance.
+    pub(super) features: usize,
+    /// `vkGetBufferDeviceAddress` of the next layer, for a device.
+    pub(super) buffer_address: usize,
     /// True for a device that a fault has lost.
     pub(super) lost: AtomicBool,
 }
@@ -45,7 +49,15 @@ impl Table {
                 (found, _) => found,
             })
             .collect();
-        Self { next, proc_addr, destroy: find(destroy), finish: None, lost: AtomicBool::new(false) }
+        Self {
+            next,
+            proc_addr,
+            destroy: find(destroy),
+            finish: None,
+            features: find("vkGetPhysicalDeviceFeatures2"),
+            buffer_address: find("vkGetBufferDeviceAddress"),
+            lost: AtomicBool::new(false),
+        }
     }
 
     /// Loses the device, once it has finished the work that it has.

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex, OnceLock, PoisonError};
+use std::thread::ThreadId;
 
 use ash::vk;
 
@@ -30,6 +31,8 @@ pub(super) struct Injector {
     fault: Option<Fault>,
     log: Option<File>,
     reached: AtomicBool,
+    /// Thread of the call that has failed.
+    thread: OnceLock<ThreadId>,
     counts: Mutex<Counts>,
 }
 
@@ -44,7 +47,13 @@ impl Injector {
         let path = std::env::var_os(LOG_VARIABLE);
         let log = path.and_then(|path| File::options().append(true).create(true).open(path).ok());
         let fault = std::env::var(FAULT_VARIABLE).ok().and_then(|text| text.parse().ok());
-        Self { fault, log, reached: AtomicBool::new(false), counts: Mutex::default() }
+        Self {
+            fault,
+            log,
+            reached: AtomicBool::new(false),
+            thread: OnceLock::new(),
+            counts: Mutex::default(),
+        }
     }
 
     fn write(&self, line: &str) {
@@ -67,7 +76,13 @@ impl Injector {
         if fault == Some(vk::Result::ERROR_DEVICE_LOST) && !is_lost {
             table.inspect(|table| table.lose());
         }
-        fault.or((is_lost && command.answers & LOST != 0).then_some(vk::Result::ERROR_DEVICE_LOST))
+        if fault.is_some() || !is_lost || command.answers & LOST == 0 {
+            return fault;
+        }
+        if self.thread.get() != Some(&std::thread::current().id()) {
+            self.write(&call_log::told_line(command.name));
+        }
+        Some(vk::Result::ERROR_DEVICE_LOST)
     }
 
     /// Counts a call of a command that may give `answers`. Returns the error if the call is to fail.
@@ -87,6 +102,7 @@ impl Injector {
         }
         if fault.command == name && fault.call == count {
             self.reached.store(true, Ordering::Relaxed);
+            let _ = self.thread.set(std::thread::current().id());
             self.write(&call_log::fault_line(name));
             return Some(result_of(fault.error));
         }

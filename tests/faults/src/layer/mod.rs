@@ -1,6 +1,7 @@
 //! The Vulkan layer: what the loader calls, and the commands that create and destroy instances and devices.
 
 mod commands;
+mod device_fault;
 mod dispatch;
 mod injector;
 mod loader;
@@ -159,7 +160,8 @@ unsafe extern "system" fn create_device(
         (*link).link = (*(*link).link).below;
         let create = address(get_instance(vk::Instance::null(), c"vkCreateDevice".as_ptr()));
         let create = std::mem::transmute::<usize, vk::PFN_vkCreateDevice>(create);
-        let result = create(physical, info, allocator, device);
+        let create = |info: *const vk::DeviceCreateInfo<'_>| create(physical, info, allocator, device);
+        let result = device_fault::without_extension(info, create);
         if result == vk::Result::SUCCESS {
             let find = |name: &str| address(get_device(*device, c_name(name).as_ptr()));
             let mut table = Table::new(find, get_device as *const () as usize, "vkDestroyDevice");
@@ -193,7 +195,7 @@ fn own(name: &str) -> usize {
         "vkDestroyInstance" => destroy_instance as *const () as usize,
         "vkCreateDevice" => create_device as *const () as usize,
         "vkDestroyDevice" => destroy_device as *const () as usize,
-        _ => 0,
+        _ => device_fault::own(name),
     }
 }
 
@@ -239,8 +241,12 @@ unsafe extern "system" fn get_device_proc_addr(
         let find = std::mem::transmute::<usize, vk::PFN_vkGetDeviceProcAddr>(table.proc_addr);
         find(device, name)
     };
-    if matches!(text, "vkGetDeviceProcAddr" | "vkDestroyDevice") {
-        return function(own(text));
+    let ours = match text {
+        "vkGetDeviceProcAddr" | "vkDestroyDevice" => own(text),
+        _ => device_fault::own(text),
+    };
+    if ours != 0 {
+        return function(ours);
     }
     wrapped(text, address(below))
 }

@@ -120,6 +120,7 @@ pub fn run(
         ending,
         stderr: String::from_utf8_lossy(&fs::read(folder.path().join("stderr"))?).into_owned(),
         reached: log.reached,
+        told_others: log.told_others,
         live: log.live,
         result: fs::read(out.join(FIRST)).ok(),
         second_result: fs::read(out.join(SECOND)).ok(),

@@ -25,6 +25,8 @@ pub struct RunOutcome {
     pub stderr: String,
     /// True if the fault was reached.
     pub reached: bool,
+    /// Commands that told other threads of the loss of a device.
+    pub told_others: BTreeSet<String>,
     /// Live objects at the end, by type.
     pub live: BTreeMap<String, i64>,
     /// The result of the first try, a picture or values. `None` if it was not written.
@@ -58,6 +60,8 @@ pub enum Flaw {
     NoMessage,
     /// An error that does not name the command that has failed.
     UnnamedCommand(String),
+    /// An error that does not name the object of that command in quotes.
+    UnnamedObject(String),
     /// No result of a second try in the same process, or another.
     NotRecovered,
 }
@@ -75,6 +79,7 @@ impl fmt::Display for Flaw {
             Self::PartialResult => out.write_str("partial result"),
             Self::NoMessage => out.write_str("no message, or several"),
             Self::UnnamedCommand(message) => write!(out, "the command is not named: {message}"),
+            Self::UnnamedObject(message) => write!(out, "the object is not named: {message}"),
             Self::NotRecovered => out.write_str("a second try in the same process fails"),
         }
     }
@@ -127,8 +132,12 @@ fn judge_result(
     let errors: Vec<&str> = found.stderr.lines().filter(|line| line.starts_with("error: ")).collect();
     match *errors {
         [error] => {
-            if fault.is_some_and(|fault| !names_cause(error, fault)) {
+            // A device is lost for all threads, and the first that notices it makes the report.
+            let names_other = found.told_others.iter().any(|command| error.contains(command));
+            if fault.is_some_and(|fault| !names_other && !names_cause(error, fault)) {
                 flaws.push(Flaw::UnnamedCommand(error.to_owned()));
+            } else if !names_object(error) {
+                flaws.push(Flaw::UnnamedObject(error.to_owned()));
             }
         }
         _ => flaws.push(Flaw::NoMessage),
@@ -146,7 +155,7 @@ fn names_cause(error: &str, fault: &Fault) -> bool {
     let names = |command: &str| error.contains(command);
     names(&fault.command)
         || fault.stays && names_a_command(error)
-        || fault.error == FaultError::SurfaceLost && names("its window is gone")
+        || fault.error == FaultError::SurfaceLost && error.contains(WINDOW_IS_GONE)
         // The loader calls it while it creates a device.
         || fault.command == "vkEnumerateDeviceExtensionProperties" && names("vkCreateDevice")
         // Its result is that of the command that was deferred.
@@ -155,10 +164,34 @@ fn names_cause(error: &str, fault: &Fault) -> bool {
 
 /// True if a word of the text is a Vulkan command, such as `vkMapMemory`.
 fn names_a_command(text: &str) -> bool {
-    let words = text.split(|letter: char| !letter.is_ascii_alphanumeric());
-    words
-        .filter_map(|word| word.strip_prefix("vk"))
-        .any(|rest| rest.starts_with(|c: char| c.is_ascii_uppercase()))
+    texts_after_commands(text).next().is_some()
+}
+
+/// True if the error names the object of a command, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`,
+/// or the swapchain whose window is gone. Every command concerns an object, those before the device the loader, the instance
+/// or the window.
+fn names_object(error: &str) -> bool {
+    let is_named = |rest: &str| {
+        let rest = rest.strip_prefix(" failed").unwrap_or(rest);
+        rest.strip_prefix(" for '").is_some_and(|name| !name.starts_with('\''))
+    };
+    texts_after_commands(error).any(is_named)
+        || error
+            .split_once(WINDOW_IS_GONE)
+            .is_some_and(|(before, _)| before.contains(" '") && !before.ends_with('\''))
+}
+
+/// The end of an error about a lost surface, after the quoted name of the swapchain.
+const WINDOW_IS_GONE: &str = "': its window is gone";
+
+/// Returns the text behind each Vulkan command.
+fn texts_after_commands(text: &str) -> impl Iterator<Item = &str> {
+    let is_of_word = |letter: char| letter.is_ascii_alphanumeric();
+    text.match_indices("vk").filter_map(move |(start, _)| {
+        let (before, word) = text.split_at(start);
+        let is_command = word[2..].starts_with(|letter: char| letter.is_ascii_uppercase());
+        (is_command && !before.ends_with(is_of_word)).then(|| word.trim_start_matches(is_of_word))
+    })
 }
 
 #[cfg(test)]
@@ -170,6 +203,7 @@ mod tests {
             ending: Ending::Status(0),
             stderr: String::new(),
             reached: false,
+            told_others: BTreeSet::new(),
             live: BTreeMap::new(),
             result: Some(b"picture".to_vec()),
             second_result: None,
@@ -180,7 +214,7 @@ mod tests {
     fn refused() -> RunOutcome {
         RunOutcome {
             ending: Ending::Status(1),
-            stderr: "warning: x\nerror: out of host memory in vkCreateBuffer\n".to_owned(),
+            stderr: "warning: x\nerror: out of host memory in vkCreateBuffer for 'rain'\n".to_owned(),
             reached: true,
             result: None,
             second_result: clean().result,
@@ -199,7 +233,10 @@ mod tests {
     #[test]
     fn the_right_result_and_a_polite_refusal_pass() {
         let other_shader = RunOutcome { files: BTreeSet::from(["caches/3.spirv".to_owned()]), ..clean() };
-        for outcome in [clean(), refused(), other_shader] {
+        let told_others = BTreeSet::from(["vkWaitSemaphores".to_owned()]);
+        let stderr = "error: the device was lost in vkWaitSemaphores".to_owned();
+        let by_other_thread = RunOutcome { told_others, stderr, ..refused() };
+        for outcome in [clean(), refused(), other_shader, by_other_thread] {
             assert_eq!(found(&outcome), []);
         }
         let twice = RunOutcome { second_result: None, stderr: refused().stderr.repeat(2), ..refused() };
@@ -216,16 +253,43 @@ mod tests {
         assert!(names("vkEnumerateDeviceExtensionProperties", memory, "error: vkCreateDevice failed"));
         let deferred = "error: out of host memory in vkCreateRayTracingPipelinesKHR for 'rays'";
         assert!(names("vkGetDeferredOperationResultKHR", memory, deferred));
-        assert!(names("vkQueuePresentKHR", FaultError::SurfaceLost, "error: swapchain: its window is gone"));
-        assert!(!names("vkQueuePresentKHR", memory, "error: swapchain: its window is gone"));
+        assert!(names(
+            "vkQueuePresentKHR",
+            FaultError::SurfaceLost,
+            "error: swapchain 'main': its window is gone"
+        ));
+        assert!(!names("vkQueuePresentKHR", memory, "error: swapchain 'main': its window is gone"));
         assert!(!names("vkCreateBuffer", memory, "error: vkCreateDevice failed"));
         let later = |text| names_cause(text, &fault(true));
         assert!(later("error: vkCreateDevice failed") && !later("error: lvk_faults failed"));
     }
 
     #[test]
+    fn objects_are_quoted_behind_the_command_or_lose_their_window() {
+        for named in [
+            "error: out of host memory in vkMapMemory for 'rain'",
+            "error: rain: vkMapMemory failed for 'rain': unknown",
+            "error: no device (vkGetPhysicalDeviceSurfaceSupportKHR failed for 'window': lost)",
+            "error: swapchain 'main': its window is gone; resume it",
+        ] {
+            assert!(names_object(named), "{named}");
+        }
+        for unnamed in [
+            "error: out of host memory in vkMapMemory",
+            "error: out of host memory in vkMapMemory for ''",
+            "error: the device was lost in vkQueueSubmit2; the graphics queue had not finished submission 3 'frame'",
+            "error: 'rain': vkMapMemory failed: unknown",
+            "error: lvkMapMemory for 'rain'",
+            "error: swapchain '': its window is gone; resume it",
+        ] {
+            assert!(!names_object(unnamed), "{unnamed}");
+        }
+    }
+
+    #[test]
     fn every_flaw_is_caught() {
         let unnamed = "error: out of memory".to_owned();
+        let without_object = "error: out of host memory in vkCreateBuffer".to_owned();
         let cases = [
             (RunOutcome { ending: Ending::Hang, ..refused() }, Flaw::Hang),
             (RunOutcome { ending: Ending::Signal(11), ..refused() }, Flaw::Signal(11)),
@@ -258,6 +322,7 @@ mod tests {
             (RunOutcome { result: Some(b"pic".to_vec()), ..refused() }, Flaw::PartialResult),
             (RunOutcome { stderr: String::new(), ..refused() }, Flaw::NoMessage),
             (RunOutcome { stderr: unnamed.clone(), ..refused() }, Flaw::UnnamedCommand(unnamed)),
+            (RunOutcome { stderr: without_object.clone(), ..refused() }, Flaw::UnnamedObject(without_object)),
             (RunOutcome { second_result: None, ..refused() }, Flaw::NotRecovered),
             (RunOutcome { second_result: Some(b"pic".to_vec()), ..refused() }, Flaw::NotRecovered),
         ];

@@ -38,7 +38,6 @@ struct Invocation<'a> {
 /// How a list of statements ended.
 enum End {
     Next,
-    Break,
     Return(u32),
 }
 
@@ -99,7 +98,6 @@ impl Invocation<'_> {
                     }
                     match self.statements(body, v) {
                         End::Next => {}
-                        End::Break => break,
                         end => return end,
                     }
                     if leave.is_some_and(|condition| holds(&condition, v)) {

@@ -13,11 +13,12 @@ use super::linker::Linker;
 use super::module::Block;
 use super::shaders::Shaders;
 use super::stage::Shader;
-use super::traces::{Passed, TraceVariables};
+use super::traces::{Passed, RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables};
 use super::{Lowering, LoweringError};
 
-/// A ray that hits does not run its closest-hit shader.
-const RAY_FLAG_SKIP_CLOSEST_HIT: u32 = 0x8;
+/// Most places of a ray generation shader that trace without a loop over states. Each place has a copy of the traversal,
+/// with the constants of the place. Two copies are faster than the loop, on GPUs and on CPUs; a third is not.
+const MOST_PLACES: u32 = 2;
 
 /// Code for some values of a selector.
 struct Case {
@@ -33,7 +34,7 @@ pub(super) struct Assembly<'a> {
     pub(super) variables: TraceVariables<'a>,
     pub(super) candidate_attributes: Passed,
     pub(super) committed_attributes: Passed,
-    /// `None` if the launch traces from one place of its ray generation shader only.
+    /// `None` if the launch traces from few places of its ray generation shader only.
     machine: Option<StateMachine>,
     /// First states of shaders that wait.
     entries: HashMap<usize, u32>,
@@ -83,7 +84,7 @@ impl<'a> Assembly<'a> {
         Ok(if needs_machine { self.write_loop(trace, callable) } else { self.write_plain_main() })
     }
 
-    /// True unless the ray generation shader alone waits, at one place at most.
+    /// True unless the ray generation shader alone waits, at few places.
     fn needs_machine(&self) -> bool {
         let ray_gen = self.lowering.ray_gen;
         let others = self.shaders.linked.keys().any(|index| *index != ray_gen && self.shaders.waits(*index));
@@ -92,7 +93,7 @@ impl<'a> Assembly<'a> {
             .linked
             .get(&ray_gen)
             .map_or(0, |shader| self.shaders.wait_count(self.linker, shader.entry));
-        others || places > 1 || self.shaders.callables_wait
+        others || places > MOST_PLACES || self.shaders.callables_wait
     }
 
     fn declare_machine(&mut self) {
@@ -126,7 +127,8 @@ impl<'a> Assembly<'a> {
             let own = self.own_variables(index, shader);
             let results = self.results(shader);
             let runs_once = index == self.lowering.ray_gen;
-            let frame = ShaderFrame { runs_once, own: &own, results: &results };
+            let misses_wait = self.lowering.miss.iter().any(|index| self.shaders.waits(*index));
+            let frame = ShaderFrame { runs_once, own: &own, misses_wait, results: &results };
             let Some(machine) = &mut self.machine else { continue };
             let pieces = flatten(self.linker, machine, function, &frame).map_err(failed)?;
             self.entries.insert(index, pieces.entry);
@@ -164,7 +166,7 @@ impl<'a> Assembly<'a> {
             if situation == Situation::AnyHit {
                 Emitter::new(self.linker, &mut code).store(donor.ignores, no);
             }
-            let blocks = self.switch(code, donor.hit_group, cases);
+            let blocks = self.switch(code, donor.hit_group, self.lowering.hit.len(), cases);
             self.replace_function(function, blocks);
         }
         let shared: Vec<(u32, u32)> = {
@@ -223,7 +225,7 @@ impl<'a> Assembly<'a> {
         found
     }
 
-    /// Returns the code for the records of a situation, and the number of all records.
+    /// Returns the code for the records of a situation.
     fn cases(&mut self, situation: Situation) -> Vec<Case> {
         let donor = *self.variables.donor;
         let [miss, hit, callable] = self.lowering.strides;
@@ -268,10 +270,17 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Returns a function's blocks: `code`, and then the case of the selector.
-    fn switch(&mut self, mut code: Vec<Inst>, selector: u32, cases: Vec<Case>) -> Vec<Block> {
+    /// Returns a function's blocks: `code`, and then the case of the selector, which has `count` values.
+    fn switch(&mut self, mut code: Vec<Inst>, selector: u32, count: usize, cases: Vec<Case>) -> Vec<Block> {
         let label = self.linker.new_id();
         let end = self.linker.new_id();
+        if let [only] = cases.as_slice()
+            && only.values.len() == count
+        {
+            code.extend(only.code.iter().cloned());
+            code.push(Inst::new(Op::Return, &[]));
+            return vec![Block { label, code }];
+        }
         let returns = Block { label: end, code: vec![Inst::new(Op::Return, &[])] };
         let mut emitter = Emitter::new(self.linker, &mut code);
         let value = emitter.load(selector);
@@ -294,13 +303,13 @@ impl<'a> Assembly<'a> {
     /// Writes the function that calls the miss, closest-hit or callable shader of a record, and returns it.
     fn write_shading(&mut self, situation: Situation) -> u32 {
         let donor = *self.variables.donor;
-        let selector = match situation {
-            Situation::Miss => donor.ray_miss,
-            Situation::Callable => self.variables.callable_index,
-            _ => donor.hit_group,
+        let (selector, count) = match situation {
+            Situation::Miss => (donor.ray_miss, self.lowering.miss.len()),
+            Situation::Callable => (self.variables.callable_index, self.lowering.callable.len()),
+            _ => (donor.hit_group, self.lowering.hit.len()),
         };
         let cases = self.cases(situation);
-        let blocks = self.switch(Vec::new(), selector, cases);
+        let blocks = self.switch(Vec::new(), selector, count, cases);
         let function = self.linker.new_id();
         self.linker.push_function(function, blocks);
         function

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use ::spirv::{Decoration, MemoryAccess, Op};
+use ::spirv::{Decoration, MemoryAccess, Op, StorageClass};
 
 use super::emit::Emitter;
 use super::instruction::{Inst, used_ids};
@@ -11,10 +11,17 @@ use super::linker::Linker;
 /// Alignment of a block in bytes, which is also the largest that an access claims.
 const BLOCK_ALIGNMENT: u32 = 16;
 
-/// Makes `functions` read the block of `variable` at the address that the variable `address` holds.
-pub(super) fn read_block_by_address(linker: &mut Linker, functions: &[u32], variable: u32, address: u32) {
+/// Makes `functions` read the block of `variable` at the address that the variable `address` holds. The error is a
+/// message.
+pub(super) fn read_block_by_address(
+    linker: &mut Linker,
+    functions: &[u32],
+    variable: u32,
+    address: u32,
+) -> Result<(), String> {
     let layout = Layout::collect(linker);
-    let pointer = linker.global(variable).map_or(0, |inst| inst.operand(0));
+    let block = linker.variable_type(variable).unwrap_or(0);
+    let pointer = linker.pointer_to(StorageClass::PhysicalStorageBuffer, block);
     for id in functions {
         let Some(mut function) = linker.take_function(*id) else { continue };
         let mut alignments = HashMap::new();
@@ -28,6 +35,7 @@ pub(super) fn read_block_by_address(linker: &mut Linker, functions: &[u32], vari
                     alignments.insert(base, (BLOCK_ALIGNMENT, pointer));
                     inst.operands.iter_mut().filter(|id| **id == variable).for_each(|id| *id = base);
                 }
+                convert_pointer(linker, &mut inst, &alignments)?;
                 layout.follow(linker, &inst, &mut alignments);
                 add_alignment(&mut inst, &alignments);
                 code.push(inst);
@@ -35,6 +43,27 @@ pub(super) fn read_block_by_address(linker: &mut Linker, functions: &[u32], vari
             block.code = code;
         }
         linker.module.functions.push(function);
+    }
+    Ok(())
+}
+
+/// Gives a pointer that is made from a pointer to a block its storage class.
+fn convert_pointer(
+    linker: &mut Linker,
+    inst: &mut Inst,
+    pointers: &HashMap<u32, (u32, u32)>,
+) -> Result<(), String> {
+    if !used_ids(inst, &linker.module.wide).iter().any(|id| pointers.contains_key(id)) {
+        return Ok(());
+    }
+    match inst.op {
+        Op::AccessChain | Op::InBoundsAccessChain => {
+            let target = linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target);
+            inst.operands[0] = linker.pointer_to(StorageClass::PhysicalStorageBuffer, target);
+            Ok(())
+        }
+        Op::Load | Op::ArrayLength => Ok(()),
+        op => Err(format!("Op{op:?} of a block of push constants or of a shader record cannot be lowered")),
     }
 }
 

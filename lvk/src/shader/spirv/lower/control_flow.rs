@@ -127,7 +127,8 @@ impl ControlFlow {
             let mut targets = self.successors[block].iter();
             !returns && !is_cut(block) && targets.all(|to| *to == construct.merge || inside.contains(to))
         };
-        let is_entered_once = |block: &usize| self.predecessors[*block].iter().all(|from| inside.contains(from));
+        let is_entered_once =
+            |block: &usize| self.predecessors[*block].iter().all(|from| inside.contains(from));
         inside.iter().all(|block| stays(*block)) && construct.members.iter().all(is_entered_once)
     }
 }

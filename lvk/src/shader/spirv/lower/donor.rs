@@ -12,6 +12,8 @@ use super::stage::freeze_constants;
 /// Ids of the variables and functions of `donor/lowered_pipeline.comp.glsl` in the linked module.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Donor {
+    /// The donor's own block of push constants.
+    pub(super) push: u32,
     pub(super) launch_id: u32,
     pub(super) launch_size: u32,
     pub(super) push_constants: u32,
@@ -64,11 +66,17 @@ pub(super) struct Needs {
     pub(super) object_ray: bool,
     pub(super) matrices: bool,
     pub(super) positions: bool,
+    /// Flags that all rays have.
+    pub(super) flags_always: u32,
+    /// Flags that rays may have.
+    pub(super) flags_possible: u32,
 }
 
 /// Ids of the specialization constants of the donor.
 const HAS_CANDIDATES: u32 = 0;
 const HAS_BOXES: u32 = 1;
+const FLAGS_ALWAYS: u32 = 2;
+const FLAGS_POSSIBLE: u32 = 3;
 
 /// Returns the words of the donor for a traversal.
 fn donor_words(traversal: Traversal) -> &'static [u8] {
@@ -95,8 +103,13 @@ impl Donor {
         module.modes.clear();
         let main = module.function_named("main");
         module.functions.retain(|function| Some(function.id()) != main);
-        let flags = [(HAS_CANDIDATES, needs.candidates), (HAS_BOXES, needs.boxes)];
-        freeze_constants(&mut module, &flags.map(|(id, is_set)| (id, u64::from(is_set))));
+        let constants = [
+            (HAS_CANDIDATES, needs.candidates.into()),
+            (HAS_BOXES, needs.boxes.into()),
+            (FLAGS_ALWAYS, needs.flags_always.into()),
+            (FLAGS_POSSIBLE, needs.flags_possible.into()),
+        ];
+        freeze_constants(&mut module, &constants);
         let optional =
             [("ObjectRay", needs.object_ray), ("Matrices", needs.matrices), ("Positions", needs.positions)];
         for (what, _) in optional.iter().filter(|(_, is_needed)| !is_needed) {
@@ -130,7 +143,8 @@ fn empty_function(module: &mut Module, name: &str) {
 type Field = fn(&mut Donor) -> &mut u32;
 
 /// Names in the donor, with the fields of their ids.
-const NAMES: [(&str, Field); 42] = [
+const NAMES: [(&str, Field); 43] = [
+    ("lvkPush", |d| &mut d.push),
     ("lvkLaunchId", |d| &mut d.launch_id),
     ("lvkLaunchSize", |d| &mut d.launch_size),
     ("lvkPushConstants", |d| &mut d.push_constants),

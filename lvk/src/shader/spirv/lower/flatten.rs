@@ -11,6 +11,8 @@ use super::instruction::{Inst, for_each_id};
 use super::linker::Linker;
 use super::liveness::live_behind_blocks;
 use super::module::{Block, Function};
+use super::split_structs::split_structs;
+use super::traces::skips_closest_hit;
 
 /// Values of the state that are no pieces of functions.
 pub(super) mod state {
@@ -58,8 +60,17 @@ pub(super) struct ShaderFrame<'a> {
     pub(super) runs_once: bool,
     /// Variables of the shader outside of functions.
     pub(super) own: &'a [u32],
+    /// True if miss shaders wait for rays or callable shaders.
+    pub(super) misses_wait: bool,
     /// Variables that are read at each return: pairs of a variable of the shader and the variable it is copied to.
     pub(super) results: &'a [(u32, u32)],
+}
+
+impl ShaderFrame<'_> {
+    /// True for a trace that runs only shaders that do not wait.
+    fn returns_directly(&self, inst: &Inst) -> bool {
+        skips_closest_hit(inst) && !self.misses_wait
+    }
 }
 
 /// Takes `function` apart. The error is a message.
@@ -73,6 +84,9 @@ pub(super) fn flatten(
         return Err("OpSwitch over 64 bits cannot be lowered here".to_owned());
     }
     let cuts = split_at_traces(linker, &mut function);
+    if !frame.runs_once {
+        split_structs(linker, &mut function);
+    }
     demote_values(linker, &mut function)?;
     let flow = ControlFlow::of(&function);
     let is_cut = |block: usize| cuts.contains(&function.blocks[block].label);
@@ -142,12 +156,14 @@ fn live_variables(
     let variables: HashSet<u32> = locals.chain(frame.own.iter().copied()).collect();
     let at_return = frame.results.iter().map(|(own, _)| *own).collect();
     let live = live_behind_blocks(linker, function, flow, &variables, &at_return);
-    let sorted = |set: HashSet<u32>| {
-        let mut list: Vec<u32> = set.into_iter().collect();
+    // A ray that runs no closest-hit shader cannot lead back to this shader, so the variables stay where they are.
+    let keeps = |block: &Block| !block.code.iter().any(|inst| frame.returns_directly(inst));
+    let sorted = |(block, set): (&Block, HashSet<u32>)| {
+        let mut list: Vec<u32> = if keeps(block) { set.into_iter().collect() } else { Vec::new() };
         list.sort_unstable();
         list
     };
-    live.into_iter().map(sorted).collect()
+    function.blocks.iter().zip(live).map(sorted).collect()
 }
 
 struct Flattener<'a> {

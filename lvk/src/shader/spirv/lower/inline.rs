@@ -41,7 +41,7 @@ fn inline_call(
     let result = declare_result(linker, function, &call);
     rename_ids(linker, &mut callee, &call);
     let first = callee.blocks.first().map_or(behind, |block| block.label);
-    move_variables(function, &mut callee, block);
+    move_variables(linker, function, &mut callee, block);
     for part in &mut callee.blocks {
         return_to(part, behind, result);
     }
@@ -88,19 +88,26 @@ fn rename_ids(linker: &mut Linker, callee: &mut Function, call: &Inst) {
     linker.copy_decorations(&ids);
 }
 
-/// Moves the variables of the callee to the start of the caller. Their initial values are stored where the call was.
-fn move_variables(function: &mut Function, callee: &mut Function, block: usize) {
+/// Moves the variables of the callee to the start of the caller. Where the call was, they take their initial values, or
+/// undefined ones: nothing that an earlier call has left is read.
+fn move_variables(linker: &mut Linker, function: &mut Function, callee: &mut Function, block: usize) {
     let Some(first) = callee.blocks.first_mut() else { return };
     let (variables, rest) =
         std::mem::take(&mut first.code).into_iter().partition(|inst| inst.op == Op::Variable);
     first.code = rest;
     let variables: Vec<Inst> = variables;
     for mut variable in variables.into_iter() {
-        if variable.operands.len() > 3 {
-            let initial = variable.operand(3);
-            variable.operands.truncate(3);
-            function.blocks[block].code.push(Inst::new(Op::Store, &[variable.operand(1), initial]));
-        }
+        let initial = match variable.operands.get(3) {
+            Some(initial) => *initial,
+            None => {
+                let ty = linker.pointer(variable.operand(0)).map_or(0, |(_, target)| target);
+                let undefined = linker.new_id();
+                function.blocks[block].code.push(Inst::new(Op::Undef, &[ty, undefined]));
+                undefined
+            }
+        };
+        variable.operands.truncate(3);
+        function.blocks[block].code.push(Inst::new(Op::Store, &[variable.operand(1), initial]));
         function.blocks[0].code.insert(0, variable);
     }
 }

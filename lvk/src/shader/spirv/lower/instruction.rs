@@ -47,26 +47,6 @@ impl Inst {
         out.push((self.operands.len() as u32 + 1) << 16 | self.op as u32);
         out.extend(&self.operands);
     }
-
-    /// True for an instruction that ends a block.
-    pub(super) fn is_terminator(&self) -> bool {
-        use Op::{
-            Branch, BranchConditional, IgnoreIntersectionKHR, Kill, Return, ReturnValue, Switch,
-            TerminateRayKHR, Unreachable,
-        };
-        matches!(
-            self.op,
-            Branch
-                | BranchConditional
-                | Switch
-                | Return
-                | ReturnValue
-                | Unreachable
-                | Kill
-                | IgnoreIntersectionKHR
-                | TerminateRayKHR
-        )
-    }
 }
 
 /// The operands of an opcode behind its results.

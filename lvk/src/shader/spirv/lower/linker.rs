@@ -14,7 +14,7 @@ pub(super) type IdMap = HashMap<u32, u32>;
 #[derive(Default)]
 pub(super) struct Linker {
     pub(super) module: Module,
-    /// Types and constants that are declared once, by opcode and operands without the result.
+    /// Types and constants that are declared once, by opcode, operands without the result, and decorations.
     unique: HashMap<(u32, Vec<u32>), u32>,
     /// Types, constants and variables by their ids.
     globals: HashMap<u32, Inst>,
@@ -30,14 +30,18 @@ impl Linker {
 
     /// Adds all of a module but its entry points and their modes. Returns the new ids.
     pub(super) fn link(&mut self, module: Module) -> Result<IdMap, UnknownOpcode> {
-        let decorated: HashSet<u32> = module.decorations.iter().map(|inst| inst.operand(0)).collect();
+        let decorations = decoration_words(&module);
         let wide = module.wide;
         let mut ids = IdMap::new();
+        let mut shared = HashSet::new();
         for import in module.imports {
             self.link_import(import, &mut ids);
         }
         for global in module.globals {
-            self.link_global(global, &decorated, &wide, &mut ids)?;
+            let old = global.result();
+            if self.link_global(global, &decorations, &wide, &mut ids)? {
+                shared.extend(old);
+            }
         }
         for mut function in module.functions {
             let parts = std::iter::once(&mut function.head).chain(&mut function.parameters);
@@ -52,7 +56,7 @@ impl Linker {
             }
             self.module.functions.push(function);
         }
-        for mut inst in module.decorations {
+        for mut inst in module.decorations.into_iter().filter(|inst| !shared.contains(&inst.operand(0))) {
             self.map_ids(&mut inst, &wide, &mut ids)?;
             self.module.decorations.push(inst);
         }
@@ -80,32 +84,46 @@ impl Linker {
         self.module.imports.push(import);
     }
 
+    /// Returns true if the module has the type or constant already.
     fn link_global(
         &mut self,
         mut inst: Inst,
-        decorated: &HashSet<u32>,
+        decorations: &HashMap<u32, Vec<u32>>,
         wide: &HashSet<u32>,
         ids: &mut IdMap,
-    ) -> Result<(), UnknownOpcode> {
+    ) -> Result<bool, UnknownOpcode> {
         let old = inst.result();
-        let is_new = old.is_none_or(|old| !ids.contains_key(&old));
-        let has_decorations = old.is_some_and(|old| decorated.contains(&old));
+        let is_forward = old.is_some_and(|old| ids.contains_key(&old));
         self.map_ids(&mut inst, wide, ids)?;
         let Some(old) = old else {
             self.module.globals.push(inst);
-            return Ok(());
+            return Ok(false);
         };
-        // A pointer that was declared before its target keeps its id.
-        if is_new && !has_decorations && is_unique(inst.op) {
-            let key = unique_key(&inst);
+        let id = ids[&old];
+        // Others may refer to a pointer that was declared before its target.
+        let can_share = is_unique(inst.op) && (!is_forward || self.take_unused_declaration(id));
+        if can_share {
+            let key = unique_key(&inst, decorations.get(&old).map_or(&[][..], Vec::as_slice));
             if let Some(known) = self.unique.get(&key) {
                 ids.insert(old, *known);
-                return Ok(());
+                return Ok(true);
             }
-            self.unique.insert(key, ids[&old]);
+            self.unique.insert(key, id);
         }
         self.push_global(inst);
-        Ok(())
+        Ok(false)
+    }
+
+    /// Removes the forward declaration of a pointer type that nothing refers to. Returns false if something does.
+    fn take_unused_declaration(&mut self, pointer: u32) -> bool {
+        let is_declaration = |inst: &Inst| inst.op == Op::TypeForwardPointer && inst.operand(0) == pointer;
+        let refers = |inst: &Inst| !is_declaration(inst) && inst.operands.contains(&pointer);
+        let Some(at) = self.module.globals.iter().position(is_declaration) else { return false };
+        if self.module.globals[at..].iter().any(refers) {
+            return false;
+        }
+        self.module.globals.remove(at);
+        true
     }
 
     fn map_ids(
@@ -188,6 +206,31 @@ impl Linker {
 
     pub(super) fn pointer_to(&mut self, storage: StorageClass, target: u32) -> u32 {
         self.declare(Op::TypePointer, &[storage as u32, target])
+    }
+
+    /// Declares a block for push constants: the members of a block, and a pair of numbers at `offset`. Returns the
+    /// variable, and the index of the pair.
+    pub(super) fn push_block(&mut self, members_of: Option<u32>, offset: u32) -> (u32, u32) {
+        let pair = self.uvec2();
+        let members = members_of.and_then(|ty| self.global(ty)).map_or(&[][..], |inst| &inst.operands[1..]);
+        let mut words = members.to_vec();
+        let index = words.len() as u32;
+        let ty = self.new_id();
+        words.insert(0, ty);
+        words.push(pair);
+        self.push_global(Inst::new(Op::TypeStruct, &words));
+        if let Some(from) = members_of {
+            self.copy_decorations(&IdMap::from([(from, ty)]));
+        } else {
+            self.module.decorations.push(Inst::new(Op::Decorate, &[ty, Decoration::Block as u32]));
+        }
+        let place = [ty, index, Decoration::Offset as u32, offset];
+        self.module.decorations.push(Inst::new(Op::MemberDecorate, &place));
+        let storage = StorageClass::PushConstant;
+        let pointer = self.pointer_to(storage, ty);
+        let variable = self.new_id();
+        self.push_global(Inst::new(Op::Variable, &[pointer, variable, storage as u32]));
+        (variable, index)
     }
 
     /// Declares the type of functions without parameters that return nothing.
@@ -323,9 +366,28 @@ fn add_new<T: PartialEq>(list: &mut Vec<T>, items: Vec<T>) {
     }
 }
 
-fn unique_key(inst: &Inst) -> (u32, Vec<u32>) {
+/// Returns the words of the decorations of each type and constant, sorted.
+fn decoration_words(module: &Module) -> HashMap<u32, Vec<u32>> {
+    let mut all: HashMap<u32, Vec<Vec<u32>>> = HashMap::new();
+    for inst in &module.decorations {
+        let words = std::iter::once(inst.op as u32).chain(inst.operands.iter().skip(1).copied());
+        all.entry(inst.operand(0)).or_default().push(words.collect());
+    }
+    let joined = |(id, mut list): (u32, Vec<Vec<u32>>)| {
+        list.sort_unstable();
+        (id, list.concat())
+    };
+    all.into_iter().map(joined).collect()
+}
+
+/// Returns the key of a type or constant: its operands without the result, and its decorations.
+fn unique_key(inst: &Inst, decorations: &[u32]) -> (u32, Vec<u32>) {
     let mut operands = inst.operands.clone();
     operands.remove(if is_type(inst.op) { 0 } else { 1 });
+    if !decorations.is_empty() {
+        operands.push(u32::MAX);
+        operands.extend(decorations);
+    }
     (inst.op as u32, operands)
 }
 

@@ -56,23 +56,37 @@ impl Effects {
         mentions: &HashMap<u32, HashSet<u32>>,
         at_return: &HashSet<u32>,
     ) -> Self {
-        let (mut read, mut written) = (HashSet::new(), HashSet::new());
+        let mut found = Self { read: HashSet::new(), written: HashSet::new() };
+        // Pointers into variables, with the variables. Pointers do not leave their block.
+        let mut parts: HashMap<u32, u32> = HashMap::new();
         for inst in code.iter().filter(|inst| inst.op != Op::Variable) {
-            let target = (inst.op == Op::Store).then(|| inst.operand(0)).filter(|id| variables.contains(id));
+            let root = |id: u32| parts.get(&id).copied().unwrap_or(id);
             let mut used = used_ids(inst, &linker.module.wide);
-            if inst.op == Op::Store {
-                used.remove(0);
+            let mut whole = None;
+            match inst.op {
+                Op::AccessChain | Op::InBoundsAccessChain => {
+                    let base = root(inst.operand(2));
+                    if variables.contains(&base) {
+                        parts.insert(inst.operand(1), base);
+                        used.retain(|id| *id != inst.operand(2));
+                    }
+                }
+                // A write of a part reads nothing, and leaves the other parts.
+                Op::Store => {
+                    used.remove(0);
+                    whole = Some(inst.operand(0)).filter(|id| variables.contains(id));
+                }
+                Op::FunctionCall => used.extend(mentions.get(&inst.operand(2)).into_iter().flatten()),
+                Op::Return | Op::ReturnValue => used.extend(at_return),
+                _ => {}
             }
-            if inst.op == Op::FunctionCall {
-                used.extend(mentions.get(&inst.operand(2)).into_iter().flatten());
-            }
-            if matches!(inst.op, Op::Return | Op::ReturnValue) {
-                used.extend(at_return);
-            }
-            read.extend(used.into_iter().filter(|id| variables.contains(id) && !written.contains(id)));
-            written.extend(target);
+            let read: Vec<u32> = used.into_iter().map(|id| parts.get(&id).copied().unwrap_or(id)).collect();
+            let is_read = |id: &u32| variables.contains(id) && !found.written.contains(id);
+            let read: Vec<u32> = read.into_iter().filter(is_read).collect();
+            found.read.extend(read);
+            found.written.extend(whole);
         }
-        Self { read, written }
+        found
     }
 }
 

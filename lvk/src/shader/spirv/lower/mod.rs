@@ -15,7 +15,9 @@ mod linker;
 mod liveness;
 mod module;
 mod prune;
+mod push_constants;
 mod shaders;
+mod split_structs;
 mod stage;
 mod traces;
 
@@ -75,6 +77,10 @@ pub(crate) struct Lowering<'a> {
     pub(crate) callable: &'a [usize],
     /// Distances between the records of the table in bytes: of miss shaders, hit groups and callable shaders.
     pub(crate) strides: [u32; 3],
+    /// Bytes of push constants that the shaders read.
+    pub(crate) push_constant_bytes: u32,
+    /// Offset of the launch's address in the push constants, in bytes.
+    pub(crate) launch_offset: u32,
     pub(crate) max_recursion: u32,
     pub(crate) max_callable_depth: u32,
 }
@@ -94,8 +100,8 @@ pub(crate) struct LoweringError {
 /// row along y. Another launch takes 8 x 8 rays in a workgroup, and its workgroups lie like the rays.
 pub(crate) const WORKGROUP_SIZE: u32 = 64;
 
-/// Values that a lowered pipeline reads at the address in its push constants, which are these 8 bytes only. The push
-/// constants of the application follow at [`Launch::PUSH_CONSTANTS`].
+/// Values that a lowered pipeline reads at the address in its push constants, at [`Lowering::launch_offset`]. A copy of
+/// the push constants of the application follows at [`Launch::PUSH_CONSTANTS`].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Launch {

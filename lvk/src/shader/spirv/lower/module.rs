@@ -173,10 +173,6 @@ impl Module {
         self.names.iter().find(|(_, own)| is_it(own)).map(|(id, _)| *id)
     }
 
-    pub(super) fn global(&self, id: u32) -> Option<&Inst> {
-        self.globals.iter().find(|inst| inst.result() == Some(id))
-    }
-
     /// Returns the words of the module.
     pub(super) fn words(&self) -> Vec<u32> {
         let mut out = vec![::spirv::MAGIC_NUMBER, self.version, 0, self.bound, 0];

@@ -9,6 +9,7 @@ use super::donor::{Donor, Needs};
 use super::instruction::Inst;
 use super::judges::rewrite_judge;
 use super::linker::Linker;
+use super::push_constants::merge_push_constants;
 use super::stage::{Shader, link_stage};
 use super::traces::{Passed, TraceVariables, hide_remap_table, is_trace, rewrite_traces};
 use super::{HitShaders, Lowering, LoweringError, Traversal};
@@ -63,13 +64,17 @@ impl Shaders {
         };
         let boxes = lowering.hit.iter().any(|group| group.intersection.is_some());
         let judges = lowering.hit.iter().any(|group| group.any_hit.is_some());
+        // Flags that are no constant may be any.
         let flags = self.ray_flags(linker);
-        let knows = |test: fn(u32) -> bool| flags.iter().all(|flags| flags.is_some_and(test));
-        let ignores_opacity = knows(|flags| flags & RAY_FLAGS_OF_OPACITY == 0);
-        let all_opaque = knows(|flags| flags & RAY_FLAG_OPAQUE != 0);
+        let always = flags.iter().fold(u32::MAX, |all, flags| all & flags.unwrap_or(0));
+        let possible = flags.iter().fold(0, |all, flags| all | flags.unwrap_or(u32::MAX));
+        let all_opaque = always & RAY_FLAG_OPAQUE != 0;
+        let candidates = boxes || possible & RAY_FLAGS_OF_OPACITY != 0 || (judges && !all_opaque);
         Needs {
-            candidates: boxes || !ignores_opacity || (judges && !all_opaque),
+            candidates,
             boxes,
+            flags_always: always & possible | if candidates { 0 } else { RAY_FLAG_OPAQUE },
+            flags_possible: possible,
             object_ray: reads(&[BuiltIn::ObjectRayOriginKHR, BuiltIn::ObjectRayDirectionKHR]),
             matrices: reads(&[BuiltIn::ObjectToWorldKHR, BuiltIn::WorldToObjectKHR]),
             positions: reads(&[BuiltIn::HitTriangleVertexPositionsKHR]),
@@ -98,16 +103,16 @@ impl Shaders {
         let donor: Donor = *variables.donor;
         let mut indices: Vec<usize> = self.linked.keys().copied().collect();
         indices.sort_unstable();
+        let shaders: Vec<&Shader> = indices.iter().filter_map(|index| self.linked.get(index)).collect();
+        merge_push_constants(linker, lowering, &donor, &shaders)
+            .map_err(|(shader, message)| LoweringError { shader, message })?;
         for index in indices {
             let shader = &self.linked[&index];
             let failed = |message| LoweringError { shader: shader.name.clone(), message };
-            if let Some(block) = shader.push {
-                read_block_by_address(linker, &shader.functions, block, donor.push_constants);
-            }
             if let Some(block) = shader.record {
                 let pair = linker.uvec2();
                 let address = linker.private(pair);
-                read_block_by_address(linker, &shader.functions, block, address);
+                read_block_by_address(linker, &shader.functions, block, address).map_err(failed)?;
                 self.records.insert(index, address);
             }
             let stage = lowering.modules[index].stage;

@@ -269,9 +269,7 @@ fn converted_storage(storage: u32) -> u32 {
     ];
     if private.iter().any(|class| *class as u32 == storage) {
         StorageClass::Private as u32
-    } else if storage == StorageClass::PushConstant as u32
-        || storage == StorageClass::ShaderRecordBufferKHR as u32
-    {
+    } else if storage == StorageClass::ShaderRecordBufferKHR as u32 {
         StorageClass::PhysicalStorageBuffer as u32
     } else {
         storage

@@ -83,6 +83,8 @@ fn lowered(pipeline: &Pipeline) -> Vec<Result<Vec<u32>, LoweringError>> {
             hit: &pipeline.hit,
             callable: &pipeline.callable,
             strides: [16, 32, 16],
+            push_constant_bytes: 100,
+            launch_offset: 248,
             max_recursion: pipeline.max_recursion,
             max_callable_depth: 2,
         })

@@ -46,6 +46,17 @@ pub(super) fn is_trace(inst: &Inst) -> bool {
     inst.op == Op::TraceRayKHR
 }
 
+/// True for a rewritten trace that runs no closest-hit shader.
+pub(super) fn skips_closest_hit(inst: &Inst) -> bool {
+    is_trace(inst) && inst.operands == SKIPS_CLOSEST_HIT
+}
+
+/// Operands of rewritten traces that run no closest-hit shader. No id is 0.
+const SKIPS_CLOSEST_HIT: [u32; 1] = [0];
+
+/// A ray that hits does not run its closest-hit shader.
+pub(super) const RAY_FLAG_SKIP_CLOSEST_HIT: u32 = 0x8;
+
 /// Stores the arguments of each trace and call of a function in variables, and leaves the bare instruction between that
 /// and the copy of the payload.
 pub(super) fn rewrite_traces(
@@ -99,7 +110,10 @@ fn rewrite_trace(
     }
     keep_miss_bits(linker, donor, out);
     let payload = inst.operand(10);
-    pass(linker, &mut variables.payloads, payload, Op::TraceRayKHR, out)
+    let flags = linker.global(inst.operand(1)).filter(|inst| inst.op == Op::Constant);
+    let skips = flags.is_some_and(|inst| inst.operand(2) & RAY_FLAG_SKIP_CLOSEST_HIT != 0);
+    let bare = Inst::new(Op::TraceRayKHR, if skips { &SKIPS_CLOSEST_HIT } else { &[] });
+    pass(linker, &mut variables.payloads, payload, bare, out)
 }
 
 /// Keeps the bits of the miss index that count.
@@ -120,7 +134,8 @@ fn rewrite_call(
     out: &mut Vec<Inst>,
 ) -> Result<(), String> {
     store_as(linker, definitions, variables.callable_index, inst.operand(0), out);
-    pass(linker, &mut variables.callables, inst.operand(1), Op::ExecuteCallableKHR, out)
+    let bare = Inst::new(Op::ExecuteCallableKHR, &[]);
+    pass(linker, &mut variables.callables, inst.operand(1), bare, out)
 }
 
 /// Copies a payload to the variable that passes it, and back behind the bare instruction.
@@ -128,16 +143,16 @@ fn pass(
     linker: &mut Linker,
     passed: &mut Passed,
     payload: u32,
-    op: Op,
+    bare: Inst,
     out: &mut Vec<Inst>,
 ) -> Result<(), String> {
     if linker.variable_type(payload).is_none() {
-        return Err(format!("the payload of Op{op:?} is no variable"));
+        return Err(format!("the payload of Op{:?} is no variable", bare.op));
     }
     let shared = passed.variable(linker, payload);
     let mut emitter = Emitter::new(linker, out);
     emitter.copy(payload, shared);
-    emitter.push(op, &[]);
+    emitter.code.push(bare);
     emitter.copy(shared, payload);
     Ok(())
 }

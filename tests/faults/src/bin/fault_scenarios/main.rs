@@ -5,6 +5,7 @@
 
 mod blas;
 mod compute;
+mod device_fault;
 mod hot_reload;
 mod leak;
 mod queues;
@@ -40,6 +41,7 @@ fn scenario(name: &str) -> Option<Scenario> {
         "queues" => queues::three,
         "raw_device" => raw_device::guest,
         "hot_reload" => hot_reload::reload,
+        "device_fault" => device_fault::explained,
         "leak" => leak::forgotten_fence,
         #[cfg(target_os = "linux")]
         "window" => window::frames_and_resize,

@@ -7,9 +7,9 @@ use lvk_dev_driver::{DriverRequest, prepare};
 use crate::Failure;
 use crate::compute::{read_words, record_step, step_pipeline, words_buffer};
 
-/// Turns an error of the engine's own calls into one that names the command.
-fn in_call(command: &'static str) -> impl Fn(vk::Result) -> Failure {
-    move |result| format!("engine: {command} failed: {result}").into()
+/// Turns an error of the engine's own calls into one that names the command and its object.
+fn in_call(command: &'static str, object: &'static str) -> impl Fn(vk::Result) -> Failure {
+    move |result| format!("{command} failed for '{object} of the engine': {result}").into()
 }
 
 /// Instance of the engine, destroyed at the end.
@@ -48,7 +48,8 @@ impl<'a> EngineSemaphore<'a> {
         let mut timeline = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut timeline);
         // SAFETY: the description is valid.
-        let raw = unsafe { device.create_semaphore(&info, None) }.map_err(in_call("vkCreateSemaphore"))?;
+        let raw = unsafe { device.create_semaphore(&info, None) }
+            .map_err(in_call("vkCreateSemaphore", "semaphore"))?;
         Ok(Self { device, raw })
     }
 }
@@ -67,8 +68,8 @@ impl Drop for EngineSemaphore<'_> {
 pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
     let engine = instance()?;
     // SAFETY: the instance is alive.
-    let devices =
-        unsafe { engine.raw.enumerate_physical_devices() }.map_err(in_call("vkEnumeratePhysicalDevices"))?;
+    let devices = unsafe { engine.raw.enumerate_physical_devices() }
+        .map_err(in_call("vkEnumeratePhysicalDevices", "instance"))?;
     let physical = *devices.first().ok_or("no device")?;
     let desc = ContextDesc::default();
     // SAFETY: the handles belong together, and are destroyed after the context and all that it made.
@@ -77,7 +78,8 @@ pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
         let (queues, mut chain) = (needs.queue_create_infos(), needs.feature_chain());
         let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
         let info = chain.merge_into(info)?;
-        let raw = engine.raw.create_device(physical, &info, None).map_err(in_call("vkCreateDevice"))?;
+        let raw =
+            engine.raw.create_device(physical, &info, None).map_err(in_call("vkCreateDevice", "device"))?;
         let device = EngineDevice { raw };
         let done = EngineSemaphore::new(&device.raw)?;
         let ctx = Context::from_raw(needs.raw_context(device.raw.clone(), needs.queues(&device.raw)), &desc)?;
@@ -100,7 +102,7 @@ fn instance() -> Result<EngineInstance, Failure> {
             Some(path) => ash::Entry::load_from(path)?,
             None => ash::Entry::load()?,
         };
-        let raw = entry.create_instance(&info, None).map_err(in_call("vkCreateInstance"))?;
+        let raw = entry.create_instance(&info, None).map_err(in_call("vkCreateInstance", "instance"))?;
         Ok(EngineInstance { entry, raw })
     }
 }
@@ -115,6 +117,6 @@ fn step(ctx: &Context, device: &ash::Device, done: vk::Semaphore) -> Result<Vec<
     let semaphores = [done];
     let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&[1]);
     // SAFETY: the semaphore is alive.
-    unsafe { device.wait_semaphores(&info, u64::MAX) }.map_err(in_call("vkWaitSemaphores"))?;
+    unsafe { device.wait_semaphores(&info, u64::MAX) }.map_err(in_call("vkWaitSemaphores", "semaphore"))?;
     Ok(read_words(ctx, *to)?)
 }

@@ -7,6 +7,9 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool kLvkHasCandidates = true;
 // False if no hit group has an intersection shader.
 layout(constant_id = 1) const bool kLvkHasBoxes = true;
+// Flags that all rays have, and flags that rays may have.
+layout(constant_id = 2) const uint kLvkFlagsAlways = 0u;
+layout(constant_id = 3) const uint kLvkFlagsPossible = 0xFFFFFFFFu;
 
 #define LVK_LOWERED_PIPELINE
 #define LVK_CANDIDATE_FUNCTION lvkJudgeCandidate
@@ -189,7 +192,7 @@ void lvkJudgeCandidate(LvkRayQueryParameter rq) {
 // Traces the ray.
 void lvkTraverse() {
     LvkRayQuery rq;
-    uint flags = lvkRayFlags & ~LVK_RAY_FLAG_SKIP_CLOSEST_HIT_SHADER | (kLvkHasCandidates ? 0u : LVK_RAY_FLAG_OPAQUE);
+    uint flags = lvkRayFlags & kLvkFlagsPossible & ~LVK_RAY_FLAG_SKIP_CLOSEST_HIT_SHADER | kLvkFlagsAlways;
     lvkRayQueryInitialize(rq, lvkRayTlas, flags, lvkRayMask & 0xFFu, lvkRayOrigin, lvkRayTMin, lvkRayDirection,
                           lvkRayTMax);
     while (lvkRayQueryProceed(rq)) {
