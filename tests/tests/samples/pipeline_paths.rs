@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
-use lvk::{Context, RayTracingPipelinePath};
+use lvk::{Context, RayQueryRequest, RayTracingPipelinePath, RayTracingPipelineRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample::{FrameTime, Sample};
@@ -18,15 +18,19 @@ use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig};
 use lvk_samples::rtx_textures::RtxTextures;
 use lvk_samples::scene::Scene;
 use lvk_tests::hybrid::HybridHarness;
-use lvk_tests::image_comparison::{Tolerance, assert_not_empty, assert_similar};
+use lvk_tests::image_comparison::{Tolerance, assert_not_empty, assert_similar, reference_image};
 use lvk_tests::oit_reference::OitRenderer;
 use lvk_tests::pipeline_paths::pipeline_devices;
 use lvk_tests::scene_obj::obj_scene;
+use lvk_tests::subprocess::on_swiftshader;
+use lvk_tests::{device_with, rtx_sample};
 
 /// No multiple of a workgroup.
 const SIZE: [u32; 2] = [99, 55];
 /// Tolerance between two paths: rays that meet an edge may fall to either side.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 60.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
+/// Tolerance between two drivers.
+const ANOTHER_DRIVER: Tolerance = Tolerance { psnr: 55.0, ..SAME_RAYS };
 
 const RTX: RtxConfig = RtxConfig { path: RayPath::Pipeline, width: SIZE[0], height: SIZE[1] };
 
@@ -81,6 +85,26 @@ fn reflections_look_the_same_by_all_pipelines() {
 #[test]
 fn rtx_hello_looks_the_same_by_all_pipelines() {
     assert_paths_agree("triangles", 20, |ctx| image_of(RtxHello::new(ctx, &RTX).unwrap()));
+}
+
+#[test]
+fn a_driver_without_ray_tracing_renders_the_triangles_by_a_pipeline() {
+    on_swiftshader(a_driver_without_ray_tracing_renders_the_triangles_by_a_pipeline, || {
+        let lowered = device_with(|desc| {
+            (desc.ray_query, desc.ray_tracing_pipeline) =
+                (RayQueryRequest::Off, RayTracingPipelineRequest::Auto);
+        });
+        let Some(ctx) = lowered else { return };
+        let [width, height] = rtx_sample::SIZE;
+        let mut triangles = RtxHello::new(&ctx, &RtxConfig { width, height, ..RTX }).unwrap();
+        let image = rtx_sample::image_of(&mut triangles, 0);
+        assert_similar(
+            "SwiftShader by a pipeline",
+            &image,
+            &reference_image("rtx_hello_small"),
+            &ANOTHER_DRIVER,
+        );
+    });
 }
 
 #[test]

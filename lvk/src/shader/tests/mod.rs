@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
 mod damage;
+#[cfg(feature = "software-ray-query")]
 mod damaged_pipelines;
 #[cfg(feature = "software-ray-query")]
 mod glsl_names;

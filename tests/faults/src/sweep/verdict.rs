@@ -234,7 +234,7 @@ mod tests {
     fn the_right_result_and_a_polite_refusal_pass() {
         let other_shader = RunOutcome { files: BTreeSet::from(["caches/3.spirv".to_owned()]), ..clean() };
         let told_others = BTreeSet::from(["vkWaitSemaphores".to_owned()]);
-        let stderr = "error: the device was lost in vkWaitSemaphores".to_owned();
+        let stderr = "error: the device was lost in vkWaitSemaphores for 'rain'".to_owned();
         let by_other_thread = RunOutcome { told_others, stderr, ..refused() };
         for outcome in [clean(), refused(), other_shader, by_other_thread] {
             assert_eq!(found(&outcome), []);
