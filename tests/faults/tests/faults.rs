@@ -278,7 +278,7 @@ fn the_fault_of_a_lost_device_is_told() {
         let program = reporting(program("device_fault"), report);
         let [outcome, _] = assert_told(&program, "vkQueueSubmit2 1 device-lost once");
         let error = error_line(&outcome);
-        let loss = "error: the device was lost in vkQueueSubmit2";
+        let loss = "error: the device was lost in vkQueueSubmit2 for 'graphics queue'";
         let has_report = !matches!(report, FaultReport::NoCounts | FaultReport::NoLists);
         let start = if has_report {
             format!("{loss} (injected page fault; InvalidWrite at 0x")

@@ -168,7 +168,7 @@ fn names_a_command(text: &str) -> bool {
 }
 
 /// True if the error names the object of a command, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`,
-/// or the swapchain whose window is gone. Every command concerns an object, those before the device the loader, the instance
+/// or the swapchain whose window is gone, or what lacks ray tracing since the device was created without it. Every command concerns an object, those before the device the loader, the instance
 /// or the window.
 fn names_object(error: &str) -> bool {
     let is_named = |rest: &str| {
@@ -179,7 +179,11 @@ fn names_object(error: &str) -> bool {
         || error
             .split_once(WINDOW_IS_GONE)
             .is_some_and(|(before, _)| before.contains(" '") && !before.ends_with('\''))
+        || error.split_once(WITHOUT_RAY_TRACING).is_some_and(|(before, _)| before.contains(" '"))
 }
+
+/// A part of errors about ray tracing behind the quoted name of what needs it, on a device that was created without.
+const WITHOUT_RAY_TRACING: &str = "vkCreateDevice with ray tracing returned";
 
 /// The end of an error about a lost surface, after the quoted name of the swapchain.
 const WINDOW_IS_GONE: &str = "': its window is gone";

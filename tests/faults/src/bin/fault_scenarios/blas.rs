@@ -3,8 +3,8 @@
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags,
     ComputePipelineDesc, Context, ContextDesc, Dependencies, DeviceProfile, Holder, RayQueryRequest,
-    ShaderModuleDesc, ShaderSource, ShaderStage, TextureDesc, TextureRegion, TextureUsage, TlasDesc,
-    TlasInstance, Triangles,
+    RayTracingPipelineRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TextureDesc, TextureRegion,
+    TextureUsage, TlasDesc, TlasInstance, Triangles,
 };
 
 use crate::{Failure, context};
@@ -34,7 +34,9 @@ pub(crate) fn on_device() -> Result<Vec<u8>, Failure> {
         ..DeviceProfile::default()
     };
     let ray_query = RayQueryRequest::HardwareIfPresent;
-    batch(&context(ContextDesc { profile: Some(&profile), ray_query, ..Default::default() })?)
+    let ray_tracing_pipeline = RayTracingPipelineRequest::HardwareIfPresent;
+    let profile = Some(&profile);
+    batch(&context(ContextDesc { profile, ray_query, ray_tracing_pipeline, ..Default::default() })?)
 }
 
 /// The batch as BVHs that software traverses.
