@@ -164,6 +164,8 @@ impl CommandBuffer {
 /// # Errors
 /// [`LimitExceeded`](Error::LimitExceeded) for a launch that needs more workgroups.
 fn launch_workgroups(pipeline: &str, size: [u32; 3], most: [u32; 3]) -> Result<[u32; 3]> {
+    let rays = size.iter().fold(1_u64, |all, side| all.saturating_mul((*side).into()));
+    check_limit(pipeline, "number of rays", rays, u32::MAX.into())?;
     let counts = match size {
         _ if size.contains(&0) => return Ok([0; 3]),
         [width, 1, 1] => {
@@ -177,8 +179,6 @@ fn launch_workgroups(pipeline: &str, size: [u32; 3], most: [u32; 3]) -> Result<[
         let what = "number of workgroups along an axis of the trace";
         check_limit(pipeline, what, count.into(), most.into())?;
     }
-    let rays = size.iter().fold(1_u64, |all, side| all.saturating_mul((*side).into()));
-    check_limit(pipeline, "number of rays", rays, u32::MAX.into())?;
     Ok(counts)
 }
 

@@ -6,7 +6,7 @@ use ::spirv::Op;
 
 use super::calls::{Call, RecordPlace, Shared, Situation};
 use super::emit::Emitter;
-use super::flatten::{Pieces, ShaderFrame, StateMachine, element, flatten, state};
+use super::flatten::{FlattenedFunction, ShaderFrame, StateMachine, element, flatten, state};
 use super::inline::inline_calls;
 use super::instruction::Inst;
 use super::linker::Linker;
@@ -38,7 +38,7 @@ pub(super) struct Assembly<'a> {
     machine: Option<StateMachine>,
     /// First states of shaders that wait.
     entries: HashMap<usize, u32>,
-    pieces: Vec<Pieces>,
+    pieces: Vec<FlattenedFunction>,
 }
 
 /// What is called for each record of a region.

@@ -27,7 +27,7 @@ pub(super) struct ControlFlow {
 }
 
 impl ControlFlow {
-    pub(super) fn of(function: &Function) -> Self {
+    pub(super) fn new(function: &Function) -> Self {
         let blocks = &function.blocks;
         let index: HashMap<u32, usize> =
             blocks.iter().enumerate().map(|(at, block)| (block.label, at)).collect();

@@ -44,7 +44,7 @@ pub(super) struct StateMachine {
 }
 
 /// The pieces of a function.
-pub(super) struct Pieces {
+pub(super) struct FlattenedFunction {
     /// The state that the function starts with.
     pub(super) entry: u32,
     /// States with the labels of their first blocks.
@@ -79,7 +79,7 @@ pub(super) fn flatten(
     machine: &mut StateMachine,
     mut function: Function,
     frame: &ShaderFrame<'_>,
-) -> Result<Pieces, String> {
+) -> Result<FlattenedFunction, String> {
     if function.code().any(|inst| inst.op == Op::Switch && linker.module.wide.contains(&inst.operand(0))) {
         return Err("OpSwitch over 64 bits cannot be lowered here".to_owned());
     }
@@ -88,7 +88,7 @@ pub(super) fn flatten(
         split_structs(linker, &mut function);
     }
     demote_values(linker, &mut function)?;
-    let flow = ControlFlow::of(&function);
+    let flow = ControlFlow::new(&function);
     let is_cut = |block: usize| cuts.contains(&function.blocks[block].label);
     let whole = flow.whole_constructs(&function, &is_cut);
     let live = live_variables(linker, &function, &flow, frame);
@@ -114,7 +114,7 @@ pub(super) fn flatten(
     let (blocks, cases) = (flattener.blocks, flattener.cases);
     let is_variable = |inst: &&Inst| inst.op == Op::Variable;
     let variables = function.code().filter(is_variable).cloned().collect();
-    Ok(Pieces { entry, cases, blocks, variables })
+    Ok(FlattenedFunction { entry, cases, blocks, variables })
 }
 
 /// Ends a block behind each trace, and returns the labels of these blocks.
@@ -179,7 +179,7 @@ struct Flattener<'a> {
     states: HashMap<usize, u32>,
     /// Arrays that keep variables of waiting functions.
     stacks: HashMap<u32, u32>,
-    /// Pieces that are not written yet.
+    /// FlattenedFunction that are not written yet.
     waiting: Vec<(usize, u32)>,
     blocks: Vec<Block>,
     cases: Vec<(u32, u32)>,

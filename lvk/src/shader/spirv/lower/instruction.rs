@@ -23,12 +23,12 @@ impl Inst {
 
     /// Returns the id of the result's type.
     pub(super) fn result_type(&self) -> Option<u32> {
-        (Form::of(self.op)?.results == 2).then(|| self.operand(0))
+        (Form::from_opcode(self.op)?.results == 2).then(|| self.operand(0))
     }
 
     /// Returns the id of the result.
     pub(super) fn result(&self) -> Option<u32> {
-        match Form::of(self.op)?.results {
+        match Form::from_opcode(self.op)?.results {
             0 => None,
             results => Some(self.operand(results - 1)),
         }
@@ -36,7 +36,7 @@ impl Inst {
 
     /// Replaces the id of the result.
     pub(super) fn set_result(&mut self, id: u32) {
-        let results = Form::of(self.op).map_or(0, |form| form.results);
+        let results = Form::from_opcode(self.op).map_or(0, |form| form.results);
         if let Some(at) = results.checked_sub(1).and_then(|at| self.operands.get_mut(at)) {
             *at = id;
         }
@@ -98,7 +98,7 @@ const ALL: usize = usize::MAX;
 
 impl Form {
     /// Returns the form of an opcode; `None` for one that lowered shaders may not have.
-    fn of(op: Op) -> Option<Self> {
+    fn from_opcode(op: Op) -> Option<Self> {
         let (results, rest) = Self::of_global(op).or_else(|| Self::of_code(op))?;
         Some(Self { results, rest })
     }
@@ -206,7 +206,7 @@ pub(super) fn least_operands(op: Op) -> usize {
         Op::BranchConditional | Op::Constant | Op::SpecConstant | Op::MemberDecorate | Op::EntryPoint => 3,
         Op::Function | Op::ReportIntersectionKHR | Op::ExtInst => 4,
         Op::TraceRayKHR => 11,
-        _ => Form::of(op).map_or(0, |form| form.results),
+        _ => Form::from_opcode(op).map_or(0, |form| form.results),
     }
 }
 
@@ -222,7 +222,7 @@ pub(super) fn for_each_id(
     mut change: impl FnMut(&mut u32),
 ) -> Result<(), UnknownOpcode> {
     let op = inst.op;
-    let form = Form::of(op).ok_or(UnknownOpcode(op))?;
+    let form = Form::from_opcode(op).ok_or(UnknownOpcode(op))?;
     let selector = inst.operand(form.results);
     let split = form.results.min(inst.operands.len());
     let (results, rest) = inst.operands.split_at_mut(split);
@@ -287,7 +287,7 @@ fn memory_ids(words: &mut [u32], change: &mut impl FnMut(&mut u32)) -> Option<()
 pub(super) fn used_ids(inst: &Inst, wide: &HashSet<u32>) -> Vec<u32> {
     let mut all = Vec::new();
     let mut copy = inst.clone();
-    let results = Form::of(inst.op).map_or(0, |form| form.results);
+    let results = Form::from_opcode(inst.op).map_or(0, |form| form.results);
     // An unknown opcode was refused when the module was read.
     let _ = for_each_id(&mut copy, wide, |id| all.push(*id));
     if results > 0 && all.len() >= results {

@@ -187,7 +187,7 @@ fn leave_loop_header(linker: &mut Linker, function: &mut Function, at: usize) ->
 
 /// Fails for a block that only the way back to the start of a loop reaches, from where no return is possible.
 fn check_continue(function: &Function, at: usize) -> Result<(), String> {
-    let flow = ControlFlow::of(function);
+    let flow = ControlFlow::new(function);
     let merges = function.blocks.iter().filter_map(|block| block.merge().map(|inst| (block, inst)));
     let mut loops = merges.filter(|(_, inst)| inst.op == Op::LoopMerge);
     let is_inside = loops.any(|(header, inst)| {

@@ -22,7 +22,7 @@ pub(super) fn live_behind_blocks(
     let effects: Vec<Effects> = function
         .blocks
         .iter()
-        .map(|block| Effects::of(linker, &block.code, variables, &mentions, at_return))
+        .map(|block| Effects::collect(linker, &block.code, variables, &mentions, at_return))
         .collect();
     let mut at_start: Vec<HashSet<u32>> = vec![HashSet::new(); effects.len()];
     let mut behind = at_start.clone();
@@ -49,7 +49,7 @@ struct Effects {
 }
 
 impl Effects {
-    fn of(
+    fn collect(
         linker: &Linker,
         code: &[Inst],
         variables: &HashSet<u32>,

@@ -218,11 +218,11 @@ fn remove_structures(linker: &Linker, function: &mut Function) {
 pub(super) fn hide_remap_table(linker: &mut Linker, function: &mut Function, tables: &[u32]) {
     let is_zero =
         |id: u32| linker.global(id).is_some_and(|inst| inst.op == Op::Constant && inst.operand(2) == 0);
+    // A chain to the address of the table, or to the whole entry with it, which nothing else in the shader reads.
     let is_rows = |inst: &&Inst| {
         matches!(inst.op, Op::AccessChain | Op::InBoundsAccessChain)
             && tables.contains(&inst.operand(2))
-            && inst.operands.len() == 6
-            && is_zero(inst.operand(5))
+            && (inst.operands.len() == 5 || inst.operands.len() == 6 && is_zero(inst.operand(5)))
     };
     let rows: Vec<u32> = function.code().filter(is_rows).filter_map(Inst::result).collect();
     for inst in function.code_mut() {
