@@ -19,7 +19,7 @@ use crate::accel::tlas_tracker::TlasTrackers;
 use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::queues::IdleFailure;
 use crate::handle::AccelStructHandle;
@@ -380,16 +380,25 @@ fn persistent_wait(
     wait()
 }
 
-/// Waits for a minute at most until `is_done`, where a wait of the device fails for want of memory. Returns false if it
-/// never was, or cannot be known.
+/// Waits for a minute at most until `is_done`, where a wait of the device fails for want of memory. Questions that fail for
+/// want of memory too are asked again for four seconds. Returns false if the work never was done, or it cannot be known.
 fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl FnMut(Duration)) -> bool {
     const PAUSE: Duration = Duration::from_millis(20);
     const TRIES: usize = 3_000;
+    const MOST_FAILURES: usize = 200;
+    let mut failures = 0;
     for _ in 0..TRIES {
         match is_done() {
-            Ok(false) => pause(PAUSE),
-            ended => return ended.unwrap_or(false),
+            Ok(true) => return true,
+            Ok(false) => {}
+            Err(Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. })
+                if failures < MOST_FAILURES =>
+            {
+                failures += 1;
+            }
+            Err(_) => return false,
         }
+        pause(PAUSE);
     }
     false
 }
@@ -397,23 +406,25 @@ fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl Fn
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Error;
     use crate::queue::Queue;
 
     #[test]
     fn polling_ends_with_the_work_or_with_an_error() {
-        let polled = |answers: &[Option<bool>]| {
+        let polled = |answers: &[std::result::Result<bool, vk::Result>]| {
             let (mut calls, mut pauses) = (0, 0);
             let is_done = || {
                 calls += 1;
-                answers[(calls - 1).min(answers.len() - 1)].ok_or_else(|| Error::usage("test", "fails"))
+                let answer = answers[(calls - 1).min(answers.len() - 1)];
+                answer.map_err(Error::vulkan("vkGetSemaphoreCounterValue", "test"))
             };
             (wait_by_polling(is_done, |_| pauses += 1), pauses)
         };
-        assert_eq!(polled(&[Some(true)]), (true, 0));
-        assert_eq!(polled(&[Some(false), Some(false), Some(true)]), (true, 2));
-        assert_eq!(polled(&[Some(false), None]), (false, 1));
-        assert_eq!(polled(&[Some(false)]), (false, 3_000));
+        let short = Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY);
+        assert_eq!(polled(&[Ok(true)]), (true, 0));
+        assert_eq!(polled(&[Ok(false), short, Ok(true)]), (true, 2));
+        assert_eq!(polled(&[Ok(false), Err(vk::Result::ERROR_UNKNOWN)]), (false, 1));
+        assert_eq!(polled(&[short]), (false, 200));
+        assert_eq!(polled(&[Ok(false)]), (false, 3_000));
     }
 
     /// Returns the results of the wait, and the number of pauses, for a wait that gives these results, the last for good.

@@ -14,6 +14,7 @@ use crate::pipeline::stage_interface_check::interface_difference;
 use crate::shader::disk_file;
 use crate::shader::layout_comparison::compare_layout;
 use crate::shader::shader_layout::{NestedLayout, StructLayout, StructMember};
+use crate::shader::spirv::lower::{HitShaders, Lowering, StageModule, Traversal, lower};
 use crate::shader::spirv::passes::merge_sampled_image::merge_sampled_images;
 use crate::shader::spirv::passes::strip_primitive_culling::strip_primitive_culling;
 use crate::shader::spirv::passes::strip_unused_bindings::strip_unused_bindings;
@@ -28,6 +29,7 @@ use crate::shader::{
 pub fn read_spirv(choice: u8, words: &[u32]) {
     let stage = ShaderStage::ALL[usize::from(choice) % ShaderStage::ALL.len()];
     run_passes(words);
+    lower_alone(stage, words);
     let desc = ShaderModuleDesc {
         stage,
         source: ShaderSource::Spirv(words),
@@ -40,6 +42,26 @@ pub fn read_spirv(choice: u8, words: &[u32]) {
         Ok(module) => use_reflection(stage, &module),
         Err(error) => drop(error.to_string()),
     }
+}
+
+/// Lowers a ray tracing pipeline whose only shader are these words, in every role.
+fn lower_alone(stage: ShaderStage, words: &[u32]) {
+    let hit = HitShaders { closest_hit: Some(0), any_hit: Some(0), intersection: Some(0) };
+    let modules = [StageModule { name: "fuzzed", stage, words, specialization: &[(0, 1)] }];
+    let lowered = lower(&Lowering {
+        traversal: Traversal::Query,
+        modules: &modules,
+        ray_gen: 0,
+        miss: &[0],
+        hit: &[hit, HitShaders { intersection: None, ..hit }],
+        callable: &[0],
+        strides: [16; 3],
+        push_constant_bytes: 64,
+        launch_offset: 120,
+        max_recursion: 2,
+        max_callable_depth: 1,
+    });
+    drop(lowered.map_err(|error| error.message));
 }
 
 fn run_passes(words: &[u32]) {

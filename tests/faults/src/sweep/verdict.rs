@@ -167,9 +167,10 @@ fn names_a_command(text: &str) -> bool {
     texts_after_commands(text).next().is_some()
 }
 
-/// True if the error names the object of a command, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`,
-/// or the swapchain whose window is gone, or what lacks ray tracing since the device was created without it. Every command concerns an object, those before the device the loader, the instance
-/// or the window.
+/// True if the error names the object of a command, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`.
+///
+/// Two other forms count: the swapchain whose window is gone, and what needs ray tracing on a device that was created
+/// without. Every command concerns an object, those before the device the loader, the instance or the window.
 fn names_object(error: &str) -> bool {
     let is_named = |rest: &str| {
         let rest = rest.strip_prefix(" failed").unwrap_or(rest);
@@ -275,6 +276,7 @@ mod tests {
             "error: rain: vkMapMemory failed for 'rain': unknown",
             "error: no device (vkGetPhysicalDeviceSurfaceSupportKHR failed for 'window': lost)",
             "error: swapchain 'main': its window is gone; resume it",
+            "error: shader 'a' needs ray queries: vkCreateDevice with ray tracing returned: lost",
         ] {
             assert!(names_object(named), "{named}");
         }
@@ -285,6 +287,7 @@ mod tests {
             "error: 'rain': vkMapMemory failed: unknown",
             "error: lvkMapMemory for 'rain'",
             "error: swapchain '': its window is gone; resume it",
+            "error: no ray queries: vkCreateDevice with ray tracing returned 'lost'",
         ] {
             assert!(!names_object(unnamed), "{unnamed}");
         }
