@@ -7,6 +7,7 @@ use ::spirv::{Op, StorageClass};
 use super::instruction::{Inst, for_each_id, used_ids};
 use super::linker::Linker;
 use super::module::Function;
+use crate::shader::spirv::parsed::MAX_NESTING;
 
 /// Keeps every value that another block uses, and every phi, in a variable of the function. Values that no variable can
 /// hold, such as handles of images, are computed anew where they are used. The error is a message.
@@ -90,7 +91,7 @@ impl<'a> Demotion<'a> {
                 continue;
             }
             for id in used_ids(&inst, &self.linker.module.wide) {
-                self.bring(function, block, id, &mut local, &mut out)?;
+                self.bring(function, (block, MAX_NESTING), id, &mut local, &mut out)?;
             }
             let wide = self.linker.module.wide.clone();
             let result = inst.result();
@@ -106,11 +107,12 @@ impl<'a> Demotion<'a> {
         Ok(())
     }
 
-    /// Makes a value of another block available in `block`, as an entry of `local`.
+    /// Makes a value of another block available in `block`, as an entry of `local`. `nesting` bounds how deep values are
+    /// computed from others.
     fn bring(
         &mut self,
         function: &mut Function,
-        block: usize,
+        (block, nesting): (usize, u32),
         id: u32,
         local: &mut HashMap<u32, u32>,
         out: &mut Vec<Inst>,
@@ -149,9 +151,10 @@ impl<'a> Demotion<'a> {
                     definition.op
                 ));
             }
+            let nesting = nesting.checked_sub(1).ok_or("OpAccessChain is nested too deeply")?;
             let mut again = definition;
             for used in used_ids(&again, &self.linker.module.wide) {
-                self.bring(function, block, used, local, out)?;
+                self.bring(function, (block, nesting), used, local, out)?;
             }
             let wide = self.linker.module.wide.clone();
             let _ = for_each_id(&mut again, &wide, |used| *used = local.get(used).copied().unwrap_or(*used));

@@ -9,6 +9,7 @@ use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::Function;
+use crate::shader::spirv::parsed::MAX_NESTING;
 
 /// Variables that pass payloads or data between shaders, one for each shape of a type.
 #[derive(Debug, Default)]
@@ -182,8 +183,11 @@ pub(super) fn value_type(linker: &Linker, definitions: &HashMap<u32, Inst>, valu
 fn structure_index(linker: &Linker, definitions: &HashMap<u32, Inst>, structure: u32) -> Result<u32, String> {
     let defined = |id: u32| {
         let mut inst = definitions.get(&id);
-        while let Some(copy) = inst.filter(|inst| inst.op == Op::CopyObject) {
-            inst = definitions.get(&copy.operand(2));
+        for _ in 0..MAX_NESTING {
+            match inst.filter(|inst| inst.op == Op::CopyObject) {
+                Some(copy) => inst = definitions.get(&copy.operand(2)),
+                None => break,
+            }
         }
         inst
     };
