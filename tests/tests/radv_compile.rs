@@ -11,9 +11,10 @@ use lvk_tests::radv::Radv;
 use lvk_tests::subprocess::on_radv;
 
 /// The compute shaders that the library runs by itself.
-const KERNELS: [(&str, &str); 2] = [
+const KERNELS: [(&str, &str); 3] = [
     ("gather", include_str!("../../lvk/src/kernels/gather.comp.glsl")),
     ("instances", include_str!("../../lvk/src/kernels/instances.comp.glsl")),
+    ("trace_size", include_str!("../../lvk/src/kernels/trace_size.comp.glsl")),
 ];
 
 fn kernels() -> impl Iterator<Item = SamplePipeline> {
