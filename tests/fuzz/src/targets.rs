@@ -19,7 +19,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "mtl", memory: MemoryBound { fixed: 2048 * KIB, multiple: 256 }, read: read_mtl },
     Target { name: "cameras", memory: MemoryBound { fixed: 2048 * KIB, multiple: 64 }, read: read_cameras },
     Target { name: "image", memory: MemoryBound { fixed: 256 * KIB, multiple: 16 << 14 }, read: read_image },
-    Target { name: "spirv", memory: MemoryBound { fixed: 64 * KIB, multiple: 128 }, read: read_spirv },
+    Target { name: "spirv", memory: MemoryBound { fixed: 1024 * KIB, multiple: 512 }, read: read_spirv },
     Target { name: "glsl", memory: MemoryBound { fixed: 512 * KIB, multiple: 8192 }, read: read_glsl },
     Target {
         name: "pipeline_cache",
