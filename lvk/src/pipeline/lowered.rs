@@ -108,11 +108,11 @@ pub(crate) fn launch_offset(bytes: u32) -> u32 {
 
 /// Returns the traversal of lowered pipelines.
 fn traversal(device: &Capabilities) -> Traversal {
-    match (device.ray_tracing_pipeline_path, device.is_cpu) {
-        (RayTracingPipelinePath::Query, _) => Traversal::Query,
-        (_, false) => Traversal::SoftwareGpu,
-        (_, true) if device.shader_int64 => Traversal::SoftwareCpuPairs,
-        (_, true) => Traversal::SoftwareCpu,
+    match device.ray_tracing_pipeline_path {
+        RayTracingPipelinePath::Query => Traversal::Query,
+        _ if device.gathers_pairs() => Traversal::SoftwareCpuPairs,
+        _ if device.is_cpu => Traversal::SoftwareCpu,
+        _ => Traversal::SoftwareGpu,
     }
 }
 

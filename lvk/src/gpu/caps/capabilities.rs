@@ -210,6 +210,11 @@ impl Capabilities {
         self.device_pipelines() || self.device_ray_queries()
     }
 
+    /// True if the device gathers 64 bits for each invocation as fast as 32.
+    pub(crate) fn gathers_pairs(&self) -> bool {
+        self.is_cpu && self.shader_int64
+    }
+
     /// True if the library builds BVHs, for pipelines or for queries in software.
     pub(crate) fn builds_software_structures(&self) -> bool {
         self.ray_query_path == RayQueryPath::Software

@@ -5,14 +5,11 @@ mod glsl;
 mod interpreter;
 mod program;
 
-use lvk::glam::{Affine3A, Vec3};
-use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, Dependencies, HitGroup, RayTracingPipelineDesc,
-    Result, ShaderRecord, ShaderStage, TlasDesc, TlasInstance, Triangles, transform_rows,
-};
+use lvk::{Context, Dependencies, HitGroup, RayTracingPipelineDesc, Result, ShaderRecord, ShaderStage};
 use lvk_tests::compute::{read_words, words_buffer};
 use lvk_tests::device;
 use lvk_tests::ray_tracer::{Method, shader};
+use lvk_tests::shader_groups::{Counts, GroupScene};
 
 use self::interpreter::record;
 use self::program::{MAX_CALLABLE_DEPTH, MAX_DEPTH, Pipeline, Shader};
@@ -22,27 +19,18 @@ const LAUNCHES: u32 = 70;
 /// Pipelines of the test. `LVK_RANDOM_PIPELINES` sets another number, and `LVK_RANDOM_SEED` another first seed.
 const PIPELINES: u64 = 12;
 
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::NoUninit)]
-struct Push {
-    results: u64,
-    tlas: u32,
-    hits: u32,
-    misses: u32,
-    pad: u32,
-}
-
 #[test]
 fn random_pipelines_compute_what_the_interpreter_computes() -> Result<()> {
     let Some(ctx) = device().filter(|ctx| Method::available(ctx).contains(&Method::Pipeline)) else {
         return Ok(());
     };
+    let scene = GroupScene::new(&ctx)?;
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
     let first = number("LVK_RANDOM_SEED").unwrap_or(0);
     for seed in first..first + number("LVK_RANDOM_PIPELINES").unwrap_or(PIPELINES) {
         let pipeline = Pipeline::random(seed);
         let expected: Vec<u32> = (0..LAUNCHES).map(|launch| interpreter::run(&pipeline, launch)).collect();
-        let found = run(&ctx, &pipeline)?;
+        let found = run(&ctx, &scene, &pipeline)?;
         assert_eq!(found, expected, "seed {seed}: {}", glsl_of(&pipeline));
     }
     Ok(())
@@ -64,23 +52,7 @@ fn glsl_of(pipeline: &Pipeline) -> String {
 }
 
 /// Returns the results of all invocations on the GPU.
-fn run(ctx: &Context, pipeline: &Pipeline) -> Result<Vec<u32>> {
-    let (hits, misses) = (pipeline.hits.len() as u32, pipeline.misses.len() as u32);
-    let corners = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    let vertices = ctx.create_buffer(&BufferDesc {
-        data: Some(bytemuck::cast_slice(&corners)),
-        usage: BufferUsage::ACCEL_INPUT,
-        ..Default::default()
-    })?;
-    let geometries = [BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
-    let model = ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?;
-    let place = |index: u32| TlasInstance {
-        transform: transform_rows(&Affine3A::from_translation(Vec3::X * index as f32)),
-        hit_group_offset: index,
-        ..TlasInstance::new(*model)
-    };
-    let instances: Vec<_> = (0..hits).map(place).collect();
-    let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
+fn run(ctx: &Context, scene: &GroupScene, pipeline: &Pipeline) -> Result<Vec<u32>> {
     let results = words_buffer(ctx, &vec![u32::MAX; LAUNCHES as usize]);
     let compiled = |shaders: &[Shader], stage: ShaderStage| {
         let text = |one: &Shader| shader(ctx, stage, &glsl::text(one, stage, pipeline.callables.len()));
@@ -117,9 +89,12 @@ fn run(ctx: &Context, pipeline: &Pipeline) -> Result<Vec<u32>> {
         ..Default::default()
     })?;
     let mut cmd = ctx.acquire_command_buffer()?;
-    cmd.bind_ray_tracing_pipeline(*made)?;
-    let results_address = ctx.buffer_address(*results)?;
-    cmd.push_constants(&Push { results: results_address, tlas: tlas.index(), hits, misses, pad: 0 })?;
+    let counts = Counts {
+        hits: pipeline.hits.len() as u32,
+        misses: pipeline.misses.len() as u32,
+        callables: pipeline.callables.len() as u32,
+    };
+    scene.bind(&mut cmd, *made, counts, *results)?;
     cmd.trace_rays([LAUNCHES, 1, 1], &Dependencies { buffers: &[*results], ..Default::default() })?;
     ctx.submit(cmd)?;
     Ok(read_words(ctx, *results, LAUNCHES as usize))

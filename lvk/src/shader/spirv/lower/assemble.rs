@@ -4,21 +4,34 @@ use std::collections::{BTreeMap, HashMap};
 
 use ::spirv::Op;
 
-use super::calls::{Call, RecordPlace, Shared, Situation};
+use super::calls::{Call, RecordPlace, Shared};
 use super::emit::Emitter;
-use super::flatten::{FlattenedFunction, ShaderFrame, StateMachine, element, flatten, state};
+use super::flatten::{FlattenedFunction, ShaderFrame, StateMachine, flatten, state};
 use super::inline::inline_calls;
 use super::instruction::Inst;
 use super::linker::Linker;
-use super::module::Block;
+use super::module::{Block, Function};
 use super::shaders::Shaders;
 use super::stage::Shader;
 use super::traces::{Passed, RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables};
 use super::{Lowering, LoweringError};
+use crate::shader::ShaderStage;
 
 /// Most places of a ray generation shader that trace without a loop over states. Each place has a copy of the traversal,
 /// with the constants of the place. Two copies are faster than the loop, on GPUs and on CPUs; a third is not.
 const MOST_PLACES: u32 = 2;
+
+/// A region of the shader binding table.
+struct Region {
+    /// Variable with the address of the records.
+    records: u32,
+    /// Variable with the index of the record to call.
+    index: u32,
+    /// Distance between records in bytes.
+    stride: u32,
+    /// Number of records.
+    count: usize,
+}
 
 /// Code for some values of a selector.
 struct Case {
@@ -41,7 +54,7 @@ pub(super) struct Assembly<'a> {
     pieces: Vec<FlattenedFunction>,
 }
 
-/// What is called for each record of a region.
+/// The shader that records of a region call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Target {
     shader: usize,
@@ -77,8 +90,8 @@ impl<'a> Assembly<'a> {
             self.declare_machine();
             self.flatten_shaders()?;
         }
-        let [miss, closest, callable] = [Situation::Miss, Situation::ClosestHit, Situation::Callable]
-            .map(|situation| self.write_shading(situation));
+        let [miss, closest, callable] = [ShaderStage::Miss, ShaderStage::ClosestHit, ShaderStage::Callable]
+            .map(|stage| self.write_shading(stage));
         let trace = self.write_trace(miss, closest);
         self.call_in_place(trace, callable);
         Ok(if needs_machine { self.write_loop(trace, callable) } else { self.write_plain_main() })
@@ -121,16 +134,15 @@ impl<'a> Assembly<'a> {
             let failed = |message| LoweringError { shader: shader.name.clone(), message };
             let Some(mut function) = self.linker.function(shader.entry).cloned() else { continue };
             inline_calls(self.linker, &mut function, &self.shaders.waiting).map_err(failed)?;
-            if !self.shaders.callables_wait {
-                hide_calls(&mut function);
-            }
             let own = self.own_variables(index, shader);
-            let results = self.results(shader);
+            let TraceVariables { payloads, callables, .. } = &mut self.variables;
+            let results = shader.results(self.linker, payloads, callables);
             let runs_once = index == self.lowering.ray_gen;
             let misses_wait = self.lowering.miss.iter().any(|index| self.shaders.waits(*index));
             let frame = ShaderFrame { runs_once, own: &own, misses_wait, results: &results };
             let Some(machine) = &mut self.machine else { continue };
-            let pieces = flatten(self.linker, machine, function, &frame).map_err(failed)?;
+            let is_wait = |inst: &Inst| self.shaders.is_wait(inst);
+            let pieces = flatten(self.linker, machine, function, &frame, &is_wait).map_err(failed)?;
             self.entries.insert(index, pieces.entry);
             self.pieces.push(pieces);
         }
@@ -146,27 +158,18 @@ impl<'a> Assembly<'a> {
         own.chain(interface.into_iter().flatten()).chain(builtins).chain(record).collect()
     }
 
-    fn results(&mut self, shader: &Shader) -> Vec<(u32, u32)> {
-        let payloads = &mut self.variables.payloads;
-        let payload = shader.incoming_payload.map(|own| (own, payloads.variable(self.linker, own)));
-        let callables = &mut self.variables.callables;
-        let callable = shader.incoming_callable.map(|own| (own, callables.variable(self.linker, own)));
-        payload.into_iter().chain(callable).collect()
-    }
-
     /// Writes the functions of the donor that call any-hit and intersection shaders.
     fn write_judge_calls(&mut self) {
         let donor = *self.variables.donor;
-        for (situation, function) in
-            [(Situation::AnyHit, donor.call_any_hit), (Situation::Intersection, donor.call_intersection)]
+        for (stage, function) in
+            [(ShaderStage::AnyHit, donor.call_any_hit), (ShaderStage::Intersection, donor.call_intersection)]
         {
-            let cases = self.cases(situation);
-            let no = self.linker.bool_constant(false);
             let mut code = Vec::new();
-            if situation == Situation::AnyHit {
+            if stage == ShaderStage::AnyHit {
+                let no = self.linker.bool_constant(false);
                 Emitter::new(self.linker, &mut code).store(donor.ignores, no);
             }
-            let blocks = self.switch(code, donor.hit_group, self.lowering.hit.len(), cases);
+            let blocks = self.switch(code, stage);
             self.replace_function(function, blocks);
         }
         let shared: Vec<(u32, u32)> = {
@@ -192,30 +195,40 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Returns the shaders that a situation calls, with the indices of their records.
-    fn targets(&self, situation: Situation) -> BTreeMap<Target, Vec<u32>> {
+    /// Returns the region of the shader binding table with the shaders of a stage.
+    fn region(&self, stage: ShaderStage) -> Region {
+        let donor = self.variables.donor;
+        let [miss, hit, callable] = self.lowering.strides;
+        let (records, index, stride, count) = match stage {
+            ShaderStage::Miss => (donor.miss_records, donor.ray_miss, miss, self.lowering.miss.len()),
+            ShaderStage::Callable => {
+                let index = self.variables.callable_index;
+                (donor.callable_records, index, callable, self.lowering.callable.len())
+            }
+            _ => (donor.hit_records, donor.hit_group, hit, self.lowering.hit.len()),
+        };
+        Region { records, index, stride, count }
+    }
+
+    /// Returns the shaders of a stage, with the indices of their records.
+    fn targets(&self, stage: ShaderStage) -> BTreeMap<Target, Vec<u32>> {
         let mut found: BTreeMap<Target, Vec<u32>> = BTreeMap::new();
         let mut add = |shader: Option<usize>, is_triangle, record: usize| {
             if let Some(shader) = shader {
                 found.entry(Target { shader, is_triangle }).or_default().push(record as u32);
             }
         };
-        match situation {
-            Situation::Miss => {
-                self.lowering.miss.iter().enumerate().for_each(|(at, shader)| add(Some(*shader), false, at));
-            }
-            Situation::Callable => {
-                self.lowering
-                    .callable
-                    .iter()
-                    .enumerate()
-                    .for_each(|(at, shader)| add(Some(*shader), false, at));
+        match stage {
+            ShaderStage::Miss | ShaderStage::Callable => {
+                let is_miss = stage == ShaderStage::Miss;
+                let shaders = if is_miss { self.lowering.miss } else { self.lowering.callable };
+                shaders.iter().enumerate().for_each(|(at, shader)| add(Some(*shader), false, at));
             }
             _ => {
                 for (at, group) in self.lowering.hit.iter().enumerate() {
-                    let shader = match situation {
-                        Situation::ClosestHit => group.closest_hit,
-                        Situation::AnyHit => group.any_hit,
+                    let shader = match stage {
+                        ShaderStage::ClosestHit => group.closest_hit,
+                        ShaderStage::AnyHit => group.any_hit,
                         _ => group.intersection,
                     };
                     add(shader, group.intersection.is_none(), at);
@@ -225,21 +238,15 @@ impl<'a> Assembly<'a> {
         found
     }
 
-    /// Returns the code for the records of a situation.
-    fn cases(&mut self, situation: Situation) -> Vec<Case> {
-        let donor = *self.variables.donor;
-        let [miss, hit, callable] = self.lowering.strides;
-        let (region, index, stride) = match situation {
-            Situation::Miss => (donor.miss_records, donor.ray_miss, miss),
-            Situation::Callable => (donor.callable_records, self.variables.callable_index, callable),
-            _ => (donor.hit_records, donor.hit_group, hit),
-        };
+    /// Returns the code for the records of a stage.
+    fn cases(&mut self, stage: ShaderStage) -> Vec<Case> {
+        let Region { records: region, index, stride, .. } = self.region(stage);
         let mut cases = Vec::new();
-        for (target, values) in self.targets(situation) {
+        for (target, values) in self.targets(stage) {
             let Some(shader) = self.shaders.linked.get(&target.shader) else { continue };
             let call = Call {
                 shader,
-                situation,
+                stage,
                 record_variable: self.shaders.records.get(&target.shader).copied(),
                 place: RecordPlace { region, index: Some(index), stride },
                 is_triangle: target.is_triangle,
@@ -270,8 +277,10 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Returns a function's blocks: `code`, and then the case of the selector, which has `count` values.
-    fn switch(&mut self, mut code: Vec<Inst>, selector: u32, count: usize, cases: Vec<Case>) -> Vec<Block> {
+    /// Returns a function's blocks: `code`, and then the call of the record's shader of this stage.
+    fn switch(&mut self, mut code: Vec<Inst>, stage: ShaderStage) -> Vec<Block> {
+        let Region { index: selector, count, .. } = self.region(stage);
+        let cases = self.cases(stage);
         let label = self.linker.new_id();
         let end = self.linker.new_id();
         if let [only] = cases.as_slice()
@@ -301,15 +310,8 @@ impl<'a> Assembly<'a> {
     }
 
     /// Writes the function that calls the miss, closest-hit or callable shader of a record, and returns it.
-    fn write_shading(&mut self, situation: Situation) -> u32 {
-        let donor = *self.variables.donor;
-        let (selector, count) = match situation {
-            Situation::Miss => (donor.ray_miss, self.lowering.miss.len()),
-            Situation::Callable => (self.variables.callable_index, self.lowering.callable.len()),
-            _ => (donor.hit_group, self.lowering.hit.len()),
-        };
-        let cases = self.cases(situation);
-        let blocks = self.switch(Vec::new(), selector, count, cases);
+    fn write_shading(&mut self, stage: ShaderStage) -> u32 {
+        let blocks = self.switch(Vec::new(), stage);
         let function = self.linker.new_id();
         self.linker.push_function(function, blocks);
         function
@@ -365,12 +367,11 @@ impl<'a> Assembly<'a> {
         self.linker.module.bound = next.saturating_add(new_ids as u32);
         let pieces = self.pieces.iter_mut().flat_map(|pieces| &mut pieces.blocks);
         let in_pieces = pieces.flat_map(|block| &mut block.code);
-        let in_functions =
-            self.linker.module.functions.iter_mut().flat_map(super::module::Function::code_mut);
+        let in_functions = self.linker.module.functions.iter_mut().flat_map(Function::code_mut);
         for inst in in_functions.chain(in_pieces) {
             let function = match inst.op {
                 Op::TraceRayKHR => trace,
-                Op::ExecuteCallableKHR | Op::Nop => callable,
+                Op::ExecuteCallableKHR => callable,
                 _ => continue,
             };
             *inst = Inst::new(Op::FunctionCall, &[void, next, function]);
@@ -384,7 +385,7 @@ impl<'a> Assembly<'a> {
         let region = self.variables.donor.ray_gen_record;
         Some(Call {
             shader: self.shaders.linked.get(&index)?,
-            situation: Situation::RayGen,
+            stage: ShaderStage::RayGen,
             record_variable: self.shaders.records.get(&index).copied(),
             place: RecordPlace { region, index: None, stride: 0 },
             is_triangle: false,
@@ -503,17 +504,12 @@ impl<'a> Assembly<'a> {
         callable: u32,
         machine: &StateMachine,
     ) -> Vec<Block> {
-        let (uint, bool) = (self.linker.uint(), self.linker.bool());
+        let bool = self.linker.bool();
         let [traces, calls, waited] = [(); 3].map(|()| self.linker.new_id());
         let mut code = Vec::new();
         let mut emitter = Emitter::new(self.linker, &mut code);
         let now = emitter.load(machine.state);
-        let depth = emitter.load(machine.depth);
-        let one = emitter.linker.constant(1);
-        let last = emitter.value(Op::ISub, uint, &[depth, one]);
-        let place = element(&mut emitter, machine.resume, uint, last);
-        let resumed = emitter.value(Op::Load, uint, &[place]);
-        emitter.store(machine.state, resumed);
+        machine.emit_resume(&mut emitter);
         if !self.shaders.callables_wait {
             emitter.call(trace);
             emitter.push(Op::Branch, &[next]);
@@ -533,12 +529,5 @@ impl<'a> Assembly<'a> {
         }
         blocks.push(Block { label: waited, code: vec![Inst::new(Op::Branch, &[next])] });
         blocks
-    }
-}
-
-/// Hides calls of callable shaders that wait for nothing, so that the function is not taken apart at them.
-fn hide_calls(function: &mut super::module::Function) {
-    for inst in function.code_mut().filter(|inst| inst.op == Op::ExecuteCallableKHR) {
-        inst.op = Op::Nop;
     }
 }

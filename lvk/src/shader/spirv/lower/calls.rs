@@ -6,17 +6,7 @@ use super::donor::Donor;
 use super::emit::Emitter;
 use super::stage::Shader;
 use super::traces::Passed;
-
-/// The situation in which a shader is called.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Situation {
-    RayGen,
-    Miss,
-    ClosestHit,
-    AnyHit,
-    Intersection,
-    Callable,
-}
+use crate::shader::ShaderStage;
 
 /// The record of a called shader: its region, its index there and the distance between records.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +30,8 @@ pub(super) struct Shared<'a> {
 /// A call of a shader.
 pub(super) struct Call<'a> {
     pub(super) shader: &'a Shader,
-    pub(super) situation: Situation,
+    /// Stage of the shader.
+    pub(super) stage: ShaderStage,
     /// Holds addresses of records for the shader.
     pub(super) record_variable: Option<u32>,
     pub(super) place: RecordPlace,
@@ -74,28 +65,20 @@ impl Call<'_> {
         }
     }
 
-    /// Returns pairs of a variable of the shader and the one that it is copied to when the shader has run.
-    pub(super) fn results(&self, emitter: &mut Emitter<'_>, shared: &mut Shared<'_>) -> Vec<(u32, u32)> {
-        let payload =
-            self.shader.incoming_payload.map(|own| (own, shared.payloads.variable(emitter.linker, own)));
-        let callable =
-            self.shader.incoming_callable.map(|own| (own, shared.callables.variable(emitter.linker, own)));
-        payload.into_iter().chain(callable).collect()
-    }
-
     /// Calls the entry function between the copies in and out.
     pub(super) fn emit_whole(&self, emitter: &mut Emitter<'_>, donor: &Donor, shared: &mut Shared<'_>) {
         self.emit_start(emitter, donor, shared);
         emitter.call(self.shader.entry);
-        for (own, passed) in self.results(emitter, shared) {
+        let results = self.shader.results(emitter.linker, shared.payloads, shared.callables);
+        for (own, passed) in results {
             emitter.copy(own, passed);
         }
     }
 
     fn emit_attributes(&self, emitter: &mut Emitter<'_>, donor: &Donor, shared: &mut Shared<'_>, own: u32) {
-        let passed = match self.situation {
-            Situation::Intersection => return,
-            Situation::AnyHit => shared.candidate_attributes.variable(emitter.linker, own),
+        let passed = match self.stage {
+            ShaderStage::Intersection => return,
+            ShaderStage::AnyHit => shared.candidate_attributes.variable(emitter.linker, own),
             _ => shared.committed_attributes.variable(emitter.linker, own),
         };
         let types = [own, donor.hit_barycentrics].map(|id| emitter.linker.variable_type(id).unwrap_or(0));
@@ -165,9 +148,9 @@ impl Call<'_> {
             BuiltIn::RayTminKHR => donor.ray_t_min,
             BuiltIn::WorldRayDirectionKHR => donor.ray_direction,
             BuiltIn::WorldRayOriginKHR => donor.ray_origin,
-            _ => match self.situation {
-                Situation::AnyHit | Situation::ClosestHit => donor.hit_t,
-                Situation::Intersection => donor.limit,
+            _ => match self.stage {
+                ShaderStage::AnyHit | ShaderStage::ClosestHit => donor.hit_t,
+                ShaderStage::Intersection => donor.limit,
                 _ => donor.ray_t_max,
             },
         }

@@ -93,9 +93,8 @@ impl<'a> Demotion<'a> {
             for id in used_ids(&inst, &self.linker.module.wide) {
                 self.bring(function, (block, MAX_NESTING), id, &mut local, &mut out)?;
             }
-            let wide = self.linker.module.wide.clone();
             let result = inst.result();
-            let _ = for_each_id(&mut inst, &wide, |id| {
+            let _ = for_each_id(&mut inst, &self.linker.module.wide, |id| {
                 if Some(*id) != result {
                     *id = local.get(id).copied().unwrap_or(*id);
                 }
@@ -156,8 +155,9 @@ impl<'a> Demotion<'a> {
             for used in used_ids(&again, &self.linker.module.wide) {
                 self.bring(function, (block, nesting), used, local, out)?;
             }
-            let wide = self.linker.module.wide.clone();
-            let _ = for_each_id(&mut again, &wide, |used| *used = local.get(used).copied().unwrap_or(*used));
+            let _ = for_each_id(&mut again, &self.linker.module.wide, |used| {
+                *used = local.get(used).copied().unwrap_or(*used);
+            });
             again.set_result(copy);
             out.push(again);
         }

@@ -58,7 +58,7 @@ pub(super) struct Donor {
     pub(super) start: u32,
 }
 
-/// What the shaders of the pipeline need of the traversal.
+/// Parts of the traversal that the shaders of the pipeline need.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Needs {
     pub(super) candidates: bool,

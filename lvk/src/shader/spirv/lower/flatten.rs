@@ -12,7 +12,7 @@ use super::linker::Linker;
 use super::liveness::live_behind_blocks;
 use super::module::{Block, Function};
 use super::split_structs::split_structs;
-use super::traces::skips_closest_hit;
+use super::traces::{is_trace, skips_closest_hit};
 
 /// Values of the state that are no pieces of functions.
 pub(super) mod state {
@@ -43,6 +43,25 @@ pub(super) struct StateMachine {
     pub(super) next_state: u32,
 }
 
+impl StateMachine {
+    /// Returns the depth of the function that has begun to wait last.
+    fn emit_last_depth(&self, emitter: &mut Emitter<'_>) -> u32 {
+        let uint = emitter.linker.uint();
+        let depth = emitter.load(self.depth);
+        let one = emitter.linker.constant(1);
+        emitter.value(Op::ISub, uint, &[depth, one])
+    }
+
+    /// Makes the function that has begun to wait last go on.
+    pub(super) fn emit_resume(&self, emitter: &mut Emitter<'_>) {
+        let uint = emitter.linker.uint();
+        let last = self.emit_last_depth(emitter);
+        let place = element(emitter, self.resume, uint, last);
+        let resumed = emitter.value(Op::Load, uint, &[place]);
+        emitter.store(self.state, resumed);
+    }
+}
+
 /// The pieces of a function.
 pub(super) struct FlattenedFunction {
     /// The state that the function starts with.
@@ -54,7 +73,7 @@ pub(super) struct FlattenedFunction {
     pub(super) variables: Vec<Inst>,
 }
 
-/// What the pieces need to know of the shader.
+/// The shader that the pieces belong to.
 pub(super) struct ShaderFrame<'a> {
     /// True for the ray generation shader, which runs once: nothing else writes its variables.
     pub(super) runs_once: bool,
@@ -73,17 +92,18 @@ impl ShaderFrame<'_> {
     }
 }
 
-/// Takes `function` apart. The error is a message.
+/// Takes `function` apart where it waits. The error is a message.
 pub(super) fn flatten(
     linker: &mut Linker,
     machine: &mut StateMachine,
     mut function: Function,
     frame: &ShaderFrame<'_>,
+    is_wait: &dyn Fn(&Inst) -> bool,
 ) -> Result<FlattenedFunction, String> {
     if function.code().any(|inst| inst.op == Op::Switch && linker.module.wide.contains(&inst.operand(0))) {
         return Err("OpSwitch over 64 bits cannot be lowered here".to_owned());
     }
-    let cuts = split_at_traces(linker, &mut function);
+    let cuts = split_at_waits(linker, &mut function, is_wait);
     if !frame.runs_once {
         split_structs(linker, &mut function);
     }
@@ -117,23 +137,23 @@ pub(super) fn flatten(
     Ok(FlattenedFunction { entry, cases, blocks, variables })
 }
 
-/// Ends a block behind each trace, and returns the labels of these blocks.
-fn split_at_traces(linker: &mut Linker, function: &mut Function) -> HashSet<u32> {
+/// Ends a block behind each instruction at which the function waits, and returns the labels of these blocks.
+fn split_at_waits(
+    linker: &mut Linker,
+    function: &mut Function,
+    is_wait: &dyn Fn(&Inst) -> bool,
+) -> HashSet<u32> {
     let mut cuts = HashSet::new();
     let mut at = 0;
     while at < function.blocks.len() {
         let code = &mut function.blocks[at].code;
-        let is_trace = |inst: &Inst| matches!(inst.op, Op::TraceRayKHR | Op::ExecuteCallableKHR);
-        if let Some(place) = code.iter().position(is_trace) {
+        if let Some(place) = code.iter().position(is_wait) {
             let rest = code.split_off(place + 1);
             let label = linker.new_id();
             code.push(Inst::new(Op::Branch, &[label]));
             let old = function.blocks[at].label;
             cuts.insert(old);
-            for inst in function.code_mut().filter(|inst| inst.op == Op::Phi) {
-                let labels = inst.operands.iter_mut().skip(3).step_by(2);
-                labels.filter(|own| **own == old).for_each(|own| *own = label);
-            }
+            function.rename_predecessor(old, label);
             function.blocks.insert(at + 1, Block { label, code: rest });
         }
         at += 1;
@@ -179,7 +199,7 @@ struct Flattener<'a> {
     states: HashMap<usize, u32>,
     /// Arrays that keep variables of waiting functions.
     stacks: HashMap<u32, u32>,
-    /// FlattenedFunction that are not written yet.
+    /// Pieces that are not written yet.
     waiting: Vec<(usize, u32)>,
     blocks: Vec<Block>,
     cases: Vec<(u32, u32)>,
@@ -357,7 +377,6 @@ impl Flattener<'_> {
     /// Ends a piece at a return of the function.
     fn emit_return(&mut self, code: &mut Vec<Inst>) {
         let machine = self.machine.clone();
-        let uint = self.linker.uint();
         let mut emitter = Emitter::new(self.linker, code);
         for (own, result) in self.frame.results {
             emitter.copy(*own, *result);
@@ -365,20 +384,15 @@ impl Flattener<'_> {
         if self.frame.runs_once {
             emitter.store_number(machine.state, state::DONE);
         } else {
-            let depth = emitter.load(machine.depth);
-            let one = emitter.linker.constant(1);
-            let last = emitter.value(Op::ISub, uint, &[depth, one]);
-            let resumed = element(&mut emitter, machine.resume, uint, last);
-            let state = emitter.value(Op::Load, uint, &[resumed]);
-            emitter.store(machine.state, state);
+            machine.emit_resume(&mut emitter);
         }
         emitter.push(Op::Branch, &[machine.next]);
     }
 
     /// Ends a piece at a trace: keeps what the function needs behind the trace, and the state that goes on there.
     fn emit_trace(&mut self, block: usize, code: &mut Vec<Inst>) {
-        let is_trace = |inst: Option<Inst>| inst.is_some_and(|inst| inst.op == Op::TraceRayKHR);
-        let waits_for = if is_trace(code.pop()) { state::TRACE } else { state::CALL };
+        let is_ray = code.pop().is_some_and(|inst| is_trace(&inst));
+        let waits_for = if is_ray { state::TRACE } else { state::CALL };
         let behind = self.flow.successors[block].first().copied().unwrap_or(0);
         let resumed = self.state_of(behind);
         let machine = self.machine.clone();
@@ -413,11 +427,8 @@ impl Flattener<'_> {
         };
         let machine = self.machine.clone();
         let stacks = self.stacks_of(from);
-        let uint = self.linker.uint();
         let mut emitter = Emitter::new(self.linker, code);
-        let deeper = emitter.load(machine.depth);
-        let one = emitter.linker.constant(1);
-        let depth = emitter.value(Op::ISub, uint, &[deeper, one]);
+        let depth = machine.emit_last_depth(&mut emitter);
         emitter.store(machine.depth, depth);
         for (variable, stack, ty) in stacks {
             let place = element(&mut emitter, stack, ty, depth);
@@ -458,7 +469,7 @@ impl Flattener<'_> {
 }
 
 /// Returns a pointer to an element of an array of the invocation.
-pub(super) fn element(emitter: &mut Emitter<'_>, array: u32, ty: u32, index: u32) -> u32 {
+fn element(emitter: &mut Emitter<'_>, array: u32, ty: u32, index: u32) -> u32 {
     let pointer = emitter.linker.pointer_to(::spirv::StorageClass::Private, ty);
     emitter.value(Op::AccessChain, pointer, &[array, index])
 }

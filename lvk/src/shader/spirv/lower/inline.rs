@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::Op;
 
+use super::demote::declare_variable;
 use super::instruction::{Inst, for_each_id};
 use super::linker::Linker;
 use super::module::{Block, Function};
@@ -53,7 +54,7 @@ fn inline_call(
     let mut rest = function.blocks[block].code.split_off(place);
     let call = rest.remove(0);
     let behind = linker.new_id();
-    rename_predecessor(function, function.blocks[block].label, behind);
+    function.rename_predecessor(function.blocks[block].label, behind);
     let result = declare_result(linker, function, &call);
     rename_ids(linker, &mut callee, &call);
     let first = callee.blocks.first().map_or(behind, |block| block.label);
@@ -74,11 +75,7 @@ fn declare_result(linker: &mut Linker, function: &mut Function, call: &Inst) -> 
     if call.operand(0) == linker.void() {
         return None;
     }
-    let pointer = linker.pointer_to(::spirv::StorageClass::Function, call.operand(0));
-    let id = linker.new_id();
-    let words = [pointer, id, ::spirv::StorageClass::Function as u32];
-    function.blocks[0].code.insert(0, Inst::new(Op::Variable, &words));
-    Some(id)
+    Some(declare_variable(linker, function, call.operand(0)))
 }
 
 /// Gives the callee new ids, and the arguments in place of its parameters.
@@ -108,11 +105,10 @@ fn rename_ids(linker: &mut Linker, callee: &mut Function, call: &Inst) {
 /// undefined ones: nothing that an earlier call has left is read.
 fn move_variables(linker: &mut Linker, function: &mut Function, callee: &mut Function, block: usize) {
     let Some(first) = callee.blocks.first_mut() else { return };
-    let (variables, rest) =
+    let (variables, rest): (Vec<Inst>, Vec<Inst>) =
         std::mem::take(&mut first.code).into_iter().partition(|inst| inst.op == Op::Variable);
     first.code = rest;
-    let variables: Vec<Inst> = variables;
-    for mut variable in variables.into_iter() {
+    for mut variable in variables {
         let initial = match variable.operands.get(3) {
             Some(initial) => *initial,
             None => {
@@ -140,16 +136,4 @@ fn return_to(block: &mut Block, behind: u32, result: Option<u32>) {
         block.code.push(Inst::new(Op::Store, &[variable, value]));
     }
     block.code.push(Inst::new(Op::Branch, &[behind]));
-}
-
-/// Makes phis name the block `new`, which now ends as the block `old` did.
-fn rename_predecessor(function: &mut Function, old: u32, new: u32) {
-    for inst in function.code_mut().filter(|inst| inst.op == Op::Phi) {
-        inst.operands
-            .iter_mut()
-            .skip(3)
-            .step_by(2)
-            .filter(|label| **label == old)
-            .for_each(|label| *label = new);
-    }
 }

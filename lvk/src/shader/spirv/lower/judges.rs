@@ -9,7 +9,7 @@ use super::donor::Donor;
 use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
-use super::module::{Block, Function};
+use super::module::{Block, Function, functions_that_reach};
 use super::stage::Shader;
 use super::traces::{Passed, value_type};
 
@@ -20,7 +20,11 @@ pub(super) fn rewrite_judge(
     shader: &Shader,
     attributes: &mut Passed,
 ) -> Result<(), String> {
-    let ending = functions_that_end(linker, shader);
+    // Functions in which the shader may end.
+    let functions = shader.functions.iter().filter_map(|id| linker.function(*id));
+    let ending = functions_that_reach(functions, |inst| {
+        matches!(inst.op, Op::IgnoreIntersectionKHR | Op::TerminateRayKHR | Op::ReportIntersectionKHR)
+    });
     for id in &shader.functions {
         let Some(mut function) = linker.take_function(*id) else { continue };
         let result = rewrite_function(linker, donor, shader, attributes, &ending, &mut function);
@@ -28,27 +32,6 @@ pub(super) fn rewrite_judge(
         result?;
     }
     Ok(())
-}
-
-/// Returns the functions in which the shader may end, or that call such ones.
-fn functions_that_end(linker: &Linker, shader: &Shader) -> HashSet<u32> {
-    let mut found: HashSet<u32> = HashSet::new();
-    let ends = |inst: &Inst, found: &HashSet<u32>| match inst.op {
-        Op::IgnoreIntersectionKHR | Op::TerminateRayKHR | Op::ReportIntersectionKHR => true,
-        Op::FunctionCall => found.contains(&inst.operand(2)),
-        _ => false,
-    };
-    loop {
-        let functions = shader.functions.iter().filter_map(|id| linker.function(*id));
-        let more: HashSet<u32> = functions
-            .filter(|function| function.code().any(|inst| ends(inst, &found)))
-            .map(Function::id)
-            .collect();
-        if more == found {
-            return found;
-        }
-        found = more;
-    }
 }
 
 fn rewrite_function(
@@ -60,11 +43,7 @@ fn rewrite_function(
     function: &mut Function,
 ) -> Result<(), String> {
     let result = function.head.operand(0);
-    let definitions: HashMap<u32, Inst> = function
-        .code()
-        .chain(&function.parameters)
-        .filter_map(|inst| inst.result().map(|id| (id, inst.clone())))
-        .collect();
+    let definitions = function.definitions();
     let mut checks = Vec::new();
     for block in &mut function.blocks {
         let mut out = Vec::with_capacity(block.code.len());
@@ -143,7 +122,7 @@ fn check_behind(
     let rest = function.blocks[at].code.split_off(place + 1);
     let (leave, stay) = (linker.new_id(), linker.new_id());
     let label = function.blocks[at].label;
-    rename_phis(function, label, stay);
+    function.rename_predecessor(label, stay);
     let mut emitter = Emitter::new(linker, &mut function.blocks[at].code);
     let unwinds = emitter.load(donor.unwinds);
     emitter.push(Op::SelectionMerge, &[stay, 0]);
@@ -180,7 +159,7 @@ fn leave_loop_header(linker: &mut Linker, function: &mut Function, at: usize) ->
     let behind = linker.new_id();
     function.blocks[at].code = phis;
     function.blocks[at].code.extend([merge, Inst::new(Op::Branch, &[behind])]);
-    rename_phis(function, label, behind);
+    function.rename_predecessor(label, behind);
     function.blocks.insert(at + 1, Block { label: behind, code: rest });
     Ok(at + 1)
 }
@@ -198,13 +177,6 @@ fn check_continue(function: &Function, at: usize) -> Result<(), String> {
         return Err("a call in the last expression of a loop cannot be lowered".to_owned());
     }
     Ok(())
-}
-
-fn rename_phis(function: &mut Function, old: u32, new: u32) {
-    for inst in function.code_mut().filter(|inst| inst.op == Op::Phi) {
-        let labels = inst.operands.iter_mut().skip(3).step_by(2);
-        labels.filter(|label| **label == old).for_each(|label| *label = new);
-    }
 }
 
 /// Returns from a function with this result type; the result does not matter.

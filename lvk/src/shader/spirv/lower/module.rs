@@ -48,6 +48,38 @@ impl Function {
     pub(super) fn code_mut(&mut self) -> impl Iterator<Item = &mut Inst> {
         self.blocks.iter_mut().flat_map(|block| &mut block.code)
     }
+
+    /// Returns the instruction of each value and parameter.
+    pub(super) fn definitions(&self) -> HashMap<u32, Inst> {
+        let all = self.code().chain(&self.parameters);
+        all.filter_map(|inst| inst.result().map(|id| (id, inst.clone()))).collect()
+    }
+
+    /// Makes phis name the block `new`, which now ends as the block `old` did.
+    pub(super) fn rename_predecessor(&mut self, old: u32, new: u32) {
+        for inst in self.code_mut().filter(|inst| inst.op == Op::Phi) {
+            let labels = inst.operands.iter_mut().skip(3).step_by(2);
+            labels.filter(|label| **label == old).for_each(|label| *label = new);
+        }
+    }
+}
+
+/// Returns the functions with an instruction that `is_it`, and those that call such ones, directly or not.
+pub(super) fn functions_that_reach<'a>(
+    functions: impl Iterator<Item = &'a Function> + Clone,
+    is_it: impl Fn(&Inst) -> bool,
+) -> HashSet<u32> {
+    let mut found: HashSet<u32> = HashSet::new();
+    loop {
+        let reaches =
+            |inst: &Inst| is_it(inst) || (inst.op == Op::FunctionCall && found.contains(&inst.operand(2)));
+        let all = functions.clone().filter(|function| function.code().any(reaches));
+        let more: HashSet<u32> = all.map(Function::id).collect();
+        if more == found {
+            return found;
+        }
+        found = more;
+    }
 }
 
 /// A module in sections. Debug information is left out.

@@ -9,7 +9,7 @@ use super::donor::{Donor, Needs};
 use super::instruction::Inst;
 use super::judges::rewrite_judge;
 use super::linker::Linker;
-use super::module::Function;
+use super::module::{Function, functions_that_reach};
 use super::push_constants::merge_push_constants;
 use super::stage::{Shader, link_stage};
 use super::traces::{Passed, TraceVariables, hide_remap_table, is_trace, rewrite_traces};
@@ -130,29 +130,13 @@ impl Shaders {
                 result.map_err(failed)?;
             }
         }
-        self.waiting = self.waiting_functions(linker);
+        self.waiting = functions_that_reach(linker.module.functions.iter(), |inst| self.is_wait(inst));
         Ok(())
     }
 
     /// True for an instruction at which a function waits.
     pub(super) fn is_wait(&self, inst: &Inst) -> bool {
         is_trace(inst) || (self.callables_wait && inst.op == Op::ExecuteCallableKHR)
-    }
-
-    fn waiting_functions(&self, linker: &Linker) -> HashSet<u32> {
-        let mut found: HashSet<u32> = HashSet::new();
-        loop {
-            let waits = |inst: &Inst| {
-                self.is_wait(inst) || (inst.op == Op::FunctionCall && found.contains(&inst.operand(2)))
-            };
-            let functions = linker.module.functions.iter();
-            let more: HashSet<u32> =
-                functions.filter(|function| function.code().any(waits)).map(Function::id).collect();
-            if more == found {
-                return found;
-            }
-            found = more;
-        }
     }
 
     /// True if the shader waits for rays or callable shaders.

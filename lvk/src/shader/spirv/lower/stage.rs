@@ -7,7 +7,8 @@ use ::spirv::{BuiltIn, Capability, Decoration, ExecutionModel, Op, StorageClass}
 use super::StageModule;
 use super::instruction::Inst;
 use super::linker::Linker;
-use super::module::Module;
+use super::module::{Function, Module};
+use super::traces::Passed;
 use crate::bindless::layout;
 use crate::shader::ShaderStage;
 
@@ -37,6 +38,20 @@ pub(super) struct Shader {
     pub(super) inputs: Vec<(u32, u32)>,
 }
 
+impl Shader {
+    /// Returns pairs of a variable of the shader and the one that it is copied to when the shader has run.
+    pub(super) fn results(
+        &self,
+        linker: &mut Linker,
+        payloads: &mut Passed,
+        callables: &mut Passed,
+    ) -> Vec<(u32, u32)> {
+        let payload = self.incoming_payload.map(|own| (own, payloads.variable(linker, own)));
+        let callable = self.incoming_callable.map(|own| (own, callables.variable(linker, own)));
+        payload.into_iter().chain(callable).collect()
+    }
+}
+
 /// The role of a variable, from its storage class and its decorations.
 enum Role {
     BuiltIn(BuiltIn),
@@ -61,7 +76,7 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     let roles = roles(&module);
     let initial = take_initial_values(&mut module);
     convert_storage(&mut module);
-    let own_functions: Vec<u32> = module.functions.iter().map(super::module::Function::id).collect();
+    let own_functions: Vec<u32> = module.functions.iter().map(Function::id).collect();
     let ids = linker.link(module).map_err(|unknown| format!("Op{:?} cannot be lowered", unknown.0))?;
     let of = |id: u32| ids.get(&id).copied().unwrap_or(0);
     let mut shader = Shader {
@@ -239,15 +254,12 @@ fn convert_storage(module: &mut Module) {
             *storage = converted_storage(*storage);
         }
     }
-    let is_private =
-        |inst: &&Inst| inst.op == Op::Variable && inst.operand(2) != StorageClass::UniformConstant as u32;
     let converted: HashSet<u32> = module
         .globals
         .iter()
-        .filter(is_private)
         .filter(|inst| {
             let storage = [StorageClass::Private, StorageClass::PhysicalStorageBuffer];
-            storage.iter().any(|class| *class as u32 == inst.operand(2))
+            inst.op == Op::Variable && storage.iter().any(|class| *class as u32 == inst.operand(2))
         })
         .map(|inst| inst.operand(1))
         .collect();

@@ -65,11 +65,7 @@ pub(super) fn rewrite_traces(
     variables: &mut TraceVariables<'_>,
     function: &mut Function,
 ) -> Result<(), String> {
-    let definitions: HashMap<u32, Inst> = function
-        .code()
-        .chain(&function.parameters)
-        .filter_map(|inst| inst.result().map(|id| (id, inst.clone())))
-        .collect();
+    let definitions = function.definitions();
     for block in &mut function.blocks {
         let mut out = Vec::with_capacity(block.code.len());
         for inst in std::mem::take(&mut block.code) {
