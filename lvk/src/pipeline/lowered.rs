@@ -110,7 +110,7 @@ pub(crate) fn launch_offset(bytes: u32) -> u32 {
 fn traversal(device: &Capabilities) -> Traversal {
     match device.ray_tracing_pipeline_path {
         RayTracingPipelinePath::Query => Traversal::Query,
-        _ if device.gathers_pairs() => Traversal::SoftwareCpuPairs,
+        _ if device.has_fast_64_bit_loads() => Traversal::SoftwareCpuPairs,
         _ if device.is_cpu => Traversal::SoftwareCpu,
         _ => Traversal::SoftwareGpu,
     }

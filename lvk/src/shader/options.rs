@@ -39,7 +39,7 @@ impl CompileOptions {
             software_ray_query: device.ray_query_path == RayQueryPath::Software,
             helpers_lose_arrays: device.helpers_lose_arrays,
             is_cpu: device.is_cpu,
-            gathers_pairs: device.gathers_pairs(),
+            gathers_pairs: device.has_fast_64_bit_loads(),
         }
     }
 }

@@ -211,7 +211,7 @@ impl Capabilities {
     }
 
     /// True if the device gathers 64 bits for each invocation as fast as 32.
-    pub(crate) fn gathers_pairs(&self) -> bool {
+    pub(crate) fn has_fast_64_bit_loads(&self) -> bool {
         self.is_cpu && self.shader_int64
     }
 

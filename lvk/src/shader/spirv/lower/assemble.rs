@@ -11,9 +11,10 @@ use super::inline::inline_calls;
 use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::{Block, Function};
+use super::passed::Passed;
 use super::shaders::Shaders;
 use super::stage::Shader;
-use super::traces::{Passed, RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables};
+use super::traces::{RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables};
 use super::{Lowering, LoweringError};
 use crate::shader::ShaderStage;
 

@@ -4,8 +4,8 @@ use ::spirv::{BuiltIn, Op};
 
 use super::donor::Donor;
 use super::emit::Emitter;
+use super::passed::Passed;
 use super::stage::Shader;
-use super::traces::Passed;
 use crate::shader::ShaderStage;
 
 /// The record of a called shader: its region, its index there and the distance between records.

@@ -10,8 +10,9 @@ use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::{Block, Function, functions_that_reach};
+use super::passed::Passed;
 use super::stage::Shader;
-use super::traces::{Passed, value_type};
+use super::traces::value_type;
 
 /// Rewrites the functions of an any-hit or intersection shader. `attributes` pass the attributes of candidates.
 pub(super) fn rewrite_judge(

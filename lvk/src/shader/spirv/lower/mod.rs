@@ -14,6 +14,7 @@ mod judges;
 mod linker;
 mod liveness;
 mod module;
+mod passed;
 mod prune;
 mod push_constants;
 mod shaders;
@@ -24,8 +25,9 @@ mod traces;
 use self::assemble::Assembly;
 use self::donor::Donor;
 use self::linker::Linker;
+use self::passed::Passed;
 use self::shaders::Shaders;
-use self::traces::{Passed, TraceVariables};
+use self::traces::TraceVariables;
 use crate::shader::ShaderStage;
 
 /// The implementation of the traversal in a lowered pipeline.

@@ -10,9 +10,10 @@ use super::instruction::Inst;
 use super::judges::rewrite_judge;
 use super::linker::Linker;
 use super::module::{Function, functions_that_reach};
+use super::passed::Passed;
 use super::push_constants::merge_push_constants;
 use super::stage::{Shader, link_stage};
-use super::traces::{Passed, TraceVariables, hide_remap_table, is_trace, rewrite_traces};
+use super::traces::{TraceVariables, hide_remap_table, is_trace, rewrite_traces};
 use super::{HitShaders, Lowering, LoweringError, Traversal};
 use crate::shader::ShaderStage;
 

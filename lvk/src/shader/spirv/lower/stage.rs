@@ -8,7 +8,7 @@ use super::StageModule;
 use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::{Function, Module};
-use super::traces::Passed;
+use super::passed::Passed;
 use crate::bindless::layout;
 use crate::shader::ShaderStage;
 
