@@ -8,11 +8,13 @@ use super::calls::{Call, RecordPlace, Shared};
 use super::emit::Emitter;
 use super::flatten::{FlattenedFunction, ShaderFrame, StateMachine, flatten, state};
 use super::inline::inline_calls;
-use super::instruction::Inst;
+use super::instruction::{Inst, used_ids};
 use super::linker::Linker;
-use super::module::{Block, Function};
+use super::localize::{forget_locals, localize};
+use super::module::{Block, Function, functions_that_reach};
 use super::passed::Passed;
 use super::shaders::Shaders;
+use super::slots::Slots;
 use super::stage::Shader;
 use super::traces::{RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables};
 use super::{Lowering, LoweringError};
@@ -62,6 +64,12 @@ struct Target {
     is_triangle: bool,
 }
 
+/// True for a function whose code stays structured where it is called: it has no early return.
+fn returns_once(function: &Function) -> bool {
+    let is_return = |inst: &&Inst| matches!(inst.op, Op::Return | Op::ReturnValue);
+    function.code().filter(is_return).count() == 1
+}
+
 impl<'a> Assembly<'a> {
     pub(super) fn new(
         linker: &'a mut Linker,
@@ -86,6 +94,7 @@ impl<'a> Assembly<'a> {
     /// Writes everything, and returns the main function.
     pub(super) fn assemble(&mut self) -> Result<u32, LoweringError> {
         self.write_judge_calls();
+        forget_locals(self.linker);
         let needs_machine = self.needs_machine();
         if needs_machine {
             self.declare_machine();
@@ -122,6 +131,8 @@ impl<'a> Assembly<'a> {
             max_depth,
             next: self.linker.new_id(),
             next_state: state::FIRST,
+            slots: Slots::default(),
+            stacks: Slots::stacks(max_depth + 1),
         });
     }
 
@@ -133,21 +144,49 @@ impl<'a> Assembly<'a> {
         for index in waiting {
             let shader = &self.shaders.linked[&index];
             let failed = |message| LoweringError { shader: shader.name.clone(), message };
-            let Some(mut function) = self.linker.function(shader.entry).cloned() else { continue };
-            inline_calls(self.linker, &mut function, &self.shaders.waiting).map_err(failed)?;
             let own = self.own_variables(index, shader);
-            let TraceVariables { payloads, callables, .. } = &mut self.variables;
-            let results = shader.results(self.linker, payloads, callables);
+            let Some(mut function) = self.whole_function(shader, &own).map_err(failed)? else { continue };
+            let given = own.iter().copied().filter(|variable| !shader.own.contains(variable));
+            let given = given.chain(shader.initial.iter().map(|(variable, _)| *variable)).collect();
+            let replaced = localize(self.linker, &mut function, &own, &given);
             let runs_once = index == self.lowering.ray_gen;
             let misses_wait = self.lowering.miss.iter().any(|index| self.shaders.waits(*index));
-            let frame = ShaderFrame { runs_once, own: &own, misses_wait, results: &results };
+            let frame = ShaderFrame { runs_once, own: &own, misses_wait };
             let Some(machine) = &mut self.machine else { continue };
             let is_wait = |inst: &Inst| self.shaders.is_wait(inst);
-            let pieces = flatten(self.linker, machine, function, &frame, &is_wait).map_err(failed)?;
+            let mut pieces = flatten(self.linker, machine, function, &frame, &is_wait).map_err(failed)?;
+            pieces.replaced = replaced;
             self.entries.insert(index, pieces.entry);
             self.pieces.push(pieces);
         }
         Ok(())
+    }
+
+    /// Returns the entry function of a shader with the functions in place that wait or that use variables of the shader.
+    /// At its returns it leaves its results. The error is a message.
+    fn whole_function(&mut self, shader: &Shader, own: &[u32]) -> Result<Option<Function>, String> {
+        let Some(entry) = self.linker.function(shader.entry).cloned() else { return Ok(None) };
+        let uses_own =
+            |inst: &Inst| used_ids(inst, &self.linker.module.wide).iter().any(|id| own.contains(id));
+        let functions = shader.functions.iter().filter_map(|id| self.linker.function(*id));
+        let mut wanted = functions_that_reach(functions, uses_own);
+        wanted.retain(|id| self.linker.function(*id).is_some_and(returns_once));
+        wanted.extend(&self.shaders.waiting);
+        let mut function = entry.clone();
+        if inline_calls(self.linker, &mut function, &wanted).is_err() {
+            // The functions that wait must be in place. Those that use variables only had better be.
+            function = entry;
+            inline_calls(self.linker, &mut function, &self.shaders.waiting)?;
+        }
+        let TraceVariables { payloads, callables, .. } = &mut self.variables;
+        let results = shader.results(self.linker, payloads, callables);
+        for block in &mut function.blocks {
+            let Some(last) = block.code.pop_if(|inst| inst.op == Op::Return) else { continue };
+            let mut emitter = Emitter::new(self.linker, &mut block.code);
+            results.iter().for_each(|(own, result)| emitter.copy(*own, *result));
+            block.code.push(last);
+        }
+        Ok(Some(function))
     }
 
     /// Returns the variables of a shader outside of its functions.
@@ -327,6 +366,8 @@ impl<'a> Assembly<'a> {
         let mut code = [const { Vec::new() }; 3];
         let [first, of_hit, of_shade] = &mut code;
         let mut emitter = Emitter::new(self.linker, first);
+        let given = self.pieces.iter().flat_map(|pieces| pieces.replaced.iter().copied());
+        given.chain(donor.hit_values()).for_each(|variable| emitter.forget(variable));
         emitter.call(donor.traverse);
         let is_hit = emitter.load(donor.is_hit);
         emitter.push(Op::SelectionMerge, &[end, 0]);
@@ -473,6 +514,7 @@ impl<'a> Assembly<'a> {
         emitter.push(Op::BranchConditional, &[is_done, outer_end, wait]);
         let waits = self.write_waits(wait, outer_next, trace, callable, &machine);
         let mut pieces = std::mem::take(&mut self.pieces);
+        self.forget_at_starts(&machine, &mut pieces);
         let variables = pieces.iter_mut().flat_map(|pieces| std::mem::take(&mut pieces.variables));
         start.code.splice(0..0, variables);
         let plain = |(label, code)| Block { label, code };
@@ -493,6 +535,25 @@ impl<'a> Assembly<'a> {
         let function = self.linker.new_id();
         self.linker.push_function(function, blocks);
         function
+    }
+
+    /// Makes each piece forget at its start what no piece reads behind that: slots, and what shaders were given.
+    fn forget_at_starts(&mut self, machine: &StateMachine, pieces: &mut [FlattenedFunction]) {
+        let given: Vec<(u32, Vec<u32>)> =
+            pieces.iter().map(|function| (function.entry, function.replaced.clone())).collect();
+        for function in pieces {
+            let starts: HashMap<u32, u32> =
+                function.cases.iter().map(|(state, label)| (*label, *state)).collect();
+            for block in &mut function.blocks {
+                let Some(state) = starts.get(&block.label) else { continue };
+                let Some(last) = block.code.pop() else { continue };
+                let mut emitter = Emitter::new(self.linker, &mut block.code);
+                machine.slots.forget(&mut emitter);
+                let given = given.iter().filter(|(entry, _)| entry != state);
+                given.flat_map(|(_, variables)| variables).for_each(|variable| emitter.forget(*variable));
+                block.code.push(last);
+            }
+        }
     }
 
     /// Writes the blocks that trace a ray or call a callable shader, after which the function that waits goes on unless

@@ -24,6 +24,8 @@ pub(super) struct ControlFlow {
     /// Immediate dominators; `None` for the first block and those that are never reached.
     dominators: Vec<Option<usize>>,
     reachable: Vec<bool>,
+    /// Reachable blocks, each behind those that dominate it.
+    pub(super) order: Vec<usize>,
 }
 
 impl ControlFlow {
@@ -36,7 +38,7 @@ impl ControlFlow {
             labels.iter().filter_map(|label| index.get(label).copied()).collect()
         };
         let successors: Vec<Vec<usize>> = blocks.iter().map(targets).collect();
-        let order = postorder(&successors);
+        let mut order = postorder(&successors);
         let mut reachable = vec![false; blocks.len()];
         order.iter().for_each(|block| reachable[*block] = true);
         let mut predecessors = vec![Vec::new(); blocks.len()];
@@ -44,11 +46,16 @@ impl ControlFlow {
             targets.iter().for_each(|to| predecessors[*to].push(from));
         }
         let dominators = immediate_dominators(&order, &predecessors);
-        Self { index, successors, predecessors, dominators, reachable }
+        order.reverse();
+        Self { index, successors, predecessors, dominators, reachable, order }
     }
 
     pub(super) fn index_of(&self, label: u32) -> Option<usize> {
         self.index.get(&label).copied()
+    }
+
+    pub(super) fn is_reachable(&self, block: usize) -> bool {
+        self.reachable[block]
     }
 
     pub(super) fn dominates(&self, above: usize, below: usize) -> bool {

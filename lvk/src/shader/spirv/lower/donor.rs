@@ -129,6 +129,27 @@ impl Donor {
     }
 }
 
+impl Donor {
+    /// Returns the variables that tell of a hit.
+    pub(super) fn hit_values(&self) -> [u32; 13] {
+        [
+            self.hit_group,
+            self.hit_t,
+            self.hit_kind,
+            self.hit_instance,
+            self.hit_custom_index,
+            self.hit_geometry,
+            self.hit_primitive,
+            self.hit_barycentrics,
+            self.hit_object_origin,
+            self.hit_object_direction,
+            self.hit_object_to_world,
+            self.hit_world_to_object,
+            self.hit_positions,
+        ]
+    }
+}
+
 /// Makes a function return at once.
 fn empty_function(module: &mut Module, name: &str) {
     let Some(id) = module.function_named(name) else { return };

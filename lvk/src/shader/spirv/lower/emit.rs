@@ -44,6 +44,13 @@ impl<'a> Emitter<'a> {
         self.store(variable, value);
     }
 
+    /// Makes a variable of the invocation undefined, so that compilers keep it in no register.
+    pub(super) fn forget(&mut self, variable: u32) {
+        let ty = self.linker.variable_type(variable).unwrap_or(0);
+        let undefined = self.linker.undefined(ty);
+        self.store(variable, undefined);
+    }
+
     /// Converts a value to a type with the same bits.
     pub(super) fn convert(&mut self, value: u32, from: u32, to: u32) -> u32 {
         if from == to {

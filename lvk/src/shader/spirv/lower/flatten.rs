@@ -9,8 +9,11 @@ use super::demote::demote_values;
 use super::emit::Emitter;
 use super::instruction::{Inst, for_each_id};
 use super::linker::Linker;
-use super::liveness::live_behind_blocks;
+use super::liveness::live_at_starts;
 use super::module::{Block, Function};
+use super::promote::{is_register, promote_variables};
+use super::simplify::simplify;
+use super::slots::Slots;
 use super::split_structs::split_structs;
 use super::traces::{is_trace, skips_closest_hit};
 
@@ -41,6 +44,10 @@ pub(super) struct StateMachine {
     pub(super) next: u32,
     /// The number of the next piece.
     pub(super) next_state: u32,
+    /// Hold what the next piece reads.
+    pub(super) slots: Slots,
+    /// Hold what functions read behind the rays and callable shaders that they wait for, by depth.
+    pub(super) stacks: Slots,
 }
 
 impl StateMachine {
@@ -71,6 +78,8 @@ pub(super) struct FlattenedFunction {
     pub(super) blocks: Vec<Block>,
     /// Variables of the function.
     pub(super) variables: Vec<Inst>,
+    /// Variables of the invocation that give the function values, and that only its first piece reads.
+    pub(super) replaced: Vec<u32>,
 }
 
 /// The shader that the pieces belong to.
@@ -81,8 +90,6 @@ pub(super) struct ShaderFrame<'a> {
     pub(super) own: &'a [u32],
     /// True if miss shaders wait for rays or callable shaders.
     pub(super) misses_wait: bool,
-    /// Variables that are read at each return: pairs of a variable of the shader and the variable it is copied to.
-    pub(super) results: &'a [(u32, u32)],
 }
 
 impl ShaderFrame<'_> {
@@ -103,10 +110,10 @@ pub(super) fn flatten(
     if function.code().any(|inst| inst.op == Op::Switch && linker.module.wide.contains(&inst.operand(0))) {
         return Err("OpSwitch over 64 bits cannot be lowered here".to_owned());
     }
+    split_structs(linker, &mut function);
+    promote_variables(linker, &mut function);
+    simplify(linker, &mut function);
     let cuts = split_at_waits(linker, &mut function, is_wait);
-    if !frame.runs_once {
-        split_structs(linker, &mut function);
-    }
     demote_values(linker, &mut function)?;
     let flow = ControlFlow::new(&function);
     let is_cut = |block: usize| cuts.contains(&function.blocks[block].label);
@@ -122,7 +129,6 @@ pub(super) fn flatten(
         frame,
         cuts: &cuts,
         states: HashMap::new(),
-        stacks: HashMap::new(),
         waiting: Vec::new(),
         blocks: Vec::new(),
         cases: Vec::new(),
@@ -134,7 +140,7 @@ pub(super) fn flatten(
     let (blocks, cases) = (flattener.blocks, flattener.cases);
     let is_variable = |inst: &&Inst| inst.op == Op::Variable;
     let variables = function.code().filter(is_variable).cloned().collect();
-    Ok(FlattenedFunction { entry, cases, blocks, variables })
+    Ok(FlattenedFunction { entry, cases, blocks, variables, replaced: Vec::new() })
 }
 
 /// Ends a block behind each instruction at which the function waits, and returns the labels of these blocks.
@@ -162,7 +168,8 @@ fn split_at_waits(
 }
 
 /// Returns the variables to keep at the end of each block, sorted. Nothing else writes the variables of a shader that runs
-/// once.
+/// Returns the variables that each block reads itself or leaves to later ones; none for a function that runs once, whose
+/// variables stay.
 fn live_variables(
     linker: &Linker,
     function: &Function,
@@ -174,16 +181,12 @@ fn live_variables(
     }
     let locals = function.code().filter(|inst| inst.op == Op::Variable).filter_map(Inst::result);
     let variables: HashSet<u32> = locals.chain(frame.own.iter().copied()).collect();
-    let at_return = frame.results.iter().map(|(own, _)| *own).collect();
-    let live = live_behind_blocks(linker, function, flow, &variables, &at_return);
-    // A ray that runs no closest-hit shader cannot lead back to this shader, so the variables stay where they are.
-    let keeps = |block: &Block| !block.code.iter().any(|inst| frame.returns_directly(inst));
-    let sorted = |(block, set): (&Block, HashSet<u32>)| {
-        let mut list: Vec<u32> = if keeps(block) { set.into_iter().collect() } else { Vec::new() };
+    let sorted = |set: HashSet<u32>| {
+        let mut list: Vec<u32> = set.into_iter().collect();
         list.sort_unstable();
         list
     };
-    function.blocks.iter().zip(live).map(sorted).collect()
+    live_at_starts(linker, function, flow, &variables).into_iter().map(sorted).collect()
 }
 
 struct Flattener<'a> {
@@ -197,8 +200,6 @@ struct Flattener<'a> {
     cuts: &'a HashSet<u32>,
     /// States of blocks that start a piece.
     states: HashMap<usize, u32>,
-    /// Arrays that keep variables of waiting functions.
-    stacks: HashMap<u32, u32>,
     /// Pieces that are not written yet.
     waiting: Vec<(usize, u32)>,
     blocks: Vec<Block>,
@@ -223,7 +224,7 @@ impl Flattener<'_> {
         let label = self.linker.new_id();
         self.cases.push((state, label));
         let mut code = Vec::new();
-        self.restore_if_resumed(block, &mut code);
+        self.restore(block, &mut code);
         // The block may be the start of a whole loop, whose header must have the label of the block.
         code.push(Inst::new(Op::Branch, &[self.function.blocks[block].label]));
         self.blocks.push(Block { label, code });
@@ -306,9 +307,8 @@ impl Flattener<'_> {
                     self.go_to(to, &mut code);
                 }
             }
-            Op::BranchConditional => self.emit_choice(&last, &mut code),
-            Op::Switch => {
-                self.emit_switch(label, code, last);
+            Op::BranchConditional | Op::Switch => {
+                self.emit_selection(label, code, last);
                 return None;
             }
             Op::Return => self.emit_return(&mut code),
@@ -320,55 +320,45 @@ impl Flattener<'_> {
 
     /// Goes on with the piece that starts with a block.
     fn go_to(&mut self, block: usize, code: &mut Vec<Inst>) {
+        self.choose(block, code);
+        code.push(Inst::new(Op::Branch, &[self.machine.next]));
+    }
+
+    /// Makes the piece that starts with a block the next one.
+    fn choose(&mut self, block: usize, code: &mut Vec<Inst>) {
         let state = self.state_of(block);
-        let (variable, next) = (self.machine.state, self.machine.next);
-        let mut emitter = Emitter::new(self.linker, code);
-        emitter.store_number(variable, state);
-        emitter.push(Op::Branch, &[next]);
+        self.keep_in_slots(block, code);
+        Emitter::new(self.linker, code).store_number(self.machine.state, state);
     }
 
-    fn emit_choice(&mut self, branch: &Inst, code: &mut Vec<Inst>) {
-        let [yes, no] = [1, 2].map(|at| {
-            let block = self.flow.index_of(branch.operand(at)).unwrap_or(0);
-            let state = self.state_of(block);
-            self.linker.constant(state)
-        });
-        let (variable, next) = (self.machine.state, self.machine.next);
-        let uint = self.linker.uint();
-        let mut emitter = Emitter::new(self.linker, code);
-        let state = emitter.value(Op::Select, uint, &[branch.operand(0), yes, no]);
-        emitter.store(variable, state);
-        emitter.push(Op::Branch, &[next]);
-    }
-
-    /// Writes a switch whose cases choose other pieces.
-    fn emit_switch(&mut self, label: u32, mut code: Vec<Inst>, switch: Inst) {
+    /// Writes a branch or a switch whose targets are other pieces.
+    fn emit_selection(&mut self, label: u32, mut code: Vec<Inst>, mut selection: Inst) {
         let end = self.linker.new_id();
         let mut labels: HashMap<u32, u32> = HashMap::new();
         let mut cases = Vec::new();
-        for target in branch_targets(&switch) {
+        for target in branch_targets(&selection) {
             labels.entry(target).or_insert_with(|| {
                 let new = self.linker.new_id();
                 cases.push((target, new));
                 new
             });
         }
-        let mut switch = switch;
-        let places = std::iter::once(1).chain((3..switch.operands.len()).step_by(2));
-        for place in places.collect::<Vec<_>>() {
-            switch.operands[place] = labels[&switch.operands[place]];
+        // The labels of a switch stand behind its selector and its literals; those of a branch behind its condition.
+        let places: Vec<usize> = match selection.op {
+            Op::Switch => std::iter::once(1).chain((3..selection.operands.len()).step_by(2)).collect(),
+            _ => vec![1, 2],
+        };
+        for place in places {
+            selection.operands[place] = labels[&selection.operands[place]];
         }
         code.push(Inst::new(Op::SelectionMerge, &[end, 0]));
-        code.push(switch);
+        code.push(selection);
         self.blocks.push(Block { label, code });
-        let variable = self.machine.state;
         for (target, label) in cases {
             let block = self.flow.index_of(target).unwrap_or(0);
-            let state = self.state_of(block);
             let mut code = Vec::new();
-            let mut emitter = Emitter::new(self.linker, &mut code);
-            emitter.store_number(variable, state);
-            emitter.push(Op::Branch, &[end]);
+            self.choose(block, &mut code);
+            code.push(Inst::new(Op::Branch, &[end]));
             self.blocks.push(Block { label, code });
         }
         self.blocks.push(Block { label: end, code: vec![Inst::new(Op::Branch, &[self.machine.next])] });
@@ -378,9 +368,6 @@ impl Flattener<'_> {
     fn emit_return(&mut self, code: &mut Vec<Inst>) {
         let machine = self.machine.clone();
         let mut emitter = Emitter::new(self.linker, code);
-        for (own, result) in self.frame.results {
-            emitter.copy(*own, *result);
-        }
         if self.frame.runs_once {
             emitter.store_number(machine.state, state::DONE);
         } else {
@@ -395,16 +382,15 @@ impl Flattener<'_> {
         let waits_for = if is_ray { state::TRACE } else { state::CALL };
         let behind = self.flow.successors[block].first().copied().unwrap_or(0);
         let resumed = self.state_of(behind);
-        let machine = self.machine.clone();
-        let stacks = self.stacks_of(block);
         let (uint, bool) = (self.linker.uint(), self.linker.bool());
-        let mut emitter = Emitter::new(self.linker, code);
-        let depth = emitter.load(machine.depth);
-        for (variable, stack, ty) in stacks {
-            let value = emitter.value(Op::Load, ty, &[variable]);
-            let place = element(&mut emitter, stack, ty, depth);
-            emitter.store(place, value);
+        let depth = Emitter::new(self.linker, code).load(self.machine.depth);
+        if self.returns_directly(block) {
+            self.keep_in_slots(behind, code);
+        } else {
+            self.keep_on_stacks(behind, depth, code);
         }
+        let machine = self.machine.clone();
+        let mut emitter = Emitter::new(self.linker, code);
         let place = element(&mut emitter, machine.resume, uint, depth);
         emitter.store_number(place, resumed);
         let one = emitter.linker.constant(1);
@@ -419,42 +405,81 @@ impl Flattener<'_> {
         emitter.push(Op::Branch, &[machine.next]);
     }
 
-    /// Restores what the function has kept, at the start of a block behind a trace.
-    fn restore_if_resumed(&mut self, block: usize, code: &mut Vec<Inst>) {
+    /// True for a block that ends at a trace that no closest-hit shader, and so not this function again, may follow.
+    fn returns_directly(&self, block: usize) -> bool {
+        self.function.blocks[block].code.iter().any(|inst| self.frame.returns_directly(inst))
+    }
+
+    /// Gives the variables that a piece reads their values, at its start.
+    fn restore(&mut self, block: usize, code: &mut Vec<Inst>) {
         let from = self.flow.predecessors[block].first().copied();
-        let Some(from) = from.filter(|from| self.cuts.contains(&self.function.blocks[*from].label)) else {
-            return;
-        };
-        let machine = self.machine.clone();
-        let stacks = self.stacks_of(from);
+        let waited = from.filter(|from| self.cuts.contains(&self.function.blocks[*from].label));
+        if let Some(from) = waited {
+            let mut emitter = Emitter::new(self.linker, code);
+            let depth = self.machine.emit_last_depth(&mut emitter);
+            emitter.store(self.machine.depth, depth);
+            if !self.returns_directly(from) {
+                return self.restore_from_stacks(block, depth, code);
+            }
+        }
+        let (slots, kept) = self.slots_of(block);
         let mut emitter = Emitter::new(self.linker, code);
-        let depth = machine.emit_last_depth(&mut emitter);
-        emitter.store(machine.depth, depth);
-        for (variable, stack, ty) in stacks {
+        for ((variable, ty), slot) in kept.into_iter().zip(slots) {
+            let value = emitter.value(Op::Load, ty, &[slot]);
+            emitter.store(variable, value);
+        }
+    }
+
+    fn keep_in_slots(&mut self, block: usize, code: &mut Vec<Inst>) {
+        let (slots, kept) = self.slots_of(block);
+        let mut emitter = Emitter::new(self.linker, code);
+        for ((variable, ty), slot) in kept.into_iter().zip(slots) {
+            let value = emitter.value(Op::Load, ty, &[variable]);
+            emitter.store(slot, value);
+        }
+    }
+
+    /// Returns the slots of what a piece reads, and the variables in their order with their types. Arrays, and variables
+    /// that other functions use, stay where they are: nothing else writes them meanwhile.
+    fn slots_of(&mut self, block: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
+        let mut kept = self.read_by(block);
+        kept.retain(|(variable, ty)| {
+            self.linker.global(*variable).is_none() && is_register(self.linker, *ty)
+        });
+        let types: Vec<u32> = kept.iter().map(|(_, ty)| *ty).collect();
+        (self.machine.slots.of(self.linker, &types), kept)
+    }
+
+    fn keep_on_stacks(&mut self, block: usize, depth: u32, code: &mut Vec<Inst>) {
+        let (stacks, kept) = self.stacks_of(block);
+        let mut emitter = Emitter::new(self.linker, code);
+        for ((variable, ty), stack) in kept.into_iter().zip(stacks) {
+            let value = emitter.value(Op::Load, ty, &[variable]);
+            let place = element(&mut emitter, stack, ty, depth);
+            emitter.store(place, value);
+        }
+    }
+
+    fn restore_from_stacks(&mut self, block: usize, depth: u32, code: &mut Vec<Inst>) {
+        let (stacks, kept) = self.stacks_of(block);
+        let mut emitter = Emitter::new(self.linker, code);
+        for ((variable, ty), stack) in kept.into_iter().zip(stacks) {
             let place = element(&mut emitter, stack, ty, depth);
             let value = emitter.value(Op::Load, ty, &[place]);
             emitter.store(variable, value);
         }
     }
 
-    /// Returns the variables that are kept at the end of a block: each with its array and its type.
-    fn stacks_of(&mut self, block: usize) -> Vec<(u32, u32, u32)> {
-        let live = self.live[block].clone();
-        let length = self.machine.max_depth + 1;
-        let of = |variable: u32| {
-            let ty = self.variable_type(variable);
-            let stack = match self.stacks.get(&variable) {
-                Some(known) => *known,
-                None => {
-                    let array = self.linker.array(ty, length);
-                    let stack = self.linker.private(array);
-                    self.stacks.insert(variable, stack);
-                    stack
-                }
-            };
-            (variable, stack, ty)
-        };
-        live.into_iter().map(of).collect()
+    fn stacks_of(&mut self, block: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
+        let kept = self.read_by(block);
+        let types: Vec<u32> = kept.iter().map(|(_, ty)| *ty).collect();
+        (self.machine.stacks.of(self.linker, &types), kept)
+    }
+
+    /// Returns the variables that a piece and those behind it read, with their types. Nothing is left for the first.
+    fn read_by(&self, block: usize) -> Vec<(u32, u32)> {
+        let read = if block == 0 { &[][..] } else { &self.live[block] };
+        read.iter().map(|variable| (*variable, self.variable_type(*variable))).collect()
     }
 
     /// Returns the type of a variable of the function or of the shader.

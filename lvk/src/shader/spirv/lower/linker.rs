@@ -257,6 +257,18 @@ impl Linker {
         self.declare(Op::ConstantNull, &[ty])
     }
 
+    /// Notes a new value of a 64-bit integer type, on which the length of a switch's literals depends.
+    pub(super) fn mark_wide(&mut self, id: u32, ty: u32) {
+        if self.global(ty).is_some_and(|inst| inst.op == Op::TypeInt && inst.operand(1) == 64) {
+            self.module.wide.insert(id);
+        }
+    }
+
+    /// Returns a value of the type that may be any.
+    pub(super) fn undefined(&mut self, ty: u32) -> u32 {
+        self.declare(Op::Undef, &[ty])
+    }
+
     /// Declares a variable of the invocation.
     pub(super) fn private(&mut self, ty: u32) -> u32 {
         let pointer = self.pointer_to(StorageClass::Private, ty);

@@ -1,4 +1,4 @@
-//! Variables whose values a function reads after a block.
+//! Variables whose values a function reads in a block or after it.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,37 +9,32 @@ use super::instruction::{Inst, used_ids};
 use super::linker::Linker;
 use super::module::Function;
 
-/// Returns, for each block, those of `variables` that may be read behind its end before they are written. `at_return`
-/// are read at each return.
-pub(super) fn live_behind_blocks(
+/// Returns, for each block, those of `variables` that may be read in it or behind it before they are written.
+pub(super) fn live_at_starts(
     linker: &Linker,
     function: &Function,
     flow: &ControlFlow,
     variables: &HashSet<u32>,
-    at_return: &HashSet<u32>,
 ) -> Vec<HashSet<u32>> {
     let mentions = mentioned_by_functions(linker, variables);
     let effects: Vec<Effects> = function
         .blocks
         .iter()
-        .map(|block| Effects::collect(linker, &block.code, variables, &mentions, at_return))
+        .map(|block| Effects::collect(linker, &block.code, variables, &mentions))
         .collect();
     let mut at_start: Vec<HashSet<u32>> = vec![HashSet::new(); effects.len()];
-    let mut behind = at_start.clone();
     let mut has_changed = true;
     while has_changed {
         has_changed = false;
-        for block in (0..effects.len()).rev() {
-            let out: HashSet<u32> =
-                flow.successors[block].iter().flat_map(|to| at_start[*to].iter().copied()).collect();
-            let kept = out.difference(&effects[block].written).copied();
+        for block in flow.order.iter().rev().copied() {
+            let behind = flow.successors[block].iter().flat_map(|to| at_start[*to].iter().copied());
+            let kept = behind.filter(|variable| !effects[block].written.contains(variable));
             let now: HashSet<u32> = effects[block].read.iter().copied().chain(kept).collect();
             has_changed |= now != at_start[block];
             at_start[block] = now;
-            behind[block] = out;
         }
     }
-    behind
+    at_start
 }
 
 /// Variables that a block reads before it writes them, and those that it writes as a whole.
@@ -54,7 +49,6 @@ impl Effects {
         code: &[Inst],
         variables: &HashSet<u32>,
         mentions: &HashMap<u32, HashSet<u32>>,
-        at_return: &HashSet<u32>,
     ) -> Self {
         let mut found = Self { read: HashSet::new(), written: HashSet::new() };
         // Pointers into variables, with the variables. Pointers do not leave their block.
@@ -77,7 +71,6 @@ impl Effects {
                     whole = Some(inst.operand(0)).filter(|id| variables.contains(id));
                 }
                 Op::FunctionCall => used.extend(mentions.get(&inst.operand(2)).into_iter().flatten()),
-                Op::Return | Op::ReturnValue => used.extend(at_return),
                 _ => {}
             }
             let read: Vec<u32> = used.into_iter().map(|id| parts.get(&id).copied().unwrap_or(id)).collect();
@@ -91,7 +84,10 @@ impl Effects {
 }
 
 /// Returns the variables that each function mentions, itself or through its calls.
-fn mentioned_by_functions(linker: &Linker, variables: &HashSet<u32>) -> HashMap<u32, HashSet<u32>> {
+pub(super) fn mentioned_by_functions(
+    linker: &Linker,
+    variables: &HashSet<u32>,
+) -> HashMap<u32, HashSet<u32>> {
     let mut calls: HashMap<u32, HashSet<u32>> = HashMap::new();
     let mut found: HashMap<u32, HashSet<u32>> = HashMap::new();
     for function in &linker.module.functions {

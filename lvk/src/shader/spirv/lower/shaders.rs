@@ -13,7 +13,7 @@ use super::module::{Function, functions_that_reach};
 use super::passed::Passed;
 use super::push_constants::merge_push_constants;
 use super::stage::{Shader, link_stage};
-use super::traces::{TraceVariables, hide_remap_table, is_trace, rewrite_traces};
+use super::traces::{TraceVariables, hide_remap_table, is_trace, rewrite_traces, skips_closest_hit};
 use super::{HitShaders, Lowering, LoweringError, Traversal};
 use crate::shader::ShaderStage;
 
@@ -26,6 +26,8 @@ pub(super) struct Shaders {
     pub(super) waiting: HashSet<u32>,
     /// True if callable shaders call others.
     pub(super) callables_wait: bool,
+    /// True if rays that run no closest-hit shader are traced where they stand.
+    traces_shadows_in_place: bool,
 }
 
 const RAY_FLAG_OPAQUE: u32 = 0x1;
@@ -54,7 +56,13 @@ impl Shaders {
                 contains(linker, shader, |inst| inst.op == Op::ExecuteCallableKHR)
             })
         });
-        Ok(Self { linked, records: HashMap::new(), waiting: HashSet::new(), callables_wait })
+        Ok(Self {
+            linked,
+            records: HashMap::new(),
+            waiting: HashSet::new(),
+            callables_wait,
+            traces_shadows_in_place: false,
+        })
     }
 
     /// Returns what the shaders need of the traversal.
@@ -131,13 +139,31 @@ impl Shaders {
                 result.map_err(failed)?;
             }
         }
-        self.waiting = functions_that_reach(linker.module.functions.iter(), |inst| self.is_wait(inst));
+        let waiting = |shaders: &Self| {
+            functions_that_reach(linker.module.functions.iter(), |inst| shaders.is_wait(inst))
+        };
+        self.waiting = waiting(self);
+        self.traces_shadows_in_place = self.can_trace_shadows_in_place(linker, lowering);
+        self.waiting = waiting(self);
         Ok(())
+    }
+
+    /// True if rays that run no closest-hit shader are traced where they stand.
+    ///
+    /// Compilers for CPUs run every piece of code that any of eight rays needs, so few pieces and more copies of the
+    /// traversal are faster.
+    fn can_trace_shadows_in_place(&self, linker: &Linker, lowering: &Lowering<'_>) -> bool {
+        const MOST_PLACES: usize = 4;
+        let is_cpu = matches!(lowering.traversal, Traversal::SoftwareCpu | Traversal::SoftwareCpuPairs);
+        let places =
+            linker.module.functions.iter().flat_map(Function::code).filter(|inst| skips_closest_hit(inst));
+        is_cpu && places.count() <= MOST_PLACES && !lowering.miss.iter().any(|index| self.waits(*index))
     }
 
     /// True for an instruction at which a function waits.
     pub(super) fn is_wait(&self, inst: &Inst) -> bool {
-        is_trace(inst) || (self.callables_wait && inst.op == Op::ExecuteCallableKHR)
+        is_trace(inst) && !(self.traces_shadows_in_place && skips_closest_hit(inst))
+            || (self.callables_wait && inst.op == Op::ExecuteCallableKHR)
     }
 
     /// True if the shader waits for rays or callable shaders.

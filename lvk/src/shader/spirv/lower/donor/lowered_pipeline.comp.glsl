@@ -220,6 +220,30 @@ uvec2 lvkRecordAddress(const uvec2 region, const uint index, const uint stride) 
     return uvec2(low, region.y + carry);
 }
 
+#ifdef LVK_DEVICE_IS_CPU
+// Eight invocations run at once: their rays make blocks of 4 x 2, which keep closer together than those of a row.
+uvec2 lvkPlaceInGroup(const uint local) {
+    uint place = local >> 3;
+    return uvec2(place & 1u, place >> 1) * uvec2(4u, 2u) + uvec2(local & 3u, local >> 2 & 1u);
+}
+
+// Each thread of lavapipe takes a run of workgroups: so a run has rows from all over the launch, and none the costly
+// half. First come rows whose numbers are multiples of 4, then those 2 beyond, 1 beyond and 3.
+uint lvkGroupRow() {
+    const uint beyond[4] = uint[](0u, 2u, 1u, 3u);
+    uint row = 0u;
+    uint begin = 0u;
+    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        row = gl_WorkGroupID.y >= begin ? (gl_WorkGroupID.y - begin) * 4u + beyond[i] : row;
+        begin += (gl_NumWorkGroups.y + 3u - beyond[i]) / 4u;
+    }
+    return row;
+}
+#else
+uvec2 lvkPlaceInGroup(const uint local) { return uvec2(local & 7u, local >> 3); }
+uint lvkGroupRow() { return gl_WorkGroupID.y; }
+#endif
+
 // Finds the invocation's place in the launch. False if the place lies outside.
 bool lvkStart() {
     LvkLaunch launch = LvkLaunch(lvkPush.launch);
@@ -234,7 +258,8 @@ bool lvkStart() {
         uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
         lvkLaunchId = uvec3(group * 64u + local, 0u, 0u);
     } else {
-        lvkLaunchId = uvec3(gl_WorkGroupID.xy * 8u + uvec2(local & 7u, local >> 3), gl_WorkGroupID.z);
+        uvec2 group = uvec2(gl_WorkGroupID.x, lvkGroupRow());
+        lvkLaunchId = uvec3(group * 8u + lvkPlaceInGroup(local), gl_WorkGroupID.z);
     }
     return all(lessThan(lvkLaunchId, lvkLaunchSize));
 }
