@@ -28,7 +28,7 @@ pub fn lowered_devices() -> Vec<(RayTracingPipelinePath, TestDevice)> {
         ctx.and_then(|ctx| on_path(path, ctx))
     };
     let software = open(RayTracingPipelineRequest::Software, RayTracingPipelinePath::Software);
-    let query = open(RayTracingPipelineRequest::Auto, RayTracingPipelinePath::Query);
+    let query = open(RayTracingPipelineRequest::Query, RayTracingPipelinePath::Query);
     software.into_iter().chain(query).collect()
 }
 

@@ -47,7 +47,7 @@ pub(super) fn open(
     needs: &DeviceNeeds,
     window: Option<Arc<dyn WindowHandles>>,
 ) -> Result<Context, RunError> {
-    use RayQueryRequest::{Hardware, HardwareIfPresent, Software};
+    use RayQueryRequest::{Hardware, Software};
     use RayTracingPipelineRequest::{HardwareIfPresent as PipelineIfPresent, Off};
     let caches = Caches::open(name, args);
     let with = |ray_tracing_pipeline, ray_query| {
@@ -70,10 +70,11 @@ pub(super) fn open(
     match needs.rays {
         None => Ok(with(Off, RayQueryRequest::Off)?),
         Some(RayTracing::Pipeline) => {
-            let chosen = with(RayTracingPipelineRequest::Auto, HardwareIfPresent)?;
+            let chosen = with(RayTracingPipelineRequest::Auto, RayQueryRequest::Off)?;
             note_lowering(chosen.capabilities());
             Ok(chosen)
         }
+        Some(RayTracing::Hardware) => Ok(with(RayTracingPipelineRequest::Hardware, RayQueryRequest::Off)?),
         Some(RayTracing::Query) => with(PipelineIfPresent, Hardware).map_err(without_queries),
         Some(RayTracing::Software) => Ok(with(Off, Software)?),
         Some(RayTracing::Auto) => Ok(open_best(args, with)?),

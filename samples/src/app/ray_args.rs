@@ -15,8 +15,10 @@ pub struct RayArgs {
 pub enum RayTracing {
     /// A ray tracing pipeline if the device supports it, else ray queries; on a CPU software ray queries, the fastest.
     Auto,
-    /// A ray tracing pipeline with a shader binding table; on devices without them, lowered to a compute shader.
+    /// A ray tracing pipeline; on CPUs and on devices without them, lowered to a compute shader.
     Pipeline,
+    /// A ray tracing pipeline of the device itself.
+    Hardware,
     /// Ray queries of the device in a compute shader; on devices without them, as `software`.
     Query,
     /// Software ray queries of the library, on any device.

@@ -180,7 +180,7 @@ impl RayPath {
     pub fn from_args(wish: RayTracing) -> Option<Self> {
         match wish {
             RayTracing::Auto => None,
-            RayTracing::Pipeline => Some(Self::Pipeline),
+            RayTracing::Pipeline | RayTracing::Hardware => Some(Self::Pipeline),
             RayTracing::Query | RayTracing::Software => Some(Self::Query),
         }
     }

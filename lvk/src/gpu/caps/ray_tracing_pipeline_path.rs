@@ -12,8 +12,9 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayTracingPipelineRequest {
     /// The device's own pipelines where it has them. Otherwise lowered: onto the library's traversal if ray queries use
-    /// it too, else onto the device's ray queries, else onto the library's traversal. Without the feature
-    /// `software-ray-query` the library has no traversal.
+    /// it too, else onto the device's ray queries, else onto the library's traversal. On CPUs, pipelines are lowered onto
+    /// the library's traversal, which is faster there, unless ray queries of shaders use the device's structures. Without
+    /// the feature `software-ray-query` the library has no traversal.
     #[default]
     Auto,
     /// Only devices with `VK_KHR_ray_tracing_pipeline` are considered.
@@ -72,9 +73,6 @@ pub(crate) struct PathInputs {
     pub(crate) is_cpu: bool,
 }
 
-/// True if lowered pipelines are faster than those of drivers for CPUs.
-const LOWERED_IS_FASTER_ON_CPUS: bool = false;
-
 impl RayTracingPipelineRequest {
     /// Returns an error for the software path in a build without it.
     pub(crate) fn check(self) -> Result<()> {
@@ -115,9 +113,10 @@ impl RayTracingPipelineRequest {
             Self::Hardware | Self::HardwareIfPresent => {
                 (None, "the device has no ray tracing pipelines of its own")
             }
-            Self::Auto if has_pipelines && !is_faster_lowered(device) => {
-                (Hardware, "the device has ray tracing pipelines")
+            Self::Auto if is_faster_lowered(device) => {
+                (Software, "the device is a CPU, on which the library's own traversal is faster")
             }
+            Self::Auto if has_pipelines => (Hardware, "the device has ray tracing pipelines"),
             Self::Auto if HAS_SOFTWARE && device.query_path == RayQueryPath::Software => (
                 Software,
                 "the device has no ray tracing pipelines of its own, and ray queries are in software as well",
@@ -132,9 +131,10 @@ impl RayTracingPipelineRequest {
     }
 }
 
-/// Returns true if lowered pipelines are known to be faster than the device's own.
+/// Returns true if pipelines in software are known to be faster than the device's own, and need no structures beside
+/// those of ray queries.
 fn is_faster_lowered(device: PathInputs) -> bool {
-    device.is_cpu && LOWERED_IS_FASTER_ON_CPUS
+    HAS_SOFTWARE && device.is_cpu && device.query_path != RayQueryPath::Hardware
 }
 
 #[cfg(test)]
@@ -142,12 +142,18 @@ mod tests {
     use super::RayTracingPipelinePath::*;
     use super::*;
 
-    /// Returns the paths of devices without ray tracing, with queries only, and with pipelines and queries.
+    /// Returns the paths of GPUs without ray tracing, with queries only, and with pipelines and queries.
     fn paths(request: RayTracingPipelineRequest, query_path: RayQueryPath) -> [RayTracingPipelinePath; 3] {
+        paths_of(request, query_path, false)
+    }
+
+    fn paths_of(
+        request: RayTracingPipelineRequest,
+        query_path: RayQueryPath,
+        is_cpu: bool,
+    ) -> [RayTracingPipelinePath; 3] {
         [(false, false), (false, true), (true, true)].map(|(has_pipelines, has_queries)| {
-            let of = |is_cpu| request.choose(PathInputs { has_pipelines, has_queries, query_path, is_cpu });
-            assert_eq!(of(false), of(true), "no CPU is known to be faster with lowered pipelines");
-            of(false).path
+            request.choose(PathInputs { has_pipelines, has_queries, query_path, is_cpu }).path
         })
     }
 
@@ -181,6 +187,18 @@ mod tests {
     fn automatic_pipelines_share_the_structures_of_software_queries() {
         let found = paths(RayTracingPipelineRequest::Auto, RayQueryPath::Software);
         assert_eq!(found, [Software, Software, Hardware]);
+    }
+
+    #[cfg(feature = "software-ray-query")]
+    #[test]
+    fn cpus_lower_unless_queries_use_their_structures() {
+        use RayQueryPath as Queries;
+        let of = |request, queries| paths_of(request, queries, true);
+        for queries in [Queries::None, Queries::Software] {
+            assert_eq!(of(RayTracingPipelineRequest::Auto, queries), [Software; 3]);
+        }
+        assert_eq!(of(RayTracingPipelineRequest::Auto, Queries::Hardware), [Software, Query, Hardware]);
+        assert_eq!(of(RayTracingPipelineRequest::Hardware, Queries::Software), [None, None, Hardware]);
     }
 
     #[test]

@@ -108,7 +108,7 @@ fn start_experiment(setup: &Setup, args: &PaperArgs, ctx: &Context) -> Result<Ex
     let (paths, note) = ray_paths(ctx)?;
     let paths: Vec<RayPath> = match args.rt {
         RayTracing::Auto => paths,
-        RayTracing::Pipeline => vec![require_path(ctx, RayPath::Pipeline)?],
+        RayTracing::Pipeline | RayTracing::Hardware => vec![require_path(ctx, RayPath::Pipeline)?],
         RayTracing::Query | RayTracing::Software => vec![require_path(ctx, RayPath::Query)?],
     };
     let [width, height] =
