@@ -146,10 +146,10 @@ fn bytes<const N: usize>(record: &[u32; N]) -> ShaderRecord<'_> {
 }
 
 impl World<'_> {
-    /// Creates a pipeline in one of four cases, as drivers take longer for it than for a whole program without any.
+    /// Creates a pipeline in one of 16 cases, as drivers take longer for it than for a whole program without any.
     pub(super) fn create_rays(&mut self, n: [u16; 6]) -> Result<bool, String> {
         let alive = self.rays.iter().filter(|rays| rays.holder.is_some()).count();
-        let Some(modules) = self.env.kit.ray_modules().filter(|_| n[0].is_multiple_of(4) && alive < MOST)
+        let Some(modules) = self.env.kit.ray_modules().filter(|_| n[0].is_multiple_of(16) && alive < MOST)
         else {
             return Ok(false);
         };
