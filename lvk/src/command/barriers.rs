@@ -1,5 +1,6 @@
 //! Turns declared uses into recorded barriers.
 
+use std::mem::take;
 use std::sync::Arc;
 
 use super::CommandBuffer;
@@ -130,19 +131,41 @@ impl CommandBuffer {
         &mut self,
         gather: impl FnOnce(&mut Self) -> Result<()>,
     ) -> Result<()> {
-        self.make_visible();
-        match gather(self) {
-            Ok(()) => {
-                self.flush_barriers();
-                Ok(())
-            }
-            Err(error) => {
-                self.state.accesses.clear();
-                self.state.declared.clear();
-                Err(error)
-            }
-        }
+        self.gather_accesses(gather)?;
+        self.flush_barriers();
+        Ok(())
     }
+
+    /// Returns the accesses of a command before which a kernel runs, with accesses of its own. `gather` is as for
+    /// [`flush_barriers_after`](Self::flush_barriers_after).
+    pub(super) fn gather_for_later(
+        &mut self,
+        gather: impl FnOnce(&mut Self) -> Result<()>,
+    ) -> Result<LaterAccesses> {
+        self.gather_accesses(gather)?;
+        let RecordingState { accesses, declared, .. } = &mut **self.state;
+        Ok(LaterAccesses { accesses: take(accesses), declared: take(declared) })
+    }
+
+    /// Puts accesses back that were gathered for later. Those of the kernel are recorded by now.
+    pub(super) fn restore_accesses(&mut self, later: LaterAccesses) {
+        (self.state.accesses, self.state.declared) = (later.accesses, later.declared);
+    }
+
+    fn gather_accesses(&mut self, gather: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        self.make_visible();
+        gather(self).inspect_err(|_| {
+            self.state.accesses.clear();
+            self.state.declared.clear();
+        })
+    }
+}
+
+/// Accesses of a command that is recorded after a kernel. Its handles are not looked up again: another thread may destroy
+/// an object in the meantime.
+pub(super) struct LaterAccesses {
+    accesses: CommandAccesses,
+    declared: Vec<(u32, bool)>,
 }
 
 /// Adds an access to a buffer. The end of the recording makes writes to mapped memory visible to the host.

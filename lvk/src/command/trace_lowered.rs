@@ -63,8 +63,9 @@ impl CommandBuffer {
         size: [u32; 3],
         dependencies: &Dependencies<'_>,
     ) -> Result<()> {
-        let most = self.shared.gpu.caps.limits.max_dispatch_workgroups;
-        let [x, y, z] = launch_workgroups(&trace.pipeline.name, size, most)?;
+        let limits = &self.shared.gpu.caps.limits;
+        let (most_rays, most) = (limits.max_trace_invocations, limits.max_dispatch_workgroups);
+        let [x, y, z] = launch_workgroups(&trace.pipeline.name, size, most_rays, most)?;
         if x == 0 {
             return Ok(());
         }
@@ -89,14 +90,11 @@ impl CommandBuffer {
         offset: u64,
         dependencies: &Dependencies<'_>,
     ) -> Result<()> {
-        let used = self.use_trace(trace.pipeline, Stages::COMPUTE, dependencies);
-        self.state.accesses.clear();
-        self.state.declared.clear();
-        used?;
         let kernel = self.kernel_pipeline(Kernel::TraceSize)?;
         let launch = self.new_launch_buffer(trace)?;
         let size = launch.address + WORKGROUP_BYTES as u64;
-        self.make_visible();
+        let of_trace =
+            self.gather_for_later(|cmd| cmd.use_trace(trace.pipeline, Stages::COMPUTE, dependencies))?;
         self.use_buffer(arguments, Use::shader_read(Stages::COMPUTE));
         self.state.accesses.add_buffer(&launch, Use::shader_write(Stages::COMPUTE));
         self.flush_barriers();
@@ -108,14 +106,15 @@ impl CommandBuffer {
             unused: 0,
         };
         self.dispatch_kernel(Some(&kernel), bytemuck::bytes_of(&push), [1, 1, 1]);
-        // The same calls succeeded above.
-        self.use_trace(trace.pipeline, Stages::COMPUTE, dependencies)?;
+        // Nothing fails from the kernel on until the caller's pipeline is bound again.
+        self.restore_accesses(of_trace);
         self.state.accesses.add_buffer(&launch, Use::indirect());
         self.state.accesses.add_buffer(&launch, Use::shader_read(Stages::COMPUTE));
         self.flush_barriers();
         self.restore_push_constants();
         self.bind_lowered(trace, size);
-        // SAFETY: a compute pipeline is bound, and the counts lie at the start of the buffer.
+        // SAFETY: a compute pipeline is bound, and the counts lie at the start of the buffer, where the kernel writes them.
+        // The caller keeps the size within the limits.
         unsafe { self.shared.gpu.device.cmd_dispatch_indirect(self.raw(), launch.raw, 0) };
         self.restore_compute();
         Ok(())
@@ -162,10 +161,10 @@ impl CommandBuffer {
 /// Returns the workgroups of a launch, all 0 for a launch without rays. `most` are the device's largest counts.
 ///
 /// # Errors
-/// [`LimitExceeded`](Error::LimitExceeded) for a launch that needs more workgroups.
-fn launch_workgroups(pipeline: &str, size: [u32; 3], most: [u32; 3]) -> Result<[u32; 3]> {
+/// [`LimitExceeded`](Error::LimitExceeded) for a launch with more than `most_rays` rays, or that needs more workgroups.
+fn launch_workgroups(pipeline: &str, size: [u32; 3], most_rays: u32, most: [u32; 3]) -> Result<[u32; 3]> {
     let rays = size.iter().fold(1_u64, |all, side| all.saturating_mul((*side).into()));
-    check_limit(pipeline, "number of rays", rays, u32::MAX.into())?;
+    check_limit(pipeline, "number of rays", rays, most_rays.into())?;
     let counts = match size {
         _ if size.contains(&0) => return Ok([0; 3]),
         [width, 1, 1] => {
@@ -187,12 +186,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::gpu::caps::limits::lowered::MAX_RAYS;
 
     const MOST: [u32; 3] = [65_535; 3];
 
     #[test]
     fn long_rows_continue_along_y() {
-        let workgroups = |size| launch_workgroups("p", size, MOST).unwrap();
+        let workgroups = |size| launch_workgroups("p", size, MAX_RAYS, MOST).unwrap();
         assert_eq!(workgroups([1, 1, 1]), [1, 1, 1]);
         assert_eq!(workgroups([65, 1, 1]), [2, 1, 1]);
         assert_eq!(workgroups([64 * 65_535, 1, 1]), [65_535, 1, 1]);
@@ -210,19 +210,31 @@ mod tests {
             ([2, 2, 65_536], "number of workgroups along an axis of the trace"),
             ([65_536, 65_536, 1], "number of rays"),
         ] {
-            let error = launch_workgroups("p", size, MOST).unwrap_err();
+            let error = launch_workgroups("p", size, MAX_RAYS, MOST).unwrap_err();
             assert!(matches!(error, Error::LimitExceeded { what: found, .. } if found == what), "{error}");
         }
     }
 
     proptest! {
         #[test]
-        fn every_ray_has_an_invocation(width in 1..=u32::MAX, most in 1024..=u32::MAX) {
+        fn every_ray_has_one_invocation(width in 1..=MAX_RAYS, most in 1024..=u32::MAX) {
             let limits = [most, 65_535, 65_535];
-            if let Ok([x, y, z]) = launch_workgroups("p", [width, 1, 1], limits) {
+            if let Ok([x, y, z]) = launch_workgroups("p", [width, 1, 1], MAX_RAYS, limits) {
+                let invocations = u64::from(x) * u64::from(y) * u64::from(WORKGROUP_SIZE);
                 prop_assert!(x <= most && z == 1);
-                prop_assert!(u64::from(x) * u64::from(y) * u64::from(WORKGROUP_SIZE) >= u64::from(width));
+                prop_assert!(invocations >= u64::from(width));
+                prop_assert!(invocations <= 1 << 32, "the shader counts them in 32 bits");
             }
         }
+    }
+
+    /// The last row of workgroups is longer than necessary, so the indices of so many invocations would wrap.
+    #[test]
+    fn launches_whose_indices_would_wrap_are_refused() {
+        let [x, y, _] = launch_workgroups("p", [u32::MAX, 1, 1], u32::MAX, MOST).unwrap();
+        assert!(u64::from(x) * u64::from(y) * u64::from(WORKGROUP_SIZE) > 1 << 32);
+        let error = launch_workgroups("p", [u32::MAX, 1, 1], MAX_RAYS, MOST).unwrap_err();
+        assert!(matches!(error, Error::LimitExceeded { what: "number of rays", .. }), "{error}");
+        assert_eq!(launch_workgroups("p", [MAX_RAYS, 1, 1], MAX_RAYS, MOST).unwrap(), [65_409, 513, 1]);
     }
 }

@@ -9,7 +9,7 @@ use super::ray_tracing_desc::RayTracingPipelineDesc;
 use super::sbt::SbtPlan;
 use super::shader_module::ShaderModule;
 use crate::cpu_scope::cpu_scope;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::ray_tracing_pipeline_path::RayTracingPipelinePath;
@@ -32,6 +32,7 @@ impl LoweredPipeline {
         plan: &SbtPlan,
     ) -> Result<Self> {
         cpu_scope!("lower ray tracing pipeline");
+        check_regions(desc.debug_name, plan)?;
         let linked = link(parts, Arc::ptr_eq);
         let modules = stage_modules(desc.debug_name, &linked)?;
         let job = LoweringJob { gpu, base, desc, linked: &linked, modules: &modules, plan };
@@ -106,6 +107,14 @@ pub(crate) fn launch_offset(bytes: u32) -> u32 {
     bytes.saturating_sub(size_of::<u64>() as u32)
 }
 
+/// Fails unless shaders can compute the place of each record, which they do in 32 bits.
+fn check_regions(pipeline: &str, plan: &SbtPlan) -> Result<()> {
+    let names =
+        ["bytes of miss shader records", "bytes of hit group records", "bytes of callable shader records"];
+    let mut regions = names.into_iter().zip([&plan.miss, &plan.hit, &plan.callable]);
+    regions.try_for_each(|(what, region)| check_limit(pipeline, what, region.size, u32::MAX.into()))
+}
+
 /// Returns the traversal of lowered pipelines.
 fn traversal(device: &Capabilities) -> Traversal {
     match device.ray_tracing_pipeline_path {
@@ -129,4 +138,22 @@ fn stage_modules<'a>(
         Ok(StageModule { name: &module.name, stage: module.stage, words, specialization })
     };
     linked.modules.iter().map(stage_module).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::sbt::SbtRegion;
+
+    #[test]
+    fn regions_that_32_bits_do_not_address_are_refused() {
+        let plan = |size| SbtPlan { hit: SbtRegion { offset: 64, stride: 4096, size }, ..SbtPlan::default() };
+        check_regions("p", &plan((1 << 32) - 4096)).unwrap();
+        let error = check_regions("p", &plan(1 << 32)).unwrap_err();
+        let is_told = matches!(
+            error,
+            Error::LimitExceeded { what: "bytes of hit group records", limit: 0xffff_ffff, .. }
+        );
+        assert!(is_told, "{error}");
+    }
 }

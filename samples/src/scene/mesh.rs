@@ -59,10 +59,13 @@ impl Mesh {
         before - kept.len()
     }
 
+    /// True if the triangle has an area. A face on one line does not count for the size of its mesh, so that its corners may
+    /// be infinite in single precision: it has none either.
     fn has_area(&self, triangle: usize) -> bool {
         let [a, b, c] =
             self.triangles[triangle].map(|v| DVec3::from(self.positions[v as usize].map(f64::from)));
-        (b - a).cross(c - a).length_squared() > 0.0
+        let squared = (b - a).cross(c - a).length_squared();
+        squared > 0.0 && squared.is_finite()
     }
 
     /// Puts opaque triangles first, each group in the order of the source, then numbers the vertices by first use and

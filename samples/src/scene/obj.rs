@@ -236,6 +236,9 @@ mod tests {
         assert!(matches!(missing, Err(SceneError::NotFound { .. })));
         let flat = load_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", &[]);
         assert!(matches!(flat, Err(SceneError::Empty { degenerate: 1, .. })));
+        // A line does not count for the size of the mesh, so it may be longer than single precision reaches.
+        let long = load_text("v 4e6 5e6 0\nv 4000000.25 5e66 5e6\nv 0 -1e30 1\nf 1 2 3\n", &[]);
+        assert!(matches!(long, Err(SceneError::Empty { degenerate: 1, .. })));
         let folder = tempfile::tempdir().unwrap();
         let unreadable = load(folder.path(), &ObjOptions::default(), &mut Progress::hidden());
         assert!(matches!(unreadable, Err(SceneError::Unreadable { .. })));

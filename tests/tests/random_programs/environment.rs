@@ -4,11 +4,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context,
-    Holder, QueueRequest, SubmitHandle, TextureDesc, TextureHandle, Triangles, ValidationSink,
+    Holder, QueueRequest, RayTracingPipelineHandle, SubmitHandle, TextureDesc, TextureHandle, Triangles,
+    ValidationSink,
 };
 use lvk_tests::device_with;
 
-use super::kit::Kit;
+use super::kit::{Kit, ray_pipeline};
 
 /// Objects of another context.
 pub struct Foreign {
@@ -16,6 +17,7 @@ pub struct Foreign {
     buffer: Holder<BufferHandle>,
     texture: Holder<TextureHandle>,
     blas: Holder<AccelStructHandle>,
+    rays: Option<Holder<RayTracingPipelineHandle>>,
     /// A submission.
     pub submission: SubmitHandle,
 }
@@ -31,8 +33,9 @@ impl Foreign {
         let geometries = [BlasGeometry::Triangles(Triangles::packed(*buffer, 3))];
         let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?;
         let texture = ctx.create_texture(&TextureDesc::default())?;
+        let rays = ctx.capabilities().ray_tracing_pipeline.then(|| ray_pipeline(&ctx)).transpose()?;
         let submission = ctx.flush()?;
-        Ok(Self { ctx, buffer, texture, blas, submission })
+        Ok(Self { ctx, buffer, texture, blas, rays, submission })
     }
 
     /// Returns a buffer.
@@ -48,6 +51,11 @@ impl Foreign {
     /// Returns a BLAS.
     pub fn blas(&self) -> AccelStructHandle {
         *self.blas
+    }
+
+    /// Returns a ray tracing pipeline, if the device has any.
+    pub fn rays(&self) -> Option<RayTracingPipelineHandle> {
+        self.rays.as_deref().copied()
     }
 
     /// Returns a command buffer.

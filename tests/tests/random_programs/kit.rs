@@ -9,6 +9,8 @@ use lvk::{
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::raster::render_pipeline;
 
+use super::plan_pipelines::RayModules;
+
 /// Push constants of every pipeline.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, NoUninit)]
@@ -27,7 +29,7 @@ pub struct Push {
     pub pad: u32,
 }
 
-const HEAD: &str = "
+pub(super) const HEAD: &str = "
     layout(buffer_reference, scalar) buffer Words { uint at[]; };
     layout(push_constant, scalar) uniform Push { Words to; Words from; uint index; uint number; uint word; };
     uint patternOf(uint i) { return (0x21 + (number + 7 * i) % 0x5d) * 0x01010101u; }
@@ -107,6 +109,7 @@ pub struct Kit {
     kernels: Vec<Holder<ComputePipelineHandle>>,
     draws: Vec<Holder<RenderPipelineHandle>>,
     trace: Option<Holder<RayTracingPipelineHandle>>,
+    ray_modules: Option<RayModules>,
 }
 
 impl Kit {
@@ -129,12 +132,15 @@ impl Kit {
         let kernels = kernels.collect();
         let draws = TARGETS.iter().map(|format| draw_pipeline(ctx, *format)).collect();
         let trace = ctx.capabilities().ray_tracing_pipeline.then(|| ray_pipeline(ctx)).transpose()?;
-        Ok(Self { kernels, draws, trace })
+        let ray_modules =
+            ctx.capabilities().ray_tracing_pipeline.then(|| RayModules::new(ctx)).transpose()?;
+        Ok(Self { kernels, draws, trace, ray_modules })
     }
 
     /// Number of its objects.
     pub fn object_count(&self) -> usize {
-        self.kernels.len() + self.draws.len() + usize::from(self.trace.is_some())
+        let modules = self.ray_modules.iter().map(|_| RayModules::COUNT).sum::<usize>();
+        self.kernels.len() + self.draws.len() + usize::from(self.trace.is_some()) + modules
     }
 
     /// Returns a compute pipeline.
@@ -151,6 +157,11 @@ impl Kit {
     /// Returns the ray tracing pipeline, if the device has any.
     pub fn trace(&self) -> Option<RayTracingPipelineHandle> {
         self.trace.as_deref().copied()
+    }
+
+    /// Returns the shaders of pipelines that programs create, if the device has any.
+    pub fn ray_modules(&self) -> Option<&RayModules> {
+        self.ray_modules.as_ref()
     }
 }
 
@@ -172,7 +183,8 @@ fn draw_pipeline(ctx: &Context, format: Format) -> Holder<RenderPipelineHandle> 
     render_pipeline(ctx, &vertex, &fragment, &desc)
 }
 
-fn ray_pipeline(ctx: &Context) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
+/// Creates a pipeline with one shader of each kind.
+pub fn ray_pipeline(ctx: &Context) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
     let module = |stage, text: &str| {
         let text = format!("{HEAD}{text}");
         let source = ShaderSource::Glsl(&text);

@@ -1,7 +1,7 @@
 //! Random programs: sequences of calls, right and wrong, against a model of their outcomes and of every byte.
 //!
-//! `op` lists the operations, `world` holds the objects and judges outcomes, `memory` models contents, `plan` and
-//! `calls` say what each operation must do, `run` runs a program, `threads` runs programs on several threads, `shrink`
+//! `op` lists the operations, `world` holds the objects and judges outcomes, `memory` models contents, `plan`,
+//! `plan_pipelines` and `calls` say what each operation must do, `run` runs a program, `threads` runs programs on several threads, `shrink`
 //! makes failing ones small, and `seeds` and `kept` are the tests: of generated programs, and of those that have failed.
 
 mod calls;
@@ -13,6 +13,7 @@ mod kit;
 mod memory;
 mod op;
 mod plan;
+mod plan_pipelines;
 mod plan_rays;
 mod plan_textures;
 mod run;

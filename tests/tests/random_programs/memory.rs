@@ -91,7 +91,22 @@ pub enum Effect {
     /// Sets the instances of a TLAS.
     Place { tlas: usize, instances: Vec<Instance> },
     /// Traces all rays and writes a word for each.
-    Trace { tlas: usize, to: (usize, usize) },
+    Trace { tlas: usize, to: (usize, usize), shading: Shading },
+}
+
+/// What the shaders of a trace make of rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shading {
+    /// The word of a ray that hits nothing.
+    pub miss: u32,
+    /// What is added to the word of a hit.
+    pub hit: u32,
+}
+
+impl Default for Shading {
+    fn default() -> Self {
+        Self { miss: MISS, hit: 0 }
+    }
 }
 
 impl Memory {
@@ -133,13 +148,13 @@ impl Memory {
                 let seen = |instance: &Instance| (*instance, self.blas[instance.blas].version);
                 self.tlas[*tlas].instances = instances.iter().map(seen).collect();
             }
-            Effect::Trace { tlas, to } => self.trace(*tlas, *to),
+            Effect::Trace { tlas, to, shading } => self.trace(*tlas, *to, *shading),
         }
     }
 
-    fn trace(&mut self, tlas: usize, (buffer, offset): (usize, usize)) {
-        let cells: Vec<_> = (0..RAYS).flat_map(|ray| self.hit(tlas, ray)).collect();
-        let miss = MISS.to_le_bytes().map(Cell::known);
+    fn trace(&mut self, tlas: usize, (buffer, offset): (usize, usize), shading: Shading) {
+        let cells: Vec<_> = (0..RAYS).flat_map(|ray| self.hit(tlas, ray, shading)).collect();
+        let miss = shading.miss.to_le_bytes().map(Cell::known);
         let is_hit = |word: &&[Cell]| **word != miss && word[0].is_known();
         self.hits += cells.chunks(4).filter(is_hit).count() as u64;
         self.write(buffer, offset, &cells);
@@ -195,7 +210,7 @@ impl Memory {
     }
 
     /// Returns the word that a ray writes.
-    fn hit(&self, tlas: usize, ray: usize) -> [Cell; 4] {
+    fn hit(&self, tlas: usize, ray: usize, shading: Shading) -> [Cell; 4] {
         let (slot, triangle) = ((ray / TRIANGLES) as u32, ray % TRIANGLES);
         let mut nearest: Option<(u32, u32)> = None;
         for (instance, version) in &self.tlas[tlas].instances {
@@ -210,7 +225,8 @@ impl Memory {
                     Some(nearest.map_or((depth, instance.custom), |best| best.min((depth, instance.custom))));
             }
         }
-        let word = nearest.map_or(MISS, |(depth, custom)| hit_word(custom, triangle as u32, depth));
+        let hit = |(depth, custom)| hit_word(custom, triangle as u32, depth) + shading.hit;
+        let word = nearest.map_or(shading.miss, hit);
         word.to_le_bytes().map(Cell::known)
     }
 }
@@ -277,12 +293,16 @@ mod tests {
         memory
             .apply(&Effect::Place { tlas: 0, instances: vec![instance(0, 2, 1), hidden, instance(1, 6, 2)] });
         let word = |word: u32| word.to_le_bytes().map(Cell::known);
-        assert_eq!(memory.hit(0, 3), word(hit_word(1, 0, 7)));
-        assert_eq!(memory.hit(0, 4), word(hit_word(1, 1, 11)));
-        assert_eq!(memory.hit(0, 5), word(MISS));
-        assert_eq!(memory.hit(0, 0), word(MISS));
+        let plain = Shading::default();
+        assert_eq!(memory.hit(0, 3, plain), word(hit_word(1, 0, 7)));
+        assert_eq!(memory.hit(0, 4, plain), word(hit_word(1, 1, 11)));
+        assert_eq!(memory.hit(0, 5, plain), word(MISS));
+        assert_eq!(memory.hit(0, 0, plain), word(MISS));
+        let other = Shading { miss: 7, hit: 3 << 24 };
+        assert_eq!(memory.hit(0, 3, other), word(hit_word(1, 0, 7) + (3 << 24)));
+        assert_eq!(memory.hit(0, 5, other), word(7));
         memory.apply(&Effect::Build { blas: 0 });
-        assert_eq!(memory.hit(0, 3), [Cell::UNKNOWN; 4]);
+        assert_eq!(memory.hit(0, 3, plain), [Cell::UNKNOWN; 4]);
     }
 
     #[test]

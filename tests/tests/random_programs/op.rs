@@ -31,6 +31,8 @@ pub enum Kind {
     DestroyBlas,
     CreateTlas,
     DestroyTlas,
+    CreateRays,
+    DestroyRays,
     Compact,
     AccelInfo,
     Acquire,
@@ -66,10 +68,11 @@ pub enum Kind {
     BuildBlas,
     UpdateTlas,
     Trace,
+    TraceRays,
 }
 
 /// Kinds that record a command. The others are calls of the context.
-const RECORDED: [(Kind, u16); 24] = [
+const RECORDED: [(Kind, u16); 25] = [
     (Kind::CopyBuffer, 6),
     (Kind::CopyRegions, 3),
     (Kind::FillBuffer, 6),
@@ -94,9 +97,10 @@ const RECORDED: [(Kind, u16); 24] = [
     (Kind::BuildBlas, 3),
     (Kind::UpdateTlas, 6),
     (Kind::Trace, 8),
+    (Kind::TraceRays, 4),
 ];
 
-const CALLED: [(Kind, u16); 33] = [
+const CALLED: [(Kind, u16); 35] = [
     (Kind::CreateBuffer, 4),
     (Kind::DestroyBuffer, 2),
     (Kind::UploadBuffer, 5),
@@ -119,6 +123,8 @@ const CALLED: [(Kind, u16); 33] = [
     (Kind::DestroyBlas, 1),
     (Kind::CreateTlas, 5),
     (Kind::DestroyTlas, 1),
+    (Kind::CreateRays, 2),
+    (Kind::DestroyRays, 1),
     (Kind::Compact, 1),
     (Kind::AccelInfo, 1),
     (Kind::Acquire, 5),

@@ -95,6 +95,7 @@ impl World<'_> {
             Kind::BuildBlas => self.build_blas(n, at),
             Kind::UpdateTlas => self.update_tlas(n, at),
             Kind::Trace => self.trace(n, queue),
+            Kind::TraceRays => self.trace_rays(n, queue),
             _ => Some(Planned::new(Vec::new(), Vec::new(), move |_, cmd| {
                 match n[0] % 3 {
                     0 => cmd.push_label("part"),

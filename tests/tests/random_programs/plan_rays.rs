@@ -3,7 +3,7 @@
 use lvk::{BuildMode, Dependencies, Queue, TlasInstance};
 
 use super::kit::{Kernel, Push};
-use super::memory::{Effect, Instance, RAYS, SLOTS};
+use super::memory::{Effect, Instance, RAYS, SLOTS, Shading};
 use super::plan::{Planned, compute_problems};
 use super::world::{OpenTlas, Problem, World};
 
@@ -160,7 +160,9 @@ impl World<'_> {
         let to = self.exact_words(n[1], n[2], RAYS)?;
         let problems = compute_problems(queue, [to.problem]);
         let effects = match to.number {
-            Some(number) if problems.is_empty() => vec![Effect::Trace { tlas, to: (number, to.offset) }],
+            Some(number) if problems.is_empty() => {
+                vec![Effect::Trace { tlas, to: (number, to.offset), shading: Shading::default() }]
+            }
             _ => Vec::new(),
         };
         let index = self.tlas[tlas].index;

@@ -78,6 +78,8 @@ impl World<'_> {
             Kind::DestroyBlas => self.destroy_blas(n),
             Kind::CreateTlas => self.create_tlas(n),
             Kind::DestroyTlas => self.destroy_tlas(n),
+            Kind::CreateRays => self.create_rays(n),
+            Kind::DestroyRays => self.destroy_rays(n),
             Kind::Compact => self.compact(n),
             Kind::AccelInfo => self.accel_info(n),
             Kind::Acquire => self.acquire(n),
@@ -290,6 +292,11 @@ impl World<'_> {
     fn destroy_tlas(&mut self, n: [u16; 6]) -> Result<bool, String> {
         let picked = self.pick_tlas(n[0]);
         Ok(destroy(self.env, &mut self.tlas, picked.map(|found| (found.handle, found.live)), n[1]))
+    }
+
+    fn destroy_rays(&mut self, n: [u16; 6]) -> Result<bool, String> {
+        let picked = self.pick_rays(n[0]);
+        Ok(destroy(self.env, &mut self.rays, picked.map(|found| (found.handle, found.live)), n[1]))
     }
 
     /// Compares all contents, and drops everything. Returns what the program has done.

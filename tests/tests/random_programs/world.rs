@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use lvk::{
     AccelStructHandle, BufferHandle, BufferUsage, CommandBuffer, Context, Destroy, Error, Format, Holder,
-    MemoryKind, QueryPoolHandle, Queue, Readback, SamplerHandle, SubmitHandle, TextureHandle, TextureUsage,
+    MemoryKind, QueryPoolHandle, Queue, RayTracingPipelineHandle, Readback, SamplerHandle, SubmitHandle,
+    TextureHandle, TextureUsage,
 };
 
 use super::cell::Cell;
@@ -12,6 +13,7 @@ use super::environment::Environment;
 use super::image::Part;
 use super::memory::{Effect, Memory};
 use super::plan::Planned;
+use super::plan_pipelines::RaysInfo;
 
 /// Reason why a call must fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +30,8 @@ pub enum Problem {
     Unsupported,
     /// The queue cannot do this.
     WrongQueue,
+    /// A shader record does not fit its block.
+    Record,
 }
 
 impl Problem {
@@ -39,6 +43,7 @@ impl Problem {
             Self::Limit => matches!(error, Error::LimitExceeded { .. }),
             Self::Unsupported => matches!(error, Error::Unsupported { .. }),
             Self::WrongQueue => matches!(error, Error::WrongQueue { .. }),
+            Self::Record => matches!(error, Error::ShaderRecord { .. }),
         }
     }
 }
@@ -217,6 +222,7 @@ pub struct World<'a> {
     pub meshes: Vec<Object<BufferHandle, usize>>,
     pub blas: Vec<Object<AccelStructHandle, BlasInfo>>,
     pub tlas: Vec<Object<AccelStructHandle, TlasInfo>>,
+    pub rays: Vec<Object<RayTracingPipelineHandle, RaysInfo>>,
     pub open: Vec<Open>,
     pub submitted: Vec<SubmitHandle>,
     pub pending: Vec<Pending>,
@@ -248,6 +254,7 @@ impl<'a> World<'a> {
             meshes: Vec::new(),
             blas: Vec::new(),
             tlas: Vec::new(),
+            rays: Vec::new(),
             open: Vec::new(),
             submitted: Vec::new(),
             pending: Vec::new(),
@@ -283,6 +290,11 @@ impl<'a> World<'a> {
     /// Chooses a TLAS.
     pub fn pick_tlas(&self, n: u16) -> Option<Picked<AccelStructHandle>> {
         pick(&self.tlas, n, self.env.foreign.blas())
+    }
+
+    /// Chooses a ray tracing pipeline.
+    pub fn pick_rays(&self, n: u16) -> Option<Picked<RayTracingPipelineHandle>> {
+        pick(&self.rays, n, self.env.foreign.rays()?)
     }
 
     /// Records a planned command into an open command buffer.

@@ -1,8 +1,10 @@
 //! Launches on every path of ray tracing pipelines: sizes, push constants, compute state, subgroups, constants.
 
+use std::sync::Barrier;
+
 use lvk::{
-    AccelStructHandle, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Dependencies, Holder,
-    RayTracingPipelineDesc, RayTracingPipelineHandle, Result, ShaderStage, SpecializationConstant,
+    AccelStructHandle, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Dependencies, Error,
+    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, Result, ShaderStage, SpecializationConstant,
     SpecializationValue, TlasDesc,
 };
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
@@ -204,6 +206,58 @@ fn compute_pipelines_stay_bound_across_traces() -> Result<()> {
     Ok(())
 }
 
+/// Another thread destroys an object of the dependencies while an indirect trace is recorded. Whether the trace is
+/// recorded or refused, the dispatch behind it runs the pipeline that was bound before.
+#[test]
+fn an_object_destroyed_beside_an_indirect_trace_leaves_the_compute_pipeline_bound() -> Result<()> {
+    const COUNT: &str = "layout(local_size_x = 1) in; void main() { words.at[place] += 1; }";
+    const RAY_GEN: &str = "
+        void main() { value = 9; trace(tlas); words.at[place + 1] += value; }";
+    const ROUNDS: u32 = 60;
+    for (path, ctx) in pipeline_devices() {
+        if !ctx.capabilities().trace_rays_indirect {
+            eprintln!("NOT TESTED, {path:?} traces nothing indirectly");
+            continue;
+        }
+        let launcher = Launcher::new(&ctx, PUSH, [RAY_GEN, COUNTING_MISS], &[])?;
+        let count = compute_pipeline(&ctx, &format!("{WORDS}{PUSH}{COUNT}"));
+        let usage = BufferUsage::INDIRECT;
+        let data = Some(bytemuck::bytes_of(&[1_u32; 3]));
+        let size = ctx.create_buffer(&BufferDesc { usage, data, ..Default::default() })?;
+        let mut recorded = 0;
+        for round in 0..ROUNDS {
+            let victim = ctx.create_tlas(&TlasDesc { capacity: 1, ..Default::default() })?.release();
+            let words = words_buffer(&ctx, &[0; 4]);
+            let mut cmd = ctx.acquire_command_buffer()?;
+            cmd.bind_compute_pipeline(*count)?;
+            launcher.bind(&mut cmd, *words, [0, 0, 0, 0, 2])?;
+            let uses =
+                Dependencies { buffers: &[*words], acceleration_structures: &[victim], ..Default::default() };
+            let (start, ctx) = (Barrier::new(2), &ctx);
+            let traced = std::thread::scope(|scope| {
+                scope.spawn(|| {
+                    start.wait();
+                    (0..40 * round).for_each(|_| std::hint::spin_loop());
+                    ctx.destroy(victim);
+                });
+                start.wait();
+                cmd.trace_rays_indirect(0, *size, 0, &uses)
+            });
+            cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*words], ..Default::default() })?;
+            ctx.submit(cmd)?;
+            let value = match traced {
+                Ok(()) => 10,
+                Err(Error::StaleHandle { .. }) => 0,
+                Err(other) => return Err(other),
+            };
+            recorded += u32::from(value > 0);
+            assert_eq!(read_words(ctx, *words, 4), [0, 0, 1, value], "{path:?}, round {round}");
+        }
+        eprintln!("{path:?}: {recorded} of {ROUNDS} traces were recorded");
+    }
+    Ok(())
+}
+
 /// The invocations that run together are others on each path, but their sums add up to the same.
 #[test]
 fn sums_of_subgroups_add_up_to_the_launch() -> Result<()> {
@@ -223,7 +277,7 @@ fn sums_of_subgroups_add_up_to_the_launch() -> Result<()> {
         }";
     for (path, ctx) in pipeline_devices() {
         let launcher = match Launcher::new(&ctx, PUSH, [RAY_GEN, COUNTING_MISS], &[]) {
-            Err(lvk::Error::Unsupported { why, .. }) => {
+            Err(Error::Unsupported { why, .. }) => {
                 eprintln!("NOT TESTED, {path:?}: {why}");
                 continue;
             }

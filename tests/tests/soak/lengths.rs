@@ -9,7 +9,7 @@ use super::scene::CYCLE;
 const HOUR: u32 = 216_000;
 
 /// Actions that every run must have done, as a loop that does nothing is flat as well.
-const ACTIONS: [&str; 22] = [
+const ACTIONS: [&str; 25] = [
     "frames",
     "draws",
     "dispatches that trace rays",
@@ -28,6 +28,9 @@ const ACTIONS: [&str; 22] = [
     "pictures compared with the first",
     "resizes of targets",
     "hot reloads",
+    "hot reloads of ray tracing pipelines",
+    "traces by pipelines",
+    "traces by pipelines compared",
     "stale handles refused",
     "transient heaps created and destroyed",
     "frames with the profiler",

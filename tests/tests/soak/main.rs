@@ -1,7 +1,7 @@
 //! Long runs: an hour of frames that create, update and destroy everything, with flat counts; and a full memory heap.
 //!
 //! `flat` decides if a series of samples is flat, `sample` takes the samples, `scene` holds what every frame uses,
-//! `frame` draws a frame, `churn` creates and destroys, `presentation` presents, `run` is the loop, `lengths` are the tests,
+//! `frame` draws a frame, `churn` creates and destroys, `rays` traces by a pipeline, `presentation` presents, `run` is the loop, `lengths` are the tests,
 //! and `heap` fills the memory.
 
 mod churn;
@@ -10,6 +10,7 @@ mod frame;
 mod heap;
 mod lengths;
 mod presentation;
+mod rays;
 mod run;
 mod sample;
 mod scene;

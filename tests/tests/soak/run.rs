@@ -13,6 +13,7 @@ use super::flat::{Rule, Samples, Series};
 use super::frame::Frames;
 #[cfg(target_os = "linux")]
 use super::presentation::Presentation;
+use super::rays::Rays;
 use super::sample::sample;
 use super::scene::{CYCLE, Scene};
 
@@ -97,11 +98,15 @@ impl Soak {
         mut present: impl FnMut(u32, &mut Tally) -> Result<()>,
     ) -> Result<Report> {
         let (mut scene, mut churn, mut frames) = (Scene::new(ctx)?, Churn::new(ctx)?, Frames::default());
+        let mut rays = Rays::new(ctx)?;
         let (mut tally, mut samples, start) = (Tally::default(), Samples::default(), Instant::now());
         let memory = if self.validation { Rule::Reported } else { Rule::Slope(Self::SLOPE) };
         for number in 0..self.frames {
             let sampled = churn.before_frame(ctx, &mut scene, number % CYCLE, &mut tally)?;
             frames.frame(ctx, &mut scene, sampled, number, &mut tally)?;
+            if let Some(rays) = &mut rays {
+                rays.frame(ctx, &scene, number % CYCLE, &mut tally)?;
+            }
             present(number % CYCLE, &mut tally)?;
             if self.leak_every.is_some_and(|every| number.is_multiple_of(every)) {
                 ctx.create_buffer(&BufferDesc { size_bytes: 4096, ..Default::default() })?.release();

@@ -110,8 +110,8 @@ pub struct Limits {
     pub max_tlas_instances: u64,
     /// Maximum recursion depth of `traceRayEXT` (`maxRayRecursionDepth`); 31 if pipelines are lowered.
     pub max_ray_recursion: u32,
-    /// Maximum number of invocations of one trace command (`maxRayDispatchInvocationCount`); `u32::MAX` if pipelines are
-    /// lowered.
+    /// Maximum number of invocations of one trace command (`maxRayDispatchInvocationCount`); 2<sup>31</sup> if pipelines
+    /// are lowered.
     pub max_trace_invocations: u32,
     /// Maximum size of hit attributes in bytes (`maxRayHitAttributeSize`); 32 if pipelines are lowered.
     pub max_hit_attribute_bytes: u32,
@@ -210,7 +210,7 @@ impl Limits {
     /// Replaces the limits of the device's ray tracing pipelines by those of lowered pipelines.
     pub(crate) fn set_lowered_pipelines(&mut self) {
         self.max_ray_recursion = lowered::MAX_RECURSION;
-        self.max_trace_invocations = u32::MAX;
+        self.max_trace_invocations = lowered::MAX_RAYS;
         self.max_hit_attribute_bytes = lowered::MAX_HIT_ATTRIBUTE_BYTES;
         self.sbt_handle_bytes = 0;
         self.sbt_handle_alignment = lowered::RECORD_ALIGNMENT;
@@ -242,6 +242,8 @@ pub(crate) mod lowered {
     pub(crate) const MAX_HIT_ATTRIBUTE_BYTES: u32 = 32;
     /// Alignment of records in bytes; the largest alignment of a member of a record is 16.
     pub(crate) const RECORD_ALIGNMENT: u32 = 16;
+    /// Most rays of a launch. Shaders count invocations in 32 bits, and a launch may have more invocations than rays.
+    pub(crate) const MAX_RAYS: u32 = 1 << 31;
     /// Largest distance of records in bytes, as of devices with ray tracing pipelines.
     pub(crate) const MAX_STRIDE: u32 = 4096;
 }

@@ -67,11 +67,18 @@ fn convert_pointer(
     }
 }
 
-/// States the alignment of a read.
+/// States the alignment of a read, which may state other properties.
 fn add_alignment(inst: &mut Inst, alignments: &HashMap<u32, (u32, u32)>) {
-    let is_read = inst.op == Op::Load && inst.operands.len() == 3;
-    if let (true, Some((alignment, _))) = (is_read, alignments.get(&inst.operand(2))) {
-        inst.operands.extend([MemoryAccess::ALIGNED.bits(), *alignment]);
+    let aligned = MemoryAccess::ALIGNED.bits();
+    let found = alignments.get(&inst.operand(2)).filter(|_| inst.op == Op::Load);
+    let Some((alignment, _)) = found else { return };
+    match inst.operands.get_mut(3) {
+        None => inst.operands.extend([aligned, *alignment]),
+        Some(properties) if *properties & aligned == 0 => {
+            *properties |= aligned;
+            inst.operands.insert(4, *alignment);
+        }
+        Some(_) => {}
     }
 }
 
@@ -149,4 +156,24 @@ impl Layout {
 /// Returns the alignment of an address `step` bytes behind an aligned one.
 fn alignment_behind(alignment: u32, step: u32) -> u32 {
     if step == 0 { alignment } else { alignment.min(1 << step.trailing_zeros()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_read_by_address_states_an_alignment() {
+        let pointers = HashMap::from([(7, (8, 0))]);
+        let read = |operands: &[u32]| {
+            let mut inst = Inst::new(Op::Load, operands);
+            add_alignment(&mut inst, &pointers);
+            inst.operands.to_vec()
+        };
+        let (volatile, aligned) = (MemoryAccess::VOLATILE.bits(), MemoryAccess::ALIGNED.bits());
+        assert_eq!(read(&[1, 2, 7]), [1, 2, 7, aligned, 8]);
+        assert_eq!(read(&[1, 2, 7, volatile]), [1, 2, 7, volatile | aligned, 8]);
+        assert_eq!(read(&[1, 2, 7, aligned, 4]), [1, 2, 7, aligned, 4]);
+        assert_eq!(read(&[1, 2, 6]), [1, 2, 6], "a pointer to something else");
+    }
 }

@@ -104,13 +104,15 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     Ok(shader)
 }
 
-/// Fails for modules that need other hardware of ray tracing pipelines.
+/// Fails for modules that need other hardware of ray tracing pipelines, and for those of the Vulkan memory model: the
+/// traversal that they are linked with has the other model, and a module has one.
 fn check_module(module: &Module) -> Result<(), String> {
     let refused = [
         Capability::ShaderInvocationReorderNV,
         Capability::RayTracingMotionBlurNV,
         Capability::RayTracingOpacityMicromapEXT,
         Capability::RayTracingDisplacementMicromapNV,
+        Capability::VulkanMemoryModel,
     ];
     let found = refused.iter().find(|capability| module.capabilities.contains(&(**capability as u32)));
     found.map_or(Ok(()), |capability| Err(format!("OpCapability {capability:?} cannot be lowered")))

@@ -267,3 +267,18 @@ fn every_kind_of_pipeline_is_lowered() {
         }
     }
 }
+
+/// A module has one memory model, and the traversal has that of GLSL.
+#[test]
+fn shaders_of_the_vulkan_memory_model_are_refused() {
+    const MISS: &str = "
+        #pragma use_vulkan_memory_model
+        layout(location = 0) rayPayloadInEXT vec3 color;
+        void main() { color = vec3(1); }";
+    let mut pipeline = simple();
+    pipeline.shaders[1].1 = MISS;
+    for result in lowered(&pipeline) {
+        let error = result.unwrap_err();
+        assert_eq!(error.message, "OpCapability VulkanMemoryModel cannot be lowered");
+    }
+}
