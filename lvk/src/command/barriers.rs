@@ -138,7 +138,7 @@ impl CommandBuffer {
 
     /// Returns the accesses of a command before which a kernel runs, with accesses of its own. `gather` is as for
     /// [`flush_barriers_after`](Self::flush_barriers_after).
-    pub(super) fn gather_for_later(
+    pub(super) fn collect_for_later(
         &mut self,
         gather: impl FnOnce(&mut Self) -> Result<()>,
     ) -> Result<LaterAccesses> {

@@ -94,7 +94,7 @@ impl CommandBuffer {
         let launch = self.new_launch_buffer(trace)?;
         let size = launch.address + WORKGROUP_BYTES as u64;
         let of_trace =
-            self.gather_for_later(|cmd| cmd.use_trace(trace.pipeline, Stages::COMPUTE, dependencies))?;
+            self.collect_for_later(|cmd| cmd.use_trace(trace.pipeline, Stages::COMPUTE, dependencies))?;
         self.use_buffer(arguments, Use::shader_read(Stages::COMPUTE));
         self.state.accesses.add_buffer(&launch, Use::shader_write(Stages::COMPUTE));
         self.flush_barriers();

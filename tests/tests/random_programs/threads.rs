@@ -94,7 +94,7 @@ mod tests {
         let Some(mut env) = Environment::new(QueueRequest::OwnHardware) else { return };
         env.lies_from = Some(2);
         let of_thread = |thread: u8| {
-            let ops = program(u64::from(thread), 100).into_iter();
+            let ops = program(u64::from(thread), 300).into_iter();
             ops.map(move |op| Op { thread, ..op })
         };
         let ops: Vec<Op> = (0..4).flat_map(of_thread).collect();
