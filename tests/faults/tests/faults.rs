@@ -8,7 +8,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use lvk_dev_driver::{VirtualDisplay, virtual_display};
-use lvk_faults::fault::FaultError;
+use lvk_faults::fault::{FaultError, Span};
 use lvk_faults::fault_report::{DESCRIPTION, FaultReport, REPORT_VARIABLE};
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
@@ -187,6 +187,28 @@ fn faults_that_had_flaws_have_none() {
     }
 }
 
+/// The end of a context asks the timelines where the queue cannot be waited for, and destroys nothing before the work has
+/// ended: without that, lavapipe's threads run code and write memory that are gone.
+#[test]
+fn objects_in_use_outlive_waits_that_fail() {
+    let [outcome, _] = assert_told(&program("slow_work"), "vkQueueWaitIdle 1 device-memory command");
+    assert!(outcome.result.is_some() && !leaks(&outcome), "{}", outcome.stderr);
+}
+
+/// Where questions about the timelines fail too, the context is leaked.
+#[test]
+fn objects_that_may_be_in_use_are_leaked() {
+    let [outcome, _] = assert_told(&program("slow_work"), "vkQueueWaitIdle 1 device-memory stays");
+    assert!(outcome.result.is_some() && leaks(&outcome), "{}", outcome.stderr);
+    let said = "warning: the end of a context: out of device memory in vkQueueWaitIdle for 'graphics queue'; its objects are";
+    assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+}
+
+/// True if objects are alive at the end.
+fn leaks(outcome: &RunOutcome) -> bool {
+    outcome.live.values().any(|count| *count != 0)
+}
+
 /// Objects of calls that create nothing: recording, submission and waits.
 #[test]
 fn errors_of_recording_submission_and_waits_name_the_object() {
@@ -267,7 +289,7 @@ fn assert_losses_are_explained(line: &str, program: Program, plan: &SweepPlan) {
 
 /// Losses of a device, spread evenly.
 fn losses(most: usize) -> SweepPlan {
-    SweepPlan { errors: vec![FaultError::DeviceLost], stays: vec![false], ..some(most) }
+    SweepPlan { errors: vec![FaultError::DeviceLost], spans: vec![Span::Once], ..some(most) }
 }
 
 /// The report has the description, the address, with the name of the buffer there, and the code. What fails in the query
