@@ -77,6 +77,15 @@ impl fmt::Display for SweepReport {
 }
 
 impl SweepReport {
+    /// Returns the row of a program in a table: calls, faults, faults that were reached, errors, right results, contexts that
+    /// were leaked, runs with flaws, and seconds.
+    #[must_use]
+    pub fn row(&self, name: &str) -> String {
+        let Self { calls, runs, reached, refused, succeeded, leaked, flawed, time, .. } = self;
+        let (flawed, seconds) = (flawed.len(), time.as_secs());
+        format!("| {name} | {calls} | {runs} | {reached} | {refused} | {succeeded} | {leaked} | {flawed} | {seconds} |")
+    }
+
     fn add(&mut self, fault: &Fault, outcome: &super::verdict::RunOutcome, flaws: Vec<Flaw>) {
         self.runs += 1;
         self.reached += usize::from(outcome.reached);
@@ -147,4 +156,26 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
 fn last_lines(text: &str) -> String {
     let lines: Vec<&str> = text.trim().lines().collect();
     lines[lines.len().saturating_sub(4)..].join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_has_the_counts_in_order() {
+        let report = SweepReport {
+            calls: 105,
+            commands: 34,
+            planned: 430,
+            runs: 420,
+            reached: 410,
+            refused: 400,
+            succeeded: 10,
+            leaked: 7,
+            flawed: vec![FlawedRun { fault: None, flaws: vec![Flaw::Hang], stderr: String::new() }],
+            time: Duration::from_secs(12),
+        };
+        assert_eq!(report.row("queues"), "| queues | 105 | 420 | 410 | 400 | 10 | 7 | 1 | 12 |");
+    }
 }
