@@ -45,11 +45,11 @@ impl FaultError {
 /// The calls that fail, from the one that a [`Fault`] names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Span {
-    /// That call.
+    /// The call alone.
     Once,
-    /// That call and all later ones of the same command.
+    /// The call and all later ones of the same command.
     Command,
-    /// That call and all later ones of every command, as far as the command may answer the error.
+    /// The call and all later ones of every command, as far as the command may answer the error.
     Stays,
 }
 

@@ -83,7 +83,9 @@ impl SweepReport {
     pub fn row(&self, name: &str) -> String {
         let Self { calls, runs, reached, refused, succeeded, leaked, flawed, time, .. } = self;
         let (flawed, seconds) = (flawed.len(), time.as_secs());
-        format!("| {name} | {calls} | {runs} | {reached} | {refused} | {succeeded} | {leaked} | {flawed} | {seconds} |")
+        format!(
+            "| {name} | {calls} | {runs} | {reached} | {refused} | {succeeded} | {leaked} | {flawed} | {seconds} |"
+        )
     }
 
     fn add(&mut self, fault: &Fault, outcome: &super::verdict::RunOutcome, flaws: Vec<Flaw>) {
