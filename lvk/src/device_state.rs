@@ -1,5 +1,7 @@
 //! Everything a context and its command buffers share.
 
+use std::mem::ManuallyDrop;
+use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
@@ -347,20 +349,55 @@ impl DeviceState {
     }
 }
 
-impl Drop for DeviceState {
+/// The state, which a context and its command buffers share. With the last of them the state is destroyed, or leaked where the
+/// device may still use its objects: to destroy those is undefined, to keep their memory is not.
+pub(crate) struct SharedDeviceState(ManuallyDrop<DeviceState>);
+
+impl SharedDeviceState {
+    pub(crate) fn new(state: DeviceState) -> Self {
+        Self(ManuallyDrop::new(state))
+    }
+}
+
+impl Deref for SharedDeviceState {
+    type Target = DeviceState;
+
+    #[inline]
+    fn deref(&self) -> &DeviceState {
+        &self.0
+    }
+}
+
+impl Drop for SharedDeviceState {
     fn drop(&mut self) {
         let idle = persistent_wait(|| self.gpu.queues.wait_idle(&self.gpu.device), std::thread::sleep);
         // The caller has the report of a loss.
         if let Err(failure) = idle
             && self.submitter.loss().get().is_none()
-            && !(failure.lacks_memory()
-                && wait_by_polling(|| self.submitter.is_all_done(), std::thread::sleep))
         {
-            log::error!("the end of a context: {}", failure.into_error());
+            let poll = || wait_by_polling(|| self.submitter.is_all_done(), std::thread::sleep);
+            if !has_work_ended(failure, poll) {
+                let error = failure.into_error();
+                log::error!(
+                    "the end of a context: {error}; its objects are leaked, because the device may still use them"
+                );
+                return;
+            }
+            if !failure.lacks_memory() {
+                log::error!("the end of a context: {}", failure.into_error());
+            }
         }
         drop(self.submitter.drain());
-        self.free_leaked_objects();
+        self.0.free_leaked_objects();
+        // SAFETY: the state is not used again.
+        unsafe { ManuallyDrop::drop(&mut self.0) };
     }
+}
+
+/// Returns true if the device no longer uses any object after a failed wait: a lost device uses none, and another has none to
+/// use once `poll` has seen the end of all submissions.
+fn has_work_ended(failure: IdleFailure, poll: impl FnOnce() -> bool) -> bool {
+    failure.result == vk::Result::ERROR_DEVICE_LOST || poll()
 }
 
 /// Waits for the queues. A wait that fails for want of memory is tried again for about a second: objects that the device
@@ -380,12 +417,12 @@ fn persistent_wait(
     wait()
 }
 
-/// Waits for a minute at most until `is_done`, where a wait of the device fails for want of memory. Questions that fail for
-/// want of memory too are asked again for four seconds. Returns false if the work never was done, or it cannot be known.
+/// Waits for a minute at most until `is_done`, where a wait of the device fails. Questions that fail for
+/// want of memory too are asked again for a second. Returns false if the work never was done, or it cannot be known.
 fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl FnMut(Duration)) -> bool {
     const PAUSE: Duration = Duration::from_millis(20);
     const TRIES: usize = 3_000;
-    const MOST_FAILURES: usize = 200;
+    const MOST_FAILURES: usize = 50;
     let mut failures = 0;
     for _ in 0..TRIES {
         match is_done() {
@@ -423,7 +460,7 @@ mod tests {
         assert_eq!(polled(&[Ok(true)]), (true, 0));
         assert_eq!(polled(&[Ok(false), short, Ok(true)]), (true, 2));
         assert_eq!(polled(&[Ok(false), Err(vk::Result::ERROR_UNKNOWN)]), (false, 1));
-        assert_eq!(polled(&[short]), (false, 200));
+        assert_eq!(polled(&[short]), (false, 50));
         assert_eq!(polled(&[Ok(false)]), (false, 3_000));
     }
 
@@ -435,6 +472,19 @@ mod tests {
             results[(calls - 1).min(results.len() - 1)]
         };
         (persistent_wait(wait, |_| pauses += 1), pauses)
+    }
+
+    #[test]
+    fn objects_are_destroyed_once_the_work_has_ended_or_the_device_is_lost() {
+        let failed = |result| IdleFailure { queue: Queue::Graphics, result };
+        for result in [vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_UNKNOWN] {
+            assert!(has_work_ended(failed(result), || true));
+            assert!(!has_work_ended(failed(result), || false));
+        }
+        assert!(
+            has_work_ended(failed(vk::Result::ERROR_DEVICE_LOST), || false),
+            "a lost device does not work"
+        );
     }
 
     #[test]

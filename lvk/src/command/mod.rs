@@ -39,7 +39,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::barrier::Use;
-use crate::device_state::DeviceState;
+use crate::device_state::SharedDeviceState;
 use crate::error::Result;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::queue::Queue;
@@ -60,7 +60,7 @@ pub(crate) use recording_state::RecordingStatePool;
 /// usable. The exceptions are builds that run out of memory half way, as their documentation says:
 /// [`Context::submit`](crate::Context::submit) then rejects the command buffer. Dropping a command buffer discards it.
 pub struct CommandBuffer {
-    pub(crate) shared: Arc<DeviceState>,
+    pub(crate) shared: Arc<SharedDeviceState>,
     queue: Queue,
     finished: bool,
     pub(crate) recording: ManuallyDrop<Box<Recording>>,
@@ -95,7 +95,7 @@ pub(crate) struct FinishedRecording {
 impl CommandBuffer {
     /// Creates a command buffer that records into `recording` and `state`, both empty.
     pub(crate) fn new(
-        shared: &Arc<DeviceState>,
+        shared: &Arc<SharedDeviceState>,
         queue: Queue,
         recording: Box<Recording>,
         state: Box<RecordingState>,
@@ -132,7 +132,7 @@ impl CommandBuffer {
     }
 
     /// True if the command buffer was created by the context that owns `shared`.
-    pub(crate) fn belongs_to(&self, shared: &Arc<DeviceState>) -> bool {
+    pub(crate) fn belongs_to(&self, shared: &Arc<SharedDeviceState>) -> bool {
         Arc::ptr_eq(&self.shared, shared)
     }
 

@@ -46,7 +46,7 @@ use std::sync::Arc;
 use crate::accel::compaction::Compactions;
 use crate::background::BackgroundJobs;
 use crate::command::RecordingStatePool;
-use crate::device_state::DeviceState;
+use crate::device_state::SharedDeviceState;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::debug::messenger::ValidationSink;
 use crate::gpu::memory::budget::MemoryBudget;
@@ -77,7 +77,7 @@ struct ContextInner {
     /// Default window for swapchains without a window of their own.
     #[cfg(feature = "window")]
     window: Option<Arc<dyn crate::gpu::start::window::WindowHandles>>,
-    shared: Arc<DeviceState>,
+    shared: Arc<SharedDeviceState>,
 }
 
 impl Context {
@@ -98,7 +98,7 @@ impl Context {
         self.device_state().gpu.instance.sink()
     }
 
-    pub(crate) fn device_state(&self) -> &Arc<DeviceState> {
+    pub(crate) fn device_state(&self) -> &Arc<SharedDeviceState> {
         &self.inner.shared
     }
 }

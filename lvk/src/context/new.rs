@@ -17,7 +17,7 @@ use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
 use crate::command::RecordingStatePool;
-use crate::device_state::DeviceState;
+use crate::device_state::{DeviceState, SharedDeviceState};
 use crate::error::driver_report::{DriverReport, VulkanReport};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -74,7 +74,7 @@ impl Context {
 
     /// Creates a context on a device. Uses the members of `desc` that do not configure device creation.
     pub(super) fn with_gpu(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
-        let shared = Arc::new(new_device_state(gpu, desc)?);
+        let shared = Arc::new(SharedDeviceState::new(new_device_state(gpu, desc)?));
         let inner = ContextInner {
             background: BackgroundJobs::new(core_count() / 2),
             prologue: Mutex::new(Rank::Pending, Prologue::default()),

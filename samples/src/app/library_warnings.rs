@@ -23,7 +23,7 @@ impl Log for ToStandardError {
 }
 
 /// Prints them to standard error from now on, unless the program has a logger already.
-pub(super) fn print() {
+pub fn print() {
     if log::set_logger(&ToStandardError).is_ok() {
         log::set_max_level(LevelFilter::Warn);
     }

@@ -14,7 +14,7 @@ pub mod frames;
 pub mod headless;
 pub mod input_file;
 pub mod interrupt;
-pub(crate) mod library_warnings;
+pub mod library_warnings;
 pub mod loading;
 pub mod metrics;
 pub mod pass_times;

@@ -20,6 +20,8 @@ pub struct CallLog {
     pub calls: Vec<Call>,
     /// True if the call that was to fail was reached.
     pub reached: bool,
+    /// Commands of which a call was made to fail.
+    pub failed: BTreeSet<String>,
     /// Commands that told other threads of the loss of a device, which these may report first.
     pub told_others: BTreeSet<String>,
     /// Objects that were alive at the end, by type. An instance among them says that others may be, too.
@@ -39,6 +41,7 @@ impl CallLog {
                     errors: words.filter_map(FaultError::named).collect(),
                 })),
                 Some("fault") => log.reached = true,
+                Some("failed") => log.failed.extend(words.next().map(str::to_owned)),
                 Some("told") => log.told_others.extend(words.next().map(str::to_owned)),
                 Some("live") => log.live = words.filter_map(live_count).collect(),
                 _ => {}
@@ -63,6 +66,11 @@ pub(crate) fn fault_line(command: &str) -> String {
     format!("fault {command}")
 }
 
+/// Returns the line for a command of which a call fails for the first time.
+pub(crate) fn failed_line(command: &str) -> String {
+    format!("failed {command}")
+}
+
 /// Returns the line for a call on a lost device, by another thread than that of the fault.
 pub(crate) fn told_line(command: &str) -> String {
     format!("told {command}")
@@ -85,14 +93,17 @@ mod tests {
             call_line("vkQueueSubmit2", &errors),
             live_line(&BTreeMap::from([("VkInstance", 1)])),
             fault_line("vkCreateBuffer"),
+            failed_line("vkCreateBuffer"),
             told_line("vkWaitSemaphores"),
             told_line("vkWaitSemaphores"),
+            failed_line("vkWaitSemaphores"),
             live_line(&BTreeMap::from([("VkInstance", 0), ("VkBuffer", 2)])),
             "ca".to_owned(),
         ];
         let expected = CallLog {
             calls: vec![Call { command: "vkQueueSubmit2".into(), errors: errors.to_vec() }],
             reached: true,
+            failed: ["vkCreateBuffer", "vkWaitSemaphores"].map(str::to_owned).into(),
             told_others: BTreeSet::from(["vkWaitSemaphores".to_owned()]),
             live: BTreeMap::from([("VkBuffer".to_owned(), 2)]),
         };

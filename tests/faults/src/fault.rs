@@ -42,6 +42,38 @@ impl FaultError {
     }
 }
 
+/// The calls that fail, from the one that a [`Fault`] names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Span {
+    /// The call alone.
+    Once,
+    /// The call and all later ones of the same command.
+    Command,
+    /// The call and all later ones of every command, as far as the command may answer the error.
+    Stays,
+}
+
+impl Span {
+    /// Every span.
+    pub const ALL: [Self; 3] = [Self::Once, Self::Command, Self::Stays];
+
+    /// Returns the name of the span in texts of faults.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Once => "once",
+            Self::Command => "command",
+            Self::Stays => "stays",
+        }
+    }
+
+    /// Returns the span of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|span| span.name() == name)
+    }
+}
+
 /// A call that fails. A command and the number of its call stay the same from run to run, where threads change the
 /// order of all calls.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,20 +84,20 @@ pub struct Fault {
     pub call: u32,
     /// The error.
     pub error: FaultError,
-    /// True if all later calls of every command fail, too, as far as the command may answer the error.
-    pub stays: bool,
+    /// The later calls that fail, too.
+    pub span: Span,
 }
 
 impl fmt::Display for Fault {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { command, call, error, stays } = self;
-        write!(out, "{command} {call} {} {}", error.name(), if *stays { "stays" } else { "once" })
+        let Self { command, call, error, span } = self;
+        write!(out, "{command} {call} {} {}", error.name(), span.name())
     }
 }
 
 /// A text that describes no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no fault; write COMMAND CALL ERROR once|stays")]
+#[error("'{0}' is no fault; write COMMAND CALL ERROR once|command|stays")]
 pub struct NoFault(String);
 
 impl FromStr for Fault {
@@ -74,14 +106,12 @@ impl FromStr for Fault {
     fn from_str(text: &str) -> Result<Self, NoFault> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let parsed = match *words {
-            [command, call, error, stays @ ("once" | "stays")] => {
-                call.parse().ok().zip(FaultError::named(error)).map(|(call, error)| Self {
-                    command: command.to_owned(),
-                    call,
-                    error,
-                    stays: stays == "stays",
-                })
-            }
+            [command, call, error, span] => call
+                .parse()
+                .ok()
+                .zip(FaultError::named(error))
+                .zip(Span::named(span))
+                .map(|((call, error), span)| Self { command: command.to_owned(), call, error, span }),
             _ => None,
         };
         parsed.ok_or_else(|| NoFault(text.to_owned()))
@@ -96,8 +126,8 @@ mod tests {
     #[test]
     fn faults_come_back_from_their_text() {
         for error in FaultError::ALL {
-            for stays in [false, true] {
-                let fault = Fault { command: "vkCreateBuffer".into(), call: 3, error, stays };
+            for span in Span::ALL {
+                let fault = Fault { command: "vkCreateBuffer".into(), call: 3, error, span };
                 assert_eq!(fault.to_string().parse(), Ok(fault));
             }
         }

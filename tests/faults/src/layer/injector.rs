@@ -1,6 +1,6 @@
 //! Counts calls and live objects of the process, and says which call fails.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::File;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,7 +12,7 @@ use ash::vk;
 use super::commands::{Creates, DATED, LOST, SURFACE};
 use super::dispatch::{COMMANDS, table_of};
 use crate::call_log;
-use crate::fault::{Fault, FaultError};
+use crate::fault::{Fault, FaultError, Span};
 
 /// Environment variable with the path of the log.
 pub const LOG_VARIABLE: &str = "LVK_FAULT_LOG";
@@ -40,6 +40,7 @@ pub(super) struct Injector {
 struct Counts {
     calls: HashMap<&'static str, u32>,
     live: BTreeMap<&'static str, i64>,
+    failed: BTreeSet<&'static str>,
 }
 
 impl Injector {
@@ -82,7 +83,15 @@ impl Injector {
         if self.thread.get() != Some(&std::thread::current().id()) {
             self.write(&call_log::told_line(command.name));
         }
+        self.log_failed(command.name);
         Some(vk::Result::ERROR_DEVICE_LOST)
+    }
+
+    /// Logs a command the first time that a call of it fails.
+    fn log_failed(&self, name: &'static str) {
+        if self.counts().failed.insert(name) {
+            self.write(&call_log::failed_line(name));
+        }
     }
 
     /// Counts a call of a command that may give `answers`. Returns the error if the call is to fail.
@@ -100,13 +109,20 @@ impl Injector {
         if !errors_of(answers).contains(&fault.error) {
             return None;
         }
-        if fault.command == name && fault.call == count {
+        let is_named = fault.command == name;
+        let fails = if is_named && fault.call == count {
             self.reached.store(true, Ordering::Relaxed);
             let _ = self.thread.set(std::thread::current().id());
             self.write(&call_log::fault_line(name));
-            return Some(result_of(fault.error));
-        }
-        (fault.stays && self.reached.load(Ordering::Relaxed)).then(|| result_of(fault.error))
+            true
+        } else {
+            let is_later = self.reached.load(Ordering::Relaxed);
+            is_later && (fault.span == Span::Stays || fault.span == Span::Command && is_named)
+        };
+        fails.then(|| {
+            self.log_failed(name);
+            result_of(fault.error)
+        })
     }
 
     /// Counts the objects that a successful call has created.

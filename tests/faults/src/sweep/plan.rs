@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::str::FromStr;
 
 use crate::call_log::Call;
-use crate::fault::{Fault, FaultError};
+use crate::fault::{Fault, FaultError, Span};
 
 /// Selection of faults.
 #[derive(Clone, Debug)]
@@ -15,8 +15,8 @@ pub struct SweepPlan {
     pub part: Part,
     /// Errors to inject.
     pub errors: Vec<FaultError>,
-    /// Faults of one call, and faults that stay.
-    pub stays: Vec<bool>,
+    /// Spans of the faults.
+    pub spans: Vec<Span>,
 }
 
 /// One of several parts of a list: every `count`-th element, from the one numbered `index`.
@@ -55,7 +55,7 @@ impl SweepPlan {
             most: usize::MAX,
             part: Part::WHOLE,
             errors: FaultError::ALL.to_vec(),
-            stays: vec![false, true],
+            spans: vec![Span::Once, Span::Stays],
         }
     }
 
@@ -68,10 +68,11 @@ impl SweepPlan {
             let call = counts.entry(command).or_default();
             *call += 1;
             for &error in errors.iter().filter(|error| self.errors.contains(error)) {
-                let of = |&stays| Fault { command: command.clone(), call: *call, error, stays };
+                let of = |&span| Fault { command: command.clone(), call: *call, error, span };
                 // A swapchain that stays out of date shows nothing, which is no defect.
-                let stays = self.stays.iter().filter(|stays| !**stays || error != FaultError::OutOfDate);
-                faults.extend(stays.map(of));
+                let spans =
+                    self.spans.iter().filter(|span| **span == Span::Once || error != FaultError::OutOfDate);
+                faults.extend(spans.map(of));
             }
         }
         let stride = faults.len().div_ceil(self.most.max(1)).max(1);
@@ -100,7 +101,7 @@ mod tests {
         let lost = SweepPlan { errors: vec![FaultError::DeviceLost], ..SweepPlan::full() };
         assert_eq!(texts(&lost), "b 1 device-lost once, b 1 device-lost stays");
         let once =
-            SweepPlan { stays: vec![false], errors: vec![FaultError::HostMemory], ..SweepPlan::full() };
+            SweepPlan { spans: vec![Span::Once], errors: vec![FaultError::HostMemory], ..SweepPlan::full() };
         assert_eq!(texts(&once), "a 1 host-memory once, b 1 host-memory once, a 2 host-memory once");
         assert_eq!(
             texts(&SweepPlan { most: 2, ..once.clone() }),

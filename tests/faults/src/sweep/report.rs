@@ -9,12 +9,16 @@ use std::time::{Duration, Instant};
 
 use super::plan::SweepPlan;
 use super::run::{LayerFolder, Program, run};
-use super::verdict::{Ending, Flaw, flaws};
+use super::verdict::{Ending, Flaw, flaws, leaks_on_purpose};
 use crate::fault::Fault;
 
-/// Returns the number of processes at the same time.
+/// Environment variable with the number of processes at the same time.
+pub const JOBS_VARIABLE: &str = "LVK_FAULT_JOBS";
+
+/// Returns the number of processes at the same time: that of the environment, or the number of cores and 2 at least.
 fn jobs() -> usize {
-    std::thread::available_parallelism().map_or(2, |count| count.get().max(2))
+    let wish = std::env::var(JOBS_VARIABLE).ok().and_then(|text| text.parse().ok()).filter(|jobs| *jobs > 0);
+    wish.unwrap_or_else(|| std::thread::available_parallelism().map_or(2, |count| count.get().max(2)))
 }
 
 /// A run with flaws.
@@ -45,6 +49,8 @@ pub struct SweepReport {
     pub refused: usize,
     /// Runs in which the fault was reached, and that ended with success.
     pub succeeded: usize,
+    /// Runs that left a context alive on purpose, as its work could not be waited for.
+    pub leaked: usize,
     /// Runs with flaws.
     pub flawed: Vec<FlawedRun>,
     /// Time of the sweep.
@@ -53,11 +59,11 @@ pub struct SweepReport {
 
 impl fmt::Display for SweepReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { calls, commands, planned, runs, reached, refused, succeeded, flawed, time } = self;
+        let Self { calls, commands, planned, runs, reached, refused, succeeded, leaked, flawed, time } = self;
         write!(
             out,
             "{calls} calls of {commands} commands, {runs} of {planned} faults, {reached} reached, {refused} errors, \
-             {succeeded} successes, {} flawed, {} s",
+             {succeeded} successes, {leaked} contexts leaked, {} flawed, {} s",
             flawed.len(),
             time.as_secs()
         )?;
@@ -71,6 +77,17 @@ impl fmt::Display for SweepReport {
 }
 
 impl SweepReport {
+    /// Returns the row of a program in a table: calls, faults, faults that were reached, errors, right results, contexts that
+    /// were leaked, runs with flaws, and seconds.
+    #[must_use]
+    pub fn row(&self, name: &str) -> String {
+        let Self { calls, runs, reached, refused, succeeded, leaked, flawed, time, .. } = self;
+        let (flawed, seconds) = (flawed.len(), time.as_secs());
+        format!(
+            "| {name} | {calls} | {runs} | {reached} | {refused} | {succeeded} | {leaked} | {flawed} | {seconds} |"
+        )
+    }
+
     fn add(&mut self, fault: &Fault, outcome: &super::verdict::RunOutcome, flaws: Vec<Flaw>) {
         self.runs += 1;
         self.reached += usize::from(outcome.reached);
@@ -79,6 +96,7 @@ impl SweepReport {
             Ending::Status(_) => self.refused += 1,
             _ => {}
         }
+        self.leaked += usize::from(leaks_on_purpose(Some(fault), outcome));
         if !flaws.is_empty() {
             let stderr = last_lines(&outcome.stderr);
             self.flawed.push(FlawedRun { fault: Some(fault.clone()), flaws, stderr });
@@ -140,4 +158,26 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
 fn last_lines(text: &str) -> String {
     let lines: Vec<&str> = text.trim().lines().collect();
     lines[lines.len().saturating_sub(4)..].join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_has_the_counts_in_order() {
+        let report = SweepReport {
+            calls: 105,
+            commands: 34,
+            planned: 430,
+            runs: 420,
+            reached: 410,
+            refused: 400,
+            succeeded: 10,
+            leaked: 7,
+            flawed: vec![FlawedRun { fault: None, flaws: vec![Flaw::Hang], stderr: String::new() }],
+            time: Duration::from_secs(12),
+        };
+        assert_eq!(report.row("queues"), "| queues | 105 | 420 | 410 | 400 | 10 | 7 | 1 | 12 |");
+    }
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::verdict::{Ending, RunOutcome};
 use crate::call_log::{Call, CallLog};
-use crate::fault::Fault;
+use crate::fault::{Fault, Span};
 use crate::layer::{FAULT_VARIABLE, LOG_VARIABLE};
 
 /// Longest time of one run.
@@ -104,7 +104,8 @@ pub fn run(
     command.envs(program.variables.iter().map(|(name, value)| (name, value)));
     if let Some(fault) = fault {
         command.env(FAULT_VARIABLE, fault.to_string());
-        if !fault.stays {
+        // A fault that stays hinders a second try, too.
+        if fault.span == Span::Once {
             command.env(AGAIN_VARIABLE, "1");
         }
     }
@@ -120,6 +121,7 @@ pub fn run(
         ending,
         stderr: String::from_utf8_lossy(&fs::read(folder.path().join("stderr"))?).into_owned(),
         reached: log.reached,
+        failed: log.failed,
         told_others: log.told_others,
         live: log.live,
         result: fs::read(out.join(FIRST)).ok(),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use crate::fault::{Fault, FaultError};
+use crate::fault::{Fault, FaultError, Span};
 
 /// The end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +25,8 @@ pub struct RunOutcome {
     pub stderr: String,
     /// True if the fault was reached.
     pub reached: bool,
+    /// Commands of which a call was made to fail.
+    pub failed: BTreeSet<String>,
     /// Commands that told other threads of the loss of a device.
     pub told_others: BTreeSet<String>,
     /// Live objects at the end, by type.
@@ -58,8 +60,10 @@ pub enum Flaw {
     PartialResult,
     /// Failure without one line that tells the error.
     NoMessage,
-    /// An error that does not name the command that has failed.
+    /// An error that names no command.
     UnnamedCommand(String),
+    /// An error that names commands, of which none has failed.
+    OtherCommand(String),
     /// An error that does not name the object of that command in quotes.
     UnnamedObject(String),
     /// No result of a second try in the same process, or another.
@@ -79,6 +83,7 @@ impl fmt::Display for Flaw {
             Self::PartialResult => out.write_str("partial result"),
             Self::NoMessage => out.write_str("no message, or several"),
             Self::UnnamedCommand(message) => write!(out, "the command is not named: {message}"),
+            Self::OtherCommand(message) => write!(out, "the command that is named has not failed: {message}"),
             Self::UnnamedObject(message) => write!(out, "the object is not named: {message}"),
             Self::NotRecovered => out.write_str("a second try in the same process fails"),
         }
@@ -99,7 +104,7 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
         flaws.push(Flaw::Panic);
     }
     let live: Vec<_> = found.live.iter().filter(|(_, count)| **count != 0).collect();
-    if !live.is_empty() {
+    if !live.is_empty() && !leaks_on_purpose(fault, found) {
         let texts: Vec<_> = live.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
         flaws.push(Flaw::Leak(texts.join(", ")));
     }
@@ -112,6 +117,19 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
     }
     flaws
 }
+
+/// True if the library says that it leaks a context whose work cannot be waited for: every wait and every question fails for
+/// want of memory, so that the device may still use the objects.
+#[must_use]
+pub fn leaks_on_purpose(fault: Option<&Fault>, found: &RunOutcome) -> bool {
+    let fails_on = fault.is_some_and(|fault| {
+        fault.span != Span::Once && matches!(fault.error, FaultError::HostMemory | FaultError::DeviceMemory)
+    });
+    fails_on && found.stderr.contains(LEAKED)
+}
+
+/// The end of the warning about a context that is leaked.
+const LEAKED: &str = "its objects are leaked, because the device may still use them";
 
 fn judge_result(
     fault: Option<&Fault>,
@@ -131,56 +149,67 @@ fn judge_result(
     }
     let errors: Vec<&str> = found.stderr.lines().filter(|line| line.starts_with("error: ")).collect();
     match *errors {
-        [error] => {
-            // A device is lost for all threads, and the first that notices it makes the report.
-            let names_other = found.told_others.iter().any(|command| error.contains(command));
-            if fault.is_some_and(|fault| !names_other && !names_cause(error, fault)) {
-                flaws.push(Flaw::UnnamedCommand(error.to_owned()));
-            } else if !names_object(error) {
-                flaws.push(Flaw::UnnamedObject(error.to_owned()));
-            }
-        }
+        [error] => flaws.extend(fault.and_then(|fault| judge_error(error, fault, found))),
         _ => flaws.push(Flaw::NoMessage),
     }
-    // A fault that stays hinders the second try, too.
-    let tries_again = fault.is_some_and(|fault| !fault.stays);
+    // A fault that goes on hinders the second try, too.
+    let tries_again = fault.is_some_and(|fault| fault.span == Span::Once);
     if tries_again && (found.second_result.is_none() || found.second_result != clean.result) {
         flaws.push(Flaw::NotRecovered);
     }
 }
 
-/// True if the error names the command that failed, or the object whose window is gone. A fault that stays may be met
-/// by another command first, where the library goes on without the one that failed.
-fn names_cause(error: &str, fault: &Fault) -> bool {
-    let names = |command: &str| error.contains(command);
-    names(&fault.command)
-        || fault.stays && names_a_command(error)
-        || fault.error == FaultError::SurfaceLost && error.contains(WINDOW_IS_GONE)
-        // The loader calls it while it creates a device.
-        || fault.command == "vkEnumerateDeviceExtensionProperties" && names("vkCreateDevice")
-        // Its result is that of the command that was deferred.
-        || fault.command == "vkGetDeferredOperationResultKHR" && names("vkCreateRayTracingPipelinesKHR")
-}
-
-/// True if a word of the text is a Vulkan command, such as `vkMapMemory`.
-fn names_a_command(text: &str) -> bool {
-    texts_after_commands(text).next().is_some()
-}
-
-/// True if the error names the object of a command, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`.
+/// Judges the line of an error: it must name a command that has failed, and behind it the object of that command.
 ///
-/// Two other forms count: the swapchain whose window is gone, and what needs ray tracing on a device that was created
-/// without. Every command concerns an object, those before the device the loader, the instance or the window.
-fn names_object(error: &str) -> bool {
-    let is_named = |rest: &str| {
-        let rest = rest.strip_prefix(" failed").unwrap_or(rest);
-        rest.strip_prefix(" for '").is_some_and(|name| !name.starts_with('\''))
-    };
-    texts_after_commands(error).any(is_named)
-        || error
-            .split_once(WINDOW_IS_GONE)
-            .is_some_and(|(before, _)| before.contains(" '") && !before.ends_with('\''))
-        || error.split_once(WITHOUT_RAY_TRACING).is_some_and(|(before, _)| before.contains(" '"))
+/// Two other forms count: the swapchain whose window is gone, for a lost surface, and what needs ray tracing on a device that
+/// was created without. Every command concerns an object, those before the device the loader, the instance or the window.
+fn judge_error(error: &str, fault: &Fault, found: &RunOutcome) -> Option<Flaw> {
+    if fault.error == FaultError::SurfaceLost
+        && let Some((before, _)) = error.split_once(WINDOW_IS_GONE)
+    {
+        let is_named = before.contains(" '") && !before.ends_with('\'');
+        return (!is_named).then(|| Flaw::UnnamedObject(error.to_owned()));
+    }
+    let failed = failed_commands(fault, found);
+    let named: Vec<_> = commands_of(error).collect();
+    let of_failed: Vec<&str> =
+        named.iter().filter(|(command, _)| failed.contains(command)).map(|(_, rest)| *rest).collect();
+    if of_failed.is_empty() {
+        let flaw = if named.is_empty() { Flaw::UnnamedCommand } else { Flaw::OtherCommand };
+        return Some(flaw(error.to_owned()));
+    }
+    let without_rays = error.split_once(WITHOUT_RAY_TRACING).is_some_and(|(before, _)| before.contains(" '"));
+    let is_named = without_rays || of_failed.into_iter().any(starts_with_object);
+    (!is_named).then(|| Flaw::UnnamedObject(error.to_owned()))
+}
+
+/// Returns the commands that an error may name: that of a fault that happens once; those that failed on other threads of a
+/// device that it has lost; and all that failed where later calls fail, too, as the library may go on without the first.
+fn failed_commands<'a>(fault: &'a Fault, found: &'a RunOutcome) -> BTreeSet<&'a str> {
+    let others = if fault.span == Span::Once { &found.told_others } else { &found.failed };
+    let mut commands: BTreeSet<&str> = others.iter().map(String::as_str).collect();
+    if fault.span == Span::Once {
+        commands.insert(&fault.command);
+    }
+    for (command, name) in OTHER_NAMES {
+        if commands.contains(command) {
+            commands.insert(name);
+        }
+    }
+    commands
+}
+
+/// Commands whose errors may be told as those of another command: the loader calls the first while it creates a device, and
+/// the result of the second is that of the command that was deferred.
+const OTHER_NAMES: [(&str, &str); 2] = [
+    ("vkEnumerateDeviceExtensionProperties", "vkCreateDevice"),
+    ("vkGetDeferredOperationResultKHR", "vkCreateRayTracingPipelinesKHR"),
+];
+
+/// True if a text behind a command names its object, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`.
+fn starts_with_object(rest: &str) -> bool {
+    let rest = rest.strip_prefix(" failed").unwrap_or(rest);
+    rest.strip_prefix(" for '").is_some_and(|name| !name.starts_with('\''))
 }
 
 /// A part of errors about ray tracing behind the quoted name of what needs it, on a device that was created without.
@@ -189,13 +218,16 @@ const WITHOUT_RAY_TRACING: &str = "vkCreateDevice with ray tracing returned";
 /// The end of an error about a lost surface, after the quoted name of the swapchain.
 const WINDOW_IS_GONE: &str = "': its window is gone";
 
-/// Returns the text behind each Vulkan command.
-fn texts_after_commands(text: &str) -> impl Iterator<Item = &str> {
+/// Returns each Vulkan command of a text, such as `vkMapMemory`, and the text behind it.
+fn commands_of(text: &str) -> impl Iterator<Item = (&str, &str)> {
     let is_of_word = |letter: char| letter.is_ascii_alphanumeric();
     text.match_indices("vk").filter_map(move |(start, _)| {
         let (before, word) = text.split_at(start);
         let is_command = word[2..].starts_with(|letter: char| letter.is_ascii_uppercase());
-        (is_command && !before.ends_with(is_of_word)).then(|| word.trim_start_matches(is_of_word))
+        (is_command && !before.ends_with(is_of_word)).then(|| {
+            let rest = word.trim_start_matches(is_of_word);
+            (&word[..word.len() - rest.len()], rest)
+        })
     })
 }
 
@@ -208,6 +240,7 @@ mod tests {
             ending: Ending::Status(0),
             stderr: String::new(),
             reached: false,
+            failed: BTreeSet::new(),
             told_others: BTreeSet::new(),
             live: BTreeMap::new(),
             result: Some(b"picture".to_vec()),
@@ -221,18 +254,19 @@ mod tests {
             ending: Ending::Status(1),
             stderr: "warning: x\nerror: out of host memory in vkCreateBuffer for 'rain'\n".to_owned(),
             reached: true,
+            failed: BTreeSet::from(["vkCreateBuffer".to_owned()]),
             result: None,
             second_result: clean().result,
             ..clean()
         }
     }
 
-    fn fault(stays: bool) -> Fault {
-        Fault { command: "vkCreateBuffer".into(), call: 1, error: FaultError::HostMemory, stays }
+    fn fault(span: Span) -> Fault {
+        Fault { command: "vkCreateBuffer".into(), call: 1, error: FaultError::HostMemory, span }
     }
 
     fn found(outcome: &RunOutcome) -> Vec<Flaw> {
-        flaws(Some(&fault(false)), outcome, &clean())
+        flaws(Some(&fault(Span::Once)), outcome, &clean())
     }
 
     #[test]
@@ -245,32 +279,67 @@ mod tests {
             assert_eq!(found(&outcome), []);
         }
         let twice = RunOutcome { second_result: None, stderr: refused().stderr.repeat(2), ..refused() };
-        assert_eq!(flaws(Some(&fault(true)), &twice, &clean()), [Flaw::NoMessage], "one try, one error");
+        assert_eq!(
+            flaws(Some(&fault(Span::Stays)), &twice, &clean()),
+            [Flaw::NoMessage],
+            "one try, one error"
+        );
         assert_eq!(found(&twice), [Flaw::NoMessage, Flaw::NotRecovered]);
+    }
+
+    /// Judges a line of a fault at `command`, where calls of `failed` were made to fail.
+    fn judged(command: &str, error: FaultError, span: Span, failed: &[&str], text: &str) -> Option<Flaw> {
+        let failed = failed.iter().map(|command| (*command).to_owned()).collect();
+        judge_error(
+            text,
+            &Fault { command: command.into(), call: 1, error, span },
+            &RunOutcome { failed, ..refused() },
+        )
     }
 
     #[test]
     fn commands_may_have_the_name_of_their_caller() {
-        let names = |command: &str, error, text| {
-            names_cause(text, &Fault { command: command.into(), error, ..fault(false) })
-        };
+        let named = |command: &str, error, text| judged(command, error, Span::Once, &[command], text);
         let memory = FaultError::HostMemory;
-        assert!(names("vkEnumerateDeviceExtensionProperties", memory, "error: vkCreateDevice failed"));
+        let other = |text: &str| Some(Flaw::OtherCommand(text.to_owned()));
+        let device = "error: vkCreateDevice failed for 'llvmpipe'";
+        assert_eq!(named("vkEnumerateDeviceExtensionProperties", memory, device), None);
         let deferred = "error: out of host memory in vkCreateRayTracingPipelinesKHR for 'rays'";
-        assert!(names("vkGetDeferredOperationResultKHR", memory, deferred));
-        assert!(names(
-            "vkQueuePresentKHR",
-            FaultError::SurfaceLost,
-            "error: swapchain 'main': its window is gone"
-        ));
-        assert!(!names("vkQueuePresentKHR", memory, "error: swapchain 'main': its window is gone"));
-        assert!(!names("vkCreateBuffer", memory, "error: vkCreateDevice failed"));
-        let later = |text| names_cause(text, &fault(true));
-        assert!(later("error: vkCreateDevice failed") && !later("error: lvk_faults failed"));
+        assert_eq!(named("vkGetDeferredOperationResultKHR", memory, deferred), None);
+        assert_eq!(named("vkCreateBuffer", memory, device), other(device));
+        let extensions = ["vkCreateBuffer", "vkEnumerateDeviceExtensionProperties"];
+        assert_eq!(judged("vkCreateBuffer", memory, Span::Stays, &extensions, device), None);
+        let gone = "error: swapchain 'main': its window is gone";
+        assert_eq!(named("vkQueuePresentKHR", FaultError::SurfaceLost, gone), None);
+        assert_eq!(named("vkQueuePresentKHR", memory, gone), Some(Flaw::UnnamedCommand(gone.to_owned())));
     }
 
     #[test]
-    fn objects_are_quoted_behind_the_command_or_lose_their_window() {
+    fn only_commands_that_have_failed_count() {
+        let (memory, lost) = (FaultError::DeviceMemory, FaultError::DeviceLost);
+        let image = "error: out of device memory in vkCreateImage for 'rain'";
+        let other = Some(Flaw::OtherCommand(image.to_owned()));
+        let both = ["vkAllocateMemory", "vkCreateImage"];
+        for span in [Span::Command, Span::Stays] {
+            assert_eq!(judged("vkAllocateMemory", memory, span, &both, image), None, "{span:?}");
+            assert_eq!(judged("vkAllocateMemory", memory, span, &both[..1], image), other, "{span:?}");
+        }
+        assert_eq!(judged("vkCreateImageView", memory, Span::Stays, &["vkCreateImageView"], image), other);
+        // After a loss that happens once, calls of the same thread fail too, but the first is to be told.
+        assert_eq!(
+            judged("vkQueueSubmit2", lost, Span::Once, &["vkQueueSubmit2", "vkCreateImage"], image),
+            other
+        );
+        let no_command = "error: lvk_faults failed for 'rain'";
+        let unnamed = Some(Flaw::UnnamedCommand(no_command.to_owned()));
+        assert_eq!(judged("vkCreateImage", memory, Span::Stays, &both, no_command), unnamed);
+    }
+
+    #[test]
+    fn objects_are_quoted_behind_the_command_that_failed_or_lose_their_window() {
+        let failed =
+            ["vkMapMemory", "vkGetPhysicalDeviceSurfaceSupportKHR", "vkCreateDevice", "vkQueueSubmit2"];
+        let judge = |error, text: &str| judged("vkMapMemory", error, Span::Stays, &failed, text);
         for named in [
             "error: out of host memory in vkMapMemory for 'rain'",
             "error: rain: vkMapMemory failed for 'rain': unknown",
@@ -278,25 +347,53 @@ mod tests {
             "error: swapchain 'main': its window is gone; resume it",
             "error: shader 'a' needs ray queries: vkCreateDevice with ray tracing returned: lost",
         ] {
-            assert!(names_object(named), "{named}");
+            assert_eq!(judge(FaultError::SurfaceLost, named), None, "{named}");
         }
         for unnamed in [
             "error: out of host memory in vkMapMemory",
             "error: out of host memory in vkMapMemory for ''",
             "error: the device was lost in vkQueueSubmit2; the graphics queue had not finished submission 3 'frame'",
             "error: 'rain': vkMapMemory failed: unknown",
-            "error: lvkMapMemory for 'rain'",
+            "error: no vkMapMemory after vkCreateBuffer for 'rain'",
             "error: swapchain '': its window is gone; resume it",
             "error: no ray queries: vkCreateDevice with ray tracing returned 'lost'",
         ] {
-            assert!(!names_object(unnamed), "{unnamed}");
+            let flaw = Some(Flaw::UnnamedObject(unnamed.to_owned()));
+            assert_eq!(judge(FaultError::SurfaceLost, unnamed), flaw, "{unnamed}");
         }
+        let attached = "error: lvkMapMemory for 'rain'";
+        assert_eq!(judge(FaultError::HostMemory, attached), Some(Flaw::UnnamedCommand(attached.to_owned())));
+    }
+
+    #[test]
+    fn a_context_may_be_leaked_where_its_work_cannot_be_waited_for() {
+        let stderr = format!("warning: the end of a context: no memory; {LEAKED}\n{}", refused().stderr);
+        let live = BTreeMap::from([("VkDevice".to_owned(), 1)]);
+        let leaked = RunOutcome { live, stderr, ..refused() };
+        let leak = Flaw::Leak("1 VkDevice".into());
+        let judged = |error, span, outcome| flaws(Some(&Fault { error, ..fault(span) }), outcome, &clean());
+        for span in [Span::Command, Span::Stays] {
+            assert_eq!(judged(FaultError::HostMemory, span, &leaked), [], "{span:?}");
+            assert_eq!(
+                judged(FaultError::DeviceLost, span, &leaked),
+                [leak.clone()],
+                "a lost device is idle"
+            );
+        }
+        assert_eq!(
+            judged(FaultError::HostMemory, Span::Once, &leaked),
+            [leak.clone()],
+            "the next wait succeeds"
+        );
+        let silent = RunOutcome { stderr: refused().stderr, ..leaked.clone() };
+        assert_eq!(judged(FaultError::HostMemory, Span::Stays, &silent), [leak]);
     }
 
     #[test]
     fn every_flaw_is_caught() {
         let unnamed = "error: out of memory".to_owned();
         let without_object = "error: out of host memory in vkCreateBuffer".to_owned();
+        let other = "error: out of host memory in vkCreateImage for 'rain'".to_owned();
         let cases = [
             (RunOutcome { ending: Ending::Hang, ..refused() }, Flaw::Hang),
             (RunOutcome { ending: Ending::Signal(11), ..refused() }, Flaw::Signal(11)),
@@ -329,6 +426,7 @@ mod tests {
             (RunOutcome { result: Some(b"pic".to_vec()), ..refused() }, Flaw::PartialResult),
             (RunOutcome { stderr: String::new(), ..refused() }, Flaw::NoMessage),
             (RunOutcome { stderr: unnamed.clone(), ..refused() }, Flaw::UnnamedCommand(unnamed)),
+            (RunOutcome { stderr: other.clone(), ..refused() }, Flaw::OtherCommand(other)),
             (RunOutcome { stderr: without_object.clone(), ..refused() }, Flaw::UnnamedObject(without_object)),
             (RunOutcome { second_result: None, ..refused() }, Flaw::NotRecovered),
             (RunOutcome { second_result: Some(b"pic".to_vec()), ..refused() }, Flaw::NotRecovered),

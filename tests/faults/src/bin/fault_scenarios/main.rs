@@ -10,6 +10,7 @@ mod hot_reload;
 mod leak;
 mod queues;
 mod raw_device;
+mod slow_work;
 mod threads;
 #[cfg(target_os = "linux")]
 mod window;
@@ -21,6 +22,7 @@ use std::process::ExitCode;
 
 use lvk::{Context, ContextDesc};
 use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_samples::app::library_warnings;
 use lvk_samples::catalogue::run_line;
 use winit::event_loop::EventLoop;
 
@@ -42,6 +44,7 @@ fn scenario(name: &str) -> Option<Scenario> {
         "raw_device" => raw_device::guest,
         "hot_reload" => hot_reload::reload,
         "device_fault" => device_fault::explained,
+        "slow_work" => slow_work::outlives_its_context,
         "leak" => leak::forgotten_fence,
         #[cfg(target_os = "linux")]
         "window" => window::frames_and_resize,
@@ -74,6 +77,7 @@ fn attempt(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
             status => Err(status),
         };
     };
+    library_warnings::print();
     let written = scenario().and_then(|bytes| Ok(std::fs::write(result, bytes)?));
     written.map_err(|error| {
         eprintln!("error: {error}");
