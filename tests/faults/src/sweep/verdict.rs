@@ -376,13 +376,13 @@ mod tests {
             assert_eq!(judged(FaultError::HostMemory, span, &leaked), [], "{span:?}");
             assert_eq!(
                 judged(FaultError::DeviceLost, span, &leaked),
-                [leak.clone()],
+                std::slice::from_ref(&leak),
                 "a lost device is idle"
             );
         }
         assert_eq!(
             judged(FaultError::HostMemory, Span::Once, &leaked),
-            [leak.clone()],
+            std::slice::from_ref(&leak),
             "the next wait succeeds"
         );
         let silent = RunOutcome { stderr: refused().stderr, ..leaked.clone() };

@@ -447,7 +447,7 @@ impl Flattener<'_> {
             self.linker.global(*variable).is_none() && is_register(self.linker, *ty)
         });
         let types: Vec<u32> = kept.iter().map(|(_, ty)| *ty).collect();
-        (self.machine.slots.of(self.linker, &types), kept)
+        (self.machine.slots.allocate(self.linker, &types), kept)
     }
 
     fn keep_on_stacks(&mut self, block: usize, depth: u32, code: &mut Vec<Inst>) {
@@ -473,7 +473,7 @@ impl Flattener<'_> {
     fn stacks_of(&mut self, block: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
         let kept = self.read_by(block);
         let types: Vec<u32> = kept.iter().map(|(_, ty)| *ty).collect();
-        (self.machine.stacks.of(self.linker, &types), kept)
+        (self.machine.stacks.allocate(self.linker, &types), kept)
     }
 
     /// Returns the variables that a piece and those behind it read, with their types. Nothing is left for the first.

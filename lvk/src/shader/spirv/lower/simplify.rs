@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn an_inserted_part_is_found_and_others_are_read_from_below() {
+    fn an_inserted_member_is_forwarded_and_others_come_from_the_base() {
         let (mut linker, code) = simplified(|linker| {
             let (uint, pair, one) = (linker.uint(), linker.uvec2(), linker.constant(1));
             vec![

@@ -24,7 +24,7 @@ impl Slots {
     }
 
     /// Returns a slot for a value of each of the types, in their order.
-    pub(super) fn of(&mut self, linker: &mut Linker, types: &[u32]) -> Vec<u32> {
+    pub(super) fn allocate(&mut self, linker: &mut Linker, types: &[u32]) -> Vec<u32> {
         let mut taken: HashMap<u32, usize> = HashMap::new();
         let mut slots = Vec::with_capacity(types.len());
         for ty in types {
@@ -51,12 +51,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_share_slots_of_the_same_type() {
+    fn states_share_slots_of_the_same_type() {
         let mut linker = Linker::new(0x0001_0600);
         let (uint, pair) = (linker.uint(), linker.uvec2());
         let mut slots = Slots::default();
-        let first = slots.of(&mut linker, &[uint, pair, uint]);
-        let second = slots.of(&mut linker, &[pair, uint]);
+        let first = slots.allocate(&mut linker, &[uint, pair, uint]);
+        let second = slots.allocate(&mut linker, &[pair, uint]);
         assert_eq!(second, [first[1], first[0]]);
         assert_ne!(first[0], first[2]);
         assert_eq!(linker.variable_type(first[1]), Some(pair));
@@ -66,7 +66,7 @@ mod tests {
     fn stacks_hold_arrays() {
         let mut linker = Linker::new(0x0001_0600);
         let uint = linker.uint();
-        let stack = Slots::stacks(5).of(&mut linker, &[uint])[0];
+        let stack = Slots::stacks(5).allocate(&mut linker, &[uint])[0];
         let array = linker.array(uint, 5);
         assert_eq!(linker.variable_type(stack), Some(array));
     }
