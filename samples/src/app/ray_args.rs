@@ -17,10 +17,10 @@ pub enum RayTracing {
     Auto,
     /// A ray tracing pipeline; on CPUs and on devices without them, lowered to a compute shader.
     Pipeline,
-    /// A ray tracing pipeline of the device itself.
-    Hardware,
     /// Ray queries of the device in a compute shader; on devices without them, as `software`.
     Query,
     /// Software ray queries of the library, on any device.
     Software,
+    /// A ray tracing pipeline of the device itself.
+    Hardware,
 }

@@ -38,6 +38,13 @@ pub(super) struct Command {
     pub(super) wrapper: usize,
 }
 
+impl Command {
+    /// True for a command that gives a queue work, and so may be lost with its device.
+    pub(super) fn gives_work(&self) -> bool {
+        self.name.starts_with("vkQueue") && self.name != "vkQueueWaitIdle"
+    }
+}
+
 macro_rules! creates {
     () => {
         Creates::Nothing

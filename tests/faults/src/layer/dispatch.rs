@@ -1,7 +1,7 @@
 //! The functions of the next layer, for each instance and device.
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use ash::vk;
@@ -37,6 +37,8 @@ pub(super) struct Table {
     pub(super) buffer_address: usize,
     /// True for a device that a fault has lost.
     pub(super) lost: AtomicBool,
+    /// Calls under way that give a queue work.
+    pub(super) submissions: AtomicUsize,
 }
 
 impl Table {
@@ -57,16 +59,22 @@ impl Table {
             features: find("vkGetPhysicalDeviceFeatures2"),
             buffer_address: find("vkGetBufferDeviceAddress"),
             lost: AtomicBool::new(false),
+            submissions: AtomicUsize::new(0),
         }
     }
 
-    /// Loses the device, once it has finished the work that it has.
+    /// Loses the device: it takes no more work, and has finished the work that it has when this returns.
+    ///
+    /// The caller's own submission does not count as one under way.
     pub(super) fn lose(&self) {
+        self.lost.store(true, Ordering::SeqCst);
+        while self.submissions.load(Ordering::SeqCst) > 0 {
+            std::thread::yield_now();
+        }
         if let Some((wait, device)) = self.finish {
             // SAFETY: the device is alive, as a command of it is being called.
             let _ = unsafe { wait(device) };
         }
-        self.lost.store(true, Ordering::Relaxed);
     }
 }
 

@@ -72,8 +72,15 @@ impl Injector {
     pub(super) fn called(&self, number: usize, handle: u64) -> Option<vk::Result> {
         let command = &COMMANDS[number];
         let table = table_of(handle);
-        let is_lost = table.as_ref().is_some_and(|table| table.lost.load(Ordering::Relaxed));
+        let submission = table.as_ref().filter(|_| command.gives_work());
+        if let Some(table) = submission {
+            table.submissions.fetch_add(1, Ordering::SeqCst);
+        }
+        let is_lost = table.as_ref().is_some_and(|table| table.lost.load(Ordering::SeqCst));
         let fault = self.called_by_name(command.name, command.answers);
+        if let Some(table) = submission.filter(|_| fault.is_some() || is_lost) {
+            table.submissions.fetch_sub(1, Ordering::SeqCst);
+        }
         if fault == Some(vk::Result::ERROR_DEVICE_LOST) && !is_lost {
             table.inspect(|table| table.lose());
         }
@@ -85,6 +92,13 @@ impl Injector {
         }
         self.log_failed(command.name);
         Some(vk::Result::ERROR_DEVICE_LOST)
+    }
+
+    /// Notes that a call which [`called`](Self::called) let pass has returned.
+    pub(super) fn returned(&self, number: usize, handle: u64) {
+        if let Some(table) = table_of(handle).filter(|_| COMMANDS[number].gives_work()) {
+            table.submissions.fetch_sub(1, Ordering::SeqCst);
+        }
     }
 
     /// Logs a command the first time that a call of it fails.

@@ -41,6 +41,7 @@ macro_rules! wrapper {
                 };
                 // SAFETY: the arguments are those of the caller.
                 let result = unsafe { next($($argument),+) };
+                injector().returned(N, words[0]);
                 if result.as_raw() >= 0 {
                     // SAFETY: a command that creates objects has written their handles to its last argument.
                     unsafe { injector().created(N, &words) };
