@@ -34,7 +34,7 @@ pub(crate) fn build_bvh8(bounds: &[Bounds], times: &mut PhaseTimes) -> Option<Bv
     times.run("release of the binary tree", || rayon::join(|| drop(binary), || drop(decisions)));
     // Bounds without area cost nothing, so that nodes of more than two children gain nothing.
     let is_small = size_of_val(&wide.nodes[..]) <= (bounds.len() - 1) * size_of::<Bvh2NodeRecord>();
-    let is_fit = is_small && wide.depth <= MAX_BVH8_DEPTH;
+    let is_fit = is_small && wide.depth <= MAX_BVH8_DEPTH && wide.order.len() == bounds.len();
     is_fit.then_some(Bvh { nodes: BvhNodes::Wide(wide.nodes), root: 0, order: wide.order })
 }
 

@@ -184,3 +184,45 @@ fn best_shares(one: &[f32; SHARES], other: &[f32; SHARES]) -> ([f32; SHARES], [u
     }
     (sums, shares)
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn decisions_are_read_as_written(kind in 0..3_usize, shares in prop::array::uniform2(0..SHARES)) {
+            let kind = [Kind::Leaf, Kind::Node, Kind::Halves][kind];
+            let decision = Decision { kind, shares };
+            prop_assert_eq!(Decision::from_bits(decision.to_bits()), decision);
+        }
+
+        #[test]
+        fn the_shares_have_the_least_sum(
+            one in prop::array::uniform7(0.0_f32..9.0), other in prop::array::uniform7(0.0_f32..9.0)
+        ) {
+            let (sums, shares) = best_shares(&one, &other);
+            for both in 0..SHARES {
+                let least = (0..=both).map(|share| one[share] + other[both - share]).fold(f32::INFINITY, f32::min);
+                let share = shares[both] as usize;
+                prop_assert_eq!((sums[both], one[share] + other[both - share]), (least, least));
+            }
+        }
+    }
+
+    #[test]
+    fn few_primitives_become_a_leaf_where_a_node_costs_more() {
+        let far = Cost::of_leaf(1.0);
+        let (cost, bits) = decide_node(1.5, &far, &far);
+        assert_eq!((cost.areas[0], Decision::from_bits(bits).kind), (2.0 * 1.5 * PRIMITIVE_COST, Kind::Leaf));
+        let (cost, bits) = decide_node(10.0, &far, &far);
+        assert_eq!(
+            (cost.areas[0], Decision::from_bits(bits).kind),
+            (2.0 * 10.0 * PRIMITIVE_COST, Kind::Leaf)
+        );
+        let many = Cost { primitives: 4, ..far };
+        assert_eq!(Decision::from_bits(decide_node(10.0, &many, &far).1).kind, Kind::Node);
+    }
+}

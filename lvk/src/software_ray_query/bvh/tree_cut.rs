@@ -32,7 +32,11 @@ pub(super) struct TreeCut {
 impl TreeCut {
     /// Cuts the tree. The size of subtrees depends on the tree only, not on the number of threads.
     pub(super) fn new(nodes: &[BinaryNode]) -> Self {
-        let largest = (nodes[0].count() / SUBTREES).max(MIN_SUBTREE);
+        Self::with_largest(nodes, (nodes[0].count() / SUBTREES).max(MIN_SUBTREE))
+    }
+
+    /// Cuts the tree above the nodes of at most `largest` primitives, at least 1.
+    pub(super) fn with_largest(nodes: &[BinaryNode], largest: u32) -> Self {
         let mut cut = Self { upper: Vec::new(), subtrees: Vec::new(), above: HashSet::new() };
         let mut open = vec![0];
         while let Some(place) = open.pop() {
@@ -52,5 +56,45 @@ impl TreeCut {
     /// True if a node is above the cut.
     pub(super) fn is_above(&self, node: u32) -> bool {
         self.above.contains(&node)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::accel::primitive_bounds::Bounds;
+    use crate::software_ray_query::bvh::morton::morton_sorted_leaves;
+    use crate::software_ray_query::bvh::ploc::build_ploc;
+
+    #[test]
+    fn each_leaf_is_in_one_subtree() {
+        let bounds =
+            |at: u16| Bounds { low: Vec3::splat(f32::from(at)), high: Vec3::splat(f32::from(at + at % 5)) };
+        let nodes = build_ploc(morton_sorted_leaves(&(0..500).map(bounds).collect::<Vec<_>>()));
+        for largest in [1, 3, 64, 1000] {
+            let cut = TreeCut::with_largest(&nodes, largest);
+            let mut seen = vec![0; 500];
+            for root in &cut.subtrees {
+                assert!(!cut.is_above(*root));
+                let mut open = vec![*root as usize];
+                while let Some(place) = open.pop() {
+                    match nodes[place].is_leaf() {
+                        true => seen[nodes[place].index() as usize] += 1,
+                        false => open.extend(nodes[place].children()),
+                    }
+                }
+            }
+            assert_eq!(seen, vec![1; 500], "{largest}");
+            let above = cut
+                .upper
+                .iter()
+                .filter(|node| matches!(node, UpperNode::Node(place) if cut.is_above(*place)));
+            assert_eq!(
+                (above.count() + 1, cut.upper.len()),
+                (cut.subtrees.len(), 2 * cut.subtrees.len() - 1)
+            );
+        }
     }
 }

@@ -205,3 +205,43 @@ fn append_primitives(nodes: &[BinaryNode], place: u32, order: &mut Vec<u32>) {
         append_primitives(nodes, node.index() + 1, order);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::vec3a;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_step_is_the_least_power_of_two_that_covers_the_length(length in 1e-18_f32..1e15) {
+            let covered = |exponent: u8| f64::from(f32::from_bits(u32::from(exponent) << 23)) * 255.0;
+            let exponent = step_exponent(length);
+            prop_assert!(covered(exponent) >= f64::from(length) * (1.0 - 1e-6));
+            prop_assert!(covered(exponent - 1) < f64::from(length) * (1.0 + 1e-6));
+        }
+
+        #[test]
+        fn each_child_has_a_slot_of_its_own(
+            centers in prop::collection::vec(prop::array::uniform3(-1e15_f32..1e15), 1..=WIDTH)
+        ) {
+            let centers: Vec<_> = centers.into_iter().map(Vec3A::from).collect();
+            let slots = slots_by_octant(Vec3A::ZERO, &centers);
+            for (child, slot) in slots.iter().enumerate() {
+                prop_assert_eq!(*slot < WIDTH, child < centers.len());
+                prop_assert!(*slot == WIDTH || !slots[..child].contains(slot));
+            }
+        }
+    }
+
+    #[test]
+    fn children_lie_in_the_direction_of_their_slots() {
+        let corner = |slot: usize| {
+            let sign = |bit: usize| if slot >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            vec3a(sign(2), sign(1), sign(0))
+        };
+        let centers: [Vec3A; WIDTH] = std::array::from_fn(|child| corner(WIDTH - 1 - child));
+        assert_eq!(slots_by_octant(Vec3A::ZERO, &centers), std::array::from_fn(|child| WIDTH - 1 - child));
+    }
+}

@@ -182,3 +182,58 @@ impl<'a, T: Copy> Gaps<'a, T> {
         all
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use obvhs::aabb::Aabb;
+    use obvhs::bvh2::Bvh2;
+    use obvhs::bvh2::node::Bvh2Node;
+    use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::accel::primitive_bounds::Bounds;
+    use crate::software_ray_query::bvh::morton::morton_sorted_leaves;
+    use crate::software_ray_query::bvh::ploc::build_ploc;
+    use crate::software_ray_query::bvh::reinsertion::reinsert_nodes;
+
+    /// Returns the same tree for the crate `obvhs`.
+    fn other_tree(nodes: &[BinaryNode], primitives: usize) -> Bvh2 {
+        let mut tree = Bvh2::zeroed(primitives);
+        tree.primitive_indices = (0..primitives as u32).collect();
+        for (other, node) in tree.nodes.iter_mut().zip(nodes) {
+            let aabb = Aabb { min: node.aabb().low, max: node.aabb().high };
+            *other = Bvh2Node::new(aabb, u32::from(node.is_leaf()), node.index());
+        }
+        tree
+    }
+
+    proptest! {
+        #[test]
+        fn the_tree_is_that_of_another_collapse_wherever_it_is_cut(
+            corners in prop::collection::vec((prop::array::uniform3(0.0_f32..9.0), prop::array::uniform3(0.1_f32..2.0)), 2..400),
+            largest in 1..200_u32
+        ) {
+            let bounds = |(low, size): ([f32; 3], [f32; 3])| {
+                Bounds { low: low.into(), high: Vec3::from(low) + Vec3::from(size) }
+            };
+            let boxes: Vec<_> = corners.into_iter().map(bounds).collect();
+            let mut nodes = build_ploc(morton_sorted_leaves(&boxes));
+            reinsert_nodes(&mut nodes, 0.3);
+            let cut = TreeCut::with_largest(&nodes, largest);
+            let tree = wide_tree(&nodes, &cut, &Decisions::new(&nodes, &cut));
+            let other = bvh2_to_cwbvh(&other_tree(&nodes, boxes.len()), 3, true, false);
+            prop_assert_eq!(&tree.order, &other.primitive_indices);
+            prop_assert_eq!(tree.nodes.len(), other.nodes.len());
+            for (node, other) in tree.nodes.iter().zip(&other.nodes) {
+                prop_assert_eq!((node.p, node.imask, node.child_meta), (other.p, other.imask, other.child_meta));
+                prop_assert_eq!(node.child_base_idx, other.child_base_idx);
+                prop_assert_eq!(node.primitive_base_idx, other.primitive_base_idx);
+            }
+            let uncut = TreeCut::with_largest(&nodes, u32::MAX);
+            let whole = wide_tree(&nodes, &uncut, &Decisions::new(&nodes, &uncut));
+            prop_assert!(whole.nodes == tree.nodes && whole.order == tree.order && whole.depth == tree.depth);
+        }
+    }
+}
