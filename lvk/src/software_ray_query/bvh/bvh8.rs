@@ -21,8 +21,13 @@ const REINSERTION_SHARE: f32 = 0.1;
 const REINSERTION_SEARCH_COST: f32 = 100.0;
 
 /// Builds a BVH8 of at least two primitives. Returns `None` if it would be too deep, or larger than a BVH2.
-pub(crate) fn build_bvh8(bounds: &[Bounds], times: &mut PhaseTimes) -> Option<Bvh> {
-    let leaves = times.run("Morton order", || morton_sorted_leaves(bounds));
+pub(crate) fn build_bvh8(bounds: Vec<Bounds>, times: &mut PhaseTimes) -> Option<Bvh> {
+    let count = bounds.len();
+    let leaves = times.run("Morton order", || {
+        let leaves = morton_sorted_leaves(&bounds);
+        drop(bounds);
+        leaves
+    });
     let mut binary = times.run("clustering", || ploc::build_ploc(leaves));
     times.run("reinsertion", || {
         let share = reinsertion_share(&binary);
@@ -33,8 +38,8 @@ pub(crate) fn build_bvh8(bounds: &[Bounds], times: &mut PhaseTimes) -> Option<Bv
     let wide = times.run("collapse: nodes", || wide_tree(&binary, &cut, &decisions));
     times.run("release of the binary tree", || rayon::join(|| drop(binary), || drop(decisions)));
     // Bounds without area cost nothing, so that nodes of more than two children gain nothing.
-    let is_small = size_of_val(&wide.nodes[..]) <= (bounds.len() - 1) * size_of::<Bvh2NodeRecord>();
-    let is_fit = is_small && wide.depth <= MAX_BVH8_DEPTH && wide.order.len() == bounds.len();
+    let is_small = size_of_val(&wide.nodes[..]) <= (count - 1) * size_of::<Bvh2NodeRecord>();
+    let is_fit = is_small && wide.depth <= MAX_BVH8_DEPTH && wide.order.len() == count;
     is_fit.then_some(Bvh { nodes: BvhNodes::Wide(wide.nodes), root: 0, order: wide.order })
 }
 
@@ -117,7 +122,7 @@ mod tests {
     use super::*;
 
     fn nodes(bounds: &[Bounds]) -> usize {
-        match build_bvh8(bounds, &mut PhaseTimes::off()).expect("a tree").nodes {
+        match build_bvh8(bounds.to_vec(), &mut PhaseTimes::off()).expect("a tree").nodes {
             BvhNodes::Wide(nodes) => nodes.len(),
             BvhNodes::Binary(_) => unreachable!("wide trees were asked for"),
         }
@@ -144,7 +149,7 @@ mod tests {
             (0..10_000).map(|number| Bounds { low: Vec3::ZERO, high: grown(number) }).collect();
         let made = std::thread::Builder::new()
             .stack_size(64 << 10)
-            .spawn(move || build_bvh8(&boxes, &mut PhaseTimes::off()).is_none());
+            .spawn(move || build_bvh8(boxes, &mut PhaseTimes::off()).is_none());
         assert!(made.unwrap().join().unwrap(), "a tree of a thousand levels");
     }
 
@@ -154,7 +159,7 @@ mod tests {
         for place in all {
             let bounds = (0..1024_u16).map(|at| place(f32::from(at))).map(|at| Bounds { low: at, high: at });
             let bounds: Vec<_> = bounds.collect();
-            let bytes = build_bvh8(&bounds, &mut PhaseTimes::off()).map_or(0, |tree| match tree.nodes {
+            let bytes = build_bvh8(bounds, &mut PhaseTimes::off()).map_or(0, |tree| match tree.nodes {
                 BvhNodes::Wide(nodes) => size_of_val(&nodes[..]),
                 BvhNodes::Binary(_) => unreachable!("wide trees were asked for"),
             });

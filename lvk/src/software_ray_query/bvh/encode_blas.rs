@@ -98,7 +98,7 @@ pub(crate) fn encode_blas_timed(mesh: &Mesh, quality: BvhSettings, times: &mut P
         let whole = union_of_all(&bounds);
         (bounds, whole)
     });
-    let tree = Bvh::build(&bounds, times);
+    let tree = Bvh::build(bounds, || mesh.bounds(), times);
     BlasBlob { bytes: times.run("encoding", || encode_bvh(mesh, &tree, quality, whole)), bounds: whole }
 }
 
@@ -284,9 +284,10 @@ mod tests {
     }
 
     fn bytes_of(leaves: &LeavesAndVertices<'_>) -> Vec<u8> {
-        let mut bytes = Vec::new();
+        let size = leaves.leaves.size().next_multiple_of(BLOCK_BYTES);
+        let mut bytes = BlobBytes { bytes: vec![0; size], end: 0 };
         leaves.leaves.append(&mut bytes, &[]);
-        bytes
+        bytes.bytes
     }
 
     #[test]

@@ -32,6 +32,8 @@ fn cluster_counting_searches(mut nodes: Vec<BinaryNode>) -> (Vec<BinaryNode>, us
     let count = nodes.len();
     let mut tree: Vec<BinaryNode> = bytemuck::zeroed_vec((2 * count).saturating_sub(1));
     let mut partners: Vec<u32> = bytemuck::zeroed_vec(count);
+    // Both sequences keep their memory: the system takes time to give new memory and to take it back.
+    let mut next = Vec::new();
     let (mut rounds, mut searches, mut free) = (0, 0, tree.len());
     while nodes.len() > 1 {
         let partners = &mut partners[..nodes.len()];
@@ -41,11 +43,11 @@ fn cluster_counting_searches(mut nodes: Vec<BinaryNode>) -> (Vec<BinaryNode>, us
             pair_neighbours(partners);
             tasks = count_pairs(partners);
         }
-        let next = merge_pairs(&nodes, partners, &tasks, &mut tree[..free]);
+        merge_pairs(&nodes, partners, &tasks, &mut tree[..free], &mut next);
         free -= 2 * (nodes.len() - next.len());
         searches += nodes.len();
         rounds += 1;
-        nodes = next;
+        std::mem::swap(&mut nodes, &mut next);
     }
     if let (Some(root), [node]) = (tree.first_mut(), &nodes[..]) {
         *root = *node;
@@ -96,15 +98,20 @@ fn pair_neighbours(partners: &mut [u32]) {
     }
 }
 
-/// Merges each pair to one node, and returns the remaining nodes. The children are written to the end of `free`.
+/// Merges each pair to one node, and writes the remaining nodes to `next`. The children are written to the end of
+/// `free`.
 fn merge_pairs(
     nodes: &[BinaryNode],
     partners: &[u32],
     tasks: &[TaskPairs],
     free: &mut [BinaryNode],
-) -> Vec<BinaryNode> {
-    let removed: usize = tasks.iter().map(|task| task.removed).sum();
-    let mut next: Vec<BinaryNode> = bytemuck::zeroed_vec(nodes.len() - removed);
+    next: &mut Vec<BinaryNode>,
+) {
+    let remaining = nodes.len() - tasks.iter().map(|task| task.removed).sum::<usize>();
+    if next.len() < remaining {
+        *next = bytemuck::zeroed_vec(remaining);
+    }
+    next.truncate(remaining);
     let (mut places, mut space) = (&mut next[..], free);
     let mut work = Vec::with_capacity(tasks.len());
     for (task, pairs) in tasks.iter().enumerate() {
@@ -129,7 +136,6 @@ fn merge_pairs(
             }
         }
     });
-    next
 }
 
 #[cfg(test)]
