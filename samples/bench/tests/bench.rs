@@ -70,7 +70,7 @@ fn a_batch_is_timed_and_its_scratch_memory_within_the_budget() {
 fn cpu_builds_are_timed_phase_by_phase_for_each_number_of_threads() {
     let table = table(&["builds", "--quick", "--threads", "1,2,3"]);
     for name in ["triangles", "Morton order", "clustering", "reinsertion", "encoding", "total"] {
-        assert_positive(&table, name, 1..4);
+        assert_positive(&table, name, 0..3);
     }
     assert!(table.contains("| 1 thread |") && table.contains("| 3 threads |"), "{table}");
     assert!(table.contains("all builds made the same bytes"), "{table}");

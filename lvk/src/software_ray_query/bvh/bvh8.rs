@@ -8,7 +8,7 @@ use super::collapse_cost::Decisions;
 use super::morton::morton_sorted_leaves;
 use super::nodes::{Bvh, BvhNodes};
 use super::phase_times::PhaseTimes;
-use super::tree_cut::TreeCut;
+use super::tree_regions::TreeRegions;
 use super::wide_tree::wide_tree;
 use super::{ploc, reinsertion};
 use crate::accel::primitive_bounds::Bounds;
@@ -33,9 +33,9 @@ pub(crate) fn build_bvh8(bounds: Vec<Bounds>, times: &mut PhaseTimes) -> Option<
         let share = reinsertion_share(&binary);
         reinsertion::reinsert_nodes(&mut binary, share);
     });
-    let cut = TreeCut::new(&binary);
-    let decisions = times.run("collapse: costs", || Decisions::new(&binary, &cut));
-    let wide = times.run("collapse: nodes", || wide_tree(&binary, &cut, &decisions));
+    let regions = TreeRegions::new(&binary);
+    let decisions = times.run("collapse: costs", || Decisions::new(&binary, &regions));
+    let wide = times.run("collapse: nodes", || wide_tree(&binary, &regions, &decisions));
     times.run("release of the binary tree", || rayon::join(|| drop(binary), || drop(decisions)));
     // Bounds without area cost nothing, so that nodes of more than two children gain nothing.
     let is_small = size_of_val(&wide.nodes[..]) <= (count - 1) * size_of::<Bvh2NodeRecord>();

@@ -2,14 +2,14 @@
 //! (Ylitie et al., 2017, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs").
 //!
 //! The cost of a subtree that becomes at most `n` children of a wide node follows from those of its two halves. It is
-//! computed from the leaves up, first in the [subtrees](super::tree_cut) on all threads, and then above them.
+//! computed from the leaves up, first in the [subtrees](super::tree_regions) on all threads, and then above them.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
 use super::binary_node::BinaryNode;
-use super::tree_cut::{TreeCut, UpperNode};
+use super::tree_regions::{TreeRegions, UpperNode};
 
 /// Maximum primitives of a leaf. The node stores the count as unary in three bits.
 const LARGEST_LEAF: u32 = 3;
@@ -57,9 +57,9 @@ pub(super) struct Decisions(Vec<AtomicU64>);
 
 impl Decisions {
     /// Decides for each node of the tree.
-    pub(super) fn new(nodes: &[BinaryNode], cut: &TreeCut) -> Self {
+    pub(super) fn new(nodes: &[BinaryNode], regions: &TreeRegions) -> Self {
         let decisions = Self(bytemuck::zeroed_vec(nodes.len()));
-        let costs: Vec<Cost> = cut
+        let costs: Vec<Cost> = regions
             .subtrees
             .par_iter()
             .map_init(<(Vec<u32>, Vec<Cost>)>::default, |(places, costs), root| {
@@ -68,7 +68,7 @@ impl Decisions {
             .collect();
         let mut subtrees = costs.into_iter().rev();
         let mut open = Vec::new();
-        for node in cut.upper.iter().rev() {
+        for node in regions.upper.iter().rev() {
             match node {
                 UpperNode::Subtree => open.extend(subtrees.next()),
                 UpperNode::Node(place) => decisions.decide(nodes, *place, &mut open),

@@ -23,6 +23,6 @@ pub(crate) mod rebraid;
 mod reinsertion;
 pub(crate) mod settings;
 pub(crate) mod subtrees;
-mod tree_cut;
+mod tree_regions;
 mod wide_node;
 mod wide_tree;

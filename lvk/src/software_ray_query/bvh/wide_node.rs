@@ -23,8 +23,8 @@ pub(super) struct WideChildren {
 
 impl WideChildren {
     /// Returns the children that were decided for a node. A ray visits the slots in the order that its octant gives.
-    pub(super) fn of(nodes: &[BinaryNode], decisions: &Decisions, place: u32) -> Self {
-        let mut found = FoundChildren { places: [NO_CHILD; WIDTH], count: 0 };
+    pub(super) fn new(nodes: &[BinaryNode], decisions: &Decisions, place: u32) -> Self {
+        let mut found = CollapsedChildren { places: [NO_CHILD; WIDTH], count: 0 };
         found.collect(nodes, decisions, place, 0);
         let mut centers = [Vec3A::ZERO; WIDTH];
         for (center, child) in centers.iter_mut().zip(&found.places[..found.count]) {
@@ -46,12 +46,12 @@ impl WideChildren {
 }
 
 /// The children of a wide node in the order of the binary tree.
-struct FoundChildren {
+struct CollapsedChildren {
     places: [u32; WIDTH],
     count: usize,
 }
 
-impl FoundChildren {
+impl CollapsedChildren {
     fn collect(&mut self, nodes: &[BinaryNode], decisions: &Decisions, place: u32, share: usize) {
         let shares = decisions.get(place, share).shares;
         let first = nodes[place as usize].index();

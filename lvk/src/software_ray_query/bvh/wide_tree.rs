@@ -1,6 +1,6 @@
 //! Makes the wide nodes of a collapsed binary tree.
 //!
-//! Nodes have the order of a depth-first traversal. The nodes of each [subtree](super::tree_cut) are made by one task,
+//! Nodes have the order of a depth-first traversal. The nodes of each [subtree](super::tree_regions) are made by one task,
 //! with indices from the first. Then they are copied between those above, with the indices that follow from the sizes
 //! of the parts before them.
 
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::binary_node::BinaryNode;
 use super::collapse_cost::Decisions;
-use super::tree_cut::TreeCut;
+use super::tree_regions::TreeRegions;
 use super::wide_node::{WideChildren, wide_node};
 
 /// The nodes of a wide tree or of a part of one, and the primitives in the order of the leaves.
@@ -22,9 +22,9 @@ pub(super) struct WideTree {
 }
 
 /// Makes the wide tree of a binary tree of at least two primitives.
-pub(super) fn wide_tree(nodes: &[BinaryNode], cut: &TreeCut, decisions: &Decisions) -> WideTree {
+pub(super) fn wide_tree(nodes: &[BinaryNode], regions: &TreeRegions, decisions: &Decisions) -> WideTree {
     let mut upper = Maker::new(nodes, decisions);
-    upper.make(0, |node| !cut.is_above(node));
+    upper.make(0, |node| !regions.is_above(node));
     let part = |place: &PartPlace| {
         let mut maker = Maker::new(nodes, decisions);
         maker.make(place.root, |_| false);
@@ -44,7 +44,7 @@ struct Offsets {
 /// A part that another task makes.
 #[derive(Debug, Clone, Copy)]
 struct PartPlace {
-    /// Its node of the binary tree.
+    /// The node of the binary tree.
     root: u32,
     /// The index of its first node.
     slot: usize,
@@ -84,7 +84,7 @@ impl<'a> Maker<'a> {
             if !self.parts.is_empty() {
                 self.behind.push((slot, self.parts.len()));
             }
-            let children = WideChildren::of(self.source, self.decisions, place);
+            let children = WideChildren::new(self.source, self.decisions, place);
             let first = self.tree.nodes.len();
             let node = wide_node(self.source, &children, place, first as u32, &mut self.tree.order);
             self.tree.nodes[slot] = node;
@@ -211,7 +211,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_tree_is_that_of_another_collapse_wherever_it_is_cut(
+        fn the_tree_is_that_of_another_collapse_for_any_regions(
             corners in prop::collection::vec((prop::array::uniform3(0.0_f32..9.0), prop::array::uniform3(0.1_f32..2.0)), 2..400),
             largest in 1..200_u32
         ) {
@@ -221,8 +221,8 @@ mod tests {
             let boxes: Vec<_> = corners.into_iter().map(bounds).collect();
             let mut nodes = build_ploc(morton_sorted_leaves(&boxes));
             reinsert_nodes(&mut nodes, 0.3);
-            let cut = TreeCut::with_largest(&nodes, largest);
-            let tree = wide_tree(&nodes, &cut, &Decisions::new(&nodes, &cut));
+            let regions = TreeRegions::with_largest(&nodes, largest);
+            let tree = wide_tree(&nodes, &regions, &Decisions::new(&nodes, &regions));
             let other = bvh2_to_cwbvh(&other_tree(&nodes, boxes.len()), 3, true, false);
             prop_assert_eq!(&tree.order, &other.primitive_indices);
             prop_assert_eq!(tree.nodes.len(), other.nodes.len());
@@ -231,8 +231,8 @@ mod tests {
                 prop_assert_eq!(node.child_base_idx, other.child_base_idx);
                 prop_assert_eq!(node.primitive_base_idx, other.primitive_base_idx);
             }
-            let uncut = TreeCut::with_largest(&nodes, u32::MAX);
-            let whole = wide_tree(&nodes, &uncut, &Decisions::new(&nodes, &uncut));
+            let whole_region = TreeRegions::with_largest(&nodes, u32::MAX);
+            let whole = wide_tree(&nodes, &whole_region, &Decisions::new(&nodes, &whole_region));
             prop_assert!(whole.nodes == tree.nodes && whole.order == tree.order && whole.depth == tree.depth);
         }
     }

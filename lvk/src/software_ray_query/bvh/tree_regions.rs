@@ -1,4 +1,4 @@
-//! Cuts a binary tree into subtrees for parallel work, and the nodes above them.
+//! Divides a binary tree into subtrees for parallel work, and the nodes above them.
 
 use std::collections::HashSet;
 
@@ -9,51 +9,51 @@ const SUBTREES: u32 = 512;
 /// Primitives of a subtree that is worth a task.
 const MIN_SUBTREE: u32 = 256;
 
-/// A place above or at the cut.
+/// A place above the subtrees, or the root of one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum UpperNode {
-    /// A node above the cut.
+    /// A node above the subtrees.
     Node(u32),
     /// The root of the next subtree.
     Subtree,
 }
 
-/// A cut through a binary tree.
-pub(super) struct TreeCut {
-    /// The nodes above the cut and the places of subtrees, each parent before its children, the first child before the
+/// The subtrees of a binary tree, and the nodes above them.
+pub(super) struct TreeRegions {
+    /// The nodes above and the places of subtrees, each parent before its children, the first child before the
     /// second.
     pub(super) upper: Vec<UpperNode>,
     /// The roots of the subtrees, in this order.
     pub(super) subtrees: Vec<u32>,
-    /// The nodes above the cut.
+    /// The nodes above.
     above: HashSet<u32>,
 }
 
-impl TreeCut {
-    /// Cuts the tree. The size of subtrees depends on the tree only, not on the number of threads.
+impl TreeRegions {
+    /// Divides the tree. The size of subtrees depends on the tree only, not on the number of threads.
     pub(super) fn new(nodes: &[BinaryNode]) -> Self {
         Self::with_largest(nodes, (nodes[0].count() / SUBTREES).max(MIN_SUBTREE))
     }
 
-    /// Cuts the tree above the nodes of at most `largest` primitives, at least 1.
+    /// Divides the tree above the nodes of at most `largest` primitives, at least 1.
     pub(super) fn with_largest(nodes: &[BinaryNode], largest: u32) -> Self {
-        let mut cut = Self { upper: Vec::new(), subtrees: Vec::new(), above: HashSet::new() };
+        let mut regions = Self { upper: Vec::new(), subtrees: Vec::new(), above: HashSet::new() };
         let mut open = vec![0];
         while let Some(place) = open.pop() {
             let node = &nodes[place as usize];
             if node.count() <= largest {
-                cut.upper.push(UpperNode::Subtree);
-                cut.subtrees.push(place);
+                regions.upper.push(UpperNode::Subtree);
+                regions.subtrees.push(place);
             } else {
-                cut.upper.push(UpperNode::Node(place));
-                cut.above.insert(place);
+                regions.upper.push(UpperNode::Node(place));
+                regions.above.insert(place);
                 open.extend([node.index() + 1, node.index()]);
             }
         }
-        cut
+        regions
     }
 
-    /// True if a node is above the cut.
+    /// True if a node is above the subtrees.
     pub(super) fn is_above(&self, node: u32) -> bool {
         self.above.contains(&node)
     }
@@ -74,10 +74,10 @@ mod tests {
             |at: u16| Bounds { low: Vec3::splat(f32::from(at)), high: Vec3::splat(f32::from(at + at % 5)) };
         let nodes = build_ploc(morton_sorted_leaves(&(0..500).map(bounds).collect::<Vec<_>>()));
         for largest in [1, 3, 64, 1000] {
-            let cut = TreeCut::with_largest(&nodes, largest);
+            let regions = TreeRegions::with_largest(&nodes, largest);
             let mut seen = vec![0; 500];
-            for root in &cut.subtrees {
-                assert!(!cut.is_above(*root));
+            for root in &regions.subtrees {
+                assert!(!regions.is_above(*root));
                 let mut open = vec![*root as usize];
                 while let Some(place) = open.pop() {
                     match nodes[place].is_leaf() {
@@ -87,13 +87,13 @@ mod tests {
                 }
             }
             assert_eq!(seen, vec![1; 500], "{largest}");
-            let above = cut
+            let above = regions
                 .upper
                 .iter()
-                .filter(|node| matches!(node, UpperNode::Node(place) if cut.is_above(*place)));
+                .filter(|node| matches!(node, UpperNode::Node(place) if regions.is_above(*place)));
             assert_eq!(
-                (above.count() + 1, cut.upper.len()),
-                (cut.subtrees.len(), 2 * cut.subtrees.len() - 1)
+                (above.count() + 1, regions.upper.len()),
+                (regions.subtrees.len(), 2 * regions.subtrees.len() - 1)
             );
         }
     }
