@@ -15,7 +15,7 @@ use crate::temporary_file::{remove_replacements, replace_file};
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 const EXTENSION: &str = ".tree";
 /// Version of the builders and of the BLAS format.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// Bytes of the header: magic, version, a reserved word, and length and checksum of the BLAS.
 const HEADER_BYTES: usize = 32;
 

@@ -5,6 +5,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasStructures};
 use crate::accel::blas_file::BlasFile;
@@ -18,10 +20,11 @@ use crate::context::read_bounds::geometry_bytes;
 use crate::device_state::{DeferredObject, DeviceState};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
-use crate::parallel::parallel_map;
+use crate::lock_order::HeldLocks;
 use crate::software_ray_query::blas::{
     BvhOrigin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan, storage_bytes,
 };
+use crate::software_ray_query::bvh::build_threads::on_build_threads;
 use crate::software_ray_query::bvh::encode_blas::{self, BlasBlob};
 use crate::software_ray_query::bvh::primitives::Mesh;
 use crate::software_ray_query::bvh::rebraid::record_capacity;
@@ -48,13 +51,15 @@ impl Context {
         let is_of_cpu = |desc: &&BlasDesc<'_>| !builds_on_gpu(desc.flags);
         let read: Vec<_> = descs.iter().filter(is_of_cpu).collect();
         let pieces = self.read_inputs(&read)?;
+        let waiting = HeldLocks::of_current_thread();
         let build = |desc: &BlasDesc<'_>| {
             let bytes = |geometry| (geometry_bytes(geometry, &pieces), geometry.flags());
             let quality = BvhSettings::from_flags(desc.flags);
             let mesh = Mesh::new(&desc.geometries.iter().map(bytes).collect::<Vec<_>>(), quality);
             self.build_on_cpu(&mesh, quality)
         };
-        Ok(parallel_map(descs, |desc| is_of_cpu(&desc).then(|| build(desc))))
+        let build_if_cpu = |desc| is_of_cpu(&desc).then(|| waiting.run_with(|| build(desc)));
+        Ok(on_build_threads(|| descs.par_iter().map(build_if_cpu).collect()))
     }
 
     /// Builds the BVH of a mesh, or takes it from an earlier run if the context keeps BVHs in files.

@@ -59,6 +59,8 @@ pub struct BenchArgs {
 pub(super) enum Benchmark {
     /// BLAS builds of many small meshes: one batch compared with one submission and wait per mesh
     Batch(BatchArgs),
+    /// BVH builds by the CPU, phase by phase, on several numbers of threads; needs no device
+    Builds(BuildsArgs),
     /// BLAS builds, refits and compaction of one large mesh, compared with hand-written Vulkan
     Compaction(MeshArgs),
     /// CPU overhead of the library: draws, dispatches, objects, submissions, uploads, start-up, heap growth
@@ -87,6 +89,30 @@ pub(super) struct BatchArgs {
     /// Triangles per mesh [default: 1000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) triangles: Option<u32>,
+}
+
+/// The measured mesh and the numbers of threads.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct BuildsArgs {
+    #[command(flatten)]
+    pub(super) mesh: MeshArgs,
+
+    /// Numbers of threads, separated by commas [default: 1, 2, 4 and so on to the number of cores]
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Vec<u16>,
+}
+
+impl BuildsArgs {
+    /// Returns the numbers of threads to measure.
+    pub(super) fn threads(&self) -> Vec<usize> {
+        if !self.threads.is_empty() {
+            return self.threads.iter().copied().map(usize::from).collect();
+        }
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        let doubled = std::iter::successors(Some(1), |threads| Some(threads * 2));
+        doubled.take_while(|threads| *threads < cores).chain([cores]).collect()
+    }
 }
 
 /// The measured mesh.
@@ -168,6 +194,7 @@ pub(super) struct TlasArgs {
 const EXAMPLES: &str = "\
 Examples:
   bench batch                                      1000 meshes of 1000 triangles
+  bench builds --scene s.obj --threads 1,2,16      BVH builds by the CPU on these numbers of threads
   bench compaction --scene living_room.obj         builds, refits and compaction of that scene
   bench core                                       CPU overhead of the library, with its limits
   bench split --parts 100 --runs 200               the generated mesh in at least 100 parts

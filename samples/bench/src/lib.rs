@@ -6,6 +6,7 @@
 
 mod args;
 mod batch;
+mod builds;
 mod compaction;
 mod cpu_overhead;
 mod error;

@@ -7,7 +7,7 @@ use crate::args::{BenchArgs, Benchmark};
 use crate::error::BenchError;
 use crate::setup::Setup;
 use crate::table::Table;
-use crate::{batch, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
+use crate::{batch, builds, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
 use lvk_samples::app::{device, scene_list};
 
 /// Runs the selected benchmark. Prints tables to standard output, and an error in one line to standard error. The exit status
@@ -40,9 +40,13 @@ fn execute(args: &BenchArgs) -> Result<String, BenchError> {
 }
 
 fn measure(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchError> {
+    if let Benchmark::Builds(builds) = benchmark {
+        return Ok(vec![builds::measure(args, builds)?]);
+    }
     let setup = Setup::new(args)?;
     let tables = match benchmark {
         Benchmark::Batch(args) => vec![batch::measure(&setup, args)?],
+        Benchmark::Builds(_) => Vec::new(),
         Benchmark::Compaction(args) => vec![compaction::measure(&setup, args)?],
         Benchmark::Core => vec![cpu_overhead::measure(&setup)?],
         Benchmark::Split(args) => vec![split::measure(&setup, args)?],

@@ -67,6 +67,18 @@ fn a_batch_is_timed_and_its_scratch_memory_within_the_budget() {
 }
 
 #[test]
+fn cpu_builds_are_timed_phase_by_phase_for_each_number_of_threads() {
+    let table = table(&["builds", "--quick", "--threads", "1,2,3"]);
+    for name in ["triangles", "Morton order", "clustering", "reinsertion", "encoding", "total"] {
+        assert_positive(&table, name, 0..3);
+    }
+    assert!(table.contains("| 1 thread |") && table.contains("| 3 threads |"), "{table}");
+    assert!(table.contains("all builds made the same bytes"), "{table}");
+    let (status, _, err) = outcome(&["builds", "--quick", "--threads", "0"]);
+    assert!(status == Some(2) && err.contains("--threads"), "{err}");
+}
+
+#[test]
 fn builds_and_sizes_are_compared_with_hand_written_vulkan() {
     let table = table(&["compaction", "--quick"]);
     for name in

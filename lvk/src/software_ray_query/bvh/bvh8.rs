@@ -1,94 +1,58 @@
-//! Builds a BVH8: [`ploc`] with reinsertion, collapsed to eight compressed children. The crate `obvhs` implements the
-//! latter two steps.
+//! Builds a BVH8: [`ploc`] with [`reinsertion`], collapsed to eight compressed children.
 
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::node::Bvh2Node;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
+use rayon::prelude::*;
 
+use super::binary_node::BinaryNode;
+use super::collapse_cost::Decisions;
+use super::morton::morton_sorted_leaves;
 use super::nodes::{Bvh, BvhNodes};
-use super::ploc;
+use super::phase_times::PhaseTimes;
+use super::tree_regions::TreeRegions;
+use super::wide_tree::wide_tree;
+use super::{ploc, reinsertion};
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::{Bvh2NodeRecord, MAX_BVH8_DEPTH};
 
-/// Maximum primitives of a leaf. The node stores the count as unary in three bits.
-const LARGEST_LEAF: u32 = 3;
 /// Share of nodes that reinsertion moves. On an NVIDIA H200, it makes rays up to 7 % faster than half of it, for a
 /// quarter more build time.
 const REINSERTION_SHARE: f32 = 0.1;
-/// Maximum levels of a binary tree that one node of eight children replaces.
-const LEVELS: usize = 7;
 /// Maximum node visits of the reinsertion search, for each node of the tree.
 const REINSERTION_SEARCH_COST: f32 = 100.0;
 
 /// Builds a BVH8 of at least two primitives. Returns `None` if it would be too deep, or larger than a BVH2.
-pub(crate) fn build_bvh8(bounds: &[Bounds]) -> Option<Bvh> {
-    let mut binary = ploc::build_ploc(bounds);
-    let moved = reinsertion_share(&binary);
-    ReinsertionOptimizer::default().run(&mut binary, moved, None);
-    // The collapse recurses for each level, and nested bounds may have thousands of levels.
-    binary.nodes = in_traversal_order(&binary, MAX_BVH8_DEPTH * LEVELS)?;
-    let mut wide = bvh2_to_cwbvh(&binary, LARGEST_LEAF, true, false);
-    wide.nodes.iter_mut().for_each(widen_thin_node);
+pub(crate) fn build_bvh8(bounds: Vec<Bounds>, times: &mut PhaseTimes) -> Option<Bvh> {
+    let count = bounds.len();
+    let leaves = times.run("Morton order", || {
+        let leaves = morton_sorted_leaves(&bounds);
+        drop(bounds);
+        leaves
+    });
+    let mut binary = times.run("clustering", || ploc::build_ploc(leaves));
+    times.run("reinsertion", || {
+        let share = reinsertion_share(&binary);
+        reinsertion::reinsert_nodes(&mut binary, share);
+    });
+    let regions = TreeRegions::new(&binary);
+    let decisions = times.run("collapse: costs", || Decisions::new(&binary, &regions));
+    let wide = times.run("collapse: nodes", || wide_tree(&binary, &regions, &decisions));
+    times.run("release of the binary tree", || rayon::join(|| drop(binary), || drop(decisions)));
     // Bounds without area cost nothing, so that nodes of more than two children gain nothing.
-    let is_small = size_of_val(&wide.nodes[..]) <= (bounds.len() - 1) * size_of::<Bvh2NodeRecord>();
-    let is_fit = is_small && max_depth(&wide.nodes) <= MAX_BVH8_DEPTH;
-    is_fit.then_some(Bvh { nodes: BvhNodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
-}
-
-/// Enlarges the steps along an axis on which a node is much thinner than on others. Rays that run along the node and
-/// touch it then take longer to leave the outermost step than to reach it. Kernels do the same in
-/// `kernels/encode.glsl`.
-fn widen_thin_node(node: &mut CwBvhNode) {
-    const THIN: u8 = 20;
-    const OF_POINT: u8 = 87;
-    let highs = [node.child_max_x, node.child_max_y, node.child_max_z];
-    let is_point = highs.as_flattened().iter().all(|high| *high == 0);
-    let widest = node.e.into_iter().max().unwrap_or(0);
-    let least = if is_point { OF_POINT } else { widest.saturating_sub(THIN) };
-    let lows = [&mut node.child_min_x, &mut node.child_min_y, &mut node.child_min_z];
-    let highs = [&mut node.child_max_x, &mut node.child_max_y, &mut node.child_max_z];
-    for ((exponent, lows), highs) in node.e.iter_mut().zip(lows).zip(highs) {
-        let shift = u32::from(least.saturating_sub(*exponent));
-        if shift > 0 {
-            *exponent = least;
-            lows.iter_mut().for_each(|low| *low = low.checked_shr(shift).unwrap_or(0));
-            highs.iter_mut().for_each(|high| *high = high.checked_shr(shift).unwrap_or(0) + 1);
-        }
-    }
-}
-
-/// Sorts the nodes of a binary tree in depth-first order, children after their parent. Returns `None` if a path has
-/// more than `most` nodes.
-///
-/// The collapse traverses the tree in this order, and then reads memory sequentially.
-fn in_traversal_order(binary: &Bvh2, most: usize) -> Option<Vec<Bvh2Node>> {
-    let mut nodes: Vec<Bvh2Node> = Vec::with_capacity(binary.nodes.len());
-    nodes.push(binary.nodes[0]);
-    let mut open = vec![(0, 1)];
-    while let Some((number, depth)) = open.pop() {
-        if nodes[number].is_leaf() {
-            continue;
-        }
-        if depth >= most {
-            return None;
-        }
-        let end = nodes.len();
-        let children = std::mem::replace(&mut nodes[number].first_index, end as u32) as usize;
-        nodes.extend_from_slice(&binary.nodes[children..children + 2]);
-        open.extend([(end + 1, depth + 1), (end, depth + 1)]);
-    }
-    Some(nodes)
+    let is_small = size_of_val(&wide.nodes[..]) <= (count - 1) * size_of::<Bvh2NodeRecord>();
+    let is_fit = is_small && wide.depth <= MAX_BVH8_DEPTH && wide.order.len() == count;
+    is_fit.then_some(Bvh { nodes: BvhNodes::Wide(wide.nodes), root: 0, order: wide.order })
 }
 
 /// Returns the share of nodes to move. The search for a position visits the nodes that a node overlaps. Their number is
 /// about that of a ray, which follows from the areas. Nested bounds overlap most of the tree, and fewer nodes are
 /// moved.
-fn reinsertion_share(binary: &Bvh2) -> f32 {
-    let area = |node: &Bvh2Node| f64::from(node.aabb().half_area());
-    let whole = binary.nodes.first().map_or(0.0, area);
-    let met = binary.nodes.iter().map(area).sum::<f64>() / whole;
+fn reinsertion_share(nodes: &[BinaryNode]) -> f32 {
+    const TASK_LENGTH: usize = 4096;
+    let area = |node: &BinaryNode| f64::from(node.aabb().half_area());
+    // Sums of chunks of one length: the same for any number of threads.
+    let parts: Vec<f64> = nodes.par_chunks(TASK_LENGTH).map(|nodes| nodes.iter().map(area).sum()).collect();
+    let whole = nodes.first().map_or(0.0, area);
+    let met = parts.into_iter().sum::<f64>() / whole;
     REINSERTION_SHARE.min(REINSERTION_SEARCH_COST / met as f32)
 }
 
@@ -158,7 +122,7 @@ mod tests {
     use super::*;
 
     fn nodes(bounds: &[Bounds]) -> usize {
-        match build_bvh8(bounds).expect("a tree").nodes {
+        match build_bvh8(bounds.to_vec(), &mut PhaseTimes::off()).expect("a tree").nodes {
             BvhNodes::Wide(nodes) => nodes.len(),
             BvhNodes::Binary(_) => unreachable!("wide trees were asked for"),
         }
@@ -166,7 +130,7 @@ mod tests {
 
     fn share(bounds: impl Iterator<Item = [f32; 2]>) -> f32 {
         let bounds = bounds.map(|[low, high]| Bounds { low: Vec3::splat(low), high: Vec3::splat(high) });
-        reinsertion_share(&ploc::build_ploc(&bounds.collect::<Vec<_>>()))
+        reinsertion_share(&ploc::build_ploc(morton_sorted_leaves(&bounds.collect::<Vec<_>>())))
     }
 
     #[test]
@@ -183,8 +147,9 @@ mod tests {
         let grown = |number: i32| Vec3::splat(1e-12 * 1.003_f32.powi(number));
         let boxes: Vec<_> =
             (0..10_000).map(|number| Bounds { low: Vec3::ZERO, high: grown(number) }).collect();
-        let made =
-            std::thread::Builder::new().stack_size(64 << 10).spawn(move || build_bvh8(&boxes).is_none());
+        let made = std::thread::Builder::new()
+            .stack_size(64 << 10)
+            .spawn(move || build_bvh8(boxes, &mut PhaseTimes::off()).is_none());
         assert!(made.unwrap().join().unwrap(), "a tree of a thousand levels");
     }
 
@@ -194,7 +159,7 @@ mod tests {
         for place in all {
             let bounds = (0..1024_u16).map(|at| place(f32::from(at))).map(|at| Bounds { low: at, high: at });
             let bounds: Vec<_> = bounds.collect();
-            let bytes = build_bvh8(&bounds).map_or(0, |tree| match tree.nodes {
+            let bytes = build_bvh8(bounds, &mut PhaseTimes::off()).map_or(0, |tree| match tree.nodes {
                 BvhNodes::Wide(nodes) => size_of_val(&nodes[..]),
                 BvhNodes::Binary(_) => unreachable!("wide trees were asked for"),
             });

@@ -1,9 +1,12 @@
 //! Encodes a BLAS to bytes.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::indexed_triangles::{IndexedMesh, index_mesh};
+use super::morton::union_of_all;
 use super::nodes::{Bvh, BvhNodes};
+use super::phase_times::PhaseTimes;
 use super::primitives::{Mesh, MeshPrimitives};
 use super::settings::BvhSettings;
 use crate::accel::geometry::GeometryFlags;
@@ -60,12 +63,12 @@ impl EncodedLeaves<'_> {
     /// Appends the leaves in the order of the tree. Returns their offset in blocks.
     ///
     /// Leaves with vertex indices already have this order.
-    fn append(&self, bytes: &mut Vec<u8>, order: &[u32]) -> u32 {
+    fn append(&self, bytes: &mut BlobBytes, order: &[u32]) -> u32 {
         match self {
-            Self::Boxes(leaves) => append_in_order(bytes, leaves, order),
-            Self::Triangles(leaves) => append_in_order(bytes, leaves, order),
-            Self::Indexed(leaves) => append(bytes, bytemuck::cast_slice(leaves)),
-            Self::Packed(leaves) => append(bytes, bytemuck::cast_slice(leaves)),
+            Self::Boxes(leaves) => bytes.append_in_order(leaves, order),
+            Self::Triangles(leaves) => bytes.append_in_order(leaves, order),
+            Self::Indexed(leaves) => bytes.append(bytemuck::cast_slice(leaves)),
+            Self::Packed(leaves) => bytes.append(bytemuck::cast_slice(leaves)),
         }
     }
 }
@@ -83,12 +86,20 @@ impl LeavesAndVertices<'_> {
     }
 }
 
-/// Builds a tree over the mesh and encodes it.
+/// Builds a tree over the mesh and encodes it. The bytes are the same for any number of threads.
 pub(crate) fn encode_blas(mesh: &Mesh, quality: BvhSettings) -> BlasBlob {
-    let bounds = mesh.bounds();
-    let tree = Bvh::build(&bounds);
-    let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
-    BlasBlob { bytes: encode_bvh(mesh, &tree, quality, whole), bounds: whole }
+    encode_blas_timed(mesh, quality, &mut PhaseTimes::off())
+}
+
+/// As [`encode_blas`], and measures the phases.
+pub(crate) fn encode_blas_timed(mesh: &Mesh, quality: BvhSettings, times: &mut PhaseTimes) -> BlasBlob {
+    let (bounds, whole) = times.run("bounds", || {
+        let bounds = mesh.bounds();
+        let whole = union_of_all(&bounds);
+        (bounds, whole)
+    });
+    let tree = Bvh::build(bounds, || mesh.bounds(), times);
+    BlasBlob { bytes: times.run("encoding", || encode_bvh(mesh, &tree, quality, whole)), bounds: whole }
 }
 
 pub(crate) fn encode_bvh(mesh: &Mesh, tree: &Bvh, quality: BvhSettings, bounds: Bounds) -> Vec<u8> {
@@ -99,18 +110,22 @@ pub(crate) fn encode_bvh(mesh: &Mesh, tree: &Bvh, quality: BvhSettings, bounds: 
     let leaves = encode_leaves(mesh, &tree.order, quality);
     let row = |flags: &GeometryFlags| GeometryRecord { flags: flags.bits(), reserved: [0; 3] };
     let geometries: Vec<_> = mesh.flags.iter().map(row).collect();
-    let parts = nodes.len() + leaves.size() + size_of_val(&geometries[..]);
-    let mut bytes = Vec::with_capacity(size_of::<BlobHeader>() + parts + 4 * BLOCK_BYTES);
-    bytes.resize(size_of::<BlobHeader>(), 0);
+    let parts =
+        [nodes.len(), leaves.leaves.size(), size_of_val(&leaves.vertices[..]), size_of_val(&geometries[..])];
+    let blocks = parts.map(|part| part.next_multiple_of(BLOCK_BYTES)).iter().sum::<usize>();
+    let mut bytes = BlobBytes {
+        bytes: bytemuck::zeroed_vec(size_of::<BlobHeader>() + blocks),
+        end: size_of::<BlobHeader>(),
+    };
     let header = BlobHeader {
         format,
         leaf_kind: leaves.leaves.kind() as u32,
         root: tree.root,
         primitive_count: tree.order.len() as u32,
-        nodes: append(&mut bytes, nodes),
+        nodes: bytes.append(nodes),
         primitives: leaves.leaves.append(&mut bytes, &tree.order),
-        vertices: append(&mut bytes, bytemuck::cast_slice(&leaves.vertices)),
-        geometries: append(&mut bytes, bytemuck::cast_slice(&geometries)),
+        vertices: bytes.append(bytemuck::cast_slice(&leaves.vertices)),
+        geometries: bytes.append(bytemuck::cast_slice(&geometries)),
         node_count: node_count as u32,
         geometry_count: geometries.len() as u32,
         marks: opacity_flags(&mesh.flags),
@@ -118,26 +133,50 @@ pub(crate) fn encode_bvh(mesh: &Mesh, tree: &Bvh, quality: BvhSettings, bounds: 
         high: bounds.high.to_array(),
         ..bytemuck::Zeroable::zeroed()
     };
+    let mut bytes = bytes.bytes;
     bytes[..size_of::<BlobHeader>()].copy_from_slice(bytemuck::bytes_of(&header));
     bytes
 }
 
-/// Appends a part. Returns its offset in blocks.
-fn append(bytes: &mut Vec<u8>, part: &[u8]) -> u32 {
-    let place = bytes.len() / BLOCK_BYTES;
-    bytes.extend_from_slice(part);
-    bytes.resize(bytes.len().next_multiple_of(BLOCK_BYTES), 0);
-    place as u32
+/// The bytes of a BLAS while its parts are written. All are 0 before.
+struct BlobBytes {
+    bytes: Vec<u8>,
+    /// The end of the parts that are written: whole blocks.
+    end: usize,
 }
 
-/// Appends primitives in the order of a tree. Returns their offset in blocks. A primitive must be whole blocks.
-fn append_in_order<T: bytemuck::NoUninit>(bytes: &mut Vec<u8>, primitives: &[T], order: &[u32]) -> u32 {
-    const { assert!(size_of::<T>().is_multiple_of(BLOCK_BYTES)) };
-    let place = bytes.len() / BLOCK_BYTES;
-    for number in order {
-        bytes.extend_from_slice(bytemuck::bytes_of(&primitives[*number as usize]));
+impl BlobBytes {
+    /// Bytes that one task copies.
+    const TASK_BYTES: usize = 1 << 18;
+
+    /// Appends a part. Returns its offset in blocks.
+    fn append(&mut self, part: &[u8]) -> u32 {
+        let (place, target) = self.next_part(part.len());
+        let chunks = target.par_chunks_mut(Self::TASK_BYTES).zip(part.par_chunks(Self::TASK_BYTES));
+        chunks.for_each(|(target, part)| target.copy_from_slice(part));
+        place
     }
-    place as u32
+
+    /// Appends primitives in the order of a tree. Returns their offset in blocks. A primitive must be whole blocks.
+    fn append_in_order<T: bytemuck::NoUninit + Sync>(&mut self, primitives: &[T], order: &[u32]) -> u32 {
+        const { assert!(size_of::<T>().is_multiple_of(BLOCK_BYTES)) };
+        let (place, target) = self.next_part(size_of::<T>() * order.len());
+        let numbers = Self::TASK_BYTES / size_of::<T>();
+        let chunks = target.par_chunks_mut(numbers * size_of::<T>()).zip(order.par_chunks(numbers));
+        chunks.for_each(|(target, order)| {
+            for (target, number) in target.chunks_exact_mut(size_of::<T>()).zip(order) {
+                target.copy_from_slice(bytemuck::bytes_of(&primitives[*number as usize]));
+            }
+        });
+        place
+    }
+
+    /// Returns the offset of the next part in blocks, and its bytes.
+    fn next_part(&mut self, length: usize) -> (u32, &mut [u8]) {
+        let start = self.end;
+        self.end = (start + length).next_multiple_of(BLOCK_BYTES);
+        ((start / BLOCK_BYTES) as u32, &mut self.bytes[start..start + length])
+    }
 }
 
 fn encode_leaves<'a>(mesh: &'a Mesh, order: &[u32], quality: BvhSettings) -> LeavesAndVertices<'a> {
@@ -245,9 +284,10 @@ mod tests {
     }
 
     fn bytes_of(leaves: &LeavesAndVertices<'_>) -> Vec<u8> {
-        let mut bytes = Vec::new();
+        let size = leaves.leaves.size().next_multiple_of(BLOCK_BYTES);
+        let mut bytes = BlobBytes { bytes: vec![0; size], end: 0 };
         leaves.leaves.append(&mut bytes, &[]);
-        bytes
+        bytes.bytes
     }
 
     #[test]

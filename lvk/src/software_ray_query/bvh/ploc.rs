@@ -4,175 +4,150 @@
 //! least area, and two nodes that choose each other become one. If each node chooses its successor, as nested bounds
 //! do, a round would merge one pair only. Such a round also pairs by position, so that every round removes a share of
 //! the nodes.
+//!
+//! The tasks of a round are chunks of nodes. Their places in the results follow from sums over the chunks before, and so
+//! the tree is the same for any number of threads.
 
-use glam::{DVec3, Vec3A};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::node::Bvh2Node;
-use obvhs::ploc::morton::morton_encode_u64_unorm;
+use rayon::prelude::*;
 
-use super::thread_budget::ThreadBudget;
-use crate::accel::primitive_bounds::Bounds;
-use crate::parallel::parallel_for;
+use super::binary_node::BinaryNode;
+use super::partners::{MAX_REACH, find_partners};
 
 /// Rounds that search the direct neighbours only; they pair most small nodes.
 const SHORT_SEARCH_ROUNDS: usize = 2;
-/// Search radius of later rounds to either side.
-const LONG_SEARCH_RADIUS: usize = 14;
 /// A round that pairs less than one in this many nodes also pairs direct neighbours.
 const MIN_PAIRED_FRACTION: usize = 32;
 /// Largest node count at which rounds pair mutual choices only.
 const FINAL_NODE_COUNT: usize = 32;
+/// Nodes of one task.
+const TASK_LENGTH: usize = 4096;
 
-/// Builds a tree of at least one AABB, with one AABB in each leaf.
-pub(crate) fn build_ploc(boxes: &[Bounds]) -> Bvh2 {
-    cluster_counting_searches(boxes).0
+/// Builds a tree of at least one leaf. Children are behind their parents.
+pub(super) fn build_ploc(leaves: Vec<BinaryNode>) -> Vec<BinaryNode> {
+    cluster_counting_searches(leaves).0
 }
 
-/// Returns the tree, and the number of searches over all rounds: at most [`MIN_PAIRED_FRACTION`] for each AABB.
-fn cluster_counting_searches(boxes: &[Bounds]) -> (Bvh2, usize) {
-    let mut tree = Bvh2::zeroed(boxes.len());
-    tree.primitive_indices = (0..boxes.len() as u32).collect();
-    let build = ThreadBudget::new();
-    let mut nodes = morton_sorted_leaves(&build, boxes);
-    let mut next = Vec::with_capacity(nodes.len());
-    let mut partners = vec![0; nodes.len()];
-    let (mut rounds, mut searches, mut free) = (0, 0, tree.nodes.len());
+/// Returns the tree, and the number of searches over all rounds: at most [`MIN_PAIRED_FRACTION`] for each leaf.
+fn cluster_counting_searches(mut nodes: Vec<BinaryNode>) -> (Vec<BinaryNode>, usize) {
+    let count = nodes.len();
+    let mut tree: Vec<BinaryNode> = bytemuck::zeroed_vec((2 * count).saturating_sub(1));
+    let mut partners: Vec<u32> = bytemuck::zeroed_vec(count);
+    // Both sequences keep their memory: the system takes time to give new memory and to take it back.
+    let mut next = Vec::new();
+    let (mut rounds, mut searches, mut free) = (0, 0, tree.len());
     while nodes.len() > 1 {
         let partners = &mut partners[..nodes.len()];
-        find_partners(
-            &build,
-            &nodes,
-            if rounds < SHORT_SEARCH_ROUNDS { 1 } else { LONG_SEARCH_RADIUS },
-            partners,
-        );
-        pair_neighbours(partners);
-        merge_pairs(&nodes, partners, &mut tree.nodes[..free], &mut next);
+        find_partners(&nodes, if rounds < SHORT_SEARCH_ROUNDS { 1 } else { MAX_REACH }, partners);
+        let mut tasks = count_pairs(partners);
+        if is_pairing_needed(partners.len(), &tasks) {
+            pair_neighbours(partners);
+            tasks = count_pairs(partners);
+        }
+        merge_pairs(&nodes, partners, &tasks, &mut tree[..free], &mut next);
         free -= 2 * (nodes.len() - next.len());
         searches += nodes.len();
         rounds += 1;
         std::mem::swap(&mut nodes, &mut next);
     }
-    tree.nodes[0] = nodes[0];
-    tree.max_depth = tree.max_depth.max(rounds + 1);
-    tree.children_are_ordered_after_parents = true;
+    if let (Some(root), [node]) = (tree.first_mut(), &nodes[..]) {
+        *root = *node;
+    }
     (tree, searches)
 }
 
-fn aabb(bounds: &Bounds) -> Aabb {
-    Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) }
+/// The pairs of a task's nodes.
+#[derive(Clone, Copy)]
+struct TaskPairs {
+    /// Nodes whose partner is before them.
+    merged: usize,
+    /// Nodes whose partner is behind them, which leave the sequence.
+    removed: usize,
 }
 
-/// Returns the leaves along a Morton curve through their centers.
-fn morton_sorted_leaves(build: &ThreadBudget, boxes: &[Bounds]) -> Vec<Bvh2Node> {
-    let whole = aabb(&boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union));
-    let scale = 1.0 / whole.diagonal().as_dvec3().max(DVec3::splat(f64::MIN_POSITIVE));
-    let low = whole.min.as_dvec3();
-    let mut codes = vec![(0_u64, 0_u32); boxes.len()];
-    let threads = build.thread_count(boxes.len());
-    let length = boxes.len().div_ceil(threads).max(1);
-    parallel_for(threads, codes.chunks_mut(length).enumerate(), |(chunk, codes)| {
-        for (place, number) in codes.iter_mut().zip((chunk * length) as u32..) {
-            let center = aabb(&boxes[number as usize]).center().as_dvec3();
-            *place = (morton_encode_u64_unorm((center - low) * scale), number);
+fn is_mutual(partners: &[u32], place: usize) -> bool {
+    partners[partners[place] as usize] as usize == place
+}
+
+fn count_pairs(partners: &[u32]) -> Vec<TaskPairs> {
+    let count = |task: usize| {
+        let mut pairs = TaskPairs { merged: 0, removed: 0 };
+        let first = task * TASK_LENGTH;
+        for place in first..(first + TASK_LENGTH).min(partners.len()) {
+            let (is_found, is_before) = (is_mutual(partners, place), (partners[place] as usize) < place);
+            pairs.merged += usize::from(is_found && is_before);
+            pairs.removed += usize::from(is_found && !is_before);
         }
-        codes.sort_unstable();
-    });
-    // The stable sort detects the sorted chunks and merges them.
-    codes.sort();
-    codes.iter().map(|(_, number)| Bvh2Node::new(aabb(&boxes[*number as usize]), 1, *number)).collect()
+        pairs
+    };
+    (0..partners.len().div_ceil(TASK_LENGTH)).into_par_iter().map(count).collect()
 }
 
-/// Finds for each node the node within `reach` positions whose union with it has the least area.
-///
-/// Of equals, a node prefers the one at the position with the last bit flipped, so that equal nodes choose each other.
-fn find_partners(build: &ThreadBudget, nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
-    let threads = build.thread_count(nodes.len());
-    // More chunks than threads, because some take longer.
-    let pieces = if threads == 1 { 1 } else { threads * 4 };
-    let length = nodes.len().div_ceil(pieces);
-    parallel_for(threads, partners.chunks_mut(length).enumerate(), |(chunk, partners)| {
-        find_partners_from(nodes, reach, chunk * length, partners);
-    });
+/// True if too few nodes chose each other. This happens if each node chooses its successor.
+fn is_pairing_needed(count: usize, tasks: &[TaskPairs]) -> bool {
+    let pairs: usize = tasks.iter().map(|task| task.merged).sum();
+    count > FINAL_NODE_COUNT && pairs * MIN_PAIRED_FRACTION < count
 }
 
-/// Finds the partners of the nodes from `first` on.
-fn find_partners_from(nodes: &[Bvh2Node], reach: usize, first: usize, partners: &mut [u32]) {
-    let end = first + partners.len();
-    let mut least = vec![f32::INFINITY; partners.len()];
-    for place in first..end {
-        let other = if place ^ 1 < nodes.len() { place ^ 1 } else { place - 1 };
-        partners[place - first] = other as u32;
-        least[place - first] = merged_half_area(&nodes[place], &nodes[other]);
-    }
-    for place in first.saturating_sub(reach)..end {
-        let own = nodes[place];
-        let (mut best, mut best_cost) = match place.checked_sub(first) {
-            Some(index) => (partners[index], least[index]),
-            None => (0, f32::NEG_INFINITY),
-        };
-        let behind = place + 1..(place + reach + 1).min(nodes.len());
-        for (other, node) in behind.clone().zip(&nodes[behind]) {
-            let cost = merged_half_area(&own, node);
-            if cost < best_cost {
-                (best, best_cost) = (other as u32, cost);
-            }
-            if let Some(index) = other.checked_sub(first)
-                && index < partners.len()
-                && cost < least[index]
-            {
-                (partners[index], least[index]) = (place as u32, cost);
-            }
-        }
-        if let Some(index) = place.checked_sub(first) {
-            (partners[index], least[index]) = (best, best_cost);
-        }
-    }
-}
-
-fn merged_half_area(one: &Bvh2Node, other: &Bvh2Node) -> f32 {
-    one.aabb().union(other.aabb()).half_area()
-}
-
-/// Pairs unpaired direct neighbours if too few nodes chose each other. This happens if each node chooses its successor.
+/// Pairs unpaired direct neighbours.
 fn pair_neighbours(partners: &mut [u32]) {
-    let found = |partners: &[u32], place: usize| partners[partners[place] as usize] as usize == place;
-    let count = partners.len();
-    let found_one = || (0..count).filter(|place| found(partners, *place)).count();
-    if count <= FINAL_NODE_COUNT || found_one() * MIN_PAIRED_FRACTION >= 2 * count {
-        return;
-    }
-    for place in (0..count - 1).step_by(2) {
-        if !found(partners, place) && !found(partners, place + 1) {
+    for place in (0..partners.len() - 1).step_by(2) {
+        if !is_mutual(partners, place) && !is_mutual(partners, place + 1) {
             partners[place] = place as u32 + 1;
             partners[place + 1] = place as u32;
         }
     }
 }
 
-/// Merges each pair to one node. The two children are written to the end of `free`.
-fn merge_pairs(nodes: &[Bvh2Node], partners: &[u32], free: &mut [Bvh2Node], next: &mut Vec<Bvh2Node>) {
-    next.clear();
-    let mut end = free.len();
-    for (place, node) in nodes.iter().enumerate() {
-        let other = partners[place] as usize;
-        if partners[other] as usize != place {
-            next.push(*node);
-        } else if other < place {
-            end -= 2;
-            free[end] = nodes[other];
-            free[end + 1] = *node;
-            next.push(Bvh2Node::new(nodes[other].aabb().union(node.aabb()), 0, end as u32));
-        }
+/// Merges each pair to one node, and writes the remaining nodes to `next`. The children are written to the end of
+/// `free`.
+fn merge_pairs(
+    nodes: &[BinaryNode],
+    partners: &[u32],
+    tasks: &[TaskPairs],
+    free: &mut [BinaryNode],
+    next: &mut Vec<BinaryNode>,
+) {
+    let remaining = nodes.len() - tasks.iter().map(|task| task.removed).sum::<usize>();
+    if next.len() < remaining {
+        *next = bytemuck::zeroed_vec(remaining);
     }
+    next.truncate(remaining);
+    let (mut places, mut space) = (&mut next[..], free);
+    let mut work = Vec::with_capacity(tasks.len());
+    for (task, pairs) in tasks.iter().enumerate() {
+        let range = task * TASK_LENGTH..((task + 1) * TASK_LENGTH).min(nodes.len());
+        let (of_task, rest) = places.split_at_mut(range.len() - pairs.removed);
+        let (free, children) = space.split_at_mut(space.len() - 2 * pairs.merged);
+        work.push((range, of_task, free.len(), children));
+        (places, space) = (rest, free);
+    }
+    work.into_par_iter().for_each(|(range, next, first_child, children)| {
+        let mut end = children.len();
+        let mut next = next.iter_mut();
+        let mut push = |node| next.next().into_iter().for_each(|place| *place = node);
+        for place in range {
+            let other = partners[place] as usize;
+            if !is_mutual(partners, place) {
+                push(nodes[place]);
+            } else if other < place {
+                end -= 2;
+                (children[end], children[end + 1]) = (nodes[other], nodes[place]);
+                push(BinaryNode::parent_of(&nodes[other], &nodes[place], (first_child + end) as u32));
+            }
+        }
+    });
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::vec3a;
+    use glam::{Vec3A, vec3a};
     use proptest::prelude::*;
 
     use super::*;
+    use crate::accel::primitive_bounds::Bounds;
+    use crate::software_ray_query::bvh::binary_node::Aabb;
+    use crate::software_ray_query::bvh::build_threads::on_new_threads;
+    use crate::software_ray_query::bvh::morton::morton_sorted_leaves;
 
     const COUNT: usize = 24_000;
 
@@ -224,23 +199,26 @@ mod tests {
         ]
     }
 
+    fn clustered(boxes: &[Bounds]) -> (Vec<BinaryNode>, usize) {
+        cluster_counting_searches(morton_sorted_leaves(boxes))
+    }
+
     /// Fails unless each AABB is in one leaf and inside all bounds above it.
-    fn check(boxes: &[Bounds], tree: &Bvh2) {
-        let (mut open, mut found) = (vec![(0, 1)], vec![false; boxes.len()]);
-        while let Some((number, depth)) = open.pop() {
-            let node: &Bvh2Node = &tree.nodes[number];
-            assert!(depth <= tree.max_depth);
+    fn check(boxes: &[Bounds], tree: &[BinaryNode]) {
+        let (mut open, mut found) = (vec![0], vec![false; boxes.len()]);
+        while let Some(place) = open.pop() {
+            let node = &tree[place];
             if node.is_leaf() {
-                let primitive = tree.primitive_indices[node.first_index as usize] as usize;
+                let primitive = node.index() as usize;
                 assert!(!std::mem::replace(&mut found[primitive], true));
-                assert_eq!(*node.aabb(), aabb(&boxes[primitive]));
+                assert_eq!(node.aabb(), Aabb::from(&boxes[primitive]));
                 continue;
             }
-            for child in [0, 1].map(|side| node.first_index as usize + side) {
-                let inside = tree.nodes[child].aabb();
-                assert!(child > number && node.aabb().union(inside) == *node.aabb());
-                open.push((child, depth + 1));
-            }
+            let children = node.children();
+            assert!(children[0] > place && children[0] % 2 == 1);
+            assert_eq!(node.count(), children.map(|child| tree[child].count()).iter().sum());
+            assert_eq!(node.aabb(), tree[children[0]].aabb().union(tree[children[1]].aabb()));
+            open.extend(children);
         }
         assert!(found.into_iter().all(|found| found));
     }
@@ -249,7 +227,7 @@ mod tests {
     fn no_boxes_take_more_searches_than_are_promised() {
         for kinds in [1, 10, 200, 700, 2_000] {
             for (name, boxes) in worst(kinds) {
-                let (tree, searches) = cluster_counting_searches(&boxes);
+                let (tree, searches) = clustered(&boxes);
                 assert!(searches <= MIN_PAIRED_FRACTION * boxes.len(), "{kinds} x {name}: {searches}");
                 check(&boxes, &tree);
             }
@@ -257,20 +235,14 @@ mod tests {
     }
 
     #[test]
-    fn threads_find_what_one_finds() {
+    fn threads_make_the_tree_that_one_makes() {
         let boxes: Vec<_> =
             (0..40_960).map(|it| place(any_position(it), Vec3A::splat(paired_share(it)))).collect();
-        let nodes = morton_sorted_leaves(&ThreadBudget::new(), &boxes);
-        for reach in [1, LONG_SEARCH_RADIUS] {
-            let [mut one, mut many] = [vec![0; nodes.len()], vec![0; nodes.len()]];
-            find_partners_from(&nodes, reach, 0, &mut one);
-            let length = nodes.len().div_ceil(7);
-            many.chunks_mut(length)
-                .enumerate()
-                .for_each(|(chunk, part)| find_partners_from(&nodes, reach, chunk * length, part));
-            assert!(one == many, "{reach}");
-        }
-        check(&boxes, &build_ploc(&boxes));
+        let nodes = |threads| on_new_threads(threads, || clustered(&boxes).0);
+        let one = nodes(1);
+        check(&boxes, &one);
+        let bytes: &[u8] = bytemuck::cast_slice(&one);
+        assert!([2, 5].into_iter().all(|threads| bytemuck::cast_slice::<_, u8>(&nodes(threads)) == bytes));
     }
 
     proptest! {
@@ -280,7 +252,7 @@ mod tests {
         ) {
             let vec = |of: [u8; 3]| Vec3A::from(of.map(f32::from));
             let boxes: Vec<_> = corners.into_iter().map(|(low, size)| place(vec(low), vec(size))).collect();
-            let (tree, searches) = cluster_counting_searches(&boxes);
+            let (tree, searches) = clustered(&boxes);
             prop_assert!(searches <= MIN_PAIRED_FRACTION * boxes.len());
             check(&boxes, &tree);
         }

@@ -1,6 +1,9 @@
 //! The primitives of a mesh as leaves store them, without those that no ray can hit.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::settings::BvhSettings;
 use crate::accel::geometry::GeometryFlags;
@@ -10,6 +13,9 @@ use crate::software_ray_query::layout::{LeafBox, LeafTriangle};
 /// Maximum coordinate of bounds. Sums of areas that a build compares stay finite with it. Kernels have it in
 /// `kernels/box.glsl`.
 pub(crate) const MAX_COORDINATE: f32 = 1e15;
+
+/// Primitives of one task.
+const TASK_LENGTH: usize = 4096;
 
 /// The primitives of all geometries.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,12 +57,13 @@ impl Mesh {
     /// Returns the bounds of the primitives.
     pub(crate) fn bounds(&self) -> Vec<Bounds> {
         match &self.primitives {
-            MeshPrimitives::Triangles(all) => all
-                .iter()
-                .map(|triangle| Bounds::from_points([triangle.a, triangle.b, triangle.c].map(clamp_to_max)))
-                .collect(),
+            MeshPrimitives::Triangles(all) => {
+                let corners = |of: &LeafTriangle| [of.a, of.b, of.c].map(clamp_to_max);
+                all.par_iter().with_min_len(TASK_LENGTH).map(|of| Bounds::from_points(corners(of))).collect()
+            }
             MeshPrimitives::Boxes(all) => {
-                all.iter().map(|place| Bounds { low: place.low, high: place.high }).collect()
+                let bounds = |of: &LeafBox| Bounds { low: of.low, high: of.high };
+                all.par_iter().with_min_len(TASK_LENGTH).map(bounds).collect()
             }
         }
     }
@@ -66,19 +73,40 @@ impl Mesh {
             (MeshPrimitives::Triangles(all), GeometryBytes::Triangles(triangles)) => {
                 let leaf = |number| leaf_triangle(triangles.vertices(number)?, number, geometry, opaque);
                 let first = all.len();
-                all.extend((0..triangles.count).filter_map(leaf));
+                extend_in_parallel(all, triangles.count, leaf);
                 if quality.keeps_given_vertices() {
                     let vertices = |of: &LeafTriangle| triangles.indices.vertex_indices(of.primitive);
-                    self.vertices.extend(all[first..].iter().filter_map(vertices));
+                    self.vertices.par_extend(all[first..].par_iter().filter_map(vertices));
                 }
             }
             (MeshPrimitives::Boxes(all), GeometryBytes::Boxes(boxes)) => {
                 let leaf = |number| leaf_aabb(boxes.bounds(number)?, number, geometry, opaque);
-                all.extend((0..boxes.count).filter_map(leaf));
+                extend_in_parallel(all, boxes.count, leaf);
             }
             // The caller has checked that all kinds are equal.
             _ => {}
         }
+    }
+}
+
+/// Appends what `make` returns for each number below `count`, in order.
+fn extend_in_parallel<T: bytemuck::Zeroable + Send>(
+    all: &mut Vec<T>,
+    count: u32,
+    make: impl Fn(u32) -> Option<T> + Sync,
+) {
+    let numbers = || (0..count).into_par_iter().with_min_len(TASK_LENGTH);
+    // Threads write to their places at once. If some make nothing, the rest must close up.
+    let (first, is_gap) = (all.len(), AtomicBool::new(false));
+    all.par_extend(numbers().map(|number| {
+        make(number).unwrap_or_else(|| {
+            is_gap.store(true, Ordering::Relaxed);
+            T::zeroed()
+        })
+    }));
+    if is_gap.into_inner() {
+        all.truncate(first);
+        all.par_extend(numbers().filter_map(&make));
     }
 }
 

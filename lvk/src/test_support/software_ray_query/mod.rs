@@ -2,6 +2,7 @@
 
 pub(crate) mod collapse_kernels;
 pub(crate) mod collapse_model;
+pub(crate) mod cpu_builds;
 pub(crate) mod gpu_build_check;
 pub(crate) mod hooks;
 pub(crate) mod sort_kernels;

@@ -16,6 +16,7 @@ mod submits;
 mod tlas_updates;
 
 pub use allocations::CountingAllocator;
+pub(super) use allocations::{peak_bytes, restart_peak};
 
 use super::error::BenchError;
 use super::setup::{DefaultBy, Setup};

@@ -1,0 +1,90 @@
+//! Measures BVH builds by the CPU, phase by phase, for several numbers of threads. Needs no device.
+
+use lvk::test_hooks::{CpuBuild, build_on_threads};
+
+use crate::args::{BenchArgs, BuildsArgs};
+use crate::cpu_overhead::{peak_bytes, restart_peak};
+use crate::error::BenchError;
+use crate::measure::median_of;
+use crate::mesh::Mesh;
+use crate::table::{Table, format_grouped, format_ms, format_ratio};
+
+/// The builds on one number of threads.
+struct ThreadRow {
+    threads: usize,
+    builds: Vec<CpuBuild>,
+    /// Heap bytes that a build had at most, beside the mesh of the caller.
+    peak: u64,
+}
+
+/// Builds the mesh on each number of threads and returns the table.
+pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, BenchError> {
+    let (triangles, runs) = if bench.quick { (2_000, 1) } else { (1_000_000, 9) };
+    let mesh = Mesh::new(&args.mesh, 1, triangles)?;
+    let runs = bench.runs.unwrap_or(runs);
+    // The first build of the process touches memory that later ones use again.
+    let mut rows: Vec<ThreadRow> = args
+        .threads()
+        .into_iter()
+        .map(|threads| ThreadRow { threads, builds: Vec::new(), peak: 0 })
+        .collect();
+    for row in &mut rows {
+        measure_row(&mesh, runs, row);
+    }
+    Ok(table(&mesh, runs, &rows))
+}
+
+fn measure_row(mesh: &Mesh, runs: u32, row: &mut ThreadRow) {
+    let (threads, builds) = (row.threads, &mut row.builds);
+    let before = restart_peak();
+    build_on_threads(&mesh.positions, &mesh.triangles, threads, 1, |_| {});
+    row.peak = peak_bytes().saturating_sub(before);
+    build_on_threads(&mesh.positions, &mesh.triangles, threads, runs, |build| builds.push(build));
+}
+
+fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
+    let title = format!("builds by the CPU: {}, {runs} runs", mesh.describe());
+    let heads: Vec<String> = rows.iter().map(|row| count_text(row.threads)).collect();
+    let columns: Vec<&str> =
+        std::iter::once("Milliseconds").chain(heads.iter().map(String::as_str)).collect();
+    let mut table = Table::new(title, &columns);
+    let phases = rows.first().and_then(|row| row.builds.first()).map_or(&[][..], |build| &build.phases);
+    for (number, (name, _)) in phases.iter().enumerate() {
+        let of_phase = |build: &CpuBuild| milliseconds(build.phases[number].1);
+        table.add_row(*name, rows.iter().map(|row| format_ms(median_of(&row.builds, of_phase))));
+    }
+    let totals: Vec<f64> =
+        rows.iter().map(|row| median_of(&row.builds, |build| milliseconds(build.total))).collect();
+    let least = |row: &ThreadRow| {
+        row.builds.iter().map(|build| milliseconds(build.total)).fold(f64::INFINITY, f64::min)
+    };
+    table.add_row("total", totals.iter().map(|total| format_ms(*total)));
+    table.add_row("least total", rows.iter().map(|row| format_ms(least(row))));
+    table.add_row(
+        "times as fast as the first column",
+        totals.iter().map(|total| format_ratio(totals[0] / total)),
+    );
+    table.add_row("peak heap memory, times the BLAS", rows.iter().map(peak_ratio));
+    let all = || rows.iter().flat_map(|row| &row.builds);
+    if let Some(first) = all().next() {
+        let cost = first.sah_cost.map_or("none".to_owned(), |cost| format!("{cost:.5}"));
+        let bytes = format_grouped(first.bytes.len() as u64);
+        table.add_note(format!("SAH cost of the tree: {cost}; bytes of the BLAS: {bytes}"));
+        let same = all().all(|build| build.bytes == first.bytes);
+        table.add_note(if same { "all builds made the same bytes" } else { "BUILDS DIFFER" });
+    }
+    table
+}
+
+fn count_text(threads: usize) -> String {
+    if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") }
+}
+
+fn peak_ratio(row: &ThreadRow) -> String {
+    let bytes = row.builds.first().map_or(0, |build| build.bytes.len());
+    if row.peak == 0 { String::new() } else { format_ratio(row.peak as f64 / bytes.max(1) as f64) }
+}
+
+fn milliseconds(time: std::time::Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
