@@ -73,8 +73,12 @@ impl BinaryNode {
         self.low.w.to_bits()
     }
 
-    /// The number of primitives: 1 for a leaf. For an inner node it is the number when the node was made, and at least
-    /// 2.
+    /// Sets the number of primitives of an inner node, at least 2.
+    pub(super) fn set_count(&mut self, count: u32) {
+        self.high.w = f32::from_bits(count);
+    }
+
+    /// The number of primitives: 1 for a leaf, and at least 2 for an inner node.
     pub(super) fn count(&self) -> u32 {
         self.high.w.to_bits()
     }

@@ -34,6 +34,7 @@ pub(super) fn reinsert_nodes(nodes: &mut [BinaryNode], share: f32) {
         touched.fill(false);
         moves.iter().for_each(|best| tree.apply(best, &mut touched));
     }
+    tree.count_primitives();
 }
 
 /// Returns the parent of each pair of siblings.
@@ -103,6 +104,29 @@ impl LinkedTree<'_> {
             other.saved.total_cmp(&one.saved).then(one.node.cmp(&other.node))
         });
         moves
+    }
+
+    /// Writes the number of primitives of each inner node, which moves have changed.
+    fn count_primitives(&mut self) {
+        let sums: Vec<AtomicU32> = bytemuck::zeroed_vec(self.nodes.len() / 2);
+        let counts: Vec<AtomicU32> = bytemuck::zeroed_vec(self.nodes.len());
+        self.nodes.par_iter().enumerate().with_min_len(TASK_LENGTH).for_each(|(mut place, node)| {
+            let mut count = 1;
+            // The second of two siblings that is counted goes on with their parent.
+            while place != 0 && node.is_leaf() {
+                let beside = sums[pair_of(place)].fetch_add(count, Ordering::Relaxed);
+                if beside == 0 {
+                    break;
+                }
+                place = self.parent(place);
+                count += beside;
+                counts[place].store(count, Ordering::Relaxed);
+            }
+        });
+        let inner = self.nodes.par_iter_mut().zip(counts).with_min_len(TASK_LENGTH);
+        inner
+            .filter(|(node, _)| !node.is_leaf())
+            .for_each(|(node, count)| node.set_count(count.into_inner()));
     }
 
     fn parent(&self, node: usize) -> usize {
@@ -238,6 +262,8 @@ mod tests {
                 assert!(!std::mem::replace(&mut seen[node.index() as usize], true));
                 continue;
             }
+            let children = node.children().map(|child| nodes[child].count());
+            assert_eq!(node.count(), children.iter().sum());
             let [one, other] = node.children();
             assert_eq!(node.aabb(), nodes[one].aabb().union(nodes[other].aabb()));
             open.extend([one, other]);
