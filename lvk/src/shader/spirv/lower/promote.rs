@@ -45,21 +45,26 @@ pub(super) fn promote_variables(linker: &mut Linker, function: &mut Function) {
 
 /// Replaces values by others, which may be replaced themselves.
 pub(super) fn replace_values(linker: &Linker, function: &mut Function, values: HashMap<u32, u32>) {
-    let last = |id: u32| {
-        let mut at = id;
-        while let Some(next) = values.get(&at) {
-            at = *next;
-        }
-        at
-    };
     for inst in function.code_mut() {
         let result = inst.result();
         let _ = for_each_id(inst, &linker.module.wide, |id| {
             if Some(*id) != result {
-                *id = last(*id);
+                *id = last_value(&values, *id);
             }
         });
     }
+}
+
+/// Returns the value that replaces another one in the end. In a damaged module, values may replace each other.
+fn last_value(values: &HashMap<u32, u32>, id: u32) -> u32 {
+    let mut at = id;
+    for _ in 0..=values.len() {
+        match values.get(&at) {
+            Some(next) => at = *next,
+            None => break,
+        }
+    }
+    at
 }
 
 /// Returns the variables that are only read and written whole, each with its type.
@@ -186,16 +191,12 @@ impl Promotion<'_> {
         let before = phis.len();
         let values = &mut self.values;
         phis.retain(|(_, inst)| {
-            let last = |id: u32| {
-                let mut at = id;
-                while let Some(next) = values.get(&at) {
-                    at = *next;
-                }
-                at
-            };
             let phi = inst.operand(1);
-            let mut selected =
-                inst.operands[2..].iter().step_by(2).map(|id| last(*id)).filter(|id| *id != phi);
+            let mut selected = inst.operands[2..]
+                .iter()
+                .step_by(2)
+                .map(|id| last_value(values, *id))
+                .filter(|id| *id != phi);
             let Some(first) = selected.next() else { return true };
             if selected.any(|id| id != first) {
                 return true;

@@ -8,10 +8,16 @@ use super::instruction::{Inst, used_ids};
 use super::linker::Linker;
 use super::module::Function;
 use super::promote::replace_values;
+use crate::shader::spirv::parsed::MAX_NESTING;
 
-/// Simplifies the function until nothing changes.
+/// Simplifies the function until nothing changes, or for a bounded number of rounds.
 pub(super) fn simplify(linker: &Linker, function: &mut Function) {
-    while forward_parts(linker, function) {}
+    // In a damaged module, composites may be parts of themselves.
+    for _ in 0..MAX_NESTING {
+        if !forward_parts(linker, function) {
+            break;
+        }
+    }
     remove_unused(linker, function);
 }
 

@@ -8,17 +8,23 @@ use super::demote::declare_variable;
 use super::instruction::{Inst, for_each_id, used_ids};
 use super::linker::Linker;
 use super::module::Function;
+use crate::shader::spirv::parsed::MAX_NESTING;
 
 /// Splits the variables of structs of a function, members that are structs included.
 pub(super) fn split_structs(linker: &mut Linker, function: &mut Function) {
-    loop {
+    // A damaged module may have a struct that contains itself.
+    for _ in 0..MAX_NESTING {
         let found = splittable(linker, function);
-        if found.is_empty() {
+        let members = found.values().filter_map(|ty| linker.global(*ty)).map(|ty| ty.operands.len());
+        if found.is_empty() || members.sum::<usize>() > MOST_MEMBERS {
             return;
         }
         split(linker, function, &found);
     }
 }
+
+/// Most variables that one round makes.
+const MOST_MEMBERS: usize = 16_384;
 
 /// Returns the variables that are only read and written whole or by members, each with its type.
 fn splittable(linker: &Linker, function: &Function) -> HashMap<u32, u32> {
