@@ -94,12 +94,12 @@ pub enum Effect {
     Trace { tlas: usize, to: (usize, usize), shading: Shading },
 }
 
-/// What the shaders of a trace make of rays.
+/// The values that the shaders of a trace give rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shading {
     /// The word of a ray that hits nothing.
     pub miss: u32,
-    /// What is added to the word of a hit.
+    /// The number that is added to the word of a hit.
     pub hit: u32,
 }
 

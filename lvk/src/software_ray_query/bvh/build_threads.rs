@@ -9,6 +9,10 @@ use crate::parallel::core_count;
 /// Stack of a thread. A thread that waits for a part of its build may work on another build.
 const STACK_BYTES: usize = 8 << 20;
 
+/// Items of a task that does little for each, which threads share without much overhead. Sums of such chunks do not
+/// depend on the number of threads.
+pub(super) const TASK_LENGTH: usize = 4096;
+
 /// Runs `work` on the threads of builds, one for each core. If the system refuses them, the current thread does all of
 /// the work.
 pub(crate) fn on_build_threads<R: Send>(work: impl FnOnce() -> R + Send) -> R {

@@ -4,6 +4,7 @@ use obvhs::cwbvh::node::CwBvhNode;
 use rayon::prelude::*;
 
 use super::binary_node::BinaryNode;
+use super::build_threads::TASK_LENGTH;
 use super::collapse_cost::Decisions;
 use super::morton::morton_sorted_leaves;
 use super::nodes::{Bvh, BvhNodes};
@@ -47,7 +48,6 @@ pub(crate) fn build_bvh8(bounds: Vec<Bounds>, times: &mut PhaseTimes) -> Option<
 /// about that of a ray, which follows from the areas. Nested bounds overlap most of the tree, and fewer nodes are
 /// moved.
 fn reinsertion_share(nodes: &[BinaryNode]) -> f32 {
-    const TASK_LENGTH: usize = 4096;
     let area = |node: &BinaryNode| f64::from(node.aabb().half_area());
     // Sums of chunks of one length: the same for any number of threads.
     let parts: Vec<f64> = nodes.par_chunks(TASK_LENGTH).map(|nodes| nodes.iter().map(area).sum()).collect();

@@ -18,7 +18,7 @@ const PRIMITIVE_COST: f32 = 0.3;
 /// The numbers of children that a subtree may become: 1 to 7. The other half becomes at least one of eight.
 const SHARES: usize = 7;
 
-/// What a subtree becomes.
+/// The form of a subtree in the wide tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A leaf of at most three primitives.

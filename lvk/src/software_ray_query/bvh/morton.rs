@@ -4,12 +4,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::binary_node::{Aabb, BinaryNode};
+use super::build_threads::TASK_LENGTH;
 use crate::accel::primitive_bounds::Bounds;
 
 /// Bits of the code for each axis.
 const AXIS_BITS: u32 = 21;
-/// Primitives of one task.
-const TASK_LENGTH: usize = 4096;
 
 /// Returns the leaves along a Morton curve through their centers. Of equal codes, the lower primitive is first.
 pub(super) fn morton_sorted_leaves(boxes: &[Bounds]) -> Vec<BinaryNode> {

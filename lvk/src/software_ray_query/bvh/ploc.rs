@@ -11,6 +11,7 @@
 use rayon::prelude::*;
 
 use super::binary_node::BinaryNode;
+use super::build_threads::TASK_LENGTH;
 use super::partners::{MAX_REACH, find_partners};
 
 /// Rounds that search the direct neighbours only; they pair most small nodes.
@@ -19,8 +20,6 @@ const SHORT_SEARCH_ROUNDS: usize = 2;
 const MIN_PAIRED_FRACTION: usize = 32;
 /// Largest node count at which rounds pair mutual choices only.
 const FINAL_NODE_COUNT: usize = 32;
-/// Nodes of one task.
-const TASK_LENGTH: usize = 4096;
 
 /// Builds a tree of at least one leaf. Children are behind their parents.
 pub(super) fn build_ploc(leaves: Vec<BinaryNode>) -> Vec<BinaryNode> {

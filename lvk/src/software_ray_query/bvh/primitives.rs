@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::build_threads::TASK_LENGTH;
 use super::settings::BvhSettings;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::{Bounds, GeometryBytes};
@@ -13,9 +14,6 @@ use crate::software_ray_query::layout::{LeafBox, LeafTriangle};
 /// Maximum coordinate of bounds. Sums of areas that a build compares stay finite with it. Kernels have it in
 /// `kernels/box.glsl`.
 pub(crate) const MAX_COORDINATE: f32 = 1e15;
-
-/// Primitives of one task.
-const TASK_LENGTH: usize = 4096;
 
 /// The primitives of all geometries.
 #[derive(Debug, Clone, PartialEq)]

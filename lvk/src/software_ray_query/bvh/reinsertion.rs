@@ -9,14 +9,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 
 use super::binary_node::{Aabb, BinaryNode, sibling};
+use super::build_threads::TASK_LENGTH;
 
 /// Rounds of moves. Round `n` moves a share of the nodes that is divided by `2 n + 1`, so that later rounds improve the
 /// top of the tree.
 const ROUNDS: usize = 16;
 /// Searches of one task.
 const TASK_SEARCHES: usize = 64;
-/// Nodes of one task that only reads them in order.
-const TASK_LENGTH: usize = 4096;
 
 /// Moves nodes of a tree to positions where the sum of all areas is less: at most `share` of the nodes in the first
 /// round. Children must be behind their parents, and are anywhere afterwards.

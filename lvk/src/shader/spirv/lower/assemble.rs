@@ -150,12 +150,11 @@ impl<'a> Assembly<'a> {
             let given = given.chain(shader.initial.iter().map(|(variable, _)| *variable)).collect();
             let replaced = localize(self.linker, &mut function, &own, &given);
             let runs_once = index == self.lowering.ray_gen;
-            let misses_wait = self.lowering.miss.iter().any(|index| self.shaders.waits(*index));
-            let frame = ShaderFrame { runs_once, own: &own, misses_wait };
+            let misses_wait = self.shaders.misses_wait(self.lowering);
+            let frame = ShaderFrame { runs_once, own: &own, misses_wait, replaced };
             let Some(machine) = &mut self.machine else { continue };
             let is_wait = |inst: &Inst| self.shaders.is_wait(inst);
-            let mut pieces = flatten(self.linker, machine, function, &frame, &is_wait).map_err(failed)?;
-            pieces.replaced = replaced;
+            let pieces = flatten(self.linker, machine, function, frame, &is_wait).map_err(failed)?;
             self.entries.insert(index, pieces.entry);
             self.pieces.push(pieces);
         }

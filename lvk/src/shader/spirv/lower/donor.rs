@@ -127,9 +127,7 @@ impl Donor {
         }
         Ok(donor)
     }
-}
 
-impl Donor {
     /// Returns the variables that tell of a hit.
     pub(super) fn hit_values(&self) -> [u32; 13] {
         [

@@ -47,8 +47,13 @@ impl<'a> Emitter<'a> {
     /// Makes a variable of the invocation undefined, so that compilers keep it in no register.
     pub(super) fn forget(&mut self, variable: u32) {
         let ty = self.linker.variable_type(variable).unwrap_or(0);
+        self.store_undefined(variable, ty);
+    }
+
+    /// Stores a value of the type that may be any.
+    pub(super) fn store_undefined(&mut self, pointer: u32, ty: u32) {
         let undefined = self.linker.undefined(ty);
-        self.store(variable, undefined);
+        self.store(pointer, undefined);
     }
 
     /// Converts a value to a type with the same bits.

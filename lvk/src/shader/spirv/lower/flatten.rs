@@ -90,6 +90,8 @@ pub(super) struct ShaderFrame<'a> {
     pub(super) own: &'a [u32],
     /// True if miss shaders wait for rays or callable shaders.
     pub(super) misses_wait: bool,
+    /// Variables of the invocation that give the function values, and that only its first piece reads.
+    pub(super) replaced: Vec<u32>,
 }
 
 impl ShaderFrame<'_> {
@@ -104,7 +106,7 @@ pub(super) fn flatten(
     linker: &mut Linker,
     machine: &mut StateMachine,
     mut function: Function,
-    frame: &ShaderFrame<'_>,
+    frame: ShaderFrame<'_>,
     is_wait: &dyn Fn(&Inst) -> bool,
 ) -> Result<FlattenedFunction, String> {
     if function.code().any(|inst| inst.op == Op::Switch && linker.module.wide.contains(&inst.operand(0))) {
@@ -118,7 +120,7 @@ pub(super) fn flatten(
     let flow = ControlFlow::new(&function);
     let is_cut = |block: usize| cuts.contains(&function.blocks[block].label);
     let whole = flow.whole_constructs(&function, &is_cut);
-    let live = live_variables(linker, &function, &flow, frame);
+    let live = live_variables(linker, &function, &flow, &frame);
     let mut flattener = Flattener {
         linker,
         machine,
@@ -126,7 +128,7 @@ pub(super) fn flatten(
         flow: &flow,
         whole,
         live,
-        frame,
+        frame: &frame,
         cuts: &cuts,
         states: HashMap::new(),
         waiting: Vec::new(),
@@ -140,7 +142,7 @@ pub(super) fn flatten(
     let (blocks, cases) = (flattener.blocks, flattener.cases);
     let is_variable = |inst: &&Inst| inst.op == Op::Variable;
     let variables = function.code().filter(is_variable).cloned().collect();
-    Ok(FlattenedFunction { entry, cases, blocks, variables, replaced: Vec::new() })
+    Ok(FlattenedFunction { entry, cases, blocks, variables, replaced: frame.replaced })
 }
 
 /// Ends a block behind each instruction at which the function waits, and returns the labels of these blocks.
@@ -327,7 +329,7 @@ impl Flattener<'_> {
     /// Makes the piece that starts with a block the next one.
     fn choose(&mut self, block: usize, code: &mut Vec<Inst>) {
         let state = self.state_of(block);
-        self.keep_in_slots(block, code);
+        self.keep_values(block, None, code);
         Emitter::new(self.linker, code).store_number(self.machine.state, state);
     }
 
@@ -384,11 +386,8 @@ impl Flattener<'_> {
         let resumed = self.state_of(behind);
         let (uint, bool) = (self.linker.uint(), self.linker.bool());
         let depth = Emitter::new(self.linker, code).load(self.machine.depth);
-        if self.returns_directly(block) {
-            self.keep_in_slots(behind, code);
-        } else {
-            self.keep_on_stacks(behind, depth, code);
-        }
+        let stack_depth = Some(depth).filter(|_| !self.returns_directly(block));
+        self.keep_values(behind, stack_depth, code);
         let machine = self.machine.clone();
         let mut emitter = Emitter::new(self.linker, code);
         let place = element(&mut emitter, machine.resume, uint, depth);
@@ -414,66 +413,46 @@ impl Flattener<'_> {
     fn restore(&mut self, block: usize, code: &mut Vec<Inst>) {
         let from = self.flow.predecessors[block].first().copied();
         let waited = from.filter(|from| self.cuts.contains(&self.function.blocks[*from].label));
+        let mut stack_depth = None;
         if let Some(from) = waited {
             let mut emitter = Emitter::new(self.linker, code);
             let depth = self.machine.emit_last_depth(&mut emitter);
             emitter.store(self.machine.depth, depth);
-            if !self.returns_directly(from) {
-                return self.restore_from_stacks(block, depth, code);
-            }
+            stack_depth = Some(depth).filter(|_| !self.returns_directly(from));
         }
-        let (slots, kept) = self.slots_of(block);
-        let mut emitter = Emitter::new(self.linker, code);
-        for ((variable, ty), slot) in kept.into_iter().zip(slots) {
-            let value = emitter.value(Op::Load, ty, &[slot]);
-            emitter.store(variable, value);
-        }
-    }
-
-    fn keep_in_slots(&mut self, block: usize, code: &mut Vec<Inst>) {
-        let (slots, kept) = self.slots_of(block);
-        let mut emitter = Emitter::new(self.linker, code);
-        for ((variable, ty), slot) in kept.into_iter().zip(slots) {
-            let value = emitter.value(Op::Load, ty, &[variable]);
-            emitter.store(slot, value);
-        }
-    }
-
-    /// Returns the slots of what a piece reads, and the variables in their order with their types. Arrays, and variables
-    /// that other functions use, stay where they are: nothing else writes them meanwhile.
-    fn slots_of(&mut self, block: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
-        let mut kept = self.read_by(block);
-        kept.retain(|(variable, ty)| {
-            self.linker.global(*variable).is_none() && is_register(self.linker, *ty)
-        });
-        let types: Vec<u32> = kept.iter().map(|(_, ty)| *ty).collect();
-        (self.machine.slots.allocate(self.linker, &types), kept)
-    }
-
-    fn keep_on_stacks(&mut self, block: usize, depth: u32, code: &mut Vec<Inst>) {
-        let (stacks, kept) = self.stacks_of(block);
-        let mut emitter = Emitter::new(self.linker, code);
-        for ((variable, ty), stack) in kept.into_iter().zip(stacks) {
-            let value = emitter.value(Op::Load, ty, &[variable]);
-            let place = element(&mut emitter, stack, ty, depth);
-            emitter.store(place, value);
-        }
-    }
-
-    fn restore_from_stacks(&mut self, block: usize, depth: u32, code: &mut Vec<Inst>) {
-        let (stacks, kept) = self.stacks_of(block);
-        let mut emitter = Emitter::new(self.linker, code);
-        for ((variable, ty), stack) in kept.into_iter().zip(stacks) {
-            let place = element(&mut emitter, stack, ty, depth);
+        for Kept { variable, place, ty } in self.kept_for(block, stack_depth) {
+            let mut emitter = Emitter::new(self.linker, code);
+            let place = place.emit_pointer(&mut emitter, ty);
             let value = emitter.value(Op::Load, ty, &[place]);
             emitter.store(variable, value);
         }
     }
 
-    fn stacks_of(&mut self, block: usize) -> (Vec<u32>, Vec<(u32, u32)>) {
-        let kept = self.read_by(block);
-        let types: Vec<u32> = kept.iter().map(|(_, ty)| *ty).collect();
-        (self.machine.stacks.allocate(self.linker, &types), kept)
+    /// Keeps what a piece reads, in slots or at a depth of the stacks.
+    fn keep_values(&mut self, block: usize, stack_depth: Option<u32>, code: &mut Vec<Inst>) {
+        for Kept { variable, place, ty } in self.kept_for(block, stack_depth) {
+            let mut emitter = Emitter::new(self.linker, code);
+            let value = emitter.value(Op::Load, ty, &[variable]);
+            let place = place.emit_pointer(&mut emitter, ty);
+            emitter.store(place, value);
+        }
+    }
+
+    /// Returns what is kept for a piece. Slots leave arrays, and variables that other functions use, where they are:
+    /// nothing else writes them meanwhile.
+    fn kept_for(&mut self, block: usize, stack_depth: Option<u32>) -> Vec<Kept> {
+        let mut read = self.read_by(block);
+        if stack_depth.is_none() {
+            read.retain(|(variable, ty)| {
+                self.linker.global(*variable).is_none() && is_register(self.linker, *ty)
+            });
+        }
+        let types: Vec<u32> = read.iter().map(|(_, ty)| *ty).collect();
+        let machine = &mut *self.machine;
+        let slots = if stack_depth.is_some() { &mut machine.stacks } else { &mut machine.slots };
+        let slots = slots.allocate(self.linker, &types);
+        let kept = |((variable, ty), slot)| Kept { variable, place: Place { slot, stack_depth }, ty };
+        read.into_iter().zip(slots).map(kept).collect()
     }
 
     /// Returns the variables that a piece and those behind it read, with their types. Nothing is left for the first.
@@ -490,6 +469,26 @@ impl Flattener<'_> {
             Some(inst) => self.linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target),
             None => self.linker.variable_type(variable).unwrap_or(0),
         }
+    }
+}
+
+/// A variable of a function whose value is kept while other code runs.
+struct Kept {
+    variable: u32,
+    place: Place,
+    ty: u32,
+}
+
+/// A slot, or an element of a stack.
+struct Place {
+    slot: u32,
+    /// The index in the stack.
+    stack_depth: Option<u32>,
+}
+
+impl Place {
+    fn emit_pointer(&self, emitter: &mut Emitter<'_>, ty: u32) -> u32 {
+        self.stack_depth.map_or(self.slot, |depth| element(emitter, self.slot, ty, depth))
     }
 }
 

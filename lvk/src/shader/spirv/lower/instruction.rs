@@ -50,6 +50,14 @@ impl Inst {
 }
 
 impl Inst {
+    /// Returns the text in the operands from `first` on.
+    pub(super) fn text(&self, first: usize) -> String {
+        let words = self.operands.get(first..).unwrap_or_default();
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+        String::from_utf8_lossy(text).into_owned()
+    }
+
     /// True for an instruction that ends a block.
     pub(super) fn is_terminator(&self) -> bool {
         matches!(
@@ -281,6 +289,25 @@ fn memory_ids(words: &mut [u32], change: &mut impl FnMut(&mut u32)) -> Option<()
         }
     }
     Some(())
+}
+
+/// Returns the place, among the operands, of the pointer that an instruction loads, stores to or leads on from.
+pub(super) fn pointer_place(op: Op) -> Option<usize> {
+    match op {
+        Op::AccessChain | Op::InBoundsAccessChain | Op::Load => Some(2),
+        Op::Store => Some(0),
+        _ => None,
+    }
+}
+
+/// Returns the ids that an instruction uses otherwise than as its pointer, without its results.
+pub(super) fn used_beside_pointer(inst: &Inst, wide: &HashSet<u32>) -> Vec<u32> {
+    let mut used = used_ids(inst, wide);
+    let pointer = pointer_place(inst.op).map(|place| inst.operand(place));
+    if let Some(place) = used.iter().position(|id| Some(*id) == pointer) {
+        used.remove(place);
+    }
+    used
 }
 
 /// Returns the ids that an instruction uses, without its results.

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use ::spirv::Op;
 
 use super::control_flow::ControlFlow;
-use super::instruction::{Inst, used_ids};
+use super::instruction::{Inst, used_beside_pointer, used_ids};
 use super::linker::Linker;
 use super::module::Function;
 
@@ -67,7 +67,7 @@ impl Effects {
                 }
                 // A write of a part reads nothing, and leaves the other parts.
                 Op::Store => {
-                    used.remove(0);
+                    used = used_beside_pointer(inst, &linker.module.wide);
                     whole = Some(inst.operand(0)).filter(|id| variables.contains(id));
                 }
                 Op::FunctionCall => used.extend(mentions.get(&inst.operand(2)).into_iter().flatten()),
@@ -88,6 +88,10 @@ pub(super) fn mentioned_by_functions(
     linker: &Linker,
     variables: &HashSet<u32>,
 ) -> HashMap<u32, HashSet<u32>> {
+    // Other functions cannot name the variables of a function.
+    if variables.iter().all(|variable| linker.global(*variable).is_none()) {
+        return HashMap::new();
+    }
     let mut calls: HashMap<u32, HashSet<u32>> = HashMap::new();
     let mut found: HashMap<u32, HashSet<u32>> = HashMap::new();
     for function in &linker.module.functions {

@@ -6,15 +6,15 @@ use ::spirv::{Op, StorageClass};
 
 use super::demote::declare_variable;
 use super::emit::Emitter;
-use super::instruction::{Inst, used_ids};
+use super::instruction::{Inst, pointer_place, used_beside_pointer};
 use super::linker::Linker;
 use super::liveness::mentioned_by_functions;
 use super::module::Function;
 use super::promote::is_register;
 
-/// Replaces those of `own` that the function only loads, stores and indexes, and that no function uses which it calls. Those in `given` keep the values that they
-/// have when the function starts.
+/// Replaces those of `own` that the function only loads, stores and indexes, and that no function uses which it calls.
 ///
+/// Those in `given` keep the values that they have when the function starts.
 /// Returns the replaced variables, which nothing reads behind the start of the function.
 pub(super) fn localize(
     linker: &mut Linker,
@@ -58,16 +58,7 @@ fn roots(linker: &Linker, function: &Function, own: &[u32]) -> Roots {
     // Blocks stand behind those that dominate them, so a chain is found before its uses.
     for inst in function.code() {
         let root = |id: u32| chains.get(&id).copied().unwrap_or(id);
-        let pointer = match inst.op {
-            Op::AccessChain | Op::InBoundsAccessChain | Op::Load => Some(inst.operand(2)),
-            Op::Store => Some(inst.operand(0)),
-            _ => None,
-        };
-        let mut used = used_ids(inst, &linker.module.wide);
-        if let Some(place) = used.iter().position(|id| Some(*id) == pointer) {
-            used.remove(place);
-        }
-        for id in used {
+        for id in used_beside_pointer(inst, &linker.module.wide) {
             plain.remove(&root(id));
         }
         if matches!(inst.op, Op::AccessChain | Op::InBoundsAccessChain) {
@@ -81,18 +72,12 @@ fn roots(linker: &Linker, function: &Function, own: &[u32]) -> Roots {
 }
 
 fn replace(linker: &mut Linker, chains: &HashMap<u32, u32>, locals: &HashMap<u32, u32>, inst: &mut Inst) {
-    let pointer = match inst.op {
-        Op::AccessChain | Op::InBoundsAccessChain => {
-            if chains.get(&inst.operand(1)).is_some_and(|root| locals.contains_key(root)) {
-                let target = linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target);
-                inst.operands[0] = linker.pointer_to(StorageClass::Function, target);
-            }
-            2
-        }
-        Op::Load => 2,
-        Op::Store => 0,
-        _ => return,
-    };
+    let is_chain = matches!(inst.op, Op::AccessChain | Op::InBoundsAccessChain);
+    if is_chain && chains.get(&inst.operand(1)).is_some_and(|root| locals.contains_key(root)) {
+        let target = linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target);
+        inst.operands[0] = linker.pointer_to(StorageClass::Function, target);
+    }
+    let Some(pointer) = pointer_place(inst.op) else { return };
     if let Some(local) = locals.get(&inst.operand(pointer)) {
         inst.operands[pointer] = *local;
     }
@@ -107,9 +92,7 @@ fn copy_given(
     given: &HashSet<u32>,
 ) {
     let Some(first) = function.blocks.first_mut() else { return };
-    let is_variable = |inst: &Inst| inst.op == Op::Variable;
-    let rest = first.code.iter().position(|inst| !is_variable(inst)).unwrap_or(first.code.len());
-    let behind = first.code.split_off(rest);
+    let behind = first.take_code_behind_variables();
     let mut emitter = Emitter::new(linker, &mut first.code);
     for variable in replaced.iter().filter(|variable| given.contains(variable)) {
         let value = emitter.load(*variable);
@@ -126,8 +109,7 @@ fn copy_given(
 pub(super) fn forget_locals(linker: &mut Linker) {
     for at in 0..linker.module.functions.len() {
         let Some(block) = linker.module.functions[at].blocks.first_mut() else { continue };
-        let first = block.code.iter().position(|inst| inst.op != Op::Variable).unwrap_or(block.code.len());
-        let behind = block.code.split_off(first);
+        let behind = block.take_code_behind_variables();
         let mut code = std::mem::take(&mut block.code);
         let variables: Vec<Inst> = code.iter().filter(|inst| inst.operands.len() == 3).cloned().collect();
         let mut emitter = Emitter::new(linker, &mut code);
@@ -153,13 +135,11 @@ fn forget_local(emitter: &mut Emitter<'_>, variable: u32, ty: u32) {
             let pointer = emitter.linker.pointer_to(StorageClass::Function, member);
             let index = emitter.linker.constant(index);
             let place = emitter.value(Op::AccessChain, pointer, &[variable, index]);
-            let undefined = emitter.linker.undefined(member);
-            emitter.store(place, undefined);
+            emitter.store_undefined(place, member);
         }
     }
     if is_register(emitter.linker, ty) {
-        let undefined = emitter.linker.undefined(ty);
-        emitter.store(variable, undefined);
+        emitter.store_undefined(variable, ty);
     }
 }
 

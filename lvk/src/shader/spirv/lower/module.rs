@@ -19,6 +19,12 @@ impl Block {
         self.code.last()
     }
 
+    /// Takes out the code behind the variables of the function, which stand at the start of its first block.
+    pub(super) fn take_code_behind_variables(&mut self) -> Vec<Inst> {
+        let first = self.code.iter().position(|inst| inst.op != Op::Variable);
+        self.code.split_off(first.unwrap_or(self.code.len()))
+    }
+
     /// Returns the merge instruction in front of the terminator.
     pub(super) fn merge(&self) -> Option<&Inst> {
         let at = self.code.len().checked_sub(2)?;

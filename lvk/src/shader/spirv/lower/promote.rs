@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use ::spirv::Op;
 
 use super::control_flow::ControlFlow;
-use super::instruction::{Inst, for_each_id, used_ids};
+use super::instruction::{Inst, for_each_id, used_beside_pointer, used_ids};
 use super::linker::Linker;
 use super::liveness::live_at_starts;
 use super::module::Function;
@@ -75,17 +75,15 @@ fn promotable(linker: &Linker, function: &Function) -> BTreeMap<u32, u32> {
         .filter(|(_, ty)| is_register(linker, *ty))
         .collect();
     for inst in function.code().filter(|inst| inst.op != Op::Variable) {
-        let plain = match inst.op {
-            Op::Load if inst.operands.len() == 3 => inst.operand(2),
-            Op::Store if inst.operands.len() == 2 => inst.operand(0),
-            _ => 0,
+        let is_whole = match inst.op {
+            Op::Load => inst.operands.len() == 3,
+            Op::Store => inst.operands.len() == 2,
+            _ => false,
         };
-        let uses = used_ids(inst, &linker.module.wide);
-        let others =
-            uses.iter().filter(|id| **id != plain || inst.operand(1) == plain && inst.op == Op::Store);
-        others.for_each(|id| {
-            found.remove(id);
-        });
+        let uses = if is_whole { used_beside_pointer } else { used_ids };
+        for id in uses(inst, &linker.module.wide) {
+            found.remove(&id);
+        }
     }
     found
 }

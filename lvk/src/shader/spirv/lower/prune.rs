@@ -122,11 +122,5 @@ fn finish_capabilities(module: &mut Module) {
     .into_iter()
     .filter_map(|(is_gone, name)| is_gone.then_some(name))
     .collect();
-    module.extensions.retain(|inst| !gone.contains(&extension_name(inst).as_str()));
-}
-
-fn extension_name(inst: &Inst) -> String {
-    let bytes: Vec<u8> = inst.operands.iter().flat_map(|word| word.to_le_bytes()).collect();
-    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    String::from_utf8_lossy(&bytes[..end]).into_owned()
+    module.extensions.retain(|inst| !gone.contains(&inst.text(0).as_str()));
 }

@@ -157,7 +157,7 @@ impl Shaders {
         let is_cpu = matches!(lowering.traversal, Traversal::SoftwareCpu | Traversal::SoftwareCpuPairs);
         let places =
             linker.module.functions.iter().flat_map(Function::code).filter(|inst| skips_closest_hit(inst));
-        is_cpu && places.count() <= MOST_PLACES && !lowering.miss.iter().any(|index| self.waits(*index))
+        is_cpu && places.count() <= MOST_PLACES && !self.misses_wait(lowering)
     }
 
     /// True for an instruction at which a function waits.
@@ -169,6 +169,11 @@ impl Shaders {
     /// True if the shader waits for rays or callable shaders.
     pub(super) fn waits(&self, index: usize) -> bool {
         self.linked.get(&index).is_some_and(|shader| self.waiting.contains(&shader.entry))
+    }
+
+    /// True if miss shaders wait for rays or callable shaders.
+    pub(super) fn misses_wait(&self, lowering: &Lowering<'_>) -> bool {
+        lowering.miss.iter().any(|index| self.waits(*index))
     }
 
     /// Returns the number of places at which a function and those it calls wait, as if all were inlined.

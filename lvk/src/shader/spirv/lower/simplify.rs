@@ -162,10 +162,7 @@ fn is_pure_of_glsl(linker: &Linker, inst: &Inst) -> bool {
     const FREXP: u32 = 51;
     let is_set = |import: &&Inst| import.operand(0) == inst.operand(2);
     let import = linker.module.imports.iter().find(is_set);
-    let name: Vec<u8> = import.map_or(Vec::new(), |import| {
-        import.operands[1..].iter().flat_map(|word| word.to_le_bytes()).collect()
-    });
-    name.starts_with(b"GLSL.std.450") && ![MODF, FREXP].contains(&inst.operand(3))
+    import.is_some_and(|import| import.text(1) == "GLSL.std.450") && ![MODF, FREXP].contains(&inst.operand(3))
 }
 
 #[cfg(test)]
@@ -205,35 +202,31 @@ mod tests {
         assert_eq!(code, [store(linker.constant(2))]);
     }
 
-    #[test]
-    fn a_composite_of_all_parts_of_another_is_the_other() {
+    /// Puts a pair together of the parts of another one with these indices.
+    fn pair_of_parts(indices: [u32; 2]) -> Vec<Inst> {
         let (_, code) = simplified(|linker| {
             let (uint, pair) = (linker.uint(), linker.uvec2());
             vec![
                 Inst::new(Op::Load, &[pair, 700, 951, 1]),
-                Inst::new(Op::CompositeExtract, &[uint, 701, 700, 0]),
-                Inst::new(Op::CompositeExtract, &[uint, 702, 700, 1]),
+                Inst::new(Op::CompositeExtract, &[uint, 701, 700, indices[0]]),
+                Inst::new(Op::CompositeExtract, &[uint, 702, 700, indices[1]]),
                 Inst::new(Op::CompositeConstruct, &[pair, 703, 701, 702]),
                 store(703),
             ]
         });
+        code
+    }
+
+    #[test]
+    fn a_composite_of_all_parts_of_another_is_the_other() {
+        let code = pair_of_parts([0, 1]);
         assert_eq!(code.last(), Some(&store(700)));
         assert_eq!(code.len(), 2);
     }
 
     #[test]
     fn parts_in_another_order_stay() {
-        let (_, code) = simplified(|linker| {
-            let (uint, pair) = (linker.uint(), linker.uvec2());
-            vec![
-                Inst::new(Op::Load, &[pair, 700, 951, 1]),
-                Inst::new(Op::CompositeExtract, &[uint, 701, 700, 1]),
-                Inst::new(Op::CompositeExtract, &[uint, 702, 700, 0]),
-                Inst::new(Op::CompositeConstruct, &[pair, 703, 701, 702]),
-                store(703),
-            ]
-        });
-        assert_eq!(code.len(), 5);
+        assert_eq!(pair_of_parts([1, 0]).len(), 5);
     }
 
     #[test]

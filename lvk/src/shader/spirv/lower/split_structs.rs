@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use ::spirv::Op;
 
 use super::demote::declare_variable;
-use super::instruction::{Inst, for_each_id, used_ids};
+use super::instruction::{Inst, for_each_id, used_beside_pointer, used_ids};
 use super::linker::Linker;
 use super::module::Function;
 use crate::shader::spirv::parsed::MAX_NESTING;
@@ -37,18 +37,15 @@ fn splittable(linker: &Linker, function: &Function) -> HashMap<u32, u32> {
         variables.filter_map(|inst| Some((inst.operand(1), struct_of(inst)?))).collect();
     let is_constant = |id: u32| linker.global(id).is_some_and(|inst| inst.op == Op::Constant);
     for inst in function.code().filter(|inst| inst.op != Op::Variable) {
-        let plain = match inst.op {
-            Op::AccessChain | Op::InBoundsAccessChain if is_constant(inst.operand(3)) => inst.operand(2),
-            Op::Load if inst.operands.len() == 3 => inst.operand(2),
-            Op::Store if inst.operands.len() == 2 => inst.operand(0),
-            _ => 0,
+        let is_plain = match inst.op {
+            Op::AccessChain | Op::InBoundsAccessChain => is_constant(inst.operand(3)),
+            Op::Load => inst.operands.len() == 3,
+            Op::Store => inst.operands.len() == 2,
+            _ => false,
         };
-        used_ids(inst, &linker.module.wide).into_iter().filter(|id| *id != plain).for_each(|id| {
+        let uses = if is_plain { used_beside_pointer } else { used_ids };
+        for id in uses(inst, &linker.module.wide) {
             found.remove(&id);
-        });
-        // A variable that is stored, or an index, is a use of another kind.
-        if inst.op == Op::Store && found.contains_key(&inst.operand(1)) {
-            found.remove(&inst.operand(1));
         }
     }
     found
