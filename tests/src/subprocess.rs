@@ -54,7 +54,7 @@ pub fn on_swiftshader(test: impl Fn(), body: impl FnOnce()) {
 }
 
 /// Runs the program's tests, without those that are ignored or have one of `skipped` in their names, in a process
-/// that has no device but SwiftShader, by ray queries in software. Prints a line and runs nothing where SwiftShader
+/// that has no device but SwiftShader, by ray queries and lowered pipelines in software. Prints a line and runs nothing where SwiftShader
 /// cannot be fetched.
 ///
 /// # Panics
@@ -62,7 +62,7 @@ pub fn on_swiftshader(test: impl Fn(), body: impl FnOnce()) {
 pub fn rerun_on_swiftshader(skipped: &[&str]) {
     let Some(icd) = swiftshader() else { return };
     let mut command = program(&only_driver(&icd));
-    command.env("LVK_TEST_RAY_QUERY", "software");
+    command.env("LVK_TEST_RAY_QUERY", "software").env("LVK_TEST_RAY_PIPELINE", "software");
     command.args(skipped.iter().flat_map(|name| ["--skip", name]));
     let status = command.status().expect("the program of the tests can be started again");
     assert!(status.success(), "tests fail on the device without ray tracing, see above");

@@ -71,6 +71,7 @@ impl LoweringJob<'_> {
         let Self { gpu, desc, linked, plan, .. } = self;
         let lowering = Lowering {
             traversal: traversal(&gpu.caps),
+            non_uniform_descriptors: gpu.caps.reads_indices_of_idle_lanes(),
             modules: self.modules,
             ray_gen,
             miss: &linked.miss,

@@ -4,8 +4,8 @@ use std::sync::Barrier;
 
 use lvk::{
     AccelStructHandle, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Dependencies, Error,
-    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, Result, ShaderStage, SpecializationConstant,
-    SpecializationValue, TlasDesc,
+    Format, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, Result, ShaderStage,
+    SpecializationConstant, SpecializationValue, TextureDesc, TextureRegion, TextureUsage, TlasDesc,
 };
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::pipeline_paths::pipeline_devices;
@@ -167,6 +167,38 @@ fn push_constants_of_the_largest_size_reach_every_shader_of_each_trace() -> Resu
         ctx.submit(cmd)?;
         let found = results.map(|words| read_words(&ctx, *words, 9));
         assert_eq!(found, *expected, "{path:?}");
+    }
+    Ok(())
+}
+
+/// An index of an image that is the same for all rays needs no `nonuniformEXT`, though rays end in different rounds of the
+/// loop, those of the first lanes first.
+#[test]
+fn rays_that_end_early_write_their_own_texels() -> Result<()> {
+    const RAY_GEN: &str = "
+        void main() {
+            value = 0;
+            for (uint i = 0; i <= gl_LaunchIDEXT.x % 8; i++) { trace(tlas); }
+            imageStore(kImages2D[place], ivec2(gl_LaunchIDEXT.xy), vec4(value));
+        }";
+    const SIZE: [u32; 2] = [64, 2];
+    for (path, ctx) in pipeline_devices() {
+        let image = ctx.create_texture(&TextureDesc {
+            format: Format::R32Float,
+            extent: SIZE,
+            usage: TextureUsage::STORAGE,
+            ..Default::default()
+        })?;
+        let launcher = Launcher::new(&ctx, PUSH, [RAY_GEN, COUNTING_MISS], &[])?;
+        let words = words_buffer(&ctx, &[0]);
+        let mut cmd = ctx.acquire_command_buffer()?;
+        launcher.bind(&mut cmd, *words, [SIZE[0], SIZE[1], 1, 0, image.index()])?;
+        let writes = Dependencies { storage_images: &[*image], ..Default::default() };
+        cmd.trace_rays([SIZE[0], SIZE[1], 1], &writes)?;
+        ctx.submit(cmd)?;
+        let bytes = ctx.download_texture(*image, &TextureRegion::default())?;
+        let expected: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(|at| (at % 8 + 1) as f32).collect();
+        assert_eq!(bytemuck::pod_collect_to_vec::<u8, f32>(&bytes), expected, "{path:?}");
     }
     Ok(())
 }

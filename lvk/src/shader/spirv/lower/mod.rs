@@ -15,6 +15,7 @@ mod linker;
 mod liveness;
 mod localize;
 mod module;
+mod non_uniform;
 mod passed;
 mod promote;
 mod prune;
@@ -29,6 +30,7 @@ mod traces;
 use self::assemble::Assembly;
 use self::donor::Donor;
 use self::linker::Linker;
+use self::non_uniform::decorate_non_uniform;
 use self::passed::Passed;
 use self::shaders::Shaders;
 use self::traces::TraceVariables;
@@ -71,6 +73,9 @@ pub(crate) struct HitShaders {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lowering<'a> {
     pub(crate) traversal: Traversal,
+    /// True if images and samplers are decorated with `NonUniform`, for drivers that else take the index of a lane that may be
+    /// idle.
+    pub(crate) non_uniform_descriptors: bool,
     /// All shaders, without duplicates.
     pub(crate) modules: &'a [StageModule<'a>],
     /// The ray generation shader, as an index in `modules`.
@@ -146,7 +151,11 @@ pub(crate) fn lower(lowering: &Lowering<'_>) -> Result<Vec<u32>, LoweringError> 
     let mut attributes = Passed::default();
     shaders.rewrite(&mut linker, lowering, &mut variables, &mut attributes)?;
     let main = Assembly::new(&mut linker, lowering, &shaders, variables, attributes).assemble()?;
-    Ok(prune::finish(linker, main).words())
+    let mut module = prune::finish(linker, main);
+    if lowering.non_uniform_descriptors {
+        decorate_non_uniform(&mut module);
+    }
+    Ok(module.words())
 }
 
 /// Version word of SPIR-V 1.6.

@@ -77,6 +77,7 @@ fn lowered(pipeline: &Pipeline) -> Vec<Result<Vec<u32>, LoweringError>> {
         let modules: Vec<StageModule<'_>> = pipeline.shaders.iter().zip(words).map(module).collect();
         lower(&Lowering {
             traversal,
+            non_uniform_descriptors: traversal == Traversal::SoftwareCpu,
             modules: &modules,
             ray_gen: 0,
             miss: &pipeline.miss,
@@ -265,6 +266,22 @@ fn every_kind_of_pipeline_is_lowered() {
                 std::fs::write(format!("{folder}/lowered_{index}_{traversal}.spv"), bytes).unwrap();
             }
         }
+    }
+}
+
+/// The index of the image is the same for all rays, and the shader does not decorate it.
+#[test]
+fn images_are_decorated_where_the_driver_needs_it() {
+    use ::spirv::{Decoration, Op};
+
+    for ((_, traversal, _), words) in donors().into_iter().zip(lowered(&simple())) {
+        let words = words.unwrap();
+        let code: Vec<_> = crate::shader::spirv::words::instructions(&words).map(Result::unwrap).collect();
+        let image = code.iter().find(|inst| inst.op == Some(Op::ImageWrite)).unwrap().operand(0);
+        let decorations =
+            code.iter().filter(|inst| inst.op == Some(Op::Decorate) && inst.operand(0) == image);
+        let count = decorations.filter(|inst| inst.operand(1) == Decoration::NonUniform as u32).count();
+        assert_eq!(count, usize::from(traversal == Traversal::SoftwareCpu));
     }
 }
 
