@@ -4,7 +4,7 @@
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
     BlasDesc, BuildFlags, BuildMode, Context, DeviceProfile, Error, GeometryFlags, HitGroup, RayQueryPath,
-    Result, ShaderStage, TlasDesc,
+    RayTracingPipelinePath, Result, ShaderStage, TlasDesc,
 };
 use lvk_tests::hit_check::rays_for;
 use lvk_tests::meshes::Mesh;
@@ -177,7 +177,11 @@ fn without_the_capability_only_software_can_fetch() -> Result<()> {
     let scene = scene(GeometryFlags::OPAQUE);
     let device = ctx.capabilities();
     // Acceleration structures of the library have positions whatever the device has.
-    let is_software = device.ray_query_path == RayQueryPath::Software && !device.ray_tracing_pipeline;
+    let is_software = device.ray_query_path == RayQueryPath::Software
+        && !matches!(
+            device.ray_tracing_pipeline_path,
+            RayTracingPipelinePath::Hardware | RayTracingPipelinePath::Query
+        );
     assert_eq!(device.position_fetch, is_software);
     if is_software {
         let gpu = scene.upload_with(&ctx, FETCH, BuildFlags::default(), 0)?;
