@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use ash::vk;
+
 use super::compute::{ComputePipeline, ComputePipelineDesc};
 use super::lowered_groups::{LinkedGroups, LoweredPart, link};
 use super::pipeline_layout::PipelineBase;
@@ -71,7 +73,7 @@ impl LoweringJob<'_> {
         let Self { gpu, desc, linked, plan, .. } = self;
         let lowering = Lowering {
             traversal: traversal(&gpu.caps),
-            non_uniform_descriptors: gpu.caps.reads_indices_of_idle_lanes(),
+            is_for_swiftshader: gpu.caps.driver_id == vk::DriverId::GOOGLE_SWIFTSHADER,
             modules: self.modules,
             ray_gen,
             miss: &linked.miss,

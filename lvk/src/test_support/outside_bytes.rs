@@ -50,7 +50,7 @@ fn lower_alone(stage: ShaderStage, words: &[u32]) {
     let modules = [StageModule { name: "fuzzed", stage, words, specialization: &[(0, 1)] }];
     let lowered = lower(&Lowering {
         traversal: Traversal::Query,
-        non_uniform_descriptors: true,
+        is_for_swiftshader: true,
         modules: &modules,
         ray_gen: 0,
         miss: &[0],

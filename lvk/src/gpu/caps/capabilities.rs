@@ -215,11 +215,6 @@ impl Capabilities {
         self.is_cpu && self.shader_int64
     }
 
-    /// True if the driver takes the index of a vector's first lane for all lanes, idle or not, where it may be uniform.
-    pub(crate) fn reads_indices_of_idle_lanes(&self) -> bool {
-        self.driver_id == vk::DriverId::GOOGLE_SWIFTSHADER
-    }
-
     /// True if the library builds BVHs, for pipelines or for queries in software.
     pub(crate) fn builds_software_structures(&self) -> bool {
         self.ray_query_path == RayQueryPath::Software

@@ -78,7 +78,7 @@ fn lowered(damaged: usize, words: &[u32]) -> bool {
         .collect();
     let result = lower(&Lowering {
         traversal: Traversal::Query,
-        non_uniform_descriptors: true,
+        is_for_swiftshader: true,
         modules: &modules,
         ray_gen: 0,
         miss: &[1],

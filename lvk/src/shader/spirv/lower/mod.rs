@@ -17,6 +17,7 @@ mod localize;
 mod module;
 mod non_uniform;
 mod passed;
+mod pointer_bits;
 mod promote;
 mod prune;
 mod push_constants;
@@ -32,6 +33,7 @@ use self::donor::Donor;
 use self::linker::Linker;
 use self::non_uniform::decorate_non_uniform;
 use self::passed::Passed;
+use self::pointer_bits::keep_pointers_as_bits;
 use self::shaders::Shaders;
 use self::traces::TraceVariables;
 use crate::shader::ShaderStage;
@@ -73,9 +75,8 @@ pub(crate) struct HitShaders {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lowering<'a> {
     pub(crate) traversal: Traversal,
-    /// True if images and samplers are decorated with `NonUniform`, for drivers that else take the index of a lane that may be
-    /// idle.
-    pub(crate) non_uniform_descriptors: bool,
+    /// True if SwiftShader compiles the shader.
+    pub(crate) is_for_swiftshader: bool,
     /// All shaders, without duplicates.
     pub(crate) modules: &'a [StageModule<'a>],
     /// The ray generation shader, as an index in `modules`.
@@ -151,8 +152,11 @@ pub(crate) fn lower(lowering: &Lowering<'_>) -> Result<Vec<u32>, LoweringError> 
     let mut attributes = Passed::default();
     shaders.rewrite(&mut linker, lowering, &mut variables, &mut attributes)?;
     let main = Assembly::new(&mut linker, lowering, &shaders, variables, attributes).assemble()?;
+    if lowering.is_for_swiftshader {
+        keep_pointers_as_bits(&mut linker);
+    }
     let mut module = prune::finish(linker, main);
-    if lowering.non_uniform_descriptors {
+    if lowering.is_for_swiftshader {
         decorate_non_uniform(&mut module);
     }
     Ok(module.words())

@@ -151,13 +151,13 @@ impl Shaders {
     /// True if rays that run no closest-hit shader are traced where they stand.
     ///
     /// Compilers for CPUs run every piece of code that any of eight rays needs, so few pieces and more copies of the
-    /// traversal are faster. SwiftShader, which has no 64-bit integers, takes ten times as long to compile the copies.
+    /// traversal are faster. SwiftShader takes ten times as long to compile the copies.
     fn can_trace_shadows_in_place(&self, linker: &Linker, lowering: &Lowering<'_>) -> bool {
         const MOST_PLACES: usize = 4;
-        let compiles_copies = lowering.traversal == Traversal::SoftwareCpuPairs;
+        let is_cpu = matches!(lowering.traversal, Traversal::SoftwareCpu | Traversal::SoftwareCpuPairs);
         let places =
             linker.module.functions.iter().flat_map(Function::code).filter(|inst| skips_closest_hit(inst));
-        compiles_copies && places.count() <= MOST_PLACES && !self.misses_wait(lowering)
+        is_cpu && !lowering.is_for_swiftshader && places.count() <= MOST_PLACES && !self.misses_wait(lowering)
     }
 
     /// True for an instruction at which a function waits.

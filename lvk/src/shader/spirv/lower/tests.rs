@@ -77,7 +77,7 @@ fn lowered(pipeline: &Pipeline) -> Vec<Result<Vec<u32>, LoweringError>> {
         let modules: Vec<StageModule<'_>> = pipeline.shaders.iter().zip(words).map(module).collect();
         lower(&Lowering {
             traversal,
-            non_uniform_descriptors: traversal == Traversal::SoftwareCpu,
+            is_for_swiftshader: traversal == Traversal::SoftwareCpu,
             modules: &modules,
             ray_gen: 0,
             miss: &pipeline.miss,
@@ -266,6 +266,48 @@ fn every_kind_of_pipeline_is_lowered() {
                 std::fs::write(format!("{folder}/lowered_{index}_{traversal}.spv"), bytes).unwrap();
             }
         }
+    }
+}
+
+/// The ray generation shader keeps the address of its words while it traces.
+#[test]
+fn variables_hold_no_pointers_where_the_driver_needs_it() {
+    use ::spirv::{Op, StorageClass};
+
+    const RAY_GEN: &str = "
+        layout(buffer_reference, scalar) buffer Words { uint at[]; };
+        layout(location = 0) rayPayloadEXT vec3 color;
+        layout(push_constant, scalar) uniform Push { Words words; uint tlas; };
+        void main() {
+            Words own = words;
+            for (uint i = 0; i < 3; i++) {
+                traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 1, 0, vec3(i), 0.0, vec3(1), 9.0, 0);
+                own = Words(uvec2(color.x, own.at[i]));
+            }
+            traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 1, 0, color, 0.0, vec3(1), 9.0, 0);
+            traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 1, 0, color, 0.0, vec3(1), 9.0, 0);
+            own.at[0] = 1;
+        }";
+    let mut pipeline = simple();
+    pipeline.shaders[0].1 = RAY_GEN;
+    for ((_, traversal, _), words) in donors().into_iter().zip(lowered(&pipeline)) {
+        let words = words.unwrap();
+        crate::shader::spirv::words::validate(&words).unwrap();
+        let code: Vec<_> = crate::shader::spirv::words::instructions(&words).map(Result::unwrap).collect();
+        let pointer = |ty: u32| {
+            let found = code.iter().find(|inst| inst.op == Some(Op::TypePointer) && inst.operand(0) == ty);
+            found.map(|inst| (inst.operand(1), inst.operand(2)))
+        };
+        let holds_pointer = |ty: u32| {
+            let target = pointer(ty).and_then(|(_, target)| pointer(target));
+            target.is_some_and(|(storage, _)| storage == StorageClass::PhysicalStorageBuffer as u32)
+        };
+        // A variable that is passed to a function is written once.
+        let calls = || code.iter().filter(|inst| inst.op == Some(Op::FunctionCall));
+        let is_passed = |variable: u32| calls().any(|inst| inst.words[4..].contains(&variable));
+        let mut variables = code.iter().filter(|inst| inst.op == Some(Op::Variable));
+        let has_any = variables.any(|inst| holds_pointer(inst.operand(0)) && !is_passed(inst.operand(1)));
+        assert_eq!(has_any, traversal != Traversal::SoftwareCpu);
     }
 }
 
