@@ -1,5 +1,6 @@
 //! Targets of a render pass: their checks and their conversion to Vulkan attachments.
 
+use arrayvec::ArrayVec;
 use ash::vk;
 
 use super::area::{PassArea, PassLayers};
@@ -8,7 +9,7 @@ use super::desc::{
 };
 use super::input_attachments::PassInputAttachments;
 use super::target::PassTarget;
-use crate::barrier::{Subresources, Use};
+use crate::barrier::{ResourceId, Subresources, Use};
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result, check_limit};
 use crate::format::{Format, NumericFormat};
@@ -17,6 +18,9 @@ use crate::pipeline::rendering_formats::RenderingFormats;
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit_barriers::vulkan_layout;
+
+/// Texels that a pass writes: those of its colour targets and of the textures they are resolved to.
+type DrawnTexels = ArrayVec<(ResourceId, Subresources), { 2 * RenderingFormats::MAX_COLORS }>;
 
 /// The checked targets of a pass.
 pub(super) struct PassTargets {
@@ -27,7 +31,7 @@ pub(super) struct PassTargets {
     pub(super) read_only_depth: bool,
     pub(super) inputs: PassInputAttachments,
     pub(super) rates: Option<vk::RenderingFragmentShadingRateAttachmentInfoKHR<'static>>,
-    pub(super) colors: Vec<vk::RenderingAttachmentInfo<'static>>,
+    pub(super) colors: ArrayVec<vk::RenderingAttachmentInfo<'static>, { RenderingFormats::MAX_COLORS }>,
     pub(super) depth: Option<vk::RenderingAttachmentInfo<'static>>,
     pub(super) stencil: Option<vk::RenderingAttachmentInfo<'static>>,
 }
@@ -41,8 +45,10 @@ impl CommandBuffer {
         let layers = PassLayers::new(gpu, desc)?;
         let mut inputs = PassInputAttachments::new(gpu, desc)?;
         let mut size = None;
-        let (mut colors, mut formats) = (Vec::new(), Vec::new());
-        let mut drawn = Vec::with_capacity(desc.color.len());
+        // None overflows: the limit of colour targets is `MAX_COLORS` at most.
+        let (mut colors, mut formats) =
+            (ArrayVec::new(), ArrayVec::<_, { RenderingFormats::MAX_COLORS }>::new());
+        let mut drawn = DrawnTexels::new();
         for attachment in desc.color {
             let ColorAttachment { texture, mip, layer, .. } = *attachment;
             let target = self.checked_target(texture, mip, layer, layers, &mut size)?;
@@ -144,10 +150,7 @@ impl CommandBuffer {
 }
 
 /// Fails if an earlier target has some of the target's texels.
-fn check_disjoint(
-    target: &PassTarget,
-    drawn: &mut Vec<(crate::barrier::ResourceId, Subresources)>,
-) -> Result<()> {
+fn check_disjoint(target: &PassTarget, drawn: &mut DrawnTexels) -> Result<()> {
     let (id, texels) = (target.texture.image.id, target.subresource_texels());
     if drawn.iter().any(|(other, part)| *other == id && part.intersection(texels).is_some()) {
         return Err(Error::usage(&target.texture.name, "the pass lists the colour target twice"));

@@ -28,7 +28,12 @@ pub(super) fn measure(silent: &Context, workload: Workload) -> Result<Vec<Overhe
             "",
             Limit::AtMost(0.005),
         ),
-        OverheadRow::new("heap allocations per frame of one pass and one dispatch", empty, "", Limit::None),
+        OverheadRow::new(
+            "heap allocations per frame of one pass and one dispatch",
+            empty,
+            "",
+            Limit::AtMost(0.005),
+        ),
     ];
     let grown = memory.zip(after).map(|(before, after)| after - before);
     let name = format!("resident memory growth over {} frames", workload.many);
