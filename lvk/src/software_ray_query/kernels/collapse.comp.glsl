@@ -3,5 +3,6 @@ void main() {
     readJob(firstJob);
     uvec2 nodes = nodesOfLevel(passOrJobs);
     uint i = nodes.x + invocation();
-    if (i < nodes.y) collapse(i, passOrJobs);
+    if (nodes.x >= nodes.y) return;
+    collapse(i, i < nodes.y, passOrJobs);
 }

@@ -1,75 +1,59 @@
 // Collapses binary nodes to nodes of eight children, from the root down, a level at a time. Every wide node replaces a
-// binary node and as many nodes below it as fit, the largest first. No invocation waits for another.
+// binary node and those below it that are decided to be split. No invocation waits for another workgroup.
 
 // Maximum nodes on a path that traversal supports.
 const uint kLevels = 32u;
 
-// A subtree of at most this many groups becomes no node of its own: its groups become leaves of the node above. So no
-// node has few children, and all nodes fit.
-const uint kFewGroups = 4u;
-
-// Gain of splitting a group, relative to that of splitting a node.
-const float kGroupWorth = 0.5;
-
-// The parts of a wide node: binary nodes and leaves.
+// The parts of a wide node: binary nodes and leaves, and the share of each.
 uint cutCount;
 uint cutReference[kChildren];
 uint cutShape[kChildren];
+uint cutShare[kChildren];
 Box cutBox[kChildren];
 
-void setCut(uint at, uint reference, Fitted what) {
+void setCut(uint at, uint reference, uint share, Fitted what) {
     cutReference[at] = reference;
     cutShape[at] = what.shape;
+    cutShare[at] = share;
     cutBox[at] = what.box;
 }
 
-bool isGroup(uint shape) { return countOf(shape) <= kMostOfGroup; }
-
-// Returns the minimum children that a subtree of this shape needs.
-uint childrenOf(uint shape, bool isTall) {
-    uint groups = groupsOf(shape);
-    return isTall || groups > kFewGroups ? 1u : groups;
+// Replaces a part by the halves of its node.
+void splitCut(uint at, uvec2 shares) {
+    Node below = readNode(cutReference[at]);
+    setCut(at, referenceOf(below, 0u), shares.x, childOf(below, 0u));
+    setCut(cutCount, referenceOf(below, 1u), shares.y, childOf(below, 1u));
+    cutCount += 1u;
 }
 
-// Returns the part to split next: the largest, or the tallest if the subtree is too tall; kNone if none is left.
-uint nextToOpen(uint closed, bool isTall) {
-    uint next = kNone;
-    float most = -1.0;
-    [[dont_unroll]] for (uint k = 0; k < cutCount; ++k) {
-        if (isLeaf(cutReference[k]) || (closed >> k & 1u) != 0u) continue;
-        float area = areaOf(cutBox[k]) * (isGroup(cutShape[k]) ? kGroupWorth : 1.0);
-        float worth = isTall ? float(heightOf(cutShape[k])) : area;
-        if (worth > most) {
-            most = worth;
-            next = k;
+// Splits the highest part until there is no more room, so that three levels of binary nodes end here.
+void cutHighest() {
+    [[dont_unroll]] while (cutCount < kChildren) {
+        uint next = 0u;
+        [[dont_unroll]] for (uint k = 1u; k < cutCount; ++k) {
+            if (heightOf(cutShape[k]) > heightOf(cutShape[next])) next = k;
         }
+        if (isLeaf(cutReference[next])) return;
+        splitCut(next, uvec2(0));
     }
-    return next;
 }
 
-// Splits the subtree of a binary node into the children of the wide node that replaces it. If paths would exceed the
-// depth of traversal, the tallest part is split first, so that three levels end here.
+// Splits the subtree of a binary node into the children of the wide node that replaces it: as decided, unless paths
+// would exceed the depth of traversal.
 void cutBelow(uint number, uint level) {
     Node top = readNode(number);
-    [[dont_unroll]] for (uint which = 0; which < 2; ++which) setCut(which, referenceOf(top, which), childOf(top, which));
+    uint first = decisionOf(number) & 7u;
+    setCut(0u, referenceOf(top, 0u), first, childOf(top, 0u));
+    setCut(1u, referenceOf(top, 1u), kShares - 1u - first, childOf(top, 1u));
     cutCount = 2u;
-    bool isTall = (heightOf(above(cutShape[0], cutShape[1])) + 1u) / 3u > kLevels - 1u - level;
-    uint taken = childrenOf(cutShape[0], isTall) + childrenOf(cutShape[1], isTall);
-    uint closed = 0u;  // parts that do not fit if split
-    [[dont_unroll]] while (cutCount < kChildren) {
-        uint next = nextToOpen(closed, isTall);
-        if (next == kNone) return;
-        Node below = readNode(cutReference[next]);
-        Fitted one = childOf(below, 0u), two = childOf(below, 1u);
-        uint more = childrenOf(one.shape, isTall) + childrenOf(two.shape, isTall) - childrenOf(cutShape[next], isTall);
-        if (taken + more > kChildren) {
-            closed |= 1u << next;
-            continue;
-        }
-        taken += more;
-        setCut(next, referenceOf(below, 0u), one);
-        setCut(cutCount, referenceOf(below, 1u), two);
-        cutCount += 1u;
+    if ((heightOf(above(cutShape[0], cutShape[1])) + 1u) / 3u > kLevels - 1u - level) {
+        cutHighest();
+        return;
+    }
+    [[dont_unroll]] for (uint k = 0u; k < cutCount;) {
+        uvec2 shares = uvec2(kNone);
+        if (!isLeaf(cutReference[k]) && cutShare[k] > 0u) shares = sharesOf(decisionOf(cutReference[k]), cutShare[k]);
+        if (shares.x == kNone) ++k; else splitCut(k, shares);
     }
 }
 
@@ -137,60 +121,81 @@ void placeGroup(uint slot, uint reference) {
     }
 }
 
-// Allocates consecutive nodes; returns kNone if they do not fit.
+// The nodes that the workgroup allocates, and the first of them.
+shared uint roomCount;
+shared uint roomFirst;
+
+// Allocates consecutive nodes for each invocation of the workgroup; returns kNone if those of the workgroup do not fit.
 uint roomForNodes(uint count, uint level) {
-    if (count == 0u) return 0u;
-    uint first = atomicAdd(state().word[kWideNodes], count);
-    if (first + count > job.wideCapacity) return kNone;
-    atomicMax(state().word[kEnds + level + 1u], first + count);
-    return first;
+    bool isFirst = gl_LocalInvocationIndex == 0u;
+    if (isFirst) roomCount = 0u;
+    barrier();
+    uint before_ = count == 0u ? 0u : atomicAdd(roomCount, count);
+    barrier();
+    if (isFirst && roomCount > 0u) {
+        uint first = atomicAdd(state().word[kWideNodes], roomCount);
+        bool fits = first + roomCount <= job.wideCapacity;
+        if (fits) atomicMax(state().word[kEnds + level + 1u], first + roomCount);
+        roomFirst = fits ? first : kNone;
+    }
+    barrier();
+    if (roomCount == 0u) return 0u;
+    return roomFirst == kNone ? kNone : roomFirst + before_;
 }
 
-// Writes a wide node except its bounds, and the binary node of each wide child into that child. Returns false if the
-// children do not fit.
-bool link(Words node, uint level) {
-    uint inner = 0u, count = 0u;
+// Returns the bits of the children that become nodes.
+uint innerChildren() {
+    uint inner = 0u;
+    [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) {
+        if (cutOf[child] != kNone && !isGroup(cutShape[cutOf[child]])) inner |= 1u << child;
+    }
+    return inner;
+}
+
+// Writes the references of a wide node to its children and primitives.
+void writeReferences(Words node, uint inner, uint firstNode, uint firstSlot) {
+    uint count = 0u;
     uvec2 metas = uvec2(0);
     [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) {
         if (cutOf[child] == kNone) continue;
-        uint shape = cutShape[cutOf[child]];
-        uint meta = 0x20u | 24u + child;
-        if (isGroup(shape)) {
-            meta = (1u << countOf(shape)) - 1u << 5 | count;
-            count += countOf(shape);
-        } else {
-            inner |= 1u << child;
+        uint below = countOf(cutShape[cutOf[child]]);
+        bool isInner = (inner >> child & 1u) != 0u;
+        uint meta = isInner ? 0x20u | 24u + child : (1u << below) - 1u << 5 | count;
+        if (!isInner) {
+            placeGroup(firstSlot + count, cutReference[cutOf[child]]);
+            count += below;
         }
         metas[child / 4] |= meta << (child & 3u) * 8u;
     }
-    uint firstNode = roomForNodes(bitCount(inner), level);
-    if (firstNode == kNone) return false;
-    uint firstSlot = count == 0u ? 0u : atomicAdd(state().word[kPlaced], count);
     node.word[3] = inner << 24;
     node.word[4] = firstNode;
     node.word[5] = firstSlot;
     node.word[6] = metas.x;
     node.word[7] = metas.y;
+    firstSlot += count;
     [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) {
-        if (cutOf[child] == kNone) continue;
+        if ((inner >> child & 1u) == 0u) continue;
         uint reference = cutReference[cutOf[child]];
-        uint shape = cutShape[cutOf[child]];
-        if (isGroup(shape)) {
-            placeGroup(firstSlot, reference);
-            firstSlot += countOf(shape);
-        } else {
-            wideAt(firstNode++).word[0] = reference;
-        }
+        Words below = wideAt(firstNode++);
+        below.word[0] = reference;
+        below.word[1] = firstSlot;
+        firstSlot += Words(job.parents).word[reference];
     }
-    return true;
 }
 
-// Builds wide node `i`.
-void collapse(uint i, uint level) {
+// Builds a wide node for each invocation of the workgroup, from node `i` if it exists. The primitives below each node
+// have consecutive slots, those of its own leaves first.
+void collapse(uint i, bool exists, uint level) {
     Words node = wideAt(i);
-    cutBelow(node.word[0], level);
-    order();
-    if (!link(node, level)) return;
+    uint inner = 0u;
+    if (exists) {
+        cutBelow(node.word[0], level);
+        order();
+        inner = innerChildren();
+    }
+    uint firstNode = roomForNodes(bitCount(inner), level);
+    if (!exists || firstNode == kNone) return;
+    writeReferences(node, inner, firstNode, node.word[1]);
     Box child[kChildren];
     [[dont_unroll]] for (uint k = 0; k < kChildren; ++k) child[k] = cutOf[k] == kNone ? emptyBox() : cutBox[cutOf[k]];
     encode(node, child);

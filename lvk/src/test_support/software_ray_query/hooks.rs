@@ -36,7 +36,6 @@ pub enum LeafEncoding {
 /// A BLAS to build.
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
-    pub improvements: u32,
     pub leaves: LeafEncoding,
 }
 
@@ -65,7 +64,6 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
             primitive_count: desc.geometries.iter().map(BlasGeometry::primitive_count).sum(),
             vertex_count: geometries.iter().map(|geometry| geometry.vertex_count).sum(),
             geometry_count: geometries.len() as u32,
-            improvements: desc.improvements,
         };
         let plan = GpuBuildPlan::blas("test", &shape)?;
         let (structure, target) = allocate_structure(ctx, &plan)?;
