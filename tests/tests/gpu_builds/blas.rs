@@ -296,7 +296,6 @@ fn trees_cost_rays_little_more_than_those_of_the_cpu() {
     let vertices = build_input_buffer(&ctx, &corners);
     let built = build(&ctx, &[triangle_geometry(*vertices, corners.len())]);
     let found = check_and_summarize(&ctx, &built);
-    eprintln!("{} nodes height {}", found.node_count, found.height);
     let found = found.cost;
     let triangles: Vec<[u32; 3]> =
         (0..corners.len() as u32).map(|first| [0, 1, 2].map(|at| first * 3 + at)).collect();

@@ -30,11 +30,16 @@ const MAX_PRIMITIVES: u64 = 1 << 27;
 const MAX_SMALL_BUILD: u32 = 2048;
 /// Keys that a workgroup sorts, `kBlock` of `software_ray_query/kernels/build_params.glsl`.
 pub(crate) const SORT_BLOCK: u32 = 1024;
-const DIGITS: u32 = 16;
+/// Values of a digit in large builds.
+pub(crate) const DIGITS: u32 = 256;
+/// Words of the counts of digits in all, `kDigitTotals` of `software_ray_query/kernels/build_params.glsl`.
+pub(crate) const DIGIT_TOTAL_WORDS: u32 = 8 * DIGITS;
 /// Maximum nodes on a path that traversal supports.
 pub(crate) const MAX_HEIGHT: u32 = 64;
 /// Bits of the first word of a code.
 const CODE_BITS: u32 = 30;
+/// Maximum bits of the second word: one pass of the sort.
+const MAX_LOW_BITS: u32 = 8;
 /// Words of the build state, `kStateWords` of `software_ray_query/kernels/build_params.glsl`.
 pub(crate) const STATE_WORDS: u64 = 48;
 const BOX_WORDS: u64 = 6;
@@ -261,7 +266,7 @@ fn low_bit_mask(shape: &BlasShape) -> u32 {
     if shape.primitive_count <= few {
         return 0;
     }
-    MAX_HEIGHT - CODE_BITS - number_bits(shape.primitive_count)
+    MAX_LOW_BITS.min(MAX_HEIGHT - CODE_BITS - number_bits(shape.primitive_count))
 }
 
 /// Returns the bits of a leaf's index.
@@ -320,7 +325,7 @@ fn blob_offsets(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blo
 }
 
 /// Returns the offsets. All are below 2^32 words, as kernels need: before the binary nodes, which kernels find by their
-/// address, a primitive takes at most 14 1/64 words.
+/// address, a primitive takes at most 14 1/4 words.
 fn scratch_offsets(shape: &BlasShape, long_codes: bool) -> (ScratchOffsets, u64) {
     let count = u64::from(shape.primitive_count);
     let nodes = u64::from(shape.primitive_count.saturating_sub(1));
@@ -336,7 +341,7 @@ fn scratch_offsets(shape: &BlasShape, long_codes: bool) -> (ScratchOffsets, u64)
         boxes: part(count * BOX_WORDS),
         keys: part(keys),
         spare_keys: part(keys),
-        digits: part(blocks * u64::from(DIGITS)),
+        digits: part(u64::from(DIGIT_TOTAL_WORDS) + blocks * u64::from(DIGITS)),
         arrivals: part(nodes),
         parents: part(nodes),
         binary: part(binary),
@@ -409,7 +414,7 @@ mod tests {
                 (at(plan.scratch.boxes), count * 24),
                 (at(plan.scratch.keys), keys),
                 (at(plan.scratch.spare_keys), keys),
-                (at(plan.scratch.digits), count.div_ceil(1024) * 64),
+                (at(plan.scratch.digits), (8 + count.div_ceil(1024)) * 1024),
                 (at(plan.scratch.arrivals), nodes * 4),
                 (at(plan.scratch.parents), nodes * 4),
                 (at(plan.scratch.binary), nodes * 96),

@@ -1,7 +1,9 @@
 //! The order of the build kernels, and their parallel phases.
 
 use crate::kernels::Kernel;
-use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SORT_BLOCK};
+use crate::software_ray_query::gpu_build::layout::{
+    BuildSource, DIGIT_TOTAL_WORDS, DIGITS, GpuBuildPlan, SORT_BLOCK,
+};
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 
@@ -9,9 +11,12 @@ use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 const WORKGROUP_SIZE: u32 = 128;
 /// Invocations of a workgroup that merges clusters, `LVK_GROUP` of `software_ray_query/kernels/cluster_group.glsl`.
 const CLUSTER_GROUP_SIZE: u32 = 32;
-/// Passes over the first word of codes with four bits each, and the maximum passes over both words.
-const FIRST_WORD_PASSES: u32 = 8;
-const MAX_PASSES: u32 = 16;
+/// Children of a wide node.
+const BVH8_CHILDREN: u32 = 8;
+/// Bits of a digit, and passes over the first word of codes. Large builds have at most eight passes.
+const DIGIT_BITS: u32 = 8;
+const FIRST_WORD_PASSES: u32 = 4;
+const MAX_PASSES: u32 = 8;
 
 /// One dispatch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,8 +83,8 @@ fn large_build_steps(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<
         _ => Kernel::BuildPrimitives,
     };
     add(0, Kernel::BuildReset, 1);
-    add(1, read, groups(count));
-    add(2, Kernel::BuildCodes, groups(count));
+    add(1, read, count.div_ceil(SORT_BLOCK).max(1));
+    add(2, Kernel::BuildCodes, groups(count.max(DIGIT_TOTAL_WORDS)));
     steps.extend(sort_steps(job, count, plan.low_bits));
     steps.push(cluster_step(3 + MAX_PASSES * 3, job, 1, count));
     if plan.leaf_kind != LeafKind::Instances {
@@ -106,12 +111,12 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
         groups: groups(invocations),
         groups_of_job: 0,
     };
-    // Eight times as many nodes as in the level above, up to the capacity.
+    // Eight times as many nodes as in the level above, up to the capacity, with eight invocations each.
     let nodes = |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity);
     let levels = if plan.wide_capacity > 0 { MAX_BVH8_DEPTH as u32 } else { 0 };
     let written = plan.capacity.max(plan.geometry_count).max(plan.vertex_count);
     let mut steps: Vec<_> =
-        (0..levels).map(|level| step(level, Kernel::Collapse, level, nodes(level))).collect();
+        (0..levels).map(|level| step(level, Kernel::Collapse, level, nodes(level) * BVH8_CHILDREN)).collect();
     steps.push(step(levels, Kernel::WriteBlas, 0, written));
     steps.push(step(levels + 1, Kernel::FitPacked, 0, plan.wide_capacity));
     steps
@@ -120,7 +125,7 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
 /// Returns the steps that sort the keys of a build, the low words first.
 pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<BuildStep> {
     let blocks = count.div_ceil(SORT_BLOCK).max(1);
-    let passes = low_bits.div_ceil(4) + FIRST_WORD_PASSES;
+    let passes = low_bits.div_ceil(DIGIT_BITS) + FIRST_WORD_PASSES;
     let pass = |pass_or_jobs| {
         let step = |nth, kernel, groups| BuildStep {
             phase: 3 + pass_or_jobs * 3 + nth,
@@ -132,7 +137,7 @@ pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<BuildStep> 
         };
         [
             step(0, Kernel::SortCount, blocks),
-            step(1, Kernel::SortScan, 1),
+            step(1, Kernel::SortScan, DIGITS),
             step(2, Kernel::SortScatter, blocks),
         ]
     };
@@ -190,8 +195,8 @@ mod tests {
                 let own: Vec<_> = steps.iter().filter(covers).collect();
                 let expected = match counts[*build] {
                     0..=2048 => 3,
-                    2049..=4096 => 4 + 8 * 3 + 34,
-                    _ => 4 + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8) + 34,
+                    2049..=4096 => 4 + 4 * 3 + 34,
+                    _ => 4 + 3 * (plans[*build].low_bits.div_ceil(8) as usize + 4) + 34,
                 };
                 prop_assert_eq!(own.len(), expected);
             }

@@ -5,8 +5,8 @@
 layout(local_size_x = LVK_GROUP) in;
 
 const uint kGroup = LVK_GROUP;
-const uint kItems = 8u;               // keys that an invocation sorts
-const uint kBlock = kGroup * kItems;  // keys that a workgroup sorts
+const uint kItems = 8u;               // primitives of an invocation that bounds or sorts them
+const uint kBlock = kGroup * kItems;  // those of a workgroup
 const uint kNone = 0xffffffffu;
 const uint kLeaf = 0x80000000u;
 
@@ -52,7 +52,7 @@ struct Job {
     uint boxes;          // offsets in the scratch memory, in words: six floats for each primitive or wide node
     uint keys;           // codes and indices of primitives
     uint spareKeys;      // later the clusters of ranges, then the index of the primitive in each slot of the leaves
-    uint digits;         // count of each digit in each block
+    uint digits;         // counts of each digit, of each pass and in each block
     uint arrivals;       // a counter for each node; during builds, the end of the range that came first at each gap
     uint nodeCapacity;   // maximum binary nodes of a build, maximum nodes of a refit
     uint reserved;
@@ -94,10 +94,18 @@ uvec2 work(uint words) { return plus(job.scratch, words << 2, words >> 30); }
 
 Words header() { return Words(job.blob); }
 
-// Passes of the sort: four bits each, the second words first, then 31 bits of the first words.
-uint lowPasses() { return (job.lowBits + 3) / 4; }
+// Passes of the sort, by bits of the second words first, then of the first words.
+#ifndef LVK_DIGIT_BITS
+#define LVK_DIGIT_BITS 8
+#endif
+const uint kDigitBits = LVK_DIGIT_BITS;
 
-uint passes() { return lowPasses() + 8; }
+uint lowPasses() { return (job.lowBits + kDigitBits - 1u) / kDigitBits; }
+
+uint passes() { return lowPasses() + 32u / kDigitBits; }
+
+// The words before the counts of digits in blocks: counts in all, for each pass and digit.
+const uint kDigitTotals = 8u * 256u;
 
 // Returns the keys before a pass; after the last they are in `keys`.
 Words keysBefore(uint pass) { return Words(work((passes() - pass & 1u) != 0u ? job.spareKeys : job.keys)); }

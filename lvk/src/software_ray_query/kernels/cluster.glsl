@@ -24,6 +24,7 @@ struct Cluster { Box box; uint reference; uint shape; uint last; uint count; };
 shared vec3 clusterLow[kGroup];
 shared vec3 clusterHigh[kGroup];
 shared uvec4 clusterRest[kGroup];
+shared float clusterCost[kShares * kGroup];
 shared uint nearest[kGroup];
 
 // For each invocation, the range that it reached: the first leaf, the first of the second half, and the last.
@@ -45,6 +46,19 @@ void putCluster(uint at, Cluster cluster) {
     clusterHigh[at] = cluster.box.hi;
     clusterRest[at] = uvec4(cluster.reference, cluster.shape, cluster.last, cluster.count);
 }
+
+Costs costsAt(uint at) {
+    Costs costs;
+    [[unroll]] for (uint share = 0u; share < kShares; ++share) costs.of[share] = clusterCost[share * kGroup + at];
+    return costs;
+}
+
+void putCosts(uint at, Costs costs) {
+    [[unroll]] for (uint share = 0u; share < kShares; ++share) clusterCost[share * kGroup + at] = costs.of[share];
+}
+
+// True if wide nodes replace the binary ones.
+bool isDecided() { return job.wideCapacity != 0u; }
 
 // Adds the bit of an invocation, and returns the bits of all.
 uint bitsOf(bool isSet) {
@@ -85,31 +99,51 @@ uint joinHalves(uvec3 range) {
     } else if (at < start + leaves) {
         reference = leafReference(at);
     }
-    uint bits = bitsOf(reference != kNone);
-    if (reference != kNone) putCluster(bitsBelow(bits), readCluster(reference, last));
+    bool exists = reference != kNone;
+    Cluster cluster;
+    Costs costs;
+    if (exists) {
+        cluster = readCluster(reference, last);
+        if (isDecided()) costs = costsOf(reference, areaOf(cluster.box));
+    }
+    uint bits = bitsOf(exists);
+    if (exists) {
+        putCluster(bitsBelow(bits), cluster);
+        if (isDecided()) putCosts(bitsBelow(bits), costs);
+    }
     barrier();
     return bitCount(bits);
 }
 
-// Returns the neighbour of a cluster whose union with it has the least area. Of equals, the cluster prefers the one at
-// the position with the last bit flipped, so that equal clusters choose each other.
-uint findNearest(uint own, uint count) {
-    Box box = clusterBox(own);
-    uint best = own ^ 1u;
-    if (best >= count) best = own - 1u;
-    float least = areaOf(join(box, clusterBox(best)));
-    [[dont_unroll]] for (uint step_ = 1u; step_ <= kReach; ++step_) {
-        for (uint side = 0u; side < 2u; ++side) {
-            uint other = side == 0u ? own - step_ : own + step_;
-            if (other >= count) continue;
-            float area = areaOf(join(box, clusterBox(other)));
-            if (area < least) {
-                least = area;
-                best = other;
-            }
+// Areas of the unions of each cluster with those behind it, for each distance less one.
+shared float unionArea[kReach * kGroup];
+
+// Returns the neighbour of the invocation's cluster whose union with it has the least area. Of equals, the cluster
+// prefers the one at the position with the last bit flipped, so that equal clusters choose each other.
+uint findNearest(uint count) {
+    uint t = gl_LocalInvocationIndex;
+    float behind[kReach];
+    Box box = clusterBox(t);
+    [[unroll]] for (uint step_ = 1u; step_ <= kReach; ++step_) {
+        behind[step_ - 1u] = t + step_ < count ? areaOf(join(box, clusterBox(t + step_))) : kFar;
+        unionArea[(step_ - 1u) * kGroup + t] = behind[step_ - 1u];
+    }
+    barrier();
+    bool isFlippedBehind = (t & 1u) == 0u && t + 1u < count;
+    uint best = isFlippedBehind ? t + 1u : t - 1u;
+    float least = isFlippedBehind || t == 0u ? behind[0] : unionArea[t - 1u];
+    [[unroll]] for (uint step_ = 1u; step_ <= kReach; ++step_) {
+        float before_ = t >= step_ ? unionArea[(step_ - 1u) * kGroup + t - step_] : kFar;
+        if (before_ < least) {
+            least = before_;
+            best = t - step_;
+        }
+        if (behind[step_ - 1u] < least) {
+            least = behind[step_ - 1u];
+            best = t + step_;
         }
     }
-    return best;
+    return t < count ? best : t;
 }
 
 // Makes a node of two clusters.
@@ -123,10 +157,6 @@ Cluster merged(Cluster one, Cluster two) {
     Cluster both = Cluster(join(one.box, two.box), node, above(one.shape, two.shape), max(one.last, two.last),
                            one.count + two.count);
     primitiveCounts().word[node] = both.count;
-    if (job.wideCapacity != 0u) {
-        decide(node, areaOf(both.box), both.shape, costsOf(one.reference, areaOf(one.box)),
-               costsOf(two.reference, areaOf(two.box)));
-    }
     return both;
 }
 
@@ -135,7 +165,7 @@ Cluster merged(Cluster one, Cluster two) {
 uint mergePairs(uint count, uint highest, bool byPosition) {
     uint t = gl_LocalInvocationIndex;
     bool exists = t < count;
-    uint other = byPosition || !exists ? t : findNearest(t, count);
+    uint other = byPosition ? t : findNearest(count);
     nearest[t] = other;
     barrier();
     bool isPair = exists && !byPosition && nearest[other] == t;
@@ -148,11 +178,20 @@ uint mergePairs(uint count, uint highest, bool byPosition) {
     }
     bool stays = (staying >> t & 1u) != 0u;
     Cluster own;
-    if (stays) own = clusterAt(t);
-    if (stays && isPair) own = merged(own, clusterAt(other));
-    memoryBarrierBuffer();
+    Costs costs;
+    if (stays) {
+        own = clusterAt(t);
+        if (isDecided()) costs = costsAt(t);
+        if (isPair) {
+            own = merged(own, clusterAt(other));
+            if (isDecided()) costs = decide(own.reference, areaOf(own.box), own.shape, costs, costsAt(other));
+        }
+    }
     barrier();
-    if (stays) putCluster(bitsBelow(staying), own);
+    if (stays) {
+        putCluster(bitsBelow(staying), own);
+        if (isDecided()) putCosts(bitsBelow(staying), costs);
+    }
     barrier();
     return bitCount(staying);
 }
@@ -212,16 +251,25 @@ void mergeRange(uvec3 range, uint leaves) {
 // Walks up from a range of leaves. Returns the first leaf of the second half of a range of many leaves, or kNone if an
 // invocation from the other half goes on.
 uint climb(inout uint first, inout uint last, uint leaves) {
+    uint before_ = first == 0u ? 0u : sharedBits(first - 1u, first);
+    uint behind = last + 1u == leaves ? 0u : sharedBits(last, last + 1u);
     while (true) {
-        bool isFirst = first == 0u ||
-                       (last + 1u < leaves && sharedBits(last, last + 1u) > sharedBits(first - 1u, first));
+        bool isFirst = first == 0u || (last + 1u < leaves && behind > before_);
         uint gap = isFirst ? last : first - 1u;
-        memoryBarrierBuffer();
+        // Publishes the clusters of the range, which the workgroup wrote before its last barrier.
+        if (last - first >= kStaying) memoryBarrierBuffer();
         uint end = atomicExchange(Words(work(job.arrivals)).word[gap], isFirst ? first : last);
         if (end == kNone) return kNone;
-        memoryBarrierBuffer();
         if (isFirst) last = end; else first = end;
-        if (last - first >= kStaying || last - first + 1u == leaves) return gap + 1u;
+        if (last - first >= kStaying || last - first + 1u == leaves) {
+            memoryBarrierBuffer();
+            return gap + 1u;
+        }
+        if (isFirst) {
+            behind = last + 1u == leaves ? 0u : sharedBits(last, last + 1u);
+        } else {
+            before_ = first == 0u ? 0u : sharedBits(first - 1u, first);
+        }
     }
 }
 

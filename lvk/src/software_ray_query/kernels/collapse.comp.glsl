@@ -2,7 +2,6 @@
 void main() {
     readJob(firstJob);
     uvec2 nodes = nodesOfLevel(passOrJobs);
-    uint i = nodes.x + invocation();
-    if (nodes.x >= nodes.y) return;
-    collapse(i, i < nodes.y, passOrJobs);
+    uint first = nodes.x + groupNumber() * kTeams;
+    if (first < nodes.y) collapse(first, nodes.y, passOrJobs);
 }

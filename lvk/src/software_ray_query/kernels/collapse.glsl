@@ -1,102 +1,170 @@
 // Collapses binary nodes to nodes of eight children, from the root down, a level at a time. Every wide node replaces a
-// binary node and those below it that are decided to be split. No invocation waits for another workgroup.
+// binary node and those below it that are decided to be split. A team of eight invocations builds a node: each has a
+// part of the node, and then a child. No invocation waits for another workgroup.
 
 // Maximum nodes on a path that traversal supports.
 const uint kLevels = 32u;
 
-// The parts of a wide node: binary nodes and leaves, and the share of each.
-uint cutCount;
-uint cutReference[kChildren];
-uint cutShape[kChildren];
-uint cutShare[kChildren];
-Box cutBox[kChildren];
+// Nodes that a workgroup builds at a time.
+const uint kTeams = kGroup / kChildren;
 
-void setCut(uint at, uint reference, uint share, Fitted what) {
-    cutReference[at] = reference;
-    cutShape[at] = what.shape;
-    cutShare[at] = share;
-    cutBox[at] = what.box;
+uint team() { return gl_LocalInvocationIndex / kChildren; }
+
+// The index of the invocation in its team: that of its part, later of its child.
+uint own() { return gl_LocalInvocationIndex % kChildren; }
+
+// Returns the place of a part or child of the team in shared memory.
+uint teamPlace(uint at) { return gl_LocalInvocationIndex - own() + at; }
+
+// A binary node or leaf that becomes a child of the wide node. Its share limits what it is split into.
+struct Part { uint reference; uint shape; uint share; Box box; };
+
+shared uint partReference[kGroup];
+shared uint partShape[kGroup];
+shared uint partShare[kGroup];
+shared vec3 partLow[kGroup];
+shared vec3 partHigh[kGroup];
+shared uint teamBits[kTeams];
+shared bool isAnySet;
+
+// Adds the bit of an invocation. Returns the bits of the team.
+uint bitsOfTeam(bool isSet) {
+    barrier();
+    if (own() == 0u) teamBits[team()] = 0u;
+    if (gl_LocalInvocationIndex == 0u) isAnySet = false;
+    barrier();
+    if (isSet) {
+        atomicOr(teamBits[team()], 1u << own());
+        isAnySet = true;
+    }
+    barrier();
+    return teamBits[team()];
 }
 
-// Replaces a part by the halves of its node.
-void splitCut(uint at, uvec2 shares) {
-    Node below = readNode(cutReference[at]);
-    setCut(at, referenceOf(below, 0u), shares.x, childOf(below, 0u));
-    setCut(cutCount, referenceOf(below, 1u), shares.y, childOf(below, 1u));
-    cutCount += 1u;
+Part halfOf(uint number, uint which, uint share) {
+    Node node = readNode(number);
+    Fitted half_ = childOf(node, which);
+    return Part(referenceOf(node, which), half_.shape, share, half_.box);
 }
 
-// Splits the highest part until there is no more room, so that three levels of binary nodes end here.
-void cutHighest() {
-    [[dont_unroll]] while (cutCount < kChildren) {
-        uint next = 0u;
-        [[dont_unroll]] for (uint k = 1u; k < cutCount; ++k) {
-            if (heightOf(cutShape[k]) > heightOf(cutShape[next])) next = k;
+// Returns the first part of the team with the greatest height.
+uint highestPart(uint count) {
+    uint highest = 0u;
+    [[dont_unroll]] for (uint k = 1u; k < count; ++k) {
+        if (heightOf(partShape[teamPlace(k)]) > heightOf(partShape[teamPlace(highest)])) highest = k;
+    }
+    return highest;
+}
+
+// Returns the shares of the halves of a part that is split, else kNone. Parts are split as decided, or the highest while
+// there is room, so that three levels of binary nodes end here.
+uvec2 splitOf(Part part, uint count, bool isTall) {
+    if (own() >= count || isLeaf(part.reference)) return uvec2(kNone);
+    if (!isTall) return part.share == 0u ? uvec2(kNone) : sharesOf(decisionOf(part.reference), part.share);
+    return count < kChildren && own() == highestPart(count) ? uvec2(0) : uvec2(kNone);
+}
+
+// Splits the subtree of a binary node into the parts of the wide node that replaces it, one for each invocation. Returns
+// their number. Parts are split as decided, unless paths would exceed the depth of traversal.
+uint cutBelow(uint number, bool exists, uint level, out Part part) {
+    part = Part(kNone, 0u, 0u, emptyBox());
+    bool isTall = false;
+    uint count = exists ? 2u : 0u;
+    if (exists) {
+        Node top = readNode(number);
+        isTall = (heightOf(above(top.part[2].w, top.part[3].w)) + 1u) / 3u > kLevels - 1u - level;
+        uint first = decisionOf(number) & 7u;
+        if (own() < 2u) part = halfOf(number, own(), own() == 0u ? first : kShares - 1u - first);
+    }
+    [[dont_unroll]] while (true) {
+        partShape[gl_LocalInvocationIndex] = part.shape;
+        barrier();
+        uvec2 shares = splitOf(part, count, isTall);
+        bool isSplit = shares.x != kNone;
+        if (!isSplit) part.share = 0u;
+        uint bits = bitsOfTeam(isSplit);
+        if (!isAnySet) return count;
+        if (isSplit) {
+            uint added = teamPlace(count + bitCount(bits & (1u << own()) - 1u));
+            partReference[added] = part.reference;
+            partShare[added] = shares.y;
+            part = halfOf(part.reference, 0u, shares.x);
         }
-        if (isLeaf(cutReference[next])) return;
-        splitCut(next, uvec2(0));
+        barrier();
+        uint more = count + bitCount(bits);
+        uint t = gl_LocalInvocationIndex;
+        if (own() >= count && own() < more) part = halfOf(partReference[t], 1u, partShare[t]);
+        count = more;
     }
 }
 
-// Splits the subtree of a binary node into the children of the wide node that replaces it: as decided, unless paths
-// would exceed the depth of traversal.
-void cutBelow(uint number, uint level) {
-    Node top = readNode(number);
-    uint first = decisionOf(number) & 7u;
-    setCut(0u, referenceOf(top, 0u), first, childOf(top, 0u));
-    setCut(1u, referenceOf(top, 1u), kShares - 1u - first, childOf(top, 1u));
-    cutCount = 2u;
-    if ((heightOf(above(cutShape[0], cutShape[1])) + 1u) / 3u > kLevels - 1u - level) {
-        cutHighest();
-        return;
-    }
-    [[dont_unroll]] for (uint k = 0u; k < cutCount;) {
-        uvec2 shares = uvec2(kNone);
-        if (!isLeaf(cutReference[k]) && cutShare[k] > 0u) shares = sharesOf(decisionOf(cutReference[k]), cutShare[k]);
-        if (shares.x == kNone) ++k; else splitCut(k, shares);
-    }
+void sharePart(Part part) {
+    uint t = gl_LocalInvocationIndex;
+    barrier();
+    partReference[t] = part.reference;
+    partShape[t] = part.shape;
+    partLow[t] = part.box.lo;
+    partHigh[t] = part.box.hi;
+    barrier();
 }
 
-// The index of the part of each child; kNone for a missing child.
-uint cutOf[kChildren];
+Box partBox(uint at) { return Box(partLow[teamPlace(at)], partHigh[teamPlace(at)]); }
 
-// For each part the best free child, and the part's distance along the direction of that child.
-uint cutChild[kChildren];
-float cutAlong[kChildren];
+// Returns the union of the parts, which are shared.
+Box wholeBox(uint count) {
+    Box whole = emptyBox();
+    [[dont_unroll]] for (uint k = 0u; k < count; ++k) whole = join(whole, partBox(k));
+    return whole;
+}
 
-void findChild(uint k, vec3 middle) {
-    vec3 offset = centre(cutBox[k]) - middle;
-    cutAlong[k] = kFar;
-    [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) {
+// For each part the best free child, and the distance of the part along the direction of that child.
+shared uint bestChild[kGroup];
+shared float bestAlong[kGroup];
+
+// The part of each child; kNone for a missing child.
+shared uint partOfChild[kGroup];
+
+void findChild(vec3 offset, uint taken) {
+    uint t = gl_LocalInvocationIndex;
+    float least = kFar;
+    uint found = 0u;
+    [[unroll]] for (uint child = 0u; child < kChildren; ++child) {
         vec3 along = mix(offset, -offset, notEqual(uvec3(child) & uvec3(4u, 2u, 1u), uvec3(0)));
         float sum = along.x + along.y + along.z;
-        if (cutOf[child] == kNone && sum < cutAlong[k]) {
-            cutAlong[k] = sum;
-            cutChild[k] = child;
+        if ((taken >> child & 1u) == 0u && sum < least) {
+            least = sum;
+            found = child;
         }
     }
+    bestAlong[t] = least;
+    bestChild[t] = found;
 }
 
 // Assigns a child to each part. Rays visit the parts along their direction, seen from the middle, last. The outermost
 // part chooses first.
-void order() {
-    Box whole = cutBox[0];
-    [[dont_unroll]] for (uint k = 1; k < cutCount; ++k) whole = join(whole, cutBox[k]);
-    vec3 middle = centre(whole);
-    [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) cutOf[child] = kNone;
-    [[dont_unroll]] for (uint k = 0; k < cutCount; ++k) findChild(k, middle);
-    uint waiting = (1u << cutCount) - 1u;
-    [[dont_unroll]] while (waiting != 0u) {
-        uint first = uint(findLSB(waiting));
-        [[dont_unroll]] for (uint k = first + 1u; k < cutCount; ++k) {
-            if ((waiting >> k & 1u) != 0u && cutAlong[k] < cutAlong[first]) first = k;
+void order(Box box, vec3 middle, uint count) {
+    uint t = gl_LocalInvocationIndex;
+    partOfChild[t] = kNone;
+    bool waits = own() < count;
+    uint taken = 0u;
+    [[dont_unroll]] for (uint round_ = 0u; round_ < kChildren; ++round_) {
+        bestAlong[t] = kFar;
+        if (waits) findChild(centre(box) - middle, taken);
+        barrier();
+        uint first = kNone;
+        float least = kFar;
+        [[dont_unroll]] for (uint k = 0u; k < count; ++k) {
+            if (bestAlong[teamPlace(k)] < least) {
+                least = bestAlong[teamPlace(k)];
+                first = k;
+            }
         }
-        uint taken = cutChild[first];
-        cutOf[taken] = first;
-        waiting &= ~(1u << first);
-        [[dont_unroll]] for (uint k = 0; k < cutCount; ++k) {
-            if ((waiting >> k & 1u) != 0u && cutChild[k] == taken) findChild(k, middle);
+        if (first != kNone) taken |= 1u << bestChild[teamPlace(first)];
+        if (first == own()) {
+            partOfChild[teamPlace(bestChild[t])] = own();
+            waits = false;
         }
+        barrier();
     }
 }
 
@@ -124,13 +192,15 @@ void placeGroup(uint slot, uint reference) {
 // The nodes that the workgroup allocates, and the first of them.
 shared uint roomCount;
 shared uint roomFirst;
+shared uint teamRoom[kTeams];
 
-// Allocates consecutive nodes for each invocation of the workgroup; returns kNone if those of the workgroup do not fit.
+// Allocates consecutive nodes for the children of each team. Returns the first, or kNone if those of the workgroup do
+// not fit.
 uint roomForNodes(uint count, uint level) {
     bool isFirst = gl_LocalInvocationIndex == 0u;
     if (isFirst) roomCount = 0u;
     barrier();
-    uint before_ = count == 0u ? 0u : atomicAdd(roomCount, count);
+    if (own() == 0u) teamRoom[team()] = atomicAdd(roomCount, count);
     barrier();
     if (isFirst && roomCount > 0u) {
         uint first = atomicAdd(state().word[kWideNodes], roomCount);
@@ -140,65 +210,106 @@ uint roomForNodes(uint count, uint level) {
     }
     barrier();
     if (roomCount == 0u) return 0u;
-    return roomFirst == kNone ? kNone : roomFirst + before_;
+    return roomFirst == kNone ? kNone : roomFirst + teamRoom[team()];
 }
 
-// Returns the bits of the children that become nodes.
-uint innerChildren() {
-    uint inner = 0u;
-    [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) {
-        if (cutOf[child] != kNone && !isGroup(cutShape[cutOf[child]])) inner |= 1u << child;
-    }
-    return inner;
-}
+// Numbers of primitives below the children.
+shared uint childCount[kGroup];
 
-// Writes the references of a wide node to its children and primitives.
-void writeReferences(Words node, uint inner, uint firstNode, uint firstSlot) {
+// Returns the primitives of the children with these bits.
+uint countOfChildren(uint bits) {
     uint count = 0u;
-    uvec2 metas = uvec2(0);
-    [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) {
-        if (cutOf[child] == kNone) continue;
-        uint below = countOf(cutShape[cutOf[child]]);
-        bool isInner = (inner >> child & 1u) != 0u;
-        uint meta = isInner ? 0x20u | 24u + child : (1u << below) - 1u << 5 | count;
-        if (!isInner) {
-            placeGroup(firstSlot + count, cutReference[cutOf[child]]);
-            count += below;
-        }
-        metas[child / 4] |= meta << (child & 3u) * 8u;
+    [[dont_unroll]] for (uint child = 0u; child < kChildren; ++child) {
+        if ((bits >> child & 1u) != 0u) count += childCount[teamPlace(child)];
     }
-    node.word[3] = inner << 24;
-    node.word[4] = firstNode;
-    node.word[5] = firstSlot;
-    node.word[6] = metas.x;
-    node.word[7] = metas.y;
-    firstSlot += count;
-    [[dont_unroll]] for (uint child = 0; child < kChildren; ++child) {
-        if ((inner >> child & 1u) == 0u) continue;
-        uint reference = cutReference[cutOf[child]];
-        Words below = wideAt(firstNode++);
-        below.word[0] = reference;
-        below.word[1] = firstSlot;
-        firstSlot += Words(job.parents).word[reference];
+    return count;
+}
+
+// The words of the nodes of all teams. Only written nodes have the mark.
+shared uint nodeWords[kTeams * kWideWords];
+shared bool isWritten[kTeams];
+
+void addByte(uint word, uint byte_) {
+    atomicOr(nodeWords[team() * kWideWords + word + own() / 4u], byte_ << (own() & 3u) * 8u);
+}
+
+// Adds the bounds of a child.
+void addBounds(Box box, vec3 corner, uvec3 exponentOfAxis) {
+    bool none = isEmpty(box);
+    [[unroll]] for (uint axis = 0u; axis < 3u; ++axis) {
+        float unit = uintBitsToFloat(exponentOfAxis[axis] << 23);
+        addByte(8u + axis * 4u, none ? 255u : stepsDown(box.lo[axis] - corner[axis], unit));
+        addByte(10u + axis * 4u, none ? 0u : stepsUp(box.hi[axis] - corner[axis], unit));
     }
 }
 
-// Builds a wide node for each invocation of the workgroup, from node `i` if it exists. The primitives below each node
+void addNode(vec3 corner, uvec3 exponentOfAxis, uint inner, uint firstNode, uint firstSlot) {
+    uint at = team() * kWideWords;
+    [[unroll]] for (uint axis = 0u; axis < 3u; ++axis) nodeWords[at + axis] = floatBitsToUint(corner[axis]);
+    nodeWords[at + 3u] = exponentOfAxis.x | exponentOfAxis.y << 8 | exponentOfAxis.z << 16 | inner << 24;
+    nodeWords[at + 4u] = firstNode;
+    nodeWords[at + 5u] = firstSlot;
+}
+
+// Writes the references to the primitives or to the node of a child. Returns its meta byte. The primitives below a node
 // have consecutive slots, those of its own leaves first.
-void collapse(uint i, bool exists, uint level) {
-    Words node = wideAt(i);
-    uint inner = 0u;
-    if (exists) {
-        cutBelow(node.word[0], level);
-        order();
-        inner = innerChildren();
+uint writeChildReferences(uint reference, uint shape, uint inner, uint all_, uint firstNode, uint firstSlot) {
+    uint before_ = (1u << own()) - 1u, leaves = all_ & ~inner;
+    if ((all_ >> own() & 1u) == 0u) return 0u;
+    if ((leaves >> own() & 1u) != 0u) {
+        uint slot = countOfChildren(leaves & before_);
+        placeGroup(firstSlot + slot, reference);
+        return (1u << countOf(shape)) - 1u << 5 | slot;
     }
+    Words below = wideAt(firstNode + bitCount(inner & before_));
+    below.word[0] = reference;
+    below.word[1] = firstSlot + countOfChildren(leaves) + countOfChildren(inner & before_);
+    return 0x20u | 24u + own();
+}
+
+// Writes the nodes of all teams.
+void writeNodes(uint first) {
+    barrier();
+    [[dont_unroll]] for (uint at = gl_LocalInvocationIndex; at < kTeams * kWideWords; at += kGroup) {
+        uint of = at / kWideWords;
+        if (isWritten[of]) wideAt(first + of).word[at - of * kWideWords] = nodeWords[at];
+    }
+}
+
+// Builds the wide nodes from `first` to before `end`, at most as many as there are teams.
+void collapse(uint first, uint end, uint level) {
+    uint t = gl_LocalInvocationIndex;
+    [[dont_unroll]] for (uint at = t; at < kTeams * kWideWords; at += kGroup) nodeWords[at] = 0u;
+    bool exists = first + team() < end;
+    uint number = 0u, firstSlot = 0u;
+    if (exists) {
+        Words from = wideAt(first + team());
+        number = from.word[0];
+        firstSlot = from.word[1];
+    }
+    Part part;
+    uint count = cutBelow(number, exists, level, part);
+    sharePart(part);
+    Box whole = wholeBox(count);
+    order(part.box, centre(whole), count);
+    bool hasPart = partOfChild[t] != kNone;
+    uint from = teamPlace(hasPart ? partOfChild[t] : 0u);
+    uint reference = partReference[from], shape = partShape[from];
+    bool isInner = hasPart && !isGroup(shape);
+    childCount[t] = isInner ? Words(job.parents).word[reference] : hasPart ? countOf(shape) : 0u;
+    uint all_ = bitsOfTeam(hasPart);
+    uint inner = bitsOfTeam(isInner);
     uint firstNode = roomForNodes(bitCount(inner), level);
-    if (!exists || firstNode == kNone) return;
-    writeReferences(node, inner, firstNode, node.word[1]);
-    Box child[kChildren];
-    [[dont_unroll]] for (uint k = 0; k < kChildren; ++k) child[k] = cutOf[k] == kNone ? emptyBox() : cutBox[cutOf[k]];
-    encode(node, child);
+    bool isComplete = exists && firstNode != kNone;
+    if (own() == 0u) isWritten[team()] = isComplete;
+    if (isComplete) {
+        addByte(6u, writeChildReferences(reference, shape, inner, all_, firstNode, firstSlot));
+        uvec3 exponentOfAxis = exponentsOf(whole.hi - whole.lo);
+        addBounds(hasPart ? Box(partLow[from], partHigh[from]) : emptyBox(), whole.lo, exponentOfAxis);
+        if (own() == 0u) addNode(whole.lo, exponentOfAxis, inner, firstNode, firstSlot);
+    }
+    writeNodes(first);
+    barrier();
 }
 
 // Returns the range of the wide nodes of a level: the first, and the one after the last.

@@ -30,8 +30,8 @@ Costs costsOf(uint reference, float area) {
     return costs;
 }
 
-// Decides for a node of this area and shape, whose halves have these costs.
-void decide(uint node, float area, uint shape, Costs one, Costs other) {
+// Decides for a node of this area and shape, whose halves have these costs. Returns the costs of the node.
+Costs decide(uint node, float area, uint shape, Costs one, Costs other) {
     float least[kShares];
     uint first[kShares];
     [[unroll]] for (uint both = 0u; both < kShares; ++both) {
@@ -49,13 +49,14 @@ void decide(uint node, float area, uint shape, Costs one, Costs other) {
     float whole = least[6] + area * kNodeCost;
     if (isFew) whole = isGroup(shape) ? area * kPrimitiveCost * float(countOf(shape)) : kNever;
     uint decision = first[6];
-    float cost[kShares];
-    cost[0] = whole;
+    Costs all_;
+    all_.of[0] = whole;
     [[unroll]] for (uint share = 1u; share < kShares; ++share) {
-        bool isLess = least[share - 1u] < cost[share - 1u];
-        cost[share] = min(isLess ? least[share - 1u] : cost[share - 1u], kNever);
+        bool isLess = least[share - 1u] < all_.of[share - 1u];
+        all_.of[share] = min(isLess ? least[share - 1u] : all_.of[share - 1u], kNever);
         decision |= (isLess ? first[share - 1u] : kAsBelow) << share * 3u;
     }
-    decisionAt(node).quad[0] = floatBitsToUint(vec4(cost[0], cost[1], cost[2], cost[3]));
-    decisionAt(node).quad[1] = uvec4(floatBitsToUint(vec3(cost[4], cost[5], cost[6])), decision);
+    decisionAt(node).quad[0] = floatBitsToUint(vec4(all_.of[0], all_.of[1], all_.of[2], all_.of[3]));
+    decisionAt(node).quad[1] = uvec4(floatBitsToUint(vec3(all_.of[4], all_.of[5], all_.of[6])), decision);
+    return all_;
 }

@@ -15,11 +15,10 @@ void sortAll() {
     [[dont_unroll]] for (uint pass = 0; pass < passes(); ++pass) {
         Source from = sourceOf(pass);
         Words to = targetOf(pass);
-        rankKeys(from, first, end);
-        [[dont_unroll]] for (uint i = first; i < end; ++i) {
-            uint rank = counts[digitOf(from, i) * kGroup + gl_LocalInvocationIndex]++;
-            moveKey(from, to, i, rank);
-        }
+        resetCounts();
+        [[dont_unroll]] for (uint i = first; i < end; ++i) countOne(digitOf(from, i));
+        rankFirsts();
+        [[dont_unroll]] for (uint i = first; i < end; ++i) moveKey(from, to, i, nextRank(digitOf(from, i)));
         meet();
     }
 }

@@ -17,14 +17,14 @@ const SHARES: usize = 7;
 const AS_BELOW: u32 = 7;
 
 /// Nodes of two children each, the root first.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Bvh2Reference {
     /// The two children of each node.
     pub nodes: Vec<[Bvh2Child; 2]>,
 }
 
 /// A child of a binary node.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bvh2Child {
     /// Bounds of the subtree.
     pub bounds: CheckBounds,
@@ -87,9 +87,9 @@ struct KnownNodes {
 }
 
 impl GroupShape {
-    const LEAF: Self = Self { height: 0, groups: 1, count: 1 };
+    pub(crate) const LEAF: Self = Self { height: 0, groups: 1, count: 1 };
 
-    fn is_above(self, other: Self) -> Self {
+    pub(crate) fn is_above(self, other: Self) -> Self {
         let count = (self.count + other.count).min(0xffff);
         let groups = if count <= MAX_GROUP_PRIMITIVES { 1 } else { (self.groups + other.groups).min(0xff) };
         Self { height: self.height.max(other.height) + 1, groups, count }
@@ -148,6 +148,45 @@ impl Decided {
 }
 
 impl Bvh2Reference {
+    /// Returns the nodes below a child, each before those below it and the first half before the second.
+    pub(crate) fn preorder(&self, root: BelowNode) -> Vec<usize> {
+        let (mut open, mut found) = (vec![root], Vec::new());
+        while let Some(below) = open.pop() {
+            if let BelowNode::Node(node) = below {
+                found.push(node);
+                open.extend(self.nodes[node].iter().rev().map(|child| child.below));
+            }
+        }
+        found
+    }
+
+    /// Returns the same tree with its nodes in [preorder](Self::preorder).
+    pub(crate) fn from_root(&self, root: BelowNode) -> Self {
+        let order = self.preorder(root);
+        let mut places = vec![0; self.nodes.len()];
+        order.iter().enumerate().for_each(|(place, node)| places[*node] = place);
+        let moved = |child: Bvh2Child| match child.below {
+            BelowNode::Node(node) => Bvh2Child { below: BelowNode::Node(places[node]), ..child },
+            BelowNode::Leaf(_) => child,
+        };
+        Self { nodes: order.iter().map(|node| self.nodes[*node].map(moved)).collect() }
+    }
+
+    /// Returns the primitives of all leaves.
+    #[cfg(test)]
+    pub(crate) fn leaves(&self) -> Vec<u32> {
+        let leaf = |child: &Bvh2Child| match child.below {
+            BelowNode::Leaf(number) => Some(number),
+            BelowNode::Node(_) => None,
+        };
+        self.nodes.iter().flatten().filter_map(leaf).collect()
+    }
+
+    /// Returns the decision about each node. Children must follow their parent.
+    pub fn decisions(&self) -> Vec<u32> {
+        self.decided().iter().map(|decided| decided.decision).collect()
+    }
+
     /// Returns the shape of the subtree of a child.
     pub(crate) fn shape(&self, below: BelowNode) -> GroupShape {
         match below {
@@ -228,18 +267,22 @@ impl Bvh2Reference {
             self.cut_highest(known, &mut cut);
             return cut;
         }
-        let mut next = 0;
-        while let Some(part) = cut.get(next) {
-            let halves = match part.child.below {
+        loop {
+            let halves = |part: &CollapsePart| match part.child.below {
                 BelowNode::Node(below) => known.decided[below].halves(part.share),
                 BelowNode::Leaf(_) => None,
             };
-            match halves {
-                Some(shares) => self.split(&mut cut, next, shares),
-                None => next += 1,
+            let splits: Vec<_> = cut.iter().map(halves).collect();
+            if splits.iter().all(Option::is_none) {
+                return cut;
+            }
+            for (part, shares) in splits.into_iter().enumerate() {
+                match shares {
+                    Some(shares) => self.split(&mut cut, part, shares),
+                    None => cut[part].share = 0,
+                }
             }
         }
-        cut
     }
 
     /// Splits the highest part until there is no more room.
@@ -343,7 +386,7 @@ fn slot_order(cut: &[CollapsePart]) -> [Option<usize>; 8] {
     children
 }
 
-fn half_area(bounds: &CheckBounds) -> f32 {
+pub(crate) fn half_area(bounds: &CheckBounds) -> f32 {
     let [x, y, z] = std::array::from_fn(|axis| (bounds[1][axis] - bounds[0][axis]).max(0.0));
     x * y + y * z + z * x
 }
