@@ -80,7 +80,7 @@ impl<'a> ClusterRun<'a> {
         let root = BelowNode::Node(words[2] as usize);
         let decision = |node: &usize| decisions[node * DECISION_WORDS + DECISION_WORDS - 1];
         let decisions = tree.preorder(root).iter().map(decision).collect();
-        (tree.from_root(root), decisions)
+        (tree.in_preorder(root), decisions)
     }
 }
 

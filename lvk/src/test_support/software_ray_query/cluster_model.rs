@@ -38,7 +38,7 @@ impl SortedPrimitives {
     pub fn cluster(&self) -> Bvh2Reference {
         let mut clusterer = Clusterer { primitives: self, tree: Bvh2Reference::default() };
         let root = clusterer.clusters(0, self.codes.len() - 1);
-        clusterer.tree.from_root(root[0].child.below)
+        clusterer.tree.in_preorder(root[0].child.below)
     }
 
     fn index_bits(&self) -> u32 {
@@ -141,8 +141,8 @@ mod tests {
         fn every_primitive_is_below_once_and_paths_are_short(
             mut codes in prop::collection::vec((0..64_u32, 0..100_u64), 2..400), corner in 0..9_u8
         ) {
-            codes.sort_by_key(|(shift, code)| code << shift % 20);
-            let codes: Vec<u64> = codes.iter().map(|(shift, code)| code << shift % 20).collect();
+            codes.sort_by_key(|(shift, code)| code << (shift % 20));
+            let codes: Vec<u64> = codes.iter().map(|(shift, code)| code << (shift % 20)).collect();
             // Nested bounds are nearest to their successors.
             let bounds = |place: usize| [[f32::from(corner); 3], [10.0 + place as f32; 3]];
             let bounds = (0..codes.len()).map(bounds).collect();

@@ -161,7 +161,7 @@ impl Bvh2Reference {
     }
 
     /// Returns the same tree with its nodes in [preorder](Self::preorder).
-    pub(crate) fn from_root(&self, root: BelowNode) -> Self {
+    pub(crate) fn in_preorder(&self, root: BelowNode) -> Self {
         let order = self.preorder(root);
         let mut places = vec![0; self.nodes.len()];
         order.iter().enumerate().for_each(|(place, node)| places[*node] = place);
