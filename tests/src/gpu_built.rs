@@ -74,7 +74,7 @@ pub fn aabb_geometry(buffer: BufferHandle, count: usize) -> BlasGeometry {
 
 /// Builds one BLAS on the GPU.
 pub fn build(ctx: &Context, geometries: &[BlasGeometry]) -> GpuStructure {
-    let desc = GpuBlasDesc { geometries, improvements: 1, leaves: LeafEncoding::Corners };
+    let desc = GpuBlasDesc { geometries, leaves: LeafEncoding::Corners };
     build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
 }
 

@@ -70,23 +70,19 @@ kernels! {
         /// Computes the Morton codes of primitives.
         BuildCodes = "software_ray_query/kernels/codes", "build_params box code codes.comp";
         /// Counts the digits of codes.
-        SortCount = "software_ray_query/kernels/sort_count", "build_params rank sort_count.comp";
+        SortCount = "software_ray_query/kernels/sort_count", "build_params sort_keys sort_count.comp";
         /// Sums the counts.
-        SortScan = "software_ray_query/kernels/sort_scan", "build_params rank sort_scan.comp";
+        SortScan = "software_ray_query/kernels/sort_scan", "build_params sort_keys prefix_sum sort_scan.comp";
         /// Moves codes to their sorted positions.
-        SortScatter = "software_ray_query/kernels/sort_scatter", "build_params rank sort_scatter.comp";
-        /// Builds the hierarchy.
-        BuildTree = "software_ray_query/kernels/tree", "build_params arrival_counters tree tree.comp";
-        /// Resets the arrival counters of nodes.
-        ResetArrivals = "software_ray_query/kernels/reset_arrivals",
-            "build_params arrival_counters reset_arrivals.comp";
-        /// Fits the bounds of binary nodes, and improves the tree by rotations.
-        BuildImprove = "software_ray_query/kernels/improve",
-            "shared build_params box leaf leaf_bounds_scratch arrival_counters node rotate fit \
-             improve.comp";
+        SortScatter = "software_ray_query/kernels/sort_scatter", "build_params sort_keys prefix_sum rank sort_scatter.comp";
+        /// Builds binary trees from sorted codes.
+        BuildClusters = "software_ray_query/kernels/cluster",
+            "cluster_group shared build_params box leaf leaf_bounds_scratch node prefix decision decide workgroup_barrier \
+             cluster cluster.comp";
         /// Collapses binary nodes to one level of wide nodes.
         Collapse = "software_ray_query/kernels/collapse",
-            "build_params box leaf leaf_bounds_scratch node wide encode collapse collapse.comp";
+            "build_params box leaf leaf_bounds_scratch node decision wide encode collapse \
+             collapse.comp";
         /// Writes all parts of a BLAS except its nodes.
         WriteBlas = "software_ray_query/kernels/blas_write",
             "build_params box input leaf leaf_write arrival_counters node wide packed blas_write \
@@ -97,25 +93,25 @@ kernels! {
              fit_packed.comp";
         /// Fits the bounds of binary nodes.
         FitBinary = "software_ray_query/kernels/fit",
-            "shared build_params box leaf leaf_bounds arrival_counters node no_rotation fit fit.comp";
+            "shared build_params box leaf leaf_bounds arrival_counters node fit fit.comp";
         /// Fits the bounds of wide nodes.
         FitWide = "software_ray_query/kernels/fit_wide",
             "shared build_params box leaf leaf_bounds wide encode fit_wide fit_wide.comp";
         /// Rewrites the primitives of leaves from moved inputs.
         RefitLeaves = "software_ray_query/kernels/refit",
             "build_params box input leaf leaf_write arrival_counters wide refit refit.comp";
-        /// Builds the binary tree of a whole BLAS by one workgroup.
+        /// Sorts the primitives of a whole BLAS by one workgroup.
         BuildSmallBlas = "software_ray_query/kernels/small_blas",
-            "shared build_params box bounds input code rank leaf leaf_bounds_scratch arrival_counters \
-             tree node rotate fit workgroup_barrier small_blas.comp small";
-        /// Builds the rest of such a BLAS by one workgroup.
+            "shared small_digits build_params box bounds input code sort_keys prefix_sum rank workgroup_barrier \
+             small_blas.comp small";
+        /// Builds the rest of such a BLAS, after its binary tree, by one workgroup.
         BuildSmallWide = "software_ray_query/kernels/small_wide",
-            "shared build_params box input leaf leaf_bounds leaf_write arrival_counters node wide encode \
+            "shared build_params box input leaf leaf_bounds leaf_write arrival_counters node decision wide encode \
              collapse packed blas_write fit_wide workgroup_barrier small_wide.comp";
-        /// Builds a whole TLAS by one workgroup.
+        /// Sorts the instances of a whole TLAS by one workgroup.
         BuildSmallTlas = "software_ray_query/kernels/small_tlas",
-            "shared build_params box bounds instance code rank leaf leaf_bounds_scratch arrival_counters \
-             tree node rotate fit workgroup_barrier small_tlas.comp small";
+            "shared small_digits build_params box bounds instance code sort_keys prefix_sum rank workgroup_barrier \
+             small_tlas.comp small";
     }
 }
 

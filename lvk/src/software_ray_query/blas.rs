@@ -170,7 +170,6 @@ pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
 
 /// Returns the plan of a build on the GPU of these validated geometries.
 pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlags) -> Result<GpuBuildPlan> {
-    const IMPROVEMENTS: u32 = 2;
     let boxes = geometries.first().is_some_and(BlasGeometry::is_aabbs);
     let sum = |of: fn(&BlasGeometry) -> u32| geometries.iter().map(of).fold(0_u32, u32::saturating_add);
     let (primitive_count, vertex_count) = (sum(BlasGeometry::primitive_count), sum(vertex_count));
@@ -184,7 +183,6 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
         primitive_count,
         vertex_count,
         geometry_count: geometries.len() as u32,
-        improvements: if flags.contains(BuildFlags::FAST_TRACE) { IMPROVEMENTS } else { 0 },
     };
     GpuBuildPlan::blas(name, &shape)
 }

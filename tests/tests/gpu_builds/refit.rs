@@ -25,7 +25,7 @@ fn trees_of_the_gpu_follow_moved_triangles() {
         for leaves in [LeafEncoding::Corners, LeafEncoding::Indexed, LeafEncoding::Packed] {
             let vertices = build_input_buffer(&ctx, &scattered_triangles(count, 1));
             let geometries = [triangle_geometry(*vertices, count)];
-            let desc = GpuBlasDesc { geometries: &geometries, improvements: 1, leaves };
+            let desc = GpuBlasDesc { geometries: &geometries, leaves };
             let structure = build_blas(&ctx, &[desc]).unwrap().remove(0);
             let before = check_and_summarize(&ctx, &structure);
             for seed in [2, 3] {

@@ -11,6 +11,8 @@ use crate::software_ray_query::layout::{BLOCK_BYTES, LeafKind};
 pub(crate) const HEADER_BYTES: u64 = 128;
 /// Bytes of a binary node.
 const BINARY_NODE_BYTES: u64 = 64;
+/// Bytes of the costs of a binary node and of the decisions about it.
+pub(crate) const DECISION_BYTES: u64 = 32;
 /// Bytes of a wide node.
 const WIDE_NODE_BYTES: u64 = 80;
 /// Maximum primitives of a BLAS that is a single leaf, without nodes.
@@ -28,14 +30,16 @@ const MAX_PRIMITIVES: u64 = 1 << 27;
 const MAX_SMALL_BUILD: u32 = 2048;
 /// Keys that a workgroup sorts, `kBlock` of `software_ray_query/kernels/build_params.glsl`.
 pub(crate) const SORT_BLOCK: u32 = 1024;
-const DIGITS: u32 = 16;
+/// Values of a digit in large builds.
+pub(crate) const DIGITS: u32 = 256;
+/// Words of the counts of digits in all, `kDigitTotals` of `software_ray_query/kernels/build_params.glsl`.
+pub(crate) const DIGIT_TOTAL_WORDS: u32 = 8 * DIGITS;
 /// Maximum nodes on a path that traversal supports.
 pub(crate) const MAX_HEIGHT: u32 = 64;
 /// Bits of the first word of a code.
 const CODE_BITS: u32 = 30;
-const MAX_IMPROVEMENTS: u32 = 8;
-/// Improvement passes of a TLAS.
-const TLAS_IMPROVEMENTS: u32 = 1;
+/// Maximum bits of the second word: one pass of the sort.
+const MAX_LOW_BITS: u32 = 8;
 /// Words of the build state, `kStateWords` of `software_ray_query/kernels/build_params.glsl`.
 pub(crate) const STATE_WORDS: u64 = 48;
 const BOX_WORDS: u64 = 6;
@@ -49,8 +53,6 @@ pub(crate) struct BlasShape {
     /// Vertices of all geometries; used only if leaves have vertex indices.
     pub(crate) vertex_count: u32,
     pub(crate) geometry_count: u32,
-    /// Number of improvement passes over the tree, 0 to 8. Each makes builds slightly slower and rays faster.
-    pub(crate) improvements: u32,
 }
 
 /// Offsets of the parts of an acceleration structure, in units of 16 bytes from its start; 0 for a missing part.
@@ -71,7 +73,7 @@ pub(crate) struct ScratchOffsets {
     pub(crate) digits: u32,
     pub(crate) arrivals: u32,
     pub(crate) parents: u32,
-    /// Binary nodes, if the acceleration structure has wide ones.
+    /// Binary nodes and the decisions about them, if the acceleration structure has wide ones.
     pub(crate) binary: u32,
 }
 
@@ -94,8 +96,6 @@ pub(crate) struct GpuBuildPlan {
     pub(crate) scratch: ScratchOffsets,
     /// Bits of the second word of a code; 0 for codes of one word.
     pub(crate) low_bits: u32,
-    /// Number of improvement passes over the tree.
-    pub(crate) improvements: u32,
 }
 
 /// The inputs of a build.
@@ -134,7 +134,6 @@ impl GpuBuildPlan {
             primitive_count: capacity,
             vertex_count: 0,
             geometry_count: 0,
-            improvements: TLAS_IMPROVEMENTS,
         };
         Self::new(name, &shape)
     }
@@ -157,7 +156,6 @@ impl GpuBuildPlan {
             scratch_bytes,
             scratch,
             low_bits,
-            improvements: shape.improvements.min(MAX_IMPROVEMENTS),
         })
     }
 
@@ -173,11 +171,11 @@ impl GpuBuildPlan {
         (u64::from(self.node_capacity()) * BINARY_NODE_BYTES).saturating_sub(wide)
     }
 
-    /// Returns the maximum binary nodes on a path from the root to a leaf, at most [`MAX_HEIGHT`]. Every node splits at
-    /// a bit of the code or, for equal codes, of the leaf's index. The header of a TLAS has the actual height.
+    /// Returns the maximum binary nodes on a path from the root to a leaf, at most [`MAX_HEIGHT`]. The header of a TLAS
+    /// has the actual height.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn max_height(&self) -> u32 {
-        (CODE_BITS + self.low_bits + number_bits(self.capacity)).min(self.node_capacity())
+        self.node_capacity().min(MAX_HEIGHT)
     }
 
     /// True if one workgroup makes the whole build of `count` primitives or instances.
@@ -226,7 +224,7 @@ impl GpuBuildPlan {
             digits: self.scratch.digits,
             arrivals: self.scratch.arrivals,
             node_capacity: count.saturating_sub(1),
-            improvements: self.improvements,
+            reserved: 0,
             wide_capacity: self.wide_capacity,
             header_flags: header_flags(source),
             unused: [0; 2],
@@ -262,13 +260,13 @@ impl OffsetAllocator {
 /// Returns the bits of the second word of a code.
 ///
 /// Codes of one word have 1024 cells along an axis: fine enough for few primitives, and sorted in fewer passes. The
-/// number of bits is limited so that the tree cannot exceed [`MAX_HEIGHT`].
+/// number of bits is limited so that no leaf has more than [`MAX_HEIGHT`] ranges above it, and the tree is no higher.
 fn low_bit_mask(shape: &BlasShape) -> u32 {
     let few = if shape.leaf_kind == LeafKind::Instances { 1 << 15 } else { 1 << 12 };
     if shape.primitive_count <= few {
         return 0;
     }
-    MAX_HEIGHT - CODE_BITS - number_bits(shape.primitive_count)
+    MAX_LOW_BITS.min(MAX_HEIGHT - CODE_BITS - number_bits(shape.primitive_count))
 }
 
 /// Returns the bits of a leaf's index.
@@ -326,11 +324,15 @@ fn blob_offsets(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blo
     Ok((BlobOffsets { nodes, primitives, vertices, geometries }, bytes))
 }
 
-/// Returns the offsets. All are below 2^32 words, as kernels need: a primitive takes at most 30 1/64 words.
+/// Returns the offsets. All are below 2^32 words, as kernels need: before the binary nodes, which kernels find by their
+/// address, a primitive takes at most 14 1/4 words.
 fn scratch_offsets(shape: &BlasShape, long_codes: bool) -> (ScratchOffsets, u64) {
     let count = u64::from(shape.primitive_count);
     let nodes = u64::from(shape.primitive_count.saturating_sub(1));
-    let binary = if shape.leaf_kind == LeafKind::Instances { 0 } else { nodes * BINARY_NODE_BYTES / 4 };
+    let binary = match shape.leaf_kind {
+        LeafKind::Instances => 0,
+        _ => nodes * (BINARY_NODE_BYTES + DECISION_BYTES) / 4,
+    };
     let keys = count * if long_codes { 3 } else { 2 };
     let blocks = u64::from(shape.primitive_count.div_ceil(SORT_BLOCK));
     let mut layout = OffsetAllocator { end: STATE_WORDS * 4 };
@@ -339,7 +341,7 @@ fn scratch_offsets(shape: &BlasShape, long_codes: bool) -> (ScratchOffsets, u64)
         boxes: part(count * BOX_WORDS),
         keys: part(keys),
         spare_keys: part(keys),
-        digits: part(blocks * u64::from(DIGITS)),
+        digits: part(u64::from(DIGIT_TOTAL_WORDS) + blocks * u64::from(DIGITS)),
         arrivals: part(nodes),
         parents: part(nodes),
         binary: part(binary),
@@ -353,13 +355,8 @@ mod tests {
 
     use super::*;
 
-    const MESH: BlasShape = BlasShape {
-        leaf_kind: LeafKind::Triangles,
-        primitive_count: 0,
-        vertex_count: 0,
-        geometry_count: 1,
-        improvements: 1,
-    };
+    const MESH: BlasShape =
+        BlasShape { leaf_kind: LeafKind::Triangles, primitive_count: 0, vertex_count: 0, geometry_count: 1 };
 
     fn kinds() -> impl Strategy<Value = LeafKind> {
         use LeafKind::{Boxes, IndexedTriangles, PackedTriangles, Triangles};
@@ -374,7 +371,6 @@ mod tests {
                 primitive_count,
                 vertex_count,
                 geometry_count,
-                improvements: 1,
             },
         )
     }
@@ -413,17 +409,17 @@ mod tests {
             let (count, nodes) = (u64::from(shape.primitive_count), u64::from(plan.node_capacity()));
             let at = |place: u32| u64::from(place) * 4;
             let keys = count * if plan.low_bits > 0 { 12 } else { 8 };
-            prop_assert!(plan.max_height() <= MAX_HEIGHT && plan.low_bits <= 30);
+            prop_assert!(CODE_BITS + plan.low_bits + number_bits(plan.capacity) <= MAX_HEIGHT && plan.low_bits <= 30);
             check_parts(vec![
                 (at(plan.scratch.boxes), count * 24),
                 (at(plan.scratch.keys), keys),
                 (at(plan.scratch.spare_keys), keys),
-                (at(plan.scratch.digits), count.div_ceil(1024) * 64),
+                (at(plan.scratch.digits), (8 + count.div_ceil(1024)) * 1024),
                 (at(plan.scratch.arrivals), nodes * 4),
                 (at(plan.scratch.parents), nodes * 4),
-                (at(plan.scratch.binary), nodes * 64),
+                (at(plan.scratch.binary), nodes * 96),
             ], STATE_WORDS * 4, plan.scratch_bytes);
-            prop_assert!(plan.scratch_bytes < 1 << 34);
+            prop_assert!(plan.scratch_bytes < 1 << 35);
         }
     }
 

@@ -27,7 +27,8 @@ pub(crate) struct GpuBuildParams {
     pub(crate) digits: u32,
     pub(crate) arrivals: u32,
     pub(crate) node_capacity: u32,
-    pub(crate) improvements: u32,
+    /// Not used.
+    pub(crate) reserved: u32,
     pub(crate) wide_capacity: u32,
     pub(crate) header_flags: u32,
     /// Pads the record to a multiple of 16 bytes.
@@ -41,4 +42,7 @@ pub(crate) struct BuildPushConstants {
     pub(crate) jobs: u64,
     pub(crate) first_job: u32,
     pub(crate) pass_or_jobs: u32,
+    pub(crate) groups_of_job: u32,
+    /// Pads the block to the alignment of its address.
+    pub(crate) unused: u32,
 }

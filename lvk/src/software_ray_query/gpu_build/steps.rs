@@ -1,15 +1,22 @@
 //! The order of the build kernels, and their parallel phases.
 
 use crate::kernels::Kernel;
-use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SORT_BLOCK};
+use crate::software_ray_query::gpu_build::layout::{
+    BuildSource, DIGIT_TOTAL_WORDS, DIGITS, GpuBuildPlan, SORT_BLOCK,
+};
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 
 /// Invocations of a workgroup, `kGroup` of `software_ray_query/kernels/build_params.glsl`.
 const WORKGROUP_SIZE: u32 = 128;
-/// Passes over the first word of codes with four bits each, and the maximum passes over both words.
-const FIRST_WORD_PASSES: u32 = 8;
-const MAX_PASSES: u32 = 16;
+/// Invocations of a workgroup that merges clusters, `LVK_GROUP` of `software_ray_query/kernels/cluster_group.glsl`.
+const CLUSTER_GROUP_SIZE: u32 = 32;
+/// Children of a wide node.
+const BVH8_CHILDREN: u32 = 8;
+/// Bits of a digit, and passes over the first word of codes. Large builds have at most eight passes.
+const DIGIT_BITS: u32 = 8;
+const FIRST_WORD_PASSES: u32 = 4;
+const MAX_PASSES: u32 = 8;
 
 /// One dispatch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,9 +26,12 @@ pub(crate) struct BuildStep {
     pub(crate) kernel: Kernel,
     /// Index of the job, or of the first of several jobs with a workgroup each.
     pub(crate) job: u32,
-    /// Index of the sort pass or of the level, or the number of jobs with a workgroup each.
+    /// Index of the sort pass or of the level, or the number of jobs of one dispatch.
     pub(crate) pass_or_jobs: u32,
+    /// Workgroups of all jobs of the dispatch.
     pub(crate) groups: u32,
+    /// Workgroups of each job where one dispatch has several jobs, else 0.
+    pub(crate) groups_of_job: u32,
 }
 
 /// Returns the steps of builds, sorted by phase. Job `i` is build `order[i]`. Builds by one workgroup come first, by
@@ -48,39 +58,45 @@ pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usiz
                 last.groups += 1;
                 last.pass_or_jobs += 1;
             }
-            (Some(kernel), _) => steps.push(BuildStep { phase: 0, kernel, job, pass_or_jobs: 1, groups: 1 }),
+            (Some(kernel), _) => {
+                let step = BuildStep { phase: 0, kernel, job, pass_or_jobs: 1, groups: 1, groups_of_job: 0 };
+                steps.push(step);
+            }
         }
     }
     let small_blas = steps.iter().find(|step| step.kernel == Kernel::BuildSmallBlas).copied();
-    steps.extend(small_blas.map(|step| BuildStep { phase: 1, kernel: Kernel::BuildSmallWide, ..step }));
+    steps.extend(small_blas.map(|step| BuildStep { phase: 2, kernel: Kernel::BuildSmallWide, ..step }));
+    let small_count = order.iter().filter(|build| small(build).is_some()).count();
+    let counts = order[..small_count].iter().map(|build| builds[*build].1.element_count(builds[*build].0));
+    steps.extend(counts.max().map(|most| cluster_step(1, 0, small_count as u32, most)));
     steps.sort_by_key(|step| (step.phase, step.kernel));
     (order, steps)
 }
 
 fn large_build_steps(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<BuildStep>) {
     let groups = |invocations: u32| invocations.div_ceil(WORKGROUP_SIZE).max(1);
-    let mut add =
-        |phase, kernel, groups| steps.push(BuildStep { phase, kernel, job, pass_or_jobs: 0, groups });
+    let mut add = |phase, kernel, groups| {
+        steps.push(BuildStep { phase, kernel, job, pass_or_jobs: 0, groups, groups_of_job: 0 });
+    };
     let read = match plan.leaf_kind {
         LeafKind::Instances => Kernel::BuildInstances,
         _ => Kernel::BuildPrimitives,
     };
     add(0, Kernel::BuildReset, 1);
-    add(1, read, groups(count));
-    add(2, Kernel::BuildCodes, groups(count));
-    add(3 + MAX_PASSES * 3, Kernel::BuildTree, groups(count));
-    let nodes = groups(plan.node_capacity());
-    let rounds = plan.improvements.max(1);
-    for round in 0..rounds {
-        if round > 0 {
-            add(3 + MAX_PASSES * 3 + 2 * round, Kernel::ResetArrivals, nodes);
-        }
-        add(4 + MAX_PASSES * 3 + 2 * round, Kernel::BuildImprove, nodes);
-    }
+    add(1, read, count.div_ceil(SORT_BLOCK).max(1));
+    add(2, Kernel::BuildCodes, groups(count.max(DIGIT_TOTAL_WORDS)));
     steps.extend(sort_steps(job, count, plan.low_bits));
+    steps.push(cluster_step(3 + MAX_PASSES * 3, job, 1, count));
     if plan.leaf_kind != LeafKind::Instances {
-        steps.extend(wide_steps(3 + MAX_PASSES * 3 + 2 * rounds, job, plan));
+        steps.extend(wide_steps(4 + MAX_PASSES * 3, job, plan));
     }
+}
+
+/// Returns the step that builds the binary trees of `jobs` jobs, from a job on, of at most `count` primitives each.
+pub(crate) fn cluster_step(phase: u32, job: u32, jobs: u32, count: u32) -> BuildStep {
+    let groups_of_job = count.div_ceil(CLUSTER_GROUP_SIZE).max(1);
+    let groups = groups_of_job * jobs;
+    BuildStep { phase, kernel: Kernel::BuildClusters, job, pass_or_jobs: jobs, groups, groups_of_job }
 }
 
 /// Returns the steps from a binary tree to the BLAS, starting at a phase. Only the last two steps know whether the wide
@@ -93,13 +109,14 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
         job,
         pass_or_jobs: level,
         groups: groups(invocations),
+        groups_of_job: 0,
     };
-    // Eight times as many nodes as in the level above, up to the capacity.
+    // Eight times as many nodes as in the level above, up to the capacity, with eight invocations each.
     let nodes = |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity);
     let levels = if plan.wide_capacity > 0 { MAX_BVH8_DEPTH as u32 } else { 0 };
     let written = plan.capacity.max(plan.geometry_count).max(plan.vertex_count);
     let mut steps: Vec<_> =
-        (0..levels).map(|level| step(level, Kernel::Collapse, level, nodes(level))).collect();
+        (0..levels).map(|level| step(level, Kernel::Collapse, level, nodes(level) * BVH8_CHILDREN)).collect();
     steps.push(step(levels, Kernel::WriteBlas, 0, written));
     steps.push(step(levels + 1, Kernel::FitPacked, 0, plan.wide_capacity));
     steps
@@ -108,7 +125,7 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
 /// Returns the steps that sort the keys of a build, the low words first.
 pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<BuildStep> {
     let blocks = count.div_ceil(SORT_BLOCK).max(1);
-    let passes = low_bits.div_ceil(4) + FIRST_WORD_PASSES;
+    let passes = low_bits.div_ceil(DIGIT_BITS) + FIRST_WORD_PASSES;
     let pass = |pass_or_jobs| {
         let step = |nth, kernel, groups| BuildStep {
             phase: 3 + pass_or_jobs * 3 + nth,
@@ -116,10 +133,11 @@ pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<BuildStep> 
             job,
             pass_or_jobs,
             groups,
+            groups_of_job: 0,
         };
         [
             step(0, Kernel::SortCount, blocks),
-            step(1, Kernel::SortScan, 1),
+            step(1, Kernel::SortScan, DIGITS),
             step(2, Kernel::SortScatter, blocks),
         ]
     };
@@ -137,7 +155,7 @@ pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<BuildStep> {
         };
         for (phase, kernel, invocations) in [(0, Kernel::RefitLeaves, written), (1, fit, plan.node_count)] {
             let groups = invocations.div_ceil(WORKGROUP_SIZE).max(1);
-            steps.push(BuildStep { phase, kernel, job, pass_or_jobs: 0, groups });
+            steps.push(BuildStep { phase, kernel, job, pass_or_jobs: 0, groups, groups_of_job: 0 });
         }
     }
     steps.sort_by_key(|step| (step.phase, step.kernel));
@@ -152,13 +170,8 @@ mod tests {
     use crate::software_ray_query::gpu_build::layout::BlasShape;
 
     fn plan(primitive_count: u32) -> GpuBuildPlan {
-        let shape = BlasShape {
-            leaf_kind: LeafKind::Triangles,
-            primitive_count,
-            vertex_count: 0,
-            geometry_count: 1,
-            improvements: 1,
-        };
+        let shape =
+            BlasShape { leaf_kind: LeafKind::Triangles, primitive_count, vertex_count: 0, geometry_count: 1 };
         GpuBuildPlan::blas("s", &shape).unwrap()
     }
 
@@ -176,13 +189,14 @@ mod tests {
             for (job, build) in order.iter().enumerate() {
                 let covers = |step: &&BuildStep| match step.kernel {
                     Kernel::BuildSmallBlas | Kernel::BuildSmallWide => job < step.groups as usize,
+                    Kernel::BuildClusters => (step.job..step.job + step.pass_or_jobs).contains(&(job as u32)),
                     _ => step.job as usize == job,
                 };
                 let own: Vec<_> = steps.iter().filter(covers).collect();
                 let expected = match counts[*build] {
-                    0..=2048 => 2,
-                    2049..=4096 => 5 + 8 * 3 + 34,
-                    _ => 5 + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8) + 34,
+                    0..=2048 => 3,
+                    2049..=4096 => 4 + 4 * 3 + 34,
+                    _ => 4 + 3 * (plans[*build].low_bits.div_ceil(8) as usize + 4) + 34,
                 };
                 prop_assert_eq!(own.len(), expected);
             }

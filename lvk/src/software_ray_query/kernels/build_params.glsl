@@ -1,9 +1,12 @@
 // Parameters and memory of every kernel of a build on the GPU.
-layout(local_size_x = 128) in;
+#ifndef LVK_GROUP
+#define LVK_GROUP 128
+#endif
+layout(local_size_x = LVK_GROUP) in;
 
-const uint kGroup = 128u;
-const uint kItems = 8u;               // keys that an invocation sorts
-const uint kBlock = kGroup * kItems;  // keys that a workgroup sorts
+const uint kGroup = LVK_GROUP;
+const uint kItems = 8u;               // primitives of an invocation that bounds or sorts them
+const uint kBlock = kGroup * kItems;  // those of a workgroup
 const uint kNone = 0xffffffffu;
 const uint kLeaf = 0x80000000u;
 
@@ -35,8 +38,8 @@ struct Job {
     uvec2 table;         // BLAS addresses that records refer to by index; 0 if records contain addresses
     uvec2 blob;          // the BLAS or TLAS
     uvec2 scratch;
-    uvec2 parents;       // of each node, a word in the scratch memory
-    uvec2 binary;        // nodes of two children; in the scratch memory if the build ends with wide nodes
+    uvec2 parents;       // of each node, a word in the scratch memory; during builds, the number of primitives below
+    uvec2 binary;        // nodes of two children; in the scratch memory, before decisions, if wide nodes replace them
     uint count;          // primitives of the inputs, inactive ones included
     uint inputCount;     // geometries, or addresses in `table`
     uint leafKind;
@@ -48,11 +51,11 @@ struct Job {
     uint vertexCount;    // vertices of the copy that leaves refer to
     uint boxes;          // offsets in the scratch memory, in words: six floats for each primitive or wide node
     uint keys;           // codes and indices of primitives
-    uint spareKeys;      // later the index of the primitive in each slot of the leaves
-    uint digits;         // count of each digit in each block
-    uint arrivals;       // a counter for each node
+    uint spareKeys;      // later the clusters of ranges, then the index of the primitive in each slot of the leaves
+    uint digits;         // counts of each digit, of each pass and in each block
+    uint arrivals;       // a counter for each node; during builds, the end of the range that came first at each gap
     uint nodeCapacity;   // maximum binary nodes of a build, maximum nodes of a refit
-    uint improvements;   // number of improvement passes
+    uint reserved;
     uint wideCapacity;   // maximum wide nodes of a build; 0 if nodes stay binary
     uint headerFlags;    // bit 0: every geometry is opaque, bit 1: no geometry is opaque
 };
@@ -60,7 +63,8 @@ struct Job {
 layout(push_constant, scalar) uniform Push {
     uvec2 jobs;
     uint firstJob;
-    uint passOrJobs;     // index of the sort pass, or number of jobs with a workgroup each
+    uint passOrJobs;     // index of the sort pass or of the level, or number of jobs
+    uint groupsOfJob;    // workgroups of each job where one dispatch has several jobs
 };
 
 const uint kJobBytes = 128u;
@@ -90,10 +94,18 @@ uvec2 work(uint words) { return plus(job.scratch, words << 2, words >> 30); }
 
 Words header() { return Words(job.blob); }
 
-// Passes of the sort: four bits each, the second words first, then 31 bits of the first words.
-uint lowPasses() { return (job.lowBits + 3) / 4; }
+// Passes of the sort, by bits of the second words first, then of the first words.
+#ifndef LVK_DIGIT_BITS
+#define LVK_DIGIT_BITS 8
+#endif
+const uint kDigitBits = LVK_DIGIT_BITS;
 
-uint passes() { return lowPasses() + 8; }
+uint lowPasses() { return (job.lowBits + kDigitBits - 1u) / kDigitBits; }
+
+uint passes() { return lowPasses() + 32u / kDigitBits; }
+
+// The words before the counts of digits in blocks: counts in all, for each pass and digit.
+const uint kDigitTotals = 8u * 256u;
 
 // Returns the keys before a pass; after the last they are in `keys`.
 Words keysBefore(uint pass) { return Words(work((passes() - pass & 1u) != 0u ? job.spareKeys : job.keys)); }
@@ -101,7 +113,6 @@ Words keysBefore(uint pass) { return Words(work((passes() - pass & 1u) != 0u ? j
 // The scratch memory starts with these words. Bounds are stored as numbers that only grow from 0.
 const uint kStateWords = 48u;
 const uint kActive = 6u;
-const uint kPlaced = 7u;     // slots of leaves with a primitive
 const uint kWideNodes = 8u;  // exceeds the capacity if the nodes did not fit
 const uint kEnds = 9u;       // for each level, the index after its last wide node
 

@@ -23,7 +23,7 @@ uvec2 codeOf(Box box) {
     return uvec2(interleave(cell >> 10), interleave(cell & 1023u) >> 30u - job.lowBits);
 }
 
-// Writes the key of primitive `i`; inactive primitives sort after all others.
+// Writes the key of primitive `i`, and resets the arrivals behind leaf `i`. Inactive primitives sort after all others.
 void writeKey(uint i) {
     Box box = readBox(Corners(work(job.boxes)), i);
     uvec2 code = isEmpty(box) ? uvec2(kNone) : codeOf(box);
@@ -31,4 +31,5 @@ void writeKey(uint i) {
     keys.word[i] = code.x;
     keys.word[job.count + i] = i;
     if (job.lowBits != 0u) keys.word[2 * job.count + i] = code.y;
+    if (i + 1u < job.count) Words(work(job.arrivals)).word[i] = kNone;
 }

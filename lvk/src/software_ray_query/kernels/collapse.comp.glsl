@@ -2,6 +2,6 @@
 void main() {
     readJob(firstJob);
     uvec2 nodes = nodesOfLevel(passOrJobs);
-    uint i = nodes.x + invocation();
-    if (i < nodes.y) collapse(i, passOrJobs);
+    uint first = nodes.x + groupNumber() * kTeams;
+    if (first < nodes.y) collapse(first, nodes.y, passOrJobs);
 }

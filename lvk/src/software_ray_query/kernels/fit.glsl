@@ -27,8 +27,8 @@ void fitFrom(uint i) {
             memoryBarrierBuffer();
         }
         Node node = readNode(number);
-        Fitted whole = Fitted(join(childOf(node, 0u).box, childOf(node, 1u).box), 0u);
-        whole.shape = rotate(number, node);
+        Fitted one = childOf(node, 0u), two = childOf(node, 1u);
+        Fitted whole = Fitted(join(one.box, two.box), above(one.shape, two.shape));
         uint parent = Words(job.parents).word[number];
         if (parent == kNone) {
             finish(whole);

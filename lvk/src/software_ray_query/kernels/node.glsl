@@ -15,6 +15,8 @@ uint groupsOf(uint shape) { return shape >> 8 & 0xffu; }
 
 uint countOf(uint shape) { return shape >> 16; }
 
+bool isGroup(uint shape) { return countOf(shape) <= kMostOfGroup; }
+
 // Returns the shape of a node of two children.
 uint above(uint one, uint two) {
     uint count = min(countOf(one) + countOf(two), 0xffffu);

@@ -1,4 +1,4 @@
-// A build up to its binary tree, with one workgroup for each job: dispatches cost more than the work of few primitives.
+// A build up to its sorted codes, with one workgroup for each job: dispatches cost more than the work of few primitives.
 void boundAll() {
     uint actives = 0;
     Box centres = emptyBox();
@@ -15,11 +15,10 @@ void sortAll() {
     [[dont_unroll]] for (uint pass = 0; pass < passes(); ++pass) {
         Source from = sourceOf(pass);
         Words to = targetOf(pass);
-        rankKeys(from, first, end);
-        [[dont_unroll]] for (uint i = first; i < end; ++i) {
-            uint rank = counts[digitOf(from, i) * kGroup + gl_LocalInvocationIndex]++;
-            moveKey(from, to, i, rank);
-        }
+        resetCounts();
+        [[dont_unroll]] for (uint i = first; i < end; ++i) countOne(digitOf(from, i));
+        rankFirsts();
+        [[dont_unroll]] for (uint i = first; i < end; ++i) moveKey(from, to, i, nextRank(digitOf(from, i)));
         meet();
     }
 }
@@ -35,13 +34,4 @@ void main() {
     [[dont_unroll]] for (uint i = t; i < job.count; i += kGroup) writeKey(i);
     meet();
     sortAll();
-    [[dont_unroll]] for (uint i = t; i < max(job.count, 1u); i += kGroup) writeHierarchy(i);
-    meet();
-    [[dont_unroll]] for (uint round_ = 1;; ++round_) {
-        [[dont_unroll]] for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);
-        if (round_ == max(job.improvements, 1u)) return;
-        meet();
-        [[dont_unroll]] for (uint i = t; i < min(header().word[8], job.nodeCapacity); i += kGroup) resetArrivals(i);
-        meet();
-    }
 }

@@ -1,2 +1,2 @@
-// Builds the binary tree of a whole BLAS by one workgroup.
+// Sorts the primitives of a whole BLAS by one workgroup.
 Box smallBox(uint i) { return inputBox(i); }

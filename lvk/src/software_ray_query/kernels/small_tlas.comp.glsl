@@ -1,2 +1,2 @@
-// Builds a whole TLAS by one workgroup.
+// Sorts the instances of a whole TLAS by one workgroup.
 Box smallBox(uint i) { return keepInstance(i); }

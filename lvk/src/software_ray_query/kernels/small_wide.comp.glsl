@@ -8,7 +8,7 @@ void main() {
     [[dont_unroll]] for (uint level = 0; level < kLevels; ++level) {
         uvec2 nodes = nodesOfLevel(level);
         if (nodes.x >= nodes.y) break;
-        [[dont_unroll]] for (uint i = nodes.x + t; i < nodes.y; i += kGroup) collapse(i, level);
+        [[dont_unroll]] for (uint i = nodes.x; i < nodes.y; i += kTeams) collapse(i, nodes.y, level);
         meet();
     }
     [[dont_unroll]] for (uint i = t; i < parts(); i += kGroup) placePart(i);

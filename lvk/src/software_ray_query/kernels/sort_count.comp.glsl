@@ -1,4 +1,4 @@
-// Counts each digit in each block of keys.
+// Counts each digit in each block of keys, and in all.
 shared uint found[kDigits];
 
 void main() {
@@ -6,13 +6,18 @@ void main() {
     uint blocks = (job.count + kBlock - 1) / kBlock;
     uint block = groupNumber();
     uint t = gl_LocalInvocationIndex;
-    if (t < kDigits) found[t] = 0;
+    if (block >= blocks) return;
+    [[dont_unroll]] for (uint digit = t; digit < kDigits; digit += kGroup) found[digit] = 0;
     barrier();
     Source from = sourceOf(passOrJobs);
-    [[dont_unroll]] for (uint k = 0; k < kItems; ++k) {
-        uint i = block * kBlock + k * kGroup + t;
-        if (i < job.count) atomicAdd(found[digitOf(from, i)], 1u);
+    [[dont_unroll]] for (uint i = block * kBlock + t; i < min((block + 1) * kBlock, job.count); i += kGroup) {
+        atomicAdd(found[digitOf(from, i)], 1u);
     }
     barrier();
-    if (t < kDigits && block < blocks) Words(work(job.digits)).word[t * blocks + block] = found[t];
+    Words table = Words(work(job.digits));
+    [[dont_unroll]] for (uint digit = t; digit < kDigits; digit += kGroup) {
+        uint count = found[digit];
+        table.word[kDigitTotals + digit * blocks + block] = count;
+        if (count > 0u) atomicAdd(table.word[passOrJobs * kDigits + digit], count);
+    }
 }

@@ -1,20 +1,22 @@
-// Converts counts of digits to positions of their keys: prefix sums of all counters. One workgroup.
+// Converts counts of digits to positions of their keys, with a workgroup for each digit.
 void main() {
     readJob(firstJob);
-    uint total = kDigits * ((job.count + kBlock - 1) / kBlock);
+    uint blocks = (job.count + kBlock - 1) / kBlock;
+    uint digit = groupNumber();
+    uint t = gl_LocalInvocationIndex;
+    if (digit >= kDigits) return;
     Words table = Words(work(job.digits));
-    uint carried = 0;
-    [[dont_unroll]] for (uint tile = 0; tile < total; tile += kBlock) {
-        uint first = tile + gl_LocalInvocationIndex * kItems;
-        uint end = min(first + kItems, total);
-        uint own = 0;
-        [[dont_unroll]] for (uint i = first; i < end; ++i) own += table.word[i];
+    uint lower = 0;
+    [[dont_unroll]] for (uint i = t; i < digit; i += kGroup) lower += table.word[passOrJobs * kDigits + i];
+    before(lower);
+    uint carried = sums[kGroup - 1];
+    barrier();
+    uint row = kDigitTotals + digit * blocks;
+    [[dont_unroll]] for (uint tile = 0; tile < blocks; tile += kGroup) {
+        uint block = tile + t;
+        uint own = block < blocks ? table.word[row + block] : 0u;
         uint sum = carried + before(own);
-        [[dont_unroll]] for (uint i = first; i < end; ++i) {
-            uint count = table.word[i];
-            table.word[i] = sum;
-            sum += count;
-        }
+        if (block < blocks) table.word[row + block] = sum;
         carried += sums[kGroup - 1];
         barrier();
     }

@@ -1,5 +1,5 @@
 // Barrier: makes writes of all invocations visible to the workgroup.
 void meet() {
-    memoryBarrierBuffer();
+    groupMemoryBarrier();
     barrier();
 }

@@ -134,7 +134,13 @@ impl CommandBuffer {
             if before.is_some_and(|before| before.phase != step.phase) {
                 self.compute_barrier();
             }
-            let push = BuildPushConstants { jobs, first_job: step.job, pass_or_jobs: step.pass_or_jobs };
+            let push = BuildPushConstants {
+                jobs,
+                first_job: step.job,
+                pass_or_jobs: step.pass_or_jobs,
+                groups_of_job: step.groups_of_job,
+                unused: 0,
+            };
             let bind = before.is_none_or(|before| before.kernel != step.kernel);
             self.dispatch_kernel(
                 bind.then_some(&pipeline),

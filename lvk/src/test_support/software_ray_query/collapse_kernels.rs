@@ -8,7 +8,7 @@ use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::kernels::Kernel;
 use crate::resource::Buffer;
-use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, GpuBuildPlan};
+use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, DECISION_BYTES, GpuBuildPlan};
 use crate::software_ray_query::gpu_build::steps::wide_steps;
 use crate::software_ray_query::layout::LeafKind;
 
@@ -18,6 +18,7 @@ const WIDE_NODES: usize = 8;
 const END_BYTES: usize = 9;
 const BINARY_WORDS: usize = 16;
 const WIDE_WORDS: usize = 20;
+const DECISION_WORDS: usize = (DECISION_BYTES / 4) as usize;
 
 /// A binary tree as input of the kernels: the memory of the BLAS, followed by the scratch memory of a build.
 pub(crate) struct Collapser<'a> {
@@ -32,7 +33,6 @@ impl<'a> Collapser<'a> {
             primitive_count: tree.nodes.len() as u32 + 1,
             vertex_count: 0,
             geometry_count: 1,
-            improvements: 0,
         };
         Ok(Self { tree, plan: GpuBuildPlan::blas("collapse", &shape)? })
     }
@@ -65,6 +65,13 @@ impl<'a> Collapser<'a> {
                 words[11 + which * 4] = self.tree.shape(child.below).packed();
             }
         }
+        let decisions = self.plan.scratch.binary as usize + self.tree.nodes.len() * BINARY_WORDS;
+        let places = scratch[decisions..].chunks_exact_mut(DECISION_WORDS);
+        for (words, decided) in places.zip(self.tree.decided()) {
+            words[DECISION_WORDS - 1] = decided.decision;
+        }
+        let counts = &mut scratch[self.plan.scratch.parents as usize..];
+        counts.iter_mut().zip(self.tree.primitive_counts()).for_each(|(word, count)| *word = count);
         words
     }
 

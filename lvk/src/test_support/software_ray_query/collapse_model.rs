@@ -1,23 +1,30 @@
-//! Reference for the collapse of a binary tree to a wide one in `software_ray_query/kernels/collapse.glsl`. Tests
-//! compare the kernel with it.
+//! Reference for the collapse of a binary tree to a wide one in `decide.glsl` and `collapse.glsl` of
+//! `software_ray_query/kernels`. Tests compare the kernels with it.
 
-use super::gpu_build_check::CheckBounds;
+use super::gpu_build_check::{CheckBounds, union_bounds};
 use crate::software_ray_query::layout::MAX_BVH8_DEPTH;
 
 const CHILDREN: u32 = 8;
 const MAX_GROUP_PRIMITIVES: u32 = 3;
-const MAX_GROUPS: u32 = 4;
-const GROUP_WORTH: f32 = 0.5;
+const MAX_GROUPS: u32 = 3;
+const PRIMITIVE_COST: f32 = 0.3125;
+const NODE_COST: f32 = 2.0;
+/// Cost of what is not allowed.
+const NEVER: f32 = 1e38;
+/// Shares of a subtree, by the maximum children less one.
+const SHARES: usize = 7;
+/// The decision of a share that is as that of the next lower one.
+const AS_BELOW: u32 = 7;
 
 /// Nodes of two children each, the root first.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Bvh2Reference {
     /// The two children of each node.
     pub nodes: Vec<[Bvh2Child; 2]>,
 }
 
 /// A child of a binary node.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bvh2Child {
     /// Bounds of the subtree.
     pub bounds: CheckBounds,
@@ -60,16 +67,29 @@ pub(crate) struct GroupShape {
     pub(crate) count: u32,
 }
 
+/// The costs of a subtree for each share, and the decisions in the kernels' format.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Decided {
+    pub(crate) costs: [f32; SHARES],
+    pub(crate) decision: u32,
+}
+
 #[derive(Clone, Copy)]
 struct CollapsePart {
     child: Bvh2Child,
-    shape: GroupShape,
+    share: usize,
+}
+
+/// What is known of each node.
+struct KnownNodes {
+    shapes: Vec<GroupShape>,
+    decided: Vec<Decided>,
 }
 
 impl GroupShape {
-    const LEAF: Self = Self { height: 0, groups: 1, count: 1 };
+    pub(crate) const LEAF: Self = Self { height: 0, groups: 1, count: 1 };
 
-    fn is_above(self, other: Self) -> Self {
+    pub(crate) fn is_above(self, other: Self) -> Self {
         let count = (self.count + other.count).min(0xffff);
         let groups = if count <= MAX_GROUP_PRIMITIVES { 1 } else { (self.groups + other.groups).min(0xff) };
         Self { height: self.height.max(other.height) + 1, groups, count }
@@ -83,13 +103,90 @@ impl GroupShape {
     fn is_group(self) -> bool {
         self.count <= MAX_GROUP_PRIMITIVES
     }
+}
 
-    fn least_children(self, is_tall: bool) -> u32 {
-        if is_tall || self.groups > MAX_GROUPS { 1 } else { self.groups }
+impl Decided {
+    fn of_leaf(bounds: &CheckBounds) -> Self {
+        Self { costs: [half_area(bounds) * PRIMITIVE_COST; SHARES], decision: 0 }
+    }
+
+    /// Decides for a node of this area and shape, whose halves are decided.
+    fn of_node(area: f32, shape: GroupShape, [one, two]: [&Self; 2]) -> Self {
+        let mut least = [(f32::INFINITY, 0); SHARES];
+        for (both, least) in least.iter_mut().enumerate() {
+            for share in 0..=both {
+                let sum = one.costs[share] + two.costs[both - share];
+                if sum < least.0 {
+                    *least = (sum, share as u32);
+                }
+            }
+        }
+        let whole = match shape {
+            _ if shape.is_group() => area * PRIMITIVE_COST * shape.count as f32,
+            _ if shape.groups <= MAX_GROUPS => NEVER,
+            _ => least[SHARES - 1].0 + area * NODE_COST,
+        };
+        let (mut costs, mut decision) = ([whole; SHARES], least[SHARES - 1].1);
+        for share in 1..SHARES {
+            let (sum, first) = least[share - 1];
+            let is_less = sum < costs[share - 1];
+            costs[share] = if is_less { sum } else { costs[share - 1] }.min(NEVER);
+            decision |= if is_less { first } else { AS_BELOW } << (3 * share);
+        }
+        Self { costs, decision }
+    }
+
+    /// Returns the shares of both halves if a subtree with this share is split.
+    fn halves(&self, mut share: usize) -> Option<[usize; 2]> {
+        let first = |share: usize| self.decision >> (3 * share) & 7;
+        while share > 0 && first(share) == AS_BELOW {
+            share -= 1;
+        }
+        let half = first(share) as usize;
+        (share > 0).then(|| [half, share - 1 - half])
     }
 }
 
 impl Bvh2Reference {
+    /// Returns the nodes below a child, each before those below it and the first half before the second.
+    pub(crate) fn preorder(&self, root: BelowNode) -> Vec<usize> {
+        let (mut open, mut found) = (vec![root], Vec::new());
+        while let Some(below) = open.pop() {
+            if let BelowNode::Node(node) = below {
+                found.push(node);
+                open.extend(self.nodes[node].iter().rev().map(|child| child.below));
+            }
+        }
+        found
+    }
+
+    /// Returns the same tree with its nodes in [preorder](Self::preorder).
+    pub(crate) fn in_preorder(&self, root: BelowNode) -> Self {
+        let order = self.preorder(root);
+        let mut places = vec![0; self.nodes.len()];
+        order.iter().enumerate().for_each(|(place, node)| places[*node] = place);
+        let moved = |child: Bvh2Child| match child.below {
+            BelowNode::Node(node) => Bvh2Child { below: BelowNode::Node(places[node]), ..child },
+            BelowNode::Leaf(_) => child,
+        };
+        Self { nodes: order.iter().map(|node| self.nodes[*node].map(moved)).collect() }
+    }
+
+    /// Returns the primitives of all leaves.
+    #[cfg(test)]
+    pub(crate) fn leaves(&self) -> Vec<u32> {
+        let leaf = |child: &Bvh2Child| match child.below {
+            BelowNode::Leaf(number) => Some(number),
+            BelowNode::Node(_) => None,
+        };
+        self.nodes.iter().flatten().filter_map(leaf).collect()
+    }
+
+    /// Returns the decision about each node. Children must follow their parent.
+    pub fn decisions(&self) -> Vec<u32> {
+        self.decided().iter().map(|decided| decided.decision).collect()
+    }
+
     /// Returns the shape of the subtree of a child.
     pub(crate) fn shape(&self, below: BelowNode) -> GroupShape {
         match below {
@@ -101,29 +198,56 @@ impl Bvh2Reference {
         }
     }
 
-    /// Returns the shape of each node. Children must follow their parent.
-    fn shapes(&self) -> Vec<GroupShape> {
-        let mut shapes = vec![GroupShape::LEAF; self.nodes.len()];
+    /// Returns the costs of each node and the decisions about it. Children must follow their parent.
+    pub(crate) fn decided(&self) -> Vec<Decided> {
+        self.known().decided
+    }
+
+    /// Returns the number of primitives below each node. Children must follow their parent.
+    pub(crate) fn primitive_counts(&self) -> Vec<u32> {
+        let mut counts = vec![0; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate().rev() {
-            let [one, two] = node.map(|child| node_below(&shapes, child.below));
-            shapes[index] = one.is_above(two);
+            counts[index] = node
+                .iter()
+                .map(|child| match child.below {
+                    BelowNode::Leaf(_) => 1,
+                    BelowNode::Node(below) => counts[below],
+                })
+                .sum();
         }
-        shapes
+        counts
+    }
+
+    fn known(&self) -> KnownNodes {
+        let (shapes, decided) = (vec![GroupShape::LEAF; self.nodes.len()], Vec::new());
+        let mut known = KnownNodes { shapes, decided };
+        known.decided.resize(self.nodes.len(), Decided { costs: [0.0; SHARES], decision: 0 });
+        for (index, node) in self.nodes.iter().enumerate().rev() {
+            let [one, two] = node.map(|child| node_below(&known.shapes, child.below));
+            known.shapes[index] = one.is_above(two);
+            let halves = node.map(|child| match child.below {
+                BelowNode::Leaf(_) => Decided::of_leaf(&child.bounds),
+                BelowNode::Node(below) => known.decided[below],
+            });
+            let area = half_area(&union_bounds(node[0].bounds, node[1].bounds));
+            known.decided[index] = Decided::of_node(area, known.shapes[index], [&halves[0], &halves[1]]);
+        }
+        known
     }
 
     /// Returns the wide tree. This tree must have more than three primitives.
     pub fn collapse(&self) -> Bvh8Reference {
-        self.is_wide(&self.shapes(), 0, 0)
+        self.is_wide(&self.known(), 0, 0)
     }
 
-    fn is_wide(&self, shapes: &[GroupShape], node: usize, level: usize) -> Bvh8Reference {
-        let cut = self.cut_to_groups(shapes, node, level);
+    fn is_wide(&self, known: &KnownNodes, node: usize, level: usize) -> Bvh8Reference {
+        let cut = self.cut(known, node, level);
         let order = slot_order(&cut);
         let child = |part: Option<usize>| {
             let Some(part) = part.map(|part| cut[part]) else { return Bvh8Child::None };
             match part.child.below {
-                BelowNode::Node(below) if !part.shape.is_group() => {
-                    Bvh8Child::Node(Box::new(self.is_wide(shapes, below, level + 1)))
+                BelowNode::Node(below) if !known.shapes[below].is_group() => {
+                    Bvh8Child::Node(Box::new(self.is_wide(known, below, level + 1)))
                 }
                 below => Bvh8Child::Leaf(self.primitives(below)),
             }
@@ -132,26 +256,57 @@ impl Bvh2Reference {
     }
 
     /// Returns the children of the wide node that replaces a binary one.
-    fn cut_to_groups(&self, shapes: &[GroupShape], node: usize, level: usize) -> Vec<CollapsePart> {
-        let part = |child: Bvh2Child| CollapsePart { child, shape: node_below(shapes, child.below) };
-        let mut cut: Vec<CollapsePart> = self.nodes[node].map(part).to_vec();
-        let is_tall = (shapes[node].height as usize + 1) / 3 > MAX_BVH8_DEPTH - 1 - level;
-        let mut taken: u32 = cut.iter().map(|part| part.shape.least_children(is_tall)).sum();
-        let mut closed = [false; CHILDREN as usize];
-        while cut.len() < CHILDREN as usize {
-            let Some((next, below)) = next_to_split(&cut, &closed, is_tall) else { break };
-            let parts = self.nodes[below].map(part);
-            let more: u32 = parts.iter().map(|part| part.shape.least_children(is_tall)).sum();
-            let after = taken + more - cut[next].shape.least_children(is_tall);
-            if after > CHILDREN {
-                closed[next] = true;
-                continue;
-            }
-            taken = after;
-            cut[next] = parts[0];
-            cut.push(parts[1]);
+    fn cut(&self, known: &KnownNodes, node: usize, level: usize) -> Vec<CollapsePart> {
+        let first = (known.decided[node].decision & 7) as usize;
+        let [one, two] = self.nodes[node];
+        let mut cut = vec![
+            CollapsePart { child: one, share: first },
+            CollapsePart { child: two, share: SHARES - 1 - first },
+        ];
+        if (known.shapes[node].height as usize + 1) / 3 > MAX_BVH8_DEPTH - 1 - level {
+            self.cut_highest(known, &mut cut);
+            return cut;
         }
-        cut
+        loop {
+            let halves = |part: &CollapsePart| match part.child.below {
+                BelowNode::Node(below) => known.decided[below].halves(part.share),
+                BelowNode::Leaf(_) => None,
+            };
+            let splits: Vec<_> = cut.iter().map(halves).collect();
+            if splits.iter().all(Option::is_none) {
+                return cut;
+            }
+            for (part, shares) in splits.into_iter().enumerate() {
+                match shares {
+                    Some(shares) => self.split(&mut cut, part, shares),
+                    None => cut[part].share = 0,
+                }
+            }
+        }
+    }
+
+    /// Splits the highest part until there is no more room.
+    fn cut_highest(&self, known: &KnownNodes, cut: &mut Vec<CollapsePart>) {
+        let height = |part: &CollapsePart| node_below(&known.shapes, part.child.below).height;
+        while cut.len() < CHILDREN as usize {
+            let mut next = 0;
+            for index in 1..cut.len() {
+                if height(&cut[index]) > height(&cut[next]) {
+                    next = index;
+                }
+            }
+            if matches!(cut[next].child.below, BelowNode::Leaf(_)) {
+                break;
+            }
+            self.split(cut, next, [0; 2]);
+        }
+    }
+
+    fn split(&self, cut: &mut Vec<CollapsePart>, part: usize, shares: [usize; 2]) {
+        let BelowNode::Node(below) = cut[part].child.below else { return };
+        let [one, two] = self.nodes[below];
+        cut[part] = CollapsePart { child: one, share: shares[0] };
+        cut.push(CollapsePart { child: two, share: shares[1] });
     }
 
     fn primitives(&self, below: BelowNode) -> Vec<u32> {
@@ -196,19 +351,6 @@ fn node_below(shapes: &[GroupShape], below: BelowNode) -> GroupShape {
     }
 }
 
-fn next_to_split(cut: &[CollapsePart], closed: &[bool], is_tall: bool) -> Option<(usize, usize)> {
-    let (mut next, mut most) = (None, -1.0);
-    for (index, part) in cut.iter().enumerate() {
-        let BelowNode::Node(node) = part.child.below else { continue };
-        let area = half_area(&part.child.bounds) * if part.shape.is_group() { GROUP_WORTH } else { 1.0 };
-        let worth = if is_tall { part.shape.height as f32 } else { area };
-        if !closed[index] && worth > most {
-            (next, most) = (Some((index, node)), worth);
-        }
-    }
-    next
-}
-
 /// Returns for each child slot the index of its part.
 fn slot_order(cut: &[CollapsePart]) -> [Option<usize>; 8] {
     let centre = |bounds: &CheckBounds| -> [f32; 3] {
@@ -244,7 +386,7 @@ fn slot_order(cut: &[CollapsePart]) -> [Option<usize>; 8] {
     children
 }
 
-fn half_area(bounds: &CheckBounds) -> f32 {
+pub(crate) fn half_area(bounds: &CheckBounds) -> f32 {
     let [x, y, z] = std::array::from_fn(|axis| (bounds[1][axis] - bounds[0][axis]).max(0.0));
     x * y + y * z + z * x
 }
@@ -294,11 +436,7 @@ fn add_child(
     let children = parts.map(|part| add_child(tree, part, even, height - 1, choose));
     tree.nodes[node] = children;
     let [one, two] = children.map(|child| child.bounds);
-    let bounds = [
-        std::array::from_fn(|axis| one[0][axis].min(two[0][axis])),
-        std::array::from_fn(|axis| one[1][axis].max(two[1][axis])),
-    ];
-    Bvh2Child { bounds, below: BelowNode::Node(node) }
+    Bvh2Child { bounds: union_bounds(one, two), below: BelowNode::Node(node) }
 }
 
 #[cfg(test)]

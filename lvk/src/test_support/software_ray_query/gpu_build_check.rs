@@ -331,7 +331,7 @@ fn bounds_of(corners: &[[f32; 3]]) -> CheckBounds {
     corners.iter().map(ended).fold(EMPTY, |all, corner| union_bounds(all, [corner, corner]))
 }
 
-fn union_bounds(a: CheckBounds, b: CheckBounds) -> CheckBounds {
+pub(crate) fn union_bounds(a: CheckBounds, b: CheckBounds) -> CheckBounds {
     let lo = std::array::from_fn(|axis| a[0][axis].min(b[0][axis]));
     let hi = std::array::from_fn(|axis| a[1][axis].max(b[1][axis]));
     [lo, hi]

@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+pub use super::cluster_model::SortedPrimitives;
 pub use super::collapse_model::{BelowNode, Bvh2Child, Bvh2Reference, Bvh8Child, Bvh8Reference, any_tree};
 pub use super::cpu_builds::{CpuBuild, build_on_threads};
 pub use super::gpu_build_check::{CheckBounds, EMPTY, StructureFacts, check_structure};
@@ -36,7 +37,6 @@ pub enum LeafEncoding {
 /// A BLAS to build.
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
-    pub improvements: u32,
     pub leaves: LeafEncoding,
 }
 
@@ -65,7 +65,6 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
             primitive_count: desc.geometries.iter().map(BlasGeometry::primitive_count).sum(),
             vertex_count: geometries.iter().map(|geometry| geometry.vertex_count).sum(),
             geometry_count: geometries.len() as u32,
-            improvements: desc.improvements,
         };
         let plan = GpuBuildPlan::blas("test", &shape)?;
         let (structure, target) = allocate_structure(ctx, &plan)?;
@@ -164,6 +163,19 @@ pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)
     let sorter = super::sort_kernels::Sorter::new(keys, low_bits);
     let words = run_on(ctx, &sorter.words(), |cmd, target, address| sorter.record(cmd, target, address))?;
     Ok(sorter.sorted(&words))
+}
+
+/// Builds the binary tree of at least two sorted primitives with the kernel, whose codes must have
+/// [`code_bits`] bits. Returns the tree, the root first, and the decision about each node.
+pub fn cluster(ctx: &Context, primitives: &SortedPrimitives) -> Result<(Bvh2Reference, Vec<u32>)> {
+    let run = super::cluster_kernels::ClusterRun::new(primitives)?;
+    let words = run_on(ctx, &run.words(), |cmd, target, address| run.record(cmd, target, address))?;
+    Ok(run.built(&words))
+}
+
+/// Returns the bits of codes in a build of `count` primitives.
+pub fn code_bits(count: usize) -> Result<u32> {
+    super::cluster_kernels::code_bits(count)
 }
 
 /// Collapses a binary tree of more than three primitives with the kernels.

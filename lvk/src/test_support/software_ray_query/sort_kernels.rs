@@ -6,6 +6,7 @@ use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::resource::Buffer;
+use crate::software_ray_query::gpu_build::layout::{DIGIT_TOTAL_WORDS, DIGITS, SORT_BLOCK};
 use crate::software_ray_query::gpu_build::params::GpuBuildParams;
 use crate::software_ray_query::gpu_build::steps::sort_steps;
 
@@ -32,7 +33,10 @@ impl<'a> Sorter<'a> {
     }
 
     fn bytes(&self) -> u64 {
-        4 * (u64::from(self.job.digits) + 16 * u64::from(self.job.count.div_ceil(1024)) + 1)
+        let blocks = self.job.count.div_ceil(SORT_BLOCK);
+        4 * (u64::from(self.job.digits)
+            + u64::from(DIGIT_TOTAL_WORDS)
+            + u64::from(DIGITS) * u64::from(blocks))
     }
 
     /// Returns the memory before the sort, with keys at the source of the first pass.
@@ -40,7 +44,7 @@ impl<'a> Sorter<'a> {
         let high = self.keys.iter().map(|key| if self.is_long() { (key >> 32) as u32 } else { *key as u32 });
         let low = self.keys.iter().filter(|_| self.is_long()).map(|key| *key as u32);
         let mut words: Vec<u32> = high.chain(0..self.job.count).chain(low).collect();
-        if self.job.low_bits.div_ceil(4) % 2 == 1 {
+        if self.job.low_bits.div_ceil(8) % 2 == 1 {
             words.splice(0..0, vec![0; self.job.spare_keys as usize]);
         }
         words.resize((self.bytes() / 4) as usize, 0);

@@ -1,5 +1,0 @@
-// Builds the hierarchy.
-void main() {
-    readJob(firstJob);
-    writeHierarchy(invocation());
-}
