@@ -8,6 +8,7 @@ use clap::{Args, Parser, Subcommand};
 use lvk::DeviceProfile;
 
 use crate::paper::PaperArgs;
+use crate::peers::PeersArgs;
 
 /// Measures the costs and gains of lvk on a device and prints Markdown tables.
 ///
@@ -77,6 +78,8 @@ pub(super) enum Benchmark {
     Overhead(TraceArgs),
     /// The paper's experiment: stand-alone and hybrid rendering along five camera paths, with a report
     Paper(PaperArgs),
+    /// The same work by lvk and by plain ash; `cargo run --release -p lvk-bench-peers` adds wgpu, blade and vk-graph
+    Peers(PeersArgs),
 }
 
 /// Sizes of [`Benchmark::Batch`].
@@ -202,6 +205,7 @@ Examples:
   bench queries --scene living_room.obj            software ray queries and the driver's ray tracing
   bench overhead --quick                           smoke test
   bench paper --out report                         the paper's tables and figures, with the scenes in LVK_SCENES
+  bench peers --rows draws,tlas                    two rows by lvk and by plain ash
 
 Exit status: 0 on success, 1 for a device error, 2 for wrong arguments or input, 130 after Ctrl-C. After Ctrl-C, `paper`
 finishes the current scene and its report.";
@@ -248,6 +252,7 @@ mod tests {
             "paper --frames 0",
             "paper --scenes",
             "paper --depth 17",
+            "peers --rows everything",
         ] {
             assert_eq!(parsed(line).unwrap_err().exit_code(), 2, "{line}");
         }

@@ -35,6 +35,8 @@ pub(super) enum BenchError {
     NoBenchmark,
     #[error("cannot create a folder for the BVH cache: {0}")]
     NoFolder(#[from] std::io::Error),
+    #[error("{0}")]
+    Peers(String),
     #[error(transparent)]
     Listing(#[from] RunError),
     #[error("number of messages that validation reported: {}; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]

@@ -18,6 +18,7 @@ mod morton;
 mod order;
 mod overhead;
 pub mod paper;
+pub mod peers;
 mod pipelines;
 mod queries;
 mod run;

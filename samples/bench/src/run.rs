@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use crate::args::{BenchArgs, Benchmark};
 use crate::error::BenchError;
+use crate::peers::{self, PeersArgs, RunOptions};
 use crate::setup::Setup;
 use crate::table::Table;
 use crate::{batch, builds, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
@@ -35,8 +36,17 @@ fn execute(args: &BenchArgs) -> Result<String, BenchError> {
         return Ok(String::new());
     }
     let benchmark = args.benchmark.as_ref().ok_or(BenchError::NoBenchmark)?;
+    if let Benchmark::Peers(peers) = benchmark {
+        return compare_peers(args, peers);
+    }
     let tables = measure(args, benchmark)?;
     Ok(tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n"))
+}
+
+fn compare_peers(args: &BenchArgs, peers: &PeersArgs) -> Result<String, BenchError> {
+    let options =
+        RunOptions { quick: args.quick, runs: args.runs, validate: args.validate, subcommand: Some("peers") };
+    peers::run(&peers::own_peers(), peers, &options).map_err(|error| BenchError::Peers(error.to_string()))
 }
 
 fn measure(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchError> {
@@ -46,7 +56,7 @@ fn measure(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchE
     let setup = Setup::new(args)?;
     let tables = match benchmark {
         Benchmark::Batch(args) => vec![batch::measure(&setup, args)?],
-        Benchmark::Builds(_) => Vec::new(),
+        Benchmark::Builds(_) | Benchmark::Peers(_) => Vec::new(),
         Benchmark::Compaction(args) => vec![compaction::measure(&setup, args)?],
         Benchmark::Core => vec![cpu_overhead::measure(&setup)?],
         Benchmark::Split(args) => vec![split::measure(&setup, args)?],

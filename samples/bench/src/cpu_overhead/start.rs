@@ -28,7 +28,7 @@ pub(super) fn measure(setup: &Setup) -> Result<Vec<OverheadRow>, BenchError> {
 }
 
 /// Returns the resident memory of the process in megabytes; `None` without `/proc/self/status`.
-pub(super) fn resident_mb() -> Option<f64> {
+pub(crate) fn resident_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
     let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;

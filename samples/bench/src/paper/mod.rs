@@ -25,6 +25,7 @@ mod trace_path;
 
 pub use args::PaperArgs;
 pub(super) use command::run;
+pub(super) use date::today;
 pub use error::PaperError;
 pub use image_metrics::ImageMetrics;
 pub use measure::{CAMERA_COUNT, CameraResult, ExperimentPlan, SceneResult, measure};

@@ -1,0 +1,71 @@
+//! The rows by `blade-graphics`.
+
+mod accel_structs;
+mod bindings;
+mod compute;
+mod device;
+mod draws;
+mod objects;
+mod rays;
+mod textured;
+
+use lvk_bench::peers::{Failure, Peer, PeerDevice, PeerEntry, Program, Row, RowRun, Sample, Workload};
+
+use device::Gpu;
+
+const TRIANGLE: &[(&str, &[u8])] =
+    &[("triangle_blade.rs", include_bytes!("../../examples/triangle_blade.rs"))];
+
+/// `blade-graphics`.
+pub(crate) const ENTRY: PeerEntry = PeerEntry {
+    name: "blade",
+    package: "blade-graphics",
+    open: || Ok(Box::new(BladePeer { gpu: Gpu::new()? })),
+    triangles: &[Program { label: "blade", dependencies: "blade-graphics = \"0.9\"", files: TRIANGLE }],
+};
+
+struct BladePeer {
+    gpu: Gpu,
+}
+
+impl Peer for BladePeer {
+    fn device(&self) -> PeerDevice {
+        self.gpu.description()
+    }
+
+    fn prepare(self: Box<Self>, row: Row, work: &Workload) -> Result<Box<dyn RowRun>, Failure> {
+        let gpu = self.gpu;
+        Ok(match row {
+            Row::EmptySubmit => Box::new(EmptySubmits { gpu, count: work.submits }),
+            Row::Buffers => Box::new(objects::Buffers { gpu, count: work.objects }),
+            Row::Textures => Box::new(objects::Textures { gpu, count: work.objects }),
+            Row::Draws => Box::new(draws::Draws::new(gpu, work.draws)?),
+            Row::Dispatches => Box::new(compute::Dispatches::new(gpu, work.dispatches)?),
+            Row::Uploads => Box::new(compute::Uploads::new(gpu, work.uploads)),
+            Row::BlasBuilds => Box::new(accel_structs::BlasBuilds::new(gpu, work)?),
+            Row::TlasBuild => Box::new(accel_structs::TlasBuild::new(gpu, work)?),
+            Row::RayQueryFrame => Box::new(rays::RayFrame::new(gpu, work)?),
+            Row::RayPipelineFrame => return Err("it has no ray tracing pipelines".into()),
+            Row::TexturedFrame => Box::new(textured::Textured::new(gpu, work)?),
+        })
+    }
+}
+
+struct EmptySubmits {
+    gpu: Gpu,
+    count: u32,
+}
+
+impl RowRun for EmptySubmits {
+    fn sample(&mut self) -> Result<Sample, Failure> {
+        let submit = || {
+            for _ in 0..self.count {
+                self.gpu.encoder.start();
+                let point = self.gpu.submit();
+                self.gpu.wait(&point)?;
+            }
+            Ok(())
+        };
+        Sample::take(submit, |()| Ok(()))
+    }
+}

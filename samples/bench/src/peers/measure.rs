@@ -1,0 +1,219 @@
+//! The parent process: it starts the children, asks them in turn, and prints the report.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use lvk_dev_driver::{DriverRequest, prepare};
+
+use super::args::{PeersArgs, WorkClass};
+use super::child::{Launch, PeerProcess};
+use super::cold_build::cold_build_seconds;
+use super::peer::{Failure, PeerEntry, Sample};
+use super::report::{Measured, Report};
+use super::row::Row;
+use super::serve::serve;
+use super::workload::Workload;
+
+/// Rounds before those that count.
+const WARM_UP_ROUNDS: u32 = 2;
+/// Time after which a row ends, once it has [`FEWEST_ROUNDS`].
+const LONGEST_ROW: Duration = Duration::from_secs(25);
+/// Rounds that a row has at least.
+const FEWEST_ROUNDS: usize = 3;
+
+/// Options that are not those of the comparison alone.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RunOptions {
+    /// Tiny sizes, two rounds.
+    pub quick: bool,
+    /// Rounds of each row; `None` for the default of the device.
+    pub runs: Option<u32>,
+    /// Run under the validation layer; a message is an error.
+    pub validate: bool,
+    /// Words in front of the options on the command line of this program.
+    pub subcommand: Option<&'static str>,
+}
+
+/// Measures the rows for `entries`, the first of which the others are compared with. Returns the report. In a child process
+/// it serves the parent and does not return.
+///
+/// # Errors
+/// The first peer does not open, a name of the command line is unknown, validation reported messages, or the report cannot
+/// be written.
+pub fn run(entries: &[PeerEntry], args: &PeersArgs, options: &RunOptions) -> Result<String, Failure> {
+    if let (Some(name), Some(row)) = (&args.serve, args.row.as_deref().and_then(Row::from_key)) {
+        let entry = entries.iter().find(|entry| entry.name == name).ok_or("no such peer")?;
+        serve(entry, row, &args.workload(&args.class))?;
+    }
+    let entries = chosen(entries, &args.peers)?;
+    prepare(&DriverRequest { validation: options.validate })?;
+    let log = options.validate.then(tempfile::NamedTempFile::new).transpose()?;
+    let launch = Launch {
+        program: std::env::current_exe()?,
+        subcommand: options.subcommand,
+        validation_log: log.as_ref().map(|log| log.path().to_owned()),
+    };
+    let report = measure(&entries, args, options, &launch)?.to_string();
+    if let Some(log) = log {
+        let messages = std::fs::read_to_string(log.path())?;
+        if !messages.trim().is_empty() {
+            return Err(format!("validation reported:\n{messages}").into());
+        }
+    }
+    if let Some(out) = &args.out {
+        write_report(out, &report)?;
+    }
+    Ok(report)
+}
+
+fn write_report(out: &PathBuf, report: &str) -> Result<(), Failure> {
+    let fail = |error| format!("cannot write {}: {error}", lvk::readable_name(out));
+    Ok(std::fs::write(out, report).map_err(fail)?)
+}
+
+/// Returns the first entry, and those with these names, or all.
+fn chosen(entries: &[PeerEntry], names: &[String]) -> Result<Vec<PeerEntry>, Failure> {
+    if let Some(unknown) = names.iter().find(|name| !entries.iter().any(|entry| entry.name == *name)) {
+        let known: Vec<_> = entries.iter().map(|entry| entry.name).collect();
+        return Err(format!("no peer '{unknown}' in this program; choose of: {}", known.join(", ")).into());
+    }
+    let is_chosen = |number: usize, entry: &PeerEntry| {
+        number == 0 || names.is_empty() || names.iter().any(|name| name == entry.name)
+    };
+    let numbered = entries.iter().enumerate().filter(|(number, entry)| is_chosen(*number, entry));
+    Ok(numbered.map(|(_, entry)| *entry).collect())
+}
+
+fn measure(
+    entries: &[PeerEntry],
+    args: &PeersArgs,
+    options: &RunOptions,
+    launch: &Launch,
+) -> Result<Report, Failure> {
+    let probe = launch.start(&args.child(entries[0].name, Row::EmptySubmit, WorkClass::Quick))?;
+    let class = match (options.quick, probe.device.is_cpu) {
+        (true, _) => WorkClass::Quick,
+        (false, true) => WorkClass::Cpu,
+        (false, false) => WorkClass::Gpu,
+    };
+    let rounds = options.runs.unwrap_or(class.rounds());
+    let work = args.workload(class.key());
+    let mut report = Report::new(entries, &probe.device.name, rounds, options.quick || options.validate);
+    drop(probe);
+    let run = Rounds { entries, args, launch, class, rounds };
+    let [opened, memory] = run.opened();
+    report.add_times("context created", 1, true, opened);
+    for row in args.rows() {
+        eprintln!("measuring {} ...", row.key());
+        let measured = run.row(row, &work);
+        report.add_times(&row.title(&work), row.items(&work), row.is_cpu_only(), measured);
+    }
+    report.add_memory(memory);
+    if args.builds {
+        for program in entries.iter().flat_map(|entry| entry.triangles) {
+            eprintln!("building the triangle of {} ...", program.label);
+            report.add_build(program, cold_build_seconds(program));
+        }
+    }
+    report.add_lines(entries.iter().flat_map(|entry| entry.triangles));
+    Ok(report)
+}
+
+/// Rounds over all peers.
+struct Rounds<'a> {
+    entries: &'a [PeerEntry],
+    args: &'a PeersArgs,
+    launch: &'a Launch,
+    class: WorkClass,
+    rounds: u32,
+}
+
+impl Rounds<'_> {
+    /// Starts a process of each peer in every round. Returns the times to open a device, and the resident memory after one
+    /// submission.
+    fn opened(&self) -> [Vec<Measured>; 2] {
+        let count = self.entries.len();
+        let [mut times, mut memory] = [(); 2].map(|()| vec![Measured::default(); count]);
+        for round in 0..self.rounds.min(WorkClass::Cpu.rounds()) as usize {
+            for turn in 0..count {
+                let which = (turn + round) % count;
+                match self.open_once(which) {
+                    Ok((opened, held)) => {
+                        times[which].samples.push(Sample { cpu: opened, done: opened });
+                        memory[which].samples.extend(held.map(|mb| Sample { cpu: mb, done: mb }));
+                    }
+                    Err(reason) => times[which].fail(&*reason),
+                }
+            }
+        }
+        [times, memory]
+    }
+
+    fn open_once(&self, which: usize) -> Result<(f64, Option<f64>), Failure> {
+        let args = self.args.child(self.entries[which].name, Row::EmptySubmit, WorkClass::Quick);
+        let mut process = self.launch.start(&args)?;
+        process.sample()?;
+        Ok((process.opened_ms, process.memory()?))
+    }
+
+    /// Measures a row. The children live until the row ends.
+    fn row(&self, row: Row, work: &Workload) -> Vec<Measured> {
+        let start = |entry: &PeerEntry| self.launch.start(&self.args.child(entry.name, row, self.class));
+        let mut found = vec![Measured::default(); self.entries.len()];
+        let mut processes: Vec<Option<PeerProcess>> = self
+            .entries
+            .iter()
+            .map(start)
+            .enumerate()
+            .map(|(which, started)| started.map_err(|reason| found[which].fail(&*reason)).ok())
+            .collect();
+        let (began, count) = (Instant::now(), processes.len());
+        for round in 0..WARM_UP_ROUNDS.min(self.rounds) + self.rounds {
+            let counts = round >= WARM_UP_ROUNDS.min(self.rounds);
+            for turn in 0..count {
+                let which = (turn + round as usize) % count;
+                let Some(process) = &mut processes[which] else { continue };
+                match process.sample() {
+                    Ok(sample) if counts => found[which].samples.push(sample),
+                    Ok(_) => {}
+                    Err(reason) => {
+                        found[which].fail(&*reason);
+                        processes[which] = None;
+                    }
+                }
+            }
+            let fewest = found.iter().filter(|f| f.reason.is_none()).map(|f| f.samples.len()).min();
+            if began.elapsed() > LONGEST_ROW && fewest.is_none_or(|fewest| fewest >= FEWEST_ROUNDS) {
+                break;
+            }
+        }
+        for (found, process) in found.iter_mut().zip(&mut processes) {
+            let Some(process) = process else { continue };
+            match process.result() {
+                Ok(result) => found.result = result,
+                Err(reason) => found.fail(&*reason),
+            }
+        }
+        debug_assert!(row.items(work) > 0);
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peers::own_peers;
+
+    #[test]
+    fn the_reference_is_always_among_the_chosen_peers() {
+        let all = own_peers();
+        let names = |names: &[&str]| {
+            let names: Vec<_> = names.iter().map(|name| (*name).to_owned()).collect();
+            chosen(&all, &names).map(|found| found.iter().map(|entry| entry.name).collect::<Vec<_>>())
+        };
+        assert_eq!(names(&[]).unwrap(), ["ash", "lvk"]);
+        assert_eq!(names(&["lvk"]).unwrap(), ["ash", "lvk"]);
+        assert_eq!(names(&["ash"]).unwrap(), ["ash"]);
+        assert!(names(&["gfx"]).unwrap_err().to_string().contains("ash, lvk"));
+    }
+}
