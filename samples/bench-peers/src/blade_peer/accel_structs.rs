@@ -100,13 +100,15 @@ impl RowRun for TlasBuild {
 fn mesh(gpu: &Gpu, work: &Workload, number: u32) -> Result<gpu::AccelerationStructureMesh, Failure> {
     let positions = work.mesh_positions(number);
     let vertices = gpu.buffer_with(bytemuck::cast_slice(&positions), gpu::Memory::Shared)?;
+    // Without indices, blade 0.9 passes a null index buffer of 16-bit indices.
+    let indices = gpu.buffer_with(bytemuck::cast_slice(&work.mesh_indices()), gpu::Memory::Shared)?;
     Ok(gpu::AccelerationStructureMesh {
         vertex_data: vertices.into(),
         vertex_format: gpu::VertexFormat::F32Vec3,
         vertex_stride: 12,
         vertex_count: positions.len() as u32,
-        index_data: vertices.into(),
-        index_type: None,
+        index_data: indices.into(),
+        index_type: Some(gpu::IndexType::U32),
         triangle_count: work.mesh_triangles,
         transform_data: gpu::Buffer::default().into(),
         is_opaque: true,

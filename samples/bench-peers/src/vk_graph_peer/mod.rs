@@ -18,8 +18,8 @@ const TRIANGLE: &[(&str, &[u8])] = &[
     ("triangle_vk_graph.rs", include_bytes!("../../examples/triangle_vk_graph.rs")),
     ("triangle.vert.glsl", include_bytes!("../../../bench/examples/triangle.vert.glsl")),
     ("triangle.frag.glsl", include_bytes!("../../../bench/examples/triangle.frag.glsl")),
-    ("triangle.vert.spv", include_bytes!("../../../bench/examples/triangle.vert.spv")),
-    ("triangle.frag.spv", include_bytes!("../../../bench/examples/triangle.frag.spv")),
+    ("triangle.vert.spv", include_bytes!("../../examples/triangle.vert.spv")),
+    ("triangle.frag.spv", include_bytes!("../../examples/triangle.frag.spv")),
 ];
 
 /// `vk-graph`.

@@ -81,6 +81,12 @@ impl Workload {
         (0..self.mesh_triangles).flat_map(|t| [corner(t, 0), corner(t, 1), corner(t, 2)]).collect()
     }
 
+    /// Returns indices of a mesh, for peers that want them: three for each triangle.
+    #[must_use]
+    pub fn mesh_indices(&self) -> Vec<u32> {
+        (0..3 * self.mesh_triangles).collect()
+    }
+
     /// Returns the transform of an instance as three rows of four. `turn` moves all instances, so that no two builds have
     /// equal inputs.
     #[must_use]
