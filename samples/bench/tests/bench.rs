@@ -241,6 +241,45 @@ fn wrong_input_and_no_ray_tracing_have_different_exit_statuses() {
 }
 
 #[test]
+fn every_row_is_done_by_lvk_and_by_plain_ash_with_equal_results() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("peers.md");
+    let table =
+        table(&["peers", "--quick", "--width", "40", "--height", "20", "--out", out.to_str().unwrap()]);
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), table);
+    for name in
+        ["context created", "empty submission", "buffer created", "texture created", "resident memory"]
+    {
+        assert_positive(&table, name, 1..3);
+    }
+    for name in ["50 draws", "20 dispatches", "12 uploads", "frame with 12 textures"] {
+        assert_positive(&table, name, 1..3);
+    }
+    assert!(table.contains("textures: equal") && table.contains("| 40x20 rays by query "), "{table}");
+    for reason in
+        table.lines().filter(|line| line.starts_with("- ash cannot") || line.starts_with("- lvk cannot"))
+    {
+        assert!(reason.contains("the device has no"), "{table}");
+    }
+    let one = self::table(&["peers", "--quick", "--rows", "submit", "--peers", "lvk", "--runs", "1"]);
+    assert!(!one.contains("draws") && !one.contains("lvk-sw"), "{one}");
+}
+
+#[test]
+fn errors_of_the_comparison_name_their_cause() {
+    let (status, _, err) = outcome(&["peers", "--quick", "--peers", "gfx"]);
+    assert!(
+        status == Some(1) && err.contains("no peer 'gfx'") && err.contains("ash, lvk"),
+        "{status:?}: {err}"
+    );
+    let (status, _, err) = outcome(&["peers", "--quick", "--rows", "submit", "--out", "/absent/peers.md"]);
+    assert!(status == Some(1) && err.contains("cannot write /absent/peers.md"), "{status:?}: {err}");
+    let absent = ["peers", "--quick", "--rows", "ray-query", "--scene", "absent.obj", "--runs", "1"];
+    let (status, out, err) = outcome(&absent);
+    assert!(status == Some(0) && out.contains("absent.obj"), "{status:?}: {out}{err}");
+}
+
+#[test]
 fn cpu_overhead_is_compared_with_its_limits() {
     let table = table(&["core", "--quick"]);
     assert_positive(&table, "push constants + draw", 0..2);

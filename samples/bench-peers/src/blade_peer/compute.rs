@@ -1,7 +1,7 @@
 //! Dispatches, each after the one before, and uploads into a buffer.
 
 use blade_graphics as gpu;
-use lvk_bench::peers::{Failure, RowRun, Sample, UPLOAD_BYTES};
+use lvk_bench::peers::{Failure, RowRun, Sample, UPLOAD_BYTES, upload_bytes};
 
 use super::bindings::Numbers;
 use super::device::Gpu;
@@ -81,8 +81,7 @@ impl RowRun for Uploads {
         let submit = || {
             gpu.encoder.start();
             for number in 0..self.count as usize {
-                let bytes = [number as u8; UPLOAD_BYTES];
-                gpu.write(self.staging, number * UPLOAD_BYTES, &bytes)?;
+                gpu.write(self.staging, number * UPLOAD_BYTES, &upload_bytes(number as u64))?;
             }
             let mut pass = gpu.encoder.transfer("uploads");
             for number in 0..u64::from(self.count) {

@@ -8,7 +8,7 @@ use vk_graph::driver::buffer::Buffer;
 use vk_graph::driver::compute::{ComputePipeline, ComputePipelineInfo};
 use vk_graph::driver::sync::AccessType;
 
-use lvk_bench::peers::{COUNT_COMPUTE, Failure, GlslStage, RowRun, Sample, UPLOAD_BYTES};
+use lvk_bench::peers::{COUNT_COMPUTE, Failure, GlslStage, RowRun, Sample, UPLOAD_BYTES, upload_bytes};
 
 use super::device::{Gpu, shader, wait};
 
@@ -79,8 +79,8 @@ impl RowRun for Uploads {
             let mut graph = Graph::default();
             let buffer = graph.bind_resource(&self.buffer);
             for number in 0..u64::from(self.count) {
-                let bytes = vec![number as u8; UPLOAD_BYTES];
-                graph.update_buffer(buffer, number * UPLOAD_BYTES as u64, bytes);
+                let offset = number * UPLOAD_BYTES as u64;
+                graph.update_buffer(buffer, offset, upload_bytes(number));
             }
             self.gpu.submit(graph)
         };

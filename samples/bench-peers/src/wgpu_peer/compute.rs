@@ -1,6 +1,6 @@
 //! Dispatches, each after the one before, and uploads into a buffer.
 
-use lvk_bench::peers::{Failure, RowRun, Sample, UPLOAD_BYTES};
+use lvk_bench::peers::{Failure, RowRun, Sample, UPLOAD_BYTES, upload_bytes};
 
 use super::device::Gpu;
 use crate::wgsl;
@@ -71,8 +71,8 @@ impl RowRun for Uploads {
     fn sample(&mut self) -> Result<Sample, Failure> {
         let submit = || {
             for number in 0..u64::from(self.count) {
-                let bytes = [number as u8; UPLOAD_BYTES];
-                self.gpu.queue.write_buffer(&self.buffer, number * UPLOAD_BYTES as u64, &bytes);
+                let offset = number * UPLOAD_BYTES as u64;
+                self.gpu.queue.write_buffer(&self.buffer, offset, &upload_bytes(number));
             }
             Ok(self.gpu.queue.submit([]))
         };

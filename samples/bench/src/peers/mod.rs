@@ -29,10 +29,11 @@ pub use peer::{Failure, Peer, PeerDevice, PeerEntry, RowRun, Sample};
 pub use program::Program;
 pub use ray_scene::{RayScene, RayView, rays_found};
 pub use row::Row;
-pub use workload::{UPLOAD_BYTES, Workload, texel, texture_cell};
+pub use workload::{UPLOAD_BYTES, Workload, texel, texture_cell, upload_bytes};
 
-/// Returns the peers that need no other library: plain `ash`, which the others are compared with, and `lvk`.
+/// Returns the peers that need no other library: plain `ash`, which the others are compared with, and `lvk`, by the driver's
+/// rays and by its own.
 #[must_use]
 pub fn own_peers() -> Vec<PeerEntry> {
-    vec![ash_peer::ENTRY, lvk_peer::ENTRY]
+    vec![ash_peer::ENTRY, lvk_peer::ENTRY, lvk_peer::SOFTWARE_ENTRY]
 }

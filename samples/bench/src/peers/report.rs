@@ -43,7 +43,8 @@ pub(super) struct Report {
 impl Report {
     pub(super) fn new(entries: &[PeerEntry], device: &str, rounds: u32, is_smoke_test: bool) -> Self {
         let smoke = if is_smoke_test { " (smoke test: times are not meaningful)" } else { "" };
-        let versions: Vec<_> = entries.iter().map(|entry| version(entry.package)).collect();
+        let mut versions: Vec<_> = entries.iter().map(|entry| version(entry.package)).collect();
+        versions.dedup();
         let title = format!(
             "## peers: the same work by several libraries{smoke}\n\n{device}; {}; {}",
             versions.join(", "),

@@ -104,6 +104,13 @@ impl Workload {
     }
 }
 
+/// Returns the bytes of an upload. The compiler cannot see what they are, so that it cannot write them in place.
+#[must_use]
+#[inline(never)]
+pub fn upload_bytes(number: u64) -> [u8; UPLOAD_BYTES] {
+    std::hint::black_box([number as u8; UPLOAD_BYTES])
+}
+
 /// Returns the four bytes of each texel of a texture.
 #[must_use]
 pub fn texel(number: u32) -> [u8; 4] {

@@ -7,7 +7,7 @@ use super::commands::Commands;
 use super::device::Device;
 use super::memory::Buffer;
 use crate::peers::peer::{Failure, RowRun, Sample};
-use crate::peers::workload::UPLOAD_BYTES;
+use crate::peers::workload::{UPLOAD_BYTES, upload_bytes};
 
 /// Uploads into one buffer, by one copy command.
 pub(super) struct Uploads {
@@ -37,9 +37,8 @@ impl RowRun for Uploads {
             let mapped = self.staging.mapped()?;
             let mut regions = Vec::with_capacity(self.count as usize);
             for number in 0..self.count as usize {
-                let bytes = [number as u8; UPLOAD_BYTES];
                 let offset = number * UPLOAD_BYTES;
-                mapped[offset..offset + UPLOAD_BYTES].copy_from_slice(&bytes);
+                mapped[offset..offset + UPLOAD_BYTES].copy_from_slice(&upload_bytes(number as u64));
                 let offset = offset as u64;
                 regions.push(vk::BufferCopy {
                     src_offset: offset,

@@ -2,11 +2,14 @@
 
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildMode, Context,
-    Holder, TlasDesc, TlasInstance, Triangles,
+    Holder, PrimitiveOrder, TlasDesc, TlasInstance, Triangles,
 };
 
 use crate::peers::peer::{Failure, RowRun, Sample};
 use crate::peers::workload::Workload;
+
+/// As the other peers: without the order in space that is the default on some drivers.
+const ORDER: PrimitiveOrder = PrimitiveOrder::Given;
 
 /// BLAS of many meshes.
 pub(super) struct BlasBuilds {
@@ -34,7 +37,7 @@ impl RowRun for BlasBuilds {
         self.ctx.wait(self.ctx.flush()?)?;
         let mut built = Vec::new();
         let submit = || {
-            let desc = |geometries| BlasDesc { geometries, ..BlasDesc::default() };
+            let desc = |geometries| BlasDesc { geometries, order: ORDER, ..BlasDesc::default() };
             let descs: Vec<_> = self.meshes.iter().map(|mesh| desc(&mesh[..])).collect();
             built = self.ctx.create_blas_batch(&descs)?;
             Ok(self.ctx.flush()?)
@@ -60,7 +63,7 @@ impl TlasBuild {
         needs_ray_tracing(&ctx)?;
         let positions = positions(&ctx, work, 0)?;
         let geometries = &triangles(*positions, work);
-        let blas = ctx.create_blas(&BlasDesc { geometries, ..BlasDesc::default() })?;
+        let blas = ctx.create_blas(&BlasDesc { geometries, order: ORDER, ..BlasDesc::default() })?;
         let tlas = ctx.create_tlas(&TlasDesc { capacity: work.instances, ..TlasDesc::default() })?;
         ctx.wait(ctx.flush()?)?;
         let instances = vec![TlasInstance::new(*blas); work.instances as usize];

@@ -6,7 +6,10 @@ mod objects;
 mod rays;
 mod uploads;
 
-use lvk::{Context, ContextDesc, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
+use lvk::{
+    Context, ContextDesc, Holder, RayQueryRequest, RayTracingPipelineRequest, ShaderModuleDesc,
+    ShaderModuleHandle, ShaderSource, ShaderStage,
+};
 use lvk_dev_driver::{DriverRequest, prepare};
 
 use super::peer::{Failure, Peer, PeerDevice, PeerEntry, RowRun, Sample};
@@ -17,23 +20,62 @@ use super::workload::Workload;
 const TRIANGLE: &[(&str, &[u8])] =
     &[("triangle_lvk.rs", include_bytes!("../../../examples/triangle_lvk.rs"))];
 
-/// `lvk`.
+/// `lvk` with the driver's acceleration structures and ray queries, as all other peers have them.
 pub(super) const ENTRY: PeerEntry = PeerEntry {
     name: "lvk",
     package: "lvk",
-    open: || Ok(Box::new(LvkPeer::new()?)),
+    open: || Ok(Box::new(LvkPeer { ctx: open(RayQueryRequest::HardwareIfPresent)? })),
     triangles: &[Program { label: "lvk", dependencies: "lvk = { path = \"{root}/lvk\" }", files: TRIANGLE }],
 };
+
+/// `lvk` with its own builders and its own traversal, on any device. It is the default on drivers that run on the CPU, and
+/// on GPUs without ray queries.
+pub(super) const SOFTWARE_ENTRY: PeerEntry = PeerEntry {
+    name: "lvk-sw",
+    package: "lvk",
+    open: || {
+        let ctx = open(RayQueryRequest::Software)?;
+        Ok(Box::new(SoftwarePeer { peer: LvkPeer { ctx } }))
+    },
+    triangles: &[],
+};
+
+fn open(ray_query: RayQueryRequest) -> Result<Context, Failure> {
+    let loader = prepare(&DriverRequest::default())?.loader;
+    let ray_tracing_pipeline = match ray_query {
+        RayQueryRequest::Software => RayTracingPipelineRequest::Off,
+        _ => RayTracingPipelineRequest::HardwareIfPresent,
+    };
+    Ok(Context::new(&ContextDesc {
+        vulkan_library: loader.as_deref(),
+        ray_query,
+        ray_tracing_pipeline,
+        ..ContextDesc::default()
+    })?)
+}
 
 struct LvkPeer {
     ctx: Context,
 }
 
-impl LvkPeer {
-    fn new() -> Result<Self, Failure> {
-        let loader = prepare(&DriverRequest::default())?.loader;
-        let desc = ContextDesc { vulkan_library: loader.as_deref(), ..ContextDesc::default() };
-        Ok(Self { ctx: Context::new(&desc)? })
+/// The rows with rays.
+struct SoftwarePeer {
+    peer: LvkPeer,
+}
+
+impl Peer for SoftwarePeer {
+    fn device(&self) -> PeerDevice {
+        self.peer.device()
+    }
+
+    fn prepare(self: Box<Self>, row: Row, work: &Workload) -> Result<Box<dyn RowRun>, Failure> {
+        match row {
+            Row::EmptySubmit | Row::BlasBuilds | Row::TlasBuild | Row::RayQueryFrame => {
+                Box::new(self.peer).prepare(row, work)
+            }
+            Row::RayPipelineFrame => Err("its pipelines are `bench queries`".into()),
+            _ => Err("as the column of lvk".into()),
+        }
     }
 }
 

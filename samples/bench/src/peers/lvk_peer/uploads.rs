@@ -7,7 +7,7 @@ use lvk::{
 
 use super::module;
 use crate::peers::peer::{Failure, RowRun, Sample};
-use crate::peers::workload::UPLOAD_BYTES;
+use crate::peers::workload::{UPLOAD_BYTES, upload_bytes};
 
 const COUNT: &str = "
     layout(local_size_x = 64) in;
@@ -77,8 +77,8 @@ impl RowRun for Uploads {
     fn sample(&mut self) -> Result<Sample, Failure> {
         let submit = || {
             for number in 0..u64::from(self.count) {
-                let bytes = [number as u8; UPLOAD_BYTES];
-                self.ctx.upload_buffer(*self.buffer, number * UPLOAD_BYTES as u64, &bytes)?;
+                let offset = number * UPLOAD_BYTES as u64;
+                self.ctx.upload_buffer(*self.buffer, offset, &upload_bytes(number))?;
             }
             Ok(self.ctx.flush()?)
         };
