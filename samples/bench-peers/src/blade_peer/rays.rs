@@ -1,7 +1,7 @@
 //! Frames of primary rays by ray queries.
 
 use blade_graphics as gpu;
-use lvk_bench::peers::{Failure, RayScene, RowRun, Sample, Workload, rays_found};
+use lvk_bench::peers::{Failure, RayScene, RowRun, Sample, Workload, ray_result};
 
 use super::accel_structs::{build_blas, tlas};
 use super::bindings::Rays;
@@ -55,7 +55,7 @@ impl RowRun for RayFrame {
 
     fn result(&mut self) -> Result<Option<f64>, Failure> {
         let bytes = 8 * u64::from(self.size[0]) * u64::from(self.size[1]);
-        Ok(Some(rays_found(&self.gpu.read(self.rays.hits.buffer, bytes)?)))
+        Ok(Some(ray_result(&self.gpu.read(self.rays.hits.buffer, bytes)?)))
     }
 }
 

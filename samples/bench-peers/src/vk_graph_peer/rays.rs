@@ -11,7 +11,7 @@ use vk_graph::driver::sync::AccessType;
 
 use lvk_bench::peers::{
     Failure, GlslStage, RAY_CLOSEST_HIT, RAY_GENERATION, RAY_MISS, RAY_QUERY, RayScene, RayView, RowRun,
-    Sample, Workload, rays_found,
+    Sample, Workload, ray_result,
 };
 
 use super::device::{Gpu, shader, wait};
@@ -140,7 +140,7 @@ fn hits(gpu: &Gpu, work: &Workload) -> Result<Arc<Buffer>, Failure> {
 }
 
 fn read(gpu: &mut Gpu, hits: &Arc<Buffer>, [width, height]: [u32; 2]) -> Result<Option<f64>, Failure> {
-    Ok(Some(rays_found(&gpu.read(hits, 8 * u64::from(width) * u64::from(height))?)))
+    Ok(Some(ray_result(&gpu.read(hits, 8 * u64::from(width) * u64::from(height))?)))
 }
 
 /// Creates the shader binding table: each group at an address of the base alignment.

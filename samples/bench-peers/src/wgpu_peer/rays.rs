@@ -1,6 +1,6 @@
 //! Frames of primary rays by ray queries.
 
-use lvk_bench::peers::{Failure, RayScene, RayView, RowRun, Sample, Workload, rays_found};
+use lvk_bench::peers::{Failure, RayScene, RayView, RowRun, Sample, Workload, ray_result};
 
 use super::accel_structs::{Mesh, geometry_size, tlas};
 use super::compute::compute_pipeline;
@@ -61,7 +61,7 @@ impl RowRun for RayFrame {
     }
 
     fn result(&mut self) -> Result<Option<f64>, Failure> {
-        Ok(Some(rays_found(&self.gpu.read_buffer(&self.hits, self.hits.size())?)))
+        Ok(Some(ray_result(&self.gpu.read_buffer(&self.hits, self.hits.size())?)))
     }
 }
 

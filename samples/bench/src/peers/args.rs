@@ -78,7 +78,7 @@ impl WorkClass {
 
 impl PeersArgs {
     /// Returns the rows to measure.
-    pub(super) fn rows(&self) -> Vec<Row> {
+    pub(super) fn selected(&self) -> Vec<Row> {
         if self.rows.is_empty() {
             return Row::ALL.to_vec();
         }
@@ -128,9 +128,9 @@ mod tests {
     }
 
     #[test]
-    fn rows_keep_the_order_of_the_table() {
-        assert_eq!(parsed("").rows(), Row::ALL);
-        assert_eq!(parsed("--rows tlas,draws").rows(), [Row::Draws, Row::TlasBuild]);
+    fn selected_work_keeps_the_order_of_the_table() {
+        assert_eq!(parsed("").selected(), Row::ALL);
+        assert_eq!(parsed("--rows tlas,draws").selected(), [Row::Draws, Row::TlasBuild]);
         assert!(Line::try_parse_from(["peers", "--rows", "everything"]).is_err());
     }
 

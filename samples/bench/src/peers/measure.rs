@@ -102,7 +102,7 @@ fn measure(
     let run = Rounds { entries, args, launch, class, rounds };
     let [opened, memory] = run.opened();
     report.add_times("context created", 1, true, opened);
-    for row in args.rows() {
+    for row in args.selected() {
         eprintln!("measuring {} ...", row.key());
         let measured = run.row(row);
         report.add_times(&row.title(&work), row.items(&work), row.is_cpu_only(), measured);
@@ -114,7 +114,7 @@ fn measure(
             report.add_build(program, cold_build_seconds(program));
         }
     }
-    report.add_lines(entries.iter().flat_map(|entry| entry.triangles));
+    report.add_lines(entries.iter().filter_map(|entry| entry.triangles.first()));
     Ok(report)
 }
 

@@ -27,7 +27,7 @@ pub use glsl::{GlslStage, RAY_CLOSEST_HIT, RAY_GENERATION, RAY_MISS, RAY_QUERY, 
 pub use measure::{RunOptions, run};
 pub use peer::{Failure, Peer, PeerDevice, PeerEntry, RowRun, Sample};
 pub use program::Program;
-pub use ray_scene::{RayScene, RayView, rays_found};
+pub use ray_scene::{RayScene, RayView, ray_result};
 pub use row::Row;
 pub use workload::{UPLOAD_BYTES, Workload, texel, texture_cell, upload_bytes};
 

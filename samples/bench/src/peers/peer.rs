@@ -18,7 +18,7 @@ pub struct PeerEntry {
     pub package: &'static str,
     /// Opens a device by the library. Vulkan's loader is in the process already.
     pub open: fn() -> Result<Box<dyn Peer>, Failure>,
-    /// Programs that draw one triangle; more than one where the library is built in different ways.
+    /// The program that draws one triangle, and others that only differ in how the library is built.
     pub triangles: &'static [Program],
 }
 

@@ -70,7 +70,7 @@ impl RayView {
 /// Returns a number that depends on the result of each ray: a distance, negative for a miss, and the index of a triangle, as
 /// eight bytes for each pixel.
 #[must_use]
-pub fn rays_found(bytes: &[u8]) -> f64 {
+pub fn ray_result(bytes: &[u8]) -> f64 {
     let (pixels, _) = bytes.as_chunks::<8>();
     let hit = |pixel: &&[u8; 8]| f32::from_ne_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]) >= 0.0;
     let index = |pixel: &[u8; 8]| u32::from_ne_bytes([pixel[4], pixel[5], pixel[6], pixel[7]]);
@@ -85,8 +85,8 @@ mod tests {
     fn hits_and_their_triangles_make_the_result() {
         let pixel = |t: f32, index: u32| [t.to_ne_bytes(), index.to_ne_bytes()].concat();
         let bytes = [pixel(1.0, 4), pixel(-1.0, 9), pixel(0.0, 1002)].concat();
-        assert_eq!(rays_found(&bytes), 5.0 + 3.0);
-        assert_eq!(rays_found(&pixel(-1.0, 0)), 0.0);
+        assert_eq!(ray_result(&bytes), 5.0 + 3.0);
+        assert_eq!(ray_result(&pixel(-1.0, 0)), 0.0);
     }
 
     #[test]

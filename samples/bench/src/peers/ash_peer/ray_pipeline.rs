@@ -10,7 +10,7 @@ use super::ray_query::{DESCRIPTORS, hits};
 use super::ray_structures::{SceneStructures, write_tlas};
 use crate::peers::glsl::{GlslStage, RAY_CLOSEST_HIT, RAY_GENERATION, RAY_MISS};
 use crate::peers::peer::{Failure, RowRun, Sample};
-use crate::peers::ray_scene::{RayScene, RayView, rays_found};
+use crate::peers::ray_scene::{RayScene, RayView, ray_result};
 use crate::peers::workload::Workload;
 
 /// A frame of primary rays.
@@ -73,7 +73,7 @@ impl RowRun for RayPipelineFrame {
 
     fn result(&mut self) -> Result<Option<f64>, Failure> {
         let bytes = 8 * self.size[0] as usize * self.size[1] as usize;
-        Ok(Some(rays_found(&self.hits.read(&self.device, &mut self.commands, bytes)?)))
+        Ok(Some(ray_result(&self.hits.read(&self.device, &mut self.commands, bytes)?)))
     }
 }
 

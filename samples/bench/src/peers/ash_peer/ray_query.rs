@@ -10,7 +10,7 @@ use super::pipelines::{Layout, Pipeline, write_buffer};
 use super::ray_structures::{SceneStructures, write_tlas};
 use crate::peers::glsl::RAY_QUERY;
 use crate::peers::peer::{Failure, RowRun, Sample};
-use crate::peers::ray_scene::{RayScene, RayView, rays_found};
+use crate::peers::ray_scene::{RayScene, RayView, ray_result};
 use crate::peers::workload::Workload;
 
 /// Descriptors of both frames of rays: the TLAS and the hits.
@@ -65,7 +65,7 @@ impl RowRun for RayQueryFrame {
 
     fn result(&mut self) -> Result<Option<f64>, Failure> {
         let bytes = 8 * self.size[0] as usize * self.size[1] as usize;
-        Ok(Some(rays_found(&self.hits.read(&self.device, &mut self.commands, bytes)?)))
+        Ok(Some(ray_result(&self.hits.read(&self.device, &mut self.commands, bytes)?)))
     }
 }
 

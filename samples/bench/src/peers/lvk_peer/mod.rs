@@ -25,7 +25,14 @@ pub(super) const ENTRY: PeerEntry = PeerEntry {
     name: "lvk",
     package: "lvk",
     open: || Ok(Box::new(LvkPeer { ctx: open(RayQueryRequest::HardwareIfPresent)? })),
-    triangles: &[Program { label: "lvk", dependencies: "lvk = { path = \"{root}/lvk\" }", files: TRIANGLE }],
+    triangles: &[
+        Program { label: "lvk", dependencies: "lvk = { path = \"{root}/lvk\" }", files: TRIANGLE },
+        Program {
+            label: "lvk without its GLSL compiler",
+            dependencies: "lvk = { path = \"{root}/lvk\", default-features = false }",
+            files: TRIANGLE,
+        },
+    ],
 };
 
 /// `lvk` with its own builders and its own traversal, on any device. It is the default on drivers that run on the CPU, and

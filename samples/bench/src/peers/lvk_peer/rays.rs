@@ -9,7 +9,7 @@ use lvk::{
 
 use super::module;
 use crate::peers::peer::{Failure, RowRun, Sample};
-use crate::peers::ray_scene::{RayScene, RayView, rays_found};
+use crate::peers::ray_scene::{RayScene, RayView, ray_result};
 use crate::peers::workload::Workload;
 
 const INPUTS: &str = "
@@ -163,7 +163,7 @@ impl RowRun for RayFrame {
     fn result(&mut self) -> Result<Option<f64>, Failure> {
         let mut bytes = vec![0; 8 * self.size[0] as usize * self.size[1] as usize];
         self.ctx.download_buffer(*self.hits, 0, &mut bytes)?;
-        Ok(Some(rays_found(&bytes)))
+        Ok(Some(ray_result(&bytes)))
     }
 }
 
