@@ -37,6 +37,10 @@ pub(super) enum BenchError {
     NoFolder(#[from] std::io::Error),
     #[error("{0}")]
     Peers(String),
+    #[error(
+        "`peers` takes the first device without --device and --profile; VK_DRIVER_FILES chooses the driver"
+    )]
+    PeersDevice,
     #[error(transparent)]
     Listing(#[from] RunError),
     #[error("number of messages that validation reported: {}; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]
@@ -53,7 +57,7 @@ impl BenchError {
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Interrupted { .. } => interrupt::STATUS,
-            Self::NoBenchmark => 2,
+            Self::NoBenchmark | Self::PeersDevice => 2,
             Self::Listing(error) => error.status(),
             Self::Paper(error) if error.is_input() => 2,
             Self::Scene(_) | Self::Driver(DriverError::Variable { .. }) => 2,

@@ -44,6 +44,9 @@ fn execute(args: &BenchArgs) -> Result<String, BenchError> {
 }
 
 fn compare_peers(args: &BenchArgs, peers: &PeersArgs) -> Result<String, BenchError> {
+    if args.device.is_some() || args.profile.is_some() {
+        return Err(BenchError::PeersDevice);
+    }
     let options =
         RunOptions { quick: args.quick, runs: args.runs, validate: args.validate, subcommand: Some("peers") };
     peers::run(&peers::own_peers(), peers, &options).map_err(|error| BenchError::Peers(error.to_string()))

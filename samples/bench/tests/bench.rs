@@ -267,6 +267,8 @@ fn every_row_is_done_by_lvk_and_by_plain_ash_with_equal_results() {
 
 #[test]
 fn errors_of_the_comparison_name_their_cause() {
+    let (status, _, err) = outcome(&["peers", "--quick", "--device", "0"]);
+    assert!(status == Some(2) && err.contains("VK_DRIVER_FILES"), "{status:?}: {err}");
     let (status, _, err) = outcome(&["peers", "--quick", "--peers", "gfx"]);
     assert!(
         status == Some(1) && err.contains("no peer 'gfx'") && err.contains("ash, lvk"),

@@ -13,9 +13,18 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// Returns the seconds that `cargo build --release` takes for a program and all of its dependencies, which are on the disk
+/// Time of a build.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct BuildTime {
+    /// Seconds from begin to end.
+    pub(super) seconds: f64,
+    /// Seconds of all cores together, where the system tells. Other programs affect them less.
+    pub(super) cpu_seconds: Option<f64>,
+}
+
+/// Returns the time that `cargo build --release` takes for a program and all of its dependencies, which are on the disk
 /// already.
-pub(super) fn cold_build_seconds(program: &Program) -> Result<f64, Failure> {
+pub(super) fn cold_build(program: &Program) -> Result<BuildTime, Failure> {
     let folder = tempfile::tempdir()?;
     let root = root().canonicalize()?;
     std::fs::create_dir(folder.path().join("src"))?;
@@ -32,9 +41,24 @@ pub(super) fn cold_build_seconds(program: &Program) -> Result<f64, Failure> {
         command
     };
     finish(cargo().arg("fetch"))?;
-    let start = Instant::now();
+    let (start, before) = (Instant::now(), cpu_seconds_of_children());
     finish(cargo().args(["build", "--release", "--offline"]))?;
-    Ok(start.elapsed().as_secs_f64())
+    let seconds = start.elapsed().as_secs_f64();
+    let cpu_seconds = before.zip(cpu_seconds_of_children()).map(|(before, after)| after - before);
+    Ok(BuildTime { seconds, cpu_seconds })
+}
+
+/// Returns the seconds that all processes have run which this one has started and waited for; `None` without Linux.
+fn cpu_seconds_of_children() -> Option<f64> {
+    children_seconds(&std::fs::read_to_string("/proc/self/stat").ok()?)
+}
+
+/// Reads the fields `cutime` and `cstime` of `/proc/PID/stat`, in hundredths of a second.
+fn children_seconds(stat: &str) -> Option<f64> {
+    // The name of the program is the only field that may have spaces and brackets.
+    let (_, fields) = stat.rsplit_once(')')?;
+    let mut numbers = fields.split_whitespace().skip(13).map_while(|field| field.parse::<f64>().ok());
+    Some((numbers.next()? + numbers.next()?) / 100.0)
 }
 
 fn finish(command: &mut Command) -> Result<(), Failure> {
@@ -60,6 +84,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn times_of_children_are_two_fields_of_the_status() {
+        let fields: Vec<String> = (3..=20).map(|field: u32| field.to_string()).collect();
+        let stat = format!("1 (a) b (c)) {}", fields.join(" "));
+        assert_eq!(children_seconds(&stat), Some((16.0 + 17.0) / 100.0));
+        assert_eq!(children_seconds("1 (a) S 1"), None);
+    }
+
+    #[test]
     fn the_manifest_names_the_repository() {
         let program = Program { label: "a", dependencies: "lvk = { path = \"{root}/lvk\" }", files: &[] };
         let text = manifest(&program, Path::new("/r"));
@@ -69,10 +101,10 @@ mod tests {
     #[test]
     fn a_program_without_dependencies_is_built() {
         let files: &[(&str, &[u8])] = &[("a.rs", b"fn main() {}")];
-        let seconds = cold_build_seconds(&Program { label: "a", dependencies: "", files }).unwrap();
-        assert!(seconds > 0.0);
+        let time = cold_build(&Program { label: "a", dependencies: "", files }).unwrap();
+        assert!(time.seconds > 0.0 && time.cpu_seconds.is_none_or(|seconds| seconds > 0.0), "{time:?}");
         let wrong: &[(&str, &[u8])] = &[("a.rs", b"fn main() { nothing(); }")];
-        let error = cold_build_seconds(&Program { label: "a", dependencies: "", files: wrong }).unwrap_err();
+        let error = cold_build(&Program { label: "a", dependencies: "", files: wrong }).unwrap_err();
         assert!(error.to_string().contains("nothing"), "{error}");
     }
 }

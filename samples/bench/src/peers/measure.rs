@@ -7,7 +7,7 @@ use lvk_dev_driver::{DriverRequest, prepare};
 
 use super::args::{PeersArgs, WorkClass};
 use super::child::{Launch, PeerProcess};
-use super::cold_build::cold_build_seconds;
+use super::cold_build::cold_build;
 use super::peer::{Failure, PeerEntry, Sample};
 use super::report::{Measured, Report};
 use super::row::Row;
@@ -97,9 +97,10 @@ fn measure(
     };
     let rounds = options.runs.unwrap_or(class.rounds());
     let work = args.workload(class.key());
-    let mut report = Report::new(entries, &probe.device.name, rounds, options.quick || options.validate);
+    let device = probe.device.name.clone();
+    let mut report = Report::new(entries, &device, rounds, options.quick || options.validate);
     drop(probe);
-    let run = Rounds { entries, args, launch, class, rounds };
+    let run = Rounds { entries, args, launch, device: &device, class, rounds };
     let [opened, memory] = run.opened();
     report.add_times("context created", 1, true, opened);
     for row in args.selected() {
@@ -111,7 +112,7 @@ fn measure(
     if args.builds {
         for program in entries.iter().flat_map(|entry| entry.triangles) {
             eprintln!("building the triangle of {} ...", program.label);
-            report.add_build(program, cold_build_seconds(program));
+            report.add_build(program, cold_build(program));
         }
     }
     report.add_lines(entries.iter().filter_map(|entry| entry.triangles.first()));
@@ -123,6 +124,8 @@ struct Rounds<'a> {
     entries: &'a [PeerEntry],
     args: &'a PeersArgs,
     launch: &'a Launch,
+    /// Name of the first peer's device, with its driver.
+    device: &'a str,
     class: WorkClass,
     rounds: u32,
 }
@@ -149,15 +152,14 @@ impl Rounds<'_> {
     }
 
     fn open_once(&self, which: usize) -> Result<(f64, Option<f64>), Failure> {
-        let args = self.args.child(self.entries[which].name, Row::EmptySubmit, WorkClass::Quick);
-        let mut process = self.launch.start(&args)?;
+        let mut process = self.start(&self.entries[which], Row::EmptySubmit, WorkClass::Quick)?;
         process.sample()?;
         Ok((process.opened_ms, process.memory()?))
     }
 
     /// Measures a row. The children live until the row ends.
     fn row(&self, row: Row) -> Vec<Measured> {
-        let mut peers: Vec<_> = self.entries.iter().map(|entry| self.start(entry, row)).collect();
+        let mut peers: Vec<_> = self.entries.iter().map(|entry| self.running(entry, row)).collect();
         let (began, warm_up) = (Instant::now(), WARM_UP_ROUNDS.min(self.rounds));
         for round in 0..warm_up + self.rounds {
             for turn in 0..peers.len() {
@@ -173,9 +175,24 @@ impl Rounds<'_> {
         peers.into_iter().map(RunningPeer::finish).collect()
     }
 
-    fn start(&self, entry: &PeerEntry, row: Row) -> RunningPeer {
+    /// Starts a child. All have to open the same device.
+    fn start(&self, entry: &PeerEntry, row: Row, class: WorkClass) -> Result<PeerProcess, Failure> {
+        let process = self.launch.start(&self.args.child(entry.name, row, class))?;
+        let name = &process.device.name;
+        if self.device.starts_with(name) {
+            return Ok(process);
+        }
+        let first = self.entries[0].name;
+        Err(format!(
+            "its device is '{name}', and that of {first} '{}'; VK_DRIVER_FILES can hide one",
+            self.device
+        )
+        .into())
+    }
+
+    fn running(&self, entry: &PeerEntry, row: Row) -> RunningPeer {
         let mut measured = Measured::default();
-        let started = self.launch.start(&self.args.child(entry.name, row, self.class));
+        let started = self.start(entry, row, self.class);
         let process = started.map_err(|reason| measured.fail(&*reason)).ok();
         RunningPeer { process, measured }
     }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::cold_build::BuildTime;
 use super::peer::{Failure, PeerEntry, Sample};
 use super::program::{Program, locked_version};
 use super::statistics::{Spread, format_time};
@@ -125,11 +126,15 @@ impl Report {
         );
     }
 
-    /// Adds the seconds of a build from an empty folder.
-    pub(super) fn add_build(&mut self, program: &Program, seconds: Result<f64, Failure>) {
-        self.builds.push(match seconds {
-            Ok(seconds) => format!("{} {seconds:.1} s", program.label),
-            Err(reason) => format!("{}: {reason}", program.label),
+    /// Adds the time of a build from an empty folder.
+    pub(super) fn add_build(&mut self, program: &Program, time: Result<BuildTime, Failure>) {
+        let label = program.label;
+        self.builds.push(match time {
+            Ok(BuildTime { seconds, cpu_seconds: Some(cpu) }) => {
+                format!("{label} {seconds:.0} s, {cpu:.0} s of all cores")
+            }
+            Ok(BuildTime { seconds, cpu_seconds: None }) => format!("{label} {seconds:.0} s"),
+            Err(reason) => format!("{label} fails: {reason}"),
         });
     }
 
@@ -151,7 +156,7 @@ impl fmt::Display for Report {
         }
         self.differing.iter().try_for_each(|line| writeln!(f, "- DIFFERENT: {line}"))?;
         if !self.builds.is_empty() {
-            writeln!(f, "- release build of the triangle from an empty folder: {}", self.builds.join(", "))?;
+            writeln!(f, "- release build of the triangle from an empty folder: {}", self.builds.join("; "))?;
         }
         writeln!(f, "- lines of code of the triangle, shaders included: {}", self.lines.join(", "))
     }
@@ -207,6 +212,10 @@ mod tests {
         report.add_times("other", 1, true, vec![measured(&[1.0], None), failed.clone()]);
         report.add_times("third", 1, true, vec![measured(&[1.0], None), failed]);
         report.add_memory(vec![measured(&[20.0], None), measured(&[25.0], None)]);
+        let program = Program { label: "a", dependencies: "", files: &[] };
+        report.add_build(&program, Ok(BuildTime { seconds: 61.2, cpu_seconds: Some(99.6) }));
+        report.add_build(&program, Ok(BuildTime { seconds: 2.0, cpu_seconds: None }));
+        report.add_build(&program, Err("no compiler".into()));
         let text = report.to_string();
         for part in [
             "ash 0.38",
@@ -215,6 +224,7 @@ mod tests {
             "lvk cannot: other; third: no such feature",
             "DIFFERENT: two items: the result of lvk is 7, not 8",
             "50.0 MB (1.25; 1.25-1.25)",
+            "a 61 s, 100 s of all cores; a 2 s; a fails: no compiler",
             "lines of code of the triangle",
         ] {
             assert!(text.contains(part), "{part} in\n{text}");
