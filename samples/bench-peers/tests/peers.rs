@@ -31,7 +31,9 @@ fn every_peer_does_every_row_that_it_can_with_the_same_result() {
         (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
     assert!(output.status.success(), "{report}{errors}");
     assert!(report.contains("textures: equal"), "{report}");
-    for reason in report.lines().filter(|line| line.contains(" cannot: ")) {
+    // Software rays are a column with few rows.
+    let is_reason = |line: &&str| line.contains(" cannot: ") && !line.starts_with("- lvk-sw");
+    for reason in report.lines().filter(is_reason) {
         let expected = ["no ray tracing pipelines", "no ray queries", "no acceleration structures"];
         assert!(expected.iter().any(|part| reason.contains(part)), "{report}");
     }
