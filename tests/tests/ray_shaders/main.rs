@@ -5,6 +5,7 @@ mod any_hit;
 mod invocation_reorder;
 mod launches;
 mod lowered;
+mod payload_types;
 mod pipelines;
 mod query_getters;
 mod query_stages;

@@ -56,15 +56,23 @@ impl<'a> Emitter<'a> {
         self.store(pointer, undefined);
     }
 
-    /// Converts a value to a type with the same bits.
+    /// Converts a value to a type of the same shape, bit by bit.
     pub(super) fn convert(&mut self, value: u32, from: u32, to: u32) -> u32 {
         if from == to {
             return value;
         }
-        let is_aggregate =
-            |ty| self.linker.global(ty).is_some_and(|inst| matches!(inst.op, Op::TypeStruct | Op::TypeArray));
-        let op = if is_aggregate(from) { Op::CopyLogical } else { Op::Bitcast };
-        self.value(op, to, &[value])
+        let (Some(parts), Some(wanted)) = (self.linker.member_types(from), self.linker.member_types(to))
+        else {
+            return self.value(Op::Bitcast, to, &[value]);
+        };
+        let pairs = (0..).zip(parts.into_iter().zip(wanted));
+        let members: Vec<u32> = pairs
+            .map(|(index, (from, to))| {
+                let member = self.value(Op::CompositeExtract, from, &[value, index]);
+                self.convert(member, from, to)
+            })
+            .collect();
+        self.value(Op::CompositeConstruct, to, &members)
     }
 
     /// Copies one variable to another one, whose type has the same shape.

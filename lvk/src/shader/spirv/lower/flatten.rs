@@ -121,6 +121,7 @@ pub(super) fn flatten(
     let is_cut = |block: usize| cuts.contains(&function.blocks[block].label);
     let whole = flow.whole_constructs(&function, &is_cut);
     let live = live_variables(linker, &function, &flow, &frame);
+    check_kept(linker, &function, &flow, &cuts, &live)?;
     let mut flattener = Flattener {
         linker,
         machine,
@@ -169,7 +170,6 @@ fn split_at_waits(
     cuts
 }
 
-/// Returns the variables to keep at the end of each block, sorted. Nothing else writes the variables of a shader that runs
 /// Returns the variables that each block reads itself or leaves to later ones; none for a function that runs once, whose
 /// variables stay.
 fn live_variables(
@@ -189,6 +189,36 @@ fn live_variables(
         list
     };
     live_at_starts(linker, function, flow, &variables).into_iter().map(sorted).collect()
+}
+
+/// Fails for a variable that no stack can hold, and whose value is needed behind a wait. The error is a message.
+fn check_kept(
+    linker: &Linker,
+    function: &Function,
+    flow: &ControlFlow,
+    cuts: &HashSet<u32>,
+    live: &[Vec<u32>],
+) -> Result<(), String> {
+    let waiting = (0..function.blocks.len()).filter(|block| cuts.contains(&function.blocks[*block].label));
+    let mut kept = waiting.flat_map(|block| &flow.successors[block]).flat_map(|behind| &live[*behind]);
+    if kept.any(|variable| !linker.can_store(variable_type(linker, function, *variable))) {
+        return Err(
+            "a ray query that goes on behind OpTraceRayKHR or OpExecuteCallableKHR cannot be lowered here; \
+                    start the query behind"
+                .to_owned(),
+        );
+    }
+    Ok(())
+}
+
+/// Returns the type of a variable of the function or of the shader.
+fn variable_type(linker: &Linker, function: &Function, variable: u32) -> u32 {
+    let is_it = |inst: &&Inst| inst.op == Op::Variable && inst.operand(1) == variable;
+    let local = function.blocks.first().and_then(|block| block.code.iter().find(is_it));
+    match local {
+        Some(inst) => linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target),
+        None => linker.variable_type(variable).unwrap_or(0),
+    }
 }
 
 struct Flattener<'a> {
@@ -458,17 +488,9 @@ impl Flattener<'_> {
     /// Returns the variables that a piece and those behind it read, with their types. Nothing is left for the first.
     fn read_by(&self, block: usize) -> Vec<(u32, u32)> {
         let read = if block == 0 { &[][..] } else { &self.live[block] };
-        read.iter().map(|variable| (*variable, self.variable_type(*variable))).collect()
-    }
-
-    /// Returns the type of a variable of the function or of the shader.
-    fn variable_type(&self, variable: u32) -> u32 {
-        let is_it = |inst: &&Inst| inst.op == Op::Variable && inst.operand(1) == variable;
-        let local = self.function.blocks.first().and_then(|block| block.code.iter().find(is_it));
-        match local {
-            Some(inst) => self.linker.pointer(inst.operand(0)).map_or(0, |(_, target)| target),
-            None => self.linker.variable_type(variable).unwrap_or(0),
-        }
+        read.iter()
+            .map(|variable| (*variable, variable_type(self.linker, self.function, *variable)))
+            .collect()
     }
 }
 

@@ -109,12 +109,16 @@ fn move_variables(linker: &mut Linker, function: &mut Function, callee: &mut Fun
         std::mem::take(&mut first.code).into_iter().partition(|inst| inst.op == Op::Variable);
     first.code = rest;
     for mut variable in variables {
+        let target = linker.pointer(variable.operand(0)).map_or(0, |(_, target)| target);
+        if !linker.can_store(target) {
+            function.blocks[0].code.insert(0, variable);
+            continue;
+        }
         let initial = match variable.operands.get(3) {
             Some(initial) => *initial,
             None => {
-                let ty = linker.pointer(variable.operand(0)).map_or(0, |(_, target)| target);
                 let undefined = linker.new_id();
-                function.blocks[block].code.push(Inst::new(Op::Undef, &[ty, undefined]));
+                function.blocks[block].code.push(Inst::new(Op::Undef, &[target, undefined]));
                 undefined
             }
         };

@@ -11,6 +11,9 @@ use crate::shader::spirv::parsed::MAX_NESTING;
 /// New ids by the ids of a module that has been linked.
 pub(super) type IdMap = HashMap<u32, u32>;
 
+/// Values of a struct or array that is converted value by value, at most.
+const MAX_CONVERTED: u32 = 4096;
+
 /// The linked module.
 #[derive(Default)]
 pub(super) struct Linker {
@@ -19,8 +22,8 @@ pub(super) struct Linker {
     unique: HashMap<(u32, Vec<u32>), u32>,
     /// Types, constants and variables by their ids.
     globals: HashMap<u32, Inst>,
-    /// Shapes of structs and arrays, and the types that stand for them.
-    shapes: HashMap<u32, u32>,
+    /// Shapes of types with the numbers of their values, and the types that stand for shapes.
+    shapes: HashMap<u32, (u32, u32)>,
     shape_keys: HashMap<Vec<u32>, u32>,
     /// Inputs by built-in value and type.
     inputs: HashMap<(u32, u32), u32>,
@@ -288,7 +291,7 @@ impl Linker {
 
     /// True if variables of the type can be loaded and stored.
     pub(super) fn can_store(&self, ty: u32) -> bool {
-        let Some(inst) = self.global(ty) else { return false };
+        let Some(inst) = self.global(self.innermost_element(ty)) else { return false };
         match inst.op {
             Op::TypePointer => inst.operand(1) == StorageClass::PhysicalStorageBuffer as u32,
             Op::TypeImage | Op::TypeSampler | Op::TypeSampledImage => false,
@@ -325,6 +328,12 @@ impl Linker {
 
     /// True for a pointer to a buffer, or an array of them.
     fn holds_buffer_pointers(&self, ty: u32) -> bool {
+        self.pointer(self.innermost_element(ty))
+            .is_some_and(|(storage, _)| storage == StorageClass::PhysicalStorageBuffer as u32)
+    }
+
+    /// Returns the type of the elements of an array of arrays; the type itself if it is no array.
+    fn innermost_element(&self, ty: u32) -> u32 {
         let mut element = ty;
         for _ in 0..MAX_NESTING {
             match self.global(element) {
@@ -332,34 +341,73 @@ impl Linker {
                 _ => break,
             }
         }
-        self.pointer(element)
-            .is_some_and(|(storage, _)| storage == StorageClass::PhysicalStorageBuffer as u32)
+        element
     }
 
-    /// Returns a type that two types share if one can be copied to the other: the first with the same members.
+    /// Returns a type that two types share if one can be converted to the other: the first with members of the same bits.
+    /// Numbers of the same size have the same bits, and so have pointers to buffers.
     pub(super) fn shape(&mut self, ty: u32) -> u32 {
-        self.nested_shape(ty, MAX_NESTING)
+        self.counted_shape(ty).0
     }
 
-    fn nested_shape(&mut self, ty: u32, nesting: u32) -> u32 {
+    /// Returns the shape, and the number of values that a conversion moves.
+    fn counted_shape(&mut self, ty: u32) -> (u32, u32) {
         if let Some(known) = self.shapes.get(&ty) {
             return *known;
         }
-        let Some(inst) = self.global(ty).filter(|_| nesting > 0) else { return ty };
-        let (op, elements, length) = match inst.op {
-            Op::TypeStruct => (inst.op, inst.operands[1..].to_vec(), 0),
-            Op::TypeArray => {
-                let length = self.global(inst.operand(2)).map_or(0, |constant| constant.operand(2));
-                (inst.op, vec![inst.operand(1)], length)
-            }
-            _ => return ty,
+        // In a damaged module, a type may contain itself.
+        self.shapes.insert(ty, (ty, 1));
+        let Some((key, count)) = self.shape_key(ty).filter(|(_, count)| *count <= MAX_CONVERTED) else {
+            return (ty, 1);
         };
-        let mut key: Vec<u32> =
-            elements.into_iter().map(|element| self.nested_shape(element, nesting - 1)).collect();
-        key.extend([length, op as u32]);
         let shape = *self.shape_keys.entry(key).or_insert(ty);
-        self.shapes.insert(ty, shape);
-        shape
+        self.shapes.insert(ty, (shape, count));
+        (shape, count)
+    }
+
+    /// Returns words that types of the same shape share, and the number of values; `None` for other types, which have
+    /// shapes of their own.
+    fn shape_key(&mut self, ty: u32) -> Option<(Vec<u32>, u32)> {
+        let inst = self.global(ty)?.clone();
+        let (op, members, length) = match inst.op {
+            Op::TypeInt | Op::TypeFloat => (Op::TypeInt, &[][..], inst.operand(1)),
+            Op::TypePointer if inst.operand(1) == StorageClass::PhysicalStorageBuffer as u32 => {
+                (inst.op, &[][..], 0)
+            }
+            Op::TypeVector | Op::TypeMatrix => (inst.op, &inst.operands[1..2], inst.operand(2)),
+            Op::TypeStruct => (inst.op, &inst.operands[1..], 1),
+            Op::TypeArray => (inst.op, &inst.operands[1..2], self.array_length(ty)?),
+            _ => return None,
+        };
+        let mut key = vec![op as u32, length];
+        let mut count = 0_u32;
+        for member in members {
+            let (shape, values) = self.counted_shape(*member);
+            key.push(shape);
+            count = count.saturating_add(values);
+        }
+        let is_whole = !matches!(op, Op::TypeStruct | Op::TypeArray);
+        Some((key, if is_whole { 1 } else { count.saturating_mul(length) }))
+    }
+
+    /// Returns the number of elements of an array type whose length is a plain constant.
+    pub(super) fn array_length(&self, array: u32) -> Option<u32> {
+        let length = self.global(array).filter(|inst| inst.op == Op::TypeArray)?.operand(2);
+        self.global(length).filter(|inst| inst.op == Op::Constant).map(|inst| inst.operand(2))
+    }
+
+    /// Returns the types of the members of a struct or array of a bounded size.
+    pub(super) fn member_types(&mut self, ty: u32) -> Option<Vec<u32>> {
+        let (_, count) = self.counted_shape(ty);
+        let inst = self.global(ty)?;
+        match inst.op {
+            Op::TypeStruct => Some(inst.operands.get(1..)?.to_vec()),
+            Op::TypeArray => {
+                let length = self.array_length(ty).filter(|length| *length <= count)?;
+                Some(vec![inst.operand(1); length as usize])
+            }
+            _ => None,
+        }
     }
 
     /// Adds a function without parameters that returns nothing.

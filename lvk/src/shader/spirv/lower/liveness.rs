@@ -70,6 +70,10 @@ impl Effects {
                     used = used_beside_pointer(inst, &linker.module.wide);
                     whole = Some(inst.operand(0)).filter(|id| variables.contains(id));
                 }
+                Op::RayQueryInitializeKHR => {
+                    used.retain(|id| *id != inst.operand(0));
+                    whole = Some(inst.operand(0)).filter(|id| variables.contains(id));
+                }
                 Op::FunctionCall => used.extend(mentions.get(&inst.operand(2)).into_iter().flatten()),
                 _ => {}
             }

@@ -327,6 +327,41 @@ fn images_are_decorated_where_the_driver_needs_it() {
     }
 }
 
+/// Returns a closest-hit shader that traces a ray, with a ray query of its own before and behind the trace.
+fn querying_hit(before: &str, behind: &str) -> &'static str {
+    format!(
+        "#extension GL_EXT_ray_query : require
+         layout(location = 0) rayPayloadInEXT vec3 color;
+         layout(push_constant, scalar) uniform Push {{ uint tlas; }};
+         #define START rayQueryInitializeEXT(query, kTLAS[tlas], 0, 0xFF, vec3(0), 0.0, vec3(1), 9.0)
+         void main() {{
+             rayQueryEXT query;
+             for (uint i = 0; i < 2; i++) {{
+                 {before}
+                 traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 1, 0, color, 0.0, vec3(1), 9.0, 0);
+                 {behind}
+                 while (rayQueryProceedEXT(query)) {{ color.x += 1.0; }}
+             }}
+         }}"
+    )
+    .leak()
+}
+
+#[test]
+fn queries_that_go_on_behind_a_trace_are_refused() {
+    let lowered_by_queries = |text: &'static str| {
+        let mut pipeline = simple();
+        let place = pipeline.shaders.iter().position(|(stage, _)| *stage == ShaderStage::ClosestHit).unwrap();
+        pipeline.shaders[place].1 = text;
+        pipeline.max_recursion = 2;
+        lowered(&pipeline).swap_remove(0)
+    };
+    let words = lowered_by_queries(querying_hit("", "START;")).unwrap();
+    crate::shader::spirv::words::validate(&words).unwrap();
+    let error = lowered_by_queries(querying_hit("START;", "")).unwrap_err();
+    assert!(error.message.contains("a ray query that goes on behind OpTraceRayKHR"), "{}", error.message);
+}
+
 /// A module has one memory model, and the traversal has that of GLSL.
 #[test]
 fn shaders_of_the_vulkan_memory_model_are_refused() {
