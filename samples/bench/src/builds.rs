@@ -1,6 +1,6 @@
-//! Measures BVH builds by the CPU, phase by phase, for several numbers of threads. Needs no device.
+//! Measures BVH builds by the CPU, phase by phase, for several numbers of threads, beside those of `obvhs`. Needs no device.
 
-use lvk::test_hooks::{CpuBuild, build_on_threads};
+use lvk::test_hooks::{CpuBuild, ObvhsBuild, build_by_obvhs, build_on_threads};
 
 use crate::args::{BenchArgs, BuildsArgs};
 use crate::cpu_overhead::{peak_bytes, restart_peak};
@@ -13,6 +13,8 @@ use crate::table::{Table, format_grouped, format_ms, format_ratio};
 struct ThreadRow {
     threads: usize,
     builds: Vec<CpuBuild>,
+    /// The same by `obvhs`.
+    others: Vec<ObvhsBuild>,
     /// Heap bytes that a build had at most, beside the mesh of the caller.
     peak: u64,
 }
@@ -26,7 +28,7 @@ pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, Ben
     let mut rows: Vec<ThreadRow> = args
         .threads()
         .into_iter()
-        .map(|threads| ThreadRow { threads, builds: Vec::new(), peak: 0 })
+        .map(|threads| ThreadRow { threads, builds: Vec::new(), others: Vec::new(), peak: 0 })
         .collect();
     for row in &mut rows {
         measure_row(&mesh, runs, row);
@@ -40,6 +42,7 @@ fn measure_row(mesh: &Mesh, runs: u32, row: &mut ThreadRow) {
     build_on_threads(&mesh.positions, &mesh.triangles, threads, 1, |_| {});
     row.peak = peak_bytes().saturating_sub(before);
     build_on_threads(&mesh.positions, &mesh.triangles, threads, runs, |build| builds.push(build));
+    build_by_obvhs(&mesh.positions, &mesh.triangles, threads, runs, |build| row.others.push(build));
 }
 
 fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
@@ -65,6 +68,13 @@ fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
         totals.iter().map(|total| format_ratio(totals[0] / total)),
     );
     table.add_row("peak heap memory, times the BLAS", rows.iter().map(peak_ratio));
+    table.add_row(
+        "total of obvhs 0.4, slow_build",
+        rows.iter().map(|row| format_ms(median_of(&row.others, |build| milliseconds(build.total)))),
+    );
+    if let Some(other) = rows.iter().find_map(|row| row.others.first()) {
+        table.add_note(format!("SAH cost of the tree of obvhs: {:.5}", other.sah_cost));
+    }
     let all = || rows.iter().flat_map(|row| &row.builds);
     if let Some(first) = all().next() {
         let cost = first.sah_cost.map_or("none".to_owned(), |cost| format!("{cost:.5}"));

@@ -4,7 +4,11 @@
 
 use std::time::{Duration, Instant};
 
+use glam::Vec3A;
+use obvhs::BvhBuildParams;
+use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::cwbvh::node::CwBvhNode;
+use obvhs::triangle::Triangle;
 
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::{GeometryBytes, IndexBytes, TriangleBytes, VertexBytes};
@@ -41,6 +45,45 @@ pub fn build_on_threads(
     on_new_threads(threads, || (0..runs).for_each(|_| done(build(positions, triangles))));
 }
 
+/// A build of one mesh by a builder of the crate `obvhs`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObvhsBuild {
+    /// Time of the whole build.
+    pub total: Duration,
+    /// As [`CpuBuild::sah_cost`].
+    pub sah_cost: f64,
+}
+
+/// Builds a BVH of eight compressed children by `obvhs` on `threads` threads, `runs` times, with its preset
+/// `slow_build`, which reinserts nodes as the library does. `done` sees each build.
+///
+/// Numbers of vertices beyond `positions` take the last of them.
+pub fn build_by_obvhs(
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    threads: usize,
+    runs: u32,
+    mut done: impl FnMut(ObvhsBuild) + Send,
+) {
+    let corner = |index: u32| {
+        let nearest = positions.get(index as usize).or(positions.last()).copied();
+        Vec3A::from_array(nearest.unwrap_or_default())
+    };
+    let triangles: Vec<Triangle> = triangles
+        .iter()
+        .map(|[a, b, c]| Triangle { v0: corner(*a), v1: corner(*b), v2: corner(*c) })
+        .collect();
+    let params = BvhBuildParams { pre_split: false, ..BvhBuildParams::slow_build() };
+    on_new_threads(threads, || {
+        for _ in 0..runs {
+            let mut total = Duration::ZERO;
+            let bvh = build_cwbvh_from_tris(&triangles, params, &mut total);
+            let sah_cost = cost_of(bvh.nodes.into_iter(), bvh.total_aabb.half_area().into());
+            done(ObvhsBuild { total, sah_cost });
+        }
+    });
+}
+
 fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> CpuBuild {
     let settings = BvhSettings { low_memory: false, refit: false };
     let bytes = bytemuck::cast_slice(positions);
@@ -58,7 +101,6 @@ fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> CpuBuild {
 }
 
 fn sah_cost(blob: &BlasBlob) -> Option<f64> {
-    const PRIMITIVE_COST: f64 = 0.3;
     let header = blob.header();
     if header.format != FORMAT_BVH8 || header.node_count == 0 {
         return None;
@@ -66,15 +108,20 @@ fn sah_cost(blob: &BlasBlob) -> Option<f64> {
     let first = header.nodes as usize * BLOCK_BYTES;
     let nodes =
         blob.bytes.get(first..)?.chunks_exact(size_of::<CwBvhNode>()).take(header.node_count as usize);
+    Some(cost_of(nodes.map(bytemuck::pod_read_unaligned::<CwBvhNode>), blob.bounds.half_area().into()))
+}
+
+fn cost_of(nodes: impl Iterator<Item = CwBvhNode>, half_area: f64) -> f64 {
+    const PRIMITIVE_COST: f64 = 0.3;
     let mut sum = 0.0;
-    for node in nodes.map(bytemuck::pod_read_unaligned::<CwBvhNode>) {
+    for node in nodes {
         for child in (0..8).filter(|child| node.child_meta[*child] != 0) {
             let primitives = f64::from((node.child_meta[child] >> 5).count_ones());
             let is_node = node.imask >> child & 1 == 1;
             sum += child_half_area(&node, child) * if is_node { 1.0 } else { PRIMITIVE_COST * primitives };
         }
     }
-    Some(1.0 + sum / f64::from(blob.bounds.half_area()))
+    1.0 + sum / half_area
 }
 
 fn child_half_area(node: &CwBvhNode, child: usize) -> f64 {
@@ -113,6 +160,10 @@ mod tests {
             let [first, others @ ..] = &built[..] else { unreachable!("eight builds") };
             assert!(first.sah_cost.is_some_and(|cost| cost > 1.0 && cost < 100.0), "{:?}", first.sah_cost);
             assert!(others.iter().all(|other| other.bytes == first.bytes), "{count}");
+            build_by_obvhs(&positions, &triangles, 2, 1, |other| {
+                let ratio = first.sah_cost.unwrap_or(0.0) / other.sah_cost;
+                assert!(ratio > 0.5 && ratio < 1.2, "{count}: {ratio}");
+            });
             assert!(first.phases.iter().map(|(_, time)| *time).sum::<Duration>() <= first.total);
         }
     }

@@ -22,7 +22,7 @@ use crate::shader::ShaderStage;
 
 /// Most places of a ray generation shader that trace without a loop over states. Each place has a copy of the traversal,
 /// with the constants of the place. Two copies are faster than the loop, on GPUs and on CPUs; a third is not.
-const MOST_PLACES: u32 = 2;
+const MOST_WAITS_WITHOUT_MACHINE: u32 = 2;
 
 /// A region of the shader binding table.
 struct Region {
@@ -116,7 +116,7 @@ impl<'a> Assembly<'a> {
             .linked
             .get(&ray_gen)
             .map_or(0, |shader| self.shaders.wait_count(self.linker, shader.entry));
-        others || places > MOST_PLACES || self.shaders.callables_wait
+        others || places > MOST_WAITS_WITHOUT_MACHINE || self.shaders.callables_wait
     }
 
     fn declare_machine(&mut self) {

@@ -153,11 +153,14 @@ impl Shaders {
     /// Compilers for CPUs run every piece of code that any of eight rays needs, so few pieces and more copies of the
     /// traversal are faster. SwiftShader takes ten times as long to compile the copies.
     fn can_trace_shadows_in_place(&self, linker: &Linker, lowering: &Lowering<'_>) -> bool {
-        const MOST_PLACES: usize = 4;
+        const MOST_SHADOW_TRACES: usize = 4;
         let is_cpu = matches!(lowering.traversal, Traversal::SoftwareCpu | Traversal::SoftwareCpuPairs);
         let places =
             linker.module.functions.iter().flat_map(Function::code).filter(|inst| skips_closest_hit(inst));
-        is_cpu && !lowering.is_for_swiftshader && places.count() <= MOST_PLACES && !self.misses_wait(lowering)
+        is_cpu
+            && !lowering.is_for_swiftshader
+            && places.count() <= MOST_SHADOW_TRACES
+            && !self.misses_wait(lowering)
     }
 
     /// True for an instruction at which a function waits.
