@@ -80,7 +80,7 @@ struct CollapsePart {
     share: usize,
 }
 
-/// What is known of each node.
+/// Properties of each node of the binary tree.
 struct KnownNodes {
     shapes: Vec<GroupShape>,
     decided: Vec<Decided>,

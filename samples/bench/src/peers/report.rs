@@ -12,7 +12,7 @@ use crate::table::Table;
 /// Versions of all packages.
 const LOCK: &str = include_str!("../../../../Cargo.lock");
 
-/// What was measured of one peer in one row.
+/// The measurements of one peer in one row.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Measured {
     pub(super) samples: Vec<Sample>,

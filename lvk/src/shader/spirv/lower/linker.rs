@@ -291,9 +291,10 @@ impl Linker {
 
     /// True if variables of the type can be loaded and stored.
     pub(super) fn can_store(&self, ty: u32) -> bool {
-        let Some(inst) = self.global(self.innermost_element(ty)) else { return false };
+        let element = self.innermost_element(ty);
+        let Some(inst) = self.global(element) else { return false };
         match inst.op {
-            Op::TypePointer => inst.operand(1) == StorageClass::PhysicalStorageBuffer as u32,
+            Op::TypePointer => self.is_buffer_pointer(element),
             Op::TypeImage | Op::TypeSampler | Op::TypeSampledImage => false,
             Op::TypeAccelerationStructureKHR | Op::TypeRayQueryKHR => false,
             _ => true,
@@ -328,8 +329,12 @@ impl Linker {
 
     /// True for a pointer to a buffer, or an array of them.
     fn holds_buffer_pointers(&self, ty: u32) -> bool {
-        self.pointer(self.innermost_element(ty))
-            .is_some_and(|(storage, _)| storage == StorageClass::PhysicalStorageBuffer as u32)
+        self.is_buffer_pointer(self.innermost_element(ty))
+    }
+
+    /// True for a pointer to a buffer: an address.
+    pub(super) fn is_buffer_pointer(&self, ty: u32) -> bool {
+        self.pointer(ty).is_some_and(|(storage, _)| storage == StorageClass::PhysicalStorageBuffer as u32)
     }
 
     /// Returns the type of the elements of an array of arrays; the type itself if it is no array.
@@ -371,9 +376,7 @@ impl Linker {
         let inst = self.global(ty)?.clone();
         let (op, members, length) = match inst.op {
             Op::TypeInt | Op::TypeFloat => (Op::TypeInt, &[][..], inst.operand(1)),
-            Op::TypePointer if inst.operand(1) == StorageClass::PhysicalStorageBuffer as u32 => {
-                (inst.op, &[][..], 0)
-            }
+            Op::TypePointer if self.is_buffer_pointer(ty) => (inst.op, &[][..], 0),
             Op::TypeVector | Op::TypeMatrix => (inst.op, &inst.operands[1..2], inst.operand(2)),
             Op::TypeStruct => (inst.op, &inst.operands[1..], 1),
             Op::TypeArray => (inst.op, &inst.operands[1..2], self.array_length(ty)?),
@@ -433,7 +436,7 @@ impl Linker {
 }
 
 /// Adds the items that are not in the list.
-fn add_new<T: PartialEq>(list: &mut Vec<T>, items: Vec<T>) {
+pub(super) fn add_new<T: PartialEq>(list: &mut Vec<T>, items: Vec<T>) {
     for item in items {
         if !list.contains(&item) {
             list.push(item);

@@ -154,12 +154,9 @@ pub(crate) fn lower(lowering: &Lowering<'_>) -> Result<Vec<u32>, LoweringError> 
     let main = Assembly::new(&mut linker, lowering, &shaders, variables, attributes).assemble()?;
     if lowering.is_for_swiftshader {
         keep_pointers_as_bits(&mut linker);
+        decorate_non_uniform(&mut linker);
     }
-    let mut module = prune::finish(linker, main);
-    if lowering.is_for_swiftshader {
-        decorate_non_uniform(&mut module);
-    }
-    Ok(module.words())
+    Ok(prune::finish(linker, main).words())
 }
 
 /// Version word of SPIR-V 1.6.

@@ -8,11 +8,12 @@ use std::collections::HashSet;
 use ::spirv::{Capability, Decoration, Op, StorageClass};
 
 use super::instruction::Inst;
-use super::module::Module;
+use super::linker::{Linker, add_new};
 
 /// Decorates every image and sampler that an index selects.
-pub(super) fn decorate_non_uniform(module: &mut Module) {
-    let arrays = descriptor_arrays(module);
+pub(super) fn decorate_non_uniform(linker: &mut Linker) {
+    let arrays = descriptor_arrays(linker);
+    let module = &mut linker.module;
     let mut selected: Vec<u32> = Vec::new();
     for function in &module.functions {
         let mut known: HashSet<u32> = HashSet::new();
@@ -45,22 +46,17 @@ pub(super) fn decorate_non_uniform(module: &mut Module) {
         Capability::SampledImageArrayNonUniformIndexing,
         Capability::StorageImageArrayNonUniformIndexing,
     ];
-    for capability in needed.map(|capability| capability as u32) {
-        if !module.capabilities.contains(&capability) {
-            module.capabilities.push(capability);
-        }
-    }
+    add_new(&mut module.capabilities, needed.map(|capability| capability as u32).to_vec());
 }
 
 /// Returns the variables that hold arrays of images or samplers.
-fn descriptor_arrays(module: &Module) -> HashSet<u32> {
-    let global = |id: u32| module.globals.iter().find(|inst| inst.result() == Some(id));
-    let is_array = |pointer: u32| {
-        let target = global(pointer).and_then(|inst| global(inst.operand(2)));
+fn descriptor_arrays(linker: &Linker) -> HashSet<u32> {
+    let storage = StorageClass::UniformConstant as u32;
+    let is_array = |variable: &u32| {
+        let target = linker.variable_type(*variable).and_then(|ty| linker.global(ty));
         target.is_some_and(|inst| matches!(inst.op, Op::TypeArray | Op::TypeRuntimeArray))
     };
-    let storage = StorageClass::UniformConstant as u32;
-    let variables =
-        module.globals.iter().filter(|inst| inst.op == Op::Variable && inst.operand(2) == storage);
-    variables.filter(|inst| is_array(inst.operand(0))).map(|inst| inst.operand(1)).collect()
+    let globals = linker.module.globals.iter();
+    let variables = globals.filter(|inst| inst.op == Op::Variable && inst.operand(2) == storage);
+    variables.map(|inst| inst.operand(1)).filter(is_array).collect()
 }

@@ -47,14 +47,12 @@ fn is_variable_of(inst: &Inst, pointers: &HashMap<u32, u32>) -> bool {
 fn pointer_variables(linker: &Linker) -> HashMap<u32, u32> {
     let module = &linker.module;
     let code = || module.functions.iter().flat_map(|function| function.code());
-    let buffer = StorageClass::PhysicalStorageBuffer as u32;
-    let is_pointer = |ty: u32| linker.pointer(ty).is_some_and(|(storage, _)| storage == buffer);
     let own = [StorageClass::Private as u32, StorageClass::Function as u32];
     let is_own =
         |inst: &&Inst| inst.op == Op::Variable && inst.operands.len() == 3 && own.contains(&inst.operand(2));
     let mut pointers: HashMap<u32, u32> = (module.globals.iter().chain(code()).filter(is_own))
         .filter_map(|inst| Some((inst.operand(1), linker.pointer(inst.operand(0))?.1)))
-        .filter(|(_, ty)| is_pointer(*ty))
+        .filter(|(_, ty)| linker.is_buffer_pointer(*ty))
         .collect();
     for inst in code().filter(|inst| inst.op != Op::Variable) {
         let uses = if matches!(inst.op, Op::Load | Op::Store) { used_beside_pointer } else { used_ids };

@@ -113,7 +113,7 @@ fn member_count(linker: &Linker, ty: u32) -> Option<usize> {
     match inst.op {
         Op::TypeVector | Op::TypeMatrix => Some(inst.operand(2) as usize),
         Op::TypeStruct => Some(inst.operands.len() - 1),
-        Op::TypeArray => linker.global(inst.operand(2)).map(|length| length.operand(2) as usize),
+        Op::TypeArray => linker.array_length(ty).map(|length| length as usize),
         _ => None,
     }
 }
