@@ -26,6 +26,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
+pub use self::document::SUPPORTED_EXTENSIONS;
+
 use self::accessors::Accessors;
 use self::budget::Budget;
 use self::buffers::Buffers;
@@ -115,7 +117,7 @@ fn load(
     let root = &document.root;
 
     let mut warnings = document.warnings();
-    let mut textures = Textures::new(&document, ktx2_texels::DECODES_BASIS);
+    let mut textures = Textures::new(&document);
     let materials = materials::read_materials(&document, &mut textures, &mut warnings)?;
     let read_mesh = |index| meshes::read_mesh(accessors, &materials, index);
     let meshes = parallel::map("meshes", root.meshes.len(), options, read_mesh)?;

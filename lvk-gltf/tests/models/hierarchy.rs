@@ -38,6 +38,14 @@ fn scenes_list_parents_before_children() {
 }
 
 #[test]
+fn scenes_may_have_no_nodes() {
+    let mut glb = Glb::new();
+    glb.push("scenes", json!({ "name": "Empty" }));
+    let model = glb.load_cleanly();
+    assert_eq!((model.default_scene, model.scenes[0].roots.len()), (Some(0), 0));
+}
+
+#[test]
 fn world_transforms_are_products_of_those_of_all_ancestors() {
     let (half, angle) = (0.3_f64.sin(), 0.3_f64.cos());
     let matrix = [1.0, 2.0, 0.0, 0.0, -2.0, 1.0, 0.0, 0.0, 0.0, 0.5, 3.0, 0.0, 7.0, 8.0, 9.0, 1.0];

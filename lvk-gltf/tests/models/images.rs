@@ -166,9 +166,9 @@ fn images_that_cannot_be_read_are_refused_by_name() {
         (&ktx2(37, 3, [1, 1], &[(&[0; 4], 4)]), "ZLIB"),
         (&ktx2(37, 0, [1, 1], &[(&[0; 8], 8)]), "not the size"),
         (&ktx2(37, 0, [1, 1], &[(&[0; 4], 4), (&[0; 4], 4)]), "2 mip levels, more than 1"),
-        (&ktx2(37, 0, [0, 1], &[(&[0; 4], 4)]), "KTX2 is damaged (ZeroWidth)"),
+        (&ktx2(37, 0, [0, 1], &[(&[0; 4], 4)]), "KTX2 is damaged (zero pixel width)"),
         (&cube, "no image in two dimensions"),
-        (&ktx2(37, 0, [1, 1], &[(&[0; 4], 4)])[..100], "KTX2 is damaged"),
+        (&ktx2(37, 0, [1, 1], &[(&[0; 4], 4)])[..100], "KTX2 is cut off"),
     ] {
         let problem = with_image(bytes).expect_problem(&["image 0 'Wood': ", part]);
         assert!(matches!(problem, Problem::Image { .. }));

@@ -380,3 +380,20 @@ fn wrong_animations_are_refused_and_useless_channels_warned_of() {
     assert_eq!(glb.load().animations[0].channels.len(), 1);
     assert_eq!(glb.warnings().len(), 1);
 }
+
+#[test]
+fn channels_without_a_node_are_left_out_with_a_warning() {
+    let mut glb = animated("translation", "LINEAR", &[0.0, 1.0], &[0.0; 6]);
+    let pointer = json!({ "KHR_animation_pointer": { "pointer": "/materials/0/emissiveFactor" } });
+    let channel = json!({ "sampler": 0, "target": { "path": "pointer", "extensions": pointer } });
+    glb.at("/animations/0/channels").as_array_mut().unwrap().push(channel);
+    glb.uses("KHR_animation_pointer");
+    assert_eq!(glb.load().animations[0].channels.len(), 1);
+    assert_eq!(
+        glb.warnings(),
+        [
+            "the extension KHR_animation_pointer is ignored",
+            "animation 0: KHR_animation_pointer of 1 of its channels, which have no node, is ignored",
+        ]
+    );
+}
