@@ -15,7 +15,8 @@ pub(crate) fn read_gltf(bytes: &[u8]) {
 
 fn check_model(model: &Model) {
     model.warnings.iter().for_each(|warning| drop(warning.to_string()));
-    for texture in model.materials.iter().flat_map(|material| material.textures()).map(|(_, texture)| texture) {
+    for texture in model.materials.iter().flat_map(|material| material.textures()).map(|(_, texture)| texture)
+    {
         let TextureRef { image, sampler, .. } = *texture;
         assert!(image < model.images.len() && sampler < model.samplers.len());
     }
@@ -31,10 +32,17 @@ fn check_model(model: &Model) {
 fn check_primitive(model: &Model, primitive: &Primitive) {
     let count = primitive.vertex_count();
     let fits = |length: usize| length == 0 || length == count;
-    assert!(primitive.indices.iter().all(|index| (*index as usize) < count) && primitive.indices.len() % 3 == 0);
+    assert!(
+        primitive.indices.iter().all(|index| (*index as usize) < count)
+            && primitive.indices.len().is_multiple_of(3)
+    );
     assert!(primitive.positions.iter().flatten().all(f32::is_finite));
-    assert!(primitive.normals.iter().flatten().chain(primitive.tangents.iter().flatten()).all(|x| x.is_finite()));
-    assert!(primitive.normals.len() == count && fits(primitive.tangents.len()) && fits(primitive.colors.len()));
+    assert!(
+        primitive.normals.iter().flatten().chain(primitive.tangents.iter().flatten()).all(|x| x.is_finite())
+    );
+    assert!(
+        primitive.normals.len() == count && fits(primitive.tangents.len()) && fits(primitive.colors.len())
+    );
     assert!(primitive.tex_coords.iter().all(|set| fits(set.len())));
     assert!(primitive.joints.len() == primitive.weights.len());
     assert!(primitive.material.is_none_or(|material| material < model.materials.len()));
