@@ -1,0 +1,159 @@
+//! A model on the GPU: arrays, textures, light and acceleration structures.
+
+use glam::{Mat3, Mat4, Vec3};
+use lvk::{
+    AccelStructHandle, BufferHandle, BufferUsage, Context, Holder, TlasDesc, TlasInstance, rows_from_columns,
+};
+use lvk_gltf::{Bounds, Model, Placement, Pose};
+use lvk_samples::app::array_buffer::array;
+
+use super::albedo_table::albedo_table;
+use super::geometry::GpuMeshes;
+use super::layout::{GpuInstance, GpuTextureSlot, LightConstants, SceneConstants};
+use super::lights::GpuLights;
+use super::materials::GpuMaterials;
+use super::textures::GpuTextures;
+use crate::light::Environment;
+
+/// Instances whose volume is a smaller share of that of their mesh have no inside, and are left out.
+const SMALLEST_DETERMINANT: f32 = 1e-30;
+/// A scene's largest coordinate over the extent that rounding errors near the origin are measured by.
+const OFFSET_SHARE: f32 = 8.0;
+
+/// A model on the GPU.
+pub(crate) struct GpuScene {
+    pub(crate) constants: SceneConstants,
+    pub(crate) light: LightConstants,
+    pub(crate) tlas: Holder<AccelStructHandle>,
+    /// The unit of length of rounding errors near the origin.
+    pub(crate) offset_extent: f32,
+    /// Triangles of all meshes, each mesh once.
+    pub(crate) triangle_count: u64,
+    /// Instances of meshes.
+    pub(crate) instance_count: u32,
+    /// What is left out, for the user to read.
+    pub(crate) warnings: Vec<String>,
+    _meshes: GpuMeshes,
+    _textures: GpuTextures,
+    _buffers: Vec<Holder<BufferHandle>>,
+}
+
+impl GpuScene {
+    /// Uploads a scene of `model` in a pose and builds its structures. Directional lights are discs of the radius
+    /// `disc_radius`, in radians.
+    pub(crate) fn new(
+        ctx: &Context,
+        model: &Model,
+        scene: usize,
+        pose: &Pose,
+        environment: &Environment,
+        disc_radius: f32,
+    ) -> lvk::Result<Self> {
+        let textures = GpuTextures::new(ctx, model)?;
+        let meshes = GpuMeshes::new(ctx, model)?;
+        let shown = Shown::new(model, scene, pose, &meshes);
+        let bounds = model.bounds(scene, pose).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ZERO });
+        let lights = GpuLights::new(model, scene, pose, environment, disc_radius, &bounds);
+        let mut arrays = Arrays { ctx, held: Vec::new() };
+        let constants =
+            arrays.constants(&meshes, &shown, &GpuMaterials::new(model, &textures), &lights, environment)?;
+        let (instances, debug_name) = (shown.tlas.as_slice(), "scene tlas");
+        let capacity = instances.len().max(1) as u32;
+        let tlas = ctx.create_tlas(&TlasDesc { instances, capacity, debug_name, ..TlasDesc::default() })?;
+        let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+        Ok(Self {
+            constants,
+            light: LightConstants {
+                light_count: lights.lights.len() as u32,
+                disc_count: lights.disc_count,
+                sky_probability: lights.sky_probability,
+                sky_size: [environment.sky.width, environment.sky.height],
+            },
+            tlas,
+            offset_extent: (largest / OFFSET_SHARE).max(f32::MIN_POSITIVE),
+            triangle_count: meshes.triangle_count,
+            instance_count: instances.len() as u32,
+            warnings: textures.warnings.clone(),
+            _meshes: meshes,
+            _textures: textures,
+            _buffers: arrays.held,
+        })
+    }
+}
+
+/// The instances of a scene, for shaders and for the top-level structure.
+struct Shown {
+    instances: Vec<GpuInstance>,
+    tlas: Vec<TlasInstance>,
+}
+
+impl Shown {
+    fn new(model: &Model, scene: usize, pose: &Pose, meshes: &GpuMeshes) -> Self {
+        let mut shown = Self { instances: Vec::new(), tlas: Vec::new() };
+        for Placement { mesh, transform, .. } in model.placements(scene, pose) {
+            let Some(gpu) = meshes.meshes.get(mesh).and_then(Option::as_ref) else { continue };
+            let determinant = Mat3::from_mat4(transform).determinant();
+            if !transform.is_finite() || determinant.abs() < SMALLEST_DETERMINANT {
+                continue;
+            }
+            shown.tlas.push(TlasInstance {
+                transform: rows(&transform),
+                custom_index: shown.instances.len() as u32,
+                ..TlasInstance::new(*gpu.blas)
+            });
+            shown.instances.push(gpu_instance(&transform, gpu.first_geometry));
+        }
+        shown
+    }
+}
+
+/// The upper three rows of a matrix.
+fn rows(matrix: &Mat4) -> [f32; 12] {
+    let [x, y, z, w] = [matrix.x_axis, matrix.y_axis, matrix.z_axis, matrix.w_axis];
+    rows_from_columns([x, y, z, w].map(|column| column.truncate().to_array()))
+}
+
+fn gpu_instance(transform: &Mat4, first_geometry: u32) -> GpuInstance {
+    let normals = Mat3::from_mat4(*transform).inverse().transpose();
+    GpuInstance { rows: rows(transform), normal_columns: normals.to_cols_array(), first_geometry }
+}
+
+/// Buffers while they are made.
+struct Arrays<'a> {
+    ctx: &'a Context,
+    held: Vec<Holder<BufferHandle>>,
+}
+
+impl Arrays<'_> {
+    /// Uploads elements and returns their address. Without elements there is an unused one.
+    fn upload<T: bytemuck::Pod>(&mut self, name: &str, elements: &[T]) -> lvk::Result<u64> {
+        let none = [T::zeroed()];
+        let elements = if elements.is_empty() { &none } else { elements };
+        let buffer = array(self.ctx, name, BufferUsage::STORAGE, elements)?;
+        let address = buffer.address()?;
+        self.held.push(buffer);
+        Ok(address)
+    }
+
+    fn constants(
+        &mut self,
+        meshes: &GpuMeshes,
+        shown: &Shown,
+        materials: &GpuMaterials,
+        lights: &GpuLights,
+        environment: &Environment,
+    ) -> lvk::Result<SceneConstants> {
+        let sky = environment.sky.distribution();
+        Ok(SceneConstants {
+            instances: self.upload("instances", &shown.instances)?,
+            geometries: self.upload("geometries", &meshes.geometries)?,
+            materials: self.upload("materials", &materials.materials)?,
+            slots: self.upload::<GpuTextureSlot>("texture slots", &materials.slots)?,
+            lights: self.upload("lights", &lights.lights)?,
+            sky_rows: self.upload("rows of the sky", &sky.rows)?,
+            sky_columns: self.upload("columns of the sky", &sky.columns)?,
+            sky: self.upload("sky", &environment.sky.texels)?,
+            albedos: self.upload("albedos", &albedo_table())?,
+        })
+    }
+}
