@@ -19,6 +19,9 @@ const uint kGlassLobe = 4u; // mirrored or bent at the boundary of a volume
 const uint kPaneLobe = 5u; // straight on
 const uint kLobeCount = 6u;
 
+// A volume whose index of refraction differs less from that around it has a boundary that nothing shows.
+const float kStraightEta = 5e-3;
+
 struct Bsdf {
     mat3 basis; // of the normal, which is its third column
     mat3 coatBasis;
@@ -40,6 +43,7 @@ struct Bsdf {
     float eta; // index of refraction beyond the surface over that on the side of the view
     vec3 pane;
     float sheenRoughness;
+    vec3 reflected; // the share of light that is neither matte nor sheen, about
     float lobes[kLobeCount]; // probability of each
 };
 
@@ -47,6 +51,7 @@ struct Bsdf {
 struct Scattered {
     vec3 direction;
     vec3 weight; // 0 where the path ends
+    vec3 matte; // the part of the weight by the matte layer and by sheen
     float density; // per solid angle, of all lobes together; unused for a pane
     bool isPane;
 };
@@ -78,15 +83,22 @@ void setLayers(inout Bsdf bsdf, Surface surface, float below, vec3 split) {
     float glass = isVolume ? surface.transmission : 0.0;
     bsdf.metal = below * metalness * rescattering(surface.baseColor, split);
     bsdf.dielectric = below * (1.0 - metalness) * (1.0 - glass) * rescattering(surface.f0, split);
-    bsdf.glass = vec3(below * (1.0 - metalness) * glass);
+    // Where the boundary bends nothing, light goes straight on.
+    bool isStraight = abs(bsdf.eta - 1.0) < kStraightEta;
+    bsdf.glass = isStraight ? vec3(0.0) : vec3(below * (1.0 - metalness) * glass);
     vec3 matte = below * (1.0 - metalness) * left * surface.baseColor;
     bsdf.diffuse = matte * (1.0 - surface.transmission);
+    if (isVolume && isStraight) {
+        bsdf.pane = below * (1.0 - metalness) * glass * surface.baseColor;
+    }
     if (surface.transmission > 0.0 && !isVolume) {
         bsdf.pane = isPane(surface) ? matte * surface.transmission : vec3(0.0);
         bsdf.thin = isPane(surface) ? vec3(0.0) : matte * surface.transmission / max(split.x, 1e-4);
     }
-    bsdf.lobes[kSpecularLobe] = largest(below * metalness * reflectedShare(surface.baseColor, vec3(1.0), split)) +
-                                largest(below * (1.0 - metalness) * (1.0 - glass) * reflectedShare(surface.f0, f90, split));
+    vec3 metal = below * metalness * reflectedShare(surface.baseColor, vec3(1.0), split);
+    vec3 dielectric = below * (1.0 - metalness) * (1.0 - glass) * reflectedShare(surface.f0, f90, split);
+    bsdf.reflected = metal + dielectric + bsdf.lobes[kCoatLobe] + bsdf.glass + bsdf.pane + bsdf.thin * split.x;
+    bsdf.lobes[kSpecularLobe] = largest(metal) + largest(dielectric);
     bsdf.lobes[kDiffuseLobe] = largest(bsdf.diffuse) + largest(bsdf.sheen);
     bsdf.lobes[kThinLobe] = largest(bsdf.thin) * split.x;
     bsdf.lobes[kGlassLobe] = largest(bsdf.glass);
@@ -130,6 +142,7 @@ Bsdf bsdfOf(Surface surface, vec3 view) {
 // The light of a direction, cosine included, and the density with which it is drawn.
 struct Response {
     vec3 value;
+    vec3 matte; // the part of the value by the matte layer and by sheen
     float density;
 };
 
@@ -166,11 +179,12 @@ void addReflection(inout Response all, Bsdf bsdf, vec3 l) {
         all.value += fresnel * shadowed * bsdf.glass;
         all.density += bsdf.lobes[kGlassLobe] * fresnel * seen;
     }
-    all.value += bsdf.diffuse * (l.z / kPi);
+    all.matte = bsdf.diffuse * (l.z / kPi);
     if (largest(bsdf.sheen) > 0.0) {
         float visible = 1.0 / (4.0 * max(l.z + bsdf.view.z - l.z * bsdf.view.z, 1e-4));
-        all.value += bsdf.sheen * sheenDistribution(h.z, bsdf.sheenRoughness) * visible * l.z;
+        all.matte += bsdf.sheen * sheenDistribution(h.z, bsdf.sheenRoughness) * visible * l.z;
     }
+    all.value += all.matte;
     all.density += bsdf.lobes[kDiffuseLobe] * l.z / kPi;
 }
 
@@ -205,7 +219,7 @@ void addTransmission(inout Response all, Bsdf bsdf, vec3 l) {
 
 // All lobes but the pane.
 Response respond(Surface surface, Bsdf bsdf, vec3 toLight) {
-    Response all = Response(vec3(0.0), 0.0);
+    Response all = Response(vec3(0.0), vec3(0.0), 0.0);
     vec3 l = toLight * bsdf.basis;
     bool isAbove = dot(toLight, surface.geometricNormal) > 0.0;
     if (isAbove) {
@@ -251,12 +265,12 @@ Scattered scatter(Surface surface, Bsdf bsdf, vec3 view, vec2 choices, vec2 u) {
     }
     if (lobe == kPaneLobe) {
         float chance = bsdf.lobes[kPaneLobe];
-        return Scattered(-view, chance > 0.0 ? bsdf.pane / chance : vec3(0.0), 0.0, true);
+        return Scattered(-view, chance > 0.0 ? bsdf.pane / chance : vec3(0.0), vec3(0.0), 0.0, true);
     }
     vec3 direction = drawDirection(bsdf, lobe, u, choices.y);
     Response response = respond(surface, bsdf, direction);
-    bool isDrawn = response.density > 0.0;
-    return Scattered(direction, isDrawn ? response.value / response.density : vec3(0.0), response.density, false);
+    float inverse = response.density > 0.0 ? 1.0 / response.density : 0.0;
+    return Scattered(direction, response.value * inverse, response.matte * inverse, response.density, false);
 }
 
 #endif

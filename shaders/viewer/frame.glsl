@@ -121,7 +121,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     FloatArray skyColumns; // of each row, one after another
     PositionArray sky; // radiance of the texels of its map, row by row
     PositionArray albedos; // of a rough reflector: the table of albedo.glsl
-    SumArray sums; // radiance of all samples so far, for each pixel
+    SumArray sums; // radiance of all samples so far and their number, for each pixel
     uint lightCount;
     uint discCount; // lights that are discs, which come first
     float skyProbability; // of being chosen, among all lights and the sky
@@ -134,8 +134,19 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     float exposure;
     float offsetExtent; // the unit of length of rounding errors near the origin
     uint toneMapping;
+    // Of the real-time method:
+    uint visibility; // an index into kTexturesU2D: the triangle of each pixel
+    Camera seen; // the camera without the shift within a pixel
+    Camera seenBefore; // of the frame before, likewise
+    SumArray planes; // of plane.glsl
+    uint frameNumber; // since the camera was chosen; 0: there is no frame before
+    uint stillCount; // frames since the camera moved
+    uint view; // what the picture shows: kViewLight or another of plane.glsl
 };
 
-layout(push_constant, scalar) uniform PushConstants { Frame frame; };
+layout(push_constant, scalar) uniform PushConstants {
+    Frame frame;
+    uint argument; // of the pass
+};
 
 #endif

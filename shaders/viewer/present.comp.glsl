@@ -1,11 +1,12 @@
-// The picture of the mean of all samples.
-#include "viewer/frame.glsl"
+// The picture of the mean of all samples, or of data about them.
+#include "viewer/plane.glsl"
 #include "viewer/tone.glsl"
 
 void presentPixel(uvec2 pixel) {
-    vec3 sum = frame.sums.at[pixel.y * frame.camera.width + pixel.x].rgb;
-    vec3 mean = sum / float(frame.sampleNumber + frame.sampleCount);
-    imageStore(kImages2D[frame.image], ivec2(pixel), vec4(displayed(mean, frame.exposure, frame.toneMapping), 1.0));
+    vec4 sum = frame.sums.at[pixel.y * frame.camera.width + pixel.x];
+    vec3 mean = sum.rgb / max(sum.a, 1.0);
+    vec3 shown = frame.view == kViewLight ? displayed(mean, frame.exposure, frame.toneMapping) : encodeSrgb(clamp(mean, 0.0, 1.0));
+    imageStore(kImages2D[frame.image], ivec2(pixel), vec4(shown, 1.0));
 }
 
 #define PIXEL_FUNCTION presentPixel

@@ -79,7 +79,8 @@ impl GpuCamera {
     }
 
     /// The same camera for sample `number` of `count`: evenly spread over each pixel, the only one in the middle.
-    pub(crate) fn for_sample(self, number: u32, count: u32) -> Self {
+    #[must_use]
+    pub fn for_sample(self, number: u32, count: u32) -> Self {
         if count <= 1 {
             return self;
         }

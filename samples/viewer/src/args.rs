@@ -24,7 +24,16 @@ pub struct ViewerArgs {
     #[arg(long, help_heading = "Model")]
     pub list_cameras: bool,
 
-    /// Samples of each pixel, 1 to 65536; noise falls with their square root
+    /// Method that renders
+    #[arg(long, value_enum, default_value_t = MethodArg::Hybrid)]
+    pub method: MethodArg,
+
+    /// Contents of the picture; all but light needs --method hybrid
+    #[arg(long, value_enum, default_value_t = ShownArg::Light)]
+    pub view: ShownArg,
+
+    /// Samples of each pixel, 1 to 65536; of the hybrid method, frames that a still takes the mean of. Noise falls with their square
+    /// root
     #[arg(long, value_name = "N", default_value_t = ViewerConfig::DEFAULT_SAMPLES)]
     #[arg(value_parser = whole(1..=ViewerConfig::MAX_SAMPLES))]
     pub samples: u32,
@@ -69,6 +78,34 @@ pub struct LightArgs {
     /// Radius of the discs of the sun and of directional lights in degrees; that of the real sun is 0.27
     #[arg(long, value_name = "DEGREES", default_value_t = 0.5, value_parser = radius)]
     pub sun_radius: f32,
+}
+
+/// The method that renders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Rasterise surfaces, trace a few rays from each, and filter over time and space.
+    Hybrid,
+    /// Trace paths from the camera, without a bias: the reference.
+    Pathtrace,
+}
+
+/// Contents of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ShownArg {
+    /// Light.
+    Light,
+    /// Normals: red to the right, green up, blue towards +z.
+    Normals,
+    /// Roughness.
+    Roughness,
+    /// Motion since the frame before.
+    Motion,
+    /// Albedo of matte layers.
+    Albedo,
+    /// Light that matte layers receive, filtered.
+    Matte,
+    /// Light that all other layers receive, filtered.
+    Mirrored,
 }
 
 /// The sky.

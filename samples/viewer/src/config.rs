@@ -4,8 +4,9 @@ use lvk::Capabilities;
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
 
-/// The mapping of radiance to what a display shows.
+/// The mapping of radiance to what a display shows, by its number in `shaders/viewer/tone.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
 pub enum ToneMapping {
     /// Khronos PBR Neutral.
     #[default]
@@ -14,16 +15,49 @@ pub enum ToneMapping {
     Linear,
 }
 
+/// The method that renders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Rasterised surfaces, a few rays for each, and filters over time and space.
+    #[default]
+    Hybrid,
+    /// Paths from the camera, without a bias.
+    PathTrace,
+}
+
+/// Contents of the picture, by their numbers in `shaders/viewer/plane.glsl`. All but light is known to the hybrid method alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
+pub enum Shown {
+    /// Light.
+    #[default]
+    Light = 0,
+    /// Normals: red to the right, green up, blue towards +z.
+    Normals,
+    /// Roughness.
+    Roughness,
+    /// Motion since the frame before: red to the right, green down; without motion grey.
+    Motion,
+    /// Albedo of matte layers.
+    Albedo,
+    /// Light that matte layers receive, filtered.
+    Matte,
+    /// Light that all other layers receive, filtered.
+    Mirrored,
+}
+
 /// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewerConfig {
+    /// The method that renders.
+    pub method: Method,
     /// The part of Vulkan that traces rays.
     pub path: RayPath,
     /// Pixels in a row.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Samples of each pixel, 1 to [`ViewerConfig::MAX_SAMPLES`].
+    /// Samples of each pixel, 1 to [`ViewerConfig::MAX_SAMPLES`]; of the hybrid method, frames of the still.
     pub samples: u32,
     /// Surfaces that a path meets at most, at least 1.
     pub bounces: u32,
@@ -31,6 +65,8 @@ pub struct ViewerConfig {
     pub exposure_stops: f32,
     /// Mapping of radiance to what a display shows.
     pub tone_mapping: ToneMapping,
+    /// Contents of the picture.
+    pub shown: Shown,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
     pub is_progressive: bool,
 }
@@ -47,6 +83,7 @@ impl ViewerConfig {
     #[must_use]
     pub fn new(path: RayPath, width: u32, height: u32) -> Self {
         Self {
+            method: Method::default(),
             path,
             width,
             height,
@@ -54,6 +91,7 @@ impl ViewerConfig {
             bounces: Self::DEFAULT_BOUNCES,
             exposure_stops: 0.0,
             tone_mapping: ToneMapping::default(),
+            shown: Shown::default(),
             is_progressive: false,
         }
     }

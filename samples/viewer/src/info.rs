@@ -5,8 +5,8 @@ use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample_info::prelude::*;
 use lvk_samples::hybrid::RayPath;
 
-use crate::args::{LightArgs, SkyArg, ToneArg, ViewerArgs};
-use crate::config::{ToneMapping, ViewerConfig};
+use crate::args::{LightArgs, MethodArg, ShownArg, SkyArg, ToneArg, ViewerArgs};
+use crate::config::{Method, Shown, ToneMapping, ViewerConfig};
 use crate::light::{Environment, SunSetting};
 use crate::model::{ModelCamera, ModelError, cameras, load, showcase};
 use crate::pipelines;
@@ -30,19 +30,21 @@ enum ArgumentError {
 
 impl SampleInfo for Viewer {
     const NAME: &'static str = pipelines::SAMPLE;
-    const ABOUT: &'static str = "Shows a glTF or OBJ model by path tracing, and writes pictures as PNG";
-    const DETAILS: &'static str = "Without FILE the sample shows balls of many materials around a knot. Light of the sun, the \
-        sky and the model's lamps reaches surfaces by any number of reflections and refractions; the picture of more samples has \
-        less noise and the same mean.";
+    const ABOUT: &'static str =
+        "Shows a glTF or OBJ model by hybrid ray tracing or by a path tracer, and writes pictures as PNG";
+    const DETAILS: &'static str = "Without FILE the sample shows balls of many materials around a knot. The hybrid \
+        method rasterises surfaces, traces a few rays from each, and filters over time and space. The path tracer is the reference: \
+        light of the sun, the sky and the model's lamps reaches surfaces by any number of reflections and refractions, and more \
+        samples have less noise and the same mean.";
     const EXAMPLES: &'static str = "
         | the built-in model, on the most capable device and its fastest path
-        model.glb --samples 1024 | a glTF file with less noise
+        model.glb --method pathtrace --samples 1024 | a glTF file by the path tracer
         model.gltf --camera 2 --exposure -1 | through its second camera, half as bright
         kitchen.obj --sky black | an OBJ file, lit by its lamp alone
         model.glb --window | in a window, where the picture gets better while nothing moves
         --rt query --validate | ray queries in a compute shader, with validation
     ";
-    const ROUND: &'static str = "";
+    const ROUND: &'static str = "one round about what the camera looks at";
     type Args = ViewerArgs;
     type Sample = Self;
 
@@ -70,6 +72,11 @@ impl SampleInfo for Viewer {
         setup.progress.stage("uploading the model and building acceleration structures", 0);
         let [width, height] = setup.extent();
         let config = ViewerConfig {
+            method: match args.method {
+                MethodArg::Hybrid => Method::Hybrid,
+                MethodArg::Pathtrace => Method::PathTrace,
+            },
+            shown: shown(args.view),
             samples: args.samples,
             bounces: args.bounces,
             exposure_stops: args.exposure,
@@ -116,6 +123,18 @@ fn scene(args: &ViewerArgs, model: lvk_gltf::Model) -> ViewerScene {
     environment.sun = environment.sun.filter(|_| !has_sun);
     let name = args.file.as_deref().map_or_else(|| "showcase".to_owned(), lvk::readable_name);
     ViewerScene { name, model, environment, disc_radius: sun_radius.to_radians() }
+}
+
+fn shown(wish: ShownArg) -> Shown {
+    match wish {
+        ShownArg::Light => Shown::Light,
+        ShownArg::Normals => Shown::Normals,
+        ShownArg::Roughness => Shown::Roughness,
+        ShownArg::Motion => Shown::Motion,
+        ShownArg::Albedo => Shown::Albedo,
+        ShownArg::Matte => Shown::Matte,
+        ShownArg::Mirrored => Shown::Mirrored,
+    }
 }
 
 /// The cameras, a line each.

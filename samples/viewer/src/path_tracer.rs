@@ -7,7 +7,7 @@ use lvk::{
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::pipelines::SampleStage;
 
-use crate::gpu::layout::SCENE_LAYOUTS;
+use crate::gpu::layout::{Push, SCENE_LAYOUTS};
 use crate::pipelines::{CANDIDATE, NEAREST_HIT, NEAREST_MISS, PATH_QUERY, PATH_RAYS, SAMPLE};
 
 /// Side of a work group in pixels.
@@ -27,11 +27,11 @@ impl PathTracer {
         })
     }
 
-    /// Records a pass over a picture of `extent` pixels whose sums are `sums`. `frame` is the address of its constants.
+    /// Records a pass over a picture of `extent` pixels whose sums are `sums`.
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,
-        frame: u64,
+        push: &Push,
         sums: BufferHandle,
         extent: [u32; 2],
     ) -> lvk::Result<()> {
@@ -39,12 +39,12 @@ impl PathTracer {
         match self {
             Self::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
-                cmd.push_constants(&frame)?;
+                cmd.push_constants(push)?;
                 cmd.trace_rays([extent[0], extent[1], 1], &dependencies)
             }
             Self::Query(pipeline) => {
                 cmd.bind_compute_pipeline(**pipeline)?;
-                cmd.push_constants(&frame)?;
+                cmd.push_constants(push)?;
                 cmd.dispatch(groups(extent), &dependencies)
             }
         }

@@ -2,7 +2,7 @@
 
 use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, TextureHandle};
 
-use crate::gpu::layout::FRAME_LAYOUT;
+use crate::gpu::layout::{FRAME_LAYOUT, Push};
 use crate::path_tracer::{compute, groups};
 use crate::pipelines::PRESENT;
 
@@ -20,13 +20,13 @@ impl Present {
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,
-        frame: u64,
+        push: &Push,
         sums: BufferHandle,
         image: TextureHandle,
         extent: [u32; 2],
     ) -> lvk::Result<()> {
         cmd.bind_compute_pipeline(*self.pipeline)?;
-        cmd.push_constants(&frame)?;
+        cmd.push_constants(push)?;
         let dependencies =
             Dependencies { read_buffers: &[sums], storage_images: &[image], ..Dependencies::default() };
         cmd.dispatch(groups(extent), &dependencies)

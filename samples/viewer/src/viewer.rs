@@ -1,9 +1,8 @@
 //! Renders the sample at a frame time.
 
-use glam::Vec3;
-use lvk::{BufferHandle, CommandBuffer, Context, Holder, TextureHandle};
+use glam::{Quat, Vec3};
+use lvk::{CommandBuffer, Context, TextureHandle};
 use lvk_gltf::{Model, Pose};
-use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::render_target::RenderTarget;
 use lvk_samples::app::run_error::RunError;
@@ -11,15 +10,16 @@ use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::scene::{Camera, GpuCamera};
 
-use crate::config::{ToneMapping, ViewerConfig};
+use crate::config::{Method, ViewerConfig};
 use crate::gpu::GpuScene;
-use crate::gpu::layout::FrameConstants;
+use crate::gpu::layout::{FrameConstants, Push};
 use crate::light::Environment;
 use crate::model::{ModelCamera, cameras};
-use crate::path_tracer::PathTracer;
+use crate::panel;
 use crate::present::Present;
+use crate::renderer::Renderer;
 
-/// Samples of a pass, so that none takes long: on a GPU, and on a CPU.
+/// Samples of a pass of the path tracer, so that none takes long: on a GPU, and on a CPU.
 const GPU_PASS: u32 = 4;
 const CPU_PASS: u32 = 16;
 /// Distance of the near plane over the distance of what the camera looks at.
@@ -43,15 +43,18 @@ pub struct Viewer {
     ctx: Context,
     config: ViewerConfig,
     scene: GpuScene,
-    tracer: PathTracer,
+    renderer: Renderer,
     present: Present,
     target: RenderTarget,
-    sums: Holder<BufferHandle>,
     cameras: Vec<ModelCamera>,
     chosen: usize,
     camera: Camera,
-    /// Samples in the sums.
+    /// The camera of the frame before.
+    before: Camera,
+    /// Samples in the picture, of the same camera.
     done: u32,
+    /// Frames since the renderer was made or began anew.
+    frame_number: u32,
 }
 
 impl Viewer {
@@ -69,16 +72,17 @@ impl Viewer {
         let camera = cameras[0].camera;
         Ok(Self {
             scene: gpu,
-            tracer: PathTracer::new(ctx, config.path)?,
+            renderer: Renderer::new(ctx, config)?,
             present: Present::new(ctx)?,
-            sums: sums(ctx, config.extent())?,
             ctx: ctx.clone(),
             config: *config,
             target,
             cameras,
             chosen: 0,
             camera,
+            before: camera,
             done: 0,
+            frame_number: 0,
         })
     }
 
@@ -88,7 +92,7 @@ impl Viewer {
         &self.cameras
     }
 
-    /// Looks through a camera of the model, by its place in [`cameras`](Self::cameras). There is no camera beyond the last.
+    /// Looks through a camera of the model, by its place in [`cameras`](Self::cameras). Beyond the last it is the last.
     pub fn choose_camera(&mut self, place: usize) {
         self.chosen = place.min(self.cameras.len() - 1);
         self.look(&self.cameras[self.chosen].camera.clone());
@@ -106,6 +110,34 @@ impl Viewer {
         &self.scene.warnings
     }
 
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &ViewerConfig {
+        &self.config
+    }
+
+    /// Renders by another configuration from now on; by the old one where this fails.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn configure(&mut self, config: &ViewerConfig) -> Result<(), SampleError> {
+        config.check(self.ctx.capabilities())?;
+        let before = &self.config;
+        let is_resized = config.extent() != before.extent();
+        if is_resized || config.method != before.method || config.path != before.path {
+            let renderer = Renderer::new(&self.ctx, config)?;
+            if is_resized {
+                self.target = RenderTarget::storage(&self.ctx, config.extent())?;
+            }
+            (self.renderer, self.frame_number, self.done) = (renderer, 0, 0);
+        }
+        if config.bounces != before.bounces {
+            self.done = 0;
+        }
+        self.config = *config;
+        Ok(())
+    }
+
     /// The mean radiance of each pixel of the last frame, rows from the top.
     ///
     /// # Errors
@@ -113,9 +145,12 @@ impl Viewer {
     pub fn radiance(&self) -> Result<Vec<[f32; 3]>, SampleError> {
         let [width, height] = self.config.extent();
         let mut sums = vec![[0.0_f32; 4]; width as usize * height as usize];
-        self.ctx.download_buffer(*self.sums, 0, bytemuck::cast_slice_mut(&mut sums))?;
-        let count = self.done.max(1) as f32;
-        Ok(sums.iter().map(|[red, green, blue, _]| [red / count, green / count, blue / count]).collect())
+        let (buffer, offset) = self.renderer.sums();
+        self.ctx.download_buffer(buffer, offset, bytemuck::cast_slice_mut(&mut sums))?;
+        Ok(sums
+            .iter()
+            .map(|[red, green, blue, count]| [red, green, blue].map(|sum| sum / count.max(1.0)))
+            .collect())
     }
 
     fn look(&mut self, camera: &Camera) {
@@ -125,29 +160,43 @@ impl Viewer {
         }
     }
 
-    fn pass_samples(&self) -> u32 {
-        if self.ctx.capabilities().is_cpu { CPU_PASS } else { GPU_PASS }
+    /// Samples of a step of a frame.
+    fn step_samples(&self) -> u32 {
+        match self.config.method {
+            Method::Hybrid => 1,
+            Method::PathTrace if self.ctx.capabilities().is_cpu => CPU_PASS,
+            Method::PathTrace => GPU_PASS,
+        }
     }
 
     fn upload_frame(&self, cmd: &mut CommandBuffer, sample_count: u32) -> lvk::Result<u64> {
-        let ViewerConfig { width, height, bounces, exposure_stops, tone_mapping, .. } = self.config;
-        let distance = Vec3::from(self.camera.eye).distance(Vec3::from(self.camera.target));
+        let ViewerConfig { width, height, bounces, exposure_stops, tone_mapping, shown, .. } = self.config;
+        let gpu = |camera: &Camera| {
+            let distance = Vec3::from(camera.eye).distance(Vec3::from(camera.target));
+            GpuCamera::new(camera, width, height, NEAR_SHARE * distance)
+        };
+        let seen = gpu(&self.camera);
+        let addresses = self.renderer.addresses()?;
         cmd.upload(&FrameConstants {
-            camera: GpuCamera::new(&self.camera, width, height, NEAR_SHARE * distance),
+            camera: seen.for_sample(self.frame_number, u32::MAX),
             scene: self.scene.constants,
-            sums: self.sums.address()?,
+            sums: addresses.sums,
             light: self.scene.light,
             tlas: self.scene.tlas.index(),
             image: self.target.image_index(),
-            sample_number: self.done,
+            sample_number: if self.config.method == Method::Hybrid { self.frame_number } else { self.done },
             sample_count,
             max_bounces: bounces - 1,
             exposure: exposure_stops.exp2(),
             offset_extent: self.scene.offset_extent,
-            tone_mapping: match tone_mapping {
-                ToneMapping::Neutral => 0,
-                ToneMapping::Linear => 1,
-            },
+            tone_mapping: tone_mapping as u32,
+            visibility: addresses.visibility,
+            seen,
+            seen_before: gpu(&self.before),
+            planes: addresses.planes,
+            frame_number: self.frame_number,
+            still_count: if self.camera == self.before { self.done } else { 0 },
+            view: shown as u32,
             _padding: 0,
         })
     }
@@ -155,13 +204,26 @@ impl Viewer {
     /// Adds samples, and stores the picture if `is_shown`.
     fn add_samples(&mut self, frame: &mut Frame<'_>, count: u32, is_shown: bool) -> lvk::Result<()> {
         let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
-        let (sums, image) = (*self.sums, self.target.image());
-        frame.pass("paths", |cmd| self.tracer.record(cmd, constants, sums, extent))?;
+        self.renderer.record(frame, constants, extent, &self.scene.draws)?;
         if is_shown {
-            frame.pass("picture", |cmd| self.present.record(cmd, constants, sums, image, extent))?;
+            let (push, sums, image) = (
+                Push { frame: constants, argument: 0, _padding: 0 },
+                self.renderer.sums().0,
+                self.target.image(),
+            );
+            frame.pass("picture", |cmd| self.present.record(cmd, &push, sums, image, extent))?;
         }
         self.done += count;
+        self.frame_number = self.frame_number.wrapping_add(1);
+        self.before = self.camera;
         Ok(())
+    }
+
+    /// One more sample, or one more frame of the real-time method, which never ends.
+    fn record_progress(&mut self, frame: &mut Frame<'_>) -> lvk::Result<()> {
+        let is_whole = self.config.method == Method::PathTrace && self.done >= self.config.samples;
+        let count = if is_whole { 0 } else { 1 };
+        if count > 0 { self.add_samples(frame, count, true) } else { Ok(()) }
     }
 }
 
@@ -170,10 +232,12 @@ impl Sample for Viewer {
         &self.ctx
     }
 
-    /// Nothing moves. Outside of windows each frame begins anew, so that it does not depend on those before.
-    fn update(&mut self, _: FrameTime) {
+    /// The camera goes around what it looks at. Outside of windows each frame begins anew, so that it does not depend on those
+    /// before.
+    fn update(&mut self, time: FrameTime) {
+        self.look(&around(&self.cameras[self.chosen].camera, time.phase()));
         if !self.config.is_progressive {
-            self.done = 0;
+            (self.done, self.frame_number, self.before) = (0, 0, self.camera);
         }
     }
 
@@ -182,35 +246,27 @@ impl Sample for Viewer {
     }
 
     fn steps_per_frame(&self) -> u64 {
-        if self.config.is_progressive { 1 } else { self.config.samples.div_ceil(self.pass_samples()).into() }
+        if self.config.is_progressive { 1 } else { self.config.samples.div_ceil(self.step_samples()).into() }
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
         if self.config.is_progressive {
-            let left = self.config.samples.saturating_sub(self.done);
-            if left > 0 {
-                self.add_samples(frame, left.min(1), true)?;
-            }
+            self.record_progress(frame)?;
             return Ok(self.target.image());
         }
-        self.done = 0;
+        (self.done, self.frame_number, self.before) = (0, 0, self.camera);
         while self.done < self.config.samples {
             if self.done > 0 {
                 frame.next_step()?;
             }
-            let count = (self.config.samples - self.done).min(self.pass_samples());
+            let count = (self.config.samples - self.done).min(self.step_samples());
             self.add_samples(frame, count, self.done + count == self.config.samples)?;
         }
         Ok(self.target.image())
     }
 
     fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), RunError> {
-        let config = ViewerConfig { width, height, ..self.config };
-        config.check(self.ctx.capabilities())?;
-        let target = RenderTarget::storage(&self.ctx, config.extent())?;
-        self.sums = sums(&self.ctx, config.extent())?;
-        (self.target, self.config, self.done) = (target, config, 0);
-        Ok(())
+        Ok(self.configure(&ViewerConfig { width, height, ..self.config })?)
     }
 
     fn view(&mut self) -> Option<Camera> {
@@ -227,32 +283,46 @@ impl Sample for Viewer {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        let mut chosen = self.chosen;
-        egui::ComboBox::from_label("camera").selected_text(&self.cameras[chosen].name).show_ui(ui, |ui| {
-            for (place, camera) in self.cameras.iter().enumerate() {
-                ui.selectable_value(&mut chosen, place, &camera.name);
-            }
-        });
-        if chosen != self.chosen {
+        if let Some(chosen) = panel::choose_camera(ui, &self.cameras, self.chosen) {
             self.choose_camera(chosen);
         }
-        ui.add(egui::Slider::new(&mut self.config.exposure_stops, -6.0..=6.0).text("stops"));
-        if ui.add(egui::Slider::new(&mut self.config.bounces, 1..=64).text("bounces")).changed() {
-            self.done = 0;
+        let mut config = self.config;
+        panel::show_settings(ui, &mut config);
+        if config != self.config
+            && let Err(error) = self.configure(&config)
+        {
+            ui.label(error.to_string());
         }
-        ui.label(format!("{} of {} samples", self.done, self.config.samples));
+        ui.label(format!("{} samples", self.done));
         let (triangles, instances) = self.counts();
         ui.label(format!("{triangles} triangles, {instances} instances"));
     }
 
     fn reload(&mut self) -> Result<(), RunError> {
-        let (tracer, present) = (PathTracer::new(&self.ctx, self.config.path)?, Present::new(&self.ctx)?);
-        (self.tracer, self.present, self.done) = (tracer, present, 0);
+        let (renderer, present) = (Renderer::new(&self.ctx, &self.config)?, Present::new(&self.ctx)?);
+        (self.renderer, self.present, self.done, self.frame_number) = (renderer, present, 0, 0);
         Ok(())
     }
 }
 
-/// The sums of a picture of `extent` pixels.
-fn sums(ctx: &Context, [width, height]: [u32; 2]) -> lvk::Result<Holder<BufferHandle>> {
-    buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))
+/// The camera after a part of a round about the vertical through what it looks at.
+fn around(camera: &Camera, phase: f32) -> Camera {
+    let (eye, target) = (Vec3::from(camera.eye), Vec3::from(camera.target));
+    let turn = Quat::from_rotation_y(std::f32::consts::TAU * phase);
+    let eye = if phase == 0.0 { eye } else { target + turn * (eye - target) };
+    Camera { eye: eye.to_array(), up: (turn * Vec3::from(camera.up)).to_array(), ..*camera }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_round_leads_around_the_target_and_back() {
+        let camera = Camera::looking_at([3.0, 1.0, 0.0], [1.0, 0.0, 0.0], 40.0);
+        assert_eq!(around(&camera, 0.0), camera);
+        let opposite = around(&camera, 0.5);
+        assert!(Vec3::from(opposite.eye).distance(Vec3::new(-1.0, 1.0, 0.0)) < 1e-5);
+        assert_eq!(opposite.target, camera.target);
+    }
 }

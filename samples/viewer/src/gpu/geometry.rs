@@ -16,14 +16,15 @@ pub(crate) struct GpuMeshes {
     pub(crate) geometries: Vec<GpuGeometry>,
     /// For each mesh the place of its first geometry, and its structure; `None` for a mesh without triangles.
     pub(crate) meshes: Vec<Option<GpuMesh>>,
-    /// Triangles of all meshes, each mesh once.
-    pub(crate) triangle_count: u64,
+    /// Triangles of each geometry of the table.
+    pub(crate) triangle_counts: Vec<u32>,
     _buffers: Vec<Holder<BufferHandle>>,
 }
 
 /// A mesh on the GPU.
 pub(crate) struct GpuMesh {
     pub(crate) first_geometry: u32,
+    pub(crate) geometry_count: u32,
     pub(crate) blas: Holder<AccelStructHandle>,
 }
 
@@ -148,15 +149,20 @@ impl GpuMeshes {
         }
         if arena.parts.is_empty() {
             let meshes = counts.iter().map(|_| None).collect();
-            return Ok(Self { geometries: Vec::new(), meshes, triangle_count: 0, _buffers: Vec::new() });
+            return Ok(Self {
+                geometries: Vec::new(),
+                meshes,
+                triangle_counts: Vec::new(),
+                _buffers: Vec::new(),
+            });
         }
         let (buffers, parts) = ArenaBuffers::new(ctx, arena)?;
         let geometries = parts.iter().map(|part| buffers.geometry(part)).collect::<lvk::Result<_>>()?;
-        let triangle_count = parts.iter().map(|part| u64::from(part.triangle_count)).sum();
+        let triangle_counts = parts.iter().map(|part| part.triangle_count).collect();
         let meshes = build(ctx, model, &counts, &parts, &buffers)?;
         let ArenaBuffers { floats, quantised, attributes, indices } = buffers;
         let _buffers = vec![floats, quantised, attributes, indices];
-        Ok(Self { geometries, meshes, triangle_count, _buffers })
+        Ok(Self { geometries, meshes, triangle_counts, _buffers })
     }
 }
 
@@ -180,11 +186,12 @@ fn build(
         }
     }
     let mut built = ctx.create_blas_batch(&descs)?.into_iter();
-    let mut first_geometry = 0;
+    let mut next = 0;
     let mesh = |count: &usize| {
-        let first = first_geometry;
-        first_geometry += *count as u32;
-        if *count == 0 { None } else { built.next().map(|blas| GpuMesh { first_geometry: first, blas }) }
+        let (first_geometry, geometry_count) = (next, *count as u32);
+        next += geometry_count;
+        let blas = if *count == 0 { None } else { built.next() };
+        blas.map(|blas| GpuMesh { first_geometry, geometry_count, blas })
     };
     Ok(counts.iter().map(mesh).collect())
 }

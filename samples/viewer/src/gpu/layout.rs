@@ -162,6 +162,22 @@ lvk::shader_struct! {
         pub(crate) exposure: f32,
         pub(crate) offset_extent: f32,
         pub(crate) tone_mapping: u32,
+        pub(crate) visibility: u32,
+        pub(crate) seen: GpuCamera,
+        pub(crate) seen_before: GpuCamera,
+        pub(crate) planes: u64,
+        pub(crate) frame_number: u32,
+        pub(crate) still_count: u32,
+        pub(crate) view: u32,
+        pub(crate) _padding: u32,
+    }
+
+    /// `PushConstants`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Push {
+        pub(crate) frame: u64,
+        pub(crate) argument: u32,
         pub(crate) _padding: u32,
     }
 }

@@ -9,4 +9,4 @@ mod scene;
 mod textures;
 mod vertices;
 
-pub(crate) use scene::GpuScene;
+pub(crate) use scene::{Draw, GpuScene};

@@ -1,5 +1,7 @@
 //! A model on the GPU: arrays, textures, light and acceleration structures.
 
+use std::ops::Range;
+
 use glam::{Mat3, Mat4, Vec3};
 use lvk::{
     AccelStructHandle, BufferHandle, BufferUsage, Context, Holder, TlasDesc, TlasInstance, rows_from_columns,
@@ -8,7 +10,7 @@ use lvk_gltf::{Bounds, Model, Placement, Pose};
 use lvk_samples::app::array_buffer::array;
 
 use super::albedo_table::albedo_table;
-use super::geometry::GpuMeshes;
+use super::geometry::{GpuMesh, GpuMeshes};
 use super::layout::{GpuInstance, GpuTextureSlot, LightConstants, SceneConstants};
 use super::lights::GpuLights;
 use super::materials::GpuMaterials;
@@ -19,6 +21,16 @@ use crate::light::Environment;
 const SMALLEST_DETERMINANT: f32 = 1e-30;
 /// A scene's largest coordinate over the extent that rounding errors near the origin are measured by.
 const OFFSET_SHARE: f32 = 8.0;
+
+/// A geometry to rasterise in some instances.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Draw {
+    /// The geometry of the mesh.
+    pub(crate) geometry: u32,
+    pub(crate) triangle_count: u32,
+    /// Places in the table of instances.
+    pub(crate) instances: Range<u32>,
+}
 
 /// A model on the GPU.
 pub(crate) struct GpuScene {
@@ -31,6 +43,8 @@ pub(crate) struct GpuScene {
     pub(crate) triangle_count: u64,
     /// Instances of meshes.
     pub(crate) instance_count: u32,
+    /// Everything to rasterise.
+    pub(crate) draws: Vec<Draw>,
     /// What is left out, for the user to read.
     pub(crate) warnings: Vec<String>,
     _meshes: GpuMeshes,
@@ -71,8 +85,9 @@ impl GpuScene {
             },
             tlas,
             offset_extent: (largest / OFFSET_SHARE).max(f32::MIN_POSITIVE),
-            triangle_count: meshes.triangle_count,
+            triangle_count: meshes.triangle_counts.iter().map(|count| u64::from(*count)).sum(),
             instance_count: instances.len() as u32,
+            draws: shown.draws,
             warnings: textures.warnings.clone(),
             _meshes: meshes,
             _textures: textures,
@@ -85,26 +100,46 @@ impl GpuScene {
 struct Shown {
     instances: Vec<GpuInstance>,
     tlas: Vec<TlasInstance>,
+    draws: Vec<Draw>,
 }
 
 impl Shown {
     fn new(model: &Model, scene: usize, pose: &Pose, meshes: &GpuMeshes) -> Self {
-        let mut shown = Self { instances: Vec::new(), tlas: Vec::new() };
-        for Placement { mesh, transform, .. } in model.placements(scene, pose) {
-            let Some(gpu) = meshes.meshes.get(mesh).and_then(Option::as_ref) else { continue };
-            let determinant = Mat3::from_mat4(transform).determinant();
-            if !transform.is_finite() || determinant.abs() < SMALLEST_DETERMINANT {
-                continue;
+        let mut shown = Self { instances: Vec::new(), tlas: Vec::new(), draws: Vec::new() };
+        let mut placements = model.placements(scene, pose);
+        placements.retain(|placement| has_inside(&placement.transform));
+        placements.sort_by_key(|placement| placement.mesh);
+        for same in placements.chunk_by(|a, b| a.mesh == b.mesh) {
+            let mesh = same.first().and_then(|placement| meshes.meshes.get(placement.mesh)?.as_ref());
+            if let Some(mesh) = mesh {
+                shown.add(mesh, same, meshes);
             }
-            shown.tlas.push(TlasInstance {
-                transform: rows(&transform),
-                custom_index: shown.instances.len() as u32,
-                ..TlasInstance::new(*gpu.blas)
-            });
-            shown.instances.push(gpu_instance(&transform, gpu.first_geometry));
         }
         shown
     }
+
+    /// Adds the instances of a mesh.
+    fn add(&mut self, mesh: &GpuMesh, placements: &[Placement], meshes: &GpuMeshes) {
+        let first = self.instances.len() as u32;
+        for Placement { transform, .. } in placements {
+            self.tlas.push(TlasInstance {
+                transform: rows(transform),
+                custom_index: self.instances.len() as u32,
+                ..TlasInstance::new(*mesh.blas)
+            });
+            self.instances.push(gpu_instance(transform, mesh.first_geometry));
+        }
+        let instances = first..self.instances.len() as u32;
+        self.draws.extend((0..mesh.geometry_count).map(|geometry| {
+            let triangle_count = meshes.triangle_counts[(mesh.first_geometry + geometry) as usize];
+            Draw { geometry, triangle_count, instances: instances.clone() }
+        }));
+    }
+}
+
+/// True if a transform leaves a mesh its volume.
+fn has_inside(transform: &Mat4) -> bool {
+    transform.is_finite() && Mat3::from_mat4(*transform).determinant().abs() >= SMALLEST_DETERMINANT
 }
 
 /// The upper three rows of a matrix.
