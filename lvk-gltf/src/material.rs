@@ -225,3 +225,42 @@ impl TextureTransform {
         [self.offset[0] + cos * u + sin * v, self.offset[1] - sin * u + cos * v]
     }
 }
+
+impl Material {
+    /// Returns the textures that the material has, each with its name in the file.
+    pub fn textures(&self) -> impl Iterator<Item = (&'static str, &TextureRef)> {
+        let (clearcoat, sheen) = (self.clearcoat.as_ref(), self.sheen.as_ref());
+        let (specular, iridescence) = (self.specular.as_ref(), self.iridescence.as_ref());
+        let volume = self.volume.as_ref();
+        let all = [
+            ("baseColorTexture", self.base_color_texture.as_ref()),
+            ("metallicRoughnessTexture", self.metallic_roughness_texture.as_ref()),
+            ("normalTexture", self.normal_texture.as_ref()),
+            ("occlusionTexture", self.occlusion_texture.as_ref()),
+            ("emissiveTexture", self.emissive_texture.as_ref()),
+            ("transmissionTexture", self.transmission.as_ref().and_then(|it| it.texture.as_ref())),
+            ("thicknessTexture", volume.and_then(|it| it.thickness_texture.as_ref())),
+            ("clearcoatTexture", clearcoat.and_then(|it| it.texture.as_ref())),
+            ("clearcoatRoughnessTexture", clearcoat.and_then(|it| it.roughness_texture.as_ref())),
+            ("clearcoatNormalTexture", clearcoat.and_then(|it| it.normal_texture.as_ref())),
+            ("sheenColorTexture", sheen.and_then(|it| it.color_texture.as_ref())),
+            ("sheenRoughnessTexture", sheen.and_then(|it| it.roughness_texture.as_ref())),
+            ("specularTexture", specular.and_then(|it| it.texture.as_ref())),
+            ("specularColorTexture", specular.and_then(|it| it.color_texture.as_ref())),
+            ("anisotropyTexture", self.anisotropy.as_ref().and_then(|it| it.texture.as_ref())),
+            ("iridescenceTexture", iridescence.and_then(|it| it.texture.as_ref())),
+            ("iridescenceThicknessTexture", iridescence.and_then(|it| it.thickness_texture.as_ref())),
+        ];
+        all.into_iter().filter_map(|(name, texture)| texture.map(|texture| (name, texture)))
+    }
+
+    /// Returns the set of texture coordinates along which tangents lie: that of the normal map, else of the clear coat's,
+    /// else that of the anisotropy. `None` if the material needs no tangents.
+    #[must_use]
+    pub fn tangent_tex_coord(&self) -> Option<usize> {
+        let clearcoat = self.clearcoat.as_ref().and_then(|clearcoat| clearcoat.normal_texture.as_ref());
+        let map = self.normal_texture.as_ref().or(clearcoat).map(|texture| texture.tex_coord);
+        let anisotropy = |it: &Anisotropy| it.texture.as_ref().map_or(0, |texture| texture.tex_coord);
+        map.or_else(|| self.anisotropy.as_ref().map(anisotropy))
+    }
+}

@@ -1,0 +1,1 @@
+//! meshopt_codecs
