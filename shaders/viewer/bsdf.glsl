@@ -234,25 +234,35 @@ Response respond(Surface surface, Bsdf bsdf, vec3 toLight) {
     return all;
 }
 
-vec3 drawGlass(Bsdf bsdf, vec2 u, float choice) {
+// A direction, and whether it leaves the side of the surface that its lobe scatters to. A microfacet may send light to the other
+// side, where it meets further microfacets: that light is lost, or is in the share of rescattering().
+struct Drawn {
+    vec3 direction;
+    bool isKept;
+};
+
+Drawn drawGlass(Bsdf bsdf, vec2 u, float choice) {
     vec3 h = visibleNormal(bsdf.view, bsdf.alpha, u);
-    float fresnel = fresnelDielectric(dot(bsdf.view, h), 1.0 / bsdf.eta);
-    return choice < fresnel ? reflect(-bsdf.view, h) : refract(-bsdf.view, h, 1.0 / bsdf.eta);
+    bool isMirrored = choice < fresnelDielectric(dot(bsdf.view, h), 1.0 / bsdf.eta);
+    vec3 l = isMirrored ? reflect(-bsdf.view, h) : refract(-bsdf.view, h, 1.0 / bsdf.eta);
+    return Drawn(bsdf.basis * l, isMirrored ? l.z > 0.0 : l.z < 0.0);
 }
 
-vec3 drawDirection(Bsdf bsdf, uint lobe, vec2 u, float choice) {
+Drawn drawDirection(Bsdf bsdf, uint lobe, vec2 u, float choice) {
     if (lobe == kCoatLobe) {
-        return bsdf.coatBasis * reflect(-bsdf.coatView, visibleNormal(bsdf.coatView, bsdf.coatAlpha, u));
+        vec3 mirrored = reflect(-bsdf.coatView, visibleNormal(bsdf.coatView, bsdf.coatAlpha, u));
+        return Drawn(bsdf.coatBasis * mirrored, mirrored.z > 0.0);
     }
     if (lobe == kDiffuseLobe) {
         float angle = 2.0 * kPi * u.y;
-        return bsdf.basis * vec3(sqrt(u.x) * vec2(cos(angle), sin(angle)), sqrt(1.0 - u.x));
+        return Drawn(bsdf.basis * vec3(sqrt(u.x) * vec2(cos(angle), sin(angle)), sqrt(1.0 - u.x)), true);
     }
     if (lobe == kGlassLobe) {
-        return bsdf.basis * drawGlass(bsdf, u, choice);
+        return drawGlass(bsdf, u, choice);
     }
     vec3 mirrored = reflect(-bsdf.view, visibleNormal(bsdf.view, bsdf.alpha, u));
-    return bsdf.basis * (lobe == kThinLobe ? vec3(mirrored.xy, -mirrored.z) : mirrored);
+    vec3 l = lobe == kThinLobe ? vec3(mirrored.xy, -mirrored.z) : mirrored;
+    return Drawn(bsdf.basis * l, mirrored.z > 0.0);
 }
 
 // `view`: where the ray came from.
@@ -267,10 +277,10 @@ Scattered scatter(Surface surface, Bsdf bsdf, vec3 view, vec2 choices, vec2 u) {
         float chance = bsdf.lobes[kPaneLobe];
         return Scattered(-view, chance > 0.0 ? bsdf.pane / chance : vec3(0.0), vec3(0.0), 0.0, true);
     }
-    vec3 direction = drawDirection(bsdf, lobe, u, choices.y);
-    Response response = respond(surface, bsdf, direction);
-    float inverse = response.density > 0.0 ? 1.0 / response.density : 0.0;
-    return Scattered(direction, response.value * inverse, response.matte * inverse, response.density, false);
+    Drawn drawn = drawDirection(bsdf, lobe, u, choices.y);
+    Response response = respond(surface, bsdf, drawn.direction);
+    float inverse = drawn.isKept && response.density > 0.0 ? 1.0 / response.density : 0.0;
+    return Scattered(drawn.direction, response.value * inverse, response.matte * inverse, response.density, false);
 }
 
 #endif

@@ -21,12 +21,14 @@ vec3 skyRadiance(vec3 direction) {
 }
 
 // Share of the row, or of the column of a row, in the distribution.
-float skyShare(readonly FloatArray cumulative, uint first, uint index) {
+float skyShare(FloatArray cumulative, uint first, uint index) {
     return cumulative.at[first + index] - (index == 0u ? 0.0 : cumulative.at[first + index - 1u]);
 }
 
 float skyCellDensity(uvec2 cell, float sine) {
-    float share = skyShare(frame.skyRows, 0u, cell.y) * skyShare(frame.skyColumns, cell.y * frame.skySize.x, cell.x);
+    FloatArray rows = frame.skyRows;
+    FloatArray columns = frame.skyColumns;
+    float share = skyShare(rows, 0u, cell.y) * skyShare(columns, cell.y * frame.skySize.x, cell.x);
     return share * float(frame.skySize.x * frame.skySize.y) / (2.0 * kPi * kPi * max(sine, 1e-6));
 }
 
@@ -37,7 +39,7 @@ float skyDensity(vec3 direction) {
 }
 
 // The first entry above `u`, and how far into it `u` is.
-uint skySearch(readonly FloatArray cumulative, uint first, uint count, float u, out float part) {
+uint skySearch(FloatArray cumulative, uint first, uint count, float u, out float part) {
     uint low = 0u;
     uint high = count - 1u;
     while (low < high) {
@@ -56,8 +58,10 @@ uint skySearch(readonly FloatArray cumulative, uint first, uint count, float u, 
 vec3 drawSky(vec2 u, out float density) {
     vec2 part;
     uvec2 cell;
-    cell.y = skySearch(frame.skyRows, 0u, frame.skySize.y, u.y, part.y);
-    cell.x = skySearch(frame.skyColumns, cell.y * frame.skySize.x, frame.skySize.x, u.x, part.x);
+    FloatArray rows = frame.skyRows;
+    FloatArray columns = frame.skyColumns;
+    cell.y = skySearch(rows, 0u, frame.skySize.y, u.y, part.y);
+    cell.x = skySearch(columns, cell.y * frame.skySize.x, frame.skySize.x, u.x, part.x);
     vec2 place = (vec2(cell) + part) / vec2(frame.skySize);
     float around = 2.0 * kPi * (place.x - 0.5);
     float down = kPi * place.y;

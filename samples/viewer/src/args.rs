@@ -20,9 +20,18 @@ pub struct ViewerArgs {
     #[arg(long, value_name = "NUMBER|NAME", help_heading = "Model")]
     pub camera: Option<String>,
 
-    /// Print the cameras of the model, and exit
+    /// Print the cameras and animations of the model, and exit
     #[arg(long, help_heading = "Model")]
     pub list_cameras: bool,
+
+    /// Animation that the model stands in, by its number or its name [default: none, as the file says]
+    #[arg(long, value_name = "NUMBER|NAME", help_heading = "Model")]
+    pub animation: Option<String>,
+
+    /// Time of the animation in seconds, 0 or more
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, requires = "animation")]
+    #[arg(help_heading = "Model")]
+    pub time: f32,
 
     /// Method that renders
     #[arg(long, value_enum, default_value_t = MethodArg::Hybrid)]
@@ -68,11 +77,11 @@ pub struct LightArgs {
     pub sky: SkyArg,
 
     /// Angle of the sun above the horizon in degrees, 1 to 90
-    #[arg(long, value_name = "DEGREES", default_value_t = 38.0, value_parser = elevation)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 42.0, value_parser = elevation)]
     pub sun_elevation: f32,
 
     /// Angle of the sun around the vertical in degrees, from +z towards +x
-    #[arg(long, value_name = "DEGREES", default_value_t = 125.0, value_parser = degrees, allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = -58.0, value_parser = degrees, allow_negative_numbers = true)]
     pub sun_azimuth: f32,
 
     /// Radius of the discs of the sun and of directional lights in degrees; that of the real sun is 0.27
@@ -126,6 +135,10 @@ pub enum ToneArg {
     Neutral,
     /// No mapping; what is too bright is clipped.
     Linear,
+}
+
+fn seconds(text: &str) -> Result<f32, String> {
+    number_within(text, 0.0, 1e6)
 }
 
 fn stops(text: &str) -> Result<f32, String> {

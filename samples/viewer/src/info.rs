@@ -1,5 +1,6 @@
 //! The description of the sample's program.
 
+use lvk_gltf::Model;
 use lvk_samples::app::png;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample_info::prelude::*;
@@ -8,7 +9,7 @@ use lvk_samples::hybrid::RayPath;
 use crate::args::{LightArgs, MethodArg, ShownArg, SkyArg, ToneArg, ViewerArgs};
 use crate::config::{Method, Shown, ToneMapping, ViewerConfig};
 use crate::light::{Environment, SunSetting};
-use crate::model::{ModelCamera, ModelError, cameras, load, showcase};
+use crate::model::{ModelCamera, ModelError, cameras, load, posed, showcase};
 use crate::pipelines;
 use crate::viewer::{Viewer, ViewerScene};
 
@@ -18,6 +19,14 @@ const OTHER_TEXTURES: u32 = 64;
 /// Errors of the sample's arguments.
 #[derive(Debug, thiserror::Error)]
 enum ArgumentError {
+    /// The model has no such animation.
+    #[error("--animation {wish}: the model has {known}")]
+    NoAnimation {
+        /// As given.
+        wish: String,
+        /// Numbers and names.
+        known: String,
+    },
     /// The model has no such camera.
     #[error("--camera {wish}: the model has the cameras {known}")]
     NoCamera {
@@ -56,7 +65,9 @@ impl SampleInfo for Viewer {
         // A file that cannot be read is reported by `open`.
         let model = args.list_cameras.then(|| model(args, &mut Progress::hidden()).ok()).flatten()?;
         let scene = model.default_scene.unwrap_or(0);
-        Some(numbered(&cameras(&model, scene, &model.pose(None, 0.0))).join("\n"))
+        let cameras = numbered(&cameras(&model, scene, &model.pose(None, 0.0)));
+        let animations = animation_lines(&model).into_iter().map(|line| format!("animation {line}"));
+        Some(cameras.into_iter().chain(animations).collect::<Vec<_>>().join("\n"))
     }
 
     fn open(args: &ViewerArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Self>, RunError> {
@@ -64,8 +75,11 @@ impl SampleInfo for Viewer {
             png::check_not_input(&setup.args.out_or(Self::NAME), "FILE", file)?;
         }
         let model = model(args, &mut setup.progress).map_err(RunError::input)?;
+        let animation = args.animation.as_deref().map(|wish| animation_place(&model, wish));
+        let animation = animation.transpose().map_err(RunError::input)?;
         let warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
         setup.warn(&warnings);
+        let model = posed(model, animation, args.time);
         let textures = model.images.len() as u32 + OTHER_TEXTURES;
         let context = setup.device(&DeviceNeeds { textures, ..DeviceNeeds::tracing(args.tracing.rt) })?;
         let path = RayPath::choose(RayPath::from_args(args.tracing.rt), context.capabilities())?;
@@ -103,12 +117,12 @@ impl SampleInfo for Viewer {
     }
 }
 
-fn model(args: &ViewerArgs, progress: &mut Progress) -> Result<lvk_gltf::Model, ModelError> {
+fn model(args: &ViewerArgs, progress: &mut Progress) -> Result<Model, ModelError> {
     args.file.as_deref().map_or_else(|| Ok(showcase()), |file| load(file, progress))
 }
 
 /// The model with the light that the arguments ask for. A model with directional lights of its own needs no sun.
-fn scene(args: &ViewerArgs, model: lvk_gltf::Model) -> ViewerScene {
+fn scene(args: &ViewerArgs, model: Model) -> ViewerScene {
     let LightArgs { sky, sun_elevation, sun_azimuth, sun_radius } = args.light;
     let has_sun = model.lights.iter().any(|light| light.kind == lvk_gltf::LightKind::Directional);
     let mut environment = match sky {
@@ -135,6 +149,27 @@ fn shown(wish: ShownArg) -> Shown {
         ShownArg::Matte => Shown::Matte,
         ShownArg::Mirrored => Shown::Mirrored,
     }
+}
+
+/// The animation that the arguments name.
+fn animation_place(model: &Model, wish: &str) -> Result<usize, ArgumentError> {
+    let number = wish.parse::<usize>().ok().filter(|number| (1..=model.animations.len()).contains(number));
+    let named = || model.animations.iter().position(|animation| animation.name.as_deref() == Some(wish));
+    number.map(|number| number - 1).or_else(named).ok_or_else(|| {
+        let known = animation_lines(model);
+        let known = if known.is_empty() { "no animation".to_owned() } else { known.join(", ") };
+        ArgumentError::NoAnimation { wish: lvk::readable_name(wish), known }
+    })
+}
+
+/// The animations, a line each.
+fn animation_lines(model: &Model) -> Vec<String> {
+    let name =
+        |animation: &lvk_gltf::Animation| animation.name.clone().unwrap_or_else(|| "animation".to_owned());
+    (1..)
+        .zip(&model.animations)
+        .map(|(number, animation)| format!("{number}  {}", lvk::readable_name(&name(animation))))
+        .collect()
 }
 
 /// The cameras, a line each.

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 use lvk_gltf::{AlphaMode, Light, LightKind, Material, Model, Transmission, Volume};
+use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
-use lvk_tests::hybrid::paths;
 use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, Sun};
 
@@ -23,7 +23,7 @@ fn floor(material: Material) -> Builder {
 
 fn seen(model: &Model, environment: &Environment, view: &View) -> Option<[f64; 3]> {
     let ctx = software_device()?;
-    Some(mean(&radiance(&ctx, paths(&ctx)[0], model, environment, view)))
+    Some(mean(&radiance(&ctx, RayPath::Query, model, environment, view)))
 }
 
 fn lit_by_sun(radius: f32) -> Environment {

@@ -1,10 +1,12 @@
 //! Meshes of a model on the GPU: vertices, indices, and a bottom-level structure for each mesh.
 
+use std::collections::HashSet;
+
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, Context, GeometryFlags, Holder,
     IndexFormat, Indices, Triangles, VertexFormat,
 };
-use lvk_gltf::{AlphaMode, Material, Model, Primitive};
+use lvk_gltf::{AlphaMode, Material, Model, Placement, Primitive};
 use lvk_samples::app::array_buffer::array;
 
 use super::layout::{GpuAttributes, GpuGeometry, QUANTISED};
@@ -132,15 +134,17 @@ impl ArenaBuffers {
 }
 
 impl GpuMeshes {
-    /// Uploads the meshes of a model and builds their structures. Primitives without triangles are left out. The default
+    /// Uploads the meshes that are placed and builds their structures. Primitives without triangles are left out. The default
     /// material has the number of the model's materials.
-    pub(crate) fn new(ctx: &Context, model: &Model) -> lvk::Result<Self> {
+    pub(crate) fn new(ctx: &Context, model: &Model, placements: &[Placement]) -> lvk::Result<Self> {
         let mut arena = Arena::default();
         let mut counts = Vec::new();
         let default = Material::default();
-        for mesh in &model.meshes {
+        let placed: HashSet<usize> = placements.iter().map(|placement| placement.mesh).collect();
+        for (place, mesh) in model.meshes.iter().enumerate() {
             let before = arena.parts.len();
-            for primitive in mesh.primitives.iter().filter(|primitive| !primitive.indices.is_empty()) {
+            let is_shown = |primitive: &&Primitive| placed.contains(&place) && !primitive.indices.is_empty();
+            for primitive in mesh.primitives.iter().filter(is_shown) {
                 let number = primitive.material.unwrap_or(model.materials.len());
                 let is_opaque = is_opaque(model.materials.get(number).unwrap_or(&default));
                 arena.add(primitive, number as u32, is_opaque);

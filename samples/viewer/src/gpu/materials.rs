@@ -10,13 +10,16 @@ use super::textures::GpuTextures;
 pub(crate) struct GpuMaterials {
     pub(crate) materials: Vec<GpuMaterial>,
     pub(crate) slots: Vec<GpuTextureSlot>,
+    /// What the picture leaves out, for the user to read.
+    pub(crate) warnings: Vec<String>,
 }
 
 impl GpuMaterials {
     /// The materials of a model, and the default material after them.
     pub(crate) fn new(model: &Model, textures: &GpuTextures) -> Self {
-        let mut all = Self { materials: Vec::new(), slots: Vec::new() };
+        let mut all = Self { materials: Vec::new(), slots: Vec::new(), warnings: Vec::new() };
         for material in model.materials.iter().chain([&Material::default()]) {
+            all.warnings.extend(ignored(material));
             let material = all.material(material, textures);
             all.materials.push(material);
         }
@@ -90,6 +93,20 @@ impl GpuMaterials {
         });
         self.slots.len() as u32 - 1
     }
+}
+
+/// Properties of a material that the viewer does not show, a line each.
+fn ignored(material: &Material) -> Vec<String> {
+    let name =
+        material.name.as_deref().map_or_else(|| "a material".to_owned(), |name| format!("material '{name}'"));
+    let has_coat_normals = material.clearcoat.as_ref().is_some_and(|coat| coat.normal_texture.is_some());
+    let all = [
+        (material.anisotropy.is_some(), "KHR_materials_anisotropy"),
+        (material.iridescence.is_some(), "KHR_materials_iridescence"),
+        (has_coat_normals, "clearcoatNormalTexture"),
+    ];
+    let shown = all.into_iter().filter(|(has, _)| *has);
+    shown.map(|(_, what)| format!("{}: {what} is ignored", lvk::readable_name(&name))).collect()
 }
 
 const DEFAULT_SPECULAR: lvk_gltf::Specular =

@@ -64,13 +64,13 @@ impl GpuScene {
         disc_radius: f32,
     ) -> lvk::Result<Self> {
         let textures = GpuTextures::new(ctx, model)?;
-        let meshes = GpuMeshes::new(ctx, model)?;
+        let meshes = GpuMeshes::new(ctx, model, &model.placements(scene, pose))?;
         let shown = Shown::new(model, scene, pose, &meshes);
         let bounds = model.bounds(scene, pose).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ZERO });
         let lights = GpuLights::new(model, scene, pose, environment, disc_radius, &bounds);
         let mut arrays = Arrays { ctx, held: Vec::new() };
-        let constants =
-            arrays.constants(&meshes, &shown, &GpuMaterials::new(model, &textures), &lights, environment)?;
+        let materials = GpuMaterials::new(model, &textures);
+        let constants = arrays.constants(&meshes, &shown, &materials, &lights, environment)?;
         let (instances, debug_name) = (shown.tlas.as_slice(), "scene tlas");
         let capacity = instances.len().max(1) as u32;
         let tlas = ctx.create_tlas(&TlasDesc { instances, capacity, debug_name, ..TlasDesc::default() })?;
@@ -88,7 +88,7 @@ impl GpuScene {
             triangle_count: meshes.triangle_counts.iter().map(|count| u64::from(*count)).sum(),
             instance_count: instances.len() as u32,
             draws: shown.draws,
-            warnings: textures.warnings.clone(),
+            warnings: [textures.warnings.as_slice(), &materials.warnings].concat(),
             _meshes: meshes,
             _textures: textures,
             _buffers: arrays.held,

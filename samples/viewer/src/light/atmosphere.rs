@@ -13,8 +13,8 @@ const EYE_HEIGHT: f64 = 200.0;
 const AIR: DVec3 = DVec3::new(5.802e-6, 13.558e-6, 33.1e-6);
 const AIR_SCALE_HEIGHT: f64 = 8e3;
 /// Scattering and extinction of haze a metre at the ground.
-const HAZE_SCATTERING: f64 = 3.996e-6;
-const HAZE_EXTINCTION: f64 = 4.44e-6;
+const HAZE_SCATTERING: f64 = 0.7 * 3.996e-6;
+const HAZE_EXTINCTION: f64 = 0.7 * 4.44e-6;
 const HAZE_SCALE_HEIGHT: f64 = 1.2e3;
 /// Asymmetry of the light that haze scatters.
 const HAZE_ASYMMETRY: f64 = 0.8;
@@ -22,8 +22,9 @@ const HAZE_ASYMMETRY: f64 = 0.8;
 const OZONE: DVec3 = DVec3::new(0.650e-6, 1.881e-6, 0.085e-6);
 const OZONE_HEIGHT: f64 = 25e3;
 const OZONE_HALF_WIDTH: f64 = 15e3;
-/// Light that was scattered before, over that which comes from the sun. It comes from everywhere.
-const SCATTERED_BEFORE: f64 = 0.5;
+/// Light that was scattered before, over that which comes from the sun. It comes from everywhere, and is bluer. The numbers are
+/// chosen by eye, for a horizon that is nearly white.
+const SCATTERED_BEFORE: DVec3 = DVec3::new(1.8, 1.8, 3.2);
 /// Steps along a view, and along a way to the sun.
 const VIEW_STEPS: u32 = 24;
 const SUN_STEPS: u32 = 32;
@@ -61,12 +62,12 @@ impl Atmosphere {
         let cosine = direction.dot(self.to_sun);
         let (air_phase, haze_phase) = (rayleigh(cosine), henyey_greenstein(cosine));
         let (mut light, mut left) = (DVec3::ZERO, DVec3::ONE);
-        let mut before = 0.0;
+        let mut start = 0.0;
         for step in 1..=VIEW_STEPS {
             // Steps are short where the air is dense.
             let end = length * (f64::from(step) / f64::from(VIEW_STEPS)).powi(2);
-            let (width, point) = (end - before, origin + direction * (0.5 * (before + end)));
-            before = end;
+            let (width, point) = (end - start, origin + direction * (0.5 * (start + end)));
+            start = end;
             let height = point.length() - GROUND_RADIUS;
             let (air, haze) = (
                 AIR * (-height / AIR_SCALE_HEIGHT).exp(),
@@ -74,8 +75,8 @@ impl Atmosphere {
             );
             let through = (-extinction(height) * width).exp();
             let sun = self.to_sun_from(height, point.normalize().dot(self.to_sun));
-            let isotropic = SCATTERED_BEFORE / (4.0 * std::f64::consts::PI);
-            let source = sun * (air * (air_phase + isotropic) + haze * (haze_phase + isotropic));
+            let before = SCATTERED_BEFORE / (4.0 * std::f64::consts::PI);
+            let source = sun * (air * (air_phase + before) + haze * (haze_phase + before));
             light += left * source * width * 0.5 * (DVec3::ONE + through);
             left *= through;
         }

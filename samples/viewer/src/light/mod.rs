@@ -47,7 +47,7 @@ pub struct SunSetting {
 
 impl Default for SunSetting {
     fn default() -> Self {
-        Self { elevation_degrees: 38.0, azimuth_degrees: 125.0, radius_degrees: 0.5 }
+        Self { elevation_degrees: 42.0, azimuth_degrees: -58.0, radius_degrees: 0.5 }
     }
 }
 

@@ -3,9 +3,11 @@
 mod cameras;
 mod load;
 mod obj;
+mod posed;
 mod showcase;
 mod showcase_textures;
 
 pub use cameras::{ModelCamera, cameras};
 pub use load::{ModelError, load};
+pub use posed::posed;
 pub use showcase::showcase;
