@@ -4,9 +4,8 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Command;
-use winit::event_loop::EventLoopBuilder;
 
-use crate::app::cli;
+use crate::app::cli::{self, EventLoopBuilder};
 use crate::app::sample_info::SampleInfo;
 use crate::pipelines::SamplePipeline;
 use crate::{
@@ -24,7 +23,7 @@ pub struct CatalogueEntry {
     /// [`SampleInfo::pipelines`].
     pub pipelines: fn() -> Vec<SamplePipeline>,
     /// Runs the program: [`cli::main_with`].
-    pub main: fn(Vec<OsString>, &mut EventLoopBuilder<()>) -> ExitCode,
+    pub main: fn(Vec<OsString>, &mut EventLoopBuilder) -> ExitCode,
 }
 
 impl CatalogueEntry {
@@ -56,7 +55,7 @@ pub const SAMPLES: [CatalogueEntry; 16] = [
 /// Runs the sample that a line of text names, such as `rtx_ao --rt query`, with the arguments of the line and `more`: for
 /// systems that start a program without arguments. Words end at white space.
 #[must_use]
-pub fn run_line(line: &str, more: Vec<OsString>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
+pub fn run_line(line: &str, more: Vec<OsString>, event_loop: &mut EventLoopBuilder) -> ExitCode {
     let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
     match words.first().and_then(|name| SAMPLES.iter().find(|sample| name == sample.name)) {
         Some(sample) => (sample.main)([words, more].concat(), event_loop),

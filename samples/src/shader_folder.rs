@@ -52,6 +52,7 @@ pub(crate) fn folder() -> Option<PathBuf> {
 }
 
 /// The files that shaders were compiled from, if a folder is named.
+#[cfg(feature = "window")]
 pub(crate) fn watched_files() -> Option<ShaderFiles> {
     folder().map(|_| FILES.clone())
 }

@@ -104,6 +104,10 @@ pub(super) struct BuildsArgs {
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Vec<u16>,
+
+    /// Builds by Embree 3 or 4 too; FILE is its library, as libembree3.so.3
+    #[arg(long, value_name = "FILE")]
+    pub(super) embree: Option<PathBuf>,
 }
 
 impl BuildsArgs {

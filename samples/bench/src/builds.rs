@@ -4,6 +4,7 @@ use lvk::test_hooks::{CpuBuild, ObvhsBuild, build_by_obvhs, build_on_threads};
 
 use crate::args::{BenchArgs, BuildsArgs};
 use crate::cpu_overhead::{peak_bytes, restart_peak};
+use crate::embree::{Embree, EmbreeBuild};
 use crate::error::BenchError;
 use crate::measure::median_of;
 use crate::mesh::Mesh;
@@ -15,6 +16,8 @@ struct ThreadRow {
     builds: Vec<CpuBuild>,
     /// The same by `obvhs`.
     others: Vec<ObvhsBuild>,
+    /// The same by Embree, if it is named.
+    by_embree: Vec<EmbreeBuild>,
     /// Heap bytes that a build had at most, beside the mesh of the caller.
     peak: u64,
 }
@@ -28,10 +31,20 @@ pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, Ben
     let mut rows: Vec<ThreadRow> = args
         .threads()
         .into_iter()
-        .map(|threads| ThreadRow { threads, builds: Vec::new(), others: Vec::new(), peak: 0 })
+        .map(|threads| ThreadRow {
+            threads,
+            builds: Vec::new(),
+            others: Vec::new(),
+            by_embree: Vec::new(),
+            peak: 0,
+        })
         .collect();
+    let embree = args.embree.as_deref().map(Embree::open).transpose()?;
     for row in &mut rows {
         measure_row(&mesh, runs, row);
+        if let Some(embree) = &embree {
+            row.by_embree = embree.build(&mesh.positions, &mesh.triangles, row.threads, runs)?;
+        }
     }
     Ok(table(&mesh, runs, &rows))
 }
@@ -72,6 +85,7 @@ fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
         "total of obvhs 0.4, slow_build",
         rows.iter().map(|row| format_ms(median_of(&row.others, |build| milliseconds(build.total)))),
     );
+    add_embree(&mut table, rows);
     if let Some(other) = rows.iter().find_map(|row| row.others.first()) {
         table.add_note(format!("SAH cost of the tree of obvhs: {:.5}", other.sah_cost));
     }
@@ -84,6 +98,22 @@ fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
         table.add_note(if same { "all builds made the same bytes" } else { "BUILDS DIFFER" });
     }
     table
+}
+
+/// Adds the builds by Embree, if there are any.
+fn add_embree(table: &mut Table, rows: &[ThreadRow]) {
+    let Some(first) = rows.first().and_then(|row| row.by_embree.first()) else { return };
+    for (name, time) in [
+        (
+            "total of Embree, medium quality",
+            (|build| build.medium) as fn(&EmbreeBuild) -> std::time::Duration,
+        ),
+        ("total of Embree, high quality", |build| build.high),
+    ] {
+        let median = |row: &ThreadRow| median_of(&row.by_embree, |build| milliseconds(time(build)));
+        table.add_row(name, rows.iter().map(|row| format_ms(median(row))));
+    }
+    table.add_note(format!("SAH cost of the tree of Embree's medium builder: {:.5}", first.sah_cost));
 }
 
 fn count_text(threads: usize) -> String {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use lvk::ash::vk;
 
+use crate::embree::EmbreeError;
 use crate::paper::PaperError;
 use lvk_dev_driver::DriverError;
 use lvk_samples::app::interrupt;
@@ -35,6 +36,8 @@ pub(super) enum BenchError {
     NoBenchmark,
     #[error("cannot create a folder for the BVH cache: {0}")]
     NoFolder(#[from] std::io::Error),
+    #[error(transparent)]
+    Embree(#[from] EmbreeError),
     #[error("{0}")]
     Peers(String),
     #[error(
@@ -57,7 +60,7 @@ impl BenchError {
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Interrupted { .. } => interrupt::STATUS,
-            Self::NoBenchmark | Self::PeersDevice => 2,
+            Self::NoBenchmark | Self::PeersDevice | Self::Embree(EmbreeError::Library { .. }) => 2,
             Self::Listing(error) => error.status(),
             Self::Paper(error) if error.is_input() => 2,
             Self::Scene(_) | Self::Driver(DriverError::Variable { .. }) => 2,

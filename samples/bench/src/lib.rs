@@ -9,6 +9,7 @@ mod batch;
 mod builds;
 mod compaction;
 mod cpu_overhead;
+mod embree;
 mod error;
 mod hand_written;
 mod instance_record;

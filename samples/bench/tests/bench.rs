@@ -76,6 +76,11 @@ fn cpu_builds_are_timed_phase_by_phase_for_each_number_of_threads() {
     assert!(table.contains("all builds made the same bytes"), "{table}");
     let (status, _, err) = outcome(&["builds", "--quick", "--threads", "0"]);
     assert!(status == Some(2) && err.contains("--threads"), "{err}");
+    let (status, _, err) = outcome(&["builds", "--quick", "--embree", "no-such-library.so"]);
+    assert!(
+        status == Some(2) && err.contains("no-such-library.so") && err.contains("libembree-dev"),
+        "{err}"
+    );
 }
 
 #[test]

@@ -2,6 +2,8 @@
 
 use super::sample_info::SampleInfo;
 use super::summary::{raster_summary, ray_summary};
+pub use super::window::EventLoopBuilder;
+
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,7 +11,6 @@ use std::sync::Arc;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use lvk::{Context, ValidationSink, WindowHandles};
-use winit::event_loop::{EventLoop, EventLoopBuilder};
 
 use super::caches::Caches;
 use super::device::{self, DeviceNeeds};
@@ -92,13 +93,13 @@ pub fn parse<S: SampleInfo>(
 /// Runs the program of a sample with the arguments of the process.
 #[must_use]
 pub fn main<S: SampleInfo>() -> ExitCode {
-    main_with::<S>(std::env::args_os().collect(), &mut EventLoop::builder())
+    main_with::<S>(std::env::args_os().collect(), &mut window::event_loop())
 }
 
 /// Runs the program of a sample with other arguments, of which the first is its name, and another event loop for its
 /// window.
 #[must_use]
-pub fn main_with<S: SampleInfo>(words: Vec<OsString>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
+pub fn main_with<S: SampleInfo>(words: Vec<OsString>, event_loop: &mut EventLoopBuilder) -> ExitCode {
     match parse::<S>(&words) {
         Ok(args) => run_with::<S>(&args, event_loop),
         Err(error) => {
@@ -128,10 +129,10 @@ fn print_usage(error: &clap::Error, words: &[OsString]) {
 /// the images were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run<S: SampleInfo>(args: &CommandLine<S::Args>) -> ExitCode {
-    run_with::<S>(args, &mut EventLoop::builder())
+    run_with::<S>(args, &mut window::event_loop())
 }
 
-fn run_with<S: SampleInfo>(args: &CommandLine<S::Args>, event_loop: &mut EventLoopBuilder<()>) -> ExitCode {
+fn run_with<S: SampleInfo>(args: &CommandLine<S::Args>, event_loop: &mut EventLoopBuilder) -> ExitCode {
     if let Some(listing) = S::listing(&args.sample) {
         print_line(&listing);
         return ExitCode::SUCCESS;
@@ -260,7 +261,7 @@ pub(crate) fn warn(warnings: &[String]) {
 }
 
 fn attempt<S: Sample>(
-    event_loop: &mut EventLoopBuilder<()>,
+    event_loop: &mut EventLoopBuilder,
     name: &str,
     args: &RunArgs,
     interrupt: &Interrupt,
@@ -307,7 +308,7 @@ fn attempt<S: Sample>(
 }
 
 fn show<S: Sample>(
-    event_loop: &mut EventLoopBuilder<()>,
+    event_loop: &mut EventLoopBuilder,
     name: &str,
     args: &RunArgs,
     make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,

@@ -36,6 +36,10 @@ pub(crate) mod summary;
 pub mod timings;
 pub mod ui;
 pub mod value_parsers;
+#[cfg(feature = "window")]
+mod window;
+#[cfg(not(feature = "window"))]
+#[path = "no_window.rs"]
 mod window;
 
 use std::io::Write as _;

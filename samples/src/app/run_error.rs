@@ -75,6 +75,15 @@ pub enum RunError {
         /// Error of the window system.
         reason: String,
     },
+    /// The program has no windows.
+    #[error(
+        "--window: this program was built without windows; build it with them by \
+         `cargo run --release --features window --bin {name} -- --window`"
+    )]
+    BuiltWithoutWindows {
+        /// Name of the program.
+        name: String,
+    },
     /// The window is gone, though it was not closed.
     #[error("{0}")]
     WindowLost(lvk::Error),
@@ -116,6 +125,7 @@ impl RunError {
     }
 
     /// No window can be opened.
+    #[cfg(feature = "window")]
     pub(super) fn window(error: &dyn std::error::Error) -> Self {
         Self::NoWindow { reason: error.to_string() }
     }
@@ -127,7 +137,7 @@ impl RunError {
         match self {
             Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
-            Self::SequenceInWindow | Self::NoShaders { .. } => 2,
+            Self::SequenceInWindow | Self::NoShaders { .. } | Self::BuiltWithoutWindows { .. } => 2,
             Self::Sample(error) => error.status(),
             Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,

@@ -107,6 +107,9 @@ pub fn render_frames(
     }
 }
 
+/// Stage of progress. Software drivers compile shaders for seconds, in the first frame.
+const RENDERING: &str = "rendering; drivers compile shaders in the first frame";
+
 fn still(
     source: &mut impl FrameSource,
     request: &RenderRequest,
@@ -116,7 +119,7 @@ fn still(
 ) -> Result<RenderReport, RunError> {
     let steps = source.steps_per_frame();
     let all = u64::from(request.warm_up) + u64::from(count);
-    progress.stage("rendering", all * steps);
+    progress.stage(RENDERING, all * steps);
     let mut timings = Timings::new();
     source.update(request.frame_time(0));
     for round in 0..all {
@@ -142,7 +145,7 @@ fn sequence(
 ) -> Result<RenderReport, RunError> {
     let steps = source.steps_per_frame();
     let count = range.end.saturating_sub(range.start);
-    progress.stage("rendering", u64::from(count) * steps);
+    progress.stage(RENDERING, u64::from(count) * steps);
     let mut played = RenderReport::default();
     for (done, frame) in (0_u32..).zip(range) {
         if interrupt.is_raised() {

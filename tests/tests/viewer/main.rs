@@ -2,8 +2,10 @@
 //! tracing paths; files that it loads.
 
 mod furnace;
+mod hybrid;
 mod known_values;
 mod paths;
 mod reference;
 mod reference_tracer;
 mod scenes;
+mod still_life;

@@ -85,14 +85,14 @@ pub struct View {
     pub samples: u32,
 }
 
-/// Returns the radiance of each pixel, rows from the top.
-pub fn radiance(
+/// Returns the viewer of a model by a method.
+pub fn viewer(
     ctx: &Context,
-    path: RayPath,
+    (method, path): (Method, RayPath),
     model: &Model,
     environment: &Environment,
     view: &View,
-) -> Vec<[f32; 3]> {
+) -> Viewer {
     let scene = ViewerScene {
         name: "test".to_owned(),
         model: model.clone(),
@@ -100,14 +100,33 @@ pub fn radiance(
         disc_radius: 0.1,
     };
     let [width, height] = view.size;
-    let config = ViewerConfig {
-        method: Method::PathTrace,
-        samples: view.samples,
-        bounces: 64,
-        ..ViewerConfig::new(path, width, height)
-    };
+    let usual = ViewerConfig::new(path, width, height);
+    let config = ViewerConfig { method, samples: view.samples, bounces: 64, ..usual };
     let mut viewer = Viewer::new(ctx, &scene, &config).unwrap();
     viewer.set_view(&view.camera);
+    viewer
+}
+
+/// Returns the radiance of each pixel by the path tracer, rows from the top.
+pub fn radiance(
+    ctx: &Context,
+    path: RayPath,
+    model: &Model,
+    environment: &Environment,
+    view: &View,
+) -> Vec<[f32; 3]> {
+    radiance_by(ctx, (Method::PathTrace, path), model, environment, view)
+}
+
+/// Returns the radiance of each pixel by a method.
+pub fn radiance_by(
+    ctx: &Context,
+    by: (Method, RayPath),
+    model: &Model,
+    environment: &Environment,
+    view: &View,
+) -> Vec<[f32; 3]> {
+    let mut viewer = viewer(ctx, by, model, environment, view);
     headless::picture(&mut viewer).unwrap();
     viewer.radiance().unwrap()
 }

@@ -10,3 +10,13 @@ mod ui_input;
 mod window_app;
 
 pub(super) use window_app::run;
+
+use winit::event_loop::EventLoop;
+
+/// The event loop of the window system, before it is built.
+pub type EventLoopBuilder = winit::event_loop::EventLoopBuilder<()>;
+
+/// Returns the event loop of the window system.
+pub(super) fn event_loop() -> EventLoopBuilder {
+    EventLoop::builder()
+}

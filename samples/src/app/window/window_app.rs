@@ -9,10 +9,11 @@ use lvk::{Context, ShaderFiles, SubmitHandle, ValidationSink, WindowHandles};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, WindowEvent};
-use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopBuilder};
+use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
 
+use super::EventLoopBuilder;
 use super::camera_controller::CameraController;
 use super::clock::Clock;
 use super::controls::{Action, Controls, help};
@@ -37,7 +38,7 @@ const NAP: Duration = Duration::from_millis(30);
 /// Shows the sample that `make` makes, until its window is closed or `--frames` are shown. Messages of the validation layer
 /// go into `sink`.
 pub(in crate::app) fn run<S, M>(
-    event_loop: &mut EventLoopBuilder<()>,
+    event_loop: &mut EventLoopBuilder,
     name: &str,
     args: &RunArgs,
     sink: &ValidationSink,
