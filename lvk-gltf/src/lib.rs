@@ -30,7 +30,7 @@ pub use error::{Error, Problem, Result};
 pub use glam;
 pub use image::{ColorSpace, Filter, Image, ImageData, MipLevel, Sampler, TexelFormat, Wrap};
 pub use light::{Light, LightKind};
-pub use load::{LoadOptions, MemoryLimit, Progress};
+pub use load::{LoadOptions, MemoryLimit, Progress, SUPPORTED_EXTENSIONS};
 pub use material::{
     AlphaMode, Anisotropy, Clearcoat, Iridescence, Material, Sheen, Specular, TextureRef, TextureTransform,
     Transmission, Volume,

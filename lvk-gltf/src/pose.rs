@@ -24,7 +24,8 @@ pub struct Placement {
     pub mesh: usize,
     /// The skin, whose joint matrices take the place of `transform`.
     pub skin: Option<usize>,
-    /// Transform from the mesh to the scene. The identity for a mesh with a skin.
+    /// Transform from the mesh to the scene. The identity for a mesh with a skin. Where its determinant is negative, triangles
+    /// are clockwise seen from the front.
     pub transform: Mat4,
 }
 
@@ -43,7 +44,7 @@ impl Model {
         Pose { world, weights, joints }
     }
 
-    /// Returns the meshes that a scene shows, one for each instance.
+    /// Returns the meshes that a scene shows, one for each instance. Instances of a mesh with a skin are left out.
     #[must_use]
     pub fn placements(&self, scene: usize, pose: &Pose) -> Vec<Placement> {
         self.scene_nodes(scene).into_iter().flat_map(|node| self.placements_of(node, pose)).collect()

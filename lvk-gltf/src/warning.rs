@@ -34,6 +34,16 @@ pub enum Warning {
         /// The primitive.
         place: String,
     },
+    /// The material of a primitive has a texture, and the primitive lacks its set of texture coordinates. Renderers read the
+    /// texture at `(0, 0)`.
+    NoTexCoords {
+        /// The primitive.
+        place: String,
+        /// Name of the texture in the material, such as `baseColorTexture`.
+        texture: &'static str,
+        /// The set.
+        set: usize,
+    },
     /// A texture or an image cannot be used, and is left out or replaced by another one that the file names.
     ImageIgnored {
         /// The image or texture.
@@ -61,6 +71,9 @@ impl fmt::Display for Warning {
             Self::NoPositions { place } => write!(f, "{place}: left out, as it has no positions"),
             Self::IncompleteTriangle { place } => {
                 write!(f, "{place}: the last triangle is incomplete and left out")
+            }
+            Self::NoTexCoords { place, texture, set } => {
+                write!(f, "{place}: it has no TEXCOORD_{set} for the {texture} of its material")
             }
             Self::ImageIgnored { place, reason } => write!(f, "{place}: {reason}"),
             Self::Corrected { place, what } => write!(f, "{place}: corrected {what}"),

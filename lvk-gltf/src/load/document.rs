@@ -5,12 +5,13 @@ use gltf::json::{self, mesh::Semantic, validation::Checked, validation::Error as
 
 use super::budget::Budget;
 use super::extensions;
-use super::place::{place, shortened};
+use super::place::{place, shortened, shortened_to};
 use super::scan::scan;
 use crate::{Problem, Warning};
 
-/// Extensions that the loader reads.
-pub(super) const SUPPORTED: &[&str] = &[
+/// Names of the extensions that the loader reads, in alphabetical order. A file that requires another one is refused; one that
+/// only uses another one gives a warning.
+pub const SUPPORTED_EXTENSIONS: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -38,6 +39,8 @@ pub(super) struct Document {
     pub(super) root: json::Root,
     /// Extensions that it does not read.
     pub(super) extensions: extensions::Root,
+    /// What was left out of the JSON.
+    warnings: Vec<Warning>,
 }
 
 impl Document {
@@ -46,11 +49,16 @@ impl Document {
         let end = text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1); // some tools pad by zeros
         let text = &text[..end];
         scan(text, budget)?;
-        let not_gltf = |error: serde_json::Error| Problem::Json { what: shortened(&error.to_string()) };
+        let not_gltf =
+            |error: serde_json::Error| Problem::Json { what: shortened_to(&error.to_string(), 200) };
         check_version(&serde_json::from_slice(text).map_err(not_gltf)?)?;
-        let root = serde_json::from_slice(text).map_err(not_gltf)?;
+        let mut warnings = Vec::new();
+        let root = match serde_json::from_slice(text) {
+            Ok(root) => root,
+            Err(error) => repaired(text, error, budget, &mut warnings)?,
+        };
         let extensions = serde_json::from_slice(text).map_err(not_gltf)?;
-        let document = Self { root, extensions };
+        let document = Self { root, extensions, warnings };
         document.check_required()?;
         document.check_positions()?;
         document.validate()?;
@@ -59,8 +67,10 @@ impl Document {
 
     /// Returns a warning for each extension that the file uses and the loader does not read.
     pub(super) fn warnings(&self) -> Vec<Warning> {
-        let unknown = self.root.extensions_used.iter().filter(|name| !SUPPORTED.contains(&name.as_str()));
-        unknown.map(|name| Warning::ExtensionIgnored { extension: shortened(name) }).collect()
+        let unknown =
+            self.root.extensions_used.iter().filter(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
+        let ignored = unknown.map(|name| Warning::ExtensionIgnored { extension: shortened(name) });
+        ignored.chain(self.warnings.iter().cloned()).collect()
     }
 
     /// Says whether the file uses an extension.
@@ -70,7 +80,8 @@ impl Document {
     }
 
     fn check_required(&self) -> Result<(), Problem> {
-        let unknown = self.root.extensions_required.iter().find(|name| !SUPPORTED.contains(&name.as_str()));
+        let unknown =
+            self.root.extensions_required.iter().find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
         unknown.map_or(Ok(()), |name| {
             let remedy = match name.as_str() {
                 "KHR_draco_mesh_compression" => ", or with EXT_meshopt_compression",
@@ -143,6 +154,52 @@ impl Document {
         };
         name.map_or(path.clone(), |name| format!("{path} of '{}'", shortened(name)))
     }
+}
+
+/// Bytes that a JSON value takes for each byte of its text, at most.
+const VALUE_BYTES: u64 = 256;
+
+/// Reads JSON that the `gltf` crate refuses although the specification allows it: scenes without nodes, and channels without a
+/// node, as `KHR_animation_pointer` has them. Such channels are left out, with a warning. `error` is what the crate said.
+fn repaired(
+    text: &[u8],
+    error: serde_json::Error,
+    budget: &Budget,
+    warnings: &mut Vec<Warning>,
+) -> Result<json::Root, Problem> {
+    if !error.to_string().starts_with("missing field `node") {
+        return Err(not_gltf(error));
+    }
+    budget.charge(VALUE_BYTES.saturating_mul(text.len() as u64), || "its JSON".into())?;
+    let mut value: serde_json::Value = serde_json::from_slice(text).map_err(not_gltf)?;
+    for scene in objects(&mut value, "scenes").filter_map(|scene| scene.as_object_mut()) {
+        scene.entry("nodes").or_insert_with(|| serde_json::Value::Array(Vec::new()));
+    }
+    for (index, animation) in objects(&mut value, "animations").enumerate() {
+        let Some(channels) = animation.get_mut("channels").and_then(|channels| channels.as_array_mut())
+        else {
+            continue;
+        };
+        let before = channels.len();
+        channels.retain(|channel| channel.get("target").is_none_or(|target| target.get("node").is_some()));
+        if channels.len() < before {
+            let count = before - channels.len();
+            let feature = format!("KHR_animation_pointer of {count} of its channels, which have no node,");
+            warnings.push(Warning::FeatureIgnored { place: place("animation", index, None), feature });
+        }
+    }
+    serde_json::from_value(value).map_err(not_gltf)
+}
+
+fn not_gltf(error: serde_json::Error) -> Problem {
+    Problem::Json { what: shortened_to(&error.to_string(), 200) }
+}
+
+fn objects<'a>(
+    value: &'a mut serde_json::Value,
+    list: &str,
+) -> impl Iterator<Item = &'a mut serde_json::Value> {
+    value.get_mut(list).and_then(|list| list.as_array_mut()).into_iter().flatten()
 }
 
 /// The version of a file, read before all else, as other versions have other objects.

@@ -2,14 +2,11 @@
 
 use std::io::Read as _;
 
-use ktx2::{Format, SupercompressionScheme};
+use ktx2::{Format, Header, LevelIndex, SupercompressionScheme};
 
 use super::budget::Budget;
 use super::images::MOST_SIDE;
 use crate::{ImageData, MipLevel, Problem, TexelFormat};
-
-/// Whether images of Basis Universal can be decoded.
-pub(super) const DECODES_BASIS: bool = false;
 
 /// What texels of a format become.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,53 +17,60 @@ enum Layout {
     Expanded(usize),
 }
 
-/// Reads the mip levels of an image in two dimensions.
+/// Reads the mip levels of an image in two dimensions. Only header and index of levels are read by the crate `ktx2`, whose
+/// reader of format descriptors overflows on damaged ones.
 pub(super) fn decode(bytes: &[u8], budget: &Budget, place: &str) -> Result<ImageData, Problem> {
     let refuse = |why: String| Problem::Image { place: place.into(), why };
-    let reader =
-        ktx2::Reader::new(bytes).map_err(|error| refuse(format!("the KTX2 is damaged ({error:?})")))?;
-    let header = reader.header();
-    let Some(format) = header.format else {
-        let why =
-            "it is Basis Universal, which is not decoded; convert it to a KTX2 of BC7 or ASTC, or to PNG";
-        return Err(refuse(why.into()));
-    };
-    let layout = layout(format).ok_or_else(|| {
-        refuse(format!(
-            "the KTX2 has the format {format:?}, which is not read; use RGBA with 8 bits, BC, ETC2 or ASTC"
-        ))
-    })?;
-    let (width, height) = (header.pixel_width, header.pixel_height);
-    let is_flat = header.pixel_depth == 0 && header.layer_count <= 1 && header.face_count == 1;
-    if !is_flat || width == 0 || height == 0 {
-        return Err(refuse("the KTX2 is no image in two dimensions; export it again".into()));
-    }
-    if width > MOST_SIDE || height > MOST_SIDE {
-        return Err(refuse(format!(
-            "it has {width}x{height} texels, but at most {MOST_SIDE} a side are read"
-        )));
-    }
-    let most_levels = width.max(height).ilog2() + 1;
-    if header.level_count > most_levels {
-        return Err(refuse(format!(
-            "the KTX2 has {} mip levels, more than {most_levels}",
-            header.level_count
-        )));
-    }
+    let cut_off = || refuse("the KTX2 is cut off; export it again".into());
+    let (header, rest) = bytes.split_first_chunk().ok_or_else(cut_off)?;
+    let header =
+        Header::from_bytes(header).map_err(|error| refuse(format!("the KTX2 is damaged ({error})")))?;
+    let layout = check(&header).map_err(refuse)?;
+    let mut index = rest;
     let mut mips = Vec::new();
-    for (number, level) in (0..).zip(reader.levels()) {
-        let (width, height) = ((width >> number).max(1), (height >> number).max(1));
-        let bytes =
-            unpack(&level, header.supercompression_scheme, size(layout, width, height), budget, place)?;
-        let bytes = if let Layout::Expanded(components) = layout {
-            expand(&bytes, components, budget, place)?
-        } else {
-            bytes
+    for number in 0..header.level_count.max(1) {
+        let (level, rest) = index.split_first_chunk().ok_or_else(cut_off)?;
+        index = rest;
+        let level = LevelIndex::from_bytes(level);
+        let range = level
+            .byte_offset
+            .checked_add(level.byte_length)
+            .and_then(|end| Some(usize::try_from(level.byte_offset).ok()?..usize::try_from(end).ok()?));
+        let data = range.and_then(|range| bytes.get(range)).ok_or_else(cut_off)?;
+        let (width, height) = ((header.pixel_width >> number).max(1), (header.pixel_height >> number).max(1));
+        let bytes = unpack(data, header.supercompression_scheme, size(layout, width, height), budget, place)?;
+        let bytes = match layout {
+            Layout::Expanded(components) => expand(&bytes, components, budget, place)?,
+            Layout::Kept(_) => bytes,
         };
         mips.push(MipLevel { width, height, bytes });
     }
     let format = if let Layout::Kept(format) = layout { format } else { TexelFormat::Rgba8 };
     Ok(ImageData { format, mips })
+}
+
+/// Checks what a header states, and returns what its texels become.
+fn check(header: &Header) -> Result<Layout, String> {
+    let Some(format) = header.format else {
+        let why =
+            "it is Basis Universal, which is not decoded; convert it to a KTX2 of BC7 or ASTC, or to PNG";
+        return Err(why.into());
+    };
+    let unknown = "which is not read; use RGBA with 8 bits, BC, ETC2 or ASTC";
+    let layout = layout(format).ok_or_else(|| format!("the KTX2 has the format {format:?}, {unknown}"))?;
+    let (width, height) = (header.pixel_width, header.pixel_height);
+    let is_flat = header.pixel_depth == 0 && header.layer_count <= 1 && header.face_count == 1;
+    if !is_flat || width == 0 || height == 0 {
+        return Err("the KTX2 is no image in two dimensions; export it again".into());
+    }
+    if width > MOST_SIDE || height > MOST_SIDE {
+        return Err(format!("it has {width}x{height} texels, but at most {MOST_SIDE} a side are read"));
+    }
+    let most_levels = width.max(height).ilog2() + 1;
+    if header.level_count > most_levels {
+        return Err(format!("the KTX2 has {} mip levels, more than {most_levels}", header.level_count));
+    }
+    Ok(layout)
 }
 
 fn size(layout: Layout, width: u32, height: u32) -> u64 {
@@ -78,7 +82,7 @@ fn size(layout: Layout, width: u32, height: u32) -> u64 {
 
 /// Returns the bytes of a level, which must be this many.
 fn unpack(
-    level: &ktx2::Level<'_>,
+    data: &[u8],
     scheme: Option<SupercompressionScheme>,
     size: u64,
     budget: &Budget,
@@ -87,9 +91,9 @@ fn unpack(
     let refuse = |why: &str| Problem::Image { place: place.into(), why: why.into() };
     const SIZE: &str = "a level of the KTX2 has not the size that its format demands; export it again";
     match scheme {
-        None if level.data.len() as u64 == size => {
+        None if data.len() as u64 == size => {
             let mut bytes = budget.list(size, || place.into())?;
-            bytes.extend_from_slice(level.data);
+            bytes.extend_from_slice(data);
             Ok(bytes)
         }
         None => Err(refuse(SIZE)),
@@ -98,7 +102,7 @@ fn unpack(
             // The decoder keeps what it has decoded, in a buffer that grows by doubling, and tables.
             budget.charge(size.saturating_mul(4).saturating_add(1 << 20), || place.into())?;
             let mut bytes = budget.list(size, || place.into())?;
-            let decoder = ruzstd::StreamingDecoder::new(level.data);
+            let decoder = ruzstd::StreamingDecoder::new(data);
             let mut decoder = decoder.map_err(|_| damaged(std::io::ErrorKind::InvalidData.into()))?;
             decoder.by_ref().take(size).read_to_end(&mut bytes).map_err(damaged)?;
             let more = decoder.read(&mut [0]).map_err(damaged)?;

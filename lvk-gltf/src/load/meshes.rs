@@ -263,11 +263,8 @@ impl<'a> Reader<'a> {
         };
         let has = |set: usize| primitive.tex_coords.get(set).is_some_and(|set| !set.is_empty());
         for (texture, reference) in material.textures().filter(|(_, texture)| !has(texture.tex_coord)) {
-            let feature = format!("{texture} of its material");
-            let set = reference.tex_coord;
-            let feature =
-                format!("{feature}, as it has no TEXCOORD_{set}: the texture is read at (0, 0), so it");
-            self.warnings.push(Warning::FeatureIgnored { place: place.into(), feature });
+            let (place, set) = (place.into(), reference.tex_coord);
+            self.warnings.push(Warning::NoTexCoords { place, texture, set });
         }
         match material.tangent_tex_coord() {
             Some(set) if primitive.tangents.is_empty() && has(set) => {

@@ -26,6 +26,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
+pub use self::document::SUPPORTED_EXTENSIONS;
+
 use self::accessors::Accessors;
 use self::budget::Budget;
 use self::buffers::Buffers;
@@ -44,6 +46,8 @@ pub struct LoadOptions<'a> {
     pub memory: MemoryLimit,
     /// Called from time to time, in the thread that loads. `Break` stops the load with [`Problem::Stopped`].
     pub on_progress: Option<&'a dyn Fn(Progress) -> ControlFlow<()>>,
+    /// Most threads that decode meshes and images, that of the caller among them. `None`: as many as there are cores.
+    pub most_threads: Option<usize>,
 }
 
 /// Most memory of a load and of its model: a fixed part and a multiple of the bytes of the files.
@@ -75,8 +79,7 @@ impl Default for MemoryLimit {
 
 impl Model {
     /// Reads a `.gltf` or `.glb` file. Its content says which of the two it is. Buffers and images that it names by a
-    /// relative path are read from its folder and the folders inside of it. Meshes and images are decoded by as many threads
-    /// as there are cores.
+    /// relative path are read from its folder and the folders inside of it.
     ///
     /// # Errors
     /// [`Error`], if a file cannot be read, breaks a rule of the format, requires an unknown extension, or would take more
@@ -114,7 +117,7 @@ fn load(
     let root = &document.root;
 
     let mut warnings = document.warnings();
-    let mut textures = Textures::new(&document, ktx2_texels::DECODES_BASIS);
+    let mut textures = Textures::new(&document);
     let materials = materials::read_materials(&document, &mut textures, &mut warnings)?;
     let read_mesh = |index| meshes::read_mesh(accessors, &materials, index);
     let meshes = parallel::map("meshes", root.meshes.len(), options, read_mesh)?;

@@ -89,7 +89,7 @@ pub(super) fn read_animations(
             let place = format!("{place}, sampler {number}");
             animation.keyframes.push(read_keyframes(accessors, sampler, &place)?);
         }
-        check_shapes(accessors, json, &place)?;
+        check_targets(accessors, json, &place)?;
         let mut moved = HashSet::new();
         for (number, json) in json.channels.iter().enumerate() {
             let place = format!("{place}, channel {number}");
@@ -141,18 +141,28 @@ fn read_keyframes(accessors: Accessors<'_>, json: &json::Sampler, place: &str) -
     Ok(Keyframes { interpolation, times, components, values })
 }
 
-/// Checks that weights of morph targets are scalars, and that nothing else is.
-fn check_shapes(accessors: Accessors<'_>, json: &json::Animation, place: &str) -> Result<(), Problem> {
+/// Checks the targets of channels, which the `gltf` crate does not, and that weights of morph targets are scalars and
+/// nothing else is.
+fn check_targets(accessors: Accessors<'_>, json: &json::Animation, place: &str) -> Result<(), Problem> {
+    let nodes = accessors.document.root.nodes.len();
     for (number, channel) in json.channels.iter().enumerate() {
-        let output = json.samplers[channel.sampler.value()].output.value();
-        let accessor = accessors.open(output, &format!("{place}, channel {number}"))?;
-        let wanted = match channel.target.path {
+        let place = format!("{place}, channel {number}");
+        let node = channel.target.node.value();
+        if node >= nodes {
+            return Err(Problem::OutOfRange { place, what: "node", index: node as u64, count: nodes as u64 });
+        }
+        let (shape, wanted) = match channel.target.path {
             Checked::Valid(Property::MorphTargetWeights) => (Type::Scalar, "SCALAR"),
             Checked::Valid(Property::Rotation) => (Type::Vec4, "VEC4"),
-            _ => (Type::Vec3, "VEC3"),
+            Checked::Valid(Property::Translation | Property::Scale) => (Type::Vec3, "VEC3"),
+            Checked::Invalid => {
+                return Err(Problem::Rule { place, rule: "its target path is unknown".into() });
+            }
         };
-        if accessor.shape != wanted.0 {
-            return Err(accessor.wrong_type(wanted.1));
+        let output = json.samplers[channel.sampler.value()].output.value();
+        let accessor = accessors.open(output, &place)?;
+        if accessor.shape != shape {
+            return Err(accessor.wrong_type(wanted));
         }
     }
     Ok(())

@@ -42,9 +42,10 @@ pub(super) fn map<T: Send>(
         stopped.fetch_or(flow.is_break(), Ordering::Relaxed);
         flow.is_continue()
     };
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = options.most_threads.unwrap_or_else(cores);
     std::thread::scope(|scope| {
-        for _ in 1..cores.min(total) {
+        for _ in 1..threads.min(total) {
             scope.spawn(|| work_on(&|_| true));
         }
         work_on(&report);

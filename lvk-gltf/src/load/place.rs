@@ -4,10 +4,14 @@ use std::path::Path;
 
 /// Returns a name for messages: without control characters, and of bounded length.
 pub(super) fn shortened(name: &str) -> String {
-    const MOST: usize = 80;
+    shortened_to(name, 80)
+}
+
+/// Returns a text for messages: without control characters, and of at most this many characters.
+pub(super) fn shortened_to(name: &str, most: usize) -> String {
     let readable = |character: char| if character.is_control() { '\u{fffd}' } else { character };
-    let mut text: String = name.chars().take(MOST).map(readable).collect();
-    if name.chars().nth(MOST).is_some() {
+    let mut text: String = name.chars().take(most).map(readable).collect();
+    if name.chars().nth(most).is_some() {
         text.push_str("...");
     }
     text

@@ -18,14 +18,12 @@ pub(super) struct Textures<'a> {
     indices: HashMap<(usize, ColorSpace), usize>,
     /// Samplers of the file and, last, the default one if it is used.
     pub(super) samplers: Vec<Sampler>,
-    /// Whether KTX2 with Basis Universal can be decoded.
-    decodes_basis: bool,
 }
 
 impl<'a> Textures<'a> {
-    pub(super) fn new(document: &'a Document, decodes_basis: bool) -> Self {
+    pub(super) fn new(document: &'a Document) -> Self {
         let samplers = document.root.samplers.iter().map(sampler).collect();
-        Self { document, images: Vec::new(), indices: HashMap::new(), samplers, decodes_basis }
+        Self { document, images: Vec::new(), indices: HashMap::new(), samplers }
     }
 
     /// Returns image and sampler of a texture, as indices of the model. A texture without a readable image is left out.
@@ -65,7 +63,7 @@ impl<'a> Textures<'a> {
         Ok(Some((image, self.sampler_of(texture))))
     }
 
-    /// Chooses among the images of a texture: the one of an extension that can be decoded, else the plain one.
+    /// Chooses among the images of a texture. Basis Universal, which is not decoded, is the last choice.
     fn source(
         &self,
         index: usize,
@@ -80,7 +78,7 @@ impl<'a> Textures<'a> {
             return Some(webp.source as usize);
         }
         if let Some(basisu) = others.basisu {
-            if self.decodes_basis || plain.is_none() {
+            if plain.is_none() {
                 return Some(basisu.source as usize);
             }
             let reason = "KHR_texture_basisu is ignored, as the texture has another image".into();

@@ -128,7 +128,8 @@ fn an_empty_file_is_an_empty_model() {
 #[test]
 fn memory_has_a_bound() {
     let mut glb = Glb::triangle();
-    let options = LoadOptions { memory: MemoryLimit { fixed_bytes: 1000, multiple: 1 }, on_progress: None };
+    let options =
+        LoadOptions { memory: MemoryLimit { fixed_bytes: 1000, multiple: 1 }, ..LoadOptions::default() };
     let error = Model::from_bytes(&glb.to_glb(), None, &options).unwrap_err();
     assert!(matches!(error.problem, Problem::Memory { .. }), "{error}");
     // An accessor without a buffer view takes no byte of the file.

@@ -167,7 +167,7 @@ impl Glb {
 pub fn load(bytes: &[u8]) -> Result<Model, Problem> {
     let go_on = |_: Progress| ControlFlow::Continue(());
     let memory = MemoryLimit { fixed_bytes: 64 << 20, multiple: 64 };
-    let options = LoadOptions { memory, on_progress: Some(&go_on) };
+    let options = LoadOptions { memory, on_progress: Some(&go_on), ..LoadOptions::default() };
     Model::from_bytes(bytes, None, &options).map_err(|error| error.problem)
 }
 

@@ -11,6 +11,7 @@ mod meshopt_codecs;
 mod motion;
 mod quantization;
 mod references;
+mod sample_models;
 mod sparse;
 mod support_table;
 mod tangents;

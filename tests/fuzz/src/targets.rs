@@ -8,6 +8,7 @@ use lvk_samples::picture::{self, Bounds};
 use lvk_samples::scene::{ObjOptions, Scene};
 
 use crate::Target;
+use crate::gltf::read_gltf;
 use crate::input::Input;
 use crate::memory::MemoryBound;
 
@@ -32,6 +33,7 @@ pub const TARGETS: &[Target] = &[
         read: read_shader_cache,
     },
     Target { name: "blas", memory: MemoryBound { fixed: 16 * KIB, multiple: 32 }, read: read_blas },
+    Target { name: "gltf", memory: MemoryBound { fixed: 4096 * KIB, multiple: 128 }, read: read_gltf },
     Target { name: "tree", memory: MemoryBound { fixed: 16 * KIB, multiple: 32 }, read: read_tree },
 ];
 

@@ -2,28 +2,20 @@
 
 use super::{CUT_OFF, Damage, TRAILING, take};
 
-const TRIANGLES_HEADER: u8 = 0xe0;
-const SEQUENCE_HEADER: u8 = 0xd0;
+const TRIANGLES_HEADER: u8 = 0xe1;
+const SEQUENCE_HEADER: u8 = 0xd1;
 const WRONG_HEADER: Damage = "its header is that of another codec or version";
 
 /// Decodes a list of triangles into indices of `width` bytes, 2 or 4.
 pub(super) fn decode_triangles(data: &[u8], width: usize, indices: &mut [u8]) -> Result<(), Damage> {
     let (header, rest) = data.split_first().ok_or(CUT_OFF)?;
-    let version = header ^ TRIANGLES_HEADER;
-    if version > 1 {
+    if *header != TRIANGLES_HEADER {
         return Err(WRONG_HEADER);
     }
     let (data, table) = rest.split_last_chunk::<16>().ok_or(CUT_OFF)?;
     let (codes, data) = data.split_at_checked(indices.len() / width / 3).ok_or(CUT_OFF)?;
-    let mut decoder = Triangles {
-        data,
-        table,
-        recent_limit: if version == 0 { 15 } else { 13 },
-        edges: Recent::default(),
-        vertices: Recent::default(),
-        next: 0,
-        last: 0,
-    };
+    let mut decoder =
+        Triangles { data, table, edges: Recent::default(), vertices: Recent::default(), next: 0, last: 0 };
     for (code, triangle) in codes.iter().zip(indices.chunks_exact_mut(3 * width)) {
         let corners = decoder.triangle(*code)?;
         triangle.chunks_exact_mut(width).zip(corners).for_each(|(index, corner)| write(index, corner));
@@ -34,7 +26,7 @@ pub(super) fn decode_triangles(data: &[u8], width: usize, indices: &mut [u8]) ->
 /// Decodes a sequence of indices of `width` bytes, 2 or 4.
 pub(super) fn decode_sequence(data: &[u8], width: usize, indices: &mut [u8]) -> Result<(), Damage> {
     let (header, rest) = data.split_first().ok_or(CUT_OFF)?;
-    if header ^ SEQUENCE_HEADER > 1 {
+    if *header != SEQUENCE_HEADER {
         return Err(WRONG_HEADER);
     }
     let mut data = rest.split_last_chunk::<4>().ok_or(CUT_OFF)?.0;
@@ -104,8 +96,6 @@ struct Triangles<'a> {
     data: &'a [u8],
     /// Frequent pairs of codes of the second and third corner.
     table: &'a [u8; 16],
-    /// Codes below this one are recent vertices.
-    recent_limit: u8,
     edges: Recent<[u32; 2]>,
     vertices: Recent<u32>,
     /// The smallest index that has not been used.
@@ -134,13 +124,10 @@ impl Triangles<'_> {
         let [a, b] = self.edges.back(edge + 1);
         let (c, is_new) = match code {
             0 => (self.take_next(), true),
-            code if code < self.recent_limit => (self.vertices.back(code + 1), false),
-            15 => (self.stored()?, true),
-            // Version 1 has short codes for the neighbours of the last index that was stored.
-            code => {
-                self.last = if code == 13 { self.last.wrapping_sub(1) } else { self.last.wrapping_add(1) };
-                (self.last, true)
-            }
+            1..=12 => (self.vertices.back(code + 1), false),
+            13 => (self.beside_stored(u32::MAX), true),
+            14 => (self.beside_stored(1), true),
+            _ => (self.stored()?, true),
         };
         if is_new {
             self.vertices.push(c);
@@ -180,6 +167,12 @@ impl Triangles<'_> {
         let next = self.next;
         self.next = next.wrapping_add(1);
         next
+    }
+
+    /// Returns a neighbour of the last index that was stored, which becomes the last one.
+    fn beside_stored(&mut self, step: u32) -> u32 {
+        self.last = self.last.wrapping_add(step);
+        self.last
     }
 
     fn stored(&mut self) -> Result<u32, Damage> {

@@ -1,0 +1,66 @@
+//! The target `gltf`: what programs rely on of any model that loads.
+
+use lvk_gltf::{LoadOptions, MemoryLimit, Model, Primitive, TextureRef};
+
+/// A `.gltf` or `.glb` file that may name no others. Within the bound of the target lie that of the load, and the tables of
+/// decoders of images.
+pub(crate) fn read_gltf(bytes: &[u8]) {
+    let memory = MemoryLimit { fixed_bytes: 2 << 20, multiple: 64 };
+    let options = LoadOptions { memory, most_threads: Some(1), ..LoadOptions::default() };
+    match Model::from_bytes(bytes, None, &options) {
+        Ok(model) => check_model(&model),
+        Err(error) => drop(error.to_string()),
+    }
+}
+
+fn check_model(model: &Model) {
+    model.warnings.iter().for_each(|warning| drop(warning.to_string()));
+    for texture in model.materials.iter().flat_map(|material| material.textures()).map(|(_, texture)| texture)
+    {
+        let TextureRef { image, sampler, .. } = *texture;
+        assert!(image < model.images.len() && sampler < model.samplers.len());
+    }
+    for level in model.images.iter().flat_map(|image| &image.data.mips) {
+        assert!(level.width > 0 && level.height > 0 && !level.bytes.is_empty());
+    }
+    for mesh in &model.meshes {
+        mesh.primitives.iter().for_each(|primitive| check_primitive(model, primitive));
+    }
+    check_nodes(model);
+}
+
+fn check_primitive(model: &Model, primitive: &Primitive) {
+    let count = primitive.vertex_count();
+    let fits = |length: usize| length == 0 || length == count;
+    assert!(
+        primitive.indices.iter().all(|index| (*index as usize) < count)
+            && primitive.indices.len().is_multiple_of(3)
+    );
+    assert!(primitive.positions.iter().flatten().all(f32::is_finite));
+    assert!(
+        primitive.normals.iter().flatten().chain(primitive.tangents.iter().flatten()).all(|x| x.is_finite())
+    );
+    assert!(
+        primitive.normals.len() == count && fits(primitive.tangents.len()) && fits(primitive.colors.len())
+    );
+    assert!(primitive.tex_coords.iter().all(|set| fits(set.len())));
+    assert!(primitive.joints.len() == primitive.weights.len());
+    assert!(primitive.material.is_none_or(|material| material < model.materials.len()));
+    for target in &primitive.morph_targets {
+        assert!(fits(target.positions.len()) && fits(target.normals.len()) && fits(target.tangents.len()));
+    }
+}
+
+fn check_nodes(model: &Model) {
+    let times = [(None, 0.0), (Some(0), 0.5), (Some(0), f32::NAN)];
+    for pose in times.map(|(animation, seconds)| model.pose(animation, seconds)) {
+        assert!(pose.world.len() == model.nodes.len() && pose.joints.len() == model.skins.len());
+        (0..model.scenes.len()).for_each(|scene| _ = model.bounds(scene, &pose));
+    }
+    for node in &model.nodes {
+        let skin = node.skin.and_then(|skin| model.skins.get(skin));
+        let Some(mesh) = node.mesh.map(|mesh| &model.meshes[mesh]) else { continue };
+        let joints = mesh.primitives.iter().flat_map(|primitive| primitive.joints.iter().flatten().flatten());
+        assert!(skin.is_none_or(|skin| joints.clone().all(|joint| usize::from(*joint) < skin.joints.len())));
+    }
+}
