@@ -22,7 +22,7 @@ pub mod rtx_textures;
 pub mod scene;
 pub mod shader_folder;
 pub mod shaders;
-mod shapes;
+pub mod shapes;
 pub mod sponza;
 pub mod triplanar;
 pub mod yuv;

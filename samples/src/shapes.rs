@@ -5,11 +5,13 @@ use glam::{Vec2, Vec3};
 
 /// A corner of triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Vertex {
-    pub(crate) position: Vec3,
+pub struct Vertex {
+    /// Position of the corner.
+    pub position: Vec3,
     /// Unit length, outwards.
-    pub(crate) normal: Vec3,
-    pub(crate) texcoord: Vec2,
+    pub normal: Vec3,
+    /// Texture coordinates.
+    pub texcoord: Vec2,
 }
 
 /// A corner without texture coordinates, as shaders read it (`Vertex` in `shaders/common/vertices.glsl`).
@@ -30,15 +32,18 @@ impl From<&Vertex> for GpuVertex {
 
 /// Triangles of fewer than 65,536 vertices.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Mesh {
-    pub(crate) vertices: Vec<Vertex>,
-    pub(crate) triangles: Vec<[u16; 3]>,
+pub struct Mesh {
+    /// Corners.
+    pub vertices: Vec<Vertex>,
+    /// Three places in `vertices` for each triangle.
+    pub triangles: Vec<[u16; 3]>,
 }
 
 impl Mesh {
     /// Adds a parallelogram from `corner` along `u` and `v`, seen from `u x v`. Texture coordinates are those of the
     /// plane that it lies in, one unit of them being `texture_extent` units of length.
-    pub(crate) fn quad(mut self, corner: Vec3, u: Vec3, v: Vec3, texture_extent: f32) -> Self {
+    #[must_use]
+    pub fn quad(mut self, corner: Vec3, u: Vec3, v: Vec3, texture_extent: f32) -> Self {
         let normal = u.cross(v).normalize();
         let base = self.vertices.len() as u16;
         for position in [corner, corner + u, corner + v, corner + u + v] {
@@ -54,14 +59,16 @@ impl Mesh {
     }
 
     /// Adds a box.
-    pub(crate) fn cuboid(self, low: [f32; 3], high: [f32; 3], texture_extent: f32) -> Self {
+    #[must_use]
+    pub fn cuboid(self, low: [f32; 3], high: [f32; 3], texture_extent: f32) -> Self {
         let (low, high) = (Vec3::from(low), Vec3::from(high));
         let size = high - low;
         self.parallelepiped(low, [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z], texture_extent)
     }
 
     /// Adds a parallelepiped with edges `[u, v, w]` from its corner `low`, where `w` is on the side of `u x v`.
-    pub(crate) fn parallelepiped(mut self, low: Vec3, [u, v, w]: [Vec3; 3], texture_extent: f32) -> Self {
+    #[must_use]
+    pub fn parallelepiped(mut self, low: Vec3, [u, v, w]: [Vec3; 3], texture_extent: f32) -> Self {
         let high = low + u + v + w;
         for (corner, u, v) in
             [(low, v, u), (low, w, v), (low, u, w), (high, -u, -v), (high, -v, -w), (high, -w, -u)]
@@ -73,7 +80,8 @@ impl Mesh {
 
     /// Adds a surface of `columns` times `rows` cells through `point`, which takes coordinates from 0 to 1. Normals
     /// follow from neighbouring points, on the side of the derivative along the second times that along the first.
-    pub(crate) fn grid(mut self, columns: u16, rows: u16, point: impl Fn(f32, f32) -> Vec3) -> Self {
+    #[must_use]
+    pub fn grid(mut self, columns: u16, rows: u16, point: impl Fn(f32, f32) -> Vec3) -> Self {
         const STEP: f32 = 1e-3;
         let base = self.vertices.len() as u16;
         for row in 0..=rows {
@@ -99,7 +107,8 @@ impl Mesh {
     }
 
     /// Adds a body of revolution about the y axis. `profile` lists radii and heights upwards; corners stay sharp.
-    pub(crate) fn lathe(mut self, profile: &[[f32; 2]], segments: u16) -> Self {
+    #[must_use]
+    pub fn lathe(mut self, profile: &[[f32; 2]], segments: u16) -> Self {
         for pair in profile.windows(2) {
             let ([r0, y0], [r1, y1]) = (pair[0], pair[1]);
             self = self.grid(segments, 1, |u, v| {
@@ -112,7 +121,8 @@ impl Mesh {
     }
 
     /// Adds a sphere, or an ellipsoid of the radii `size`.
-    pub(crate) fn ball(self, centre: Vec3, size: Vec3, segments: u16) -> Self {
+    #[must_use]
+    pub fn ball(self, centre: Vec3, size: Vec3, segments: u16) -> Self {
         self.grid(segments, segments / 2, |u, v| {
             let (sine, cosine) = (u * std::f32::consts::TAU).sin_cos();
             let (ring, height) = (v * std::f32::consts::PI).sin_cos();
@@ -121,7 +131,8 @@ impl Mesh {
     }
 
     /// The smallest and the largest coordinates.
-    pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
+    #[must_use]
+    pub fn bounds(&self) -> (Vec3, Vec3) {
         let start = (Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY));
         self.vertices.iter().fold(start, |(low, high), v| (low.min(v.position), high.max(v.position)))
     }

@@ -224,7 +224,7 @@ impl<'a> SampleSetup<'a> {
     ///
     /// # Errors
     /// Those of [`SampleSetup::device`], and rays that the device cannot trace as asked.
-    pub(crate) fn ray_device(&mut self, wish: RayTracing) -> Result<(Context, RtxConfig), RunError> {
+    pub fn ray_device(&mut self, wish: RayTracing) -> Result<(Context, RtxConfig), RunError> {
         let context = self.device(&DeviceNeeds::tracing(wish))?;
         let config = RtxConfig::from_args(wish, self.extent(), context.capabilities())?;
         Ok((context, config))

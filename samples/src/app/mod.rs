@@ -2,7 +2,7 @@
 //!
 //! [`sample`] defines a sample, [`sample_info`] the description that its program follows from.
 
-pub(crate) mod array_buffer;
+pub mod array_buffer;
 pub mod caches;
 pub mod cli;
 pub mod device;
@@ -35,7 +35,7 @@ pub mod sequence;
 pub(crate) mod summary;
 pub mod timings;
 pub mod ui;
-pub(crate) mod value_parsers;
+pub mod value_parsers;
 #[cfg(feature = "window")]
 mod window;
 #[cfg(not(feature = "window"))]

@@ -175,7 +175,10 @@ impl SampleError {
     }
 
     /// Fails with [`SampleError::BadSize`] unless the device has 2D images of this size.
-    pub(crate) fn check_size([width, height]: [u32; 2], capabilities: &Capabilities) -> Result<(), Self> {
+    ///
+    /// # Errors
+    /// [`SampleError::BadSize`].
+    pub fn check_size([width, height]: [u32; 2], capabilities: &Capabilities) -> Result<(), Self> {
         let limit = capabilities.limits.max_texture_2d;
         let is_possible = |side| (1..=limit).contains(&side);
         match is_possible(width) && is_possible(height) {
@@ -185,7 +188,10 @@ impl SampleError {
     }
 
     /// Fails with [`SampleError::OutOfRange`] unless `value` is `min` to `max`.
-    pub(crate) fn check_range(setting: &'static str, value: u32, [min, max]: [u32; 2]) -> Result<(), Self> {
+    ///
+    /// # Errors
+    /// [`SampleError::OutOfRange`].
+    pub fn check_range(setting: &'static str, value: u32, [min, max]: [u32; 2]) -> Result<(), Self> {
         match (min..=max).contains(&value) {
             true => Ok(()),
             false => Err(Self::OutOfRange { setting, value, min, max }),

@@ -9,7 +9,7 @@ lvk::shader_struct! {
     /// Bytes by which the shaders know a camera (`shaders/common/camera.glsl`).
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
-    pub(crate) struct GpuCamera {
+    pub struct GpuCamera {
         eye: [f32; 3],
         near_plane: f32,
         forward: [f32; 3],
@@ -26,7 +26,8 @@ lvk::shader_struct! {
 
 impl GpuCamera {
     /// The camera of a picture of `width` times `height` pixels. `near_plane` is in scene units.
-    pub(crate) fn new(camera: &Camera, width: u32, height: u32, near_plane: f32) -> Self {
+    #[must_use]
+    pub fn new(camera: &Camera, width: u32, height: u32, near_plane: f32) -> Self {
         let [right, up, forward] = camera.frame().map(Vec3::from);
         let half_height = (0.5 * camera.vertical_fov_degrees.to_radians()).tan();
         let right = right * (half_height * width as f32 / height as f32);
@@ -78,7 +79,8 @@ impl GpuCamera {
     }
 
     /// The same camera for sample `number` of `count`: evenly spread over each pixel, the only one in the middle.
-    pub(crate) fn for_sample(self, number: u32, count: u32) -> Self {
+    #[must_use]
+    pub fn for_sample(self, number: u32, count: u32) -> Self {
         if count <= 1 {
             return self;
         }

@@ -68,7 +68,7 @@ pub use camera::Camera;
 pub use camera_path::CameraPath;
 pub(crate) use camera_path::CameraTour;
 pub use error::SceneError;
-pub(crate) use gpu_camera::GpuCamera;
+pub use gpu_camera::GpuCamera;
 pub use light::{Ambient, DirectionalLight, PointLight, display};
 pub use material::Material;
 pub(crate) use procedural::{PAINTED, Valley, painted_textures};

@@ -1,0 +1,166 @@
+//! The sample's own arguments.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use lvk_samples::app::ray_args::RayArgs;
+use lvk_samples::app::value_parsers::{positive, whole};
+
+use crate::config::ViewerConfig;
+
+/// Arguments of the sample.
+#[derive(Debug, Clone, PartialEq, Args)]
+#[command(next_help_heading = "Rendering")]
+pub struct ViewerArgs {
+    /// Model to show: glTF (.gltf, .glb) or Wavefront OBJ [default: the built-in showcase]
+    #[arg(value_name = "FILE", help_heading = "Model")]
+    pub file: Option<PathBuf>,
+
+    /// Camera of the model, by its number in --list-cameras or its name [default: the first]
+    #[arg(long, value_name = "NUMBER|NAME", help_heading = "Model")]
+    pub camera: Option<String>,
+
+    /// Print the cameras and animations of the model, and exit
+    #[arg(long, help_heading = "Model")]
+    pub list_cameras: bool,
+
+    /// Animation that the model stands in, by its number or its name [default: none, as the file says]
+    #[arg(long, value_name = "NUMBER|NAME", help_heading = "Model")]
+    pub animation: Option<String>,
+
+    /// Time of the animation in seconds, 0 or more
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, requires = "animation")]
+    #[arg(help_heading = "Model")]
+    pub time: f32,
+
+    /// Method that renders
+    #[arg(long, value_enum, default_value_t = MethodArg::Hybrid)]
+    pub method: MethodArg,
+
+    /// Contents of the picture; all but light needs --method hybrid
+    #[arg(long, value_enum, default_value_t = ShownArg::Light)]
+    pub view: ShownArg,
+
+    /// Samples of each pixel, 1 to 65536; of the hybrid method, frames that a still takes the mean of. Noise falls with their square
+    /// root
+    #[arg(long, value_name = "N", default_value_t = ViewerConfig::DEFAULT_SAMPLES)]
+    #[arg(value_parser = whole(1..=ViewerConfig::MAX_SAMPLES))]
+    pub samples: u32,
+
+    /// Surfaces that a path meets at most, 1 to 256
+    #[arg(long, value_name = "N", default_value_t = ViewerConfig::DEFAULT_BOUNCES, value_parser = whole(1..=256))]
+    pub bounces: u32,
+
+    /// Exposure in stops: each doubles the brightness
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_negative_numbers = true)]
+    pub exposure: f32,
+
+    /// Mapping of radiance to what a display shows
+    #[arg(long, value_enum, default_value_t = ToneArg::Neutral)]
+    pub tone: ToneArg,
+
+    /// Light from outside of the model
+    #[command(flatten)]
+    pub light: LightArgs,
+
+    /// The ray tracing path
+    #[command(flatten)]
+    pub tracing: RayArgs,
+}
+
+/// Arguments that set the light from outside of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+#[command(next_help_heading = "Light")]
+pub struct LightArgs {
+    /// The sky
+    #[arg(long, value_enum, default_value_t = SkyArg::Day)]
+    pub sky: SkyArg,
+
+    /// Angle of the sun above the horizon in degrees, 1 to 90
+    #[arg(long, value_name = "DEGREES", default_value_t = 42.0, value_parser = elevation)]
+    pub sun_elevation: f32,
+
+    /// Angle of the sun around the vertical in degrees, from +z towards +x
+    #[arg(long, value_name = "DEGREES", default_value_t = -58.0, value_parser = degrees, allow_negative_numbers = true)]
+    pub sun_azimuth: f32,
+
+    /// Radius of the discs of the sun and of directional lights in degrees; that of the real sun is 0.27
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.5, value_parser = radius)]
+    pub sun_radius: f32,
+}
+
+/// The method that renders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Rasterise surfaces, trace a few rays from each, and filter over time and space.
+    Hybrid,
+    /// Trace paths from the camera, without a bias: the reference.
+    Pathtrace,
+}
+
+/// Contents of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ShownArg {
+    /// Light.
+    Light,
+    /// Normals: red to the right, green up, blue towards +z.
+    Normals,
+    /// Roughness.
+    Roughness,
+    /// Motion since the frame before.
+    Motion,
+    /// Albedo of matte layers.
+    Albedo,
+    /// Light that matte layers receive, filtered.
+    Matte,
+    /// Light that all other layers receive, filtered.
+    Mirrored,
+}
+
+/// The sky.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SkyArg {
+    /// A clear day with its sun.
+    Day,
+    /// The same white from everywhere.
+    White,
+    /// No light but that of the model.
+    Black,
+}
+
+/// The mapping of radiance to what a display shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ToneArg {
+    /// Khronos PBR Neutral: colours of materials stay, highlights are compressed.
+    Neutral,
+    /// No mapping; what is too bright is clipped.
+    Linear,
+}
+
+fn seconds(text: &str) -> Result<f32, String> {
+    number_within(text, 0.0, 1e6)
+}
+
+fn stops(text: &str) -> Result<f32, String> {
+    number_within(text, -20.0, 20.0)
+}
+
+fn elevation(text: &str) -> Result<f32, String> {
+    number_within(text, 1.0, 90.0)
+}
+
+fn degrees(text: &str) -> Result<f32, String> {
+    number_within(text, -360.0, 360.0)
+}
+
+fn radius(text: &str) -> Result<f32, String> {
+    positive(text)?;
+    number_within(text, 0.01, 45.0)
+}
+
+fn number_within(text: &str, min: f32, max: f32) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if (min..=max).contains(&value) => Ok(value),
+        _ => Err(format!("a number from {min} to {max} is needed")),
+    }
+}

@@ -1,0 +1,111 @@
+//! The configuration of the sample.
+
+use lvk::Capabilities;
+use lvk_samples::app::sample_error::SampleError;
+use lvk_samples::hybrid::RayPath;
+
+/// The mapping of radiance to what a display shows, by its number in `shaders/viewer/tone.glsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
+pub enum ToneMapping {
+    /// Khronos PBR Neutral.
+    #[default]
+    Neutral,
+    /// None.
+    Linear,
+}
+
+/// The method that renders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Rasterised surfaces, a few rays for each, and filters over time and space.
+    #[default]
+    Hybrid,
+    /// Paths from the camera, without a bias.
+    PathTrace,
+}
+
+/// Contents of the picture, by their numbers in `shaders/viewer/plane.glsl`. All but light is known to the hybrid method alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
+pub enum Shown {
+    /// Light.
+    #[default]
+    Light = 0,
+    /// Normals: red to the right, green up, blue towards +z.
+    Normals,
+    /// Roughness.
+    Roughness,
+    /// Motion since the frame before: red to the right, green down; without motion grey.
+    Motion,
+    /// Albedo of matte layers.
+    Albedo,
+    /// Light that matte layers receive, filtered.
+    Matte,
+    /// Light that all other layers receive, filtered.
+    Mirrored,
+}
+
+/// The configuration of the sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewerConfig {
+    /// The method that renders.
+    pub method: Method,
+    /// The part of Vulkan that traces rays.
+    pub path: RayPath,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples of each pixel, 1 to [`ViewerConfig::MAX_SAMPLES`]; of the hybrid method, frames of the still.
+    pub samples: u32,
+    /// Surfaces that a path meets at most, at least 1.
+    pub bounces: u32,
+    /// Exposure in stops.
+    pub exposure_stops: f32,
+    /// Mapping of radiance to what a display shows.
+    pub tone_mapping: ToneMapping,
+    /// Contents of the picture.
+    pub shown: Shown,
+    /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
+    pub is_progressive: bool,
+}
+
+impl ViewerConfig {
+    /// Largest number of samples.
+    pub const MAX_SAMPLES: u32 = 65_536;
+    /// Usual number of samples.
+    pub const DEFAULT_SAMPLES: u32 = 64;
+    /// Usual largest number of surfaces of a path.
+    pub const DEFAULT_BOUNCES: u32 = 32;
+
+    /// A picture of this size by `path`, everything else as usual.
+    #[must_use]
+    pub fn new(path: RayPath, width: u32, height: u32) -> Self {
+        Self {
+            method: Method::default(),
+            path,
+            width,
+            height,
+            samples: Self::DEFAULT_SAMPLES,
+            bounces: Self::DEFAULT_BOUNCES,
+            exposure_stops: 0.0,
+            tone_mapping: ToneMapping::default(),
+            shown: Shown::default(),
+            is_progressive: false,
+        }
+    }
+
+    /// Width and height.
+    pub(crate) fn extent(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    pub(crate) fn check(&self, capabilities: &Capabilities) -> Result<(), SampleError> {
+        SampleError::check_size(self.extent(), capabilities)?;
+        SampleError::check_range("--samples", self.samples, [1, Self::MAX_SAMPLES])?;
+        SampleError::check_range("--bounces", self.bounces, [1, u32::MAX - 1])?;
+        RayPath::choose(Some(self.path), capabilities)?;
+        Ok(())
+    }
+}

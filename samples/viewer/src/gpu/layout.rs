@@ -1,0 +1,197 @@
+//! Structs that shaders read, laid out as `shaders/viewer/frame.glsl` has them.
+
+use bytemuck::{Pod, Zeroable};
+use lvk::BlockLayout;
+use lvk_samples::scene::GpuCamera;
+
+/// Index of a texture slot that is not there (`kNoTexture`).
+pub(crate) const NO_TEXTURE: u32 = u32::MAX;
+
+/// Bit of `Geometry.flags`: positions are `Snorm16x4`.
+pub(crate) const QUANTISED: u32 = 1;
+
+/// Bits of `Material.flags`.
+pub(crate) mod material_flag {
+    pub(crate) const ALPHA_MASK: u32 = 1;
+    pub(crate) const ALPHA_BLEND: u32 = 2;
+    pub(crate) const DOUBLE_SIDED: u32 = 4;
+    pub(crate) const UNLIT: u32 = 8;
+    pub(crate) const THIN: u32 = 16;
+}
+
+/// Places in `Material.slots`.
+pub(crate) mod slot {
+    pub(crate) const BASE_COLOR: usize = 0;
+    pub(crate) const METAL_ROUGH: usize = 1;
+    pub(crate) const NORMAL: usize = 2;
+    pub(crate) const EMISSION: usize = 3;
+    pub(crate) const TRANSMISSION: usize = 4;
+    pub(crate) const SPECULAR: usize = 5;
+    pub(crate) const SPECULAR_COLOR: usize = 6;
+    pub(crate) const COAT: usize = 7;
+    pub(crate) const COAT_ROUGHNESS: usize = 8;
+    pub(crate) const SHEEN_COLOR: usize = 9;
+    pub(crate) const SHEEN_ROUGHNESS: usize = 10;
+    pub(crate) const COUNT: usize = 11;
+}
+
+/// Values of `Light.kind`.
+pub(crate) mod light_kind {
+    pub(crate) const DISC: u32 = 0;
+    pub(crate) const POINT: u32 = 1;
+    pub(crate) const SPOT: u32 = 2;
+}
+
+lvk::shader_struct! {
+    /// `Instance`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuInstance {
+        pub(crate) rows: [f32; 12],
+        pub(crate) normal_columns: [f32; 9],
+        pub(crate) first_geometry: u32,
+    }
+
+    /// `Geometry`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuGeometry {
+        pub(crate) positions: u64,
+        pub(crate) attributes: u64,
+        pub(crate) indices: u64,
+        pub(crate) material: u32,
+        pub(crate) flags: u32,
+    }
+
+    /// `Attributes`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuAttributes {
+        pub(crate) normal: u32,
+        pub(crate) tangent: u32,
+        pub(crate) texcoords: [[f32; 2]; 2],
+        pub(crate) color: u32,
+    }
+
+    /// `TextureSlot`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuTextureSlot {
+        pub(crate) tex: u32,
+        pub(crate) sampler as smp: u32,
+        pub(crate) set: u32,
+        pub(crate) columns: [f32; 4],
+        pub(crate) offset: [f32; 2],
+    }
+
+    /// `Material`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuMaterial {
+        pub(crate) base_color: [f32; 4],
+        pub(crate) emission: [f32; 3],
+        pub(crate) metalness: f32,
+        pub(crate) extinction: [f32; 3],
+        pub(crate) roughness: f32,
+        pub(crate) specular_color: [f32; 3],
+        pub(crate) specular: f32,
+        pub(crate) sheen_color: [f32; 3],
+        pub(crate) sheen_roughness: f32,
+        pub(crate) transmission: f32,
+        pub(crate) ior: f32,
+        pub(crate) alpha_cutoff: f32,
+        pub(crate) normal_scale: f32,
+        pub(crate) coat: f32,
+        pub(crate) coat_roughness: f32,
+        pub(crate) flags: u32,
+        pub(crate) slots: [u32; slot::COUNT],
+    }
+
+    /// `Light`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuLight {
+        pub(crate) position: [f32; 3],
+        pub(crate) kind: u32,
+        pub(crate) color: [f32; 3],
+        pub(crate) probability: f32,
+        pub(crate) direction: [f32; 3],
+        pub(crate) cone: f32,
+        pub(crate) cos_inner: f32,
+        pub(crate) range: f32,
+    }
+
+    /// `Frame`: what leads to the scene, the same in every frame.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct SceneConstants {
+        pub(crate) instances: u64,
+        pub(crate) geometries: u64,
+        pub(crate) materials: u64,
+        pub(crate) slots: u64,
+        pub(crate) lights: u64,
+        pub(crate) sky_rows: u64,
+        pub(crate) sky_columns: u64,
+        pub(crate) sky: u64,
+        pub(crate) albedos: u64,
+    }
+
+    /// `Frame`: light.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct LightConstants {
+        pub(crate) light_count: u32,
+        pub(crate) disc_count: u32,
+        pub(crate) sky_probability: f32,
+        pub(crate) sky_size: [u32; 2],
+    }
+
+    /// `Frame`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct FrameConstants {
+        pub(crate) camera: GpuCamera,
+        pub(crate) scene: SceneConstants,
+        pub(crate) sums: u64,
+        pub(crate) light: LightConstants,
+        pub(crate) tlas: u32,
+        pub(crate) image: u32,
+        pub(crate) sample_number: u32,
+        pub(crate) sample_count: u32,
+        pub(crate) max_bounces: u32,
+        pub(crate) exposure: f32,
+        pub(crate) offset_extent: f32,
+        pub(crate) tone_mapping: u32,
+        pub(crate) visibility: u32,
+        pub(crate) seen: GpuCamera,
+        pub(crate) seen_before: GpuCamera,
+        pub(crate) planes: u64,
+        pub(crate) frame_number: u32,
+        pub(crate) still_count: u32,
+        pub(crate) view: u32,
+        pub(crate) _padding: u32,
+    }
+
+    /// `PushConstants`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Push {
+        pub(crate) frame: u64,
+        pub(crate) argument: u32,
+        pub(crate) _padding: u32,
+    }
+}
+
+/// The layout that pipelines compare with their shaders which read the frame alone.
+pub(crate) const FRAME_LAYOUT: &[BlockLayout] = &[BlockLayout::buffer_reference::<FrameConstants>("Frame")];
+
+/// Layouts that pipelines compare with their shaders which read the scene.
+pub(crate) const SCENE_LAYOUTS: &[BlockLayout] = &[
+    BlockLayout::buffer_reference::<FrameConstants>("Frame"),
+    BlockLayout::buffer_reference::<GpuInstance>("InstanceArray"),
+    BlockLayout::buffer_reference::<GpuGeometry>("GeometryArray"),
+    BlockLayout::buffer_reference::<GpuAttributes>("AttributesArray"),
+    BlockLayout::buffer_reference::<GpuTextureSlot>("SlotArray"),
+    BlockLayout::buffer_reference::<GpuMaterial>("MaterialArray"),
+    BlockLayout::buffer_reference::<GpuLight>("LightArray"),
+];

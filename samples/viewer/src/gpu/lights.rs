@@ -1,0 +1,137 @@
+//! Lights of a model and of its environment as shaders read them.
+
+use glam::{DVec3, Mat4, Vec3};
+use lvk_gltf::{Bounds, LightKind, Model, Pose};
+
+use super::layout::{GpuLight, light_kind};
+use crate::light::{Environment, Sun, luminance};
+
+/// Lights, discs first, with the probabilities of them and of the sky.
+pub(crate) struct GpuLights {
+    pub(crate) lights: Vec<GpuLight>,
+    pub(crate) disc_count: u32,
+    pub(crate) sky_probability: f32,
+}
+
+/// The share of samples that a source of light gets at least, over its even share.
+const LEAST_SHARE: f64 = 0.25;
+
+impl GpuLights {
+    /// The sun, and the lights of the nodes of a scene. A directional light is a disc of the radius `disc_radius` radians.
+    pub(crate) fn new(
+        model: &Model,
+        scene: usize,
+        pose: &Pose,
+        environment: &Environment,
+        disc_radius: f32,
+        bounds: &Bounds,
+    ) -> Self {
+        let mut discs: Vec<GpuLight> = environment.sun.iter().map(disc).collect();
+        let mut lamps = Vec::new();
+        for node in model.scene_nodes(scene) {
+            let light = model.nodes[node].light.and_then(|light| model.lights.get(light));
+            let Some((light, world)) = light.zip(pose.world.get(node)) else { continue };
+            match light.kind {
+                LightKind::Directional => discs.push(directional(light, world, disc_radius)),
+                LightKind::Point | LightKind::Spot { .. } => lamps.push(lamp(light, world)),
+            }
+        }
+        let disc_count = discs.len() as u32;
+        let mut lights = [discs, lamps].concat();
+        let sky = luminance(environment.sky.mean()) * std::f64::consts::PI;
+        let sky_probability = choose(&mut lights, sky, bounds);
+        Self { lights, disc_count, sky_probability }
+    }
+}
+
+/// Sets the probabilities of lights by the light that they bring about the middle of the scene. Returns the sky's.
+fn choose(lights: &mut [GpuLight], sky: f64, bounds: &Bounds) -> f32 {
+    let middle = 0.5 * (bounds.min + bounds.max);
+    let near = (0.25 * bounds.min.distance_squared(bounds.max)).max(1e-12);
+    let brightness = |light: &GpuLight| {
+        let bright = luminance(Vec3::from(light.color).as_dvec3());
+        match light.kind {
+            light_kind::DISC => bright,
+            _ => bright / f64::from(middle.distance_squared(light.position.into()).max(near)),
+        }
+    };
+    let all: Vec<f64> = lights.iter().map(brightness).chain([sky]).collect();
+    let (sum, count) = (all.iter().sum::<f64>(), all.iter().filter(|bright| **bright > 0.0).count());
+    let weight = |bright: &f64| {
+        if *bright > 0.0 { bright / sum + LEAST_SHARE / count as f64 } else { 0.0 }
+    };
+    let weights: Vec<f64> = all.iter().map(weight).collect();
+    let total = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    for (light, weight) in lights.iter_mut().zip(&weights) {
+        light.probability = (weight / total) as f32;
+    }
+    weights.last().map_or(0.0, |weight| (weight / total) as f32)
+}
+
+fn disc(sun: &Sun) -> GpuLight {
+    // Half of the sine of half the angle, squared: 1 - cosine without a difference of nearly equal numbers.
+    let half = (0.5 * f64::from(sun.radius)).sin();
+    GpuLight {
+        position: sun.direction,
+        kind: light_kind::DISC,
+        color: sun.irradiance,
+        cone: (2.0 * half * half) as f32,
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+fn directional(light: &lvk_gltf::Light, world: &Mat4, radius: f32) -> GpuLight {
+    let direction = -along(world);
+    let irradiance = Vec3::from(light.color) * light.intensity;
+    disc(&Sun { direction: direction.to_array(), irradiance: irradiance.to_array(), radius })
+}
+
+fn lamp(light: &lvk_gltf::Light, world: &Mat4) -> GpuLight {
+    let (kind, cone, cos_inner) = match light.kind {
+        LightKind::Spot { inner_cone_angle, outer_cone_angle } => {
+            (light_kind::SPOT, outer_cone_angle.cos(), inner_cone_angle.cos())
+        }
+        LightKind::Point | LightKind::Directional => (light_kind::POINT, 0.0, 0.0),
+    };
+    GpuLight {
+        position: world.w_axis.truncate().to_array(),
+        kind,
+        color: (Vec3::from(light.color) * light.intensity).to_array(),
+        probability: 0.0,
+        direction: along(world).to_array(),
+        cone,
+        cos_inner,
+        range: light.range.unwrap_or(0.0),
+    }
+}
+
+/// The direction that a light of a node shines along.
+fn along(world: &Mat4) -> Vec3 {
+    let direction: DVec3 = world.transform_vector3(Vec3::NEG_Z).as_dvec3();
+    direction.try_normalize().map_or(Vec3::NEG_Y, |direction| direction.as_vec3())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probabilities_sum_up_to_one_and_follow_the_light() {
+        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let lit = |color: [f32; 3], position: [f32; 3]| GpuLight {
+            kind: light_kind::POINT,
+            color,
+            position,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let mut lights =
+            vec![lit([8.0; 3], [0.0; 3]), lit([8.0; 3], [100.0, 0.0, 0.0]), lit([0.0; 3], [0.0; 3])];
+        let sky = choose(&mut lights, 1.0, &bounds);
+        let sum: f32 = lights.iter().map(|light| light.probability).sum::<f32>() + sky;
+        assert!((sum - 1.0).abs() < 1e-6);
+        assert!(lights[0].probability > lights[1].probability && lights[1].probability > 0.05);
+        assert_eq!(lights[2].probability, 0.0);
+        let mut none = [];
+        assert_eq!(choose(&mut none, 0.0, &bounds), 0.0);
+    }
+}

@@ -1,0 +1,79 @@
+//! The real-time method: rasterised surfaces, a few rays for each, and filters over time and space.
+
+mod passes;
+mod visibility;
+
+use lvk::{BufferHandle, Context, Holder};
+use lvk_samples::app::array_buffer::buffer;
+use lvk_samples::app::frame::Frame;
+use lvk_samples::hybrid::RayPath;
+
+use crate::gpu::{Draw, layout::Push};
+use passes::Passes;
+use visibility::Visibility;
+pub(crate) use visibility::{DEPTH_FORMAT, TRIANGLE_FORMAT};
+
+/// Planes of `shaders/viewer/plane.glsl`.
+const PLANES: u64 = 19;
+/// The plane that the picture is made of (`kPlaneShown` there).
+const SHOWN: u64 = 18;
+/// Bytes of an element of a plane.
+const ELEMENT: u64 = 16;
+
+/// Passes and data of the real-time method, for pictures of one size.
+pub(crate) struct Hybrid {
+    visibility: Visibility,
+    passes: Passes,
+    planes: Holder<BufferHandle>,
+    extent: [u32; 2],
+}
+
+impl Hybrid {
+    pub(crate) fn new(ctx: &Context, path: RayPath, extent: [u32; 2]) -> lvk::Result<Self> {
+        let size_bytes = PLANES * plane_bytes(extent);
+        Ok(Self {
+            visibility: Visibility::new(ctx, extent)?,
+            passes: Passes::new(ctx, path)?,
+            planes: buffer(ctx, "planes", size_bytes)?,
+            extent,
+        })
+    }
+
+    /// Address of the planes.
+    pub(crate) fn planes_address(&self) -> lvk::Result<u64> {
+        self.planes.address()
+    }
+
+    /// Address of the plane that the picture is made of.
+    pub(crate) fn shown_address(&self) -> lvk::Result<u64> {
+        Ok(self.planes.address()? + SHOWN * plane_bytes(self.extent))
+    }
+
+    /// The buffer of all planes.
+    pub(crate) fn planes(&self) -> BufferHandle {
+        *self.planes
+    }
+
+    /// Bytes from the beginning of the planes to the one that the picture is made of.
+    pub(crate) fn shown_offset(&self) -> u64 {
+        SHOWN * plane_bytes(self.extent)
+    }
+
+    /// Bindless index of the target of triangles.
+    pub(crate) fn visibility_index(&self) -> u32 {
+        self.visibility.index()
+    }
+
+    /// Records a frame, whose constants are at `frame`.
+    pub(crate) fn record(&self, to: &mut Frame<'_>, frame: u64, draws: &[Draw]) -> lvk::Result<()> {
+        let push = |argument| Push { frame, argument, _padding: 0 };
+        to.pass("visible triangles", |cmd| self.visibility.record(cmd, frame, draws))?;
+        let (planes, visible) = (*self.planes, self.visibility.triangles());
+        to.pass("light", |cmd| self.passes.record_gather(cmd, &push(0), planes, visible, self.extent))?;
+        to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))
+    }
+}
+
+fn plane_bytes([width, height]: [u32; 2]) -> u64 {
+    ELEMENT * u64::from(width) * u64::from(height)
+}

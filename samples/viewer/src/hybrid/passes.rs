@@ -1,0 +1,88 @@
+//! Rays and filters of the real-time method.
+
+use lvk::{
+    BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder,
+    RayTracingPipelineHandle, TextureHandle,
+};
+use lvk_samples::hybrid::RayPath;
+
+use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
+use crate::path_tracer::{compute, groups, ray_pipeline};
+use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, GATHER_QUERY, GATHER_RAYS, TEMPORAL};
+
+/// Steps of the filter in space.
+const FILTER_STEPS: u32 = 4;
+
+/// The pipelines.
+pub(crate) struct Passes {
+    gather: Gather,
+    temporal: Holder<ComputePipelineHandle>,
+    filter: Holder<ComputePipelineHandle>,
+    composite: Holder<ComputePipelineHandle>,
+    antialias: Holder<ComputePipelineHandle>,
+}
+
+enum Gather {
+    Pipeline(Holder<RayTracingPipelineHandle>),
+    Query(Holder<ComputePipelineHandle>),
+}
+
+impl Passes {
+    pub(crate) fn new(ctx: &Context, path: RayPath) -> lvk::Result<Self> {
+        let filter = |stage| compute(ctx, stage, FRAME_LAYOUT);
+        Ok(Self {
+            gather: match path {
+                RayPath::Pipeline => Gather::Pipeline(ray_pipeline(ctx, &[GATHER_RAYS], "viewer light")?),
+                RayPath::Query => Gather::Query(compute(ctx, GATHER_QUERY, SCENE_LAYOUTS)?),
+            },
+            temporal: filter(TEMPORAL)?,
+            filter: filter(FILTER)?,
+            composite: filter(COMPOSITE)?,
+            antialias: filter(ANTIALIAS)?,
+        })
+    }
+
+    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`.
+    pub(crate) fn record_gather(
+        &self,
+        cmd: &mut CommandBuffer,
+        push: &Push,
+        planes: BufferHandle,
+        visible: TextureHandle,
+        extent: [u32; 2],
+    ) -> lvk::Result<()> {
+        let dependencies =
+            Dependencies { buffers: &[planes], sampled_images: &[visible], ..Dependencies::default() };
+        match &self.gather {
+            Gather::Pipeline(pipeline) => {
+                cmd.bind_ray_tracing_pipeline(**pipeline)?;
+                cmd.push_constants(push)?;
+                cmd.trace_rays([extent[0], extent[1], 1], &dependencies)
+            }
+            Gather::Query(pipeline) => {
+                cmd.bind_compute_pipeline(**pipeline)?;
+                cmd.push_constants(push)?;
+                cmd.dispatch(groups(extent), &dependencies)
+            }
+        }
+    }
+
+    /// Records the filters. `push` makes the constants of a pass from its argument.
+    pub(crate) fn record_filters(
+        &self,
+        cmd: &mut CommandBuffer,
+        push: impl Fn(u32) -> Push,
+        planes: BufferHandle,
+        extent: [u32; 2],
+    ) -> lvk::Result<()> {
+        let last = FILTER_STEPS & 1;
+        let steps = (0..FILTER_STEPS).map(|step| (&self.filter, step));
+        let all = [(&self.temporal, 0)].into_iter().chain(steps);
+        for (pipeline, argument) in all.chain([(&self.composite, last), (&self.antialias, last)]) {
+            cmd.bind_compute_pipeline(**pipeline)?;
+            cmd.push_constants(&push(argument))?;
+            cmd.dispatch(groups(extent), &Dependencies { buffers: &[planes], ..Dependencies::default() })?;
+        }
+        Ok(())
+    }
+}

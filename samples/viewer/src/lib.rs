@@ -1,0 +1,23 @@
+//! The `viewer` sample: shows models of glTF and OBJ files, by an unbiased path tracer or by a
+//! real-time method.
+//!
+//! [`Viewer`] is the sample for programs and tests, `info.rs` describes its program. [`model`] loads models or makes the one that
+//! needs no file, [`light`] makes the sky and the sun, `gpu` uploads both, `path_tracer.rs` traces paths and `hybrid` is the real-time method.
+
+mod args;
+mod config;
+mod gpu;
+mod hybrid;
+mod info;
+pub mod light;
+pub mod model;
+mod panel;
+mod path_tracer;
+mod pipelines;
+mod present;
+mod renderer;
+mod viewer;
+
+pub use args::{LightArgs, MethodArg, ShownArg, SkyArg, ToneArg, ViewerArgs};
+pub use config::{Method, Shown, ToneMapping, ViewerConfig};
+pub use viewer::{Viewer, ViewerScene};

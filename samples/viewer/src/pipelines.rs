@@ -1,0 +1,56 @@
+//! The sample's stages and pipelines as data.
+
+use crate::hybrid::{DEPTH_FORMAT, TRIANGLE_FORMAT};
+use lvk_samples::pipelines::{SamplePipeline, SampleStage};
+
+/// Name of the sample, and of its folder of shaders.
+pub(crate) const SAMPLE: &str = "viewer";
+
+/// The stage whose GLSL is `shaders/viewer/<name>.glsl`.
+macro_rules! stage {
+    ($name:literal) => {
+        SampleStage::from_glsl(
+            include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders/viewer/", $name, ".glsl")),
+            $name,
+        )
+    };
+}
+
+pub(crate) const PATH_RAYS: SampleStage = stage!("path.rgen");
+pub(crate) const PATH_QUERY: SampleStage = stage!("path.comp");
+pub(crate) const NEAREST_MISS: SampleStage = stage!("nearest.rmiss");
+pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
+pub(crate) const CANDIDATE: SampleStage = stage!("candidate.rahit");
+pub(crate) const VISIBILITY_VERTEX: SampleStage = stage!("visibility.vert");
+pub(crate) const VISIBILITY_FRAGMENT: SampleStage = stage!("visibility.frag");
+pub(crate) const GATHER_RAYS: SampleStage = stage!("gather.rgen");
+pub(crate) const GATHER_QUERY: SampleStage = stage!("gather.comp");
+pub(crate) const TEMPORAL: SampleStage = stage!("temporal.comp");
+pub(crate) const FILTER: SampleStage = stage!("filter.comp");
+pub(crate) const COMPOSITE: SampleStage = stage!("composite.comp");
+pub(crate) const ANTIALIAS: SampleStage = stage!("antialias.comp");
+pub(crate) const PRESENT: SampleStage = stage!("present.comp");
+
+/// Returns every pipeline of the sample.
+pub(crate) fn pipelines() -> Vec<SamplePipeline> {
+    vec![
+        SamplePipeline::new("viewer: paths by pipeline", &[PATH_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
+        SamplePipeline::new("viewer: paths by query", &[PATH_QUERY]),
+        SamplePipeline::raster(
+            "viewer: visible triangles",
+            &[VISIBILITY_VERTEX, VISIBILITY_FRAGMENT],
+            &[TRIANGLE_FORMAT],
+            Some(DEPTH_FORMAT),
+        ),
+        SamplePipeline::new(
+            "viewer: light by pipeline",
+            &[GATHER_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE],
+        ),
+        SamplePipeline::new("viewer: light by query", &[GATHER_QUERY]),
+        SamplePipeline::new("viewer: means over time", &[TEMPORAL]),
+        SamplePipeline::new("viewer: filter", &[FILTER]),
+        SamplePipeline::new("viewer: composite", &[COMPOSITE]),
+        SamplePipeline::new("viewer: antialiasing", &[ANTIALIAS]),
+        SamplePipeline::new("viewer: picture", &[PRESENT]),
+    ]
+}

@@ -1,0 +1,76 @@
+//! Either method, with its data for pictures of one size.
+
+use lvk::{BufferHandle, Context, Holder};
+use lvk_samples::app::array_buffer::buffer;
+use lvk_samples::app::frame::Frame;
+
+use crate::config::{Method, ViewerConfig};
+use crate::gpu::Draw;
+use crate::gpu::layout::Push;
+use crate::hybrid::Hybrid;
+use crate::path_tracer::PathTracer;
+
+/// Either method.
+pub(crate) enum Renderer {
+    Hybrid(Hybrid),
+    PathTrace { tracer: PathTracer, sums: Holder<BufferHandle> },
+}
+
+/// Addresses and indices of a method's data.
+pub(crate) struct Addresses {
+    pub(crate) sums: u64,
+    pub(crate) planes: u64,
+    pub(crate) visibility: u32,
+}
+
+impl Renderer {
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
+        let [width, height] = config.extent();
+        Ok(match config.method {
+            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config.path, config.extent())?),
+            Method::PathTrace => Self::PathTrace {
+                tracer: PathTracer::new(ctx, config.path)?,
+                sums: buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))?,
+            },
+        })
+    }
+
+    pub(crate) fn addresses(&self) -> lvk::Result<Addresses> {
+        Ok(match self {
+            Self::Hybrid(hybrid) => Addresses {
+                sums: hybrid.shown_address()?,
+                planes: hybrid.planes_address()?,
+                visibility: hybrid.visibility_index(),
+            },
+            Self::PathTrace { sums, .. } => {
+                let sums = sums.address()?;
+                Addresses { sums, planes: sums, visibility: 0 }
+            }
+        })
+    }
+
+    /// The buffer that the picture is made of, and the bytes before its first pixel.
+    pub(crate) fn sums(&self) -> (BufferHandle, u64) {
+        match self {
+            Self::Hybrid(hybrid) => (hybrid.planes(), hybrid.shown_offset()),
+            Self::PathTrace { sums, .. } => (**sums, 0),
+        }
+    }
+
+    /// Records a frame, or a pass over a picture of `extent` pixels. The constants are at `frame`.
+    pub(crate) fn record(
+        &self,
+        to: &mut Frame<'_>,
+        frame: u64,
+        extent: [u32; 2],
+        draws: &[Draw],
+    ) -> lvk::Result<()> {
+        match self {
+            Self::Hybrid(hybrid) => hybrid.record(to, frame, draws),
+            Self::PathTrace { tracer, sums } => {
+                let push = Push { frame, argument: 0, _padding: 0 };
+                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, extent))
+            }
+        }
+    }
+}

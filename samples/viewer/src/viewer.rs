@@ -1,0 +1,328 @@
+//! Renders the sample at a frame time.
+
+use glam::{Quat, Vec3};
+use lvk::{CommandBuffer, Context, TextureHandle};
+use lvk_gltf::{Model, Pose};
+use lvk_samples::app::frame::Frame;
+use lvk_samples::app::render_target::RenderTarget;
+use lvk_samples::app::run_error::RunError;
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
+use lvk_samples::scene::{Camera, GpuCamera};
+
+use crate::config::{Method, ViewerConfig};
+use crate::gpu::GpuScene;
+use crate::gpu::layout::{FrameConstants, Push};
+use crate::light::Environment;
+use crate::model::{ModelCamera, cameras};
+use crate::panel;
+use crate::present::Present;
+use crate::renderer::Renderer;
+
+/// Samples of a pass of the path tracer, so that none takes long: on a GPU, and on a CPU.
+const GPU_PASS: u32 = 4;
+const CPU_PASS: u32 = 16;
+/// Distance of the near plane over the distance of what the camera looks at.
+const NEAR_SHARE: f32 = 1e-3;
+
+/// A model with the light that falls on it.
+#[derive(Debug, Clone)]
+pub struct ViewerScene {
+    /// For the log.
+    pub name: String,
+    /// The model, of which the default scene is shown.
+    pub model: Model,
+    /// Light from outside.
+    pub environment: Environment,
+    /// Radius of the discs of directional lights, in radians.
+    pub disc_radius: f32,
+}
+
+/// Shows a model.
+pub struct Viewer {
+    ctx: Context,
+    config: ViewerConfig,
+    scene: GpuScene,
+    renderer: Renderer,
+    present: Present,
+    target: RenderTarget,
+    cameras: Vec<ModelCamera>,
+    chosen: usize,
+    camera: Camera,
+    /// The camera of the frame before.
+    before: Camera,
+    /// Samples in the picture, of the same camera.
+    done: u32,
+    /// Frames since the renderer was made or began anew.
+    frame_number: u32,
+}
+
+impl Viewer {
+    /// Uploads the scene, builds its acceleration structures and makes all pipelines. The first camera looks.
+    ///
+    /// # Errors
+    /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &ViewerScene, config: &ViewerConfig) -> Result<Self, SampleError> {
+        config.check(ctx.capabilities())?;
+        let target = RenderTarget::storage(ctx, config.extent())?;
+        let shown = scene.model.default_scene.unwrap_or(0);
+        let pose: Pose = scene.model.pose(None, 0.0);
+        let gpu = GpuScene::new(ctx, &scene.model, shown, &pose, &scene.environment, scene.disc_radius)?;
+        let cameras = cameras(&scene.model, shown, &pose);
+        let camera = cameras[0].camera;
+        Ok(Self {
+            scene: gpu,
+            renderer: Renderer::new(ctx, config)?,
+            present: Present::new(ctx)?,
+            ctx: ctx.clone(),
+            config: *config,
+            target,
+            cameras,
+            chosen: 0,
+            camera,
+            before: camera,
+            done: 0,
+            frame_number: 0,
+        })
+    }
+
+    /// Cameras of the model; never empty.
+    #[must_use]
+    pub fn cameras(&self) -> &[ModelCamera] {
+        &self.cameras
+    }
+
+    /// Looks through a camera of the model, by its place in [`cameras`](Self::cameras). Beyond the last it is the last.
+    pub fn choose_camera(&mut self, place: usize) {
+        self.chosen = place.min(self.cameras.len() - 1);
+        self.look(&self.cameras[self.chosen].camera.clone());
+    }
+
+    /// Triangles of all meshes, each mesh once, and instances of meshes.
+    #[must_use]
+    pub fn counts(&self) -> (u64, u32) {
+        (self.scene.triangle_count, self.scene.instance_count)
+    }
+
+    /// What the picture leaves out, for the user to read.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.scene.warnings
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &ViewerConfig {
+        &self.config
+    }
+
+    /// Renders by another configuration from now on; by the old one where this fails.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn configure(&mut self, config: &ViewerConfig) -> Result<(), SampleError> {
+        config.check(self.ctx.capabilities())?;
+        let before = &self.config;
+        let is_resized = config.extent() != before.extent();
+        if is_resized || config.method != before.method || config.path != before.path {
+            let renderer = Renderer::new(&self.ctx, config)?;
+            if is_resized {
+                self.target = RenderTarget::storage(&self.ctx, config.extent())?;
+            }
+            (self.renderer, self.frame_number, self.done) = (renderer, 0, 0);
+        }
+        if config.bounces != before.bounces {
+            self.done = 0;
+        }
+        self.config = *config;
+        Ok(())
+    }
+
+    /// The mean radiance of each pixel of the last frame, rows from the top.
+    ///
+    /// # Errors
+    /// [`SampleError::Device`].
+    pub fn radiance(&self) -> Result<Vec<[f32; 3]>, SampleError> {
+        let [width, height] = self.config.extent();
+        let mut sums = vec![[0.0_f32; 4]; width as usize * height as usize];
+        let (buffer, offset) = self.renderer.sums();
+        self.ctx.download_buffer(buffer, offset, bytemuck::cast_slice_mut(&mut sums))?;
+        Ok(sums
+            .iter()
+            .map(|[red, green, blue, count]| [red, green, blue].map(|sum| sum / count.max(1.0)))
+            .collect())
+    }
+
+    fn look(&mut self, camera: &Camera) {
+        if self.camera != *camera {
+            self.camera = *camera;
+            self.done = 0;
+        }
+    }
+
+    /// Samples of a step of a frame.
+    fn step_samples(&self) -> u32 {
+        match self.config.method {
+            Method::Hybrid => 1,
+            Method::PathTrace if self.ctx.capabilities().is_cpu => CPU_PASS,
+            Method::PathTrace => GPU_PASS,
+        }
+    }
+
+    fn upload_frame(&self, cmd: &mut CommandBuffer, sample_count: u32) -> lvk::Result<u64> {
+        let ViewerConfig { width, height, bounces, exposure_stops, tone_mapping, shown, .. } = self.config;
+        let gpu = |camera: &Camera| {
+            let distance = Vec3::from(camera.eye).distance(Vec3::from(camera.target));
+            GpuCamera::new(camera, width, height, NEAR_SHARE * distance)
+        };
+        let seen = gpu(&self.camera);
+        let addresses = self.renderer.addresses()?;
+        cmd.upload(&FrameConstants {
+            camera: seen.for_sample(self.frame_number, u32::MAX),
+            scene: self.scene.constants,
+            sums: addresses.sums,
+            light: self.scene.light,
+            tlas: self.scene.tlas.index(),
+            image: self.target.image_index(),
+            sample_number: if self.config.method == Method::Hybrid { self.frame_number } else { self.done },
+            sample_count,
+            max_bounces: bounces - 1,
+            exposure: exposure_stops.exp2(),
+            offset_extent: self.scene.offset_extent,
+            tone_mapping: tone_mapping as u32,
+            visibility: addresses.visibility,
+            seen,
+            seen_before: gpu(&self.before),
+            planes: addresses.planes,
+            frame_number: self.frame_number,
+            still_count: if self.camera == self.before { self.done } else { 0 },
+            view: shown as u32,
+            _padding: 0,
+        })
+    }
+
+    /// Adds samples, and stores the picture if `is_shown`.
+    fn add_samples(&mut self, frame: &mut Frame<'_>, count: u32, is_shown: bool) -> lvk::Result<()> {
+        let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
+        self.renderer.record(frame, constants, extent, &self.scene.draws)?;
+        if is_shown {
+            let (push, sums, image) = (
+                Push { frame: constants, argument: 0, _padding: 0 },
+                self.renderer.sums().0,
+                self.target.image(),
+            );
+            frame.pass("picture", |cmd| self.present.record(cmd, &push, sums, image, extent))?;
+        }
+        self.done += count;
+        self.frame_number = self.frame_number.wrapping_add(1);
+        self.before = self.camera;
+        Ok(())
+    }
+
+    /// One more sample, or one more frame of the real-time method, which never ends.
+    fn record_progress(&mut self, frame: &mut Frame<'_>) -> lvk::Result<()> {
+        let is_whole = self.config.method == Method::PathTrace && self.done >= self.config.samples;
+        let count = if is_whole { 0 } else { 1 };
+        if count > 0 { self.add_samples(frame, count, true) } else { Ok(()) }
+    }
+}
+
+impl Sample for Viewer {
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    /// The camera goes around what it looks at. Outside of windows each frame begins anew, so that it does not depend on those
+    /// before.
+    fn update(&mut self, time: FrameTime) {
+        self.look(&around(&self.cameras[self.chosen].camera, time.phase()));
+        if !self.config.is_progressive {
+            (self.done, self.frame_number, self.before) = (0, 0, self.camera);
+        }
+    }
+
+    fn stands_at_first(&self) -> bool {
+        true
+    }
+
+    fn steps_per_frame(&self) -> u64 {
+        if self.config.is_progressive { 1 } else { self.config.samples.div_ceil(self.step_samples()).into() }
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
+        if self.config.is_progressive {
+            self.record_progress(frame)?;
+            return Ok(self.target.image());
+        }
+        (self.done, self.frame_number, self.before) = (0, 0, self.camera);
+        while self.done < self.config.samples {
+            if self.done > 0 {
+                frame.next_step()?;
+            }
+            let count = (self.config.samples - self.done).min(self.step_samples());
+            self.add_samples(frame, count, self.done + count == self.config.samples)?;
+        }
+        Ok(self.target.image())
+    }
+
+    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), RunError> {
+        Ok(self.configure(&ViewerConfig { width, height, ..self.config })?)
+    }
+
+    fn view(&mut self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.look(camera);
+    }
+
+    /// Looks through the next camera of the model.
+    fn next(&mut self) {
+        self.choose_camera((self.chosen + 1) % self.cameras.len());
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        if let Some(chosen) = panel::choose_camera(ui, &self.cameras, self.chosen) {
+            self.choose_camera(chosen);
+        }
+        let mut config = self.config;
+        panel::show_settings(ui, &mut config);
+        if config != self.config
+            && let Err(error) = self.configure(&config)
+        {
+            ui.label(error.to_string());
+        }
+        ui.label(format!("{} samples", self.done));
+        let (triangles, instances) = self.counts();
+        ui.label(format!("{triangles} triangles, {instances} instances"));
+    }
+
+    fn reload(&mut self) -> Result<(), RunError> {
+        let (renderer, present) = (Renderer::new(&self.ctx, &self.config)?, Present::new(&self.ctx)?);
+        (self.renderer, self.present, self.done, self.frame_number) = (renderer, present, 0, 0);
+        Ok(())
+    }
+}
+
+/// The camera after a part of a round about the vertical through what it looks at.
+fn around(camera: &Camera, phase: f32) -> Camera {
+    let (eye, target) = (Vec3::from(camera.eye), Vec3::from(camera.target));
+    let turn = Quat::from_rotation_y(std::f32::consts::TAU * phase);
+    let eye = if phase == 0.0 { eye } else { target + turn * (eye - target) };
+    Camera { eye: eye.to_array(), up: (turn * Vec3::from(camera.up)).to_array(), ..*camera }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_round_leads_around_the_target_and_back() {
+        let camera = Camera::looking_at([3.0, 1.0, 0.0], [1.0, 0.0, 0.0], 40.0);
+        assert_eq!(around(&camera, 0.0), camera);
+        let opposite = around(&camera, 0.5);
+        assert!(Vec3::from(opposite.eye).distance(Vec3::new(-1.0, 1.0, 0.0)) < 1e-5);
+        assert_eq!(opposite.target, camera.target);
+    }
+}

@@ -1,0 +1,91 @@
+// A step of an edge-avoiding a-trous filter, guided by the variance of light over time (Schied et al., 2017). Light that no longer
+// varies is not blurred. `argument`: number of the step; its taps are 2^argument pixels apart.
+#include "viewer/plane.glsl"
+
+const float kBrightnessScale = 3.0; // in standard deviations
+const float kSharpRoughness = 0.06; // mirrors below it are not blurred
+
+// Roughly how wide the light of a surface varies with its normal.
+float normalWeight(vec3 a, vec3 b, float power) {
+    return pow(max(dot(a, b), 0.0), power);
+}
+
+float blurredVariance(uint plane, ivec2 pixel) {
+    const float kernel[2] = float[](0.5, 0.25);
+    float sum = 0.0;
+    float total = 0.0;
+    ivec2 last = ivec2(frame.camera.width, frame.camera.height) - 1;
+    for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x) {
+            float weight = kernel[abs(x)] * kernel[abs(y)];
+            sum += weight * frame.planes.at[planePlace(plane, pixelPlace(clamp(pixel + ivec2(x, y), ivec2(0), last)))].a;
+            total += weight;
+        }
+    }
+    return sum / total;
+}
+
+struct Blur {
+    vec4 sum; // light, and variance by the squares of weights
+    float total;
+    float scale; // of differences in brightness
+    float bright;
+};
+
+Blur startBlur(uint plane, ivec2 pixel, vec4 own) {
+    return Blur(own, 1.0, kBrightnessScale * sqrt(max(blurredVariance(plane, pixel), 0.0)) + 1e-5, brightness(own.rgb));
+}
+
+void addTap(inout Blur blur, vec4 tap, float weight) {
+    weight *= exp(-abs(brightness(tap.rgb) - blur.bright) / blur.scale);
+    blur.sum += vec4(tap.rgb * weight, tap.a * weight * weight);
+    blur.total += weight;
+}
+
+vec4 blurred(Blur blur) {
+    return vec4(blur.sum.rgb / blur.total, blur.sum.a / (blur.total * blur.total));
+}
+
+void filterPixel(uvec2 at) {
+    ivec2 pixel = ivec2(at);
+    uint place = pixelPlace(pixel);
+    uint from = argument & 1u;
+    uint to = 1u - from;
+    Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, place)]);
+    vec4 ownMatte = frame.planes.at[planePlace(kPlaneMatte + from, place)];
+    vec4 ownMirrored = frame.planes.at[planePlace(kPlaneMirrored + from, place)];
+    Blur matte = startBlur(kPlaneMatte + from, pixel, ownMatte);
+    Blur mirrored = startBlur(kPlaneMirrored + from, pixel, ownMirrored);
+    vec3 point = seenPoint(frame.camera, pixel, seen.distance);
+    float depthScale = 2.0 * frame.camera.pixelSpread * seen.distance * float(1u << argument);
+    float sharpness = 1.0 / max(seen.roughness * seen.roughness, 1e-3);
+    const float kernel[3] = float[](1.0, 2.0 / 3.0, 1.0 / 6.0);
+    for (int y = -2; y <= 2 && !isSky(seen); ++y) {
+        for (int x = -2; x <= 2; ++x) {
+            ivec2 tap = pixel + ivec2(x, y) * int(1u << argument);
+            bool isInside = all(greaterThanEqual(tap, ivec2(0))) && all(lessThan(tap, ivec2(frame.camera.width, frame.camera.height)));
+            if ((x == 0 && y == 0) || !isInside) {
+                continue;
+            }
+            uint tapPlace = pixelPlace(tap);
+            Seen other = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, tapPlace)]);
+            if (isSky(other)) {
+                continue;
+            }
+            vec3 way = seenPoint(frame.camera, tap, other.distance) - point;
+            float weight = kernel[abs(x)] * kernel[abs(y)] * exp(-abs(dot(way, seen.normal)) / max(depthScale, 1e-6));
+            addTap(matte, frame.planes.at[planePlace(kPlaneMatte + from, tapPlace)], weight * normalWeight(seen.normal, other.normal, 64.0));
+            bool isAlike = abs(other.roughness - seen.roughness) < 0.1 && seen.roughness > kSharpRoughness;
+            if (isAlike) {
+                float power = clamp(16.0 * sharpness, 64.0, 4096.0);
+                addTap(mirrored, frame.planes.at[planePlace(kPlaneMirrored + from, tapPlace)],
+                       weight * normalWeight(seen.normal, other.normal, power));
+            }
+        }
+    }
+    frame.planes.at[planePlace(kPlaneMatte + to, place)] = blurred(matte);
+    frame.planes.at[planePlace(kPlaneMirrored + to, place)] = blurred(mirrored);
+}
+
+#define PIXEL_FUNCTION filterPixel
+#include "common/for_each_pixel.glsl"

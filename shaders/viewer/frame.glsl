@@ -1,0 +1,152 @@
+// The frame constants of the sample, and what they lead to: the arrays of the scene.
+#ifndef VIEWER_FRAME
+#define VIEWER_FRAME
+
+#include "common/camera.glsl"
+#include "common/no_texture.glsl"
+
+const float kPi = 3.14159265358979;
+
+// Bits of Geometry.flags.
+const uint kQuantised = 1u; // positions are four signed normalised numbers of 16 bits each
+
+// Bits of Material.flags.
+const uint kAlphaMask = 1u; // holes where alpha is below the cutoff
+const uint kAlphaBlend = 2u; // alpha is the share of light that meets the surface
+const uint kDoubleSided = 4u;
+const uint kUnlit = 8u;
+const uint kThin = 16u; // light that passes keeps its direction: there is no volume behind the surface
+
+// What a texture multiplies (places in Material.slots).
+const uint kSlotBaseColor = 0u;
+const uint kSlotMetalRough = 1u;
+const uint kSlotNormal = 2u;
+const uint kSlotEmission = 3u;
+const uint kSlotTransmission = 4u;
+const uint kSlotSpecular = 5u;
+const uint kSlotSpecularColor = 6u;
+const uint kSlotCoat = 7u;
+const uint kSlotCoatRoughness = 8u;
+const uint kSlotSheenColor = 9u;
+const uint kSlotSheenRoughness = 10u;
+const uint kSlotCount = 11u;
+
+// Kinds of lights.
+const uint kLightDisc = 0u; // infinitely far away, a disc in the sky
+const uint kLightPoint = 1u;
+const uint kLightSpot = 2u;
+
+struct Instance {
+    vec4 rows[3]; // to the world
+    vec3 normalColumns[3]; // of normals to the world
+    uint firstGeometry;
+};
+
+// Addresses are numbers: SwiftShader miscompiles copies of structs that hold buffer references.
+struct Geometry {
+    uvec2 positions;
+    uvec2 attributes;
+    uvec2 indices;
+    uint material;
+    uint flags;
+};
+
+struct Attributes {
+    uint normal; // octahedral, two signed normalised numbers
+    uint tangent; // likewise; the lowest bit is set where the bitangent is turned
+    vec2 texcoords[2];
+    uint color; // linear, four unsigned normalised numbers
+};
+
+// A texture as a material uses it: texture coordinates are columns * texcoord + offset.
+struct TextureSlot {
+    uint tex;
+    uint smp;
+    uint set; // 0 or 1: which texture coordinates
+    vec4 columns;
+    vec2 offset;
+};
+
+struct Material {
+    vec4 baseColor;
+    vec3 emission;
+    float metalness;
+    vec3 extinction; // of the volume behind the surface, per unit of length
+    float roughness;
+    vec3 specularColor;
+    float specular;
+    vec3 sheenColor;
+    float sheenRoughness;
+    float transmission;
+    float ior;
+    float alphaCutoff;
+    float normalScale;
+    float coat;
+    float coatRoughness;
+    uint flags;
+    uint slots[kSlotCount]; // indices into the texture slots, or kNoTexture
+};
+
+struct Light {
+    vec3 position; // for a disc: towards it
+    uint kind;
+    vec3 color; // irradiance of a disc, else radiant intensity
+    float probability; // of being chosen, among all lights and the sky
+    vec3 direction; // along which a spot shines
+    float cone; // of a disc, 1 - cosine of its radius; of a spot, cosine of the outer cone
+    float cosInner; // of a spot's inner cone
+    float range; // of a point or spot light; 0 for no end
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer InstanceArray { Instance at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray { Geometry at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer AttributesArray { Attributes at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PositionArray { vec3 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer QuantisedArray { uvec2 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CornerArray { uvec3 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialArray { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SlotArray { TextureSlot at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightArray { Light at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FloatArray { float at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { vec4 at[]; };
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
+    Camera camera;
+    InstanceArray instances;
+    GeometryArray geometries;
+    MaterialArray materials;
+    SlotArray slots;
+    LightArray lights;
+    FloatArray skyRows; // cumulative distribution of the rows of the sky's map
+    FloatArray skyColumns; // of each row, one after another
+    PositionArray sky; // radiance of the texels of its map, row by row
+    PositionArray albedos; // of a rough reflector: the table of albedo.glsl
+    SumArray sums; // radiance of all samples so far and their number, for each pixel
+    uint lightCount;
+    uint discCount; // lights that are discs, which come first
+    float skyProbability; // of being chosen, among all lights and the sky
+    uvec2 skySize; // texels of the map of the sky: columns around y, rows from the zenith down
+    uint tlas;
+    uint image;
+    uint sampleNumber; // of the first sample of this pass
+    uint sampleCount; // of this pass
+    uint maxBounces;
+    float exposure;
+    float offsetExtent; // the unit of length of rounding errors near the origin
+    uint toneMapping;
+    // Of the real-time method:
+    uint visibility; // an index into kTexturesU2D: the triangle of each pixel
+    Camera seen; // the camera without the shift within a pixel
+    Camera seenBefore; // of the frame before, likewise
+    SumArray planes; // of plane.glsl
+    uint frameNumber; // since the camera was chosen; 0: there is no frame before
+    uint stillCount; // frames since the camera moved
+    uint view; // what the picture shows: kViewLight or another of plane.glsl
+};
+
+layout(push_constant, scalar) uniform PushConstants {
+    Frame frame;
+    uint argument; // of the pass
+};
+
+#endif

@@ -1,0 +1,122 @@
+// The light of a pixel by paths from the camera. At each surface a shadow ray looks for light, and the path goes on in a direction
+// that the surface prefers; light that both can find is shared between them. The including file provides traceNearest() and
+// transmittanceTo().
+#ifndef VIEWER_PATH
+#define VIEWER_PATH
+
+#include "common/ray_offset.glsl"
+#include "viewer/lights.glsl"
+
+// Surfaces of a path before chance may end it.
+const uint kSureBounces = 3u;
+
+vec3 leaveTo(Surface surface, vec3 direction) {
+    bool isAbove = dot(direction, surface.geometricNormal) > 0.0;
+    return leaveSurface(surface.position, isAbove ? surface.geometricNormal : -surface.geometricNormal, frame.offsetExtent);
+}
+
+// Light at a surface from one light or from the sky, drawn by chance: all of it, and what the matte layer scatters.
+struct DirectLight {
+    vec3 all;
+    vec3 matte;
+};
+
+DirectLight directLight(Surface surface, Bsdf bsdf, float choice, vec2 u) {
+    Arriving arriving = drawLight(surface.position, choice, u);
+    Response response = respond(surface, bsdf, arriving.direction);
+    if (!any(greaterThan(response.value * arriving.radiance, vec3(0.0)))) {
+        return DirectLight(vec3(0.0), vec3(0.0));
+    }
+    vec3 origin = leaveTo(surface, arriving.direction);
+    float range = arriving.distance >= kFar ? kFar : 0.9999 * arriving.distance;
+    vec3 way = transmittanceTo(origin, arriving.direction, range);
+    float share = arriving.density > 0.0 ? powerShare(arriving.density, response.density) : 1.0;
+    vec3 light = share * way * arriving.radiance;
+    return DirectLight(light * response.value, light * response.matte);
+}
+
+// A path under way.
+struct Path {
+    vec3 origin;
+    vec3 direction;
+    float density; // of the direction; below 0 where nothing else looks for light along it
+    vec3 extinction; // of the volume that the path is in
+    float squeezed; // radiance is eta^2 as much inside of a volume, which comes back at its end
+};
+
+Path firstPath(vec3 origin, vec3 direction) {
+    return Path(origin, direction, -1.0, vec3(0.0), 1.0);
+}
+
+// Goes on from a surface.
+void follow(inout Path path, Surface surface, Bsdf bsdf, Scattered scattered) {
+    // Shadow rays go through panes, but not through what bounds a volume.
+    bool isThin = (surface.flags & kThin) != 0u;
+    path.density = !scattered.isPane ? scattered.density : isThin ? path.density : -1.0;
+    if (!isThin && dot(scattered.direction, surface.geometricNormal) < 0.0) {
+        path.extinction = surface.isFront ? frame.materials.at[surface.material].extinction : vec3(0.0);
+        path.squeezed *= bsdf.eta * bsdf.eta;
+    }
+    path.origin = leaveTo(surface, scattered.direction);
+    path.direction = scattered.direction;
+}
+
+// Light that comes against the direction of a path whose next surface has the number `bounce`.
+vec3 pathRadiance(Path path, uint bounce, inout Random random) {
+    vec3 radiance = vec3(0.0);
+    vec3 throughput = vec3(1.0);
+    for (; bounce <= frame.maxBounces; ++bounce) {
+        Hit hit = traceNearest(path.origin, path.direction, hashWords(random.seed + bounce, random.number));
+        if (hit.instance == kNothing) {
+            radiance += throughput * missedLight(path.direction, path.density);
+            break;
+        }
+        Surface surface = surfaceAt(hit, path.direction, 0.0);
+        throughput *= exp(-path.extinction * hit.distance);
+        if ((surface.flags & kUnlit) != 0u) {
+            radiance += throughput * surface.baseColor;
+            break;
+        }
+        radiance += throughput * surface.emission;
+        Bsdf bsdf = bsdfOf(surface, -path.direction);
+        vec2 lightChoices = nextPair(random);
+        vec2 lightPlace = nextPair(random);
+        radiance += throughput * directLight(surface, bsdf, lightChoices.x, lightPlace).all;
+        vec2 choices = nextPair(random);
+        vec2 u = nextPair(random);
+        Scattered scattered = scatter(surface, bsdf, -path.direction, choices, u);
+        throughput *= scattered.weight;
+        follow(path, surface, bsdf, scattered);
+        float chance = min(largest(throughput) * path.squeezed, 1.0);
+        if (bounce >= kSureBounces) {
+            chance = min(chance, 0.95);
+            if (lightChoices.y >= chance) {
+                break;
+            }
+            throughput /= chance;
+        } else if (chance <= 0.0) {
+            break;
+        }
+    }
+    bool isNumber = !any(isnan(radiance)) && !any(isinf(radiance));
+    return isNumber ? radiance : vec3(0.0);
+}
+
+// Samples of a pixel are spread over all of it.
+vec3 sampleRadiance(uvec2 pixel, uint number) {
+    Random random = randomOf(pixel, number);
+    vec2 ndc = (vec2(pixel) + nextPair(random)) / vec2(frame.camera.width, frame.camera.height) * 2.0 - 1.0;
+    vec3 direction = normalize(frame.camera.forward + ndc.x * frame.camera.right + ndc.y * frame.camera.down);
+    return pathRadiance(firstPath(frame.camera.eye, direction), 0u, random);
+}
+
+void pathPixel(uvec2 pixel) {
+    uint place = pixel.y * frame.camera.width + pixel.x;
+    vec3 sum = frame.sampleNumber == 0u ? vec3(0.0) : frame.sums.at[place].rgb;
+    for (uint i = 0u; i < frame.sampleCount; ++i) {
+        sum += sampleRadiance(pixel, frame.sampleNumber + i);
+    }
+    frame.sums.at[place] = vec4(sum, float(frame.sampleNumber + frame.sampleCount));
+}
+
+#endif

@@ -1,0 +1,93 @@
+// Adds the light of a frame to that of the frames before, where they saw the same surface (Schied et al., "Spatiotemporal
+// Variance-Guided Filtering", 2017).
+#include "viewer/plane.glsl"
+
+// Frames in the mean while the camera moves: of matte layers, and of mirrors, whose picture moves otherwise than their surface.
+const float kMostFrames = 48.0;
+const float kMostMirrorFrames = 4.0;
+// While it stands.
+const float kMostStillFrames = 65536.0;
+// Frames before the variance over time says enough.
+const float kFirstFrames = 4.0;
+
+struct History {
+    vec4 matte;
+    vec4 mirrored;
+    vec4 moments;
+};
+
+bool isSameSurface(Seen seen, vec3 point, Seen before, ivec2 pixel) {
+    if (isSky(before) || before.instance != seen.instance || dot(before.normal, seen.normal) < 0.8) {
+        return false;
+    }
+    vec3 way = seenPoint(frame.seenBefore, pixel, before.distance) - point;
+    return abs(dot(way, seen.normal)) < 0.01 * seen.distance;
+}
+
+// The mean of the frames before around a place in pixels, of the pixels that saw the same surface; its matte.a is 0 without any.
+History historyAt(vec2 place, Seen seen, vec3 point) {
+    History sum = History(vec4(0.0), vec4(0.0), vec4(0.0));
+    vec2 low = floor(place - 0.5);
+    vec2 part = place - 0.5 - low;
+    part = mix(part, round(part), lessThan(abs(part - round(part)), vec2(0.01)));
+    float total = 0.0;
+    for (int corner = 0; corner < 4; ++corner) {
+        ivec2 offset = ivec2(corner & 1, corner >> 1);
+        ivec2 pixel = ivec2(low) + offset;
+        vec2 share = mix(1.0 - part, part, vec2(offset));
+        float weight = share.x * share.y;
+        bool isInside = all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, ivec2(frame.camera.width, frame.camera.height)));
+        if (weight <= 0.0 || !isInside) {
+            continue;
+        }
+        uint from = pixelPlace(pixel);
+        if (!isSameSurface(seen, point, unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]), pixel)) {
+            continue;
+        }
+        sum.matte += weight * frame.planes.at[previousPlane(kPlaneMatteHistory, from)];
+        sum.mirrored += weight * frame.planes.at[previousPlane(kPlaneMirroredHistory, from)];
+        sum.moments += weight * frame.planes.at[previousPlane(kPlaneMoments, from)];
+        total += weight;
+    }
+    float inverse = total > 0.05 ? 1.0 / total : 0.0;
+    return History(sum.matte * inverse, sum.mirrored * inverse, sum.moments * inverse);
+}
+
+// A mean with one more number, of which it holds `most` at most; the last component counts them.
+vec4 extended(vec4 mean, vec3 next, float most) {
+    float count = min(mean.a + 1.0, most);
+    return vec4(mix(mean.rgb, next, 1.0 / count), count);
+}
+
+void temporalPixel(uvec2 at) {
+    ivec2 pixel = ivec2(at);
+    uint place = pixelPlace(pixel);
+    Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, place)]);
+    vec3 matte = frame.planes.at[planePlace(kPlaneMatte, place)].rgb;
+    vec3 mirrored = frame.planes.at[planePlace(kPlaneMirrored, place)].rgb;
+    History history = History(vec4(0.0), vec4(0.0), vec4(0.0));
+    if (frame.frameNumber > 0u && !isSky(seen)) {
+        vec3 point = seenPoint(frame.camera, pixel, seen.distance);
+        vec2 moved = placeOf(frame.seen, point) - placeOf(frame.seenBefore, point);
+        history = historyAt(vec2(pixel) + 0.5 - moved, seen, point);
+    }
+    bool isStill = frame.stillCount > 0u;
+    float mirrorFrames = mix(kMostMirrorFrames, kMostFrames, clamp(2.0 * seen.roughness, 0.0, 1.0));
+    history.matte = extended(history.matte, matte, isStill ? kMostStillFrames : kMostFrames);
+    history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillFrames : mirrorFrames);
+    vec2 bright = vec2(brightness(matte), brightness(mirrored));
+    vec4 counts = vec2(history.matte.a, history.mirrored.a).xyxy;
+    history.moments = mix(history.moments, vec4(bright, bright * bright), 1.0 / counts);
+    // Of the mean. A few frames say little about how much their light varies.
+    vec2 variance = max(history.moments.zw - history.moments.xy * history.moments.xy, 0.0);
+    vec2 few = max(kFirstFrames / counts.xy - 1.0, 0.0) * history.moments.xy * history.moments.xy;
+    variance = variance / counts.xy + few;
+    frame.planes.at[currentPlane(kPlaneMatteHistory, place)] = history.matte;
+    frame.planes.at[currentPlane(kPlaneMirroredHistory, place)] = history.mirrored;
+    frame.planes.at[currentPlane(kPlaneMoments, place)] = history.moments;
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(history.matte.rgb, variance.x);
+    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(history.mirrored.rgb, variance.y);
+}
+
+#define PIXEL_FUNCTION temporalPixel
+#include "common/for_each_pixel.glsl"

@@ -1,0 +1,21 @@
+// The triangle that a pixel shows.
+#include "viewer/candidate.glsl"
+
+layout(location = 0) flat in uvec2 inTriangle;
+layout(location = 1) in vec2 inBarycentrics;
+layout(location = 0) out uvec4 outTriangle;
+
+void main() {
+    uvec2 pixel = uvec2(gl_FragCoord.xy);
+    Instance instance = frame.instances.at[inTriangle.x];
+    Geometry geometry = frame.geometries.at[instance.firstGeometry + argument];
+    if ((frame.materials.at[geometry.material].flags & (kAlphaMask | kAlphaBlend)) != 0u) {
+        Payload payload;
+        payload.seed = hashWords(randomOf(pixel, 0u).seed, frame.sampleNumber) & 0x7fffffffu;
+        Hit hit = Hit(inTriangle.x, argument, inTriangle.y, inBarycentrics, 0.0);
+        if (passesThrough(hit, cameraDirection(frame.camera, pixel), payload)) {
+            discard;
+        }
+    }
+    outTriangle = uvec4(inTriangle.x, argument, inTriangle.y, 0u);
+}

@@ -1,0 +1,81 @@
+//! The real-time method against the path tracer.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use image::RgbaImage;
+use lvk::Context;
+use lvk_gltf::Model;
+use lvk_samples::app::headless;
+use lvk_samples::app::sample::Sample as _;
+use lvk_samples::hybrid::RayPath;
+use lvk_samples::scene::Camera;
+use lvk_tests::image_comparison::{Tolerance, assert_similar};
+use lvk_tests::rtx_sample::software_device;
+use lvk_viewer::light::{Environment, SunSetting};
+use lvk_viewer::{Method, Shown, ViewerConfig};
+
+use crate::scenes::{View, viewer};
+use crate::still_life::still_life;
+
+const SIZE: [u32; 2] = [96, 64];
+
+fn environment() -> Environment {
+    Environment::day(&SunSetting::default())
+}
+
+fn view(samples: u32) -> View {
+    View { camera: Camera::looking_at([1.5, 1.7, 4.5], [-0.2, 0.5, 0.0], 40.0), size: SIZE, samples }
+}
+
+fn picture(ctx: &Context, method: Method, model: &Model, view: &View) -> RgbaImage {
+    let mut viewer = viewer(ctx, (method, RayPath::Query), model, &environment(), view);
+    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(&mut viewer).unwrap()).unwrap()
+}
+
+#[test]
+fn a_still_comes_close_to_the_reference() {
+    let Some(ctx) = software_device() else { return };
+    let model = still_life();
+    let reference = picture(&ctx, Method::PathTrace, &model, &view(1024));
+    let few = Tolerance { psnr: 22.0, ssim: 0.75, flip: 0.15, ..Tolerance::default() };
+    assert_similar("four frames", &picture(&ctx, Method::Hybrid, &model, &view(4)), &reference, &few);
+    let many = Tolerance { psnr: 28.0, ssim: 0.9, flip: 0.08, ..Tolerance::default() };
+    assert_similar("64 frames", &picture(&ctx, Method::Hybrid, &model, &view(64)), &reference, &many);
+}
+
+#[test]
+fn a_moving_camera_leaves_no_trail() {
+    let Some(ctx) = software_device() else { return };
+    let model = still_life();
+    let reference = picture(&ctx, Method::PathTrace, &model, &view(256));
+    let mut viewer = viewer(&ctx, (Method::Hybrid, RayPath::Query), &model, &environment(), &view(1));
+    viewer.configure(&ViewerConfig { is_progressive: true, ..*viewer.config() }).unwrap();
+    let end = view(1).camera;
+    let mut last = Vec::new();
+    for frame in (0..24_u8).rev() {
+        let [x, y, z] = end.eye;
+        viewer.set_view(&Camera { eye: [x - 0.04 * f32::from(frame), y, z], ..end });
+        last = headless::picture(&mut viewer).unwrap();
+    }
+    let last = RgbaImage::from_raw(SIZE[0], SIZE[1], last).unwrap();
+    let moving = Tolerance { psnr: 22.0, ssim: 0.75, flip: 0.15, ..Tolerance::default() };
+    assert_similar("after 24 frames of motion", &last, &reference, &moving);
+}
+
+#[test]
+fn views_of_data_show_what_they_say() {
+    let Some(ctx) = software_device() else { return };
+    let mut viewer = viewer(&ctx, (Method::Hybrid, RayPath::Query), &still_life(), &environment(), &view(1));
+    // The lowest pixels show the floor: it faces +y, is of roughness 0.5, and nothing moves.
+    let at = (SIZE[0] * (SIZE[1] - 1) + SIZE[0] / 2) as usize;
+    let mut floor = |shown| {
+        viewer.configure(&ViewerConfig { shown, ..*viewer.config() }).unwrap();
+        headless::picture(&mut viewer).unwrap();
+        viewer.radiance().unwrap()[at]
+    };
+    let is_near = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01);
+    assert!(is_near(floor(Shown::Normals), [0.5, 1.0, 0.5]));
+    assert!(is_near(floor(Shown::Roughness), [0.5; 3]));
+    assert!(is_near(floor(Shown::Motion), [0.5; 3]));
+    let albedo = floor(Shown::Albedo);
+    assert!((0.55..0.7).contains(&albedo[0]), "{albedo:?}");
+}

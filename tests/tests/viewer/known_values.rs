@@ -1,0 +1,135 @@
+//! Pictures whose radiance is known without a computer.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::f64::consts::PI;
+
+use glam::Vec3;
+use lvk_gltf::{AlphaMode, Light, LightKind, Material, Model, Transmission, Volume};
+use lvk_samples::hybrid::RayPath;
+use lvk_samples::scene::Camera;
+use lvk_tests::rtx_sample::software_device;
+use lvk_viewer::light::{Environment, Sun};
+
+use crate::scenes::{Builder, View, assert_close, colored, matte, mean, radiance};
+
+/// Looks at the origin from above, a little from the side, at an area small enough to be evenly lit.
+fn above(height: f32) -> View {
+    View { camera: Camera::looking_at([0.02, height, 0.01], [0.0; 3], 0.2), size: [8, 8], samples: 256 }
+}
+
+fn floor(material: Material) -> Builder {
+    Builder::default().quad(Vec3::new(-40.0, 0.0, -40.0), Vec3::Z * 80.0, Vec3::X * 80.0, material)
+}
+
+fn seen(model: &Model, environment: &Environment, view: &View) -> Option<[f64; 3]> {
+    let ctx = software_device()?;
+    Some(mean(&radiance(&ctx, RayPath::Query, model, environment, view)))
+}
+
+fn lit_by_sun(radius: f32) -> Environment {
+    let direction = Vec3::new(0.6, 0.8, 0.0);
+    let sun = Sun { direction: direction.to_array(), irradiance: [3.0, 2.0, 1.0], radius };
+    Environment { sun: Some(sun), ..Environment::uniform([0.1, 0.2, 0.3]) }
+}
+
+#[test]
+fn sun_and_sky_light_a_matte_floor() {
+    let model = floor(matte([0.5, 0.4, 0.25])).model();
+    for radius in [0.004, 0.3] {
+        let Some(actual) = seen(&model, &lit_by_sun(radius), &above(5.0)) else { return };
+        // A disc gives its irradiance to a surface that faces it, and the cosine of its middle to another.
+        let expected = [(0.5, 3.0, 0.1), (0.4, 2.0, 0.2), (0.25, 1.0, 0.3)]
+            .map(|(albedo, sun, sky)| albedo * (sun * 0.8 / PI + sky));
+        assert_close(&format!("sun of radius {radius}"), actual, expected, 0.01);
+    }
+}
+
+#[test]
+fn light_goes_straight_on_through_a_pane() {
+    let color = [0.9, 0.6, 0.3];
+    let transmission = Some(Transmission { factor: 1.0, texture: None });
+    let pane = Material { transmission, roughness: 0.0, ..matte(color) };
+    let model = floor(matte([0.5; 3]))
+        .quad(Vec3::new(-40.0, 3.0, -40.0), Vec3::Z * 80.0, Vec3::X * 80.0, pane)
+        .model();
+    let Some(actual) = seen(&model, &lit_by_sun(0.1), &above(2.5)) else { return };
+    // A pane without a highlight reflects nothing, so that no light comes back to the floor.
+    let expected = [(0.9, 3.0, 0.1), (0.6, 2.0, 0.2), (0.3, 1.0, 0.3)]
+        .map(|(color, sun, sky)| 0.5 * color * (sun * 0.8 / PI + sky));
+    assert_close("below a pane", actual, expected, 0.015);
+}
+
+#[test]
+fn lamps_follow_the_inverse_square() {
+    let lamp = |kind| Light { name: None, color: [1.0, 0.5, 0.25], intensity: 12.0, range: None, kind };
+    let wide = LightKind::Spot { inner_cone_angle: 0.3, outer_cone_angle: 0.5 };
+    for kind in [LightKind::Point, wide] {
+        let model = floor(matte([0.8; 3])).lamp(lamp(kind), Vec3::new(0.0, 2.0, 0.0)).model();
+        let Some(actual) = seen(&model, &Environment::uniform([0.0; 3]), &above(1.5)) else { return };
+        let expected = [1.0, 0.5, 0.25].map(|color| 0.8 / PI * 12.0 * color / 4.0);
+        assert_close(&format!("{kind:?}"), actual, expected, 0.01);
+    }
+    // A lamp beside the axis is outside of a narrow cone.
+    let narrow = LightKind::Spot { inner_cone_angle: 0.1, outer_cone_angle: 0.2 };
+    let model = floor(matte([0.8; 3])).lamp(lamp(narrow), Vec3::new(1.0, 2.0, 0.0)).model();
+    let Some(actual) = seen(&model, &Environment::uniform([0.0; 3]), &above(1.5)) else { return };
+    assert_eq!(actual, [0.0; 3]);
+}
+
+#[test]
+fn alpha_is_the_share_of_light_that_meets_a_surface() {
+    let shown = |alpha, alpha_mode| {
+        let unlit = Material { unlit: true, alpha_mode, ..colored([0.2, 0.4, 0.8], 0.0, 1.0) };
+        Material { base_color: [0.2, 0.4, 0.8, alpha], ..unlit }
+    };
+    let cases = [
+        (shown(0.3, AlphaMode::Blend), 0.3),
+        (shown(0.3, AlphaMode::Mask { cutoff: 0.5 }), 0.0),
+        (shown(0.7, AlphaMode::Mask { cutoff: 0.5 }), 1.0),
+        (shown(0.3, AlphaMode::Opaque), 1.0),
+    ];
+    for (material, alpha) in cases {
+        let what = format!("{:?}", material.alpha_mode);
+        let Some(actual) = seen(&floor(material).model(), &Environment::uniform([2.0; 3]), &above(5.0))
+        else {
+            return;
+        };
+        let expected = [0.2, 0.4, 0.8].map(|color| alpha * color + (1.0 - alpha) * 2.0);
+        assert_close(&what, actual, expected, 0.01);
+    }
+}
+
+#[test]
+fn a_volume_without_a_boundary_takes_light_by_its_depth() {
+    let color = [0.9, 0.5, 0.2];
+    let volume = Volume {
+        thickness: 1.0,
+        thickness_texture: None,
+        attenuation_distance: 2.0,
+        attenuation_color: color,
+    };
+    let transmission = Some(Transmission { factor: 1.0, texture: None });
+    let fog = Material { ior: 1.0, transmission, volume: Some(volume), ..colored([1.0; 3], 0.0, 0.0) };
+    let model =
+        Builder::default().cuboid(Vec3::new(-9.0, -1.5, -9.0), Vec3::new(9.0, 1.5, 9.0), &fog).model();
+    let Some(actual) = seen(&model, &Environment::uniform([1.0; 3]), &above(5.0)) else { return };
+    let expected = color.map(|color| f64::from(color).powf(3.0 / 2.0));
+    assert_close("three units of fog", actual, expected, 0.01);
+}
+
+#[test]
+fn a_lamp_of_triangles_lights_as_its_solid_angle() {
+    // A ceiling that glows and reflects nothing, seen from the floor below its middle.
+    let glowing = Material { emissive: [1.0, 2.0, 3.0], double_sided: true, ..matte([0.0; 3]) };
+    let half = 2.0;
+    let model = floor(matte([0.6; 3]))
+        .quad(Vec3::new(-half, 1.0, -half), Vec3::X * 2.0 * half, Vec3::Z * 2.0 * half, glowing)
+        .model();
+    let view = View { samples: 2048, ..above(0.9) };
+    let Some(actual) = seen(&model, &Environment::uniform([0.0; 3]), &view) else { return };
+    // Form factor of a square above its middle, four times that of a quarter above its corner.
+    let side = f64::from(half);
+    let edge = side / (1.0 + side * side).sqrt();
+    let factor = 4.0 / PI * edge * edge.atan();
+    assert_close("a glowing ceiling", actual, [1.0, 2.0, 3.0].map(|light| 0.6 * factor * light), 0.02);
+}
