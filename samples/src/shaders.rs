@@ -111,7 +111,6 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/bsdf",
     "viewer/candidate",
     "viewer/frame",
-    "viewer/gather",
     "viewer/ggx",
     "viewer/hit",
     "viewer/lights",
@@ -125,6 +124,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/tone",
     "viewer/trace_pipeline",
     "viewer/trace_query",
+    "viewer/visible_light",
     "yuv/push",
 ];
 

@@ -38,8 +38,8 @@ pub struct ViewerArgs {
     pub method: MethodArg,
 
     /// Contents of the picture; all but light needs --method hybrid
-    #[arg(long, value_enum, default_value_t = ShownArg::Light)]
-    pub view: ShownArg,
+    #[arg(long, value_enum, default_value_t = ContentArg::Light)]
+    pub view: ContentArg,
 
     /// Samples of each pixel, 1 to 65536; of the hybrid method, frames that a still takes the mean of. Noise falls with their square
     /// root
@@ -100,7 +100,7 @@ pub enum MethodArg {
 
 /// Contents of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ShownArg {
+pub enum ContentArg {
     /// Light.
     Light,
     /// Normals: red to the right, green up, blue towards +z.

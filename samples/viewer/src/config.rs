@@ -28,7 +28,7 @@ pub enum Method {
 /// Contents of the picture, by their numbers in `shaders/viewer/plane.glsl`. All but light is known to the hybrid method alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u32)]
-pub enum Shown {
+pub enum Content {
     /// Light.
     #[default]
     Light = 0,
@@ -66,7 +66,7 @@ pub struct ViewerConfig {
     /// Mapping of radiance to what a display shows.
     pub tone_mapping: ToneMapping,
     /// Contents of the picture.
-    pub shown: Shown,
+    pub content: Content,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
     pub is_progressive: bool,
 }
@@ -91,7 +91,7 @@ impl ViewerConfig {
             bounces: Self::DEFAULT_BOUNCES,
             exposure_stops: 0.0,
             tone_mapping: ToneMapping::default(),
-            shown: Shown::default(),
+            content: Content::default(),
             is_progressive: false,
         }
     }

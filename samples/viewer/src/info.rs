@@ -6,8 +6,8 @@ use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample_info::prelude::*;
 use lvk_samples::hybrid::RayPath;
 
-use crate::args::{LightArgs, MethodArg, ShownArg, SkyArg, ToneArg, ViewerArgs};
-use crate::config::{Method, Shown, ToneMapping, ViewerConfig};
+use crate::args::{ContentArg, LightArgs, MethodArg, SkyArg, ToneArg, ViewerArgs};
+use crate::config::{Content, Method, ToneMapping, ViewerConfig};
 use crate::light::{Environment, SunSetting};
 use crate::model::{ModelCamera, ModelError, cameras, load, posed, showcase};
 use crate::pipelines;
@@ -90,7 +90,7 @@ impl SampleInfo for Viewer {
                 MethodArg::Hybrid => Method::Hybrid,
                 MethodArg::Pathtrace => Method::PathTrace,
             },
-            shown: shown(args.view),
+            content: content(args.view),
             samples: args.samples,
             bounces: args.bounces,
             exposure_stops: args.exposure,
@@ -139,15 +139,15 @@ fn scene(args: &ViewerArgs, model: Model) -> ViewerScene {
     ViewerScene { name, model, environment, disc_radius: sun_radius.to_radians() }
 }
 
-fn shown(wish: ShownArg) -> Shown {
+fn content(wish: ContentArg) -> Content {
     match wish {
-        ShownArg::Light => Shown::Light,
-        ShownArg::Normals => Shown::Normals,
-        ShownArg::Roughness => Shown::Roughness,
-        ShownArg::Motion => Shown::Motion,
-        ShownArg::Albedo => Shown::Albedo,
-        ShownArg::Matte => Shown::Matte,
-        ShownArg::Mirrored => Shown::Mirrored,
+        ContentArg::Light => Content::Light,
+        ContentArg::Normals => Content::Normals,
+        ContentArg::Roughness => Content::Roughness,
+        ContentArg::Motion => Content::Motion,
+        ContentArg::Albedo => Content::Albedo,
+        ContentArg::Matte => Content::Matte,
+        ContentArg::Mirrored => Content::Mirrored,
     }
 }
 
@@ -168,7 +168,7 @@ fn animation_lines(model: &Model) -> Vec<String> {
         |animation: &lvk_gltf::Animation| animation.name.clone().unwrap_or_else(|| "animation".to_owned());
     (1..)
         .zip(&model.animations)
-        .map(|(number, animation)| format!("{number}  {}", lvk::readable_name(&name(animation))))
+        .map(|(number, animation)| format!("{number}  {}", lvk::readable_name(name(animation))))
         .collect()
 }
 

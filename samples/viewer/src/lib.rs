@@ -18,6 +18,6 @@ mod present;
 mod renderer;
 mod viewer;
 
-pub use args::{LightArgs, MethodArg, ShownArg, SkyArg, ToneArg, ViewerArgs};
-pub use config::{Method, Shown, ToneMapping, ViewerConfig};
+pub use args::{ContentArg, LightArgs, MethodArg, SkyArg, ToneArg, ViewerArgs};
+pub use config::{Content, Method, ToneMapping, ViewerConfig};
 pub use viewer::{Viewer, ViewerScene};

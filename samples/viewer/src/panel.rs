@@ -1,6 +1,6 @@
 //! Switches in the panel of the window.
 
-use crate::config::{Method, Shown, ToneMapping, ViewerConfig};
+use crate::config::{Content, Method, ToneMapping, ViewerConfig};
 use crate::model::ModelCamera;
 
 /// Lays out the list of cameras. Returns another choice than `chosen`.
@@ -22,17 +22,17 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
         ui.selectable_value(&mut config.method, Method::PathTrace, "path tracer");
     });
     if config.method == Method::Hybrid {
-        egui::ComboBox::from_label("view").selected_text(format!("{:?}", config.shown)).show_ui(ui, |ui| {
-            for shown in [
-                Shown::Light,
-                Shown::Normals,
-                Shown::Roughness,
-                Shown::Motion,
-                Shown::Albedo,
-                Shown::Matte,
-                Shown::Mirrored,
+        egui::ComboBox::from_label("view").selected_text(format!("{:?}", config.content)).show_ui(ui, |ui| {
+            for content in [
+                Content::Light,
+                Content::Normals,
+                Content::Roughness,
+                Content::Motion,
+                Content::Albedo,
+                Content::Matte,
+                Content::Mirrored,
             ] {
-                ui.selectable_value(&mut config.shown, shown, format!("{shown:?}"));
+                ui.selectable_value(&mut config.content, content, format!("{content:?}"));
             }
         });
     }

@@ -23,8 +23,8 @@ pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
 pub(crate) const CANDIDATE: SampleStage = stage!("candidate.rahit");
 pub(crate) const VISIBILITY_VERTEX: SampleStage = stage!("visibility.vert");
 pub(crate) const VISIBILITY_FRAGMENT: SampleStage = stage!("visibility.frag");
-pub(crate) const GATHER_RAYS: SampleStage = stage!("gather.rgen");
-pub(crate) const GATHER_QUERY: SampleStage = stage!("gather.comp");
+pub(crate) const LIGHT_RAYS: SampleStage = stage!("visible_light.rgen");
+pub(crate) const LIGHT_QUERY: SampleStage = stage!("visible_light.comp");
 pub(crate) const TEMPORAL: SampleStage = stage!("temporal.comp");
 pub(crate) const FILTER: SampleStage = stage!("filter.comp");
 pub(crate) const COMPOSITE: SampleStage = stage!("composite.comp");
@@ -42,11 +42,8 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
             &[TRIANGLE_FORMAT],
             Some(DEPTH_FORMAT),
         ),
-        SamplePipeline::new(
-            "viewer: light by pipeline",
-            &[GATHER_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE],
-        ),
-        SamplePipeline::new("viewer: light by query", &[GATHER_QUERY]),
+        SamplePipeline::new("viewer: light by pipeline", &[LIGHT_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
+        SamplePipeline::new("viewer: light by query", &[LIGHT_QUERY]),
         SamplePipeline::new("viewer: means over time", &[TEMPORAL]),
         SamplePipeline::new("viewer: filter", &[FILTER]),
         SamplePipeline::new("viewer: composite", &[COMPOSITE]),

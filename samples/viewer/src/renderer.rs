@@ -38,7 +38,7 @@ impl Renderer {
     pub(crate) fn addresses(&self) -> lvk::Result<Addresses> {
         Ok(match self {
             Self::Hybrid(hybrid) => Addresses {
-                sums: hybrid.shown_address()?,
+                sums: hybrid.picture_address()?,
                 planes: hybrid.planes_address()?,
                 visibility: hybrid.visibility_index(),
             },
@@ -52,7 +52,7 @@ impl Renderer {
     /// The buffer that the picture is made of, and the bytes before its first pixel.
     pub(crate) fn sums(&self) -> (BufferHandle, u64) {
         match self {
-            Self::Hybrid(hybrid) => (hybrid.planes(), hybrid.shown_offset()),
+            Self::Hybrid(hybrid) => (hybrid.planes(), hybrid.picture_offset()),
             Self::PathTrace { sums, .. } => (**sums, 0),
         }
     }

@@ -95,7 +95,7 @@ impl Viewer {
     /// Looks through a camera of the model, by its place in [`cameras`](Self::cameras). Beyond the last it is the last.
     pub fn choose_camera(&mut self, place: usize) {
         self.chosen = place.min(self.cameras.len() - 1);
-        self.look(&self.cameras[self.chosen].camera.clone());
+        self.set_camera(&self.cameras[self.chosen].camera.clone());
     }
 
     /// Triangles of all meshes, each mesh once, and instances of meshes.
@@ -153,7 +153,7 @@ impl Viewer {
             .collect())
     }
 
-    fn look(&mut self, camera: &Camera) {
+    fn set_camera(&mut self, camera: &Camera) {
         if self.camera != *camera {
             self.camera = *camera;
             self.done = 0;
@@ -170,7 +170,7 @@ impl Viewer {
     }
 
     fn upload_frame(&self, cmd: &mut CommandBuffer, sample_count: u32) -> lvk::Result<u64> {
-        let ViewerConfig { width, height, bounces, exposure_stops, tone_mapping, shown, .. } = self.config;
+        let ViewerConfig { width, height, bounces, exposure_stops, tone_mapping, content, .. } = self.config;
         let gpu = |camera: &Camera| {
             let distance = Vec3::from(camera.eye).distance(Vec3::from(camera.target));
             GpuCamera::new(camera, width, height, NEAR_SHARE * distance)
@@ -196,7 +196,7 @@ impl Viewer {
             planes: addresses.planes,
             frame_number: self.frame_number,
             still_count: if self.camera == self.before { self.done } else { 0 },
-            view: shown as u32,
+            view: content as u32,
             _padding: 0,
         })
     }
@@ -235,7 +235,7 @@ impl Sample for Viewer {
     /// The camera goes around what it looks at. Outside of windows each frame begins anew, so that it does not depend on those
     /// before.
     fn update(&mut self, time: FrameTime) {
-        self.look(&around(&self.cameras[self.chosen].camera, time.phase()));
+        self.set_camera(&around(&self.cameras[self.chosen].camera, time.phase()));
         if !self.config.is_progressive {
             (self.done, self.frame_number, self.before) = (0, 0, self.camera);
         }
@@ -274,7 +274,7 @@ impl Sample for Viewer {
     }
 
     fn set_view(&mut self, camera: &Camera) {
-        self.look(camera);
+        self.set_camera(camera);
     }
 
     /// Looks through the next camera of the model.

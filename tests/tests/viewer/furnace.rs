@@ -23,7 +23,7 @@ fn brightness(ctx: &Context, material: &Material) -> [f64; 3] {
     ANGLES.map(|angle| {
         let (sine, cosine) = angle.to_radians().sin_cos();
         let camera = Camera::looking_at([4.0 * sine, 4.0 * cosine, 0.0], [0.0; 3], 1.0);
-        let view = View { camera, size: [8, 8], samples: 2048 };
+        let view = View { camera, size: [8, 8], samples: 256 };
         let [red, green, blue] =
             mean(&radiance(ctx, RayPath::Query, &model, &Environment::uniform([1.0; 3]), &view));
         (red + green + blue) / 3.0
@@ -33,7 +33,7 @@ fn brightness(ctx: &Context, material: &Material) -> [f64; 3] {
 fn assert_white(ctx: &Context, what: &str, material: &Material) {
     let all = brightness(ctx, material);
     eprintln!("{what}: {all:.4?}");
-    
+    assert!(all.iter().all(|bright| (bright - 1.0).abs() < 0.01), "{what}: {all:?}");
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn a_clear_coat_keeps_all_light() {
 #[test]
 fn thin_glass_keeps_all_light() {
     let Some(ctx) = software_device() else { return };
-    for roughness in [0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9] {
+    for roughness in [0.0, 0.3, 0.4, 0.9] {
         let transmission = Some(Transmission { factor: 1.0, texture: None });
         let material = Material { transmission, ..colored([1.0; 3], 0.0, roughness) };
         assert_white(&ctx, &format!("thin glass of roughness {roughness}"), &material);

@@ -11,7 +11,7 @@ use lvk_samples::scene::Camera;
 use lvk_tests::image_comparison::{Tolerance, assert_similar};
 use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, SunSetting};
-use lvk_viewer::{Method, Shown, ViewerConfig};
+use lvk_viewer::{Content, Method, ViewerConfig};
 
 use crate::scenes::{View, viewer};
 use crate::still_life::still_life;
@@ -67,15 +67,15 @@ fn views_of_data_show_what_they_say() {
     let mut viewer = viewer(&ctx, (Method::Hybrid, RayPath::Query), &still_life(), &environment(), &view(1));
     // The lowest pixels show the floor: it faces +y, is of roughness 0.5, and nothing moves.
     let at = (SIZE[0] * (SIZE[1] - 1) + SIZE[0] / 2) as usize;
-    let mut floor = |shown| {
-        viewer.configure(&ViewerConfig { shown, ..*viewer.config() }).unwrap();
+    let mut floor = |content| {
+        viewer.configure(&ViewerConfig { content, ..*viewer.config() }).unwrap();
         headless::picture(&mut viewer).unwrap();
         viewer.radiance().unwrap()[at]
     };
     let is_near = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01);
-    assert!(is_near(floor(Shown::Normals), [0.5, 1.0, 0.5]));
-    assert!(is_near(floor(Shown::Roughness), [0.5; 3]));
-    assert!(is_near(floor(Shown::Motion), [0.5; 3]));
-    let albedo = floor(Shown::Albedo);
+    assert!(is_near(floor(Content::Normals), [0.5, 1.0, 0.5]));
+    assert!(is_near(floor(Content::Roughness), [0.5; 3]));
+    assert!(is_near(floor(Content::Motion), [0.5; 3]));
+    let albedo = floor(Content::Albedo);
     assert!((0.55..0.7).contains(&albedo[0]), "{albedo:?}");
 }

@@ -54,7 +54,7 @@ struct Part {
 
 impl Arena {
     fn add(&mut self, primitive: &Primitive, material: u32, is_opaque: bool) {
-        let packed = PackedPositions::of(&primitive.positions);
+        let packed = PackedPositions::new(&primitive.positions);
         let is_quantised = matches!(packed, PackedPositions::Quantised(_));
         self.parts.push(Part {
             is_quantised,

@@ -65,7 +65,7 @@ impl GpuScene {
     ) -> lvk::Result<Self> {
         let textures = GpuTextures::new(ctx, model)?;
         let meshes = GpuMeshes::new(ctx, model, &model.placements(scene, pose))?;
-        let shown = Shown::new(model, scene, pose, &meshes);
+        let shown = SceneInstances::new(model, scene, pose, &meshes);
         let bounds = model.bounds(scene, pose).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ZERO });
         let lights = GpuLights::new(model, scene, pose, environment, disc_radius, &bounds);
         let mut arrays = Arrays { ctx, held: Vec::new() };
@@ -97,13 +97,13 @@ impl GpuScene {
 }
 
 /// The instances of a scene, for shaders and for the top-level structure.
-struct Shown {
+struct SceneInstances {
     instances: Vec<GpuInstance>,
     tlas: Vec<TlasInstance>,
     draws: Vec<Draw>,
 }
 
-impl Shown {
+impl SceneInstances {
     fn new(model: &Model, scene: usize, pose: &Pose, meshes: &GpuMeshes) -> Self {
         let mut shown = Self { instances: Vec::new(), tlas: Vec::new(), draws: Vec::new() };
         let mut placements = model.placements(scene, pose);
@@ -173,7 +173,7 @@ impl Arrays<'_> {
     fn constants(
         &mut self,
         meshes: &GpuMeshes,
-        shown: &Shown,
+        shown: &SceneInstances,
         materials: &GpuMaterials,
         lights: &GpuLights,
         environment: &Environment,

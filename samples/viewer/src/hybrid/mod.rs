@@ -45,7 +45,7 @@ impl Hybrid {
     }
 
     /// Address of the plane that the picture is made of.
-    pub(crate) fn shown_address(&self) -> lvk::Result<u64> {
+    pub(crate) fn picture_address(&self) -> lvk::Result<u64> {
         Ok(self.planes.address()? + SHOWN * plane_bytes(self.extent))
     }
 
@@ -55,7 +55,7 @@ impl Hybrid {
     }
 
     /// Bytes from the beginning of the planes to the one that the picture is made of.
-    pub(crate) fn shown_offset(&self) -> u64 {
+    pub(crate) fn picture_offset(&self) -> u64 {
         SHOWN * plane_bytes(self.extent)
     }
 
@@ -69,7 +69,7 @@ impl Hybrid {
         let push = |argument| Push { frame, argument, _padding: 0 };
         to.pass("visible triangles", |cmd| self.visibility.record(cmd, frame, draws))?;
         let (planes, visible) = (*self.planes, self.visibility.triangles());
-        to.pass("light", |cmd| self.passes.record_gather(cmd, &push(0), planes, visible, self.extent))?;
+        to.pass("light", |cmd| self.passes.record_light(cmd, &push(0), planes, visible, self.extent))?;
         to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))
     }
 }

@@ -8,21 +8,21 @@ use lvk_samples::hybrid::RayPath;
 
 use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
 use crate::path_tracer::{compute, groups, ray_pipeline};
-use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, GATHER_QUERY, GATHER_RAYS, TEMPORAL};
+use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, LIGHT_QUERY, LIGHT_RAYS, TEMPORAL};
 
 /// Steps of the filter in space.
 const FILTER_STEPS: u32 = 4;
 
 /// The pipelines.
 pub(crate) struct Passes {
-    gather: Gather,
+    light: LightPass,
     temporal: Holder<ComputePipelineHandle>,
     filter: Holder<ComputePipelineHandle>,
     composite: Holder<ComputePipelineHandle>,
     antialias: Holder<ComputePipelineHandle>,
 }
 
-enum Gather {
+enum LightPass {
     Pipeline(Holder<RayTracingPipelineHandle>),
     Query(Holder<ComputePipelineHandle>),
 }
@@ -31,9 +31,9 @@ impl Passes {
     pub(crate) fn new(ctx: &Context, path: RayPath) -> lvk::Result<Self> {
         let filter = |stage| compute(ctx, stage, FRAME_LAYOUT);
         Ok(Self {
-            gather: match path {
-                RayPath::Pipeline => Gather::Pipeline(ray_pipeline(ctx, &[GATHER_RAYS], "viewer light")?),
-                RayPath::Query => Gather::Query(compute(ctx, GATHER_QUERY, SCENE_LAYOUTS)?),
+            light: match path {
+                RayPath::Pipeline => LightPass::Pipeline(ray_pipeline(ctx, &[LIGHT_RAYS], "viewer light")?),
+                RayPath::Query => LightPass::Query(compute(ctx, LIGHT_QUERY, SCENE_LAYOUTS)?),
             },
             temporal: filter(TEMPORAL)?,
             filter: filter(FILTER)?,
@@ -43,7 +43,7 @@ impl Passes {
     }
 
     /// Records the rays of a picture of `extent` pixels whose triangles are `visible`.
-    pub(crate) fn record_gather(
+    pub(crate) fn record_light(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
@@ -53,13 +53,13 @@ impl Passes {
     ) -> lvk::Result<()> {
         let dependencies =
             Dependencies { buffers: &[planes], sampled_images: &[visible], ..Dependencies::default() };
-        match &self.gather {
-            Gather::Pipeline(pipeline) => {
+        match &self.light {
+            LightPass::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
                 cmd.trace_rays([extent[0], extent[1], 1], &dependencies)
             }
-            Gather::Query(pipeline) => {
+            LightPass::Query(pipeline) => {
                 cmd.bind_compute_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
                 cmd.dispatch(groups(extent), &dependencies)

@@ -45,7 +45,7 @@ impl Visibility {
         *self.triangles
     }
 
-    /// Its bindless index.
+    /// The bindless index of the target.
     pub(crate) fn index(&self) -> u32 {
         self.triangles.index()
     }

@@ -22,9 +22,9 @@ pub struct SkyMap {
 /// A cumulative distribution of the brightness of a [`SkyMap`] over solid angle.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SkyDistribution {
-    /// Of rows.
+    /// The distribution of rows.
     pub(crate) rows: Vec<f32>,
-    /// Of the texels of each row, one row after another.
+    /// The distribution of the texels of each row, one row after another.
     pub(crate) columns: Vec<f32>,
 }
 

@@ -1,7 +1,7 @@
 // Light of a pixel, by the ray tracing pipeline.
 #include "viewer/trace_pipeline.glsl"
-#include "viewer/gather.glsl"
+#include "viewer/visible_light.glsl"
 
 void main() {
-    gatherPixel(gl_LaunchIDEXT.xy);
+    visibleLightPixel(gl_LaunchIDEXT.xy);
 }

@@ -1,7 +1,7 @@
 // Light of a pixel, by ray queries.
 #include "common/group_pixel.glsl"
 #include "viewer/trace_query.glsl"
-#include "viewer/gather.glsl"
+#include "viewer/visible_light.glsl"
 
-#define PIXEL_FUNCTION gatherPixel
+#define PIXEL_FUNCTION visibleLightPixel
 #include "common/for_each_pixel.glsl"

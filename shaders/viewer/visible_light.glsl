@@ -1,8 +1,8 @@
 // The light of what each pixel shows, of one sample: rays for shadows, for one direction that its surface prefers, and along a path
 // that goes on from there. Matte layers and all others are kept apart, without their colours, for the filter. The including file
 // provides traceNearest() and transmittanceTo().
-#ifndef VIEWER_GATHER
-#define VIEWER_GATHER
+#ifndef VIEWER_VISIBLE_LIGHT
+#define VIEWER_VISIBLE_LIGHT
 
 #include "viewer/path.glsl"
 #include "viewer/plane.glsl"
@@ -34,7 +34,7 @@ vec3 clamped(vec3 light) {
     return most > kBrightestSample ? light * (kBrightestSample / most) : light;
 }
 
-void storeGathered(uint place, Seen seen, vec3 base, vec3 matte, vec3 matteAlbedo, vec3 mirrored, vec3 share) {
+void storeLight(uint place, Seen seen, vec3 base, vec3 matte, vec3 matteAlbedo, vec3 mirrored, vec3 share) {
     frame.planes.at[currentPlane(kPlaneSurface, place)] = packedSeen(seen);
     frame.planes.at[planePlace(kPlaneBase, place)] = vec4(base, 0.0);
     frame.planes.at[planePlace(kPlaneMatteAlbedo, place)] = vec4(matteAlbedo, 0.0);
@@ -43,20 +43,20 @@ void storeGathered(uint place, Seen seen, vec3 base, vec3 matte, vec3 matteAlbed
     frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(clamped(mirrored / max(share, 1e-3)), 0.0);
 }
 
-void gatherPixel(uvec2 pixel) {
+void visibleLightPixel(uvec2 pixel) {
     uint place = pixelPlace(ivec2(pixel));
     vec3 direction = cameraDirection(frame.camera, pixel);
     uvec4 visible = texelFetch(kTexturesU2D[frame.visibility], ivec2(pixel), 0);
     const vec3 none = vec3(0.0);
     if (visible.x == kNothing) {
-        storeGathered(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), none, none, none, none);
+        storeLight(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), none, none, none, none);
         return;
     }
     Hit hit = visibleHit(visible, frame.camera.eye, direction);
     Surface surface = surfaceAt(hit, direction, frame.camera.pixelSpread);
     Seen seen = Seen(surface.normal, hit.distance, hit.instance, surface.roughness);
     if ((surface.flags & kUnlit) != 0u) {
-        storeGathered(place, seen, surface.baseColor, none, none, none, none);
+        storeLight(place, seen, surface.baseColor, none, none, none, none);
         return;
     }
     Random random = randomOf(pixel, frame.sampleNumber);
@@ -79,7 +79,7 @@ void gatherPixel(uvec2 pixel) {
     bool isClear = bsdf.lobes[kGlassLobe] + bsdf.lobes[kPaneLobe] > 0.0;
     vec3 share = isClear ? vec3(1.0) : bsdf.reflected;
     seen.roughness = surface.coat > 0.0 ? min(surface.roughness, surface.coatRoughness) : surface.roughness;
-    storeGathered(place, seen, surface.emission, matte, bsdf.diffuse + bsdf.sheen, mirrored, share);
+    storeLight(place, seen, surface.emission, matte, bsdf.diffuse + bsdf.sheen, mirrored, share);
 }
 
 #endif
