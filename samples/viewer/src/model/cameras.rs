@@ -14,7 +14,7 @@ const OVERVIEW_FROM: Vec3 = Vec3::new(0.55, 0.38, 1.0);
 /// A camera and its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelCamera {
-    /// Name in the file, else `camera` and its number, or [`OVERVIEW`].
+    /// Name in the file, else `camera` and its number; `overview` for the one that sees the whole model.
     pub name: String,
     /// The camera.
     pub camera: Camera,
