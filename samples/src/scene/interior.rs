@@ -9,6 +9,9 @@ use super::{Camera, bounds_of};
 /// Cells along the longest side of the grid.
 const CELLS: f32 = 48.0;
 
+/// Most steps of half a cell: more than there are along the diagonal of the grid.
+const MOST_STEPS: u32 = 4 * CELLS as u32;
+
 /// Vertical field of view of the cameras, in degrees.
 const FOV: f32 = 65.0;
 
@@ -87,7 +90,8 @@ impl Grid {
             self.detail[index] += 1;
         }
         let longest = (b - a).length().max((c - a).length()).max((c - b).length());
-        let steps = (2.0 * longest / self.cell).ceil().max(1.0) as u32;
+        // The squares of very long edges are infinite.
+        let steps = (2.0 * longest / self.cell).ceil().max(1.0).min(MOST_STEPS as f32) as u32;
         for i in 0..=steps {
             for j in 0..=steps - i {
                 let (u, v) = (i as f32 / steps as f32, j as f32 / steps as f32);
@@ -111,13 +115,14 @@ impl Grid {
     /// outside.
     fn hit(&self, from: Vec3, direction: Vec3) -> Option<(f32, usize)> {
         let mut distance = 0.0;
-        loop {
+        for _ in 0..MOST_STEPS {
             distance += 0.5 * self.cell;
             let index = self.index(from + distance * direction)?;
             if self.filled[index] {
                 return Some((distance, index));
             }
         }
+        None
     }
 
     /// True if `point` is free and has surfaces below and on all sides but one.
@@ -193,5 +198,37 @@ impl Grid {
         });
         directions.map(|direction| self.hit(place, direction).map_or(setup, |(depth, _)| depth)).sum::<f32>()
             / 32.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(positions: Vec<[f32; 3]>) -> Mesh {
+        let triangles =
+            (0..positions.len() as u32 / 3).map(|first| [0, 1, 2].map(|v| 3 * first + v)).collect();
+        Mesh { positions, triangles, ..Mesh::default() }
+    }
+
+    #[test]
+    fn meshes_beyond_the_squares_of_floats_end() {
+        for far in [1e18, 1e25, 1e38] {
+            let corners = vec![[-far, 0.0, 0.0], [far, far, 0.0], [0.0, -far, far]];
+            let grid = Grid::from_mesh(&mesh(corners.clone()));
+            assert!(grid.filled.iter().filter(|filled| **filled).count() > 100, "{far}");
+            let _ = views(&mesh(corners));
+        }
+    }
+
+    #[test]
+    fn rays_end_where_floats_have_no_place_for_the_next_cell() {
+        let at = [4e6, 7e6, 5e6];
+        for small in [0.0, 1e-30, 0.25] {
+            let corners = vec![at, [at[0] + small, at[1], at[2]], [at[0], at[1] + small, at[2]]];
+            let grid = Grid::from_mesh(&mesh(corners));
+            let hit = grid.hit(Vec3::from(at), Vec3::NEG_Y);
+            assert!(hit.is_none_or(|(distance, _)| distance.is_finite()), "{small}");
+        }
     }
 }
