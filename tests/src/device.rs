@@ -143,7 +143,7 @@ fn validation() -> ValidationMode {
 /// When there is no driver.
 pub fn vulkan() -> Option<Option<&'static Path>> {
     match loader() {
-        Ok(library) => Some(library.as_deref()),
+        Ok(loader) => Some(loader.library.as_deref()),
         Err(reason) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
             eprintln!("SKIPPED, no Vulkan device: {reason}");
             None
@@ -161,6 +161,16 @@ pub fn loses_neighbours_of_inactive(ctx: &Context) -> bool {
         eprintln!("NOT TESTED, {name} loses primitives beside inactive ones");
     }
     loses
+}
+
+/// True if the driver draws to windows of an X server without a screen. NVIDIA's (580.159.04) makes no swapchain there, and
+/// ends the process when it is asked whether it presents to a server without GLX. Prints a line if it does not.
+pub(crate) fn draws_to_virtual_displays() -> bool {
+    let draws = !loader().is_ok_and(|loader| loader.has_nvidia);
+    if !draws {
+        eprintln!("NOT TESTED, NVIDIA's driver does not draw to an X server without a screen");
+    }
+    draws
 }
 
 /// Returns the driver manifest of SwiftShader, a device without ray tracing. Prints a line and returns `None` where
@@ -196,32 +206,48 @@ pub(crate) fn fetched<T>(found: Result<T, DriverError>, what: &str) -> Option<T>
     }
 }
 
+/// The Vulkan loader to open, and what tests must know of its drivers.
+struct Loader {
+    /// `None` for the system's own.
+    library: Option<PathBuf>,
+    has_nvidia: bool,
+}
+
 /// Returns the Vulkan loader to open, found or fetched once.
-fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
-    static LOADER: OnceLock<Result<Option<PathBuf>, String>> = OnceLock::new();
+fn loader() -> Result<&'static Loader, &'static str> {
+    static LOADER: OnceLock<Result<Loader, String>> = OnceLock::new();
     let found = LOADER.get_or_init(|| {
         let request = DriverRequest { validation: !matches!(validation(), ValidationMode::Off) };
         let driver = prepare(&request).map_err(|error| error.to_string())?;
-        set_driver_variables(driver.loader.as_deref());
-        Ok(driver.loader)
+        let has_nvidia = keep_drivers(driver.loader.as_deref()).contains(&vk::DriverId::NVIDIA_PROPRIETARY);
+        Ok(Loader { library: driver.loader, has_nvidia })
     });
     found.as_ref().map_err(String::as_str)
 }
 
-/// Keeps the driver loaded until the process ends, by an instance that is never destroyed: a process can load
-/// NVIDIA's driver only some thirty times. Without a driver the first context reports the error.
-fn set_driver_variables(library: Option<&Path>) {
+/// Keeps the drivers loaded until the process ends, by an instance that is never destroyed: a process can load
+/// NVIDIA's driver only some thirty times. Without a driver the first context reports the error. Returns the drivers of
+/// the devices.
+fn keep_drivers(library: Option<&Path>) -> Vec<vk::DriverId> {
     // SAFETY: the library is a Vulkan loader, and stays open.
     let entry = unsafe { library.map_or_else(|| Entry::load(), |path| Entry::load_from(path)) };
-    let Ok(entry) = entry else { return };
+    let Ok(entry) = entry else { return Vec::new() };
     let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
     let info = vk::InstanceCreateInfo::default().application_info(&application);
     // SAFETY: the description is valid, and the entry is kept with the instance.
-    if let Ok(instance) = unsafe { entry.create_instance(&info, None) } {
-        // SAFETY: the instance is alive. Drivers are loaded by then.
-        drop(unsafe { instance.enumerate_physical_devices() });
-        std::mem::forget((entry, instance));
-    }
+    let Ok(instance) = (unsafe { entry.create_instance(&info, None) }) else { return Vec::new() };
+    let driver_of = |device| {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+        // SAFETY: the device belongs to the instance. One without Vulkan 1.2 leaves the structure as it is.
+        unsafe { instance.get_physical_device_properties2(device, &mut properties) };
+        driver.driver_id
+    };
+    // SAFETY: the instance is alive. Drivers are loaded by then.
+    let devices = unsafe { instance.enumerate_physical_devices() }.unwrap_or_default();
+    let drivers = devices.into_iter().map(driver_of).collect();
+    std::mem::forget((entry, instance));
+    drivers
 }
 
 #[expect(clippy::panic, reason = "a test without its device has failed")]

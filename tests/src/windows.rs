@@ -20,7 +20,7 @@ use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass};
 use x11rb::xcb_ffi::{XCBConnection, load_libxcb};
 
-use crate::device::{fetched, unavailable, vulkan};
+use crate::device::{draws_to_virtual_displays, fetched, unavailable, vulkan};
 
 /// The X server of the test program, with a connection that keeps it running.
 pub struct Desktop {
@@ -36,7 +36,7 @@ pub const ROOM: u32 = 200;
 const COLUMNS: u32 = 10;
 
 /// Returns the desktop of this program. Prints a line and returns `None` where there is no X server and none can be
-/// fetched.
+/// fetched, and where the driver does not draw to it.
 ///
 /// # Panics
 /// When there is none although `LVK_REQUIRE_GPU=1` demands every test.
@@ -46,11 +46,14 @@ pub fn desktop() -> Option<&'static Desktop> {
 }
 
 /// Starts an X server for programs that a test starts. Prints a line and returns `None` where there is none and none
-/// can be fetched.
+/// can be fetched, and where the driver does not draw to it.
 ///
 /// # Panics
 /// As [`desktop`].
 pub fn display() -> Option<VirtualDisplay> {
+    if !draws_to_virtual_displays() {
+        return None;
+    }
     fetched(virtual_display(), "X server for windows")
 }
 

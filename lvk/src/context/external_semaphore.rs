@@ -1,6 +1,6 @@
 //! Semaphores that other devices, processes and APIs share by file descriptors.
 
-use std::os::fd::{AsRawFd, FromRawFd, IntoRawFd, OwnedFd};
+use std::os::fd::{AsRawFd, IntoRawFd, OwnedFd};
 use std::sync::Arc;
 
 use ash::vk;
@@ -9,6 +9,7 @@ use super::Context;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
+use crate::gpu::memory::external::owned_fd;
 
 /// Kind of a semaphore (`VkSemaphoreType`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -81,7 +82,7 @@ impl Context {
     }
 
     /// Creates a semaphore from the file descriptor of another device, process or API (`vkImportSemaphoreFdKHR`). A
-    /// [`SyncFile`](SemaphoreFdType::SyncFile) allows one wait.
+    /// [`SyncFile`](SemaphoreFdType::SyncFile) allows one wait; `None` is a sync file whose signal has come.
     ///
     /// # Safety
     /// The file descriptor was exported from a semaphore of this kind as this type; opaque ones by this driver on this
@@ -89,15 +90,24 @@ impl Context {
     ///
     /// # Errors
     /// As [`create_shared_semaphore`](Self::create_shared_semaphore), for the import; [`InvalidUsage`](Error::InvalidUsage)
-    /// for a file descriptor that the driver does not know. The file descriptor is closed then.
+    /// for a file descriptor that the driver does not know, and for none of an opaque semaphore. The file descriptor is
+    /// closed then.
     pub unsafe fn import_semaphore(
         &self,
         kind: SemaphoreKind,
         fd_type: SemaphoreFdType,
-        fd: OwnedFd,
+        fd: Option<OwnedFd>,
     ) -> Result<SharedSemaphore> {
+        // Vulkan's number for a sync file whose signal has come.
+        const SIGNALLED: i32 = -1;
         let gpu = &self.device_state().gpu;
         check_semaphore(gpu, kind, fd_type, vk::ExternalSemaphoreFeatureFlags::IMPORTABLE)?;
+        if fd.is_none() && fd_type != SemaphoreFdType::SyncFile {
+            return Err(Error::usage(
+                "semaphore",
+                "only a sync file may be signalled and have no file descriptor",
+            ));
+        }
         let semaphore = SharedSemaphore::new(gpu, kind, fd_type, None)?;
         let flags = match fd_type {
             SemaphoreFdType::Opaque => vk::SemaphoreImportFlags::empty(),
@@ -107,7 +117,7 @@ impl Context {
             .semaphore(semaphore.raw)
             .flags(flags)
             .handle_type(fd_type.raw())
-            .fd(fd.as_raw_fd());
+            .fd(fd.as_ref().map_or(SIGNALLED, AsRawFd::as_raw_fd));
         // SAFETY: the semaphore is new; the caller promises the rest.
         unsafe { functions(gpu).import_semaphore_fd(&info) }.map_err(|result| match result {
             vk::Result::ERROR_INVALID_EXTERNAL_HANDLE => Error::usage(
@@ -117,7 +127,7 @@ impl Context {
             other => Error::vulkan("vkImportSemaphoreFdKHR", "semaphore")(other),
         })?;
         // The driver owns the file descriptor now.
-        let _ = fd.into_raw_fd();
+        let _ = fd.map(IntoRawFd::into_raw_fd);
         Ok(semaphore)
     }
 }
@@ -153,7 +163,8 @@ impl SharedSemaphore {
         self.kind
     }
 
-    /// Exports the semaphore (`vkGetSemaphoreFdKHR`). Each call returns a new file descriptor.
+    /// Exports the semaphore (`vkGetSemaphoreFdKHR`). Each call returns a new file descriptor, or `None` for a
+    /// [`SyncFile`](SemaphoreFdType::SyncFile) whose signal has come, so that no wait is needed: drivers may return either.
     ///
     /// # Safety
     /// A semaphore that is exported as [`SyncFile`](SemaphoreFdType::SyncFile) has a pending signal, and no waiter.
@@ -161,7 +172,7 @@ impl SharedSemaphore {
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for an imported semaphore; [`Vulkan`](Error::Vulkan) for an error of the
     /// driver, such as too many open files.
-    pub unsafe fn export(&self) -> Result<OwnedFd> {
+    pub unsafe fn export(&self) -> Result<Option<OwnedFd>> {
         if !self.exportable {
             return Err(Error::usage(
                 "semaphore",
@@ -172,8 +183,13 @@ impl SharedSemaphore {
         // SAFETY: the semaphore was created for export as this type; the caller promises the rest.
         let fd = unsafe { functions(&self.gpu).get_semaphore_fd(&info) }
             .map_err(Error::vulkan("vkGetSemaphoreFdKHR", "semaphore"))?;
-        // SAFETY: Vulkan gives the caller a new file descriptor.
-        Ok(unsafe { OwnedFd::from_raw_fd(fd) })
+        // SAFETY: Vulkan gives the caller a new file descriptor, or -1.
+        match unsafe { owned_fd(fd) } {
+            None if self.fd_type != SemaphoreFdType::SyncFile => {
+                Err(Error::vulkan("vkGetSemaphoreFdKHR", "semaphore")(vk::Result::ERROR_UNKNOWN))
+            }
+            fd => Ok(fd),
+        }
     }
 }
 

@@ -193,6 +193,24 @@ fn two_contexts_share_a_semaphore() {
     }
 }
 
+/// A sync file without a file descriptor has its signal, so that a wait for it ends.
+#[test]
+fn a_sync_file_that_is_signalled_has_no_file_descriptor() {
+    let Some((_, importer)) = two_contexts(OptionalFeature::ExternalSemaphoreFd) else { return };
+    // SAFETY: there is no file descriptor.
+    let imported =
+        unsafe { importer.import_semaphore(SemaphoreKind::Binary, SemaphoreFdType::SyncFile, None) };
+    if let Err(Error::Unsupported { .. }) = imported {
+        eprintln!("NOT TESTED, the driver imports no sync files");
+        return;
+    }
+    let imported = imported.unwrap();
+    let wait = RawWait { semaphore: imported.raw(), value: 0, stages: vk::PipelineStageFlags2::ALL_COMMANDS };
+    // SAFETY: the semaphore is signalled, and outlives the work.
+    unsafe { importer.submit_with(importer.acquire_command_buffer().unwrap(), &[wait], &[]) }.unwrap();
+    importer.wait_idle().unwrap();
+}
+
 fn message<T>(result: lvk::Result<T>) -> String {
     let Err(error) = result else { return String::new() };
     assert!(matches!(error, Error::InvalidUsage { .. } | Error::Unsupported { .. }), "{error:?}");
@@ -282,8 +300,14 @@ fn wrong_descriptions_are_refused() {
         let refused = message(ctx.import_texture_memory(&texture_desc(), opaque(4)));
         assert!(refused.contains("shared texture: the imported memory has 4 bytes"), "{refused}");
         let sync_file =
-            ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile, other_file());
+            ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile, Some(other_file()));
         assert!(message(sync_file).contains("a sync file holds a binary semaphore"));
+        let none = ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::Opaque, None);
+        let refused = message(none);
+        assert!(
+            refused.contains("only a sync file may be signalled") || refused.contains("does not share it"),
+            "{refused}"
+        );
         let timeline = ctx.create_shared_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile);
         assert!(message(timeline).contains("a sync file holds a binary semaphore"));
     }

@@ -1,6 +1,6 @@
 //! Memory that other devices, processes and APIs share by file descriptors: its allocation, export and import.
 
-use std::os::fd::{AsRawFd, FromRawFd, IntoRawFd, OwnedFd};
+use std::os::fd::{AsRawFd, FromRawFd, IntoRawFd, OwnedFd, RawFd};
 
 use ash::vk;
 
@@ -223,8 +223,18 @@ impl Gpu {
         let fd =
             unsafe { functions.get_memory_fd(&info) }.map_err(Error::vulkan("vkGetMemoryFdKHR", name))?;
         // SAFETY: Vulkan gives the caller a new file descriptor.
-        Ok(unsafe { OwnedFd::from_raw_fd(fd) })
+        let fd = unsafe { owned_fd(fd) };
+        fd.ok_or_else(|| Error::vulkan("vkGetMemoryFdKHR", name)(vk::Result::ERROR_UNKNOWN))
     }
+}
+
+/// Returns a file descriptor that a driver gave; `None` for a negative number, which an [`OwnedFd`] must not hold.
+///
+/// # Safety
+/// A number that is not negative is a new file descriptor, which nothing else closes.
+pub(crate) unsafe fn owned_fd(fd: RawFd) -> Option<OwnedFd> {
+    // SAFETY: the number is not negative; the caller promises the rest.
+    (fd >= 0).then(|| unsafe { OwnedFd::from_raw_fd(fd) })
 }
 
 /// Returns the memory type to import with, or an error that names the object.
@@ -281,6 +291,16 @@ mod tests {
         assert_eq!(shared_type(&types, 0b0011), Some(0));
         assert_eq!(shared_type(&types, 0b0010), None);
         assert_eq!(shared_type(&[], u32::MAX), None);
+    }
+
+    #[test]
+    fn a_negative_number_is_no_file_descriptor() {
+        // SAFETY: neither number is a file descriptor.
+        assert!(unsafe { owned_fd(-1) }.is_none() && unsafe { owned_fd(RawFd::MIN) }.is_none());
+        let file = std::fs::File::open("/dev/null").unwrap();
+        let number = OwnedFd::from(file).into_raw_fd();
+        // SAFETY: the file is open, and nothing else owns it.
+        assert_eq!(unsafe { owned_fd(number) }.unwrap().as_raw_fd(), number);
     }
 
     #[test]
