@@ -12,6 +12,8 @@ use crate::test_support::fault_injection;
 use crate::test_support::null_commands::with_null_commands;
 #[cfg(feature = "test-hooks")]
 pub use crate::test_support::outside_bytes;
+#[cfg(all(feature = "glsl", feature = "test-hooks"))]
+pub use crate::test_support::outside_pipelines;
 #[cfg(feature = "software-ray-query")]
 pub use crate::test_support::software_ray_query::hooks::*;
 use crate::test_support::submit_hook;

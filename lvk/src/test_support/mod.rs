@@ -8,6 +8,8 @@ pub(crate) mod micromap_functions;
 pub(crate) mod null_commands;
 #[cfg(feature = "test-hooks")]
 pub mod outside_bytes;
+#[cfg(all(feature = "glsl", any(test, feature = "test-hooks")))]
+pub mod outside_pipelines;
 #[cfg(test)]
 pub(crate) mod scattered_bounds;
 #[cfg(feature = "software-ray-query")]

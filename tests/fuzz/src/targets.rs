@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lvk::test_hooks::outside_bytes;
+use lvk::test_hooks::{outside_bytes, outside_pipelines};
 use lvk_samples::app::progress::Progress;
 use lvk_samples::picture::{self, Bounds};
 use lvk_samples::scene::{ObjOptions, Scene};
@@ -21,6 +21,11 @@ pub const TARGETS: &[Target] = &[
     Target { name: "cameras", memory: MemoryBound { fixed: 2048 * KIB, multiple: 64 }, read: read_cameras },
     Target { name: "image", memory: MemoryBound { fixed: 256 * KIB, multiple: 16 << 14 }, read: read_image },
     Target { name: "spirv", memory: MemoryBound { fixed: 1024 * KIB, multiple: 512 }, read: read_spirv },
+    Target {
+        name: "ray_pipeline",
+        memory: MemoryBound { fixed: 4096 * KIB, multiple: 512 },
+        read: read_ray_pipeline,
+    },
     Target { name: "glsl", memory: MemoryBound { fixed: 512 * KIB, multiple: 8192 }, read: read_glsl },
     Target {
         name: "pipeline_cache",
@@ -124,6 +129,16 @@ fn read_spirv(bytes: &[u8]) {
     input.short();
     input.byte();
     outside_bytes::read_spirv(choice, &input.words());
+}
+
+/// SPIR-V words of a shader of a ray tracing pipeline, whose other shaders are intact. The first four bytes choose the place of
+/// the shader and the traversal, so that words stay aligned.
+fn read_ray_pipeline(bytes: &[u8]) {
+    let mut input = Input::new(bytes);
+    let choice = input.byte();
+    input.short();
+    input.byte();
+    outside_pipelines::read_ray_pipeline(choice, &input.words());
 }
 
 /// GLSL texts: the module's own, then pairs of the name and the text of a listed include, then a log of the compiler. A NUL

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, RgbaImage};
-use lvk::test_hooks::outside_bytes;
+use lvk::test_hooks::{outside_bytes, outside_pipelines};
 
 /// Choices that begin an input of the target `image`: the name of the file, and small bounds.
 const PNG: u8 = 0;
@@ -24,16 +24,21 @@ fn write(target: &str, name: &str, parts: &[&[u8]]) {
 #[ignore = "writes files"]
 fn write_seeds() {
     write_images();
-    for (number, (choice, words)) in outside_bytes::example_spirv().into_iter().enumerate() {
-        let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        write("spirv", &format!("seed-{number}"), &[&[choice, 0, 0, 0], &words]);
-    }
+    write_modules("spirv", outside_bytes::example_spirv());
+    write_modules("ray_pipeline", outside_pipelines::example_ray_pipeline());
     for (number, (is_aabbs, counts, tree)) in outside_bytes::example_trees().into_iter().enumerate() {
         let choice = 1 | u8::from(is_aabbs) << 1 | (counts.len() as u8) << 2;
         let counts: Vec<u8> = counts.iter().flat_map(|count| (*count as u16).to_le_bytes()).collect();
         write("tree", &format!("seed-{number}"), &[&[choice], &counts, &tree]);
     }
     write("blas", "seed-0", &[&[1], &outside_bytes::example_blas()]);
+}
+
+fn write_modules(target: &str, modules: Vec<(u8, Vec<u32>)>) {
+    for (number, (choice, words)) in modules.into_iter().enumerate() {
+        let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        write(target, &format!("seed-{number}"), &[&[choice, 0, 0, 0], &words]);
+    }
 }
 
 fn write_images() {
