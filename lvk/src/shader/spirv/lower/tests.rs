@@ -54,8 +54,8 @@ fn the_kernels_of_lowered_pipelines_are_those_of_their_source() {
 }
 
 /// The shaders of a pipeline: stage and text.
-struct Pipeline {
-    shaders: Vec<(ShaderStage, &'static str)>,
+struct Pipeline<'a> {
+    shaders: Vec<(ShaderStage, &'a str)>,
     miss: Vec<usize>,
     hit: Vec<HitShaders>,
     callable: Vec<usize>,
@@ -63,18 +63,15 @@ struct Pipeline {
 }
 
 /// Lowers a pipeline for each traversal, with the first shader as the ray generation shader.
-fn lowered(pipeline: &Pipeline) -> Vec<Result<Vec<u32>, LoweringError>> {
+fn lowered(pipeline: &Pipeline<'_>) -> Vec<Result<Vec<u32>, LoweringError>> {
     let one = |(_, traversal, options): (&str, Traversal, CompileOptions)| {
         let words: Vec<Vec<u32>> =
             pipeline.shaders.iter().map(|(stage, text)| compiled(*stage, text, &options)).collect();
-        let module = |((stage, _), words): (&(ShaderStage, &'static str), &'static [u32])| StageModule {
-            name: "shader",
-            stage: *stage,
-            words,
-            specialization: &[],
-        };
-        let words: Vec<&'static [u32]> = words.into_iter().map(|words| &*words.leak()).collect();
-        let modules: Vec<StageModule<'_>> = pipeline.shaders.iter().zip(words).map(module).collect();
+        let stages = pipeline.shaders.iter().map(|(stage, _)| *stage);
+        let modules: Vec<_> = stages
+            .zip(&words)
+            .map(|(stage, words)| StageModule { name: "shader", stage, words, specialization: &[] })
+            .collect();
         lower(&Lowering {
             traversal,
             is_for_swiftshader: traversal == Traversal::SoftwareCpu,
@@ -116,7 +113,7 @@ const CLOSEST_HIT: &str = "
             + gl_ObjectToWorldEXT * vec4(1);
     }";
 
-fn simple() -> Pipeline {
+fn simple() -> Pipeline<'static> {
     Pipeline {
         shaders: vec![
             (ShaderStage::RayGen, RAY_GEN),
@@ -230,7 +227,7 @@ const CALLING: &str = "
     void main() { float kept = data.x; inner = data * 2.0; executeCallableEXT(0, 1); data += inner * kept; }";
 
 /// A pipeline of everything; `callables` are its callable shaders.
-fn busy(callables: [&'static str; 2]) -> Pipeline {
+fn busy(callables: [&'static str; 2]) -> Pipeline<'static> {
     Pipeline {
         shaders: vec![
             (ShaderStage::RayGen, BUSY_RAY_GEN),
@@ -328,7 +325,7 @@ fn images_are_decorated_where_the_driver_needs_it() {
 }
 
 /// Returns a closest-hit shader that traces a ray, with a ray query of its own before and behind the trace.
-fn querying_hit(before: &str, behind: &str) -> &'static str {
+fn querying_hit(before: &str, behind: &str) -> String {
     format!(
         "#extension GL_EXT_ray_query : require
          layout(location = 0) rayPayloadInEXT vec3 color;
@@ -344,21 +341,20 @@ fn querying_hit(before: &str, behind: &str) -> &'static str {
              }}
          }}"
     )
-    .leak()
 }
 
 #[test]
 fn queries_that_go_on_behind_a_trace_are_refused() {
-    let lowered_by_queries = |text: &'static str| {
-        let mut pipeline = simple();
+    let lowered_by_queries = |text: &str| {
+        let mut pipeline: Pipeline<'_> = simple();
         let place = pipeline.shaders.iter().position(|(stage, _)| *stage == ShaderStage::ClosestHit).unwrap();
         pipeline.shaders[place].1 = text;
         pipeline.max_recursion = 2;
         lowered(&pipeline).swap_remove(0)
     };
-    let words = lowered_by_queries(querying_hit("", "START;")).unwrap();
+    let words = lowered_by_queries(&querying_hit("", "START;")).unwrap();
     crate::shader::spirv::words::validate(&words).unwrap();
-    let error = lowered_by_queries(querying_hit("START;", "")).unwrap_err();
+    let error = lowered_by_queries(&querying_hit("START;", "")).unwrap_err();
     assert!(error.message.contains("a ray query that goes on behind OpTraceRayKHR"), "{}", error.message);
 }
 
