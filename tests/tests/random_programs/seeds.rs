@@ -1,8 +1,11 @@
 //! The tests: seeds of the bounded tests, programs on several threads, and the long run.
 
+use std::ffi::OsStr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
+
+use lvk_tests::subprocess::in_subprocess;
 
 use super::environment::Environment;
 use super::op::{Kind, Op, program};
@@ -17,6 +20,8 @@ use super::world::Tally;
 const LENGTH: usize = 400;
 /// Programs of the bounded tests, for each kind of queues.
 const BOUNDED_SEEDS: u64 = 400;
+/// Programs of the bounded test by lowered pipelines, which take longer to create.
+const LOWERED_SEEDS: u64 = 60;
 /// Programs after which objects and memory are counted.
 const CHECKED_EVERY: u64 = 16;
 /// Runs the programs of seeds one after the other. Returns what they have done.
@@ -114,6 +119,19 @@ fn random_programs_on_four_threads_of_one_context_do_what_the_model_says() {
             let Some(total) = run_on_threads(queues, &seeds, 4, dog) else { return };
             eprintln!("{queues:?}, four threads: {total}");
         }
+    });
+}
+
+/// The device's ray queries and the library's traversal, in a process of its own, whose environment chooses the pipelines.
+#[test]
+fn random_programs_by_lowered_pipelines_do_what_the_model_says() {
+    let variables = [("LVK_TEST_RAY_PIPELINE", Some(OsStr::new("software")))];
+    in_subprocess(random_programs_by_lowered_pipelines_do_what_the_model_says, &variables, || {
+        Watchdog::watch(|dog| {
+            let seeds = 2_000_000..2_000_000 + LOWERED_SEEDS;
+            let Some(total) = run_seeds(lvk::QueueRequest::OwnHardware, seeds, dog) else { return };
+            assert!(total.hits > LOWERED_SEEDS, "rays are too rare");
+        });
     });
 }
 
