@@ -101,13 +101,13 @@ impl Context {
         // Vulkan's number for a sync file whose signal has come.
         const SIGNALLED: i32 = -1;
         let gpu = &self.device_state().gpu;
-        check_semaphore(gpu, kind, fd_type, vk::ExternalSemaphoreFeatureFlags::IMPORTABLE)?;
         if fd.is_none() && fd_type != SemaphoreFdType::SyncFile {
             return Err(Error::usage(
                 "semaphore",
                 "only a sync file may be signalled and have no file descriptor",
             ));
         }
+        check_semaphore(gpu, kind, fd_type, vk::ExternalSemaphoreFeatureFlags::IMPORTABLE)?;
         let semaphore = SharedSemaphore::new(gpu, kind, fd_type, None)?;
         let flags = match fd_type {
             SemaphoreFdType::Opaque => vk::SemaphoreImportFlags::empty(),

@@ -303,11 +303,7 @@ fn wrong_descriptions_are_refused() {
             ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile, Some(other_file()));
         assert!(message(sync_file).contains("a sync file holds a binary semaphore"));
         let none = ctx.import_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::Opaque, None);
-        let refused = message(none);
-        assert!(
-            refused.contains("only a sync file may be signalled") || refused.contains("does not share it"),
-            "{refused}"
-        );
+        assert!(message(none).contains("only a sync file may be signalled"));
         let timeline = ctx.create_shared_semaphore(SemaphoreKind::Timeline, SemaphoreFdType::SyncFile);
         assert!(message(timeline).contains("a sync file holds a binary semaphore"));
     }
