@@ -1,11 +1,12 @@
 //! The pipelines of the samples and of the benchmarks.
 
+use lvk_samples::app::sample_info::SampleInfo as _;
 use lvk_samples::pipelines::SamplePipeline;
 
 /// Returns every pipeline of the samples and of the benchmarks.
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
-    [lvk_samples::pipelines::all(), lvk_bench::pipelines()].concat()
+    [lvk_samples::pipelines::all(), lvk_viewer::Viewer::pipelines(), lvk_bench::pipelines()].concat()
 }
 
 #[cfg(test)]
