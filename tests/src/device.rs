@@ -165,6 +165,7 @@ pub fn loses_neighbours_of_inactive(ctx: &Context) -> bool {
 
 /// True if the driver draws to windows of an X server without a screen. NVIDIA's (580.159.04) makes no swapchain there, and
 /// ends the process when it is asked whether it presents to a server without GLX. Prints a line if it does not.
+#[cfg_attr(not(target_os = "linux"), allow(dead_code, reason = "windows of tests are those of X servers"))]
 pub(crate) fn draws_to_virtual_displays() -> bool {
     let draws = !loader().is_ok_and(|loader| loader.has_nvidia);
     if !draws {
@@ -210,6 +211,10 @@ pub(crate) fn fetched<T>(found: Result<T, DriverError>, what: &str) -> Option<T>
 struct Loader {
     /// `None` for the system's own.
     library: Option<PathBuf>,
+    #[cfg_attr(
+        not(target_os = "linux"),
+        allow(dead_code, reason = "windows of tests are those of X servers")
+    )]
     has_nvidia: bool,
 }
 
