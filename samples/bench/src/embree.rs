@@ -3,7 +3,6 @@
 //! Names, numbers and layouts are those of Embree's C interface, `rtcore.h`.
 
 use std::ffi::{CString, c_char, c_void};
-use std::mem::MaybeUninit;
 use std::path::{Path, PathBuf};
 use std::ptr;
 use std::time::{Duration, Instant};
@@ -355,7 +354,7 @@ unsafe fn allocate(allocator: Object, user: Object, primitives: u32) -> Object {
     unsafe {
         let functions = &*user.cast::<Functions>();
         let node = (functions.thread_local_alloc)(allocator, size_of::<Node>(), align_of::<Node>());
-        node.cast::<MaybeUninit<Node>>().write(MaybeUninit::new(empty));
+        node.cast::<Node>().write(empty);
         node
     }
 }
