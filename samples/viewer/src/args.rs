@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use lvk_samples::app::ray_args::RayArgs;
 use lvk_samples::app::value_parsers::{positive, whole};
 
-use crate::config::ViewerConfig;
+use crate::config::{Content, Method, ToneMapping, ViewerConfig};
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -34,12 +34,12 @@ pub struct ViewerArgs {
     pub time: f32,
 
     /// Method that renders
-    #[arg(long, value_enum, default_value_t = MethodArg::Hybrid)]
-    pub method: MethodArg,
+    #[arg(long, value_enum, default_value_t = Method::Hybrid)]
+    pub method: Method,
 
     /// Contents of the picture; all but light needs --method hybrid
-    #[arg(long, value_enum, default_value_t = ContentArg::Light)]
-    pub view: ContentArg,
+    #[arg(long, value_enum, default_value_t = Content::Light)]
+    pub view: Content,
 
     /// Samples of each pixel, 1 to 65536; of the hybrid method, frames that a still takes the mean of. Noise falls with their square
     /// root
@@ -56,8 +56,8 @@ pub struct ViewerArgs {
     pub exposure: f32,
 
     /// Mapping of radiance to what a display shows
-    #[arg(long, value_enum, default_value_t = ToneArg::Neutral)]
-    pub tone: ToneArg,
+    #[arg(long, value_enum, default_value_t = ToneMapping::Neutral)]
+    pub tone: ToneMapping,
 
     /// Light from outside of the model
     #[command(flatten)]
@@ -89,34 +89,6 @@ pub struct LightArgs {
     pub sun_radius: f32,
 }
 
-/// The method that renders.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodArg {
-    /// Rasterise surfaces, trace a few rays from each, and filter over time and space.
-    Hybrid,
-    /// Trace paths from the camera, without a bias: the reference.
-    Pathtrace,
-}
-
-/// Contents of the picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ContentArg {
-    /// Light.
-    Light,
-    /// Normals: red to the right, green up, blue towards +z.
-    Normals,
-    /// Roughness.
-    Roughness,
-    /// Motion since the frame before.
-    Motion,
-    /// Albedo of matte layers.
-    Albedo,
-    /// Light that matte layers receive, filtered.
-    Matte,
-    /// Light that all other layers receive, filtered.
-    Mirrored,
-}
-
 /// The sky.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SkyArg {
@@ -126,15 +98,6 @@ pub enum SkyArg {
     White,
     /// No light but that of the model.
     Black,
-}
-
-/// The mapping of radiance to what a display shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ToneArg {
-    /// Khronos PBR Neutral: colours of materials stay, highlights are compressed.
-    Neutral,
-    /// No mapping; what is too bright is clipped.
-    Linear,
 }
 
 fn seconds(text: &str) -> Result<f32, String> {

@@ -1,32 +1,34 @@
 //! The configuration of the sample.
 
+use clap::ValueEnum;
 use lvk::Capabilities;
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
 
 /// The mapping of radiance to what a display shows, by its number in `shaders/viewer/tone.glsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 #[repr(u32)]
 pub enum ToneMapping {
-    /// Khronos PBR Neutral.
+    /// Khronos PBR Neutral: colours of materials stay, highlights are compressed.
     #[default]
     Neutral,
-    /// None.
+    /// No mapping; what is too bright is clipped.
     Linear,
 }
 
 /// The method that renders.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Method {
-    /// Rasterised surfaces, a few rays for each, and filters over time and space.
+    /// Rasterise surfaces, trace a few rays from each, and filter over time and space.
     #[default]
     Hybrid,
-    /// Paths from the camera, without a bias.
+    /// Trace paths from the camera, without a bias: the reference.
+    #[value(name = "pathtrace")]
     PathTrace,
 }
 
 /// Contents of the picture, by their numbers in `shaders/viewer/plane.glsl`. All but light is known to the hybrid method alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 #[repr(u32)]
 pub enum Content {
     /// Light.

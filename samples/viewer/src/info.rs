@@ -6,8 +6,8 @@ use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample_info::prelude::*;
 use lvk_samples::hybrid::RayPath;
 
-use crate::args::{ContentArg, LightArgs, MethodArg, SkyArg, ToneArg, ViewerArgs};
-use crate::config::{Content, Method, ToneMapping, ViewerConfig};
+use crate::args::{LightArgs, SkyArg, ViewerArgs};
+use crate::config::ViewerConfig;
 use crate::light::{Environment, SunSetting};
 use crate::model::{ModelCamera, ModelError, cameras, load, posed, showcase};
 use crate::pipelines;
@@ -86,18 +86,12 @@ impl SampleInfo for Viewer {
         setup.progress.stage("uploading the model and building acceleration structures", 0);
         let [width, height] = setup.extent();
         let config = ViewerConfig {
-            method: match args.method {
-                MethodArg::Hybrid => Method::Hybrid,
-                MethodArg::Pathtrace => Method::PathTrace,
-            },
-            content: content(args.view),
+            method: args.method,
+            content: args.view,
             samples: args.samples,
             bounces: args.bounces,
             exposure_stops: args.exposure,
-            tone_mapping: match args.tone {
-                ToneArg::Neutral => ToneMapping::Neutral,
-                ToneArg::Linear => ToneMapping::Linear,
-            },
+            tone_mapping: args.tone,
             is_progressive: setup.is_for_window(),
             ..ViewerConfig::new(path, width, height)
         };
@@ -137,18 +131,6 @@ fn scene(args: &ViewerArgs, model: Model) -> ViewerScene {
     environment.sun = environment.sun.filter(|_| !has_sun);
     let name = args.file.as_deref().map_or_else(|| "showcase".to_owned(), lvk::readable_name);
     ViewerScene { name, model, environment, disc_radius: sun_radius.to_radians() }
-}
-
-fn content(wish: ContentArg) -> Content {
-    match wish {
-        ContentArg::Light => Content::Light,
-        ContentArg::Normals => Content::Normals,
-        ContentArg::Roughness => Content::Roughness,
-        ContentArg::Motion => Content::Motion,
-        ContentArg::Albedo => Content::Albedo,
-        ContentArg::Matte => Content::Matte,
-        ContentArg::Mirrored => Content::Mirrored,
-    }
 }
 
 /// The animation that the arguments name.

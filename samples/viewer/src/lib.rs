@@ -18,6 +18,6 @@ mod present;
 mod renderer;
 mod viewer;
 
-pub use args::{ContentArg, LightArgs, MethodArg, SkyArg, ToneArg, ViewerArgs};
+pub use args::{LightArgs, SkyArg, ViewerArgs};
 pub use config::{Content, Method, ToneMapping, ViewerConfig};
 pub use viewer::{Viewer, ViewerScene};
