@@ -4,9 +4,15 @@
 
 use std::ffi::OsStr;
 
-use lvk::{ComputePipelineHandle, Context, Dependencies, Result, ValidationMode};
+use lvk::{
+    ComputePipelineHandle, Context, Dependencies, HitGroup, RayTracingPipelineDesc, RayTracingPipelinePath,
+    Result, ShaderStage, ValidationMode,
+};
 use lvk_tests::compute::{compute_pipeline, words_buffer};
 use lvk_tests::device_with;
+use lvk_tests::pipeline_paths::pipeline_devices;
+use lvk_tests::ray_tracer::shader;
+use lvk_tests::shader_groups::{Counts, GroupScene};
 use lvk_tests::subprocess::output_of_subprocess;
 
 /// Writes the word of one buffer at a place to another.
@@ -62,6 +68,53 @@ fn the_layer_prints_what_shaders_print() {
     let Some(said) = said.filter(|said| said.contains("dispatched")) else { return };
     for number in 1..=3 {
         assert!(said.contains(&format!("sheep {number} of 3")), "{said}");
+    }
+}
+
+/// Each shader of a ray prints the path, and the index of the ray.
+fn print_in_each_shader(path: RayTracingPipelinePath, ctx: &Context) -> Result<()> {
+    let text = |variable: &str, name: &str, code: &str| {
+        format!(
+            "layout(buffer_reference, scalar) buffer Words {{ uint at[]; }};
+             layout(push_constant, scalar) uniform Push {{ Words results; uint tlas; uint hits; uint misses; }};
+             layout(location = 0) {variable} uint value;
+             void main() {{ {code} debugPrintfEXT(\"{path:?} {name} %u\", gl_LaunchIDEXT.x + value); }}"
+        )
+    };
+    let trace = "value = 0;
+        traceRayEXT(kTLAS[tlas], 0, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, vec3(0, 0, gl_LaunchIDEXT.x == 0 ? 1 : -1), 9.0, 0);";
+    let ray_gen = shader(ctx, ShaderStage::RayGen, &text("rayPayloadEXT", "behind", trace))?;
+    let hit = shader(ctx, ShaderStage::ClosestHit, &text("rayPayloadInEXT", "hit", "value += 10;"))?;
+    let miss = shader(ctx, ShaderStage::Miss, &text("rayPayloadInEXT", "miss", "value += 20;"))?;
+    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &[*ray_gen],
+        miss: &[*miss],
+        hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }],
+        ..Default::default()
+    })?;
+    let counts = Counts { hits: 1, misses: 1, callables: 0 };
+    GroupScene::new(ctx)?.run(*pipeline, 0, counts).map(drop)
+}
+
+#[test]
+fn the_layer_prints_what_ray_tracing_shaders_print_on_every_path() {
+    let on = Some(OsStr::new("1"));
+    let variables = [("VK_LAYER_PRINTF_ENABLE", on), ("VK_LAYER_PRINTF_TO_STDOUT", on)];
+    let test = the_layer_prints_what_ray_tracing_shaders_print_on_every_path;
+    let said = output_of_subprocess(test, &variables, || {
+        for (path, ctx) in pipeline_devices() {
+            print_in_each_shader(path, &ctx).unwrap();
+            println!("traced by {path:?}");
+        }
+    });
+    let Some(said) = said else { return };
+    for path in ["Hardware", "Query", "Software"] {
+        if !said.contains(&format!("traced by {path}")) {
+            continue;
+        }
+        for line in ["hit 10", "miss 21", "behind 10", "behind 21"] {
+            assert!(said.contains(&format!("{path} {line}")), "{path} {line}: {said}");
+        }
     }
 }
 

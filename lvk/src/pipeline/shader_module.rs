@@ -116,7 +116,8 @@ fn create_raw(gpu: &Gpu, name: &str, words: &[u32]) -> Result<vk::ShaderModule> 
 /// Returns the capabilities of ray tracing stages that need no feature of the device if pipelines are lowered.
 fn lowered_capabilities(device: &Capabilities) -> impl Iterator<Item = u32> {
     let fetch = device.position_fetch.then_some(Capability::RayTracingPositionFetchKHR);
-    let always = [Capability::RayTracingKHR, Capability::RayTraversalPrimitiveCullingKHR];
+    let always =
+        [Capability::RayTracingKHR, Capability::RayTraversalPrimitiveCullingKHR, Capability::RayCullMaskKHR];
     always.into_iter().chain(fetch).map(|capability| capability as u32)
 }
 

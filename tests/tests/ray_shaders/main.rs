@@ -3,6 +3,7 @@
 
 mod any_hit;
 mod invocation_reorder;
+mod judging_loops;
 mod launches;
 mod lowered;
 mod payload_types;
@@ -11,5 +12,6 @@ mod query_getters;
 mod query_stages;
 mod random_pipelines;
 mod recursion;
+mod shader_forms;
 mod swiftshader;
 mod which_runs;

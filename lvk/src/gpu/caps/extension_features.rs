@@ -26,6 +26,7 @@ pub(crate) struct ExtensionFeatures {
     pub(crate) fault: vk::PhysicalDeviceFaultFeaturesEXT<'static>,
     pub(crate) invocation_reorder: InvocationReorderFeatures,
     pub(crate) invocation_reorder_nv: vk::PhysicalDeviceRayTracingInvocationReorderFeaturesNV<'static>,
+    pub(crate) ray_tracing_maintenance1: vk::PhysicalDeviceRayTracingMaintenance1FeaturesKHR<'static>,
     pub(crate) micromaps: vk::PhysicalDeviceOpacityMicromapFeaturesEXT<'static>,
     pub(crate) swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'static>,
     /// All true on devices without `VK_KHR_portability_subset`.
@@ -99,6 +100,9 @@ impl ExtensionFeatures {
         }
         if has(ash::nv::ray_tracing_invocation_reorder::NAME) {
             all = all.push_next(&mut self.invocation_reorder_nv);
+        }
+        if has(ash::khr::ray_tracing_maintenance1::NAME) {
+            all = all.push_next(&mut self.ray_tracing_maintenance1);
         }
         if has(ash::ext::opacity_micromap::NAME) {
             all = all.push_next(&mut self.micromaps);

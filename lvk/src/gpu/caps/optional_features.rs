@@ -187,6 +187,9 @@ pub enum OptionalFeature {
     InvocationReorder,
     /// The same by `GL_NV_shader_invocation_reorder` (`VK_NV_ray_tracing_invocation_reorder`).
     InvocationReorderNv,
+    /// The cull mask of a ray in shaders of ray tracing pipelines, `gl_CullMaskEXT` of `GL_EXT_ray_cull_mask`
+    /// (`rayTracingMaintenance1` of `VK_KHR_ray_tracing_maintenance1`). Lowered pipelines need no feature for it.
+    RayTracingMaintenance1,
     /// Opacity micromaps of triangles (`micromap` of `VK_EXT_opacity_micromap`):
     /// [`Context::create_opacity_micromap`](crate::Context::create_opacity_micromap). Only devices that build
     /// acceleration structures have it.
@@ -345,8 +348,8 @@ pub(crate) const OF_MESH_SHADERS: [OptionalFeature; 3] =
     [F::MultiviewMesh, F::MeshShaderQueries, F::MeshPrimitiveShadingRate];
 
 /// Features of ray tracing pipelines, which have a separate flag.
-pub(crate) const OF_RAY_TRACING_PIPELINES: [OptionalFeature; 2] =
-    [F::InvocationReorder, F::InvocationReorderNv];
+pub(crate) const OF_RAY_TRACING_PIPELINES: [OptionalFeature; 3] =
+    [F::InvocationReorder, F::InvocationReorderNv, F::RayTracingMaintenance1];
 
 /// Features of presentation, available only if the instance has surface extensions.
 pub(crate) const OF_WINDOWS: [OptionalFeature; 3] = [F::Swapchain, F::SwapchainMaintenance1, F::HdrMetadata];
@@ -373,7 +376,7 @@ struct FeatureRow {
 }
 
 #[rustfmt::skip]
-const ROWS: [FeatureRow; 104] = [
+const ROWS: [FeatureRow; 105] = [
     FeatureRow { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, field: |f| &mut f.core.full_draw_index_uint32 },
     FeatureRow { feature: F::CubeArrays, name: "imageCubeArray", extension: None, field: |f| &mut f.core.image_cube_array },
     FeatureRow { feature: F::GeometryShader, name: "geometryShader", extension: None, field: |f| &mut f.core.geometry_shader },
@@ -458,6 +461,7 @@ const ROWS: [FeatureRow; 104] = [
     FeatureRow { feature: F::HdrMetadata, name: "VK_EXT_hdr_metadata", extension: Some(ash::ext::hdr_metadata::NAME), field: |f| &mut f.ext.hdr_metadata },
     FeatureRow { feature: F::InvocationReorder, name: "rayTracingInvocationReorder", extension: Some(INVOCATION_REORDER_EXT), field: |f| &mut f.ext.invocation_reorder.ray_tracing_invocation_reorder },
     FeatureRow { feature: F::InvocationReorderNv, name: "VK_NV_ray_tracing_invocation_reorder", extension: Some(ash::nv::ray_tracing_invocation_reorder::NAME), field: |f| &mut f.ext.invocation_reorder_nv.ray_tracing_invocation_reorder },
+    FeatureRow { feature: F::RayTracingMaintenance1, name: "rayTracingMaintenance1", extension: Some(ash::khr::ray_tracing_maintenance1::NAME), field: |f| &mut f.ext.ray_tracing_maintenance1.ray_tracing_maintenance1 },
     FeatureRow { feature: F::OpacityMicromaps, name: "micromap", extension: Some(ash::ext::opacity_micromap::NAME), field: |f| &mut f.ext.micromaps.micromap },
     FeatureRow { feature: F::ConstantAlphaColorBlend, name: "constantAlphaColorBlendFactors", extension: None, field: |f| &mut f.ext.portability.constant_alpha_color_blend_factors },
     FeatureRow { feature: F::Events, name: "events", extension: None, field: |f| &mut f.ext.portability.events },

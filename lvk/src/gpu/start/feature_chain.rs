@@ -342,6 +342,7 @@ extension_structures! {
     fault: vk::PhysicalDeviceFaultFeaturesEXT<'_>, ash::ext::device_fault::NAME;
     invocation_reorder: InvocationReorderFeatures, INVOCATION_REORDER_EXT;
     invocation_reorder_nv: vk::PhysicalDeviceRayTracingInvocationReorderFeaturesNV<'_>, ash::nv::ray_tracing_invocation_reorder::NAME;
+    ray_tracing_maintenance1: vk::PhysicalDeviceRayTracingMaintenance1FeaturesKHR<'_>, ash::khr::ray_tracing_maintenance1::NAME;
     micromaps: vk::PhysicalDeviceOpacityMicromapFeaturesEXT<'_>, ash::ext::opacity_micromap::NAME;
     swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'_>, ash::ext::swapchain_maintenance1::NAME;
     portability: vk::PhysicalDevicePortabilitySubsetFeaturesKHR<'_>, ash::khr::portability_subset::NAME;

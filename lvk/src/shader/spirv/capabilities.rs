@@ -37,7 +37,7 @@ const SHADER_INVOCATION_REORDER_EXT: u32 = 5388;
 type CapabilityRow = (C, fn(&Features) -> vk::Bool32, &'static str);
 
 #[rustfmt::skip]
-const BY_FEATURE: [CapabilityRow; 53] = [
+const BY_FEATURE: [CapabilityRow; 54] = [
     (C::Geometry, |f| f.core.geometry_shader, "geometryShader"),
     (C::Tessellation, |f| f.core.tessellation_shader, "tessellationShader"),
     (C::GeometryPointSize, point_size, "shaderTessellationAndGeometryPointSize"),
@@ -76,6 +76,7 @@ const BY_FEATURE: [CapabilityRow; 53] = [
     (C::RayTracingKHR, |f| f.ext.ray_tracing.ray_tracing_pipeline, "rayTracingPipeline"),
     (C::RayQueryKHR, |f| f.ext.ray_query.ray_query, "rayQuery"),
     (C::RayTraversalPrimitiveCullingKHR, |f| f.ext.ray_tracing.ray_traversal_primitive_culling, "rayTraversalPrimitiveCulling"),
+    (C::RayCullMaskKHR, |f| f.ext.ray_tracing_maintenance1.ray_tracing_maintenance1, "rayTracingMaintenance1"),
     (C::RayTracingPositionFetchKHR, |f| f.ext.position_fetch.ray_tracing_position_fetch, "rayTracingPositionFetch"),
     (C::RayQueryPositionFetchKHR, |f| f.ext.position_fetch.ray_tracing_position_fetch, "rayTracingPositionFetch"),
     (C::ShaderInvocationReorderNV, |f| f.ext.invocation_reorder_nv.ray_tracing_invocation_reorder, "VK_NV_ray_tracing_invocation_reorder"),

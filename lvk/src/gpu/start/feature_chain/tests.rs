@@ -34,6 +34,7 @@ fn all_extensions() -> Vec<&'static CStr> {
         ext::device_fault::NAME,
         INVOCATION_REORDER_EXT,
         ash::nv::ray_tracing_invocation_reorder::NAME,
+        khr::ray_tracing_maintenance1::NAME,
         ext::opacity_micromap::NAME,
         ext::swapchain_maintenance1::NAME,
         khr::portability_subset::NAME,

@@ -145,7 +145,7 @@ pub(super) fn branch_targets(inst: &Inst) -> Vec<u32> {
     match inst.op {
         Op::Branch => vec![inst.operand(0)],
         Op::BranchConditional => vec![inst.operand(1), inst.operand(2)],
-        // Literals of 64 bits are refused earlier.
+        // There are no literals of 64 bits: see `narrow_switches`.
         Op::Switch => {
             let cases = inst.operands.iter().skip(3).step_by(2).copied();
             std::iter::once(inst.operand(1)).chain(cases).collect()

@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use ::spirv::Op;
 
 use super::Traversal;
+use super::constants::freeze_constants;
 use super::linker::Linker;
 use super::module::Module;
-use super::stage::freeze_constants;
 
 /// Ids of the variables and functions of `donor/lowered_pipeline.comp.glsl` in the linked module.
 #[derive(Debug, Clone, Copy, Default)]

@@ -75,6 +75,16 @@ impl<'a> Emitter<'a> {
         self.value(Op::CompositeConstruct, to, &members)
     }
 
+    /// Returns an index as `uint`, from an integer type of any size.
+    pub(super) fn index(&mut self, value: u32, ty: u32) -> u32 {
+        const BITS: u32 = 32;
+        let uint = self.linker.uint();
+        if self.linker.global(ty).is_some_and(|inst| inst.op == Op::TypeInt && inst.operand(1) != BITS) {
+            return self.value(Op::UConvert, uint, &[value]);
+        }
+        self.convert(value, ty, uint)
+    }
+
     /// Copies one variable to another one, whose type has the same shape.
     pub(super) fn copy(&mut self, from: u32, to: u32) {
         if from == to {

@@ -109,9 +109,6 @@ pub(super) fn flatten(
     frame: ShaderFrame<'_>,
     is_wait: &dyn Fn(&Inst) -> bool,
 ) -> Result<FlattenedFunction, String> {
-    if function.code().any(|inst| inst.op == Op::Switch && linker.module.wide.contains(&inst.operand(0))) {
-        return Err("OpSwitch over 64 bits cannot be lowered here".to_owned());
-    }
     split_structs(linker, &mut function);
     promote_variables(linker, &mut function);
     simplify(linker, &mut function);

@@ -128,7 +128,7 @@ impl Form {
             Op::SpecConstantOp => (2, Rest::SpecConstantOp),
             Op::Variable => (2, LiteralsThenIds(1)),
             Op::Undef => (2, Ids),
-            Op::ExtInstImport => (1, IdsThenLiterals(0)),
+            Op::ExtInstImport | Op::String => (1, IdsThenLiterals(0)),
             Op::Decorate | Op::MemberDecorate | Op::DecorateString | Op::MemberDecorateString => {
                 (0, IdsThenLiterals(1))
             }

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::{BuiltIn, Op};
 
+use super::block_loop::run_blocks_in_loop;
 use super::control_flow::ControlFlow;
 use super::donor::Donor;
 use super::emit::Emitter;
@@ -71,7 +72,11 @@ fn rewrite_function(
         }
         block.code = out;
     }
-    checks.into_iter().try_for_each(|call| check_behind(linker, donor, function, call))
+    if !can_return_behind(function, &checks) {
+        run_blocks_in_loop(linker, function)?;
+    }
+    checks.into_iter().for_each(|call| check_behind(linker, donor, function, call));
+    Ok(())
 }
 
 /// Replaces a report by a call of the donor's function.
@@ -99,13 +104,38 @@ fn report(
     }
 }
 
+/// True if the control flow allows a return behind each of the calls with these results.
+fn can_return_behind(function: &Function, calls: &[u32]) -> bool {
+    let flow = ControlFlow::new(function);
+    let has_call =
+        |block: &Block| block.code.iter().any(|inst| inst.result().is_some_and(|id| calls.contains(&id)));
+    let mut with_calls = (0..function.blocks.len()).filter(|at| has_call(&function.blocks[*at]));
+    with_calls.all(|at| can_leave_header(function, at) && !is_on_the_way_back(function, &flow, at))
+}
+
+/// True for a block that heads no loop, and for a header whose code can move to a block of its own.
+fn can_leave_header(function: &Function, at: usize) -> bool {
+    let block = &function.blocks[at];
+    let Some(merge) = block.merge().filter(|inst| inst.op == Op::LoopMerge) else { return true };
+    let exits = [merge.operand(0), merge.operand(1)];
+    let leaves = block.terminator().is_some_and(|inst| {
+        inst.op == Op::Branch || [1, 2].iter().any(|place| exits.contains(&inst.operand(*place)))
+    });
+    leaves && !exits.contains(&block.label)
+}
+
+/// True for a block that only the way back to the start of a loop reaches, from where no return is possible.
+fn is_on_the_way_back(function: &Function, flow: &ControlFlow, at: usize) -> bool {
+    let merges = function.blocks.iter().filter_map(|block| block.merge().map(|inst| (block, inst)));
+    let mut loops = merges.filter(|(_, inst)| inst.op == Op::LoopMerge);
+    loops.any(|(header, inst)| {
+        let target = flow.index_of(inst.operand(1));
+        inst.operand(1) != header.label && target.is_some_and(|target| flow.dominates(target, at))
+    })
+}
+
 /// Returns from the function if the shader has ended in the call with the result `call`.
-fn check_behind(
-    linker: &mut Linker,
-    donor: &Donor,
-    function: &mut Function,
-    call: u32,
-) -> Result<(), String> {
+fn check_behind(linker: &mut Linker, donor: &Donor, function: &mut Function, call: u32) {
     let result = function.head.operand(0);
     let is_call = |inst: &Inst| inst.result() == Some(call);
     let place = function
@@ -113,9 +143,8 @@ fn check_behind(
         .iter()
         .enumerate()
         .find_map(|(at, block)| block.code.iter().position(is_call).map(|place| (at, place)));
-    let Some((at, place)) = place else { return Ok(()) };
-    let at = leave_loop_header(linker, function, at)?;
-    check_continue(function, at)?;
+    let Some((at, place)) = place else { return };
+    let at = leave_loop_header(linker, function, at);
     let place = function.blocks[at].code.iter().position(is_call).unwrap_or(place);
     // The values of built-ins are stored right behind a report.
     let stores = function.blocks[at].code[place + 1..].iter();
@@ -132,7 +161,6 @@ fn check_behind(
     emit_return(&mut Emitter::new(linker, &mut code), result);
     let blocks = [Block { label: leave, code }, Block { label: stay, code: rest }];
     function.blocks.splice(at + 1..at + 1, blocks);
-    Ok(())
 }
 
 /// True for the load and store of the limit behind a report.
@@ -142,18 +170,11 @@ fn is_update(inst: &Inst, donor: &Donor) -> bool {
 }
 
 /// Moves the code of a loop's header to a block of its own, whose index is the result. Other blocks stay.
-fn leave_loop_header(linker: &mut Linker, function: &mut Function, at: usize) -> Result<usize, String> {
+fn leave_loop_header(linker: &mut Linker, function: &mut Function, at: usize) -> usize {
     let Some(merge) = function.blocks[at].merge().filter(|inst| inst.op == Op::LoopMerge).cloned() else {
-        return Ok(at);
+        return at;
     };
     let label = function.blocks[at].label;
-    let exits = [merge.operand(0), merge.operand(1)];
-    let leaves = function.blocks[at].terminator().is_some_and(|inst| {
-        inst.op == Op::Branch || [1, 2].iter().any(|place| exits.contains(&inst.operand(*place)))
-    });
-    if exits.contains(&label) || !leaves {
-        return Err("a call in the header of a loop cannot be lowered".to_owned());
-    }
     let code = std::mem::take(&mut function.blocks[at].code);
     let (phis, mut rest): (Vec<Inst>, Vec<Inst>) = code.into_iter().partition(|inst| inst.op == Op::Phi);
     rest.retain(|inst| inst.op != Op::LoopMerge);
@@ -162,22 +183,7 @@ fn leave_loop_header(linker: &mut Linker, function: &mut Function, at: usize) ->
     function.blocks[at].code.extend([merge, Inst::new(Op::Branch, &[behind])]);
     function.rename_predecessor(label, behind);
     function.blocks.insert(at + 1, Block { label: behind, code: rest });
-    Ok(at + 1)
-}
-
-/// Fails for a block that only the way back to the start of a loop reaches, from where no return is possible.
-fn check_continue(function: &Function, at: usize) -> Result<(), String> {
-    let flow = ControlFlow::new(function);
-    let merges = function.blocks.iter().filter_map(|block| block.merge().map(|inst| (block, inst)));
-    let mut loops = merges.filter(|(_, inst)| inst.op == Op::LoopMerge);
-    let is_inside = loops.any(|(header, inst)| {
-        let target = flow.index_of(inst.operand(1));
-        inst.operand(1) != header.label && target.is_some_and(|target| flow.dominates(target, at))
-    });
-    if is_inside {
-        return Err("a call in the last expression of a loop cannot be lowered".to_owned());
-    }
-    Ok(())
+    at + 1
 }
 
 /// Returns from a function with this result type; the result does not matter.

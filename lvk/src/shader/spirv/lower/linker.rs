@@ -11,8 +11,9 @@ use crate::shader::spirv::parsed::MAX_NESTING;
 /// New ids by the ids of a module that has been linked.
 pub(super) type IdMap = HashMap<u32, u32>;
 
-/// Values of a struct or array that is converted value by value, at most.
-const MAX_CONVERTED: u32 = 4096;
+/// Values of a payload, callable data or attributes at most, as these may be converted value by value. A vector or matrix
+/// counts as one.
+pub(super) const MAX_PASSED: u32 = 4096;
 
 /// The linked module.
 #[derive(Default)]
@@ -43,6 +44,10 @@ impl Linker {
         let mut shared = HashSet::new();
         for import in module.imports {
             self.link_import(import, &mut ids);
+        }
+        for mut string in module.strings {
+            self.map_ids(&mut string, &wide, &mut ids)?;
+            self.module.strings.push(string);
         }
         for global in module.globals {
             let old = global.result();
@@ -243,12 +248,21 @@ impl Linker {
     /// Declares the type of functions without parameters that return nothing.
     pub(super) fn plain_function_type(&mut self) -> u32 {
         let void = self.void();
-        self.declare(Op::TypeFunction, &[void])
+        self.function_type(void, &[])
+    }
+
+    pub(super) fn function_type(&mut self, result: u32, parameters: &[u32]) -> u32 {
+        self.declare(Op::TypeFunction, &[&[result], parameters].concat())
     }
 
     pub(super) fn constant(&mut self, value: u32) -> u32 {
         let uint = self.uint();
         self.declare(Op::Constant, &[uint, value])
+    }
+
+    /// Declares a constant of a type of numbers, by its words.
+    pub(super) fn constant_of(&mut self, ty: u32, words: &[u32]) -> u32 {
+        self.declare(Op::Constant, &[&[ty], words].concat())
     }
 
     pub(super) fn bool_constant(&mut self, value: bool) -> u32 {
@@ -355,6 +369,32 @@ impl Linker {
         self.counted_shape(ty).0
     }
 
+    /// Returns the number of values of a type that passes from one shader to another; `None` for more than
+    /// [`MAX_PASSED`], and for a number that is not known.
+    pub(super) fn value_count(&self, ty: u32) -> Option<u32> {
+        self.value_count_within(ty, MAX_NESTING)
+    }
+
+    /// In a damaged module, a type may contain itself. A struct counts as one value at least, so that the bound ends this.
+    fn value_count_within(&self, ty: u32, nesting: u32) -> Option<u32> {
+        let nesting = nesting.checked_sub(1)?;
+        let inst = self.global(ty)?;
+        let bounded = |count: u32| Some(count).filter(|count| *count <= MAX_PASSED);
+        match inst.op {
+            Op::TypeArray => {
+                let of_each = self.value_count_within(inst.operand(1), nesting)?;
+                bounded(of_each.saturating_mul(self.array_length(ty)?))
+            }
+            Op::TypeStruct => {
+                let count = inst.operands[1..].iter().try_fold(0_u32, |sum, member| {
+                    bounded(sum.saturating_add(self.value_count_within(*member, nesting)?))
+                })?;
+                Some(count.max(1))
+            }
+            _ => Some(1),
+        }
+    }
+
     /// Returns the shape, and the number of values that a conversion moves.
     fn counted_shape(&mut self, ty: u32) -> (u32, u32) {
         if let Some(known) = self.shapes.get(&ty) {
@@ -362,7 +402,7 @@ impl Linker {
         }
         // In a damaged module, a type may contain itself.
         self.shapes.insert(ty, (ty, 1));
-        let Some((key, count)) = self.shape_key(ty).filter(|(_, count)| *count <= MAX_CONVERTED) else {
+        let Some((key, count)) = self.shape_key(ty).filter(|(_, count)| *count <= MAX_PASSED) else {
             return (ty, 1);
         };
         let shape = *self.shape_keys.entry(key).or_insert(ty);

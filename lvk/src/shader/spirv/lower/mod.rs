@@ -1,8 +1,10 @@
 //! Lowers the shaders of a ray tracing pipeline to one compute shader, which traverses in software or by ray queries.
 
 mod assemble;
+mod block_loop;
 mod block_pointers;
 mod calls;
+mod constants;
 mod control_flow;
 mod demote;
 mod donor;
@@ -26,6 +28,8 @@ mod simplify;
 mod slots;
 mod split_structs;
 mod stage;
+mod structure_arguments;
+mod switches;
 mod traces;
 
 use self::assemble::Assembly;

@@ -88,7 +88,7 @@ pub(super) fn functions_that_reach<'a>(
     }
 }
 
-/// A module in sections. Debug information is left out.
+/// A module in sections. Debug information is left out, but for names and texts.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Module {
     pub(super) version: u32,
@@ -102,6 +102,8 @@ pub(super) struct Module {
     pub(super) entry_points: Vec<Inst>,
     /// `OpExecutionMode` and `OpExecutionModeId`.
     pub(super) modes: Vec<Inst>,
+    /// Texts (`OpString`), which `debugPrintfEXT` prints.
+    pub(super) strings: Vec<Inst>,
     pub(super) names: HashMap<u32, String>,
     pub(super) decorations: Vec<Inst>,
     /// Types, constants and variables.
@@ -170,8 +172,9 @@ impl Module {
             return Err(format!("Op{op:?} is cut off"));
         }
         match op {
-            Op::Source | Op::SourceContinued | Op::SourceExtension | Op::String | Op::ModuleProcessed => {}
+            Op::Source | Op::SourceContinued | Op::SourceExtension | Op::ModuleProcessed => {}
             Op::MemberName | Op::Line | Op::NoLine | Op::Nop => {}
+            Op::String => self.strings.push(inst),
             Op::Name => _ = self.names.insert(inst.operand(0), instruction.string(1).0),
             Op::Capability => self.capabilities.push(inst.operand(0)),
             Op::Extension => self.extensions.push(inst),
@@ -251,8 +254,8 @@ impl Module {
         }
         self.extensions.iter().chain(&self.imports).for_each(|inst| inst.write(&mut out));
         Inst::new(Op::MemoryModel, &self.memory_model).write(&mut out);
-        let rest = self.entry_points.iter().chain(&self.modes).chain(&self.decorations).chain(&self.globals);
-        rest.for_each(|inst| inst.write(&mut out));
+        let first = self.entry_points.iter().chain(&self.modes).chain(&self.strings);
+        first.chain(&self.decorations).chain(&self.globals).for_each(|inst| inst.write(&mut out));
         for function in &self.functions {
             function.head.write(&mut out);
             function.parameters.iter().for_each(|inst| inst.write(&mut out));

@@ -18,6 +18,7 @@ pub(super) fn finish(linker: Linker, main: u32) -> Module {
     module.globals.retain(|inst| inst.result().is_none_or(|id| globals.contains(&id)));
     let forward = |inst: &Inst| inst.op != Op::TypeForwardPointer || globals.contains(&inst.operand(0));
     module.globals.retain(forward);
+    module.strings.retain(|inst| globals.contains(&inst.operand(0)));
     let local: HashSet<u32> = local_ids(&module).collect();
     let is_alive = |id: u32| globals.contains(&id) || local.contains(&id);
     module.decorations.retain(|inst| is_alive(inst.operand(0)));
@@ -48,7 +49,7 @@ fn reached_functions(module: &Module, main: u32) -> HashSet<u32> {
     reached
 }
 
-/// Returns the types, constants and variables that the functions use.
+/// Returns the types, constants, variables and texts that the functions use.
 fn reached_globals(module: &Module) -> HashSet<u32> {
     let wide = HashSet::new();
     let mut reached: HashSet<u32> = HashSet::new();

@@ -13,6 +13,8 @@ use super::module::{Function, functions_that_reach};
 use super::passed::Passed;
 use super::push_constants::merge_push_constants;
 use super::stage::{Shader, link_stage};
+use super::structure_arguments::pass_indices;
+use super::switches::narrow_switches;
 use super::traces::{TraceVariables, hide_remap_table, is_trace, rewrite_traces, skips_closest_hit};
 use super::{HitShaders, Lowering, LoweringError, Traversal};
 use crate::shader::ShaderStage;
@@ -49,6 +51,8 @@ impl Shaders {
             };
             let shader = link_stage(linker, module)
                 .map_err(|message| LoweringError { shader: module.name.to_owned(), message })?;
+            narrow_switches(linker, &shader.functions);
+            pass_indices(linker, &shader.functions);
             linked.insert(index, shader);
         }
         let callables_wait = lowering.callable.iter().any(|index| {

@@ -1,12 +1,13 @@
 //! Links one shader of a pipeline: its variables become those of the invocation, and its roles are collected.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use ::spirv::{BuiltIn, Capability, Decoration, ExecutionModel, Op, StorageClass};
 
 use super::StageModule;
+use super::constants::freeze_constants;
 use super::instruction::Inst;
-use super::linker::Linker;
+use super::linker::{Linker, MAX_PASSED};
 use super::module::{Function, Module};
 use super::passed::Passed;
 use crate::bindless::layout;
@@ -59,12 +60,21 @@ enum Role {
     IncomingPayload,
     IncomingCallable,
     Attributes,
+    /// A payload or data of a shader that traces or calls.
+    Outgoing,
     Record,
     Push,
     TlasTable,
     Own,
     /// Descriptors and the like.
     Shared,
+}
+
+impl Role {
+    /// True for a variable whose value passes from one shader to another.
+    fn is_passed(&self) -> bool {
+        matches!(self, Self::IncomingPayload | Self::IncomingCallable | Self::Attributes | Self::Outgoing)
+    }
 }
 
 /// Links a shader. The error is a message.
@@ -88,6 +98,9 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     };
     for (variable, role) in roles {
         let id = of(variable);
+        if role.is_passed() {
+            check_passed(linker, id)?;
+        }
         match role {
             Role::BuiltIn(builtin) => shader.builtins.push((builtin, id)),
             Role::Input(builtin) => shader.inputs.push((id, declare_input(linker, builtin, id))),
@@ -97,7 +110,7 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
             Role::Record => shader.record = Some(id),
             Role::Push => shader.push = Some(id),
             Role::TlasTable => shader.tlas_tables.push(id),
-            Role::Own => shader.own.push(id),
+            Role::Outgoing | Role::Own => shader.own.push(id),
             Role::Shared => {}
         }
     }
@@ -116,6 +129,18 @@ fn check_module(module: &Module) -> Result<(), String> {
     ];
     let found = refused.iter().find(|capability| module.capabilities.contains(&(**capability as u32)));
     found.map_or(Ok(()), |capability| Err(format!("OpCapability {capability:?} cannot be lowered")))
+}
+
+/// Fails for a variable whose type cannot be compared with the type on the other side. The error is a message.
+fn check_passed(linker: &Linker, variable: u32) -> Result<(), String> {
+    let ty = linker.variable_type(variable).unwrap_or(0);
+    if linker.value_count(ty).is_none() {
+        return Err(format!(
+            "OpVariable of a payload, callable data or attributes has an array whose length is not known, or more than \
+             {MAX_PASSED} values"
+        ));
+    }
+    Ok(())
 }
 
 /// Takes the entry points and their modes out, and returns the entry function.
@@ -138,39 +163,6 @@ fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<u32, String> {
     Ok(entry.operand(1))
 }
 
-/// Gives specialization constants their values, after which they are plain constants.
-pub(super) fn freeze_constants(module: &mut Module, values: &[(u32, u64)]) {
-    let is_spec_id = |inst: &Inst| inst.op == Op::Decorate && inst.operand(1) == Decoration::SpecId as u32;
-    let given: HashMap<u32, u64> = module
-        .decorations
-        .iter()
-        .filter(|inst| is_spec_id(inst))
-        .filter_map(|inst| {
-            let value = values.iter().find(|(id, _)| *id == inst.operand(2));
-            value.map(|(_, bits)| (inst.operand(0), *bits))
-        })
-        .collect();
-    module.decorations.retain(|inst| !is_spec_id(inst));
-    for inst in &mut module.globals {
-        let value = given.get(&inst.operand(1));
-        match inst.op {
-            Op::SpecConstantTrue | Op::SpecConstantFalse => {
-                let is_true = value.map_or(inst.op == Op::SpecConstantTrue, |bits| *bits != 0);
-                inst.op = if is_true { Op::ConstantTrue } else { Op::ConstantFalse };
-            }
-            Op::SpecConstant => {
-                inst.op = Op::Constant;
-                if let Some(bits) = value {
-                    let words = [*bits as u32, (*bits >> 32) as u32];
-                    inst.operands.iter_mut().skip(2).zip(words).for_each(|(own, word)| *own = word);
-                }
-            }
-            Op::SpecConstantComposite => inst.op = Op::ConstantComposite,
-            _ => {}
-        }
-    }
-}
-
 fn roles(module: &Module) -> Vec<(u32, Role)> {
     let decoration = |id: u32, which: Decoration| {
         let is_it = |inst: &&Inst| {
@@ -189,10 +181,8 @@ fn roles(module: &Module) -> Vec<(u32, Role)> {
             (Some(StorageClass::HitAttributeKHR), _) => Role::Attributes,
             (Some(StorageClass::ShaderRecordBufferKHR), _) => Role::Record,
             (Some(StorageClass::PushConstant), _) => Role::Push,
-            (
-                Some(StorageClass::RayPayloadKHR | StorageClass::CallableDataKHR | StorageClass::Private),
-                _,
-            ) => Role::Own,
+            (Some(StorageClass::RayPayloadKHR | StorageClass::CallableDataKHR), _) => Role::Outgoing,
+            (Some(StorageClass::Private), _) => Role::Own,
             (Some(StorageClass::StorageBuffer), _)
                 if decoration(id, Decoration::DescriptorSet) == Some(layout::SET)
                     && decoration(id, Decoration::Binding) == Some(layout::TLAS_TABLE) =>

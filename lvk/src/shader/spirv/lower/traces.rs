@@ -10,7 +10,7 @@ use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::Function;
 use super::passed::Passed;
-use crate::shader::spirv::parsed::MAX_NESTING;
+use super::structure_arguments::{Element, element_of};
 
 /// Variables that the rewritten code uses.
 pub(super) struct TraceVariables<'a> {
@@ -67,10 +67,15 @@ fn rewrite_trace(
     inst: &Inst,
     out: &mut Vec<Inst>,
 ) -> Result<(), String> {
-    let index = structure_index(linker, definitions, inst.operand(0))?;
+    let Some(Element { index, .. }) = element_of(linker, definitions, inst.operand(0)) else {
+        return Err("the acceleration structure of OpTraceRayKHR is no element of kTLAS".to_owned());
+    };
     let donor = variables.donor;
+    let ty = value_type(linker, definitions, index);
+    let mut emitter = Emitter::new(linker, out);
+    let index = emitter.index(index, ty);
+    emitter.store(donor.ray_tlas, index);
     let arguments = [
-        (donor.ray_tlas, index),
         (donor.ray_flags, inst.operand(1)),
         (donor.ray_mask, inst.operand(2)),
         (donor.ray_offset, inst.operand(3)),
@@ -152,30 +157,6 @@ fn store_as(
 pub(super) fn value_type(linker: &Linker, definitions: &HashMap<u32, Inst>, value: u32) -> u32 {
     let inst = definitions.get(&value).or_else(|| linker.global(value));
     inst.and_then(Inst::result_type).unwrap_or(0)
-}
-
-/// Returns the index in `kTLAS` of an acceleration structure.
-fn structure_index(linker: &Linker, definitions: &HashMap<u32, Inst>, structure: u32) -> Result<u32, String> {
-    let defined = |id: u32| {
-        let mut inst = definitions.get(&id);
-        for _ in 0..MAX_NESTING {
-            match inst.filter(|inst| inst.op == Op::CopyObject) {
-                Some(copy) => inst = definitions.get(&copy.operand(2)),
-                None => break,
-            }
-        }
-        inst
-    };
-    let load = defined(structure).filter(|inst| inst.op == Op::Load);
-    let chain = load.and_then(|inst| defined(inst.operand(2)));
-    let is_chain = |inst: &&Inst| {
-        matches!(inst.op, Op::AccessChain | Op::InBoundsAccessChain)
-            && inst.operands.len() == 4
-            && linker.global(inst.operand(2)).is_some()
-    };
-    let chain = chain.filter(is_chain);
-    let why = "the acceleration structure of OpTraceRayKHR is no element of kTLAS";
-    chain.map_or_else(|| Err(why.to_owned()), |inst| Ok(inst.operand(3)))
 }
 
 /// Removes the handles of acceleration structures that only the traces used.
