@@ -11,7 +11,6 @@ use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::{Block, Function};
 use super::switches::emit_choice;
-use super::traces::value_type;
 
 /// Makes each block a case of a switch in a loop. No block but those of the loop has a merge instruction then, and a
 /// return may stand behind any instruction. The error is a message.
@@ -93,7 +92,7 @@ impl Cases<'_> {
         let Some(last) = code.pop() else { return code };
         let done = self.done();
         let numbers: Vec<u32> = last.operands.iter().map(|label| self.number(*label)).collect();
-        let selector = (last.operand(0), value_type(self.linker, &self.definitions, last.operand(0)));
+        let selector = (last.operand(0), self.linker.value_type(&self.definitions, last.operand(0)));
         let mut emitter = Emitter::new(self.linker, &mut code);
         let uint = emitter.linker.uint();
         let next = match last.op {

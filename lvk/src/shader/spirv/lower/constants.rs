@@ -51,7 +51,7 @@ fn evaluate_operations(module: &mut Module) {
         if inst.op == Op::SpecConstantOp {
             known.evaluate(inst);
         }
-        known.note(inst);
+        known.insert(inst);
     }
 }
 
@@ -66,7 +66,7 @@ struct Known {
 }
 
 impl Known {
-    fn note(&mut self, inst: &Inst) {
+    fn insert(&mut self, inst: &Inst) {
         const BITS: u32 = 32;
         let is_known = self.types.contains_key(&inst.operand(0));
         let id = inst.operand(1);

@@ -13,7 +13,6 @@ use super::linker::Linker;
 use super::module::{Block, Function, functions_that_reach};
 use super::passed::Passed;
 use super::stage::Shader;
-use super::traces::value_type;
 
 /// Rewrites the functions of an any-hit or intersection shader. `attributes` pass the attributes of candidates.
 pub(super) fn rewrite_judge(
@@ -89,7 +88,7 @@ fn report(
     inst: &Inst,
     out: &mut Vec<Inst>,
 ) {
-    let kind_type = value_type(linker, definitions, inst.operand(3));
+    let kind_type = linker.value_type(definitions, inst.operand(3));
     let shared = shader.attributes.map(|own| (own, attributes.variable(linker, own)));
     let uint = linker.uint();
     let mut emitter = Emitter::new(linker, out);

@@ -167,6 +167,12 @@ impl Linker {
         self.globals.get(&id)
     }
 
+    /// Returns the type of a value, of which `definitions` has those of its function, or of a constant.
+    pub(super) fn value_type(&self, definitions: &HashMap<u32, Inst>, value: u32) -> u32 {
+        let inst = definitions.get(&value).or_else(|| self.global(value));
+        inst.and_then(Inst::result_type).unwrap_or(0)
+    }
+
     /// Returns the storage class and the target of a pointer type.
     pub(super) fn pointer(&self, ty: u32) -> Option<(u32, u32)> {
         let inst = self.global(ty).filter(|inst| inst.op == Op::TypePointer)?;

@@ -8,7 +8,6 @@ use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::Function;
-use super::traces::value_type;
 use crate::shader::spirv::parsed::MAX_NESTING;
 
 /// An element of an array of acceleration structures.
@@ -32,7 +31,7 @@ pub(super) fn pass_indices(linker: &mut Linker, functions: &[u32]) {
 /// A parameter to be replaced.
 struct Parameter {
     function: u32,
-    /// Its place among the parameters.
+    /// The place among the function's parameters.
     place: usize,
     /// The array of all elements that are passed.
     array: u32,
@@ -106,7 +105,7 @@ fn replace_in_calls(linker: &mut Linker, functions: &[u32], parameter: &Paramete
                     && let Some(argument) = inst.operands.get_mut(3 + parameter.place)
                     && let Some(Element { index, .. }) = element_of(linker, &definitions, *argument)
                 {
-                    let ty = value_type(linker, &definitions, index);
+                    let ty = linker.value_type(&definitions, index);
                     *argument = Emitter::new(linker, &mut out).index(index, ty);
                 }
                 out.push(inst);

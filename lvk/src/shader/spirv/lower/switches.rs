@@ -7,7 +7,6 @@ use ::spirv::Op;
 use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
-use super::traces::value_type;
 
 /// Makes switches over 64 bits switches over the number of the case, in 32 bits: the targets of all switches stand in the
 /// same places then.
@@ -35,7 +34,7 @@ fn narrowed(
     code: &mut Vec<Inst>,
 ) -> Inst {
     let (selector, default) = (switch.operand(0), switch.operand(1));
-    let ty = value_type(linker, definitions, selector);
+    let ty = linker.value_type(definitions, selector);
     let cases = switch.operands.get(2..).unwrap_or_default().as_chunks::<3>().0;
     let numbers: Vec<([u32; 2], u32)> =
         (1..).zip(cases).map(|(number, [low, high, _])| ([*low, *high], number)).collect();

@@ -71,7 +71,7 @@ fn rewrite_trace(
         return Err("the acceleration structure of OpTraceRayKHR is no element of kTLAS".to_owned());
     };
     let donor = variables.donor;
-    let ty = value_type(linker, definitions, index);
+    let ty = linker.value_type(definitions, index);
     let mut emitter = Emitter::new(linker, out);
     let index = emitter.index(index, ty);
     emitter.store(donor.ray_tlas, index);
@@ -146,17 +146,11 @@ fn store_as(
     value: u32,
     out: &mut Vec<Inst>,
 ) {
-    let from = value_type(linker, definitions, value);
+    let from = linker.value_type(definitions, value);
     let to = linker.variable_type(variable).unwrap_or(0);
     let mut emitter = Emitter::new(linker, out);
     let value = emitter.convert(value, from, to);
     emitter.store(variable, value);
-}
-
-/// Returns the type of a value or a constant.
-pub(super) fn value_type(linker: &Linker, definitions: &HashMap<u32, Inst>, value: u32) -> u32 {
-    let inst = definitions.get(&value).or_else(|| linker.global(value));
-    inst.and_then(Inst::result_type).unwrap_or(0)
 }
 
 /// Removes the handles of acceleration structures that only the traces used.
