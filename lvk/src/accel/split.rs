@@ -32,8 +32,8 @@ pub(crate) struct PartPlan {
     pub(crate) geometries: Vec<Vec<u32>>,
 }
 
-/// Splits a mesh into spatially compact parts that fit and overlap little. The number of parts is about the minimum,
-/// or up to twice that for a mesh that mixes large and small primitives. Parts that still do not fit, because their
+/// Splits a mesh into spatially compact parts that fit and overlap little. The number of parts is up to 1.4 times the
+/// minimum, or up to 3 times for a mesh whose parts would overlap much. Parts that still do not fit, because their
 /// mix of geometries needs more memory, are split further. `bounds` holds the bounds of each geometry's primitives.
 /// `sizes` returns the sizes of an acceleration structure with the given number of primitives of each geometry.
 /// Deterministic.
@@ -99,8 +99,7 @@ impl SplitPlanner<'_> {
     fn split_part(&mut self, items: &mut [PrimitiveBounds], parts: u64) -> Result<()> {
         let share = (items.len() as u64).div_ceil(parts).max(1) as usize;
         let leaf = (share / median_leaves_of_part(parts)).max(1);
-        let enough = usize::try_from(parts.saturating_mul(2)).unwrap_or(usize::MAX);
-        for mut part in merge_parts(sah_leaves(items, leaf), share, enough) {
+        for mut part in merge_cheapest(&sah_leaves(items, leaf), share, parts) {
             self.plan_parts(&mut part)?;
         }
         Ok(())
@@ -184,84 +183,137 @@ fn sah_leaves(items: &mut [PrimitiveBounds], most: usize) -> Vec<&mut [Primitive
     done
 }
 
+/// A way to merge leaves to parts.
+#[derive(Debug, Clone, Copy)]
+struct MergeRule {
+    /// Share of the surface of a merged part that its preference to two parts is worth. Where it is negative, parts
+    /// are merged only if they overlap much.
+    preference: f32,
+    /// Most parts, as a multiple of the minimum.
+    most_parts: f32,
+}
+
+/// The first rule makes few parts. The second makes many that overlap less, which is cheaper where no few parts are
+/// compact, as for shapes that reach into each other. The idea is that of re-braiding (Benthin and others, *Improved
+/// Two-Level BVHs using Partial Re-Braiding*, 2017): it opens the structures that overlap.
+const MERGE_RULES: [MergeRule; 2] =
+    [MergeRule { preference: 0.25, most_parts: 1.4 }, MergeRule { preference: -0.25, most_parts: 3.0 }];
+
+/// Share of a ray's cost that many parts must save, as each part is an object and an instance.
+const LEAST_SAVING: f32 = 0.1;
+
+/// Merges leaves by the rule whose parts cost rays least. `fewest` is the minimum of parts, each of which has at most
+/// `most` primitives.
+fn merge_cheapest(leaves: &[&mut [PrimitiveBounds]], most: usize, fewest: u64) -> Vec<Vec<PrimitiveBounds>> {
+    let leaf = |(index, leaf): (usize, &&mut [PrimitiveBounds])| MergeCandidate {
+        leaves: vec![index],
+        count: leaf.len(),
+        bounds: union_bounds(leaf),
+        partner: None,
+    };
+    let candidates: Vec<_> = leaves.iter().enumerate().map(leaf).collect();
+    let [few, many] = MERGE_RULES.map(|rule| merge_parts(candidates.clone(), rule, most, fewest));
+    let cheapest = if ray_cost(&many) < ray_cost(&few) * (1.0 - LEAST_SAVING) { many } else { few };
+    let items =
+        |part: MergeCandidate| part.leaves.iter().flat_map(|leaf| leaves[*leaf].iter().copied()).collect();
+    cheapest.into_iter().map(items).collect()
+}
+
+/// Returns the cost of a ray that passes the parts, by the surface area heuristic: for each part that the ray enters,
+/// one for the entry, and the depth of a tree of the part, of which the tree of all primitives has the depth one.
+fn ray_cost(parts: &[MergeCandidate]) -> f32 {
+    let depth = |count: usize| (count.max(2) as f32).log2();
+    let all = depth(parts.iter().map(|part| part.count).sum());
+    parts.iter().map(|part| part.bounds.half_area() * (1.0 + depth(part.count) / all)).sum()
+}
+
 /// A part that is merged from leaves.
+#[derive(Debug, Clone)]
 struct MergeCandidate {
-    items: Vec<PrimitiveBounds>,
+    /// Indices of the leaves.
+    leaves: Vec<usize>,
+    /// Number of primitives.
+    count: usize,
     bounds: Bounds,
     /// The other part that gives the largest merge gain, and the gain.
     partner: Option<(usize, f32)>,
 }
 
-impl MergeCandidate {
-    /// Surface area saved if both parts become one; `None` if the merged part would be too large.
-    fn merge_gain(&self, other: &Self, most: usize) -> Option<f32> {
-        /// One part is preferred to two with a slightly smaller total, because each part costs every ray that enters
-        /// it.
-        const REORDER_PREFERENCE: f32 = 0.25;
-        if self.items.len() + other.items.len() > most {
-            return None;
-        }
-        let together = self.bounds.union(other.bounds).half_area() * (1.0 - REORDER_PREFERENCE);
-        Some(self.bounds.half_area() + other.bounds.half_area() - together)
+/// Merges parts, those with the largest overlap first. Merges until no merge gains and the rule's number of parts
+/// remains, or until each merged part would have more than `most` primitives.
+fn merge_parts(parts: Vec<MergeCandidate>, rule: MergeRule, most: usize, fewest: u64) -> Vec<MergeCandidate> {
+    let enough = (fewest as f32 * rule.most_parts) as usize;
+    let mut merger = Merger { parts, preference: rule.preference, most };
+    (0..merger.parts.len()).for_each(|part| merger.find_partner(part));
+    while let Some((part, partner)) = merger.best_merge(merger.parts.len() > enough) {
+        merger.merge(part.min(partner), part.max(partner));
     }
+    merger.parts
 }
 
-/// Merges leaves, those with the largest overlap first. Merges until no merge gains and at most `enough` parts remain,
-/// or until each merged part would have more than `most` primitives.
-fn merge_parts(pieces: Vec<&mut [PrimitiveBounds]>, most: usize, enough: usize) -> Vec<Vec<PrimitiveBounds>> {
-    let merged = |piece: &mut [PrimitiveBounds]| MergeCandidate {
-        items: piece.to_vec(),
-        bounds: union_bounds(piece),
-        partner: None,
-    };
-    let mut parts: Vec<_> = pieces.into_iter().map(merged).collect();
-    (0..parts.len()).for_each(|part| find_merge_partner(&mut parts, part, most));
-    while let Some((part, partner)) = best_merge(&parts, parts.len() > enough) {
-        let (part, partner) = (part.min(partner), part.max(partner));
-        let taken = parts.swap_remove(partner);
-        let moved = parts.len();
-        parts[part].bounds = parts[part].bounds.union(taken.bounds);
-        parts[part].items.extend(taken.items);
-        for other in 0..parts.len() {
-            match parts[other].partner {
-                Some((with, _)) if with == part || with == partner => {
-                    find_merge_partner(&mut parts, other, most)
-                }
-                Some((with, gain)) if with == moved => parts[other].partner = Some((partner, gain)),
+struct Merger {
+    parts: Vec<MergeCandidate>,
+    /// See [`MergeRule::preference`].
+    preference: f32,
+    /// Most primitives of a part.
+    most: usize,
+}
+
+impl Merger {
+    /// Surface area saved if both parts become one; `None` if the merged part would be too large.
+    fn gain(&self, part: &MergeCandidate, other: &MergeCandidate) -> Option<f32> {
+        if part.count + other.count > self.most {
+            return None;
+        }
+        let together = part.bounds.union(other.bounds).half_area() * (1.0 - self.preference);
+        Some(part.bounds.half_area() + other.bounds.half_area() - together)
+    }
+
+    /// Merges `partner` into `part`, which has the lower index.
+    fn merge(&mut self, part: usize, partner: usize) {
+        let taken = self.parts.swap_remove(partner);
+        let moved = self.parts.len();
+        let merged = &mut self.parts[part];
+        merged.bounds = merged.bounds.union(taken.bounds);
+        merged.leaves.extend(taken.leaves);
+        merged.count += taken.count;
+        for other in 0..self.parts.len() {
+            match self.parts[other].partner {
+                Some((with, _)) if with == part || with == partner => self.find_partner(other),
+                Some((with, gain)) if with == moved => self.parts[other].partner = Some((partner, gain)),
                 _ => {}
             }
         }
-        find_merge_partner(&mut parts, part, most);
-        (0..parts.len()).for_each(|other| offer_merge(&mut parts, other, part, most));
+        self.find_partner(part);
+        (0..self.parts.len()).for_each(|other| self.offer(other, part));
     }
-    parts.into_iter().map(|part| part.items).collect()
-}
 
-fn find_merge_partner(parts: &mut [MergeCandidate], part: usize, most: usize) {
-    parts[part].partner = None;
-    (0..parts.len()).for_each(|other| offer_merge(parts, part, other, most));
-}
-
-/// Makes `other` the merge partner of `part` if it gains more than the present partner.
-fn offer_merge(parts: &mut [MergeCandidate], part: usize, other: usize, most: usize) {
-    if part == other {
-        return;
+    fn find_partner(&mut self, part: usize) {
+        self.parts[part].partner = None;
+        (0..self.parts.len()).for_each(|other| self.offer(part, other));
     }
-    if let Some(gain) = parts[part].merge_gain(&parts[other], most)
-        && parts[part].partner.is_none_or(|(_, present)| gain > present)
-    {
-        parts[part].partner = Some((other, gain));
-    }
-}
 
-/// The two parts with the largest merge gain. With `at_a_loss`, the gain may be negative.
-fn best_merge(parts: &[MergeCandidate], at_a_loss: bool) -> Option<(usize, usize)> {
-    let pairs = parts.iter().enumerate().filter_map(|(part, merged)| {
-        let (partner, gain) = merged.partner?;
-        Some((part, partner, gain))
-    });
-    let best = pairs.reduce(|best, pair| if pair.2 > best.2 { pair } else { best });
-    best.filter(|(_, _, gain)| at_a_loss || *gain >= 0.0).map(|(part, partner, _)| (part, partner))
+    /// Makes `other` the partner of `part` if it gains more than the present partner.
+    fn offer(&mut self, part: usize, other: usize) {
+        if part == other {
+            return;
+        }
+        if let Some(gain) = self.gain(&self.parts[part], &self.parts[other])
+            && self.parts[part].partner.is_none_or(|(_, present)| gain > present)
+        {
+            self.parts[part].partner = Some((other, gain));
+        }
+    }
+
+    /// Returns the two parts with the largest gain. With `at_a_loss`, the gain may be negative.
+    fn best_merge(&self, at_a_loss: bool) -> Option<(usize, usize)> {
+        let pairs = self.parts.iter().enumerate().filter_map(|(part, merged)| {
+            let (partner, gain) = merged.partner?;
+            Some((part, partner, gain))
+        });
+        let best = pairs.reduce(|best, pair| if pair.2 > best.2 { pair } else { best });
+        best.filter(|(_, _, gain)| at_a_loss || *gain >= 0.0).map(|(part, partner, _)| (part, partner))
+    }
 }
 
 /// Primitives of each geometry in an average part: `ceil(total / parts)` in sum over all geometries. Rounding each
@@ -357,7 +409,7 @@ mod tests {
         let bounds = [scattered(1000)];
         // 1000 + 10 n <= 1500 holds for n <= 50. So 20 parts are needed, though the whole is only 8 times too large.
         let parts = plan_split("mesh", &bounds, &limits(1500, 1500, 1000), &mut linear(1000, 10, 1)).unwrap();
-        assert!((20..=40).contains(&parts.len()), "{}", parts.len());
+        assert!((20..=60).contains(&parts.len()), "{}", parts.len());
     }
 
     #[test]
@@ -414,7 +466,7 @@ mod tests {
     fn many_small_geometries_take_no_more_parts_than_a_large_one() {
         let bounds: Vec<_> = scattered(5000).chunks(10).map(<[Bounds]>::to_vec).collect();
         let parts = plan_split("mesh", &bounds, &limits(MIB, MIB, 170), &mut linear(0, 1, 1)).unwrap();
-        assert!((30..=45).contains(&parts.len()), "{}", parts.len());
+        assert!((30..=90).contains(&parts.len()), "{}", parts.len());
     }
 
     #[test]
