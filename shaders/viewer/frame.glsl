@@ -45,6 +45,7 @@ struct Instance {
 // Addresses are numbers: SwiftShader miscompiles copies of structs that hold buffer references.
 struct Geometry {
     uvec2 positions;
+    uvec2 positionsBefore; // in the frame before; where nothing moves the same
     uvec2 attributes;
     uvec2 indices;
     uint material;
@@ -99,6 +100,7 @@ struct Light {
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer InstanceArray { Instance at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RowsArray { vec4 at[][3]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray { Geometry at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer AttributesArray { Attributes at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PositionArray { vec3 at[]; };
@@ -113,6 +115,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
     InstanceArray instances;
+    RowsArray rowsBefore; // of the instances in the frame before
     GeometryArray geometries;
     MaterialArray materials;
     SlotArray slots;
@@ -142,6 +145,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint frameNumber; // since the camera was chosen; 0: there is no frame before
     uint stillCount; // frames since the camera moved
     uint view; // what the picture shows: kViewLight or another of plane.glsl
+    uint sceneMoves; // not 0: something is elsewhere than in the frame before
 };
 
 layout(push_constant, scalar) uniform PushConstants {

@@ -9,7 +9,7 @@ use lvk_samples::hybrid::RayPath;
 use crate::args::{LightArgs, SkyArg, ViewerArgs};
 use crate::config::ViewerConfig;
 use crate::light::{Environment, SunSetting};
-use crate::model::{ModelCamera, ModelError, cameras, load, posed, showcase};
+use crate::model::{ModelCamera, ModelError, cameras, load, showcase};
 use crate::pipelines;
 use crate::viewer::{Viewer, ViewerScene};
 
@@ -51,9 +51,10 @@ impl SampleInfo for Viewer {
         model.gltf --camera 2 --exposure -1 | through its second camera, half as bright
         kitchen.obj --sky black | an OBJ file, lit by its lamp alone
         model.glb --window | in a window, where the picture gets better while nothing moves
+        model.glb --animation walk --time 0.5 | in a pose of an animation, which --frames 0..60 and a window play from there
         --rt query --validate | ray queries in a compute shader, with validation
     ";
-    const ROUND: &'static str = "one round about what the camera looks at";
+    const ROUND: &'static str = "one round about what the camera looks at, or the animation";
     type Args = ViewerArgs;
     type Sample = Self;
 
@@ -79,7 +80,6 @@ impl SampleInfo for Viewer {
         let animation = animation.transpose().map_err(RunError::input)?;
         let warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
         setup.warn(&warnings);
-        let model = posed(model, animation, args.time);
         let textures = model.images.len() as u32 + OTHER_TEXTURES;
         let context = setup.device(&DeviceNeeds { textures, ..DeviceNeeds::tracing(args.tracing.rt) })?;
         let path = RayPath::choose(RayPath::from_args(args.tracing.rt), context.capabilities())?;
@@ -98,6 +98,7 @@ impl SampleInfo for Viewer {
         let scene = scene(args, model);
         let mut sample = Self::new(&context, &scene, &config)?;
         setup.warn(sample.warnings());
+        sample.play(animation, args.time);
         if let Some(wish) = &args.camera {
             let place = camera_place(sample.cameras(), wish).map_err(RunError::input)?;
             sample.choose_camera(place);

@@ -14,6 +14,7 @@ pub mod model;
 mod panel;
 mod path_tracer;
 mod pipelines;
+mod playback;
 mod present;
 mod renderer;
 mod viewer;

@@ -5,7 +5,7 @@ use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
 use crate::config::{Method, ViewerConfig};
-use crate::gpu::Draw;
+use crate::gpu::FrameScene;
 use crate::gpu::layout::Push;
 use crate::hybrid::Hybrid;
 use crate::path_tracer::PathTracer;
@@ -63,13 +63,13 @@ impl Renderer {
         to: &mut Frame<'_>,
         frame: u64,
         extent: [u32; 2],
-        draws: &[Draw],
+        scene: FrameScene<'_>,
     ) -> lvk::Result<()> {
         match self {
-            Self::Hybrid(hybrid) => hybrid.record(to, frame, draws),
+            Self::Hybrid(hybrid) => hybrid.record(to, frame, scene),
             Self::PathTrace { tracer, sums } => {
                 let push = Push { frame, argument: 0, _padding: 0 };
-                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, extent))
+                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, scene.written, extent))
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 use lvk::{CommandBuffer, Context, TextureHandle};
-use lvk_gltf::{Model, Pose};
+use lvk_gltf::{Bounds, Model};
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::render_target::RenderTarget;
 use lvk_samples::app::run_error::RunError;
@@ -11,11 +11,12 @@ use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::scene::{Camera, GpuCamera};
 
 use crate::config::{Method, ViewerConfig};
-use crate::gpu::GpuScene;
 use crate::gpu::layout::{FrameConstants, Push};
+use crate::gpu::{FrameScene, GpuScene};
 use crate::light::Environment;
-use crate::model::{ModelCamera, cameras};
+use crate::model::{self, ModelCamera};
 use crate::panel;
+use crate::playback::Playback;
 use crate::present::Present;
 use crate::renderer::Renderer;
 
@@ -46,6 +47,8 @@ pub struct Viewer {
     renderer: Renderer,
     present: Present,
     target: RenderTarget,
+    bounds: Bounds,
+    playback: Playback,
     cameras: Vec<ModelCamera>,
     chosen: usize,
     camera: Camera,
@@ -66,9 +69,11 @@ impl Viewer {
         config.check(ctx.capabilities())?;
         let target = RenderTarget::storage(ctx, config.extent())?;
         let shown = scene.model.default_scene.unwrap_or(0);
-        let pose: Pose = scene.model.pose(None, 0.0);
-        let gpu = GpuScene::new(ctx, &scene.model, shown, &pose, &scene.environment, scene.disc_radius)?;
-        let cameras = cameras(&scene.model, shown, &pose);
+        let pose = scene.model.pose(None, 0.0);
+        let bounds = model::bounds(&scene.model, shown, &pose);
+        let light = (&scene.environment, scene.disc_radius);
+        let gpu = GpuScene::new(ctx, (&scene.model, shown), &pose, light, &bounds)?;
+        let cameras = model::cameras_around(&scene.model, shown, &pose, &bounds);
         let camera = cameras[0].camera;
         Ok(Self {
             scene: gpu,
@@ -77,6 +82,8 @@ impl Viewer {
             ctx: ctx.clone(),
             config: *config,
             target,
+            bounds,
+            playback: Playback::default(),
             cameras,
             chosen: 0,
             camera,
@@ -98,10 +105,39 @@ impl Viewer {
         self.set_camera(&self.cameras[self.chosen].camera.clone());
     }
 
+    /// Plays an animation of the model, by its place there, from a time in seconds on; `None` shows the nodes as they are.
+    pub fn play(&mut self, animation: Option<usize>, start: f32) {
+        self.playback = Playback { animation, start, ..self.playback };
+        self.pose();
+    }
+
+    /// Moves everything to where it is at the time that is shown. A camera of a node moves with it.
+    fn pose(&mut self) {
+        let pose = self.playback.pose(self.scene.rig());
+        if !self.scene.set_pose(&pose) {
+            return;
+        }
+        self.done = 0;
+        let is_own = self.camera == self.cameras[self.chosen].camera;
+        self.cameras = model::cameras_around(self.scene.rig(), self.scene.shown(), &pose, &self.bounds);
+        if is_own {
+            self.choose_camera(self.chosen);
+        }
+    }
+
+    /// The positions of vertices that morph targets or joints move, as the last frame has them: a list for each primitive with
+    /// triangles, in the order of meshes and then of nodes. Empty if the model has no animations.
+    ///
+    /// # Errors
+    /// [`SampleError::Device`].
+    pub fn moved_positions(&self) -> Result<Vec<Vec<[f32; 3]>>, SampleError> {
+        Ok(self.scene.moved_positions(&self.ctx)?)
+    }
+
     /// Triangles of all meshes, each mesh once, and instances of meshes.
     #[must_use]
     pub fn counts(&self) -> (u64, u32) {
-        (self.scene.triangle_count, self.scene.instance_count)
+        (self.scene.triangle_count, self.scene.instance_count())
     }
 
     /// What the picture leaves out, for the user to read.
@@ -160,6 +196,11 @@ impl Viewer {
         }
     }
 
+    /// True if the renderer knows no frame before.
+    fn is_first(&self) -> bool {
+        self.frame_number == 0
+    }
+
     /// Samples of a step of a frame.
     fn step_samples(&self) -> u32 {
         match self.config.method {
@@ -177,9 +218,10 @@ impl Viewer {
         };
         let seen = gpu(&self.camera);
         let addresses = self.renderer.addresses()?;
+        let scene = self.scene.constants(cmd, self.is_first())?;
         cmd.upload(&FrameConstants {
             camera: seen.for_sample(self.frame_number, u32::MAX),
-            scene: self.scene.constants,
+            scene,
             sums: addresses.sums,
             light: self.scene.light,
             tlas: self.scene.tlas.index(),
@@ -192,19 +234,21 @@ impl Viewer {
             tone_mapping: tone_mapping as u32,
             visibility: addresses.visibility,
             seen,
-            seen_before: gpu(&self.before),
+            seen_before: gpu(if self.is_first() { &self.camera } else { &self.before }),
             planes: addresses.planes,
             frame_number: self.frame_number,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
-            _padding: 0,
+            scene_moves: u32::from(self.scene.moves()),
         })
     }
 
     /// Adds samples, and stores the picture if `is_shown`.
     fn add_samples(&mut self, frame: &mut Frame<'_>, count: u32, is_shown: bool) -> lvk::Result<()> {
+        self.scene.record_motion(frame, self.is_first())?;
         let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
-        self.renderer.record(frame, constants, extent, &self.scene.draws)?;
+        let scene = FrameScene { draws: self.scene.draws(), written: &self.scene.written() };
+        self.renderer.record(frame, constants, extent, scene)?;
         if is_shown {
             let (push, sums, image) = (
                 Push { frame: constants, argument: 0, _padding: 0 },
@@ -213,6 +257,7 @@ impl Viewer {
             );
             frame.pass("picture", |cmd| self.present.record(cmd, &push, sums, image, extent))?;
         }
+        self.scene.end_frame(self.is_first());
         self.done += count;
         self.frame_number = self.frame_number.wrapping_add(1);
         self.before = self.camera;
@@ -232,17 +277,21 @@ impl Sample for Viewer {
         &self.ctx
     }
 
-    /// The camera goes around what it looks at. Outside of windows each frame begins anew, so that it does not depend on those
-    /// before.
+    /// The animation goes on; without one the camera goes around what it looks at. Outside of windows each frame begins anew, so
+    /// that it does not depend on those before.
     fn update(&mut self, time: FrameTime) {
-        self.set_camera(&around(&self.cameras[self.chosen].camera, time.phase()));
+        self.playback.elapsed = time.seconds();
+        self.pose();
+        let phase = if self.playback.animation.is_some() { 0.0 } else { time.phase() };
+        self.set_camera(&around(&self.cameras[self.chosen].camera, phase));
         if !self.config.is_progressive {
             (self.done, self.frame_number, self.before) = (0, 0, self.camera);
         }
     }
 
+    /// Unless an animation was asked for.
     fn stands_at_first(&self) -> bool {
-        true
+        self.playback.animation.is_none()
     }
 
     fn steps_per_frame(&self) -> u64 {

@@ -57,6 +57,7 @@ lvk::shader_struct! {
     #[repr(C)]
     pub(crate) struct GpuGeometry {
         pub(crate) positions: u64,
+        pub(crate) positions_before: u64,
         pub(crate) attributes: u64,
         pub(crate) indices: u64,
         pub(crate) material: u32,
@@ -126,6 +127,7 @@ lvk::shader_struct! {
     #[repr(C)]
     pub(crate) struct SceneConstants {
         pub(crate) instances: u64,
+        pub(crate) rows_before: u64,
         pub(crate) geometries: u64,
         pub(crate) materials: u64,
         pub(crate) slots: u64,
@@ -169,7 +171,7 @@ lvk::shader_struct! {
         pub(crate) frame_number: u32,
         pub(crate) still_count: u32,
         pub(crate) view: u32,
-        pub(crate) _padding: u32,
+        pub(crate) scene_moves: u32,
     }
 
     /// `PushConstants`.

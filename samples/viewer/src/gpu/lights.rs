@@ -16,30 +16,40 @@ pub(crate) struct GpuLights {
 /// The share of samples that a source of light gets at least, over its even share.
 const LEAST_SHARE: f64 = 0.25;
 
+/// What lights of a scene depend on beside its nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct LightSetting {
+    sun: Option<Sun>,
+    /// Irradiance that the sky gives.
+    sky: f64,
+    /// Radius of the discs of directional lights, in radians.
+    disc_radius: f32,
+    bounds: Bounds,
+}
+
+impl LightSetting {
+    pub(crate) fn new(environment: &Environment, disc_radius: f32, bounds: Bounds) -> Self {
+        let sky = luminance(environment.sky.mean()) * std::f64::consts::PI;
+        Self { sun: environment.sun, sky, disc_radius, bounds }
+    }
+}
+
 impl GpuLights {
-    /// The sun, and the lights of the nodes of a scene. A directional light is a disc of the radius `disc_radius` radians.
-    pub(crate) fn new(
-        model: &Model,
-        scene: usize,
-        pose: &Pose,
-        environment: &Environment,
-        disc_radius: f32,
-        bounds: &Bounds,
-    ) -> Self {
-        let mut discs: Vec<GpuLight> = environment.sun.iter().map(disc).collect();
+    /// The sun, and the lights of the nodes of a scene.
+    pub(crate) fn new(model: &Model, scene: usize, pose: &Pose, setting: &LightSetting) -> Self {
+        let mut discs: Vec<GpuLight> = setting.sun.iter().map(disc).collect();
         let mut lamps = Vec::new();
         for node in model.scene_nodes(scene) {
             let light = model.nodes[node].light.and_then(|light| model.lights.get(light));
             let Some((light, world)) = light.zip(pose.world.get(node)) else { continue };
             match light.kind {
-                LightKind::Directional => discs.push(directional(light, world, disc_radius)),
+                LightKind::Directional => discs.push(directional(light, world, setting.disc_radius)),
                 LightKind::Point | LightKind::Spot { .. } => lamps.push(lamp(light, world)),
             }
         }
         let disc_count = discs.len() as u32;
         let mut lights = [discs, lamps].concat();
-        let sky = luminance(environment.sky.mean()) * std::f64::consts::PI;
-        let sky_probability = choose(&mut lights, sky, bounds);
+        let sky_probability = choose(&mut lights, setting.sky, &setting.bounds);
         Self { lights, disc_count, sky_probability }
     }
 }

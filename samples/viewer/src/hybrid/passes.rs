@@ -42,17 +42,21 @@ impl Passes {
         })
     }
 
-    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`.
+    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`. They read what was `written` before.
     pub(crate) fn record_light(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
         planes: BufferHandle,
-        visible: TextureHandle,
+        (visible, written): (TextureHandle, &[BufferHandle]),
         extent: [u32; 2],
     ) -> lvk::Result<()> {
-        let dependencies =
-            Dependencies { buffers: &[planes], sampled_images: &[visible], ..Dependencies::default() };
+        let dependencies = Dependencies {
+            buffers: &[planes],
+            read_buffers: written,
+            sampled_images: &[visible],
+            ..Dependencies::default()
+        };
         match &self.light {
             LightPass::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
