@@ -56,7 +56,8 @@ vec3 dataOf(uint place, ivec2 pixel, Seen seen) {
     case kViewMotion: return vec3(0.5 + 0.05 * motionAt(pixel, seen), 0.5);
     case kViewAlbedo: return frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
     case kViewMatte: return frame.exposure * frame.planes.at[planePlace(kPlaneMatte + argument, place)].rgb;
-    default: return frame.exposure * frame.planes.at[planePlace(kPlaneMirrored + argument, place)].rgb;
+    case kViewMirrored: return frame.exposure * frame.planes.at[planePlace(kPlaneMirrored + argument, place)].rgb;
+    default: return vec3(0.0);
     }
 }
 

@@ -12,6 +12,7 @@ const uint kViewMotion = 3u;
 const uint kViewAlbedo = 4u;
 const uint kViewMatte = 5u; // light of matte layers, filtered
 const uint kViewMirrored = 6u; // all other light, filtered
+const uint kViewSteps = 7u; // steps of rays, which another pass counts
 
 // Two planes of the same kind are those of this frame and of the one before, in turn.
 const uint kPlaneSurface = 0u; // and 1: normal, distance, instance, roughness

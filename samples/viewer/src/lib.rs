@@ -6,11 +6,14 @@
 
 mod args;
 mod config;
+mod dropped;
 mod gpu;
 mod hybrid;
 mod info;
 pub mod light;
 pub mod model;
+mod names;
+mod open;
 mod panel;
 mod path_tracer;
 mod pipelines;
@@ -18,6 +21,7 @@ mod playback;
 mod present;
 mod renderer;
 mod viewer;
+mod viewer_sample;
 
 pub use args::{LightArgs, SkyArg, ViewerArgs};
 pub use config::{Content, Method, ToneMapping, ViewerConfig};

@@ -30,6 +30,7 @@ pub(crate) const TEMPORAL: SampleStage = stage!("temporal.comp");
 pub(crate) const FILTER: SampleStage = stage!("filter.comp");
 pub(crate) const COMPOSITE: SampleStage = stage!("composite.comp");
 pub(crate) const ANTIALIAS: SampleStage = stage!("antialias.comp");
+pub(crate) const STEPS: SampleStage = stage!("steps.comp");
 pub(crate) const PRESENT: SampleStage = stage!("present.comp");
 
 /// Returns every pipeline of the sample.
@@ -50,6 +51,7 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
         SamplePipeline::new("viewer: filter", &[FILTER]),
         SamplePipeline::new("viewer: composite", &[COMPOSITE]),
         SamplePipeline::new("viewer: antialiasing", &[ANTIALIAS]),
+        SamplePipeline::new("viewer: steps of rays", &[STEPS]),
         SamplePipeline::new("viewer: picture", &[PRESENT]),
     ]
 }

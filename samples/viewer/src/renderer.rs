@@ -27,7 +27,7 @@ impl Renderer {
     pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
         let [width, height] = config.extent();
         Ok(match config.method {
-            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config.path, config.extent())?),
+            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config)?),
             Method::PathTrace => Self::PathTrace {
                 tracer: PathTracer::new(ctx, config.path)?,
                 sums: buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))?,

@@ -2,6 +2,7 @@
 //! tracing paths; files that it loads.
 
 mod animation;
+mod dropped;
 mod furnace;
 mod hybrid;
 mod known_values;

@@ -28,9 +28,11 @@ pub(crate) struct LightSetting {
 }
 
 impl LightSetting {
-    pub(crate) fn new(environment: &Environment, disc_radius: f32, bounds: Bounds) -> Self {
+    /// A model with directional lights of its own needs no sun.
+    pub(crate) fn new(model: &Model, environment: &Environment, disc_radius: f32, bounds: Bounds) -> Self {
         let sky = luminance(environment.sky.mean()) * std::f64::consts::PI;
-        Self { sun: environment.sun, sky, disc_radius, bounds }
+        let has_sun = model.lights.iter().any(|light| light.kind == LightKind::Directional);
+        Self { sun: environment.sun.filter(|_| !has_sun), sky, disc_radius, bounds }
     }
 }
 

@@ -28,6 +28,8 @@ pub(crate) struct GpuScene {
     pub(crate) offset_extent: f32,
     /// Triangles of all meshes, each mesh once.
     pub(crate) triangle_count: u64,
+    /// Bytes of the structures of meshes, and of the top level.
+    pub(crate) structure_bytes: [u64; 2],
     /// What is left out, for the user to read.
     pub(crate) warnings: Vec<String>,
     /// The model without what is uploaded.
@@ -38,7 +40,7 @@ pub(crate) struct GpuScene {
     light_setting: LightSetting,
     /// `None` if the model has no animations.
     motion: Option<SceneMotion>,
-    meshes: GpuMeshes,
+    _meshes: GpuMeshes,
     _textures: GpuTextures,
     _buffers: Vec<Holder<BufferHandle>>,
 }
@@ -58,7 +60,7 @@ impl GpuScene {
         let keys: Vec<MeshKey> = placements.iter().map(|placement| MeshKey::new(model, placement)).collect();
         let UploadedMeshes { meshes, deformation } = GpuMeshes::upload(ctx, model, pose, &unique(&keys))?;
         let instances = SceneInstances::new(&placements, &keys, &meshes);
-        let light_setting = LightSetting::new(environment, disc_radius, *bounds);
+        let light_setting = LightSetting::new(model, environment, disc_radius, *bounds);
         let lights = GpuLights::new(model, shown, pose, &light_setting);
         let mut arrays = Arrays { ctx, held: Vec::new() };
         let materials = GpuMaterials::new(model, &textures);
@@ -69,17 +71,18 @@ impl GpuScene {
         Ok(Self {
             constants,
             light: light_constants(&lights, environment),
-            tlas,
             offset_extent: (largest / OFFSET_SHARE).max(f32::MIN_POSITIVE),
             triangle_count: meshes.triangle_counts.iter().map(|count| u64::from(*count)).sum(),
+            structure_bytes: structure_bytes(ctx, &meshes, *tlas)?,
             warnings: [textures.warnings.as_slice(), &materials.warnings].concat(),
+            tlas,
             rig: rig(model),
             shown,
             instances,
             lights,
             light_setting,
             motion: (!model.animations.is_empty()).then_some(motion),
-            meshes,
+            _meshes: meshes,
             _textures: textures,
             _buffers: arrays.held,
         })
@@ -103,13 +106,6 @@ impl GpuScene {
     /// Everything to rasterise.
     pub(crate) fn draws(&self) -> &[Draw] {
         &self.instances.draws
-    }
-
-    /// Bytes of the structures: of the meshes, and of the top level.
-    pub(crate) fn structure_bytes(&self, ctx: &Context) -> lvk::Result<[u64; 2]> {
-        let bytes = |handle| Ok::<_, lvk::Error>(ctx.accel_struct_info(handle)?.structure_bytes);
-        let meshes = self.meshes.structures().map(bytes).sum::<lvk::Result<u64>>()?;
-        Ok([meshes, bytes(*self.tlas)?])
     }
 
     /// Moves nodes, lights and vertices to another pose, in the next frame. Returns false if nothing moves.
@@ -168,6 +164,11 @@ impl GpuScene {
     pub(crate) fn moved_positions(&self, ctx: &Context) -> lvk::Result<Vec<Vec<[f32; 3]>>> {
         self.motion.as_ref().map_or(Ok(Vec::new()), |motion| motion.positions(ctx))
     }
+}
+
+fn structure_bytes(ctx: &Context, meshes: &GpuMeshes, tlas: AccelStructHandle) -> lvk::Result<[u64; 2]> {
+    let bytes = |handle| Ok::<_, lvk::Error>(ctx.accel_struct_info(handle)?.structure_bytes);
+    Ok([meshes.structures().map(bytes).sum::<lvk::Result<u64>>()?, bytes(tlas)?])
 }
 
 fn unique(keys: &[MeshKey]) -> Vec<MeshKey> {

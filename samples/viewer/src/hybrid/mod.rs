@@ -6,8 +6,8 @@ mod visibility;
 use lvk::{BufferHandle, Context, Holder};
 use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
-use lvk_samples::hybrid::RayPath;
 
+use crate::config::ViewerConfig;
 use crate::gpu::{FrameScene, layout::Push};
 use passes::Passes;
 use visibility::Visibility;
@@ -29,11 +29,12 @@ pub(crate) struct Hybrid {
 }
 
 impl Hybrid {
-    pub(crate) fn new(ctx: &Context, path: RayPath, extent: [u32; 2]) -> lvk::Result<Self> {
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
+        let extent = config.extent();
         let size_bytes = PLANES * plane_bytes(extent);
         Ok(Self {
             visibility: Visibility::new(ctx, extent)?,
-            passes: Passes::new(ctx, path)?,
+            passes: Passes::new(ctx, config)?,
             planes: buffer(ctx, "planes", size_bytes)?,
             extent,
         })
@@ -72,7 +73,13 @@ impl Hybrid {
         to.pass("light", |cmd| {
             self.passes.record_light(cmd, &push(0), planes, (visible, scene.written), self.extent)
         })?;
-        to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))
+        to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
+        match self.passes.counts_steps() {
+            true => to.pass("steps", |cmd| {
+                self.passes.record_steps(cmd, &push(0), planes, scene.written, self.extent)
+            }),
+            false => Ok(()),
+        }
     }
 }
 
