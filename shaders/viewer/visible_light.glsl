@@ -84,7 +84,7 @@ void visibleLightPixel(uvec2 pixel) {
     Bsdf bsdf = bsdfOf(surface, -direction);
     vec2 lightChoices = nextPair(random);
     vec2 lightPlace = nextPair(random);
-    DirectLight direct = directLight(surface, bsdf, lightChoices.x, lightPlace);
+    DirectLight direct = directLight(surface, bsdf, vec3(0.0), lightChoices.x, lightPlace);
     vec2 choices = nextPair(random);
     vec2 u = nextPair(random);
     Scattered scattered = scatter(surface, bsdf, -direction, choices, u);

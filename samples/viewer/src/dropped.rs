@@ -51,7 +51,15 @@ impl DroppedFile {
     pub(crate) fn take(&mut self) -> Option<Viewer> {
         let loaded = self.thread.as_mut()?.take()?;
         self.thread = None;
-        loaded.map_err(|error| self.error = Some(error.to_string())).ok()
+        match loaded {
+            Ok(viewer) => Some(viewer),
+            Err(error) => {
+                let error = error.to_string();
+                warn(std::slice::from_ref(&error));
+                self.error = Some(error);
+                None
+            }
+        }
     }
 
     /// Why the last file cannot be shown, if so.

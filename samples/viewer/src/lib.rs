@@ -1,8 +1,9 @@
 //! The `viewer` sample: shows models of glTF and OBJ files, by an unbiased path tracer or by a
 //! real-time method.
 //!
-//! [`Viewer`] is the sample for programs and tests, `info.rs` describes its program. [`model`] loads models or makes the one that
-//! needs no file, [`light`] makes the sky and the sun, `gpu` uploads both, `path_tracer.rs` traces paths and `hybrid` is the real-time method.
+//! [`Viewer`] is the sample for programs and tests, `viewer_sample.rs` what it does in each frame, `info.rs` describes its program and
+//! `open.rs` opens what the arguments name. [`model`] loads models or makes the one that needs no file, [`light`] makes the sky and the
+//! sun, `gpu` uploads both and moves what an animation moves, `path_tracer.rs` traces paths and `hybrid` is the real-time method.
 
 mod args;
 mod config;

@@ -282,6 +282,8 @@ impl Viewer {
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
             scene_moves: u32::from(self.scene.moves()),
+            emission: self.scene.emission(),
+            _padding: 0,
         })
     }
 

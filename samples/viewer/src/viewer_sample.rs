@@ -113,7 +113,7 @@ impl Sample for Viewer {
         }
         panel::show_error(ui, self.refused.as_deref());
         let (triangles, instances) = self.counts();
-        ui.label(format!("{} samples; {triangles} triangles, {instances} instances", self.done));
+        ui.label(format!("samples: {}; {triangles} triangles, {instances} instances", self.done));
         panel::show_memory(ui, self.scene.structure_bytes);
     }
 

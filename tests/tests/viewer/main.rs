@@ -3,6 +3,7 @@
 
 mod animation;
 mod dropped;
+mod emitters;
 mod furnace;
 mod hybrid;
 mod known_values;

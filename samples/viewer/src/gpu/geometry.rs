@@ -10,6 +10,7 @@ use lvk_gltf::{AlphaMode, Material, Model, Pose, Primitive};
 use lvk_samples::app::array_buffer::array;
 
 use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
+use super::emitters::{EmissiveMeshes, emission_weight};
 use super::instances::MeshKey;
 use super::layout::{GpuAttributes, GpuGeometry, QUANTISED};
 use super::vertices::{PackedPositions, attributes};
@@ -21,6 +22,8 @@ pub(crate) struct GpuMeshes {
     pub(crate) geometries: Vec<GpuGeometry>,
     /// Triangles of each geometry of the table.
     pub(crate) triangle_counts: Vec<u32>,
+    /// Triangles that glow.
+    pub(crate) emissive: EmissiveMeshes,
     /// The meshes that have triangles.
     meshes: HashMap<MeshKey, GpuMesh>,
     _buffers: Vec<Holder<BufferHandle>>,
@@ -41,6 +44,7 @@ struct Arena {
     attributes: Vec<GpuAttributes>,
     indices: Vec<u32>,
     parts: Vec<Part>,
+    emissive: EmissiveMeshes,
 }
 
 /// A primitive in the arrays.
@@ -55,18 +59,22 @@ struct Part {
     triangle_count: u32,
     material: u32,
     is_opaque: bool,
+    /// Luminance of its light, if shadow rays look for it.
+    emission_weight: f32,
 }
 
 impl Arena {
     /// Adds the primitives of a mesh that have triangles, in a pose; those that move in other poses also go to `rest`.
     fn add_mesh(&mut self, model: &Model, pose: &Pose, key: MeshKey, rest: &mut RestArrays) {
-        let default = Material::default();
+        let (default, first) = (Material::default(), self.parts.len());
         let primitives = model.meshes.get(key.mesh).map_or(&[][..], |mesh| &mesh.primitives);
         for primitive in primitives.iter().filter(|primitive| !primitive.indices.is_empty()) {
             let number = primitive.material.unwrap_or(model.materials.len());
-            let is_opaque = is_opaque(model.materials.get(number).unwrap_or(&default));
+            let material = model.materials.get(number).unwrap_or(&default);
+            let is_opaque = is_opaque(material);
             let Some(node) = key.deformed_by else {
                 self.add(primitive, number as u32, is_opaque);
+                self.add_emission(first, primitive, emission_weight(material, model));
                 continue;
             };
             let (weights, joints) = movers(model, node, pose);
@@ -78,11 +86,21 @@ impl Arena {
         }
     }
 
+    /// Shadow rays look for light of the last geometry, of a mesh whose first one has the place `first`.
+    fn add_emission(&mut self, first: usize, primitive: &Primitive, weight: f32) {
+        if let Some(part) = self.parts.last_mut().filter(|_| weight > 0.0) {
+            part.emission_weight = weight;
+            let geometry = self.parts.len() - 1 - first;
+            self.emissive.add(first as u32, geometry as u32, primitive, weight);
+        }
+    }
+
     fn add(&mut self, primitive: &Primitive, material: u32, is_opaque: bool) {
         let packed = PackedPositions::new(&primitive.positions);
         let is_quantised = matches!(packed, PackedPositions::Quantised(_));
         self.parts.push(Part {
             first_before: None,
+            emission_weight: 0.0,
             is_quantised,
             first_position: if is_quantised { self.quantised.len() } else { self.floats.len() },
             first_attributes: self.attributes.len(),
@@ -137,6 +155,8 @@ impl ArenaBuffers {
             indices: self.indices.address()? + 4 * part.first_index as u64,
             material: part.material,
             flags: if part.is_quantised { QUANTISED } else { 0 },
+            emission_weight: part.emission_weight,
+            _padding: 0,
         })
     }
 
@@ -213,11 +233,13 @@ impl GpuMeshes {
             let meshes = Self {
                 geometries: Vec::new(),
                 triangle_counts: Vec::new(),
+                emissive: EmissiveMeshes::default(),
                 meshes: HashMap::new(),
                 _buffers: Vec::new(),
             };
             return Ok(UploadedMeshes { meshes, deformation: None });
         }
+        let emissive = std::mem::take(&mut arena.emissive);
         let (buffers, parts) = ArenaBuffers::new(ctx, arena)?;
         let deformation = Deformation::new(ctx, rest, buffers.moved()?)?;
         let before = deformation.as_ref().map_or(Ok(0), Deformation::before_address)?;
@@ -227,7 +249,10 @@ impl GpuMeshes {
         let meshes = build(ctx, model, &runs, &parts, &buffers)?;
         let ArenaBuffers { floats, quantised, attributes, indices } = buffers;
         let _buffers = vec![floats, quantised, attributes, indices];
-        Ok(UploadedMeshes { meshes: Self { geometries, triangle_counts, meshes, _buffers }, deformation })
+        Ok(UploadedMeshes {
+            meshes: Self { geometries, triangle_counts, emissive, meshes, _buffers },
+            deformation,
+        })
     }
 }
 

@@ -62,6 +62,18 @@ lvk::shader_struct! {
         pub(crate) indices: u64,
         pub(crate) material: u32,
         pub(crate) flags: u32,
+        pub(crate) emission_weight: f32,
+        pub(crate) _padding: u32,
+    }
+
+    /// `Emitter`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuEmitter {
+        pub(crate) instance: u32,
+        pub(crate) geometry: u32,
+        pub(crate) primitive: u32,
+        pub(crate) chance: f32,
     }
 
     /// `Attributes`.
@@ -132,6 +144,7 @@ lvk::shader_struct! {
         pub(crate) materials: u64,
         pub(crate) slots: u64,
         pub(crate) lights: u64,
+        pub(crate) emitters: u64,
         pub(crate) sky_rows: u64,
         pub(crate) sky_columns: u64,
         pub(crate) sky: u64,
@@ -146,6 +159,15 @@ lvk::shader_struct! {
         pub(crate) disc_count: u32,
         pub(crate) sky_probability: f32,
         pub(crate) sky_size: [u32; 2],
+    }
+
+    /// `Frame`: light of triangles.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct EmissionConstants {
+        pub(crate) emitter_count: u32,
+        pub(crate) emitter_probability: f32,
+        pub(crate) emitter_power: f32,
     }
 
     /// `Frame`.
@@ -172,6 +194,8 @@ lvk::shader_struct! {
         pub(crate) still_count: u32,
         pub(crate) view: u32,
         pub(crate) scene_moves: u32,
+        pub(crate) emission: EmissionConstants,
+        pub(crate) _padding: u32,
     }
 
     /// `PushConstants`.
@@ -196,4 +220,5 @@ pub(crate) const SCENE_LAYOUTS: &[BlockLayout] = &[
     BlockLayout::buffer_reference::<GpuTextureSlot>("SlotArray"),
     BlockLayout::buffer_reference::<GpuMaterial>("MaterialArray"),
     BlockLayout::buffer_reference::<GpuLight>("LightArray"),
+    BlockLayout::buffer_reference::<GpuEmitter>("EmitterArray"),
 ];

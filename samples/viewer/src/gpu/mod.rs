@@ -2,6 +2,7 @@
 
 mod albedo_table;
 mod deformation;
+mod emitters;
 mod geometry;
 mod instances;
 pub(crate) mod layout;

@@ -6,9 +6,10 @@ use lvk_samples::app::array_buffer::array;
 use lvk_samples::app::frame::Frame;
 
 use super::albedo_table::albedo_table;
+use super::emitters::Emitters;
 use super::geometry::{GpuMeshes, UploadedMeshes};
 use super::instances::{Draw, MeshKey, SceneInstances};
-use super::layout::{GpuTextureSlot, LightConstants, SceneConstants};
+use super::layout::{EmissionConstants, GpuTextureSlot, LightConstants, SceneConstants};
 use super::lights::{GpuLights, LightSetting};
 use super::materials::GpuMaterials;
 use super::motion::SceneMotion;
@@ -37,10 +38,11 @@ pub(crate) struct GpuScene {
     shown: usize,
     instances: SceneInstances,
     lights: GpuLights,
+    emitters: Emitters,
     light_setting: LightSetting,
     /// `None` if the model has no animations.
     motion: Option<SceneMotion>,
-    _meshes: GpuMeshes,
+    meshes: GpuMeshes,
     _textures: GpuTextures,
     _buffers: Vec<Holder<BufferHandle>>,
 }
@@ -61,10 +63,12 @@ impl GpuScene {
         let UploadedMeshes { meshes, deformation } = GpuMeshes::upload(ctx, model, pose, &unique(&keys))?;
         let instances = SceneInstances::new(&placements, &keys, &meshes);
         let light_setting = LightSetting::new(model, environment, disc_radius, *bounds);
-        let lights = GpuLights::new(model, shown, pose, &light_setting);
+        let emitters = meshes.emissive.emitters(&instances.table);
+        let lights = GpuLights::new((model, shown), pose, &emitters, &light_setting);
         let mut arrays = Arrays { ctx, held: Vec::new() };
         let materials = GpuMaterials::new(model, &textures);
-        let constants = arrays.constants(&meshes, &instances, &materials, &lights, environment)?;
+        let constants =
+            arrays.constants(&meshes, &instances, &materials, (&lights, &emitters), environment)?;
         let tlas = tlas(ctx, &instances)?;
         let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
         let motion = SceneMotion::new(deformation, meshes.deformed(), pose.clone());
@@ -80,9 +84,10 @@ impl GpuScene {
             shown,
             instances,
             lights,
+            emitters,
             light_setting,
             motion: (!model.animations.is_empty()).then_some(motion),
-            _meshes: meshes,
+            meshes,
             _textures: textures,
             _buffers: arrays.held,
         })
@@ -113,7 +118,11 @@ impl GpuScene {
         let is_other = self.motion.as_mut().is_some_and(|motion| motion.set_pose(pose));
         if is_other {
             self.instances.place(&self.placements(pose));
-            self.lights = GpuLights::new(&self.rig, self.shown, pose, &self.light_setting);
+            if !self.meshes.emissive.is_empty() {
+                self.emitters = self.meshes.emissive.emitters(&self.instances.table);
+            }
+            let scene = (&self.rig, self.shown);
+            self.lights = GpuLights::new(scene, pose, &self.emitters, &self.light_setting);
             self.light.sky_probability = self.lights.sky_probability;
         }
         is_other
@@ -139,13 +148,19 @@ impl GpuScene {
         let Some(motion) = self.motion.as_ref().filter(|_| !self.instances.table.is_empty()) else {
             return Ok(self.constants);
         };
-        let lights = &self.lights.lights;
+        let (lights, emitters) = (&self.lights.lights, &self.emitters.triangles);
         Ok(SceneConstants {
             instances: cmd.upload_slice(&self.instances.table)?,
             rows_before: cmd.upload_slice(&motion.rows_before(self.instances.rows(), is_first))?,
             lights: if lights.is_empty() { self.constants.lights } else { cmd.upload_slice(lights)? },
+            emitters: if emitters.is_empty() { self.constants.emitters } else { cmd.upload_slice(emitters)? },
             ..self.constants
         })
+    }
+
+    /// How light of triangles is looked for.
+    pub(crate) fn emission(&self) -> EmissionConstants {
+        self.lights.emission
     }
 
     /// Buffers that vertices are moved in; draws and rays read them.
@@ -220,7 +235,7 @@ impl Arrays<'_> {
         meshes: &GpuMeshes,
         instances: &SceneInstances,
         materials: &GpuMaterials,
-        lights: &GpuLights,
+        (lights, emitters): (&GpuLights, &Emitters),
         environment: &Environment,
     ) -> lvk::Result<SceneConstants> {
         let sky = environment.sky.distribution();
@@ -231,6 +246,7 @@ impl Arrays<'_> {
             materials: self.upload("materials", &materials.materials)?,
             slots: self.upload::<GpuTextureSlot>("texture slots", &materials.slots)?,
             lights: self.upload("lights", &lights.lights)?,
+            emitters: self.upload("emitters", &emitters.triangles)?,
             sky_rows: self.upload("rows of the sky", &sky.rows)?,
             sky_columns: self.upload("columns of the sky", &sky.columns)?,
             sky: self.upload("sky", &environment.sky.texels)?,

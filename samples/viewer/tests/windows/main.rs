@@ -9,7 +9,9 @@ mod session;
 
 use std::path::Path;
 
-use session::{BESIDE_PANEL, F1, SIZE, Session, assert_success, desktop, differing, read_image, sample, texts};
+use session::{
+    BESIDE_PANEL, F1, SIZE, Session, assert_success, desktop, differing, read_image, sample, texts,
+};
 
 const VIEWER: &str = env!("CARGO_BIN_EXE_viewer");
 
@@ -18,7 +20,7 @@ fn a_window_shows_what_a_sequence_does() {
     let Some(desktop) = desktop() else { return };
     let folder = tempfile::tempdir().unwrap();
     // Data, which is the same after any number of frames.
-    let args = ["--view", "normals"];
+    let args = ["--view", "normals", "--bounces", "1"];
     let windowed = [&["--window", "--frames", "3", "--validate", "--out", "window.png"], &args[..]].concat();
     let mut program = sample(VIEWER, &windowed, folder.path());
     desktop.attach(&mut program);
@@ -46,7 +48,7 @@ fn files_are_dropped_on_a_window() {
     let (good, bad) = (folder.path().join("a file.obj"), folder.path().join("bad.glb"));
     write_triangle(&good);
     std::fs::write(&bad, "glTF").unwrap();
-    let args = ["--view", "normals"];
+    let args = ["--view", "normals", "--bounces", "1"];
     let Some(mut session) = Session::new(VIEWER, &args, folder.path()) else { return };
     session.wait_for_line("loaded in");
     let shot = |number: u32| folder.path().join(format!("viewer_window_{number:04}.png"));
@@ -56,9 +58,11 @@ fn files_are_dropped_on_a_window() {
     drag_and_drop::drop_file(&session, &bad);
     session.wait_for_line("warning: ");
     let still = session.take_screenshot(&shot(3));
-    assert!(differing(&showcase, &still, 0) < 0.02, "the showcase is no longer shown");
+    // Each frame looks at other places within its pixels.
+    let differs = differing(&showcase, &still, 0);
+    assert!(differs < 0.25, "{differs} of the showcase is no longer shown");
     drag_and_drop::drop_file(&session, &good);
     session.wait_for_line("uploading the model");
-    session.shoot_until(&shot(4), |_, image| differing(&showcase, image, 0) > 0.3);
+    session.shoot_until(&shot(4), |_, image| differing(&showcase, image, 0) > 0.6);
     session.close();
 }
