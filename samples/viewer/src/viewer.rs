@@ -133,7 +133,8 @@ impl Viewer {
         }
         self.done = 0;
         let is_own = self.camera == self.cameras[self.chosen].camera;
-        self.cameras = model::cameras_around(self.scene.rig(), self.scene.shown(), &pose, &self.bounds);
+        self.cameras =
+            model::cameras_around(self.scene.rig(), self.scene.scene_number(), &pose, &self.bounds);
         if is_own {
             self.set_camera(&self.cameras[self.chosen].camera.clone());
         }

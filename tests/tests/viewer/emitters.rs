@@ -26,7 +26,7 @@ fn corner_factor([a, b]: [f64; 2], height: f64) -> f64 {
 }
 
 #[test]
-fn small_lights_are_found_at_once() {
+fn small_lights_light_as_their_form_factor() {
     let Some(ctx) = software_device() else { return };
     let glowing = Material { emissive: [1.0, 2.0, 3.0], emissive_strength: 50.0, ..matte([0.0; 3]) };
     // From 0.5 to 0.7 and from 0.2 to 0.3 beside the point that is seen: so few paths meet it by chance that noise would be large.

@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_thread_has_loaded_is_taken_once() {
+    fn a_loaded_value_is_taken_once() {
         let mut thread = LoadThread::start(|_| 7).unwrap();
         assert_eq!((taken(&mut thread), thread.take()), (7, None));
     }

@@ -9,7 +9,7 @@ use lvk::{
 use lvk_gltf::{Model, Pose, Primitive};
 use lvk_samples::app::array_buffer::{array, buffer};
 
-use super::instances::rows;
+use super::instances::transform_rows;
 use super::layout::GpuAttributes;
 use crate::model::movers;
 use crate::pipelines::{DEFORM, SAMPLE};
@@ -258,7 +258,7 @@ impl Deformation {
 fn upload_joints(cmd: &mut CommandBuffer, matrices: &[Mat4]) -> lvk::Result<u64> {
     let none = [Mat4::ZERO];
     let matrices = if matrices.is_empty() { &none } else { matrices };
-    cmd.upload_slice(&matrices.iter().map(rows).collect::<Vec<_>>())
+    cmd.upload_slice(&matrices.iter().map(transform_rows).collect::<Vec<_>>())
 }
 
 /// The targets whose weight is not 0.

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_holes_or_no_light_is_not_looked_for() {
+    fn materials_with_holes_and_without_light_are_left_out() {
         let model = Model::default();
         let glowing = Material { emissive: [1.0, 0.0, 0.0], emissive_strength: 10.0, ..Material::default() };
         assert!((emission_weight(&glowing, &model) - 2.126).abs() < 1e-3);

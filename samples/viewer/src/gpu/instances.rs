@@ -85,7 +85,7 @@ impl SceneInstances {
             let transform = placements.get(*place).map(|placement| placement.transform);
             // All points of what has no inside are one, so that nothing of it is rasterised.
             let transform = transform.filter(has_inside).unwrap_or(Mat4::ZERO);
-            instance.rows = rows(&transform);
+            instance.rows = transform_rows(&transform);
             instance.normal_columns = normal_columns(&transform);
             structure.transform = instance.rows;
         }
@@ -98,7 +98,7 @@ impl SceneInstances {
     }
 
     /// Transforms of all instances.
-    pub(crate) fn rows(&self) -> Vec<[f32; 12]> {
+    pub(crate) fn transforms(&self) -> Vec<[f32; 12]> {
         self.table.iter().map(|instance| instance.rows).collect()
     }
 }
@@ -109,7 +109,7 @@ fn has_inside(transform: &Mat4) -> bool {
 }
 
 /// The upper three rows of a matrix.
-pub(crate) fn rows(matrix: &Mat4) -> [f32; 12] {
+pub(crate) fn transform_rows(matrix: &Mat4) -> [f32; 12] {
     let [x, y, z, w] = [matrix.x_axis, matrix.y_axis, matrix.z_axis, matrix.w_axis];
     rows_from_columns([x, y, z, w].map(|column| column.truncate().to_array()))
 }

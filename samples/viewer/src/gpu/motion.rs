@@ -18,7 +18,7 @@ pub(super) struct SceneMotion {
     /// True if the pose of the last frame was another one than that before.
     was_new: bool,
     /// Transforms of instances in the last frame.
-    rows_before: Vec<[f32; 12]>,
+    transforms_before: Vec<[f32; 12]>,
 }
 
 impl SceneMotion {
@@ -28,7 +28,7 @@ impl SceneMotion {
         refitted: Vec<AccelStructHandle>,
         pose: Pose,
     ) -> Self {
-        Self { deformation, refitted, pose, is_new: true, was_new: false, rows_before: Vec::new() }
+        Self { deformation, refitted, pose, is_new: true, was_new: false, transforms_before: Vec::new() }
     }
 
     /// Takes another pose over. Returns false if it is that of before.
@@ -47,8 +47,12 @@ impl SceneMotion {
     }
 
     /// The transforms of instances in the frame before, which are those of now where there is none.
-    pub(super) fn rows_before(&self, now: Vec<[f32; 12]>, is_first: bool) -> Vec<[f32; 12]> {
-        if is_first || self.rows_before.len() != now.len() { now } else { self.rows_before.clone() }
+    pub(super) fn transforms_before(&self, now: Vec<[f32; 12]>, is_first: bool) -> Vec<[f32; 12]> {
+        if is_first || self.transforms_before.len() != now.len() {
+            now
+        } else {
+            self.transforms_before.clone()
+        }
     }
 
     /// Records what moves vertices and structures to the pose.
@@ -86,7 +90,7 @@ impl SceneMotion {
     pub(super) fn end_frame(&mut self, instances: &SceneInstances, is_first: bool) {
         self.was_new = self.is_new && !is_first;
         self.is_new = false;
-        self.rows_before = instances.rows();
+        self.transforms_before = instances.transforms();
     }
 
     /// Buffers that vertices are moved in.

@@ -99,7 +99,7 @@ impl GpuScene {
     }
 
     /// The number of the scene of the model.
-    pub(crate) fn shown(&self) -> usize {
+    pub(crate) fn scene_number(&self) -> usize {
         self.shown
     }
 
@@ -151,7 +151,8 @@ impl GpuScene {
         let (lights, emitters) = (&self.lights.lights, &self.emitters.triangles);
         Ok(SceneConstants {
             instances: cmd.upload_slice(&self.instances.table)?,
-            rows_before: cmd.upload_slice(&motion.rows_before(self.instances.rows(), is_first))?,
+            rows_before: cmd
+                .upload_slice(&motion.transforms_before(self.instances.transforms(), is_first))?,
             lights: if lights.is_empty() { self.constants.lights } else { cmd.upload_slice(lights)? },
             emitters: if emitters.is_empty() { self.constants.emitters } else { cmd.upload_slice(emitters)? },
             ..self.constants
@@ -241,7 +242,7 @@ impl Arrays<'_> {
         let sky = environment.sky.distribution();
         Ok(SceneConstants {
             instances: self.upload("instances", &instances.table)?,
-            rows_before: self.upload("instances before", &instances.rows())?,
+            rows_before: self.upload("instances before", &instances.transforms())?,
             geometries: self.upload("geometries", &meshes.geometries)?,
             materials: self.upload("materials", &materials.materials)?,
             slots: self.upload::<GpuTextureSlot>("texture slots", &materials.slots)?,
