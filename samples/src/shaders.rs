@@ -110,6 +110,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/albedo",
     "viewer/bsdf",
     "viewer/candidate",
+    "viewer/emitters",
     "viewer/frame",
     "viewer/ggx",
     "viewer/hit",

@@ -43,21 +43,21 @@ vec4 before(vec2 place) {
     return sum;
 }
 
-vec2 motionOf(ivec2 pixel, Seen seen) {
-    // The sky is as far away as numbers allow.
-    float distance = isSky(seen) ? 1e6 * frame.camera.nearPlane : seen.distance;
+vec2 motionAt(ivec2 pixel, Seen seen) {
+    float distance = isSky(seen) ? kSkyDistance * frame.camera.nearPlane : seen.distance;
     vec3 point = seenPoint(frame.camera, pixel, distance);
-    return placeOf(frame.seen, point) - placeOf(frame.seenBefore, point);
+    return motionOf(point, frame.planes.at[planePlace(kPlaneBefore, pixelPlace(pixel))].xyz);
 }
 
 vec3 dataOf(uint place, ivec2 pixel, Seen seen) {
     switch (frame.view) {
     case kViewNormals: return isSky(seen) ? vec3(0.0) : seen.normal * 0.5 + 0.5;
     case kViewRoughness: return vec3(isSky(seen) ? 0.0 : seen.roughness);
-    case kViewMotion: return vec3(0.5 + 0.05 * motionOf(pixel, seen), 0.5);
+    case kViewMotion: return vec3(0.5 + 0.05 * motionAt(pixel, seen), 0.5);
     case kViewAlbedo: return frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
     case kViewMatte: return frame.exposure * frame.planes.at[planePlace(kPlaneMatte + argument, place)].rgb;
-    default: return frame.exposure * frame.planes.at[planePlace(kPlaneMirrored + argument, place)].rgb;
+    case kViewMirrored: return frame.exposure * frame.planes.at[planePlace(kPlaneMirrored + argument, place)].rgb;
+    default: return vec3(0.0);
     }
 }
 
@@ -69,7 +69,7 @@ void antialiasPixel(uvec2 at) {
     vec4 mean = vec4(0.0);
     bool isStill = frame.stillCount > 0u;
     if (frame.frameNumber > 0u) {
-        vec2 from = vec2(pixel) + 0.5 - (isStill ? vec2(0.0) : motionOf(pixel, seen));
+        vec2 from = vec2(pixel) + 0.5 - (isStill ? vec2(0.0) : motionAt(pixel, seen));
         bool isInside = all(greaterThanEqual(from, vec2(0.0))) && all(lessThan(from, vec2(frame.camera.width, frame.camera.height)));
         if (isInside) {
             mean = before(from);

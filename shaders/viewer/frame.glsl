@@ -45,10 +45,21 @@ struct Instance {
 // Addresses are numbers: SwiftShader miscompiles copies of structs that hold buffer references.
 struct Geometry {
     uvec2 positions;
+    uvec2 positionsBefore; // in the frame before; where nothing moves the same
     uvec2 attributes;
     uvec2 indices;
     uint material;
     uint flags;
+    float emissionWeight; // of its triangles among all that shadow rays look for; 0 if they do not
+    uint padding;
+};
+
+// A triangle that shadow rays look for.
+struct Emitter {
+    uint instance;
+    uint geometry; // of the instance
+    uint primitive;
+    float chance; // that this one or one before it is chosen
 };
 
 struct Attributes {
@@ -91,7 +102,7 @@ struct Light {
     vec3 position; // for a disc: towards it
     uint kind;
     vec3 color; // irradiance of a disc, else radiant intensity
-    float probability; // of being chosen, among all lights and the sky
+    float probability; // of being chosen, among all lights, emitters and the sky
     vec3 direction; // along which a spot shines
     float cone; // of a disc, 1 - cosine of its radius; of a spot, cosine of the outer cone
     float cosInner; // of a spot's inner cone
@@ -99,6 +110,7 @@ struct Light {
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer InstanceArray { Instance at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RowsArray { vec4 at[][3]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray { Geometry at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer AttributesArray { Attributes at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer PositionArray { vec3 at[]; };
@@ -107,16 +119,19 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Cor
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaterialArray { Material at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SlotArray { TextureSlot at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightArray { Light at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer EmitterArray { Emitter at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FloatArray { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { vec4 at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
     InstanceArray instances;
+    RowsArray rowsBefore; // of the instances in the frame before
     GeometryArray geometries;
     MaterialArray materials;
     SlotArray slots;
     LightArray lights;
+    EmitterArray emitters;
     FloatArray skyRows; // cumulative distribution of the rows of the sky's map
     FloatArray skyColumns; // of each row, one after another
     PositionArray sky; // radiance of the texels of its map, row by row
@@ -124,7 +139,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     SumArray sums; // radiance of all samples so far and their number, for each pixel
     uint lightCount;
     uint discCount; // lights that are discs, which come first
-    float skyProbability; // of being chosen, among all lights and the sky
+    float skyProbability; // likewise
     uvec2 skySize; // texels of the map of the sky: columns around y, rows from the zenith down
     uint tlas;
     uint image;
@@ -142,6 +157,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint frameNumber; // since the camera was chosen; 0: there is no frame before
     uint stillCount; // frames since the camera moved
     uint view; // what the picture shows: kViewLight or another of plane.glsl
+    uint sceneMoves; // not 0: something is elsewhere than in the frame before
+    uint emitterCount;
+    float emitterProbability; // of being chosen, among all lights, emitters and the sky
+    float emitterPower; // sum of areas of emitters times their weights
 };
 
 layout(push_constant, scalar) uniform PushConstants {

@@ -29,17 +29,25 @@ struct Triangle {
     uint geometry; // in the list of all
 };
 
-vec3 positionOf(Geometry geometry, uint corner) {
-    if ((geometry.flags & kQuantised) == 0u) {
-        return PositionArray(geometry.positions).at[corner];
+vec3 positionIn(uvec2 positions, uint flags, uint corner) {
+    if ((flags & kQuantised) == 0u) {
+        return PositionArray(positions).at[corner];
     }
-    uvec2 words = QuantisedArray(geometry.positions).at[corner];
+    uvec2 words = QuantisedArray(positions).at[corner];
     return vec3(unpackSnorm2x16(words.x), unpackSnorm2x16(words.y).x);
 }
 
-vec3 toWorld(Instance instance, vec3 point) {
+vec3 positionOf(Geometry geometry, uint corner) {
+    return positionIn(geometry.positions, geometry.flags, corner);
+}
+
+vec3 transformed(vec4 rows[3], vec3 point) {
     vec4 p = vec4(point, 1.0);
-    return vec3(dot(instance.rows[0], p), dot(instance.rows[1], p), dot(instance.rows[2], p));
+    return vec3(dot(rows[0], p), dot(rows[1], p), dot(rows[2], p));
+}
+
+vec3 toWorld(Instance instance, vec3 point) {
+    return transformed(instance.rows, point);
 }
 
 vec3 vectorToWorld(Instance instance, vec3 v) {

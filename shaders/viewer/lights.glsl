@@ -1,20 +1,10 @@
-// Light that arrives at a point: from the sky, from discs in it such as the sun, and from lamps.
+// Light that arrives at a point: from the sky, from discs in it such as the sun, from lamps, and from triangles that glow.
 #ifndef VIEWER_LIGHTS
 #define VIEWER_LIGHTS
 
 #include "viewer/bsdf.glsl"
+#include "viewer/emitters.glsl"
 #include "viewer/sky.glsl"
-
-// A ray goes no farther.
-const float kFar = 1e30;
-
-// A direction to light, drawn by chance.
-struct Arriving {
-    vec3 direction;
-    float distance;
-    vec3 radiance; // over the density; for a lamp, its irradiance over the chance to be chosen
-    float density; // per solid angle; 0 for a lamp, which no scattered ray meets
-};
 
 float discSolidAngle(Light light) {
     return 2.0 * kPi * light.cone;
@@ -60,6 +50,10 @@ Arriving drawLight(vec3 position, float choice, vec2 u) {
         return Arriving(direction, kFar, density > 0.0 ? skyRadiance(direction) / density : vec3(0.0), density);
     }
     choice -= frame.skyProbability;
+    if (choice < frame.emitterProbability) {
+        return drawEmitter(position, choice / frame.emitterProbability, u);
+    }
+    choice -= frame.emitterProbability;
     uint number = 0u;
     while (number + 1u < frame.lightCount && choice >= frame.lights.at[number].probability) {
         choice -= frame.lights.at[number].probability;

@@ -15,13 +15,22 @@ vec3 leaveTo(Surface surface, vec3 direction) {
     return leaveSurface(surface.position, isAbove ? surface.geometricNormal : -surface.geometricNormal, frame.offsetExtent);
 }
 
+// The extinction on the side of a surface that a direction leads to, of which `before` is on that of the path so far.
+vec3 extinctionTowards(Surface surface, vec3 direction, vec3 before) {
+    if ((surface.flags & kThin) != 0u || dot(direction, surface.geometricNormal) > 0.0) {
+        return before;
+    }
+    return surface.isFront ? frame.materials.at[surface.material].extinction : vec3(0.0);
+}
+
 // Light at a surface from one light or from the sky, drawn by chance: all of it, and what the matte layer scatters.
 struct DirectLight {
     vec3 all;
     vec3 matte;
 };
 
-DirectLight directLight(Surface surface, Bsdf bsdf, float choice, vec2 u) {
+// `extinction`: of the volume that the path came through.
+DirectLight directLight(Surface surface, Bsdf bsdf, vec3 extinction, float choice, vec2 u) {
     Arriving arriving = drawLight(surface.position, choice, u);
     Response response = respond(surface, bsdf, arriving.direction);
     if (!any(greaterThan(response.value * arriving.radiance, vec3(0.0)))) {
@@ -30,6 +39,9 @@ DirectLight directLight(Surface surface, Bsdf bsdf, float choice, vec2 u) {
     vec3 origin = leaveTo(surface, arriving.direction);
     float range = arriving.distance >= kFar ? kFar : 0.9999 * arriving.distance;
     vec3 way = transmittanceTo(origin, arriving.direction, range);
+    if (arriving.distance < kFar) {
+        way *= exp(-extinctionTowards(surface, arriving.direction, extinction) * arriving.distance);
+    }
     float share = arriving.density > 0.0 ? powerShare(arriving.density, response.density) : 1.0;
     vec3 light = share * way * arriving.radiance;
     return DirectLight(light * response.value, light * response.matte);
@@ -40,12 +52,13 @@ struct Path {
     vec3 origin;
     vec3 direction;
     float density; // of the direction; below 0 where nothing else looks for light along it
+    vec3 from; // the surface that the direction was drawn at
     vec3 extinction; // of the volume that the path is in
     float squeezed; // radiance is eta^2 as much inside of a volume, which comes back at its end
 };
 
 Path firstPath(vec3 origin, vec3 direction) {
-    return Path(origin, direction, -1.0, vec3(0.0), 1.0);
+    return Path(origin, direction, -1.0, origin, vec3(0.0), 1.0);
 }
 
 // Goes on from a surface.
@@ -53,12 +66,24 @@ void follow(inout Path path, Surface surface, Bsdf bsdf, Scattered scattered) {
     // Shadow rays go through panes, but not through what bounds a volume.
     bool isThin = (surface.flags & kThin) != 0u;
     path.density = !scattered.isPane ? scattered.density : isThin ? path.density : -1.0;
+    path.from = scattered.isPane ? path.from : surface.position;
+    path.extinction = extinctionTowards(surface, scattered.direction, path.extinction);
     if (!isThin && dot(scattered.direction, surface.geometricNormal) < 0.0) {
-        path.extinction = surface.isFront ? frame.materials.at[surface.material].extinction : vec3(0.0);
         path.squeezed *= bsdf.eta * bsdf.eta;
     }
     path.origin = leaveTo(surface, scattered.direction);
     path.direction = scattered.direction;
+}
+
+// The share of the light of a surface that shadow rays do not find.
+float emissionShare(Path path, Hit hit, Surface surface) {
+    if (path.density < 0.0 || frame.emitterCount == 0u) {
+        return 1.0;
+    }
+    float weight = frame.geometries.at[frame.instances.at[hit.instance].firstGeometry + hit.geometry].emissionWeight;
+    vec3 way = surface.position - path.from;
+    float density = emitterDensity(weight, length(way), abs(dot(surface.geometricNormal, path.direction)));
+    return powerShare(path.density, density);
 }
 
 // Light that comes against the direction of a path whose next surface has the number `bounce`.
@@ -77,11 +102,11 @@ vec3 pathRadiance(Path path, uint bounce, inout Random random) {
             radiance += throughput * surface.baseColor;
             break;
         }
-        radiance += throughput * surface.emission;
+        radiance += throughput * emissionShare(path, hit, surface) * surface.emission;
         Bsdf bsdf = bsdfOf(surface, -path.direction);
         vec2 lightChoices = nextPair(random);
         vec2 lightPlace = nextPair(random);
-        radiance += throughput * directLight(surface, bsdf, lightChoices.x, lightPlace).all;
+        radiance += throughput * directLight(surface, bsdf, path.extinction, lightChoices.x, lightPlace).all;
         vec2 choices = nextPair(random);
         vec2 u = nextPair(random);
         Scattered scattered = scatter(surface, bsdf, -path.direction, choices, u);

@@ -12,6 +12,7 @@ const uint kViewMotion = 3u;
 const uint kViewAlbedo = 4u;
 const uint kViewMatte = 5u; // light of matte layers, filtered
 const uint kViewMirrored = 6u; // all other light, filtered
+const uint kViewSteps = 7u; // steps of rays, which another pass counts
 
 // Two planes of the same kind are those of this frame and of the one before, in turn.
 const uint kPlaneSurface = 0u; // and 1: normal, distance, instance, roughness
@@ -25,7 +26,8 @@ const uint kPlaneMatteAlbedo = 14u;
 const uint kPlaneMirroredShare = 15u;
 const uint kPlaneBase = 16u; // light that needs no filter
 const uint kPlaneFrame = 17u; // the picture of this frame
-const uint kPlaneShown = 18u;
+const uint kPlaneBefore = 18u; // where the point that the pixel shows was in the frame before
+const uint kPlaneShown = 19u;
 
 uint pixelPlace(ivec2 pixel) {
     return uint(pixel.y) * frame.camera.width + uint(pixel.x);
@@ -43,6 +45,9 @@ uint currentPlane(uint plane, uint place) {
 uint previousPlane(uint plane, uint place) {
     return planePlace(plane + 1u - (frame.frameNumber & 1u), place);
 }
+
+// The sky is as far away as numbers allow, in distances of the near plane.
+const float kSkyDistance = 1e6;
 
 // What a pixel shows, as far as later passes need to know it.
 struct Seen {
@@ -75,6 +80,11 @@ vec3 seenPoint(Camera camera, ivec2 pixel, float distance) {
 vec2 placeOf(Camera camera, vec3 point) {
     vec4 clip = cameraClip(camera, point);
     return (clip.xy / max(clip.w, 1e-6) * 0.5 + 0.5) * vec2(camera.width, camera.height);
+}
+
+// Pixels that what a pixel shows has moved since the frame before.
+vec2 motionOf(vec3 point, vec3 pointBefore) {
+    return placeOf(frame.seen, point) - placeOf(frame.seenBefore, pointBefore);
 }
 
 float brightness(vec3 color) {

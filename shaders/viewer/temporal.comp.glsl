@@ -5,6 +5,8 @@
 // Frames in the mean while the camera moves: of matte layers, and of mirrors, whose picture moves otherwise than their surface.
 const float kMostFrames = 48.0;
 const float kMostMirrorFrames = 4.0;
+// While something else moves, whose light and shadow move with it.
+const float kMostMovingFrames = 16.0;
 // While it stands.
 const float kMostStillFrames = 65536.0;
 // Frames before the variance over time says enough.
@@ -24,7 +26,8 @@ bool isSameSurface(Seen seen, vec3 point, Seen before, ivec2 pixel) {
     return abs(dot(way, seen.normal)) < 0.01 * seen.distance;
 }
 
-// The mean of the frames before around a place in pixels, of the pixels that saw the same surface; its matte.a is 0 without any.
+// The mean of the frames before around a place in pixels, of the pixels that saw the same surface, which was at `point`; its matte.a
+// is 0 without any.
 History historyAt(vec2 place, Seen seen, vec3 point) {
     History sum = History(vec4(0.0), vec4(0.0), vec4(0.0));
     vec2 low = floor(place - 0.5);
@@ -67,13 +70,14 @@ void temporalPixel(uvec2 at) {
     vec3 mirrored = frame.planes.at[planePlace(kPlaneMirrored, place)].rgb;
     History history = History(vec4(0.0), vec4(0.0), vec4(0.0));
     if (frame.frameNumber > 0u && !isSky(seen)) {
-        vec3 point = seenPoint(frame.camera, pixel, seen.distance);
-        vec2 moved = placeOf(frame.seen, point) - placeOf(frame.seenBefore, point);
-        history = historyAt(vec2(pixel) + 0.5 - moved, seen, point);
+        vec3 before = frame.planes.at[planePlace(kPlaneBefore, place)].xyz;
+        vec2 moved = motionOf(seenPoint(frame.camera, pixel, seen.distance), before);
+        history = historyAt(vec2(pixel) + 0.5 - moved, seen, before);
     }
     bool isStill = frame.stillCount > 0u;
-    float mirrorFrames = mix(kMostMirrorFrames, kMostFrames, clamp(2.0 * seen.roughness, 0.0, 1.0));
-    history.matte = extended(history.matte, matte, isStill ? kMostStillFrames : kMostFrames);
+    float matteFrames = frame.sceneMoves != 0u ? kMostMovingFrames : kMostFrames;
+    float mirrorFrames = mix(kMostMirrorFrames, matteFrames, clamp(2.0 * seen.roughness, 0.0, 1.0));
+    history.matte = extended(history.matte, matte, isStill ? kMostStillFrames : matteFrames);
     history.mirrored = extended(history.mirrored, mirrored, isStill ? kMostStillFrames : mirrorFrames);
     vec2 bright = vec2(brightness(matte), brightness(mirrored));
     vec4 counts = vec2(history.matte.a, history.mirrored.a).xyxy;

@@ -29,6 +29,21 @@ Hit visibleHit(uvec4 visible, vec3 origin, vec3 direction) {
     return Hit(visible.x, visible.y, visible.z, barycentrics, distance);
 }
 
+// Where the surface at `point` was in the frame before.
+vec3 pointBefore(Hit hit, vec3 point) {
+    Geometry geometry = frame.geometries.at[frame.instances.at[hit.instance].firstGeometry + hit.geometry];
+    uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
+    vec3 weights = weightsOf(hit.barycentrics);
+    vec3 now = vec3(0.0);
+    vec3 before = vec3(0.0);
+    for (uint corner = 0u; corner < 3u; ++corner) {
+        now += weights[corner] * positionIn(geometry.positions, geometry.flags, corners[corner]);
+        before += weights[corner] * positionIn(geometry.positionsBefore, geometry.flags, corners[corner]);
+    }
+    vec3 way = transformed(frame.rowsBefore.at[hit.instance], before) - transformed(frame.instances.at[hit.instance].rows, now);
+    return frame.sceneMoves != 0u ? point + way : point;
+}
+
 vec3 clamped(vec3 light) {
     float most = largest(light) * frame.exposure;
     return most > kBrightestSample ? light * (kBrightestSample / most) : light;
@@ -43,18 +58,24 @@ void storeLight(uint place, Seen seen, vec3 base, vec3 matte, vec3 matteAlbedo, 
     frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(clamped(mirrored / max(share, 1e-3)), 0.0);
 }
 
+void storePoint(uint place, vec3 point) {
+    frame.planes.at[planePlace(kPlaneBefore, place)] = vec4(point, 0.0);
+}
+
 void visibleLightPixel(uvec2 pixel) {
     uint place = pixelPlace(ivec2(pixel));
     vec3 direction = cameraDirection(frame.camera, pixel);
     uvec4 visible = texelFetch(kTexturesU2D[frame.visibility], ivec2(pixel), 0);
     const vec3 none = vec3(0.0);
     if (visible.x == kNothing) {
+        storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
         storeLight(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), none, none, none, none);
         return;
     }
     Hit hit = visibleHit(visible, frame.camera.eye, direction);
     Surface surface = surfaceAt(hit, direction, frame.camera.pixelSpread);
     Seen seen = Seen(surface.normal, hit.distance, hit.instance, surface.roughness);
+    storePoint(place, pointBefore(hit, frame.camera.eye + hit.distance * direction));
     if ((surface.flags & kUnlit) != 0u) {
         storeLight(place, seen, surface.baseColor, none, none, none, none);
         return;
@@ -63,7 +84,7 @@ void visibleLightPixel(uvec2 pixel) {
     Bsdf bsdf = bsdfOf(surface, -direction);
     vec2 lightChoices = nextPair(random);
     vec2 lightPlace = nextPair(random);
-    DirectLight direct = directLight(surface, bsdf, lightChoices.x, lightPlace);
+    DirectLight direct = directLight(surface, bsdf, vec3(0.0), lightChoices.x, lightPlace);
     vec2 choices = nextPair(random);
     vec2 u = nextPair(random);
     Scattered scattered = scatter(surface, bsdf, -direction, choices, u);

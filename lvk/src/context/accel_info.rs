@@ -45,6 +45,9 @@ pub struct AccelStructInfo {
     /// instances. Compaction frees the gathered inputs of a BLAS without
     /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), because that BLAS is never built again.
     pub table_bytes: u64,
+    /// Refits that were submitted since the last build. With [`BuildMode::Auto`](crate::BuildMode::Auto) they become 0 at its
+    /// rebuilds.
+    pub refits: u32,
     /// Compaction state.
     pub compaction: Compaction,
 }
@@ -123,6 +126,7 @@ fn accel_struct_info_of(object: &AccelStruct) -> AccelStructInfo {
             is_remapped: false,
             structure_bytes: tlas.memory_bytes(),
             table_bytes: tlas.table_bytes(),
+            refits: tlas.contents().refits,
             compaction: Compaction::None,
         },
         AccelKind::Blas(blas) => {
@@ -144,6 +148,7 @@ fn accel_struct_info_of(object: &AccelStruct) -> AccelStructInfo {
                 is_remapped: blas.parts.iter().any(|part| part.map.is_some()),
                 structure_bytes: after_bytes,
                 table_bytes: blas.table_bytes(),
+                refits: blas.refit_count(),
                 compaction,
             }
         }

@@ -254,7 +254,7 @@ impl<'a> SampleSetup<'a> {
 }
 
 /// Prints warnings to standard error.
-pub(crate) fn warn(warnings: &[String]) {
+pub fn warn(warnings: &[String]) {
     for warning in warnings {
         print_message("warning", warning);
     }

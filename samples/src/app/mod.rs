@@ -17,6 +17,7 @@ pub mod interrupt;
 pub mod library_warnings;
 pub mod loading;
 pub mod metrics;
+pub mod orbit_camera;
 pub mod pass_times;
 pub mod png;
 pub mod progress;

@@ -30,8 +30,10 @@
 //! ```
 //!
 //! For a window, a sample also implements [`resize`](Sample::resize), [`camera_mut`](Sample::camera_mut),
-//! [`panel`](Sample::panel) and [`reload`](Sample::reload). A sample that takes long to create is
+//! [`panel`](Sample::panel), [`reload`](Sample::reload) and [`drop_file`](Sample::drop_file). A sample that takes long to create is
 //! [`Loading`](super::loading::Loading) there: a thread creates it while the window displays the progress.
+
+use std::path::Path;
 
 use lvk::{Context, TextureHandle};
 
@@ -146,6 +148,21 @@ pub trait Sample {
             *own = *camera;
         }
     }
+
+    /// True if dragging the mouse goes around what the camera looks at, until the user chooses to fly; else it turns the camera.
+    fn orbits_at_first(&self) -> bool {
+        false
+    }
+
+    /// True once after the sample has chosen another camera, which takes the place of the user's. Asked before every frame of a
+    /// window.
+    fn takes_camera_back(&mut self) -> bool {
+        false
+    }
+
+    /// A file was dropped on the window. A sample that can show it loads it [on a thread](super::loading::LoadThread), and
+    /// shows what it showed before until then.
+    fn drop_file(&mut self, _path: &Path) {}
 
     /// Lays out the sample's own switches in the panel of its window.
     fn panel(&mut self, _ui: &mut egui::Ui) {}

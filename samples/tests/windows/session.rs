@@ -90,9 +90,9 @@ pub(crate) fn differing_by(steps: u8, one: &RgbaImage, other: &RgbaImage, first:
 pub(crate) struct Session {
     program: Child,
     pub(crate) said: Receiver<String>,
-    keys: RustConnection,
-    root: u32,
-    window: u32,
+    pub(crate) keys: RustConnection,
+    pub(crate) root: u32,
+    pub(crate) window: u32,
     _desktop: VirtualDisplay,
 }
 

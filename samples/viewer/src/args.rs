@@ -24,11 +24,11 @@ pub struct ViewerArgs {
     #[arg(long, help_heading = "Model")]
     pub list_cameras: bool,
 
-    /// Animation that the model stands in, by its number or its name [default: none, as the file says]
+    /// Animation to play, by its number in --list-cameras or its name [default: none, nodes stand as the file says]
     #[arg(long, value_name = "NUMBER|NAME", help_heading = "Model")]
     pub animation: Option<String>,
 
-    /// Time of the animation in seconds, 0 or more
+    /// Time of the animation in the first frame in seconds, 0 or more; after its end it begins anew
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, requires = "animation")]
     #[arg(help_heading = "Model")]
     pub time: f32,

@@ -46,6 +46,9 @@ pub enum Content {
     Matte,
     /// Light that all other layers receive, filtered.
     Mirrored,
+    /// Steps of the ray of each pixel through the acceleration structures, from black over blue, green and red to white at 512 and
+    /// more. Software ray queries count them; where a device traverses, all is black.
+    Steps,
 }
 
 /// The configuration of the sample.
@@ -108,6 +111,9 @@ impl ViewerConfig {
         SampleError::check_range("--samples", self.samples, [1, Self::MAX_SAMPLES])?;
         SampleError::check_range("--bounces", self.bounces, [1, u32::MAX - 1])?;
         RayPath::choose(Some(self.path), capabilities)?;
+        if self.content == Content::Steps {
+            RayPath::choose(Some(RayPath::Query), capabilities)?;
+        }
         Ok(())
     }
 }

@@ -1,22 +1,28 @@
 //! The `viewer` sample: shows models of glTF and OBJ files, by an unbiased path tracer or by a
 //! real-time method.
 //!
-//! [`Viewer`] is the sample for programs and tests, `info.rs` describes its program. [`model`] loads models or makes the one that
-//! needs no file, [`light`] makes the sky and the sun, `gpu` uploads both, `path_tracer.rs` traces paths and `hybrid` is the real-time method.
+//! [`Viewer`] is the sample for programs and tests, `viewer_sample.rs` what it does in each frame, `info.rs` describes its program and
+//! `open.rs` opens what the arguments name. [`model`] loads models or makes the one that needs no file, [`light`] makes the sky and the
+//! sun, `gpu` uploads both and moves what an animation moves, `path_tracer.rs` traces paths and `hybrid` is the real-time method.
 
 mod args;
 mod config;
+mod dropped;
 mod gpu;
 mod hybrid;
 mod info;
 pub mod light;
 pub mod model;
+mod names;
+mod open;
 mod panel;
 mod path_tracer;
 mod pipelines;
+mod playback;
 mod present;
 mod renderer;
 mod viewer;
+mod viewer_sample;
 
 pub use args::{LightArgs, SkyArg, ViewerArgs};
 pub use config::{Content, Method, ToneMapping, ViewerConfig};

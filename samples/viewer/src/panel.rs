@@ -1,7 +1,53 @@
-//! Switches in the panel of the window.
+//! What the panel of the window shows of the viewer.
+
+use egui::{Color32, RichText};
+use lvk_gltf::Animation;
 
 use crate::config::{Content, Method, ToneMapping, ViewerConfig};
 use crate::model::ModelCamera;
+
+/// Lays out the name of the model, and why the last file that was dropped is not shown, if so.
+pub(crate) fn show_model(ui: &mut egui::Ui, name: &str, drop_error: Option<&str>) {
+    ui.label(format!("{name} (drop another glTF or OBJ file here)"));
+    show_error(ui, drop_error);
+}
+
+/// Lays out an error, if there is one.
+pub(crate) fn show_error(ui: &mut egui::Ui, error: Option<&str>) {
+    if let Some(error) = error {
+        ui.label(RichText::new(error).color(Color32::LIGHT_RED));
+    }
+}
+
+/// Lays out the memory of the structures of meshes and of the top level, in bytes.
+pub(crate) fn show_memory(ui: &mut egui::Ui, bytes: [u64; 2]) {
+    let [meshes, top] = bytes.map(|bytes| bytes as f64 / 1024.0 / 1024.0);
+    ui.label(format!("structures: {meshes:.2} MiB of meshes, {top:.2} MiB of the top level"));
+}
+
+/// Lays out the list of animations. Returns another choice than `chosen`.
+pub(crate) fn choose_animation(
+    ui: &mut egui::Ui,
+    animations: &[Animation],
+    chosen: Option<usize>,
+) -> Option<Option<usize>> {
+    if animations.is_empty() {
+        return None;
+    }
+    let name = |place: Option<usize>| match place.and_then(|place| Some((place, animations.get(place)?))) {
+        Some((place, animation)) => {
+            animation.name.clone().unwrap_or_else(|| format!("animation {}", place + 1))
+        }
+        None => "none".to_owned(),
+    };
+    let mut choice = chosen;
+    egui::ComboBox::from_label("plays").selected_text(name(chosen)).show_ui(ui, |ui| {
+        for place in std::iter::once(None).chain((0..animations.len()).map(Some)) {
+            ui.selectable_value(&mut choice, place, name(place));
+        }
+    });
+    (choice != chosen).then_some(choice)
+}
 
 /// Lays out the list of cameras. Returns another choice than `chosen`.
 pub(crate) fn choose_camera(ui: &mut egui::Ui, cameras: &[ModelCamera], chosen: usize) -> Option<usize> {
@@ -31,6 +77,7 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
                 Content::Albedo,
                 Content::Matte,
                 Content::Mirrored,
+                Content::Steps,
             ] {
                 ui.selectable_value(&mut config.content, content, format!("{content:?}"));
             }

@@ -27,15 +27,17 @@ impl PathTracer {
         })
     }
 
-    /// Records a pass over a picture of `extent` pixels whose sums are `sums`.
+    /// Records a pass over a picture of `extent` pixels whose sums are `sums`. It reads what was `written` before.
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
         sums: BufferHandle,
+        written: &[BufferHandle],
         extent: [u32; 2],
     ) -> lvk::Result<()> {
-        let dependencies = Dependencies { buffers: &[sums], ..Dependencies::default() };
+        let dependencies =
+            Dependencies { buffers: &[sums], read_buffers: written, ..Dependencies::default() };
         match self {
             Self::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;

@@ -21,6 +21,7 @@ pub(crate) const PATH_QUERY: SampleStage = stage!("path.comp");
 pub(crate) const NEAREST_MISS: SampleStage = stage!("nearest.rmiss");
 pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
 pub(crate) const CANDIDATE: SampleStage = stage!("candidate.rahit");
+pub(crate) const DEFORM: SampleStage = stage!("deform.comp");
 pub(crate) const VISIBILITY_VERTEX: SampleStage = stage!("visibility.vert");
 pub(crate) const VISIBILITY_FRAGMENT: SampleStage = stage!("visibility.frag");
 pub(crate) const LIGHT_RAYS: SampleStage = stage!("visible_light.rgen");
@@ -29,6 +30,7 @@ pub(crate) const TEMPORAL: SampleStage = stage!("temporal.comp");
 pub(crate) const FILTER: SampleStage = stage!("filter.comp");
 pub(crate) const COMPOSITE: SampleStage = stage!("composite.comp");
 pub(crate) const ANTIALIAS: SampleStage = stage!("antialias.comp");
+pub(crate) const STEPS: SampleStage = stage!("steps.comp");
 pub(crate) const PRESENT: SampleStage = stage!("present.comp");
 
 /// Returns every pipeline of the sample.
@@ -36,6 +38,7 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
     vec![
         SamplePipeline::new("viewer: paths by pipeline", &[PATH_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
         SamplePipeline::new("viewer: paths by query", &[PATH_QUERY]),
+        SamplePipeline::new("viewer: morph targets and joints", &[DEFORM]),
         SamplePipeline::raster(
             "viewer: visible triangles",
             &[VISIBILITY_VERTEX, VISIBILITY_FRAGMENT],
@@ -48,6 +51,7 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
         SamplePipeline::new("viewer: filter", &[FILTER]),
         SamplePipeline::new("viewer: composite", &[COMPOSITE]),
         SamplePipeline::new("viewer: antialiasing", &[ANTIALIAS]),
+        SamplePipeline::new("viewer: steps of rays", &[STEPS]),
         SamplePipeline::new("viewer: picture", &[PRESENT]),
     ]
 }

@@ -5,7 +5,7 @@ use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
 use crate::config::{Method, ViewerConfig};
-use crate::gpu::Draw;
+use crate::gpu::FrameScene;
 use crate::gpu::layout::Push;
 use crate::hybrid::Hybrid;
 use crate::path_tracer::PathTracer;
@@ -27,7 +27,7 @@ impl Renderer {
     pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
         let [width, height] = config.extent();
         Ok(match config.method {
-            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config.path, config.extent())?),
+            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config)?),
             Method::PathTrace => Self::PathTrace {
                 tracer: PathTracer::new(ctx, config.path)?,
                 sums: buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))?,
@@ -63,13 +63,13 @@ impl Renderer {
         to: &mut Frame<'_>,
         frame: u64,
         extent: [u32; 2],
-        draws: &[Draw],
+        scene: FrameScene<'_>,
     ) -> lvk::Result<()> {
         match self {
-            Self::Hybrid(hybrid) => hybrid.record(to, frame, draws),
+            Self::Hybrid(hybrid) => hybrid.record(to, frame, scene),
             Self::PathTrace { tracer, sums } => {
                 let push = Push { frame, argument: 0, _padding: 0 };
-                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, extent))
+                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, scene.written, extent))
             }
         }
     }

@@ -1,21 +1,20 @@
-//! Renders the sample at a frame time.
+//! The viewer: a model on the GPU, a camera, and the picture so far.
 
-use glam::{Quat, Vec3};
-use lvk::{CommandBuffer, Context, TextureHandle};
-use lvk_gltf::{Model, Pose};
+use glam::Vec3;
+use lvk::{CommandBuffer, Context};
+use lvk_gltf::{Bounds, Model};
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::render_target::RenderTarget;
-use lvk_samples::app::run_error::RunError;
-use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::scene::{Camera, GpuCamera};
 
-use crate::config::{Method, ViewerConfig};
-use crate::gpu::GpuScene;
+use crate::config::{Content, Method, ViewerConfig};
+use crate::dropped::DroppedFile;
 use crate::gpu::layout::{FrameConstants, Push};
+use crate::gpu::{FrameScene, GpuScene};
 use crate::light::Environment;
-use crate::model::{ModelCamera, cameras};
-use crate::panel;
+use crate::model::{self, ModelCamera};
+use crate::playback::Playback;
 use crate::present::Present;
 use crate::renderer::Renderer;
 
@@ -32,7 +31,7 @@ pub struct ViewerScene {
     pub name: String,
     /// The model, of which the default scene is shown.
     pub model: Model,
-    /// Light from outside.
+    /// Light from outside. Its sun does not shine on a model with directional lights of its own.
     pub environment: Environment,
     /// Radius of the discs of directional lights, in radians.
     pub disc_radius: f32,
@@ -40,21 +39,32 @@ pub struct ViewerScene {
 
 /// Shows a model.
 pub struct Viewer {
-    ctx: Context,
-    config: ViewerConfig,
-    scene: GpuScene,
-    renderer: Renderer,
-    present: Present,
-    target: RenderTarget,
-    cameras: Vec<ModelCamera>,
-    chosen: usize,
-    camera: Camera,
+    pub(crate) ctx: Context,
+    pub(crate) name: String,
+    pub(crate) config: ViewerConfig,
+    pub(crate) scene: GpuScene,
+    pub(crate) environment: Environment,
+    pub(crate) disc_radius: f32,
+    pub(crate) renderer: Renderer,
+    pub(crate) present: Present,
+    pub(crate) target: RenderTarget,
+    bounds: Bounds,
+    pub(crate) playback: Playback,
+    pub(crate) cameras: Vec<ModelCamera>,
+    /// The camera that looks, by its place among `cameras`.
+    pub(crate) chosen: usize,
+    /// True if another was chosen, until the window knows.
+    pub(crate) has_chosen_camera: bool,
+    pub(crate) dropped: DroppedFile,
+    /// Why the configuration that the panel asked for last cannot be, if so.
+    pub(crate) refused: Option<String>,
+    pub(crate) camera: Camera,
     /// The camera of the frame before.
-    before: Camera,
+    pub(crate) before: Camera,
     /// Samples in the picture, of the same camera.
-    done: u32,
+    pub(crate) done: u32,
     /// Frames since the renderer was made or began anew.
-    frame_number: u32,
+    pub(crate) frame_number: u32,
 }
 
 impl Viewer {
@@ -66,19 +76,29 @@ impl Viewer {
         config.check(ctx.capabilities())?;
         let target = RenderTarget::storage(ctx, config.extent())?;
         let shown = scene.model.default_scene.unwrap_or(0);
-        let pose: Pose = scene.model.pose(None, 0.0);
-        let gpu = GpuScene::new(ctx, &scene.model, shown, &pose, &scene.environment, scene.disc_radius)?;
-        let cameras = cameras(&scene.model, shown, &pose);
+        let pose = scene.model.pose(None, 0.0);
+        let bounds = model::bounds(&scene.model, shown, &pose);
+        let light = (&scene.environment, scene.disc_radius);
+        let gpu = GpuScene::new(ctx, (&scene.model, shown), &pose, light, &bounds)?;
+        let cameras = model::cameras_around(&scene.model, shown, &pose, &bounds);
         let camera = cameras[0].camera;
         Ok(Self {
             scene: gpu,
             renderer: Renderer::new(ctx, config)?,
             present: Present::new(ctx)?,
             ctx: ctx.clone(),
+            name: scene.name.clone(),
             config: *config,
+            environment: scene.environment.clone(),
+            disc_radius: scene.disc_radius,
             target,
+            bounds,
+            playback: Playback::default(),
             cameras,
             chosen: 0,
+            has_chosen_camera: false,
+            dropped: DroppedFile::default(),
+            refused: None,
             camera,
             before: camera,
             done: 0,
@@ -96,12 +116,67 @@ impl Viewer {
     pub fn choose_camera(&mut self, place: usize) {
         self.chosen = place.min(self.cameras.len() - 1);
         self.set_camera(&self.cameras[self.chosen].camera.clone());
+        self.has_chosen_camera = true;
+    }
+
+    /// Plays an animation of the model, by its place there, from a time in seconds on; `None` shows the nodes as they are.
+    pub fn play(&mut self, animation: Option<usize>, start: f32) {
+        self.playback = Playback { animation, start, ..self.playback };
+        self.pose();
+    }
+
+    /// Moves everything to where it is at the time that is shown. A camera of a node moves with it.
+    pub(crate) fn pose(&mut self) {
+        let pose = self.playback.pose(self.scene.rig());
+        if !self.scene.set_pose(&pose) {
+            return;
+        }
+        self.done = 0;
+        let is_own = self.camera == self.cameras[self.chosen].camera;
+        self.cameras =
+            model::cameras_around(self.scene.rig(), self.scene.scene_number(), &pose, &self.bounds);
+        if is_own {
+            self.set_camera(&self.cameras[self.chosen].camera.clone());
+        }
+    }
+
+    /// Name of the model.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Why the file that was dropped last cannot be shown, if so.
+    #[must_use]
+    pub fn drop_error(&self) -> Option<&str> {
+        self.dropped.error()
+    }
+
+    /// Shows a dropped file in place of the model, once it is loaded.
+    pub(crate) fn take_dropped(&mut self) {
+        let Some(mut loaded) = self.dropped.take() else { return };
+        match loaded.configure(&self.config) {
+            Ok(()) => {
+                loaded.has_chosen_camera = true;
+                *self = loaded;
+            }
+            Err(error) => self.refused = Some(error.to_string()),
+        }
+    }
+
+    /// The positions of vertices that morph targets or joints move, as the last frame has them: a list for each primitive with
+    /// triangles, in the order of meshes and then of nodes. Empty if the model has no animations.
+    ///
+    /// # Errors
+    /// [`SampleError::Device`].
+    pub fn moved_positions(&self) -> Result<Vec<Vec<[f32; 3]>>, SampleError> {
+        Ok(self.scene.moved_positions(&self.ctx)?)
     }
 
     /// Triangles of all meshes, each mesh once, and instances of meshes.
     #[must_use]
     pub fn counts(&self) -> (u64, u32) {
-        (self.scene.triangle_count, self.scene.instance_count)
+        (self.scene.triangle_count, self.scene.instance_count())
     }
 
     /// What the picture leaves out, for the user to read.
@@ -124,7 +199,11 @@ impl Viewer {
         config.check(self.ctx.capabilities())?;
         let before = &self.config;
         let is_resized = config.extent() != before.extent();
-        if is_resized || config.method != before.method || config.path != before.path {
+        let counts_steps = |config: &ViewerConfig| config.content == Content::Steps;
+        let needs_others = config.method != before.method
+            || config.path != before.path
+            || counts_steps(config) != counts_steps(before);
+        if is_resized || needs_others {
             let renderer = Renderer::new(&self.ctx, config)?;
             if is_resized {
                 self.target = RenderTarget::storage(&self.ctx, config.extent())?;
@@ -153,15 +232,20 @@ impl Viewer {
             .collect())
     }
 
-    fn set_camera(&mut self, camera: &Camera) {
+    pub(crate) fn set_camera(&mut self, camera: &Camera) {
         if self.camera != *camera {
             self.camera = *camera;
             self.done = 0;
         }
     }
 
+    /// True if the renderer knows no frame before.
+    fn is_first(&self) -> bool {
+        self.frame_number == 0
+    }
+
     /// Samples of a step of a frame.
-    fn step_samples(&self) -> u32 {
+    pub(crate) fn step_samples(&self) -> u32 {
         match self.config.method {
             Method::Hybrid => 1,
             Method::PathTrace if self.ctx.capabilities().is_cpu => CPU_PASS,
@@ -177,9 +261,10 @@ impl Viewer {
         };
         let seen = gpu(&self.camera);
         let addresses = self.renderer.addresses()?;
+        let scene = self.scene.constants(cmd, self.is_first())?;
         cmd.upload(&FrameConstants {
             camera: seen.for_sample(self.frame_number, u32::MAX),
-            scene: self.scene.constants,
+            scene,
             sums: addresses.sums,
             light: self.scene.light,
             tlas: self.scene.tlas.index(),
@@ -192,19 +277,28 @@ impl Viewer {
             tone_mapping: tone_mapping as u32,
             visibility: addresses.visibility,
             seen,
-            seen_before: gpu(&self.before),
+            seen_before: gpu(if self.is_first() { &self.camera } else { &self.before }),
             planes: addresses.planes,
             frame_number: self.frame_number,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
+            scene_moves: u32::from(self.scene.moves()),
+            emission: self.scene.emission(),
             _padding: 0,
         })
     }
 
     /// Adds samples, and stores the picture if `is_shown`.
-    fn add_samples(&mut self, frame: &mut Frame<'_>, count: u32, is_shown: bool) -> lvk::Result<()> {
+    pub(crate) fn add_samples(
+        &mut self,
+        frame: &mut Frame<'_>,
+        count: u32,
+        is_shown: bool,
+    ) -> lvk::Result<()> {
+        self.scene.record_motion(frame, self.is_first())?;
         let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
-        self.renderer.record(frame, constants, extent, &self.scene.draws)?;
+        let scene = FrameScene { draws: self.scene.draws(), written: &self.scene.written() };
+        self.renderer.record(frame, constants, extent, scene)?;
         if is_shown {
             let (push, sums, image) = (
                 Push { frame: constants, argument: 0, _padding: 0 },
@@ -213,116 +307,10 @@ impl Viewer {
             );
             frame.pass("picture", |cmd| self.present.record(cmd, &push, sums, image, extent))?;
         }
+        self.scene.end_frame(self.is_first());
         self.done += count;
         self.frame_number = self.frame_number.wrapping_add(1);
         self.before = self.camera;
         Ok(())
-    }
-
-    /// One more sample, or one more frame of the real-time method, which never ends.
-    fn record_progress(&mut self, frame: &mut Frame<'_>) -> lvk::Result<()> {
-        let is_whole = self.config.method == Method::PathTrace && self.done >= self.config.samples;
-        let count = if is_whole { 0 } else { 1 };
-        if count > 0 { self.add_samples(frame, count, true) } else { Ok(()) }
-    }
-}
-
-impl Sample for Viewer {
-    fn context(&self) -> &Context {
-        &self.ctx
-    }
-
-    /// The camera goes around what it looks at. Outside of windows each frame begins anew, so that it does not depend on those
-    /// before.
-    fn update(&mut self, time: FrameTime) {
-        self.set_camera(&around(&self.cameras[self.chosen].camera, time.phase()));
-        if !self.config.is_progressive {
-            (self.done, self.frame_number, self.before) = (0, 0, self.camera);
-        }
-    }
-
-    fn stands_at_first(&self) -> bool {
-        true
-    }
-
-    fn steps_per_frame(&self) -> u64 {
-        if self.config.is_progressive { 1 } else { self.config.samples.div_ceil(self.step_samples()).into() }
-    }
-
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
-        if self.config.is_progressive {
-            self.record_progress(frame)?;
-            return Ok(self.target.image());
-        }
-        (self.done, self.frame_number, self.before) = (0, 0, self.camera);
-        while self.done < self.config.samples {
-            if self.done > 0 {
-                frame.next_step()?;
-            }
-            let count = (self.config.samples - self.done).min(self.step_samples());
-            self.add_samples(frame, count, self.done + count == self.config.samples)?;
-        }
-        Ok(self.target.image())
-    }
-
-    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), RunError> {
-        Ok(self.configure(&ViewerConfig { width, height, ..self.config })?)
-    }
-
-    fn view(&mut self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.set_camera(camera);
-    }
-
-    /// Looks through the next camera of the model.
-    fn next(&mut self) {
-        self.choose_camera((self.chosen + 1) % self.cameras.len());
-    }
-
-    fn panel(&mut self, ui: &mut egui::Ui) {
-        if let Some(chosen) = panel::choose_camera(ui, &self.cameras, self.chosen) {
-            self.choose_camera(chosen);
-        }
-        let mut config = self.config;
-        panel::show_settings(ui, &mut config);
-        if config != self.config
-            && let Err(error) = self.configure(&config)
-        {
-            ui.label(error.to_string());
-        }
-        ui.label(format!("{} samples", self.done));
-        let (triangles, instances) = self.counts();
-        ui.label(format!("{triangles} triangles, {instances} instances"));
-    }
-
-    fn reload(&mut self) -> Result<(), RunError> {
-        let (renderer, present) = (Renderer::new(&self.ctx, &self.config)?, Present::new(&self.ctx)?);
-        (self.renderer, self.present, self.done, self.frame_number) = (renderer, present, 0, 0);
-        Ok(())
-    }
-}
-
-/// The camera after a part of a round about the vertical through what it looks at.
-fn around(camera: &Camera, phase: f32) -> Camera {
-    let (eye, target) = (Vec3::from(camera.eye), Vec3::from(camera.target));
-    let turn = Quat::from_rotation_y(std::f32::consts::TAU * phase);
-    let eye = if phase == 0.0 { eye } else { target + turn * (eye - target) };
-    Camera { eye: eye.to_array(), up: (turn * Vec3::from(camera.up)).to_array(), ..*camera }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_round_leads_around_the_target_and_back() {
-        let camera = Camera::looking_at([3.0, 1.0, 0.0], [1.0, 0.0, 0.0], 40.0);
-        assert_eq!(around(&camera, 0.0), camera);
-        let opposite = around(&camera, 0.5);
-        assert!(Vec3::from(opposite.eye).distance(Vec3::new(-1.0, 1.0, 0.0)) < 1e-5);
-        assert_eq!(opposite.target, camera.target);
     }
 }

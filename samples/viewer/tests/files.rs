@@ -51,5 +51,5 @@ fn cameras_are_listed_without_a_device() {
     let folder = tempfile::tempdir().unwrap();
     let output = viewer(folder.path(), &["--list-cameras"]);
     assert!(output.status.success());
-    assert_eq!(String::from_utf8(output.stdout).unwrap(), "1  showcase\n2  overview\n");
+    assert_eq!(String::from_utf8(output.stdout).unwrap(), "1  showcase\n2  overview\nanimation 1  turn\n");
 }

@@ -8,6 +8,7 @@ use lvk_samples::app::headless;
 use lvk_samples::app::sample::Sample as _;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
+use lvk_tests::device;
 use lvk_tests::image_comparison::{Tolerance, assert_similar};
 use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, SunSetting};
@@ -78,4 +79,24 @@ fn views_of_data_show_what_they_say() {
     assert!(is_near(floor(Content::Motion), [0.5; 3]));
     let albedo = floor(Content::Albedo);
     assert!((0.55..0.7).contains(&albedo[0]), "{albedo:?}");
+}
+
+#[test]
+fn steps_of_rays_are_counted_in_software_alone() {
+    let (Some(software), Some(hardware)) = (software_device(), device()) else { return };
+    let model = still_life();
+    for (ctx, is_counted) in [(&*software, true), (&*hardware, false)] {
+        let mut viewer = viewer(ctx, (Method::Hybrid, RayPath::Query), &model, &environment(), &view(1));
+        viewer.configure(&ViewerConfig { content: Content::Steps, ..*viewer.config() }).unwrap();
+        headless::picture(&mut viewer).unwrap();
+        let radiance = viewer.radiance().unwrap();
+        if !is_counted {
+            assert!(radiance.iter().all(|pixel| *pixel == [0.0; 3]));
+            continue;
+        }
+        // The box of glass in the middle is behind more bounds than the sky in the corner.
+        let bright = |x: u32, y: u32| radiance[(SIZE[0] * y + x) as usize].iter().sum::<f32>();
+        let (sky, glass) = (bright(1, 1), bright(SIZE[0] / 3, SIZE[1] / 2));
+        assert!(sky > 0.0 && glass > 1.5 * sky, "{sky} {glass}");
+    }
 }

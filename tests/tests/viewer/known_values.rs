@@ -125,7 +125,7 @@ fn a_lamp_of_triangles_lights_as_its_solid_angle() {
     let model = floor(matte([0.6; 3]))
         .quad(Vec3::new(-half, 1.0, -half), Vec3::X * 2.0 * half, Vec3::Z * 2.0 * half, glowing)
         .model();
-    let view = View { samples: 2048, ..above(0.9) };
+    let view = View { samples: 128, ..above(0.9) };
     let Some(actual) = seen(&model, &Environment::uniform([0.0; 3]), &view) else { return };
     // Form factor of a square above its middle, four times that of a quarter above its corner.
     let side = f64::from(half);

@@ -1,9 +1,13 @@
 //! The viewer: its path tracer against values that are known, against an independent path tracer, and against itself by other ray
 //! tracing paths; files that it loads.
 
+mod animation;
+mod dropped;
+mod emitters;
 mod furnace;
 mod hybrid;
 mod known_values;
+mod moving_model;
 mod paths;
 mod reference;
 mod reference_tracer;

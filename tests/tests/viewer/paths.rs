@@ -31,7 +31,7 @@ fn all_paths_trace_the_same_light() {
 
 /// Paths are chaotic: the last bit of a distance may send one to the other side of an edge, and the filter of the hybrid method
 /// spreads what differs. So few pixels may differ.
-fn assert_alike(what: &str, first: &[[f32; 3]], other: &[[f32; 3]]) {
+pub fn assert_alike(what: &str, first: &[[f32; 3]], other: &[[f32; 3]]) {
     let differs = |a: &[f32; 3], b: &[f32; 3]| {
         a.iter().zip(b).any(|(a, b)| (a - b).abs() > 0.02 * a.abs().max(b.abs()).max(0.1))
     };

@@ -34,6 +34,9 @@
 // function may use LVK_CANDIDATE and LVK_COMMITTED, confirm, generate and terminate, but trace no ray. The library's own
 // traversal calls the function without leaving its loops, which is much faster.
 //
+// A module can define LVK_COUNT_TRAVERSAL_STEPS before the include. lvkTraversalSteps, a variable of each invocation, then
+// counts the steps of its rays: nodes visited and primitives tested by the library's own traversal. Devices count none.
+//
 // The context chooses the traversal when it compiles the module: `rayQueryEXT`, or the library's own traversal if
 // LVK_SOFTWARE_RAY_QUERY is defined (Capabilities::ray_query_path).
 
@@ -55,6 +58,10 @@
 #define LVK_COMMITTED_NONE 0u
 #define LVK_COMMITTED_TRIANGLE 1u
 #define LVK_COMMITTED_GENERATED 2u
+
+#ifdef LVK_COUNT_TRAVERSAL_STEPS
+uint lvkTraversalSteps = 0u;
+#endif
 
 #ifdef LVK_SOFTWARE_RAY_QUERY
 #include <lvk/software_ray_query.glsl>

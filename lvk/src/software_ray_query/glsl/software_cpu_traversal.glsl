@@ -33,6 +33,7 @@ struct LvkSoftNearest {
 // the triangle's leaf is read once the nearest one is known.
 bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level,
                          LvkSoftTriangleLevel triangles, bool counts, inout LvkSoftNearest nearest) {
+    LVK_SOFT_COUNT_STEP();
     uint primitive = cursor.leaves.x + uint(findLSB(cursor.leaves.y));
     cursor.leaves.y &= cursor.leaves.y - 1u;
     vec3 vertices[3], lengths;
@@ -54,6 +55,7 @@ bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftCursor cursor, L
 
 // Visits the next node of the group. The rest of the group is pushed only if the ray hits inner children of the node.
 void lvkSoftVisitWide(inout LvkSoftCursor cursor, LvkSoftLevel level, LvkSoftTriangleLevel triangles, vec2 range) {
+    LVK_SOFT_COUNT_STEP();
     uint node = lvkSoftTakeNode(cursor, level);
     uvec4 hits = lvkSoftIntersectNode(level.slabs, triangles.order,
                                       lvkSoftItem(triangles.nodes, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);

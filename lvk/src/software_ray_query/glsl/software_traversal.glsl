@@ -71,6 +71,13 @@ struct LvkSoftLevel {
 #define LVK_SOFT_ONE_NODE 0x80000000u
 #define LVK_SOFT_ANY_NODE 0x01000000u
 
+// A step of the traversal: a node that a ray visits, or a primitive that it tests.
+#ifdef LVK_COUNT_TRAVERSAL_STEPS
+#define LVK_SOFT_COUNT_STEP() lvkTraversalSteps += 1u
+#else
+#define LVK_SOFT_COUNT_STEP()
+#endif
+
 // Constants, so that compilers remove the code that a module without candidates or without AABBs does not need.
 #ifdef LVK_LOWERED_PIPELINE
 const bool kLvkSoftHasCandidates = kLvkHasCandidates;
@@ -212,6 +219,7 @@ uint lvkSoftTakeNode(inout LvkSoftCursor cursor, LvkSoftLevel level) {
 
 // Visits the next node of the group.
 void lvkSoftVisit(inout LvkSoftCursor cursor, LvkSoftLevel level, vec2 range) {
+    LVK_SOFT_COUNT_STEP();
     if (level.wide) {
         uint node = lvkSoftTakeNode(cursor, level);
         if (cursor.group.y >= LVK_SOFT_ANY_NODE) {
@@ -369,6 +377,7 @@ bool lvkSoftHandOver(inout LvkSoftState state, inout LvkSoftCursor cursor) {
 
 // Tests the next primitive. Returns true if it is a candidate that waits for the shader.
 bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftCursor cursor, LvkSoftLevel level) {
+    LVK_SOFT_COUNT_STEP();
     uint primitive = cursor.leaves.x + uint(findLSB(cursor.leaves.y));
     cursor.leaves.y &= cursor.leaves.y - 1u;
     bool isBox = kLvkSoftHasBoxes && level.kind == LVK_SOFT_BOXES;
@@ -410,6 +419,7 @@ uint lvkSoftDescend(LvkSoftState state, inout LvkSoftCursor cursor, uint referen
     vec3 slack = lvkSoftWorldSlack(slabs);
     uint nodes = tlas.at[1].x;
     while ((reference & LVK_SOFT_LEAF) == 0u) {
+        LVK_SOFT_COUNT_STEP();
         uvec2 hits = lvkSoftIntersect2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t), true, slack);
         if (hits.y != LVK_SOFT_NONE) {
             lvkSoftPushReference(cursor.top, hits.y);

@@ -4,6 +4,8 @@ mod background;
 mod overlay;
 mod sample;
 mod status;
+mod thread;
 
 pub use sample::Loading;
 pub use status::{Status, Stopped};
+pub use thread::LoadThread;

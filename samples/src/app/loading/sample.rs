@@ -1,14 +1,11 @@
 //! A sample that may still be loading.
 
-use std::panic::resume_unwind;
-use std::thread::{self, JoinHandle};
-use std::time::Instant;
+use std::path::Path;
 
 use lvk::{Context, Holder, TextureHandle};
 
 use super::background::background;
-use super::overlay;
-use super::status::Status;
+use super::thread::LoadThread;
 use crate::app::cli::ReadySample;
 use crate::app::frame::Frame;
 use crate::app::print_line;
@@ -28,14 +25,12 @@ enum State<S> {
     Ready(S),
 }
 
-/// The thread that loads. Dropping this asks it to end, and waits for that.
+/// The thread that loads, and what is shown meanwhile.
 struct UnderWay<S> {
-    status: Status,
-    thread: Option<JoinHandle<Made<S>>>,
+    thread: LoadThread<Made<S>>,
     background: Holder<TextureHandle>,
     /// The size that pictures are to have by now, if not that from the beginning.
     extent: Option<[u32; 2]>,
-    start: Instant,
     frames: u32,
 }
 
@@ -60,16 +55,8 @@ impl<S: Sample> Loading<S> {
     where
         S: Send + 'static,
     {
-        let background = background(ctx)?;
-        let status = Status::default();
-        let mut progress = Progress::with_log_lines().with_status(&status);
-        let thread = thread::Builder::new()
-            .name("loading".to_owned())
-            .spawn(move || load(&mut progress))
-            .map_err(RunError::device)?;
-        let thread = Some(thread);
-        let start = Instant::now();
-        let under_way = UnderWay { status, thread, background, extent: None, start, frames: 0 };
+        let (background, thread) = (background(ctx)?, LoadThread::start(load)?);
+        let under_way = UnderWay { thread, background, extent: None, frames: 0 };
         Ok(Self { ctx: ctx.clone(), state: State::UnderWay(under_way) })
     }
 
@@ -92,30 +79,18 @@ impl<S: Sample> Loading<S> {
 impl<S: Sample> UnderWay<S> {
     /// Takes the result of the thread, once it has ended.
     fn take(&mut self) -> Option<Made<S>> {
-        let thread = self.thread.take_if(|thread| thread.is_finished())?;
-        let ReadySample { mut sample, summary } =
-            match thread.join().unwrap_or_else(|panic| resume_unwind(panic)) {
-                Ok(opened) => opened,
-                Err(error) => return Some(Err(error)),
-            };
+        let ReadySample { mut sample, summary } = match self.thread.take()? {
+            Ok(opened) => opened,
+            Err(error) => return Some(Err(error)),
+        };
         if let Some(extent) = self.extent
             && let Err(error) = sample.resize(extent)
         {
             return Some(Err(error));
         }
-        let seconds = self.start.elapsed().as_secs_f32();
+        let seconds = self.thread.elapsed().as_secs_f32();
         eprintln!("loaded in {seconds:.1} s, with {} frames shown meanwhile", self.frames);
         Some(Ok(ReadySample { sample, summary }))
-    }
-}
-
-impl<S> Drop for UnderWay<S> {
-    fn drop(&mut self) {
-        self.status.stop();
-        if let Some(thread) = self.thread.take() {
-            // The result is no longer needed, and neither is its error.
-            let _ = thread.join();
-        }
     }
 }
 
@@ -194,9 +169,21 @@ impl<S: Sample> Sample for Loading<S> {
     fn overlay(&mut self, ui: &egui::Context) {
         match &mut self.state {
             State::Ready(sample) => sample.overlay(ui),
-            State::UnderWay(under_way) => {
-                overlay::show(ui, &under_way.status.stage(), under_way.start.elapsed());
-            }
+            State::UnderWay(under_way) => under_way.thread.show(ui),
+        }
+    }
+
+    fn orbits_at_first(&self) -> bool {
+        self.sample().is_some_and(S::orbits_at_first)
+    }
+
+    fn takes_camera_back(&mut self) -> bool {
+        self.sample_mut().is_some_and(S::takes_camera_back)
+    }
+
+    fn drop_file(&mut self, path: &Path) {
+        if let Some(sample) = self.sample_mut() {
+            sample.drop_file(path);
         }
     }
 

@@ -16,6 +16,8 @@ pub(super) enum Action {
     Pause,
     /// Gives the camera back to the animation.
     ReleaseCamera,
+    /// Goes around what the camera looks at, or flies again.
+    Orbit,
     /// Shows or hides the panel.
     Panel,
     /// Goes on to the next of what the sample shows.
@@ -31,11 +33,12 @@ pub(super) enum Action {
 }
 
 /// The keys, as the panel tells them; those of the camera first.
-const HELP: [(&str, &str); 10] = [
-    ("drag", "look around"),
+const HELP: [(&str, &str); 11] = [
+    ("drag", "look around, or orbit"),
     ("W A S D", "fly"),
     ("Q E", "down, up"),
-    ("Shift, wheel", "in a hurry, faster"),
+    ("Shift, wheel", "in a hurry; faster, or nearer"),
+    ("O", "orbit or fly"),
     ("C", "the animation's camera"),
     ("Space", "animation"),
     ("F1", "this panel"),
@@ -45,7 +48,7 @@ const HELP: [(&str, &str); 10] = [
 ];
 
 /// Number of keys of the camera.
-const CAMERA_KEYS: usize = 5;
+const CAMERA_KEYS: usize = 6;
 
 /// Returns the help for keys and mouse, of a sample with or without a camera.
 pub(super) fn help(has_camera: bool) -> &'static [(&'static str, &'static str)] {
@@ -78,6 +81,7 @@ impl Controls {
         match key {
             KeyCode::Space => Some(Action::Pause),
             KeyCode::KeyC => Some(Action::ReleaseCamera),
+            KeyCode::KeyO => Some(Action::Orbit),
             KeyCode::F1 => Some(Action::Panel),
             KeyCode::KeyN => Some(Action::Next),
             KeyCode::F5 => Some(Action::Reload),
@@ -173,7 +177,7 @@ mod tests {
     #[test]
     fn the_help_names_no_camera_keys_without_a_camera() {
         let keys = |has_camera| help(has_camera).iter().map(|(key, _)| *key).collect::<Vec<_>>();
-        assert_eq!(keys(true)[..CAMERA_KEYS], ["drag", "W A S D", "Q E", "Shift, wheel", "C"]);
+        assert_eq!(keys(true)[..CAMERA_KEYS], ["drag", "W A S D", "Q E", "Shift, wheel", "O", "C"]);
         assert_eq!(keys(false), ["Space", "F1", "F5", "F9", "F12, Esc"]);
     }
 

@@ -221,6 +221,8 @@ struct Running<S> {
     window: Arc<Window>,
     /// Size of the window in pixels, as it was told last: a window that is gone cannot be asked.
     size: [u32; 2],
+    /// True until the sample is loaded.
+    is_new: bool,
     /// Frames that the window has shown.
     frames_here: u32,
     /// True while there is no window to draw in.
@@ -234,9 +236,7 @@ impl<S: Sample> Running<S> {
         let present_pass = PresentPass::new(&ctx, size)?;
         let (mode, _) = present_pass.present_modes()?;
         ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
-        let mut panel = Panel::new(mode);
-        // Frames that are counted are those of the animation.
-        panel.animates = args.frames.is_some() || !sample.stands_at_first();
+        let panel = Panel::new(mode);
         Ok(Self {
             sample,
             present_pass,
@@ -246,7 +246,7 @@ impl<S: Sample> Running<S> {
             resize: ResizeDebounce::new([args.width, args.height]),
             finger: Finger::default(),
             shader_files: shader_folder::watched_files(),
-            camera_controller: CameraController::new(),
+            camera_controller: CameraController::new(false),
             clock: Clock::new(Instant::now()),
             at: None,
             shown: 0,
@@ -255,6 +255,7 @@ impl<S: Sample> Running<S> {
             ctx,
             window,
             size,
+            is_new: true,
             frames_here: 0,
             is_suspended: false,
         })
@@ -297,6 +298,7 @@ impl<S: Sample> Running<S> {
                 self.size = [size.width, size.height];
                 self.present_pass.resize(self.size)?;
             }
+            WindowEvent::DroppedFile(path) => self.sample.drop_file(path),
             WindowEvent::Focused(false) => self.controls.release_all(),
             WindowEvent::CursorMoved { position, .. } => {
                 self.controls.pointer([position.x as f32, position.y as f32]);
@@ -330,6 +332,7 @@ impl<S: Sample> Running<S> {
                 self.camera_controller.release();
                 self.at = None;
             }
+            Action::Orbit => self.camera_controller.set_orbits(!self.camera_controller.orbits()),
             Action::Panel => self.panel.is_open = !self.panel.is_open,
             Action::Next => self.sample.next(),
             Action::Reload => self.reload(),
@@ -360,7 +363,13 @@ impl<S: Sample> Running<S> {
 
     fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
         if self.sample.is_loading()? {
+            self.is_new = true;
             return self.redraw_loading(name);
+        }
+        if std::mem::take(&mut self.is_new) {
+            // Frames that are counted are those of the animation.
+            self.panel.animates &= args.frames.is_some() || !self.sample.stands_at_first();
+            self.camera_controller = CameraController::new(self.sample.orbits_at_first());
         }
         self.ctx.next_frame()?;
         let seconds = self.clock.tick(Instant::now(), self.panel.animates);
@@ -442,6 +451,9 @@ impl<S: Sample> Running<S> {
         self.follow_size();
         if self.shader_files.as_ref().is_some_and(ShaderFiles::changed) {
             self.reload();
+        }
+        if self.sample.takes_camera_back() {
+            self.camera_controller.release();
         }
         let steering = self.controls.take_steering();
         let is_steered = self.camera_controller.steer(self.sample.view().as_ref(), &steering, seconds);

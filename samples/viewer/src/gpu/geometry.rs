@@ -1,25 +1,31 @@
 //! Meshes of a model on the GPU: vertices, indices, and a bottom-level structure for each mesh.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, Context, GeometryFlags, Holder,
-    IndexFormat, Indices, Triangles, VertexFormat,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, Context, GeometryFlags,
+    Holder, IndexFormat, Indices, Triangles, VertexFormat,
 };
-use lvk_gltf::{AlphaMode, Material, Model, Placement, Primitive};
+use lvk_gltf::{AlphaMode, Material, Model, Pose, Primitive};
 use lvk_samples::app::array_buffer::array;
 
+use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
+use super::emitters::{EmissiveMeshes, emission_weight};
+use super::instances::MeshKey;
 use super::layout::{GpuAttributes, GpuGeometry, QUANTISED};
 use super::vertices::{PackedPositions, attributes};
+use crate::model::{moved, movers};
 
 /// Meshes on the GPU.
 pub(crate) struct GpuMeshes {
     /// The table of geometries.
     pub(crate) geometries: Vec<GpuGeometry>,
-    /// For each mesh the place of its first geometry, and its structure; `None` for a mesh without triangles.
-    pub(crate) meshes: Vec<Option<GpuMesh>>,
     /// Triangles of each geometry of the table.
     pub(crate) triangle_counts: Vec<u32>,
+    /// Triangles that glow.
+    pub(crate) emissive: EmissiveMeshes,
+    /// The meshes that have triangles.
+    meshes: HashMap<MeshKey, GpuMesh>,
     _buffers: Vec<Holder<BufferHandle>>,
 }
 
@@ -38,10 +44,13 @@ struct Arena {
     attributes: Vec<GpuAttributes>,
     indices: Vec<u32>,
     parts: Vec<Part>,
+    emissive: EmissiveMeshes,
 }
 
 /// A primitive in the arrays.
 struct Part {
+    /// The place of its positions among those of the frame before, if they move.
+    first_before: Option<usize>,
     is_quantised: bool,
     first_position: usize,
     first_attributes: usize,
@@ -50,13 +59,48 @@ struct Part {
     triangle_count: u32,
     material: u32,
     is_opaque: bool,
+    /// Luminance of its light, if shadow rays look for it.
+    emission_weight: f32,
 }
 
 impl Arena {
+    /// Adds the primitives of a mesh that have triangles, in a pose; those that move in other poses also go to `rest`.
+    fn add_mesh(&mut self, model: &Model, pose: &Pose, key: MeshKey, rest: &mut RestArrays) {
+        let (default, first) = (Material::default(), self.parts.len());
+        let primitives = model.meshes.get(key.mesh).map_or(&[][..], |mesh| &mesh.primitives);
+        for primitive in primitives.iter().filter(|primitive| !primitive.indices.is_empty()) {
+            let number = primitive.material.unwrap_or(model.materials.len());
+            let material = model.materials.get(number).unwrap_or(&default);
+            let is_opaque = is_opaque(material);
+            let Some(node) = key.deformed_by else {
+                self.add(primitive, number as u32, is_opaque);
+                self.add_emission(first, primitive, emission_weight(material, model));
+                continue;
+            };
+            let (weights, joints) = movers(model, node, pose);
+            self.add(&moved(primitive, weights, joints), number as u32, is_opaque);
+            if let Some(part) = self.parts.last_mut().filter(|_| !model.animations.is_empty()) {
+                let places = [part.first_position, part.first_attributes];
+                part.first_before = Some(rest.add((model, node), primitive, places));
+            }
+        }
+    }
+
+    /// Shadow rays look for light of the last geometry, of a mesh whose first one has the place `first`.
+    fn add_emission(&mut self, first: usize, primitive: &Primitive, weight: f32) {
+        if let Some(part) = self.parts.last_mut().filter(|_| weight > 0.0) {
+            part.emission_weight = weight;
+            let geometry = self.parts.len() - 1 - first;
+            self.emissive.add(first as u32, geometry as u32, primitive, weight);
+        }
+    }
+
     fn add(&mut self, primitive: &Primitive, material: u32, is_opaque: bool) {
         let packed = PackedPositions::new(&primitive.positions);
         let is_quantised = matches!(packed, PackedPositions::Quantised(_));
         self.parts.push(Part {
+            first_before: None,
+            emission_weight: 0.0,
             is_quantised,
             first_position: if is_quantised { self.quantised.len() } else { self.floats.len() },
             first_attributes: self.attributes.len(),
@@ -98,22 +142,33 @@ impl ArenaBuffers {
         Ok((buffers, arena.parts))
     }
 
-    fn geometry(&self, part: &Part) -> lvk::Result<GpuGeometry> {
-        let (positions, stride) = if part.is_quantised { (&self.quantised, 8) } else { (&self.floats, 12) };
+    /// `before`: address of the positions of the frame before.
+    fn geometry(&self, part: &Part, before: u64) -> lvk::Result<GpuGeometry> {
+        let (positions, stride) =
+            if part.is_quantised { (&self.quantised, 8) } else { (&self.floats, POSITION) };
+        let positions = positions.address()? + stride * part.first_position as u64;
         Ok(GpuGeometry {
-            positions: positions.address()? + stride * part.first_position as u64,
+            positions,
+            positions_before: part.first_before.map_or(positions, |first| before + POSITION * first as u64),
             attributes: self.attributes.address()?
                 + (size_of::<GpuAttributes>() * part.first_attributes) as u64,
             indices: self.indices.address()? + 4 * part.first_index as u64,
             material: part.material,
             flags: if part.is_quantised { QUANTISED } else { 0 },
+            emission_weight: part.emission_weight,
+            _padding: 0,
         })
+    }
+
+    fn moved(&self) -> lvk::Result<MovedArrays> {
+        let place = |buffer: &Holder<BufferHandle>| Ok::<_, lvk::Error>((**buffer, buffer.address()?));
+        Ok(MovedArrays { positions: place(&self.floats)?, attributes: place(&self.attributes)? })
     }
 
     fn triangles(&self, part: &Part) -> BlasGeometry {
         let (buffer, stride, format) = match part.is_quantised {
             true => (*self.quantised, 8, VertexFormat::Snorm16x4),
-            false => (*self.floats, 12, VertexFormat::F32x3),
+            false => (*self.floats, POSITION, VertexFormat::F32x3),
         };
         let (offset, flags) = (
             4 * part.first_index as u64,
@@ -133,71 +188,103 @@ impl ArenaBuffers {
     }
 }
 
+/// Meshes and what moves their vertices.
+pub(crate) struct UploadedMeshes {
+    pub(crate) meshes: GpuMeshes,
+    /// `None` if no vertex moves.
+    pub(super) deformation: Option<Deformation>,
+}
+
 impl GpuMeshes {
-    /// Uploads the meshes that are placed and builds their structures. Primitives without triangles are left out. The default
-    /// material has the number of the model's materials.
-    pub(crate) fn new(ctx: &Context, model: &Model, placements: &[Placement]) -> lvk::Result<Self> {
-        let mut arena = Arena::default();
-        let mut counts = Vec::new();
-        let default = Material::default();
-        let placed: HashSet<usize> = placements.iter().map(|placement| placement.mesh).collect();
-        for (place, mesh) in model.meshes.iter().enumerate() {
+    /// The mesh of a key, if it has triangles.
+    pub(crate) fn get(&self, key: MeshKey) -> Option<&GpuMesh> {
+        self.meshes.get(&key)
+    }
+
+    /// All structures.
+    pub(crate) fn structures(&self) -> impl Iterator<Item = AccelStructHandle> {
+        self.meshes.values().map(|mesh| *mesh.blas)
+    }
+
+    /// Structures of meshes whose vertices move.
+    pub(crate) fn deformed(&self) -> Vec<AccelStructHandle> {
+        let mut keys: Vec<_> = self.meshes.keys().filter(|key| key.deformed_by.is_some()).collect();
+        keys.sort();
+        keys.iter().map(|key| *self.meshes[key].blas).collect()
+    }
+
+    /// Uploads meshes in a pose and builds their structures. Primitives without triangles are left out. The default material has
+    /// the number of the model's materials.
+    pub(crate) fn upload(
+        ctx: &Context,
+        model: &Model,
+        pose: &Pose,
+        keys: &[MeshKey],
+    ) -> lvk::Result<UploadedMeshes> {
+        let (mut arena, mut rest) = (Arena::default(), RestArrays::default());
+        let mut runs = Vec::new();
+        for key in keys {
             let before = arena.parts.len();
-            let is_shown = |primitive: &&Primitive| placed.contains(&place) && !primitive.indices.is_empty();
-            for primitive in mesh.primitives.iter().filter(is_shown) {
-                let number = primitive.material.unwrap_or(model.materials.len());
-                let is_opaque = is_opaque(model.materials.get(number).unwrap_or(&default));
-                arena.add(primitive, number as u32, is_opaque);
-            }
-            counts.push(arena.parts.len() - before);
+            arena.add_mesh(model, pose, *key, &mut rest);
+            runs.push((*key, arena.parts.len() - before));
         }
+        runs.retain(|(_, count)| *count > 0);
         if arena.parts.is_empty() {
-            let meshes = counts.iter().map(|_| None).collect();
-            return Ok(Self {
+            let meshes = Self {
                 geometries: Vec::new(),
-                meshes,
                 triangle_counts: Vec::new(),
+                emissive: EmissiveMeshes::default(),
+                meshes: HashMap::new(),
                 _buffers: Vec::new(),
-            });
+            };
+            return Ok(UploadedMeshes { meshes, deformation: None });
         }
+        let emissive = std::mem::take(&mut arena.emissive);
         let (buffers, parts) = ArenaBuffers::new(ctx, arena)?;
-        let geometries = parts.iter().map(|part| buffers.geometry(part)).collect::<lvk::Result<_>>()?;
+        let deformation = Deformation::new(ctx, rest, buffers.moved()?)?;
+        let before = deformation.as_ref().map_or(Ok(0), Deformation::before_address)?;
+        let geometries =
+            parts.iter().map(|part| buffers.geometry(part, before)).collect::<lvk::Result<_>>()?;
         let triangle_counts = parts.iter().map(|part| part.triangle_count).collect();
-        let meshes = build(ctx, model, &counts, &parts, &buffers)?;
+        let meshes = build(ctx, model, &runs, &parts, &buffers)?;
         let ArenaBuffers { floats, quantised, attributes, indices } = buffers;
         let _buffers = vec![floats, quantised, attributes, indices];
-        Ok(Self { geometries, meshes, triangle_counts, _buffers })
+        Ok(UploadedMeshes {
+            meshes: Self { geometries, triangle_counts, emissive, meshes, _buffers },
+            deformation,
+        })
     }
 }
 
-/// Builds a structure for each mesh that has geometries.
+/// Builds a structure for each mesh, of so many geometries.
 fn build(
     ctx: &Context,
     model: &Model,
-    counts: &[usize],
+    runs: &[(MeshKey, usize)],
     parts: &[Part],
     buffers: &ArenaBuffers,
-) -> lvk::Result<Vec<Option<GpuMesh>>> {
+) -> lvk::Result<HashMap<MeshKey, GpuMesh>> {
     let all: Vec<BlasGeometry> = parts.iter().map(|part| buffers.triangles(part)).collect();
     let mut rest = all.as_slice();
     let mut descs = Vec::new();
-    for (mesh, count) in model.meshes.iter().zip(counts) {
+    for (key, count) in runs {
         let (geometries, after) = rest.split_at(*count);
         rest = after;
-        if !geometries.is_empty() {
-            let debug_name = mesh.name.as_deref().unwrap_or("mesh");
-            descs.push(BlasDesc { geometries, debug_name, ..BlasDesc::default() });
-        }
+        let debug_name = model.meshes[key.mesh].name.as_deref().unwrap_or("mesh");
+        let update = if key.deformed_by.is_some() { BuildFlags::ALLOW_UPDATE } else { BuildFlags::empty() };
+        let flags = BuildFlags::default() | update;
+        descs.push(BlasDesc { geometries, flags, debug_name, ..BlasDesc::default() });
     }
-    let mut built = ctx.create_blas_batch(&descs)?.into_iter();
+    let built = ctx.create_blas_batch(&descs)?;
     let mut next = 0;
-    let mesh = |count: &usize| {
-        let (first_geometry, geometry_count) = (next, *count as u32);
-        next += geometry_count;
-        let blas = if *count == 0 { None } else { built.next() };
-        blas.map(|blas| GpuMesh { first_geometry, geometry_count, blas })
-    };
-    Ok(counts.iter().map(mesh).collect())
+    let pairs = runs.iter().zip(built);
+    Ok(pairs
+        .map(|((key, count), blas)| {
+            let (first_geometry, geometry_count) = (next, *count as u32);
+            next += geometry_count;
+            (*key, GpuMesh { first_geometry, geometry_count, blas })
+        })
+        .collect())
 }
 
 /// True if no ray goes on behind a surface of the material without a bend.

@@ -57,10 +57,23 @@ lvk::shader_struct! {
     #[repr(C)]
     pub(crate) struct GpuGeometry {
         pub(crate) positions: u64,
+        pub(crate) positions_before: u64,
         pub(crate) attributes: u64,
         pub(crate) indices: u64,
         pub(crate) material: u32,
         pub(crate) flags: u32,
+        pub(crate) emission_weight: f32,
+        pub(crate) _padding: u32,
+    }
+
+    /// `Emitter`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuEmitter {
+        pub(crate) instance: u32,
+        pub(crate) geometry: u32,
+        pub(crate) primitive: u32,
+        pub(crate) chance: f32,
     }
 
     /// `Attributes`.
@@ -126,10 +139,12 @@ lvk::shader_struct! {
     #[repr(C)]
     pub(crate) struct SceneConstants {
         pub(crate) instances: u64,
+        pub(crate) rows_before: u64,
         pub(crate) geometries: u64,
         pub(crate) materials: u64,
         pub(crate) slots: u64,
         pub(crate) lights: u64,
+        pub(crate) emitters: u64,
         pub(crate) sky_rows: u64,
         pub(crate) sky_columns: u64,
         pub(crate) sky: u64,
@@ -144,6 +159,15 @@ lvk::shader_struct! {
         pub(crate) disc_count: u32,
         pub(crate) sky_probability: f32,
         pub(crate) sky_size: [u32; 2],
+    }
+
+    /// `Frame`: light of triangles.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct EmissionConstants {
+        pub(crate) emitter_count: u32,
+        pub(crate) emitter_probability: f32,
+        pub(crate) emitter_power: f32,
     }
 
     /// `Frame`.
@@ -169,6 +193,8 @@ lvk::shader_struct! {
         pub(crate) frame_number: u32,
         pub(crate) still_count: u32,
         pub(crate) view: u32,
+        pub(crate) scene_moves: u32,
+        pub(crate) emission: EmissionConstants,
         pub(crate) _padding: u32,
     }
 
@@ -194,4 +220,5 @@ pub(crate) const SCENE_LAYOUTS: &[BlockLayout] = &[
     BlockLayout::buffer_reference::<GpuTextureSlot>("SlotArray"),
     BlockLayout::buffer_reference::<GpuMaterial>("MaterialArray"),
     BlockLayout::buffer_reference::<GpuLight>("LightArray"),
+    BlockLayout::buffer_reference::<GpuEmitter>("EmitterArray"),
 ];

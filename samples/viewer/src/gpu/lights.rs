@@ -3,7 +3,8 @@
 use glam::{DVec3, Mat4, Vec3};
 use lvk_gltf::{Bounds, LightKind, Model, Pose};
 
-use super::layout::{GpuLight, light_kind};
+use super::emitters::Emitters;
+use super::layout::{EmissionConstants, GpuLight, light_kind};
 use crate::light::{Environment, Sun, luminance};
 
 /// Lights, discs first, with the probabilities of them and of the sky.
@@ -11,41 +12,66 @@ pub(crate) struct GpuLights {
     pub(crate) lights: Vec<GpuLight>,
     pub(crate) disc_count: u32,
     pub(crate) sky_probability: f32,
+    pub(crate) emission: EmissionConstants,
 }
 
 /// The share of samples that a source of light gets at least, over its even share.
 const LEAST_SHARE: f64 = 0.25;
 
+/// What lights of a scene depend on beside its nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct LightSetting {
+    sun: Option<Sun>,
+    /// Irradiance that the sky gives.
+    sky: f64,
+    /// Radius of the discs of directional lights, in radians.
+    disc_radius: f32,
+    bounds: Bounds,
+}
+
+impl LightSetting {
+    /// A model with directional lights of its own needs no sun.
+    pub(crate) fn new(model: &Model, environment: &Environment, disc_radius: f32, bounds: Bounds) -> Self {
+        let sky = luminance(environment.sky.mean()) * std::f64::consts::PI;
+        let has_sun = model.lights.iter().any(|light| light.kind == LightKind::Directional);
+        Self { sun: environment.sun.filter(|_| !has_sun), sky, disc_radius, bounds }
+    }
+}
+
 impl GpuLights {
-    /// The sun, and the lights of the nodes of a scene. A directional light is a disc of the radius `disc_radius` radians.
+    /// The sun, the lights of the nodes of a scene, and its triangles that glow.
     pub(crate) fn new(
-        model: &Model,
-        scene: usize,
+        (model, scene): (&Model, usize),
         pose: &Pose,
-        environment: &Environment,
-        disc_radius: f32,
-        bounds: &Bounds,
+        emitters: &Emitters,
+        setting: &LightSetting,
     ) -> Self {
-        let mut discs: Vec<GpuLight> = environment.sun.iter().map(disc).collect();
+        let mut discs: Vec<GpuLight> = setting.sun.iter().map(disc).collect();
         let mut lamps = Vec::new();
         for node in model.scene_nodes(scene) {
             let light = model.nodes[node].light.and_then(|light| model.lights.get(light));
             let Some((light, world)) = light.zip(pose.world.get(node)) else { continue };
             match light.kind {
-                LightKind::Directional => discs.push(directional(light, world, disc_radius)),
+                LightKind::Directional => discs.push(directional(light, world, setting.disc_radius)),
                 LightKind::Point | LightKind::Spot { .. } => lamps.push(lamp(light, world)),
             }
         }
         let disc_count = discs.len() as u32;
         let mut lights = [discs, lamps].concat();
-        let sky = luminance(environment.sky.mean()) * std::f64::consts::PI;
-        let sky_probability = choose(&mut lights, sky, bounds);
-        Self { lights, disc_count, sky_probability }
+        let [emitter_probability, sky_probability] =
+            choose(&mut lights, [emitters.power, setting.sky], &setting.bounds);
+        let emission = EmissionConstants {
+            emitter_count: emitters.triangles.len() as u32,
+            emitter_probability,
+            emitter_power: emitters.power as f32,
+        };
+        Self { lights, disc_count, sky_probability, emission }
     }
 }
 
-/// Sets the probabilities of lights by the light that they bring about the middle of the scene. Returns the sky's.
-fn choose(lights: &mut [GpuLight], sky: f64, bounds: &Bounds) -> f32 {
+/// Sets the probabilities of lights by the light that they bring about the middle of the scene. Returns those of emitters, which
+/// have that radiant intensity, and of the sky, which has that irradiance.
+fn choose(lights: &mut [GpuLight], [emitters, sky]: [f64; 2], bounds: &Bounds) -> [f32; 2] {
     let middle = 0.5 * (bounds.min + bounds.max);
     let near = (0.25 * bounds.min.distance_squared(bounds.max)).max(1e-12);
     let brightness = |light: &GpuLight| {
@@ -55,7 +81,7 @@ fn choose(lights: &mut [GpuLight], sky: f64, bounds: &Bounds) -> f32 {
             _ => bright / f64::from(middle.distance_squared(light.position.into()).max(near)),
         }
     };
-    let all: Vec<f64> = lights.iter().map(brightness).chain([sky]).collect();
+    let all: Vec<f64> = lights.iter().map(brightness).chain([emitters / f64::from(near), sky]).collect();
     let (sum, count) = (all.iter().sum::<f64>(), all.iter().filter(|bright| **bright > 0.0).count());
     let weight = |bright: &f64| {
         if *bright > 0.0 { bright / sum + LEAST_SHARE / count as f64 } else { 0.0 }
@@ -65,7 +91,8 @@ fn choose(lights: &mut [GpuLight], sky: f64, bounds: &Bounds) -> f32 {
     for (light, weight) in lights.iter_mut().zip(&weights) {
         light.probability = (weight / total) as f32;
     }
-    weights.last().map_or(0.0, |weight| (weight / total) as f32)
+    let [.., emitters, sky] = weights[..] else { return [0.0; 2] };
+    [emitters, sky].map(|weight| (weight / total) as f32)
 }
 
 fn disc(sun: &Sun) -> GpuLight {
@@ -126,12 +153,13 @@ mod tests {
         };
         let mut lights =
             vec![lit([8.0; 3], [0.0; 3]), lit([8.0; 3], [100.0, 0.0, 0.0]), lit([0.0; 3], [0.0; 3])];
-        let sky = choose(&mut lights, 1.0, &bounds);
-        let sum: f32 = lights.iter().map(|light| light.probability).sum::<f32>() + sky;
+        let [emitters, sky] = choose(&mut lights, [0.5, 1.0], &bounds);
+        assert!(emitters > 0.05 && sky > 0.05);
+        let sum: f32 = lights.iter().map(|light| light.probability).sum::<f32>() + emitters + sky;
         assert!((sum - 1.0).abs() < 1e-6);
         assert!(lights[0].probability > lights[1].probability && lights[1].probability > 0.05);
         assert_eq!(lights[2].probability, 0.0);
         let mut none = [];
-        assert_eq!(choose(&mut none, 0.0, &bounds), 0.0);
+        assert_eq!(choose(&mut none, [0.0; 2], &bounds), [0.0; 2]);
     }
 }

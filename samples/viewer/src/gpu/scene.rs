@@ -1,156 +1,217 @@
 //! A model on the GPU: arrays, textures, light and acceleration structures.
 
-use std::ops::Range;
-
-use glam::{Mat3, Mat4, Vec3};
-use lvk::{
-    AccelStructHandle, BufferHandle, BufferUsage, Context, Holder, TlasDesc, TlasInstance, rows_from_columns,
-};
+use lvk::{AccelStructHandle, BufferHandle, BufferUsage, CommandBuffer, Context, Holder, TlasDesc};
 use lvk_gltf::{Bounds, Model, Placement, Pose};
 use lvk_samples::app::array_buffer::array;
+use lvk_samples::app::frame::Frame;
 
 use super::albedo_table::albedo_table;
-use super::geometry::{GpuMesh, GpuMeshes};
-use super::layout::{GpuInstance, GpuTextureSlot, LightConstants, SceneConstants};
-use super::lights::GpuLights;
+use super::emitters::Emitters;
+use super::geometry::{GpuMeshes, UploadedMeshes};
+use super::instances::{Draw, MeshKey, SceneInstances};
+use super::layout::{EmissionConstants, GpuTextureSlot, LightConstants, SceneConstants};
+use super::lights::{GpuLights, LightSetting};
 use super::materials::GpuMaterials;
+use super::motion::SceneMotion;
 use super::textures::GpuTextures;
 use crate::light::Environment;
+use crate::model::rig;
 
-/// Instances whose volume is a smaller share of that of their mesh have no inside, and are left out.
-const SMALLEST_DETERMINANT: f32 = 1e-30;
 /// A scene's largest coordinate over the extent that rounding errors near the origin are measured by.
 const OFFSET_SHARE: f32 = 8.0;
 
-/// A geometry to rasterise in some instances.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Draw {
-    /// The geometry of the mesh.
-    pub(crate) geometry: u32,
-    pub(crate) triangle_count: u32,
-    /// Places in the table of instances.
-    pub(crate) instances: Range<u32>,
-}
-
 /// A model on the GPU.
 pub(crate) struct GpuScene {
-    pub(crate) constants: SceneConstants,
+    constants: SceneConstants,
     pub(crate) light: LightConstants,
     pub(crate) tlas: Holder<AccelStructHandle>,
     /// The unit of length of rounding errors near the origin.
     pub(crate) offset_extent: f32,
     /// Triangles of all meshes, each mesh once.
     pub(crate) triangle_count: u64,
-    /// Instances of meshes.
-    pub(crate) instance_count: u32,
-    /// Everything to rasterise.
-    pub(crate) draws: Vec<Draw>,
+    /// Bytes of the structures of meshes, and of the top level.
+    pub(crate) structure_bytes: [u64; 2],
     /// What is left out, for the user to read.
     pub(crate) warnings: Vec<String>,
-    _meshes: GpuMeshes,
+    /// The model without what is uploaded.
+    rig: Model,
+    shown: usize,
+    instances: SceneInstances,
+    lights: GpuLights,
+    emitters: Emitters,
+    light_setting: LightSetting,
+    /// `None` if the model has no animations.
+    motion: Option<SceneMotion>,
+    meshes: GpuMeshes,
     _textures: GpuTextures,
     _buffers: Vec<Holder<BufferHandle>>,
 }
 
 impl GpuScene {
-    /// Uploads a scene of `model` in a pose and builds its structures. Directional lights are discs of the radius
-    /// `disc_radius`, in radians.
+    /// Uploads the scene `shown` of `model` in a pose and builds its structures. Directional lights are discs of the radius
+    /// `disc_radius`, in radians. All of it is inside of `bounds`.
     pub(crate) fn new(
         ctx: &Context,
-        model: &Model,
-        scene: usize,
+        (model, shown): (&Model, usize),
         pose: &Pose,
-        environment: &Environment,
-        disc_radius: f32,
+        (environment, disc_radius): (&Environment, f32),
+        bounds: &Bounds,
     ) -> lvk::Result<Self> {
         let textures = GpuTextures::new(ctx, model)?;
-        let meshes = GpuMeshes::new(ctx, model, &model.placements(scene, pose))?;
-        let shown = SceneInstances::new(model, scene, pose, &meshes);
-        let bounds = model.bounds(scene, pose).unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ZERO });
-        let lights = GpuLights::new(model, scene, pose, environment, disc_radius, &bounds);
+        let placements = model.placements(shown, pose);
+        let keys: Vec<MeshKey> = placements.iter().map(|placement| MeshKey::new(model, placement)).collect();
+        let UploadedMeshes { meshes, deformation } = GpuMeshes::upload(ctx, model, pose, &unique(&keys))?;
+        let instances = SceneInstances::new(&placements, &keys, &meshes);
+        let light_setting = LightSetting::new(model, environment, disc_radius, *bounds);
+        let emitters = meshes.emissive.emitters(&instances.table);
+        let lights = GpuLights::new((model, shown), pose, &emitters, &light_setting);
         let mut arrays = Arrays { ctx, held: Vec::new() };
         let materials = GpuMaterials::new(model, &textures);
-        let constants = arrays.constants(&meshes, &shown, &materials, &lights, environment)?;
-        let (instances, debug_name) = (shown.tlas.as_slice(), "scene tlas");
-        let capacity = instances.len().max(1) as u32;
-        let tlas = ctx.create_tlas(&TlasDesc { instances, capacity, debug_name, ..TlasDesc::default() })?;
+        let constants =
+            arrays.constants(&meshes, &instances, &materials, (&lights, &emitters), environment)?;
+        let tlas = tlas(ctx, &instances)?;
         let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+        let motion = SceneMotion::new(deformation, meshes.deformed(), pose.clone());
         Ok(Self {
             constants,
-            light: LightConstants {
-                light_count: lights.lights.len() as u32,
-                disc_count: lights.disc_count,
-                sky_probability: lights.sky_probability,
-                sky_size: [environment.sky.width, environment.sky.height],
-            },
-            tlas,
+            light: light_constants(&lights, environment),
             offset_extent: (largest / OFFSET_SHARE).max(f32::MIN_POSITIVE),
             triangle_count: meshes.triangle_counts.iter().map(|count| u64::from(*count)).sum(),
-            instance_count: instances.len() as u32,
-            draws: shown.draws,
+            structure_bytes: structure_bytes(ctx, &meshes, *tlas)?,
             warnings: [textures.warnings.as_slice(), &materials.warnings].concat(),
-            _meshes: meshes,
+            tlas,
+            rig: rig(model),
+            shown,
+            instances,
+            lights,
+            emitters,
+            light_setting,
+            motion: (!model.animations.is_empty()).then_some(motion),
+            meshes,
             _textures: textures,
             _buffers: arrays.held,
         })
     }
-}
 
-/// The instances of a scene, for shaders and for the top-level structure.
-struct SceneInstances {
-    instances: Vec<GpuInstance>,
-    tlas: Vec<TlasInstance>,
-    draws: Vec<Draw>,
-}
+    /// The model without vertices, images and materials.
+    pub(crate) fn rig(&self) -> &Model {
+        &self.rig
+    }
 
-impl SceneInstances {
-    fn new(model: &Model, scene: usize, pose: &Pose, meshes: &GpuMeshes) -> Self {
-        let mut shown = Self { instances: Vec::new(), tlas: Vec::new(), draws: Vec::new() };
-        let mut placements = model.placements(scene, pose);
-        placements.retain(|placement| has_inside(&placement.transform));
-        placements.sort_by_key(|placement| placement.mesh);
-        for same in placements.chunk_by(|a, b| a.mesh == b.mesh) {
-            let mesh = same.first().and_then(|placement| meshes.meshes.get(placement.mesh)?.as_ref());
-            if let Some(mesh) = mesh {
-                shown.add(mesh, same, meshes);
+    /// The number of the scene of the model.
+    pub(crate) fn scene_number(&self) -> usize {
+        self.shown
+    }
+
+    /// The number of instances of meshes.
+    pub(crate) fn instance_count(&self) -> u32 {
+        self.instances.table.len() as u32
+    }
+
+    /// Everything to rasterise.
+    pub(crate) fn draws(&self) -> &[Draw] {
+        &self.instances.draws
+    }
+
+    /// Moves nodes, lights and vertices to another pose, in the next frame. Returns false if nothing moves.
+    pub(crate) fn set_pose(&mut self, pose: &Pose) -> bool {
+        let is_other = self.motion.as_mut().is_some_and(|motion| motion.set_pose(pose));
+        if is_other {
+            self.instances.place(&self.placements(pose));
+            if !self.meshes.emissive.is_empty() {
+                self.emitters = self.meshes.emissive.emitters(&self.instances.table);
             }
+            let scene = (&self.rig, self.shown);
+            self.lights = GpuLights::new(scene, pose, &self.emitters, &self.light_setting);
+            self.light.sky_probability = self.lights.sky_probability;
         }
-        shown
+        is_other
     }
 
-    /// Adds the instances of a mesh.
-    fn add(&mut self, mesh: &GpuMesh, placements: &[Placement], meshes: &GpuMeshes) {
-        let first = self.instances.len() as u32;
-        for Placement { transform, .. } in placements {
-            self.tlas.push(TlasInstance {
-                transform: rows(transform),
-                custom_index: self.instances.len() as u32,
-                ..TlasInstance::new(*mesh.blas)
-            });
-            self.instances.push(gpu_instance(transform, mesh.first_geometry));
+    fn placements(&self, pose: &Pose) -> Vec<Placement> {
+        self.rig.placements(self.shown, pose)
+    }
+
+    /// True if the next frame shows something elsewhere than the last one.
+    pub(crate) fn moves(&self) -> bool {
+        self.motion.as_ref().is_some_and(SceneMotion::moves)
+    }
+
+    /// Records what moves vertices and structures to the pose. `is_first`: there is no frame before.
+    pub(crate) fn record_motion(&self, frame: &mut Frame<'_>, is_first: bool) -> lvk::Result<()> {
+        let moved = (&self.rig, &self.instances);
+        self.motion.as_ref().map_or(Ok(()), |motion| motion.record(frame, moved, *self.tlas, is_first))
+    }
+
+    /// Uploads what moves, and returns what leads to the scene in this step of a frame.
+    pub(crate) fn constants(&self, cmd: &mut CommandBuffer, is_first: bool) -> lvk::Result<SceneConstants> {
+        let Some(motion) = self.motion.as_ref().filter(|_| !self.instances.table.is_empty()) else {
+            return Ok(self.constants);
+        };
+        let (lights, emitters) = (&self.lights.lights, &self.emitters.triangles);
+        Ok(SceneConstants {
+            instances: cmd.upload_slice(&self.instances.table)?,
+            rows_before: cmd
+                .upload_slice(&motion.transforms_before(self.instances.transforms(), is_first))?,
+            lights: if lights.is_empty() { self.constants.lights } else { cmd.upload_slice(lights)? },
+            emitters: if emitters.is_empty() { self.constants.emitters } else { cmd.upload_slice(emitters)? },
+            ..self.constants
+        })
+    }
+
+    /// How light of triangles is looked for.
+    pub(crate) fn emission(&self) -> EmissionConstants {
+        self.lights.emission
+    }
+
+    /// Buffers that vertices are moved in; draws and rays read them.
+    pub(crate) fn written(&self) -> Vec<BufferHandle> {
+        self.motion.as_ref().map_or_else(Vec::new, SceneMotion::written)
+    }
+
+    /// A frame is recorded.
+    pub(crate) fn end_frame(&mut self, is_first: bool) {
+        if let Some(motion) = &mut self.motion {
+            motion.end_frame(&self.instances, is_first);
         }
-        let instances = first..self.instances.len() as u32;
-        self.draws.extend((0..mesh.geometry_count).map(|geometry| {
-            let triangle_count = meshes.triangle_counts[(mesh.first_geometry + geometry) as usize];
-            Draw { geometry, triangle_count, instances: instances.clone() }
-        }));
+    }
+
+    /// Reads the positions of vertices that morph targets or joints move, a list for each geometry.
+    pub(crate) fn moved_positions(&self, ctx: &Context) -> lvk::Result<Vec<Vec<[f32; 3]>>> {
+        self.motion.as_ref().map_or(Ok(Vec::new()), |motion| motion.positions(ctx))
     }
 }
 
-/// True if a transform leaves a mesh its volume.
-fn has_inside(transform: &Mat4) -> bool {
-    transform.is_finite() && Mat3::from_mat4(*transform).determinant().abs() >= SMALLEST_DETERMINANT
+fn structure_bytes(ctx: &Context, meshes: &GpuMeshes, tlas: AccelStructHandle) -> lvk::Result<[u64; 2]> {
+    let bytes = |handle| Ok::<_, lvk::Error>(ctx.accel_struct_info(handle)?.structure_bytes);
+    Ok([meshes.structures().map(bytes).sum::<lvk::Result<u64>>()?, bytes(tlas)?])
 }
 
-/// The upper three rows of a matrix.
-fn rows(matrix: &Mat4) -> [f32; 12] {
-    let [x, y, z, w] = [matrix.x_axis, matrix.y_axis, matrix.z_axis, matrix.w_axis];
-    rows_from_columns([x, y, z, w].map(|column| column.truncate().to_array()))
+fn unique(keys: &[MeshKey]) -> Vec<MeshKey> {
+    let mut unique = keys.to_vec();
+    unique.sort();
+    unique.dedup();
+    unique
 }
 
-fn gpu_instance(transform: &Mat4, first_geometry: u32) -> GpuInstance {
-    let normals = Mat3::from_mat4(*transform).inverse().transpose();
-    GpuInstance { rows: rows(transform), normal_columns: normals.to_cols_array(), first_geometry }
+fn light_constants(lights: &GpuLights, environment: &Environment) -> LightConstants {
+    LightConstants {
+        light_count: lights.lights.len() as u32,
+        disc_count: lights.disc_count,
+        sky_probability: lights.sky_probability,
+        sky_size: [environment.sky.width, environment.sky.height],
+    }
+}
+
+/// The top-level structure, with room for instances that are not shown yet.
+fn tlas(ctx: &Context, instances: &SceneInstances) -> lvk::Result<Holder<AccelStructHandle>> {
+    let structures = instances.structures();
+    ctx.create_tlas(&TlasDesc {
+        instances: &structures,
+        capacity: instances.table.len().max(1) as u32,
+        debug_name: "scene tlas",
+        ..TlasDesc::default()
+    })
 }
 
 /// Buffers while they are made.
@@ -173,18 +234,20 @@ impl Arrays<'_> {
     fn constants(
         &mut self,
         meshes: &GpuMeshes,
-        shown: &SceneInstances,
+        instances: &SceneInstances,
         materials: &GpuMaterials,
-        lights: &GpuLights,
+        (lights, emitters): (&GpuLights, &Emitters),
         environment: &Environment,
     ) -> lvk::Result<SceneConstants> {
         let sky = environment.sky.distribution();
         Ok(SceneConstants {
-            instances: self.upload("instances", &shown.instances)?,
+            instances: self.upload("instances", &instances.table)?,
+            rows_before: self.upload("instances before", &instances.transforms())?,
             geometries: self.upload("geometries", &meshes.geometries)?,
             materials: self.upload("materials", &materials.materials)?,
             slots: self.upload::<GpuTextureSlot>("texture slots", &materials.slots)?,
             lights: self.upload("lights", &lights.lights)?,
+            emitters: self.upload("emitters", &emitters.triangles)?,
             sky_rows: self.upload("rows of the sky", &sky.rows)?,
             sky_columns: self.upload("columns of the sky", &sky.columns)?,
             sky: self.upload("sky", &environment.sky.texels)?,

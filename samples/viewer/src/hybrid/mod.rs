@@ -6,17 +6,17 @@ mod visibility;
 use lvk::{BufferHandle, Context, Holder};
 use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
-use lvk_samples::hybrid::RayPath;
 
-use crate::gpu::{Draw, layout::Push};
+use crate::config::ViewerConfig;
+use crate::gpu::{FrameScene, layout::Push};
 use passes::Passes;
 use visibility::Visibility;
 pub(crate) use visibility::{DEPTH_FORMAT, TRIANGLE_FORMAT};
 
 /// Planes of `shaders/viewer/plane.glsl`.
-const PLANES: u64 = 19;
+const PLANES: u64 = 20;
 /// The plane that the picture is made of (`kPlaneShown` there).
-const SHOWN: u64 = 18;
+const SHOWN: u64 = 19;
 /// Bytes of an element of a plane.
 const ELEMENT: u64 = 16;
 
@@ -29,11 +29,12 @@ pub(crate) struct Hybrid {
 }
 
 impl Hybrid {
-    pub(crate) fn new(ctx: &Context, path: RayPath, extent: [u32; 2]) -> lvk::Result<Self> {
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
+        let extent = config.extent();
         let size_bytes = PLANES * plane_bytes(extent);
         Ok(Self {
             visibility: Visibility::new(ctx, extent)?,
-            passes: Passes::new(ctx, path)?,
+            passes: Passes::new(ctx, config)?,
             planes: buffer(ctx, "planes", size_bytes)?,
             extent,
         })
@@ -65,12 +66,20 @@ impl Hybrid {
     }
 
     /// Records a frame, whose constants are at `frame`.
-    pub(crate) fn record(&self, to: &mut Frame<'_>, frame: u64, draws: &[Draw]) -> lvk::Result<()> {
+    pub(crate) fn record(&self, to: &mut Frame<'_>, frame: u64, scene: FrameScene<'_>) -> lvk::Result<()> {
         let push = |argument| Push { frame, argument, _padding: 0 };
-        to.pass("visible triangles", |cmd| self.visibility.record(cmd, frame, draws))?;
+        to.pass("visible triangles", |cmd| self.visibility.record(cmd, frame, scene))?;
         let (planes, visible) = (*self.planes, self.visibility.triangles());
-        to.pass("light", |cmd| self.passes.record_light(cmd, &push(0), planes, visible, self.extent))?;
-        to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))
+        to.pass("light", |cmd| {
+            self.passes.record_light(cmd, &push(0), planes, (visible, scene.written), self.extent)
+        })?;
+        to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
+        match self.passes.counts_steps() {
+            true => to.pass("steps", |cmd| {
+                self.passes.record_steps(cmd, &push(0), planes, scene.written, self.extent)
+            }),
+            false => Ok(()),
+        }
     }
 }
 

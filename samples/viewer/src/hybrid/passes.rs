@@ -6,9 +6,10 @@ use lvk::{
 };
 use lvk_samples::hybrid::RayPath;
 
+use crate::config::{Content, ViewerConfig};
 use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
 use crate::path_tracer::{compute, groups, ray_pipeline};
-use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, LIGHT_QUERY, LIGHT_RAYS, TEMPORAL};
+use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, LIGHT_QUERY, LIGHT_RAYS, STEPS, TEMPORAL};
 
 /// Steps of the filter in space.
 const FILTER_STEPS: u32 = 4;
@@ -20,6 +21,8 @@ pub(crate) struct Passes {
     filter: Holder<ComputePipelineHandle>,
     composite: Holder<ComputePipelineHandle>,
     antialias: Holder<ComputePipelineHandle>,
+    /// Where the picture is of steps.
+    steps: Option<Holder<ComputePipelineHandle>>,
 }
 
 enum LightPass {
@@ -28,10 +31,11 @@ enum LightPass {
 }
 
 impl Passes {
-    pub(crate) fn new(ctx: &Context, path: RayPath) -> lvk::Result<Self> {
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
+        let is_of_steps = config.content == Content::Steps;
         let filter = |stage| compute(ctx, stage, FRAME_LAYOUT);
         Ok(Self {
-            light: match path {
+            light: match config.path {
                 RayPath::Pipeline => LightPass::Pipeline(ray_pipeline(ctx, &[LIGHT_RAYS], "viewer light")?),
                 RayPath::Query => LightPass::Query(compute(ctx, LIGHT_QUERY, SCENE_LAYOUTS)?),
             },
@@ -39,20 +43,25 @@ impl Passes {
             filter: filter(FILTER)?,
             composite: filter(COMPOSITE)?,
             antialias: filter(ANTIALIAS)?,
+            steps: is_of_steps.then(|| compute(ctx, STEPS, SCENE_LAYOUTS)).transpose()?,
         })
     }
 
-    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`.
+    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`. They read what was `written` before.
     pub(crate) fn record_light(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
         planes: BufferHandle,
-        visible: TextureHandle,
+        (visible, written): (TextureHandle, &[BufferHandle]),
         extent: [u32; 2],
     ) -> lvk::Result<()> {
-        let dependencies =
-            Dependencies { buffers: &[planes], sampled_images: &[visible], ..Dependencies::default() };
+        let dependencies = Dependencies {
+            buffers: &[planes],
+            read_buffers: written,
+            sampled_images: &[visible],
+            ..Dependencies::default()
+        };
         match &self.light {
             LightPass::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
@@ -65,6 +74,29 @@ impl Passes {
                 cmd.dispatch(groups(extent), &dependencies)
             }
         }
+    }
+
+    /// True if the picture is of the steps of rays.
+    pub(crate) fn counts_steps(&self) -> bool {
+        self.steps.is_some()
+    }
+
+    /// Records the rays whose steps are counted, which read what was `written` before. Their picture takes the place of the
+    /// filters'.
+    pub(crate) fn record_steps(
+        &self,
+        cmd: &mut CommandBuffer,
+        push: &Push,
+        planes: BufferHandle,
+        written: &[BufferHandle],
+        extent: [u32; 2],
+    ) -> lvk::Result<()> {
+        let Some(steps) = &self.steps else { return Ok(()) };
+        cmd.bind_compute_pipeline(**steps)?;
+        cmd.push_constants(push)?;
+        let dependencies =
+            Dependencies { buffers: &[planes], read_buffers: written, ..Dependencies::default() };
+        cmd.dispatch(groups(extent), &dependencies)
     }
 
     /// Records the filters. `push` makes the constants of a pass from its argument.

@@ -6,7 +6,7 @@ use lvk::{
     TextureDesc, TextureHandle, TextureUsage,
 };
 
-use crate::gpu::Draw;
+use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, SCENE_LAYOUTS};
 use crate::pipelines::{SAMPLE, VISIBILITY_FRAGMENT, VISIBILITY_VERTEX};
 
@@ -51,7 +51,12 @@ impl Visibility {
     }
 
     /// Records the pass.
-    pub(crate) fn record(&self, cmd: &mut CommandBuffer, frame: u64, draws: &[Draw]) -> lvk::Result<()> {
+    pub(crate) fn record(
+        &self,
+        cmd: &mut CommandBuffer,
+        frame: u64,
+        scene: FrameScene<'_>,
+    ) -> lvk::Result<()> {
         let color = ColorAttachment {
             texture: *self.triangles,
             mip: 0,
@@ -63,12 +68,12 @@ impl Visibility {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &[color],
             depth: Some(DepthAttachment { store: false, ..DepthAttachment::clear(*self.depth, 0.0) }),
-            dependencies: Dependencies::default(),
+            dependencies: Dependencies { read_buffers: scene.written, ..Dependencies::default() },
             debug_name: "visible triangles",
             ..RenderPassDesc::default()
         })?;
         pass.bind_render_pipeline(*self.pipeline)?;
-        for draw in draws {
+        for draw in scene.draws {
             pass.push_constants(&Push { frame, argument: draw.geometry, _padding: 0 })?;
             pass.draw(0..3 * draw.triangle_count, draw.instances.clone())?;
         }

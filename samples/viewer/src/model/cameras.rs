@@ -23,7 +23,16 @@ pub struct ModelCamera {
 /// Returns the cameras of the nodes of a scene, then the overview. Parallel projections become perspectives from far away.
 #[must_use]
 pub fn cameras(model: &Model, scene: usize, pose: &Pose) -> Vec<ModelCamera> {
-    let bounds = model.bounds(scene, pose).unwrap_or(Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    cameras_around(model, scene, pose, &bounds(model, scene, pose))
+}
+
+/// The box around a scene in a pose; around the origin where it shows nothing.
+pub(crate) fn bounds(model: &Model, scene: usize, pose: &Pose) -> Bounds {
+    model.bounds(scene, pose).unwrap_or(Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE })
+}
+
+/// As [`cameras`], of a scene in a box that is known.
+pub(crate) fn cameras_around(model: &Model, scene: usize, pose: &Pose, bounds: &Bounds) -> Vec<ModelCamera> {
     let mut all = Vec::new();
     for node in model.scene_nodes(scene) {
         let camera = model.nodes[node].camera.and_then(|camera| model.cameras.get(camera));
@@ -31,9 +40,9 @@ pub fn cameras(model: &Model, scene: usize, pose: &Pose) -> Vec<ModelCamera> {
         let names = [&camera.name, &model.nodes[node].name];
         let name = names.into_iter().flatten().next().cloned();
         let name = name.unwrap_or_else(|| format!("camera {}", all.len() + 1));
-        all.push(ModelCamera { name, camera: placed(&camera.projection, world, &bounds) });
+        all.push(ModelCamera { name, camera: placed(&camera.projection, world, bounds) });
     }
-    all.push(ModelCamera { name: OVERVIEW.to_owned(), camera: overview(&bounds) });
+    all.push(ModelCamera { name: OVERVIEW.to_owned(), camera: overview(bounds) });
     all
 }
 

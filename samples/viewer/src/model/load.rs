@@ -1,5 +1,7 @@
 //! Models from files.
 
+use std::cell::{Cell, RefCell};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use lvk_gltf::{LoadOptions, Model};
@@ -26,6 +28,20 @@ pub enum ModelError {
     },
 }
 
+/// Loads a glTF file. The load ends early where nobody waits for it any more.
+fn load_gltf(path: &Path, progress: &mut Progress) -> Result<Model, lvk_gltf::Error> {
+    let (step, progress) = (Cell::new(""), RefCell::new(progress));
+    let on_progress = |at: lvk_gltf::Progress| {
+        let mut progress = progress.borrow_mut();
+        if step.replace(at.step) != at.step {
+            progress.stage(at.step, at.total as u64);
+        }
+        progress.set(at.done as u64);
+        if progress.go_on().is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    };
+    Model::load(path, &LoadOptions { on_progress: Some(&on_progress), ..LoadOptions::default() })
+}
+
 /// Loads a glTF file, or an OBJ file where the name ends so.
 ///
 /// # Errors
@@ -35,7 +51,7 @@ pub fn load(path: &Path, progress: &mut Progress) -> Result<Model, ModelError> {
     let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
     let model = match is_obj {
         true => obj::model(&Scene::from_obj(path, &ObjOptions::default(), progress)?),
-        false => Model::load(path, &LoadOptions::default())?,
+        false => load_gltf(path, progress)?,
     };
     let scene = model.default_scene.unwrap_or(0);
     let placements = model.placements(scene, &model.pose(None, 0.0));

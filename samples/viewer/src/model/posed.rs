@@ -34,8 +34,7 @@ pub fn posed(mut model: Model, animation: Option<usize>, seconds: f32) -> Model 
 fn moved_mesh(model: &Model, node: usize, pose: &Pose) -> Option<Mesh> {
     let node_data = &model.nodes[node];
     let mesh = model.meshes.get(node_data.mesh?)?;
-    let weights = pose.weights.get(node).map_or(&[][..], Vec::as_slice);
-    let joints = node_data.skin.and_then(|skin| pose.joints.get(skin)).map_or(&[][..], Vec::as_slice);
+    let (weights, joints) = movers(model, node, pose);
     let is_moved = !joints.is_empty() || weights.iter().any(|weight| *weight != 0.0);
     is_moved.then(|| Mesh {
         primitives: mesh.primitives.iter().map(|primitive| moved(primitive, weights, joints)).collect(),
@@ -44,7 +43,15 @@ fn moved_mesh(model: &Model, node: usize, pose: &Pose) -> Option<Mesh> {
     })
 }
 
-fn moved(primitive: &Primitive, weights: &[f32], joints: &[Mat4]) -> Primitive {
+/// The weights of morph targets and the matrices of joints that move the vertices of a node's mesh.
+pub(crate) fn movers<'a>(model: &Model, node: usize, pose: &'a Pose) -> (&'a [f32], &'a [Mat4]) {
+    let weights = pose.weights.get(node).map_or(&[][..], Vec::as_slice);
+    let skin = model.nodes.get(node).and_then(|node| node.skin);
+    (weights, skin.and_then(|skin| pose.joints.get(skin)).map_or(&[][..], Vec::as_slice))
+}
+
+/// The triangles with their vertices where morph targets and joints move them.
+pub(crate) fn moved(primitive: &Primitive, weights: &[f32], joints: &[Mat4]) -> Primitive {
     let vertices = 0..primitive.vertex_count();
     let turned = |vertex: usize, direction: Vec3| {
         let matrix = primitive.skin_matrix(vertex, joints).map_or(Mat3::IDENTITY, Mat3::from_mat4);
@@ -62,7 +69,11 @@ fn moved(primitive: &Primitive, weights: &[f32], joints: &[Mat4]) -> Primitive {
     };
     let tangent = |(vertex, [x, y, z, side]): (usize, &[f32; 4])| {
         let matrix = primitive.skin_matrix(vertex, joints).unwrap_or(Mat4::IDENTITY);
-        let along = matrix.transform_vector3(Vec3::new(*x, *y, *z)).try_normalize().unwrap_or(Vec3::X);
+        let targets = primitive.morph_targets.iter().zip(weights);
+        let sum = targets.fold(Vec3::new(*x, *y, *z), |sum, (target, weight)| {
+            sum + *weight * Vec3::from(target.tangents.get(vertex).copied().unwrap_or_default())
+        });
+        let along = matrix.transform_vector3(sum).try_normalize().unwrap_or(Vec3::X);
         [along.x, along.y, along.z, *side]
     };
     Primitive {

@@ -1,11 +1,11 @@
-//! The model that needs no file: balls of many materials around a knot, on a tiled floor.
+//! The model that needs no file: balls of many materials around a knot that can turn, on a tiled floor.
 
 use std::f32::consts::{PI, TAU};
 
 use glam::{Quat, Vec3};
 use lvk_gltf::{
-    AlphaMode, Clearcoat, Material, Mesh, Model, Node, Positions, Primitive, Sampler, Sheen, TextureRef,
-    TextureTransform, Transmission, Trs, Volume,
+    AlphaMode, Animation, Channel, ChannelPath, Clearcoat, Interpolation, Keyframes, Material, Mesh, Model,
+    Node, Positions, Primitive, Sampler, Sheen, TextureRef, TextureTransform, Transmission, Trs, Volume,
 };
 use lvk_samples::shapes;
 
@@ -15,6 +15,8 @@ use super::showcase_textures;
 const BALL_SEGMENTS: u16 = 96;
 /// Units of length that one repetition of the floor's textures covers.
 const TILE: f32 = 2.0;
+/// Seconds in which the knot turns around once.
+const TURN: f32 = 8.0;
 
 /// Builds the model. The same on every machine and every call.
 #[must_use]
@@ -202,7 +204,23 @@ fn knot(builder: &mut Builder) {
         line(t) + 0.24 * (side * cosine + side.cross(forward) * sine)
     });
     let mesh = builder.mesh("knot", &shape, copper);
-    builder.place(mesh, Vec3::new(0.0, 1.62, -0.9), Quat::from_rotation_z(0.5 * PI));
+    let upright = Quat::from_rotation_z(0.5 * PI);
+    builder.place(mesh, Vec3::new(0.0, 1.62, -0.9), upright);
+    let turns = (0..=4_u8).map(|quarter| Quat::from_rotation_y(0.5 * PI * f32::from(quarter)) * upright);
+    builder.model.animations.push(Animation {
+        name: Some("turn".into()),
+        channels: vec![Channel {
+            node: builder.model.nodes.len() - 1,
+            path: ChannelPath::Rotation,
+            keyframes: 0,
+        }],
+        keyframes: vec![Keyframes {
+            interpolation: Interpolation::Linear,
+            times: (0..=4_u8).map(|quarter| 0.25 * TURN * f32::from(quarter)).collect(),
+            components: 4,
+            values: turns.flat_map(|turn| turn.to_array()).collect(),
+        }],
+    });
 }
 
 #[cfg(test)]

@@ -1,0 +1,112 @@
+//! Opens the model that the arguments name.
+
+use lvk::{Context, RayQueryPath};
+use lvk_gltf::Model;
+use lvk_samples::app::cli::{ReadySample, warn};
+use lvk_samples::app::progress::Progress;
+use lvk_samples::app::run_error::RunError;
+use lvk_samples::hybrid::RayPath;
+
+use crate::args::{LightArgs, SkyArg, ViewerArgs};
+use crate::config::{Content, ViewerConfig};
+use crate::light::{Environment, SunSetting};
+use crate::model::{ModelError, load, showcase};
+use crate::names::{animation_place, camera_place};
+use crate::viewer::{Viewer, ViewerScene};
+
+/// What to open, on any thread.
+pub(crate) struct Request {
+    pub(crate) args: ViewerArgs,
+    /// Width and height of the pictures in pixels.
+    pub(crate) extent: [u32; 2],
+    pub(crate) is_for_window: bool,
+}
+
+/// The model that the arguments name.
+pub(crate) fn model(args: &ViewerArgs, progress: &mut Progress) -> Result<Model, ModelError> {
+    args.file.as_deref().map_or_else(|| Ok(showcase()), |file| load(file, progress))
+}
+
+impl Request {
+    /// Loads the model and prints its warnings.
+    pub(crate) fn model(&self, progress: &mut Progress) -> Result<Model, RunError> {
+        let model = model(&self.args, progress).map_err(RunError::input)?;
+        progress.go_on()?;
+        let warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
+        warn_beside(progress, &warnings);
+        Ok(model)
+    }
+
+    /// Uploads the model, chooses its camera and animation, and makes all pipelines.
+    pub(crate) fn viewer(
+        &self,
+        ctx: &Context,
+        model: Model,
+        progress: &mut Progress,
+    ) -> Result<ReadySample<Viewer>, RunError> {
+        let args = &self.args;
+        let animation = args.animation.as_deref().map(|wish| animation_place(&model, wish));
+        let animation = animation.transpose().map_err(RunError::input)?;
+        progress.stage("uploading the model and building acceleration structures", 0);
+        let config = self.config(ctx)?;
+        let scene = self.scene(model);
+        let mut viewer = Viewer::new(ctx, &scene, &config)?;
+        warn_beside(progress, viewer.warnings());
+        if config.content == Content::Steps && ctx.capabilities().ray_query_path == RayQueryPath::Hardware {
+            let text = "--view steps is black: the device counts no steps of its rays; --rt software does";
+            warn_beside(progress, &[text.to_owned()]);
+        }
+        viewer.play(animation, args.time);
+        if let Some(wish) = &args.camera {
+            let place = camera_place(viewer.cameras(), wish).map_err(RunError::input)?;
+            viewer.choose_camera(place);
+        }
+        let (triangles, instances) = viewer.counts();
+        let text = format!(
+            "{}: {triangles} triangles, {instances} instances; {} samples a pixel, paths of {} surfaces at most",
+            scene.name, config.samples, config.bounces
+        );
+        progress.pause();
+        Ok(ReadySample::ray_traced(viewer, config.path, "a compute shader", &text))
+    }
+
+    fn config(&self, ctx: &Context) -> Result<ViewerConfig, RunError> {
+        let args = &self.args;
+        let path = RayPath::choose(RayPath::from_args(args.tracing.rt), ctx.capabilities())?;
+        let [width, height] = self.extent;
+        Ok(ViewerConfig {
+            method: args.method,
+            content: args.view,
+            samples: args.samples,
+            bounces: args.bounces,
+            exposure_stops: args.exposure,
+            tone_mapping: args.tone,
+            is_progressive: self.is_for_window,
+            ..ViewerConfig::new(path, width, height)
+        })
+    }
+
+    /// The model with the light that the arguments ask for.
+    fn scene(&self, model: Model) -> ViewerScene {
+        let LightArgs { sky, sun_elevation, sun_azimuth, sun_radius } = self.args.light;
+        let environment = match sky {
+            SkyArg::Day => Environment::day(&SunSetting {
+                elevation_degrees: sun_elevation,
+                azimuth_degrees: sun_azimuth,
+                radius_degrees: sun_radius,
+            }),
+            SkyArg::White => Environment::uniform([1.0; 3]),
+            SkyArg::Black => Environment::uniform([0.0; 3]),
+        };
+        let name = self.args.file.as_deref().map_or_else(|| "showcase".to_owned(), lvk::readable_name);
+        ViewerScene { name, model, environment, disc_radius: sun_radius.to_radians() }
+    }
+}
+
+/// Prints warnings to standard error, after pausing the progress bar.
+fn warn_beside(progress: &mut Progress, warnings: &[String]) {
+    if !warnings.is_empty() {
+        progress.pause();
+    }
+    warn(warnings);
+}
