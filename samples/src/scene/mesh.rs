@@ -17,24 +17,11 @@ pub(super) struct Mesh {
 }
 
 impl Mesh {
-    /// Creates a mesh without triangles, with memory for these numbers of vertices and triangles.
-    pub fn with_capacity(vertices: usize, triangles: usize) -> Self {
-        Self {
-            positions: Vec::with_capacity(vertices),
-            normals: Vec::with_capacity(vertices),
-            texcoords: Vec::with_capacity(vertices),
-            colors: Vec::new(),
-            triangles: Vec::with_capacity(triangles),
-            triangle_materials: Vec::with_capacity(triangles),
-            source_triangles: Vec::with_capacity(triangles),
-        }
-    }
-
     /// Appends a vertex and returns its number.
     pub fn add_vertex(&mut self, position: [f32; 3], normal: [f32; 3], texcoord: [f32; 2]) -> u32 {
-        self.positions.push(position);
-        self.normals.push(normal);
-        self.texcoords.push(texcoord);
+        append(&mut self.positions, position);
+        append(&mut self.normals, normal);
+        append(&mut self.texcoords, texcoord);
         (self.positions.len() - 1) as u32
     }
 
@@ -49,9 +36,9 @@ impl Mesh {
 
     /// Appends a triangle, numbered in the order of calls.
     pub fn add_triangle(&mut self, vertices: [u32; 3], material: u32) {
-        self.source_triangles.push(self.triangles.len() as u32);
-        self.triangles.push(vertices);
-        self.triangle_materials.push(material);
+        append(&mut self.source_triangles, self.triangles.len() as u32);
+        append(&mut self.triangles, vertices);
+        append(&mut self.triangle_materials, material);
     }
 
     /// The unit normal of a triangle by its winding, and its angle at a corner in radians.
@@ -129,6 +116,15 @@ impl Mesh {
             self.colors = picked(&self.colors, &used);
         }
     }
+}
+
+/// Appends an element. Full memory grows by an eighth: large meshes have no memory for twice of what they hold.
+fn append<T>(elements: &mut Vec<T>, element: T) {
+    const LEAST: usize = 256;
+    if elements.len() == elements.capacity() {
+        elements.reserve_exact(LEAST.max(elements.len() / 8));
+    }
+    elements.push(element);
 }
 
 /// The elements of these numbers.

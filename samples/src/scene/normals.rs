@@ -32,7 +32,8 @@ pub(super) fn complete(mesh: &mut Mesh) -> usize {
     let missing: Vec<bool> = mesh.normals.iter().map(|normal| *normal == [0.0; 3]).collect();
     let count = mesh.triangles.iter().flatten().filter(|vertex| missing[**vertex as usize]).count();
     if count > 0 {
-        let mut clusters = Vec::new();
+        // Most vertices have one.
+        let mut clusters = Vec::with_capacity(missing.iter().filter(|is_missing| **is_missing).count());
         let chosen = cluster_corners(mesh, &missing, count, &mut clusters);
         split_vertices(mesh, &missing, &chosen, &clusters);
     }

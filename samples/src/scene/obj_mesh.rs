@@ -116,8 +116,8 @@ impl<'a> Builder<'a> {
     fn new(obj: &'a mut ObjText, colors: &'a [[f32; 3]], placement: &'a Placement) -> Self {
         // Most files name each position, and few have more vertices than positions.
         let vertices = obj.positions.len().min(obj.corners.len());
-        let mesh = Mesh::with_capacity(vertices, obj.triangle_count);
         let numbers = KeyNumbers::with_capacity(vertices);
+        let mesh = Mesh::default();
         Self { obj, colors, placement, mesh, keys: Segments::default(), numbers, vertices: Vec::new() }
     }
 
