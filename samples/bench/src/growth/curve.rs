@@ -49,7 +49,7 @@ impl Unit {
     /// Returns the label of the axis.
     pub(super) const fn axis(self) -> &'static str {
         match self {
-            Self::Milliseconds => "milliseconds",
+            Self::Milliseconds => "time",
             Self::BytesPerTriangle => "bytes a triangle",
             Self::Times => "times the final data",
             Self::Count => "number",

@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::curve::Curve;
+use super::curve::{Curve, Unit};
 use crate::error::BenchError;
 
 /// Size of the picture, and width of the legend at its right, in pixels.
@@ -28,8 +28,7 @@ pub(super) struct LogLogChart<'a> {
     pub(super) title: String,
     /// Label of the x axis.
     pub(super) sizes: &'a str,
-    /// Label of the y axis.
-    pub(super) costs: &'a str,
+    pub(super) unit: Unit,
     pub(super) curves: Vec<&'a Curve>,
 }
 
@@ -54,8 +53,9 @@ impl LogLogChart<'_> {
             .build_cartesian_2d((xs.0..xs.1).log_scale(), (ys.0..ys.1).log_scale())
             .map_err(|error| error.to_string())?;
         let mut mesh = chart.configure_mesh();
-        mesh.light_line_style(WHITE).x_desc(self.sizes).y_desc(self.costs);
-        mesh.x_label_formatter(&|x| label(*x)).y_label_formatter(&|y| label(*y));
+        mesh.max_light_lines(0).x_desc(self.sizes).y_desc(self.unit.axis());
+        let cost = |y: &f64| self.cost_label(*y);
+        mesh.x_label_formatter(&|x| label(*x)).y_label_formatter(&cost);
         mesh.draw().map_err(|error| error.to_string())?;
         for (curve, color) in self.curves.iter().zip(COLORS.iter().cycle()) {
             let points = || usable(curve);
@@ -81,6 +81,19 @@ impl LogLogChart<'_> {
             legend.draw(&name).map_err(|error| error.to_string())?;
         }
         Ok(())
+    }
+
+    /// Returns a label of the y axis.
+    fn cost_label(&self, cost: f64) -> String {
+        match self.unit {
+            Unit::Milliseconds => {
+                let units = [(1e3, "s"), (1.0, "ms"), (1e-3, "us"), (1e-6, "ns")];
+                let (factor, unit) =
+                    units.into_iter().find(|unit| cost >= 0.999 * unit.0).unwrap_or((1e-6, "ns"));
+                format!("{} {unit}", rounded(cost / factor))
+            }
+            _ => label(cost),
+        }
     }
 
     /// Returns the powers of ten around all numbers.
@@ -120,7 +133,7 @@ fn rounded(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::growth::curve::{Expected, Unit};
+    use crate::growth::curve::Expected;
 
     #[test]
     fn a_chart_has_a_dot_for_each_point_and_names_the_exponents() {
@@ -129,7 +142,8 @@ mod tests {
         let mut flawed = Curve::new("flawed", Unit::Milliseconds, Expected::Constant);
         [(1, 0.0), (10, f64::NAN), (100, 5.0)].into_iter().for_each(|(size, cost)| flawed.push(size, cost));
         let curves = vec![&linear, &flawed];
-        let chart = LogLogChart { title: "costs".to_owned(), sizes: "sizes", costs: "ms", curves };
+        let unit = Unit::Milliseconds;
+        let chart = LogLogChart { title: "costs".to_owned(), sizes: "sizes", unit, curves };
         let svg = chart.svg().unwrap();
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{svg}");
         assert_eq!(svg.matches("<circle").count(), 5);
@@ -138,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_chart_without_points_is_empty() {
-        let chart = LogLogChart { title: String::new(), sizes: "n", costs: "ms", curves: Vec::new() };
+        let chart = LogLogChart { title: String::new(), sizes: "n", unit: Unit::Count, curves: Vec::new() };
         assert_eq!(chart.svg().unwrap().matches("<circle").count(), 0);
     }
 
@@ -146,5 +160,9 @@ mod tests {
     fn labels_are_short() {
         let labels = [1e-5, 0.01, 1.0, 100.0, 1e3, 1e5, 1e6, 1e7].map(label);
         assert_eq!(labels, ["0.00001", "0.01", "1", "100", "1 k", "100 k", "1 M", "10 M"]);
+        let unit = Unit::Milliseconds;
+        let chart = LogLogChart { title: String::new(), sizes: "n", unit, curves: Vec::new() };
+        let times = [1e-7, 1e-5, 1e-3, 0.1, 10.0, 1e5].map(|cost| chart.cost_label(cost));
+        assert_eq!(times, ["0.1 ns", "10 ns", "1 us", "100 us", "10 ms", "100 s"]);
     }
 }

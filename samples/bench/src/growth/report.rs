@@ -34,7 +34,7 @@ pub(super) fn plots(group: &Group) -> Result<Vec<(String, String)>, BenchError> 
         let curves: Vec<_> = group.curves.iter().filter(|curve| curve.unit == unit).collect();
         if !curves.is_empty() {
             let title = format!("cost by number of {}", group.key.title());
-            let chart = LogLogChart { title, sizes: group.key.title(), costs: unit.axis(), curves };
+            let chart = LogLogChart { title, sizes: group.key.title(), unit, curves };
             plots.push((format!("{}{}.svg", group.key.name(), unit.file_suffix()), chart.svg()?));
         }
     }
