@@ -54,9 +54,10 @@ pub(super) fn measure(ctx: &Context, effort: Effort) -> Result<Group, BenchError
 
 fn curves() -> Vec<Curve> {
     let constant = |name| Curve::new(name, Unit::Milliseconds, Expected::Constant);
+    let first_touch = Expected::Grows("one sample: new objects and first touches of memory");
     let cache = Expected::Grows("cache misses of the CPU: the same handles stay as fast");
     vec![
-        constant("create all that are missing, each"),
+        Curve::new("create all that are missing, each", Unit::Milliseconds, first_touch),
         constant("create one more"),
         constant("destroy one, with the submission that frees it"),
         constant("buffer_address of the same 16 handles, each"),
