@@ -31,7 +31,7 @@ pub(super) enum Unit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Expected {
     Constant,
-    /// It grows, because the work does: why.
+    /// Growth with the work: the reason.
     Grows(&'static str),
 }
 

@@ -38,7 +38,7 @@ pub(super) fn measure(effort: Effort) -> Result<Group, BenchError> {
             let loaded = in_child(&file)?;
             let costs = [loaded.milliseconds, loaded.resident_ratio(), loaded.counted_ratio()];
             of_corners.iter_mut().zip(costs).for_each(|(curve, cost)| curve.push(count, cost));
-            notes.extend((count == sizes[sizes.len() - 1]).then(|| loaded.note(corners)));
+            notes.extend((count == sizes[sizes.len() - 1]).then(|| loaded.compare_with_goal(corners)));
         }
         curves.extend(of_corners);
     }
@@ -106,7 +106,7 @@ impl Loaded {
     }
 
     /// Compares the largest file with the goal.
-    fn note(&self, corners: Corners) -> String {
+    fn compare_with_goal(&self, corners: Corners) -> String {
         let megabytes = |bytes: u64| bytes as f64 * 1e-6;
         let ratio = self.peak as f64 / self.data as f64;
         let verdict = if ratio <= GOAL { "kept" } else { "missed" };
@@ -171,7 +171,7 @@ mod tests {
         assert_eq!((loaded.resident_ratio(), loaded.counted_ratio()), (3.0, 2.5));
         assert_eq!(Loaded::from_line("loaded 1.5 2 3"), None);
         assert_eq!(Loaded::from_line("warning: 1.5 2 3 4 5"), None);
-        assert!(loaded.note(Corners::All).ends_with("3.50 times: goal missed"));
+        assert!(loaded.compare_with_goal(Corners::All).ends_with("3.50 times: goal missed"));
     }
 
     #[test]
