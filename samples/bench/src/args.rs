@@ -7,6 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Args, Parser, Subcommand};
 use lvk::DeviceProfile;
 
+use crate::growth::GrowthArgs;
 use crate::paper::PaperArgs;
 use crate::peers::PeersArgs;
 
@@ -66,6 +67,8 @@ pub(super) enum Benchmark {
     Compaction(MeshArgs),
     /// CPU overhead of the library: draws, dispatches, objects, submissions, uploads, start-up, heap growth
     Core,
+    /// Cost against size: instances, textures, buffers, draws, triangles, OBJ files; exponents and log-log plots
+    Growth(GrowthArgs),
     /// Ray tracing cost of a mesh split into several BLAS, compared with one BLAS
     Split(SplitArgs),
     /// TLAS updates, compared with a memory copy plus the driver's build
@@ -204,6 +207,7 @@ Examples:
   bench builds --scene s.obj --threads 1,2,16      BVH builds by the CPU on these numbers of threads
   bench compaction --scene living_room.obj         builds, refits and compaction of that scene
   bench core                                       CPU overhead of the library, with its limits
+  bench growth --only handles,draws --out growth   cost against size, with plots in that folder
   bench split --parts 100 --runs 200               the generated mesh in at least 100 parts
   bench order --scene living_room.obj --camera 3   rays per second by triangle order
   bench queries --scene living_room.obj            software ray queries and the driver's ray tracing

@@ -38,6 +38,12 @@ pub(super) enum BenchError {
     NoFolder(#[from] std::io::Error),
     #[error(transparent)]
     Embree(#[from] EmbreeError),
+    #[error("cannot write {}: {source}; choose another folder", lvk::readable_name(path))]
+    Write { path: PathBuf, source: std::io::Error },
+    #[error("cannot draw {name}: {what}")]
+    Plot { name: String, what: String },
+    #[error("the process that loads an OBJ file ended with {0}")]
+    Child(String),
     #[error("{0}")]
     Peers(String),
     #[error(
@@ -63,7 +69,7 @@ impl BenchError {
             Self::NoBenchmark | Self::PeersDevice | Self::Embree(EmbreeError::Library { .. }) => 2,
             Self::Listing(error) => error.status(),
             Self::Paper(error) if error.is_input() => 2,
-            Self::Scene(_) | Self::Driver(DriverError::Variable { .. }) => 2,
+            Self::Write { .. } | Self::Scene(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             _ => 1,
         }
     }

@@ -11,6 +11,7 @@ mod compaction;
 mod cpu_overhead;
 mod embree;
 mod error;
+mod growth;
 mod hand_written;
 mod instance_record;
 mod measure;

@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use crate::args::{BenchArgs, Benchmark};
 use crate::error::BenchError;
+use crate::growth::GrowthArgs;
 use crate::peers::{self, PeersArgs, RunOptions};
 use crate::setup::Setup;
 use crate::table::Table;
-use crate::{batch, builds, compaction, cpu_overhead, order, overhead, paper, queries, split, tlas};
+use crate::{batch, builds, compaction, cpu_overhead, growth, order, overhead, paper, queries, split, tlas};
 use lvk_samples::app::{device, scene_list};
 
 /// Runs the selected benchmark. Prints tables to standard output, and an error in one line to standard error. The exit status
@@ -39,6 +40,9 @@ fn execute(args: &BenchArgs) -> Result<String, BenchError> {
     if let Benchmark::Peers(peers) = benchmark {
         return compare_peers(args, peers);
     }
+    if let Benchmark::Growth(GrowthArgs { load: Some(file), .. }) = benchmark {
+        return growth::load(file);
+    }
     let tables = measure(args, benchmark)?;
     Ok(tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n"))
 }
@@ -62,6 +66,7 @@ fn measure(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchE
         Benchmark::Builds(_) | Benchmark::Peers(_) => Vec::new(),
         Benchmark::Compaction(args) => vec![compaction::measure(&setup, args)?],
         Benchmark::Core => vec![cpu_overhead::measure(&setup)?],
+        Benchmark::Growth(args) => growth::measure(&setup, args)?,
         Benchmark::Split(args) => vec![split::measure(&setup, args)?],
         Benchmark::Tlas(args) => vec![tlas::measure(&setup, args)?],
         Benchmark::Order(args) => vec![order::measure(&setup, args)?],

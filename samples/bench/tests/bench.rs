@@ -127,6 +127,71 @@ fn tlas_updates_are_timed_for_every_requested_instance_count() {
 }
 
 #[test]
+fn growth_is_measured_for_every_group_and_plotted() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("made/growth");
+    let text = table(&["growth", "--quick", "--out", out.to_str().unwrap()]);
+    let rows = |table: &str| {
+        let lines = table.lines().filter(|line| line.starts_with("| "));
+        lines.map(|line| line.split('|').nth(1).unwrap().trim().to_owned()).collect::<Vec<_>>()
+    };
+    for (title, expected) in [
+        (
+            "instances of one TLAS",
+            &["created and built, lvk", "one moved, refit, lvk", "the same rays traced, lvk"][..],
+        ),
+        (
+            "textures alive",
+            &["create one more", "empty submission and wait", "dispatch with 16 in `Dependencies`, recorded"],
+        ),
+        (
+            "buffers alive",
+            &["create one more", "buffer_address of handles at random, each", "VkDeviceMemory objects"],
+        ),
+        ("draws of one pass", &["push constants and draw, recorded, each"]),
+        (
+            "triangles of one BLAS",
+            &["BLAS created and built, lvk", "first trace, lvk", "memory of the BLAS, lvk"],
+        ),
+        ("triangles of a loaded OBJ file", &[]),
+    ] {
+        let (_, part) = text.split_once(&format!("## growth: {title}")).unwrap_or_else(|| panic!("{text}"));
+        let part = part.split_once("\n## ").map_or(part, |(part, _)| part);
+        assert!(expected.iter().all(|name| rows(part).iter().any(|row| row == name)), "{part}");
+        assert!(part.contains("- constant, where it should be: "), "{part}");
+        for line in part.lines().filter(|line| line.starts_with("| ")).skip(1) {
+            let cells: Vec<_> = line.split('|').map(str::trim).collect();
+            let verdict = cells[cells.len() - 3];
+            assert!(["yes", "no", "-"].contains(&verdict), "{line}");
+            let costs = &cells[2..cells.len() - 4];
+            assert!(costs.len() == 4 && costs.iter().all(|cost| number(cost) >= 0.0), "{line}");
+        }
+    }
+    let page = std::fs::read_to_string(out.join("growth.md")).unwrap();
+    for name in ["instances", "textures", "handles", "handles_count", "draws", "triangles", "triangles_bytes"]
+    {
+        assert!(page.contains(&format!("({name}.svg)")), "{page}");
+        let svg = std::fs::read_to_string(out.join(format!("{name}.svg"))).unwrap();
+        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{name}");
+        assert!(svg.matches("<circle").count() >= 4 && !svg.contains("NaN"), "{name}");
+    }
+    if cfg!(target_os = "linux") {
+        assert!(rows(&text).iter().any(|row| row == "resident peak, all of v, vt, vn"), "{text}");
+        assert!(text.contains("MB of final data") && page.contains("(loading_times.svg)"), "{text}");
+    }
+}
+
+#[test]
+fn selected_groups_of_growth_are_measured_alone() {
+    let draws = table(&["growth", "--quick", "--only", "draws"]);
+    assert!(draws.contains("growth: draws") && !draws.contains("growth: buffers"), "{draws}");
+    let (status, _, err) = outcome(&["growth", "--quick", "--only", "draws", "--out", "/dev/null/growth"]);
+    assert!(status == Some(2) && err.contains("/dev/null/growth"), "{status:?}: {err}");
+    let (status, _, err) = outcome(&["growth", "--load", "absent.obj"]);
+    assert!(status == Some(2) && err.contains("absent.obj"), "{status:?}: {err}");
+}
+
+#[test]
 fn orders_are_timed_and_render_the_same_image() {
     let table = table(&["order", "--quick"]);
     assert!(table.lines().any(|line| line.starts_with("| primary rays by")), "{table}");

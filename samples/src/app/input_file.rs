@@ -61,6 +61,19 @@ pub fn read_named_by_user(path: &Path, kind: FileKind) -> io::Result<Vec<u8>> {
     }
 }
 
+/// Opens a file that the command line names, as [`read_named_by_user`], to be read as a stream. Returns its size, too, but for
+/// standard input.
+///
+/// # Errors
+/// As [`read`]; those about the size of standard input when it is read.
+pub fn open_named_by_user(path: &Path, kind: FileKind) -> io::Result<(Box<dyn Read>, Option<u64>)> {
+    if cfg!(unix) && path == Path::new(STANDARD_INPUT) {
+        return Ok((Box::new(BoundedStream::new(io::stdin().lock(), kind.most_bytes())), None));
+    }
+    let (file, size) = regular_file::open(path, kind.most_bytes())?;
+    Ok((Box::new(file.take(size)), Some(size)))
+}
+
 /// Opens a file for reading.
 ///
 /// # Errors
@@ -72,12 +85,34 @@ pub fn open(path: &Path, kind: FileKind) -> io::Result<File> {
 /// Reads a stream of unknown length to its end.
 fn read_stream(stream: impl Read, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    stream.take(most_bytes + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most_bytes {
-        let message = format!("it has more than the {most_bytes} bytes that are read of such a file");
-        return Err(io::Error::new(ErrorKind::FileTooLarge, message));
-    }
+    BoundedStream::new(stream, most_bytes).read_to_end(&mut bytes)?;
     Ok(bytes)
+}
+
+/// A stream of unknown length that fails when it exceeds a bound.
+struct BoundedStream<R> {
+    stream: R,
+    /// Bytes that may follow.
+    left: u64,
+    most_bytes: u64,
+}
+
+impl<R> BoundedStream<R> {
+    fn new(stream: R, most_bytes: u64) -> Self {
+        Self { stream, left: most_bytes, most_bytes }
+    }
+}
+
+impl<R: Read> Read for BoundedStream<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.stream.read(buffer)?;
+        self.left = self.left.checked_sub(count as u64).ok_or_else(|| {
+            let most_bytes = self.most_bytes;
+            let message = format!("it has more than the {most_bytes} bytes that are read of such a file");
+            io::Error::new(ErrorKind::FileTooLarge, message)
+        })?;
+        Ok(count)
+    }
 }
 
 #[cfg(test)]

@@ -19,9 +19,9 @@ pub(super) struct Mesh {
 impl Mesh {
     /// Appends a vertex and returns its number.
     pub fn add_vertex(&mut self, position: [f32; 3], normal: [f32; 3], texcoord: [f32; 2]) -> u32 {
-        self.positions.push(position);
-        self.normals.push(normal);
-        self.texcoords.push(texcoord);
+        append(&mut self.positions, position);
+        append(&mut self.normals, normal);
+        append(&mut self.texcoords, texcoord);
         (self.positions.len() - 1) as u32
     }
 
@@ -36,9 +36,9 @@ impl Mesh {
 
     /// Appends a triangle, numbered in the order of calls.
     pub fn add_triangle(&mut self, vertices: [u32; 3], material: u32) {
-        self.source_triangles.push(self.triangles.len() as u32);
-        self.triangles.push(vertices);
-        self.triangle_materials.push(material);
+        append(&mut self.source_triangles, self.triangles.len() as u32);
+        append(&mut self.triangles, vertices);
+        append(&mut self.triangle_materials, material);
     }
 
     /// The unit normal of a triangle by its winding, and its angle at a corner in radians.
@@ -54,9 +54,19 @@ impl Mesh {
     /// Takes out triangles without area; returns how many.
     pub fn drop_degenerate(&mut self) -> usize {
         let before = self.triangles.len();
-        let kept: Vec<usize> = (0..before).filter(|&i| self.has_area(i)).collect();
-        self.keep_triangles(&kept);
-        before - kept.len()
+        let mut kept = 0;
+        for triangle in 0..before {
+            if self.has_area(triangle) {
+                self.triangles[kept] = self.triangles[triangle];
+                self.triangle_materials[kept] = self.triangle_materials[triangle];
+                self.source_triangles[kept] = self.source_triangles[triangle];
+                kept += 1;
+            }
+        }
+        self.triangles.truncate(kept);
+        self.triangle_materials.truncate(kept);
+        self.source_triangles.truncate(kept);
+        before - kept
     }
 
     /// True if the triangle has an area. A face on one line does not count for the size of its mesh, so that its corners may
@@ -71,40 +81,55 @@ impl Mesh {
     /// Puts opaque triangles first, each group in the order of the source, then numbers the vertices by first use and
     /// drops unused ones. Returns the number of opaque triangles.
     pub fn arrange(&mut self, materials: &[Material]) -> u32 {
-        let is_opaque = |i: &usize| !materials[self.triangle_materials[*i] as usize].is_refractive();
-        let (mut sequence, refractive): (Vec<usize>, Vec<usize>) =
-            (0..self.triangles.len()).partition(is_opaque);
-        let opaque_count = sequence.len() as u32;
-        sequence.extend(refractive);
-        self.keep_triangles(&sequence);
+        let is_opaque = |material: &u32| !materials[*material as usize].is_refractive();
+        let opaque_count = self.triangle_materials.iter().filter(|material| is_opaque(material)).count();
+        let front = &self.triangle_materials[..opaque_count];
+        if !front.iter().all(is_opaque) {
+            let (mut sequence, refractive): (Vec<u32>, Vec<u32>) = (0..self.triangles.len() as u32)
+                .partition(|&triangle| is_opaque(&self.triangle_materials[triangle as usize]));
+            sequence.extend(refractive);
+            self.triangles = picked(&self.triangles, &sequence);
+            self.triangle_materials = picked(&self.triangle_materials, &sequence);
+            self.source_triangles = picked(&self.source_triangles, &sequence);
+        }
         self.number_vertices_by_use();
-        opaque_count
-    }
-
-    /// Leaves the triangles named in `sequence`, in that order.
-    fn keep_triangles(&mut self, sequence: &[usize]) {
-        self.triangles = sequence.iter().map(|&i| self.triangles[i]).collect();
-        self.triangle_materials = sequence.iter().map(|&i| self.triangle_materials[i]).collect();
-        self.source_triangles = sequence.iter().map(|&i| self.source_triangles[i]).collect();
+        opaque_count as u32
     }
 
     fn number_vertices_by_use(&mut self) {
         const UNUSED: u32 = u32::MAX;
         let mut number = vec![UNUSED; self.positions.len()];
-        let mut used = Vec::with_capacity(self.positions.len());
+        let mut used: Vec<u32> = Vec::with_capacity(self.positions.len());
         for vertex in self.triangles.iter_mut().flatten() {
             let old = *vertex as usize;
             if number[old] == UNUSED {
                 number[old] = used.len() as u32;
-                used.push(old);
+                used.push(old as u32);
             }
             *vertex = number[old];
         }
-        self.positions = used.iter().map(|&i| self.positions[i]).collect();
-        self.normals = used.iter().map(|&i| self.normals[i]).collect();
-        self.texcoords = used.iter().map(|&i| self.texcoords[i]).collect();
-        self.colors = used.iter().filter_map(|&i| self.colors.get(i).copied()).collect();
+        drop(number);
+        self.positions = picked(&self.positions, &used);
+        self.normals = picked(&self.normals, &used);
+        self.texcoords = picked(&self.texcoords, &used);
+        if !self.colors.is_empty() {
+            self.colors = picked(&self.colors, &used);
+        }
     }
+}
+
+/// Appends an element. Full memory grows by an eighth: large meshes have no memory for twice of what they hold.
+fn append<T>(elements: &mut Vec<T>, element: T) {
+    const LEAST: usize = 256;
+    if elements.len() == elements.capacity() {
+        elements.reserve_exact(LEAST.max(elements.len() / 8));
+    }
+    elements.push(element);
+}
+
+/// The elements of these numbers.
+fn picked<T: Copy>(elements: &[T], numbers: &[u32]) -> Vec<T> {
+    numbers.iter().map(|&i| elements[i as usize]).collect()
 }
 
 #[cfg(test)]

@@ -4,15 +4,21 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
+use super::key_numbers::KeyNumbers;
 use super::mesh::Mesh;
 
 /// Faces that meet at more than this angle, in degrees, keep a sharp edge between them.
 const CREASE_DEGREES: f32 = 50.0;
 
+/// Stands for no number.
+const NONE: u32 = u32::MAX;
+
 /// Faces around one position that share a normal.
 struct Cluster {
     leader: Vec3,
     sum: Vec3,
+    /// The next cluster at the position, or [`NONE`].
+    next: u32,
 }
 
 /// Gives every corner whose normal is zero the mean of the faces around its position, weighted by their angle
@@ -23,53 +29,118 @@ pub(super) fn complete(mesh: &mut Mesh) -> usize {
     for normal in &mut mesh.normals {
         *normal = Vec3::from(*normal).normalize_or_zero().to_array();
     }
-    let missing: Vec<(usize, usize)> = (0..mesh.triangles.len())
-        .flat_map(|triangle| (0..3).map(move |corner| (triangle, corner)))
-        .filter(|&(triangle, corner)| mesh.normals[mesh.triangles[triangle][corner] as usize] == [0.0; 3])
-        .collect();
-    let mut clusters = Vec::new();
-    let chosen = cluster_corners(mesh, &missing, &mut clusters);
-    split_vertices(mesh, &missing, &chosen, &clusters);
-    missing.len()
+    let missing: Vec<bool> = mesh.normals.iter().map(|normal| *normal == [0.0; 3]).collect();
+    let count = mesh.triangles.iter().flatten().filter(|vertex| missing[**vertex as usize]).count();
+    if count > 0 {
+        // Most vertices have one.
+        let mut clusters = Vec::with_capacity(missing.iter().filter(|is_missing| **is_missing).count());
+        let chosen = cluster_corners(mesh, &missing, count, &mut clusters);
+        split_vertices(mesh, &missing, &chosen, &clusters);
+    }
+    count
 }
 
-/// The cluster of each of the `corners`, in order.
-fn cluster_corners(mesh: &Mesh, corners: &[(usize, usize)], clusters: &mut Vec<Cluster>) -> Vec<usize> {
-    let crease = CREASE_DEGREES.to_radians().cos();
-    let mut at_position: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
-    corners
-        .iter()
-        .map(|&(triangle, corner)| {
+/// The cluster of each of the `count` corners without a normal, in order.
+fn cluster_corners(mesh: &Mesh, missing: &[bool], count: usize, clusters: &mut Vec<Cluster>) -> Vec<u32> {
+    let mut places = Places::new(mesh);
+    let mut chosen = Vec::with_capacity(count);
+    for (triangle, vertices) in mesh.triangles.iter().enumerate() {
+        for (corner, &vertex) in vertices.iter().enumerate().filter(|(_, vertex)| missing[**vertex as usize])
+        {
             let (face, angle) = mesh.face_normal_and_angle(triangle, corner);
-            let position = mesh.positions[mesh.triangles[triangle][corner] as usize];
+            let cluster = find_or_add(clusters, places.first_cluster(vertex), face);
+            clusters[cluster as usize].sum += face * angle;
+            chosen.push(cluster);
+        }
+    }
+    chosen
+}
+
+/// The first cluster of the list from `first` on that takes the face, or a new one at its end.
+fn find_or_add(clusters: &mut Vec<Cluster>, first: &mut u32, face: Vec3) -> u32 {
+    let crease = CREASE_DEGREES.to_radians().cos();
+    let (mut last, mut cluster) = (NONE, *first);
+    while cluster != NONE {
+        let Cluster { leader, next, .. } = clusters[cluster as usize];
+        if leader.dot(face) >= crease {
+            return cluster;
+        }
+        (last, cluster) = (cluster, next);
+    }
+    let new = clusters.len() as u32;
+    match clusters.get_mut(last as usize) {
+        Some(last) => last.next = new,
+        None => *first = new,
+    }
+    clusters.push(Cluster { leader: face, sum: Vec3::ZERO, next: NONE });
+    new
+}
+
+/// The first cluster of each position, whichever vertices have it.
+struct Places<'a> {
+    mesh: &'a Mesh,
+    numbers: KeyNumbers,
+    /// A vertex of each place.
+    vertices: Vec<u32>,
+    first_clusters: Vec<u32>,
+    /// The place of each vertex that was asked for, or [`NONE`].
+    of_vertices: Vec<u32>,
+}
+
+impl<'a> Places<'a> {
+    fn new(mesh: &'a Mesh) -> Self {
+        let count = mesh.positions.len();
+        Self {
+            mesh,
+            numbers: KeyNumbers::with_capacity(count),
+            vertices: Vec::with_capacity(count),
+            first_clusters: Vec::with_capacity(count),
+            of_vertices: vec![NONE; count],
+        }
+    }
+
+    fn first_cluster(&mut self, vertex: u32) -> &mut u32 {
+        let Self { mesh, numbers, vertices, first_clusters, of_vertices } = self;
+        let place = &mut of_vertices[vertex as usize];
+        if *place == NONE {
             // Adding zero turns -0 into 0, which is the same place.
-            let near = at_position.entry(position.map(|x| (x + 0.0).to_bits())).or_default();
-            let found = near.iter().copied().find(|&i| clusters[i].leader.dot(face) >= crease);
-            let cluster = found.unwrap_or_else(|| {
-                near.push(clusters.len());
-                clusters.push(Cluster { leader: face, sum: Vec3::ZERO });
-                clusters.len() - 1
-            });
-            clusters[cluster].sum += face * angle;
-            cluster
-        })
-        .collect()
+            let bits = |vertex: u32| mesh.positions[vertex as usize].map(|x| (x + 0.0).to_bits());
+            let (number, is_new) = numbers.number_of(&bits(vertex), |place| bits(vertices[place as usize]));
+            if is_new {
+                vertices.push(vertex);
+                first_clusters.push(NONE);
+            }
+            *place = number;
+        }
+        &mut first_clusters[*place as usize]
+    }
 }
 
 /// Writes the normals of the clusters, doubling vertices that two clusters share.
-fn split_vertices(mesh: &mut Mesh, corners: &[(usize, usize)], chosen: &[usize], clusters: &[Cluster]) {
-    let mut vertex_of: HashMap<(u32, usize), u32> = HashMap::new();
-    for (&(triangle, corner), &cluster) in corners.iter().zip(chosen) {
-        let vertex = mesh.triangles[triangle][corner];
-        let normal = clusters[cluster].sum.try_normalize().unwrap_or(clusters[cluster].leader);
-        let split = *vertex_of.entry((vertex, cluster)).or_insert_with(|| {
-            if mesh.normals[vertex as usize] == [0.0; 3] {
-                mesh.normals[vertex as usize] = normal.to_array();
-                return vertex;
+fn split_vertices(mesh: &mut Mesh, missing: &[bool], chosen: &[u32], clusters: &[Cluster]) {
+    // The cluster that has the vertex itself; others have doubles.
+    let mut owners = vec![NONE; missing.len()];
+    let mut doubles: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut chosen = chosen.iter();
+    for triangle in 0..mesh.triangles.len() {
+        for corner in 0..3 {
+            let vertex = mesh.triangles[triangle][corner];
+            if !missing[vertex as usize] {
+                continue;
             }
-            mesh.double_vertex(vertex, normal.to_array())
-        });
-        mesh.triangles[triangle][corner] = split;
+            let Some(&cluster) = chosen.next() else { return };
+            let Cluster { leader, sum, .. } = clusters[cluster as usize];
+            let normal = sum.try_normalize().unwrap_or(leader).to_array();
+            let owner = &mut owners[vertex as usize];
+            if *owner == NONE {
+                *owner = cluster;
+                mesh.normals[vertex as usize] = normal;
+            } else if *owner != cluster {
+                let double = || mesh.double_vertex(vertex, normal);
+                let double = *doubles.entry((vertex, cluster)).or_insert_with(double);
+                mesh.triangles[triangle][corner] = double;
+            }
+        }
     }
 }
 

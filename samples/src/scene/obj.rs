@@ -8,7 +8,6 @@ use super::obj_text::{self, ObjText};
 use super::placement::Placement;
 use super::setting::Setting;
 use super::texcoord_mapping::Mapping;
-use super::text_lines::decoded;
 use super::{
     Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals, obj_mesh, texcoord_mapping,
     vertex_colors,
@@ -63,11 +62,10 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
 }
 
 fn read_text(path: &Path, name: &str, progress: &mut Progress) -> Result<ObjText, SceneError> {
-    let content = input_file::read_named_by_user(path, FileKind::Obj)
+    let (file, size) = input_file::open_named_by_user(path, FileKind::Obj)
         .map_err(|source| SceneError::from_io(path, source))?;
-    let content = decoded(&content);
-    progress.stage(&format!("{name}: reading"), content.len() as u64);
-    obj_text::parse(path, &content, progress)
+    progress.stage(&format!("{name}: reading"), size.unwrap_or(0));
+    obj_text::parse(path, file, progress)
 }
 
 fn read_library(path: &Path, obj: &ObjText, options: &ObjOptions, has_colors: bool) -> Library {

@@ -4,12 +4,16 @@
 //! follow each other in any order are resolved here: relative indices become absolute and are checked.
 
 use std::collections::HashMap;
+use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
 use lvk::{readable_bytes, readable_name};
 
 use super::SceneError;
-use super::text_lines::{is_keyword, next_logical_line, split_word};
+use super::segments::Segments;
+use super::text_blocks::TextBlocks;
+use super::text_lines::{LogicalLine, is_keyword, next_logical_line, split_word};
 use super::text_numbers::{Number, words};
 use super::vertex_colors::{self, UNCOLORED};
 use super::warnings::Warnings;
@@ -22,17 +26,17 @@ pub(super) const NONE: u32 = u32::MAX;
 #[derive(Default)]
 pub(super) struct ObjText {
     /// Positions in file units; all NaN where the file has a number that is not finite.
-    pub positions: Vec<[f64; 3]>,
+    pub positions: Segments<[f64; 3]>,
     /// Colours as in the file, [`UNCOLORED`] for positions without one; empty, or as many as positions.
     pub colors: Vec<[f32; 3]>,
     /// Texture coordinates, `v` up.
-    pub texcoords: Vec<[f32; 2]>,
+    pub texcoords: Segments<[f32; 2]>,
     /// Unit normals, or zero where the file has no usable one.
-    pub normals: Vec<[f32; 3]>,
+    pub normals: Segments<[f32; 3]>,
     /// Faces in the order of the file.
-    pub faces: Vec<Face>,
+    pub faces: Segments<Face>,
     /// Position, texture coordinate and normal of each corner of the faces; the last two may be [`NONE`].
-    pub corners: Vec<[u32; 3]>,
+    pub corners: Segments<[u32; 3]>,
     /// Name behind each material number; `None` for faces before the first `usemtl`.
     pub materials: Vec<Option<Vec<u8>>>,
     /// Arguments of the `mtllib` lines, in order.
@@ -48,8 +52,8 @@ pub(super) struct ObjText {
 /// A polygon of at least three corners, which end where those of the next face start.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Face {
-    /// Number of its first corner in [`ObjText::corners`].
-    pub start: usize,
+    /// Number of its first corner in [`ObjText::corners`], whose files are too small for more.
+    pub start: u32,
     /// Number of its material in [`ObjText::materials`].
     pub material: u32,
     /// Line in the file, from 1.
@@ -71,17 +75,16 @@ pub(super) struct Flaw {
 pub(super) const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 impl ObjText {
-    /// Number of the corner behind the last one of a face.
-    pub(super) fn face_end(&self, face: usize) -> usize {
-        self.faces.get(face + 1).map_or(self.corners.len(), |next| next.start)
+    /// Numbers of the corners of a face.
+    pub(super) fn corners_of(&self, face: usize) -> Range<usize> {
+        let end = self.faces.get(face + 1).map_or(self.corners.len(), |next| next.start as usize);
+        self.faces[face].start as usize..end
     }
 }
 
-/// Parses the decoded OBJ file `content`, read from `path` (which errors name).
-pub(super) fn parse(path: &Path, content: &[u8], progress: &mut Progress) -> Result<ObjText, SceneError> {
-    if content.contains(&0) {
-        return Err(SceneError::NotObj { path: path.into(), why: "it holds binary data" });
-    }
+/// Parses an OBJ file while it is read from `path` (which errors name).
+pub(super) fn parse(path: &Path, file: impl Read, progress: &mut Progress) -> Result<ObjText, SceneError> {
+    let mut blocks = TextBlocks::new(file);
     let mut parser = Parser {
         path,
         line_number: 0,
@@ -93,25 +96,26 @@ pub(super) fn parse(path: &Path, content: &[u8], progress: &mut Progress) -> Res
         weights: 0,
         paint: Vec::new(),
     };
-    let mut rest = content;
-    while !rest.is_empty() {
-        let (line, after) = next_logical_line(rest);
-        parser.line_number += 1;
-        parser.statement(&line.text)?;
-        if line.is_cut {
-            parser.warn(
-                "continued lines",
-                "it ends in a backslash, but the next line is a statement of its own",
-            );
+    let mut found = Ok(());
+    while !blocks.is_ended() {
+        let checked = blocks.text().len();
+        blocks.read_on().map_err(|source| SceneError::from_io(path, source))?;
+        if blocks.text()[checked..].contains(&0) {
+            return Err(SceneError::NotObj { path: path.into(), why: "it holds binary data" });
         }
-        parser.line_number += line.line_count - 1;
-        rest = after;
-        if parser.line_number.is_multiple_of(65_536) {
-            progress.set((content.len() - rest.len()) as u64);
-            progress.go_on()?;
+        // What an error says about a line of binary data would help little: the rest is searched for zeros first.
+        let consumed = match found {
+            Ok(()) => parser.statements(blocks.text(), blocks.complete_end()),
+            Err(_) => Ok(blocks.text().len()),
+        };
+        match consumed {
+            Ok(count) => blocks.consume(count),
+            Err(error) => found = Err(error),
         }
+        progress.set(blocks.consumed);
+        progress.go_on()?;
     }
-    parser.finish()
+    found.and_then(|()| parser.finish())
 }
 
 /// The largest index a kind of element was asked for, and where.
@@ -138,6 +142,34 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
+    /// Takes the statements of a text that end at `end` or before; returns the length of what it took.
+    fn statements(&mut self, text: &[u8], end: usize) -> Result<usize, SceneError> {
+        let mut consumed = 0;
+        while consumed < end {
+            let (line, after) = next_logical_line(&text[consumed..]);
+            let next = text.len() - after.len();
+            if next > end {
+                break;
+            }
+            self.line(&line)?;
+            consumed = next;
+        }
+        Ok(consumed)
+    }
+
+    fn line(&mut self, line: &LogicalLine<'_>) -> Result<(), SceneError> {
+        self.line_number += 1;
+        self.statement(&line.text)?;
+        if line.is_cut {
+            self.warn(
+                "continued lines",
+                "it ends in a backslash, but the next line is a statement of its own",
+            );
+        }
+        self.line_number += line.line_count - 1;
+        Ok(())
+    }
+
     fn statement(&mut self, line: &[u8]) -> Result<(), SceneError> {
         let (keyword, rest) = split_word(line);
         match keyword {
@@ -268,6 +300,7 @@ impl Parser<'_> {
             return Ok(());
         }
         let line = u32::try_from(self.line_number).unwrap_or(u32::MAX);
+        let start = u32::try_from(start).unwrap_or(u32::MAX);
         self.obj.faces.push(Face { start, material: self.material, line });
         self.obj.triangle_count += corner_count - 2;
         Ok(())
@@ -393,9 +426,7 @@ mod tests {
     /// Corners of each face, with numbers from 0.
     fn faces(text: impl AsRef<[u8]>) -> Vec<Vec<[u32; 3]>> {
         let obj = parsed(text).unwrap();
-        (0..obj.faces.len())
-            .map(|face| obj.corners[obj.faces[face].start..obj.face_end(face)].to_vec())
-            .collect()
+        (0..obj.faces.len()).map(|face| obj.corners.range(obj.corners_of(face)).copied().collect()).collect()
     }
 
     fn warnings(text: &str) -> Vec<String> {
@@ -477,7 +508,7 @@ mod tests {
         let names = [&b"b c"[..], b"M\xe4", b"M\xf6"].map(|name| Some(name.to_vec()));
         assert_eq!((obj.materials[0].clone(), &obj.materials[1..]), (None, &names[..]));
         assert_eq!(obj.libraries, [b"my file.mtl"]);
-        assert_eq!(obj.faces.iter().map(|face| face.material).collect::<Vec<_>>(), [1, 2, 1, 0]);
+        assert_eq!(obj.faces.range(0..4).map(|face| face.material).collect::<Vec<_>>(), [1, 2, 1, 0]);
     }
 
     #[test]
@@ -485,8 +516,8 @@ mod tests {
         let text = "v 0 0 0\nv 1 0 0\nv 0 1.#INF 0\nvt 0.5\nvt nan 1\nvt 1e39 1\nvn 0 -nan(ind) 1\n\
                     vn -1.#IND00 -1.#IND00 -1.#IND00\nvn 0 1\nvn 0 0 2\nf 1 2 3\n";
         let obj = parsed(text).unwrap();
-        assert_eq!(obj.texcoords, [[0.5, 0.0], [0.0, 1.0], [0.0, 1.0]]);
-        assert_eq!(obj.normals, [[0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]);
+        assert!(obj.texcoords.range(0..3).eq(&[[0.5, 0.0], [0.0, 1.0], [0.0, 1.0]]));
+        assert!(obj.normals.range(0..4).eq(&[[0.0; 3], [0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]));
         assert!(obj.positions[2].iter().all(|x| x.is_nan()));
         let flaws: Vec<_> = obj.flaws.iter().map(|flaw| (flaw.kind, flaw.index, flaw.line)).collect();
         assert_eq!(flaws, [(0, 2, 3), (1, 1, 5), (1, 2, 6), (2, 0, 7), (2, 1, 8), (2, 2, 9)]);

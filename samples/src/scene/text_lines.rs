@@ -80,8 +80,16 @@ pub(super) fn decoded(content: &[u8]) -> Cow<'_, [u8]> {
     }
 }
 
+/// True if a text that begins so is in UTF-16.
+pub(super) fn is_utf16(start: &[u8]) -> bool {
+    matches!(
+        start,
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [1..=0xff, 0, 1..=0xff, 0, ..] | [0, 1..=0xff, 0, 1..=0xff, ..]
+    )
+}
+
 /// The text without the zeros and the end marks of DOS (Ctrl-Z) that old programs fill the last block of a file with.
-fn without_padding(text: &[u8]) -> &[u8] {
+pub(super) fn without_padding(text: &[u8]) -> &[u8] {
     let last = text.iter().rposition(|byte| !matches!(byte, 0 | 0x1a));
     &text[..last.map_or(0, |last| last + 1)]
 }

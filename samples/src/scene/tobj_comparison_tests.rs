@@ -132,9 +132,9 @@ struct PlainFace {
 fn our_faces(obj: &ObjText) -> Vec<PlainFace> {
     let face = |number: usize| {
         let face = obj.faces[number];
-        let corners = &obj.corners[face.start..obj.face_end(number)];
+        let corners = obj.corners.range(obj.corners_of(number));
         let used = |kind: usize| {
-            corners.iter().map(move |corner| corner[kind]).filter(|i| *i != NONE).map(|i| i as usize)
+            corners.clone().map(move |corner| corner[kind]).filter(|i| *i != NONE).map(|i| i as usize)
         };
         PlainFace {
             material: obj.materials[face.material as usize]

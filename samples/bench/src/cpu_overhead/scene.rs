@@ -7,7 +7,7 @@ use lvk::{
 };
 
 /// Push constants of draws and dispatches.
-pub(super) type Push = [u32; 16];
+pub(crate) type Push = [u32; 16];
 
 const VERTEX: &str = "
     layout(push_constant) uniform Push { uint words[16]; };
@@ -22,17 +22,17 @@ const COMPUTE: &str = "
     void main() { imageStore(kImages2D[words[0]], ivec2(gl_LocalInvocationID.xy), vec4(1.0)); }";
 
 /// The objects that draws and dispatches use.
-pub(super) struct Scene {
-    pub(super) target: Holder<TextureHandle>,
-    pub(super) image: Holder<TextureHandle>,
-    pub(super) draw: Holder<RenderPipelineHandle>,
-    pub(super) compute: Holder<ComputePipelineHandle>,
+pub(crate) struct Scene {
+    pub(crate) target: Holder<TextureHandle>,
+    pub(crate) image: Holder<TextureHandle>,
+    pub(crate) draw: Holder<RenderPipelineHandle>,
+    pub(crate) compute: Holder<ComputePipelineHandle>,
 }
 
 impl Scene {
-    pub(super) const SIDE: u32 = 16;
+    pub(crate) const SIDE: u32 = 16;
 
-    pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
+    pub(crate) fn new(ctx: &Context) -> lvk::Result<Self> {
         let texture = |usage| {
             let desc = TextureDesc {
                 format: Format::Rgba8Unorm,
@@ -65,7 +65,7 @@ impl Scene {
     }
 
     /// Begins a render pass on the target and binds the pipeline.
-    pub(super) fn pass<'a>(&self, cmd: &'a mut CommandBuffer) -> lvk::Result<RenderPass<'a>> {
+    pub(crate) fn pass<'a>(&self, cmd: &'a mut CommandBuffer) -> lvk::Result<RenderPass<'a>> {
         let color = [ColorAttachment::clear(*self.target, [0.0; 4])];
         let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..RenderPassDesc::default() })?;
         pass.bind_render_pipeline(*self.draw)?;

@@ -29,6 +29,7 @@ pub use peer::{Failure, Peer, PeerDevice, PeerEntry, RowRun, Sample};
 pub use program::Program;
 pub use ray_scene::{RayScene, RayView, ray_result};
 pub use row::Row;
+pub(crate) use statistics::format_time;
 pub use workload::{UPLOAD_BYTES, Workload, texel, texture_cell, upload_bytes};
 
 /// Returns the peers that need no other library: plain `ash`, which the others are compared with, and `lvk`, by the driver's

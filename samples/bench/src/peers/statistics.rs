@@ -29,7 +29,7 @@ impl Spread {
 }
 
 /// Formats milliseconds with three digits, in a unit that fits.
-pub(super) fn format_time(milliseconds: f64) -> String {
+pub(crate) fn format_time(milliseconds: f64) -> String {
     let (value, unit) = match milliseconds {
         ms if ms >= 1e4 => (ms * 1e-3, "s"),
         ms if ms >= 1.0 => (ms, "ms"),
