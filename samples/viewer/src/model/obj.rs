@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use lvk_gltf::{
     AlphaMode, ColorSpace, Image, ImageData, Light, LightKind, Material, Mesh, MipLevel, Model, Node,
-    Positions, Primitive, Sampler, TexelFormat, TextureRef, Transmission, Trs, Volume,
+    Positions, Primitive, Projection, Sampler, TexelFormat, TextureRef, Transmission, Trs, Volume,
 };
 use lvk_samples::scene::{self, Scene};
 
@@ -31,6 +31,7 @@ pub(super) fn model(scene: &Scene) -> Model {
         model.nodes.push(Node { mesh: Some(model.meshes.len() - 1), ..Node::default() });
     }
     add_lamp(&mut model, scene);
+    add_cameras(&mut model, scene);
     let roots = (0..model.nodes.len()).collect();
     model.scenes.push(lvk_gltf::Scene { name: Some(scene.name.clone()), roots });
     model
@@ -114,6 +115,17 @@ fn add_lamp(model: &mut Model, scene: &Scene) {
     model.nodes.push(Node { light: Some(0), transform, ..Node::default() });
 }
 
+/// The views of the scene, which lie inside of interiors.
+fn add_cameras(model: &mut Model, scene: &Scene) {
+    for (number, camera) in (1..).zip(&scene.cameras) {
+        let yfov = camera.vertical_fov_degrees.to_radians();
+        let projection = Projection::Perspective { yfov, aspect_ratio: None, znear: 0.01, zfar: None };
+        let transform = lvk_gltf::Transform::Matrix(camera.view_from_world().inverse());
+        model.nodes.push(Node { camera: Some(model.cameras.len()), transform, ..Node::default() });
+        model.cameras.push(lvk_gltf::Camera { name: Some(format!("view {number}")), projection });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -129,5 +141,19 @@ mod tests {
             assert!(part.material.is_some_and(|material| material < model.materials.len()));
         }
         assert!(model.materials.iter().any(|material| material.transmission.is_some()));
+    }
+
+    #[test]
+    fn the_views_of_a_scene_are_its_first_cameras() {
+        let scene = Scene::procedural();
+        let model = model(&scene);
+        let cameras = crate::model::cameras(&model, 0, &model.pose(None, 0.0));
+        assert_eq!(cameras.len(), scene.cameras.len() + 1);
+        for (found, own) in cameras.iter().zip(&scene.cameras) {
+            let [wanted, turned] =
+                [own, &found.camera].map(|camera| camera.view_from_world().to_cols_array());
+            assert!(wanted.iter().zip(turned).all(|(a, b)| (a - b).abs() < 1e-4), "{}", found.name);
+            assert!((found.camera.vertical_fov_degrees - own.vertical_fov_degrees).abs() < 1e-3);
+        }
     }
 }
