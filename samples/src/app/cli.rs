@@ -2,7 +2,7 @@
 
 use super::sample_info::SampleInfo;
 use super::summary::{raster_summary, ray_summary};
-pub use super::window::EventLoopBuilder;
+pub use super::window::{EventLoopBuilder, event_loop};
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -93,7 +93,7 @@ pub fn parse<S: SampleInfo>(
 /// Runs the program of a sample with the arguments of the process.
 #[must_use]
 pub fn main<S: SampleInfo>() -> ExitCode {
-    main_with::<S>(std::env::args_os().collect(), &mut window::event_loop())
+    main_with::<S>(std::env::args_os().collect(), &mut event_loop())
 }
 
 /// Runs the program of a sample with other arguments, of which the first is its name, and another event loop for its
@@ -129,7 +129,7 @@ fn print_usage(error: &clap::Error, words: &[OsString]) {
 /// the images were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run<S: SampleInfo>(args: &CommandLine<S::Args>) -> ExitCode {
-    run_with::<S>(args, &mut window::event_loop())
+    run_with::<S>(args, &mut event_loop())
 }
 
 fn run_with<S: SampleInfo>(args: &CommandLine<S::Args>, event_loop: &mut EventLoopBuilder) -> ExitCode {

@@ -10,7 +10,7 @@ use super::run_error::RunError;
 pub type EventLoopBuilder = ();
 
 /// Returns the event loop of a program without windows.
-pub(super) fn event_loop() -> EventLoopBuilder {}
+pub fn event_loop() -> EventLoopBuilder {}
 
 /// Fails: the program has no windows.
 pub(super) fn run<S, M>(

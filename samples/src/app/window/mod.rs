@@ -17,6 +17,6 @@ use winit::event_loop::EventLoop;
 pub type EventLoopBuilder = winit::event_loop::EventLoopBuilder<()>;
 
 /// Returns the event loop of the window system.
-pub(super) fn event_loop() -> EventLoopBuilder {
+pub fn event_loop() -> EventLoopBuilder {
     EventLoop::builder()
 }

@@ -22,9 +22,9 @@ use std::process::ExitCode;
 
 use lvk::{Context, ContextDesc};
 use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_samples::app::cli::event_loop;
 use lvk_samples::app::library_warnings;
 use lvk_samples::catalogue::run_line;
-use winit::event_loop::EventLoop;
 
 /// Error of a scenario.
 type Failure = Box<dyn Error + Send + Sync>;
@@ -72,7 +72,7 @@ fn attempt(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
     let Some(scenario) = scenario(name) else {
         let mut words: Vec<OsString> = args.iter().map(OsString::from).collect();
         words.extend([OsString::from("--out"), result.into()]);
-        return match run_line(name, words, &mut EventLoop::builder()) {
+        return match run_line(name, words, &mut event_loop()) {
             ExitCode::SUCCESS => Ok(()),
             status => Err(status),
         };
