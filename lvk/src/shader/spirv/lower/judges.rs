@@ -145,9 +145,6 @@ fn check_behind(linker: &mut Linker, donor: &Donor, function: &mut Function, cal
     let Some((at, place)) = place else { return };
     let at = leave_loop_header(linker, function, at);
     let place = function.blocks[at].code.iter().position(is_call).unwrap_or(place);
-    // The values of built-ins are stored right behind a report.
-    let stores = function.blocks[at].code[place + 1..].iter();
-    let place = place + stores.take_while(|inst| is_update(inst, donor)).count();
     let rest = function.blocks[at].code.split_off(place + 1);
     let (leave, stay) = (linker.new_id(), linker.new_id());
     let label = function.blocks[at].label;
@@ -160,12 +157,6 @@ fn check_behind(linker: &mut Linker, donor: &Donor, function: &mut Function, cal
     emit_return(&mut Emitter::new(linker, &mut code), result);
     let blocks = [Block { label: leave, code }, Block { label: stay, code: rest }];
     function.blocks.splice(at + 1..at + 1, blocks);
-}
-
-/// True for the load and store of the limit behind a report.
-fn is_update(inst: &Inst, donor: &Donor) -> bool {
-    (inst.op == Op::Load && inst.operand(2) == donor.limit)
-        || inst.op == Op::Store && inst.operands.len() == 2
 }
 
 /// Moves the code of a loop's header to a block of its own, whose index is the result. Other blocks stay.
@@ -192,5 +183,36 @@ fn emit_return(emitter: &mut Emitter<'_>, result: u32) {
     } else {
         let value = emitter.linker.null(result);
         emitter.push(Op::ReturnValue, &[value]);
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    use super::*;
+
+    /// glslang makes a pointer just before it stores by it, so the words are written here.
+    #[test]
+    fn nothing_runs_between_a_report_and_its_check() {
+        const REPORTED: u32 = 700;
+        let mut linker = Linker::default();
+        let bool = linker.bool();
+        let donor = Donor { unwinds: linker.private(bool), limit: 703, ..Donor::default() };
+        let store = Inst::new(Op::Store, &[701, 702]);
+        let code = vec![
+            Inst::new(Op::FunctionCall, &[bool, REPORTED, 704]),
+            store.clone(),
+            Inst::new(Op::Return, &[]),
+        ];
+        let head = Inst::new(Op::Function, &[linker.void(), 800, 0, linker.plain_function_type()]);
+        let blocks = vec![Block { label: 1, code }];
+        let mut function = Function { head, parameters: Vec::new(), blocks };
+        check_behind(&mut linker, &donor, &mut function, REPORTED);
+        let [report, ended, stays] = function.blocks.as_slice() else { unreachable!("{function:?}") };
+        let ops: Vec<Op> = report.code.iter().map(|inst| inst.op).collect();
+        assert_eq!(ops, [Op::FunctionCall, Op::Load, Op::SelectionMerge, Op::BranchConditional]);
+        assert_eq!(report.terminator().unwrap().operands[1..], [ended.label, stays.label]);
+        assert_eq!(ended.code, [Inst::new(Op::Return, &[])]);
+        assert_eq!(stays.code, [store, Inst::new(Op::Return, &[])]);
     }
 }
