@@ -19,7 +19,7 @@ const HIT: &str = r"
     void main() { color = vec3(1.0 - bary.x - bary.y, bary); }";
 const SIZE: [u32; 2] = [640, 480];
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let driver = prepare(&DriverRequest::default())?;
     let ctx = Context::new(&ContextDesc { vulkan_library: driver.loader.as_deref(), ..Default::default() })?;
     let vertices = ctx.create_buffer(&BufferDesc {

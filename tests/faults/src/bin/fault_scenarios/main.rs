@@ -10,6 +10,7 @@ mod hot_reload;
 mod leak;
 mod queues;
 mod raw_device;
+mod single_file_programs;
 mod slow_work;
 mod threads;
 #[cfg(target_os = "linux")]
@@ -22,9 +23,10 @@ use std::process::ExitCode;
 
 use lvk::{Context, ContextDesc};
 use lvk_dev_driver::{DriverRequest, prepare};
-use lvk_samples::app::cli::event_loop;
+use lvk_samples::app::cli::{event_loop, main_with};
 use lvk_samples::app::library_warnings;
 use lvk_samples::catalogue::run_line;
+use lvk_viewer::Viewer;
 
 /// Error of a scenario.
 type Failure = Box<dyn Error + Send + Sync>;
@@ -46,6 +48,8 @@ fn scenario(name: &str) -> Option<Scenario> {
         "device_fault" => device_fault::explained,
         "slow_work" => slow_work::outlives_its_context,
         "leak" => leak::forgotten_fence,
+        "triangle" => single_file_programs::sample,
+        "example_triangle" => single_file_programs::example,
         #[cfg(target_os = "linux")]
         "window" => window::frames_and_resize,
         _ => return None,
@@ -72,7 +76,11 @@ fn attempt(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
     let Some(scenario) = scenario(name) else {
         let mut words: Vec<OsString> = args.iter().map(OsString::from).collect();
         words.extend([OsString::from("--out"), result.into()]);
-        return match run_line(name, words, &mut event_loop()) {
+        let status = match name {
+            "viewer" => main_with::<Viewer>([vec![name.into()], words].concat(), &mut event_loop()),
+            _ => run_line(name, words, &mut event_loop()),
+        };
+        return match status {
             ExitCode::SUCCESS => Ok(()),
             status => Err(status),
         };
