@@ -1,6 +1,7 @@
 //! The clocks of device and host, read at the same time.
 
 use std::num::NonZeroU64;
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use ash::vk;
@@ -55,19 +56,22 @@ impl CalibratedTimestamps {
 
 /// Reads the clocks of device and host together.
 pub(crate) struct ClockReader {
+    physical: vk::PhysicalDevice,
     functions: Functions,
-    clock: HostClock,
-    /// Ticks of a second of the host's clock.
-    frequency: NonZeroU64,
+    /// The host's clock and the ticks of its second, once the driver has said which clocks it reads; inside, `None` without any.
+    clock: OnceLock<Option<(HostClock, NonZeroU64)>>,
 }
 
 enum Functions {
-    Ext(ash::ext::calibrated_timestamps::Device),
-    Khr(ash::khr::calibrated_timestamps::Device),
+    Ext(ash::ext::calibrated_timestamps::Instance, ash::ext::calibrated_timestamps::Device),
+    Khr(ash::khr::calibrated_timestamps::Instance, ash::khr::calibrated_timestamps::Device),
 }
 
+/// The object in errors.
+const CLOCKS: &str = "clocks of device and host";
+
 impl ClockReader {
-    /// `None` if the device or the driver cannot read both clocks, or supports only unknown host clocks.
+    /// `None` without an extension of such clocks.
     pub(crate) fn new(
         instance: &Instance,
         device: &ash::Device,
@@ -75,34 +79,59 @@ impl ClockReader {
         calibration: Calibration,
     ) -> Option<Self> {
         let (entry, raw) = (&instance.entry, &instance.raw);
-        let (functions, domains) = match calibration {
+        let functions = match calibration {
             Calibration::None => return None,
-            Calibration::Ext => {
-                let ext = ash::ext::calibrated_timestamps::Instance::new(entry, raw);
+            Calibration::Ext => Functions::Ext(
+                ash::ext::calibrated_timestamps::Instance::new(entry, raw),
+                ash::ext::calibrated_timestamps::Device::new(raw, device),
+            ),
+            Calibration::Khr => Functions::Khr(
+                ash::khr::calibrated_timestamps::Instance::new(entry, raw),
+                ash::khr::calibrated_timestamps::Device::new(raw, device),
+            ),
+        };
+        Some(Self { physical, functions, clock: OnceLock::new() })
+    }
+
+    /// Returns the host's clock and the ticks of its second. A failed question is asked again by the next call.
+    fn clock(&self) -> Result<(HostClock, NonZeroU64)> {
+        let clock = match self.clock.get() {
+            Some(clock) => *clock,
+            None => {
                 // SAFETY: the physical device belongs to the instance and has the extension.
-                let domains = unsafe { ext.get_physical_device_calibrateable_time_domains(physical) };
-                (Functions::Ext(ash::ext::calibrated_timestamps::Device::new(raw, device)), domains)
-            }
-            Calibration::Khr => {
-                let khr = ash::khr::calibrated_timestamps::Instance::new(entry, raw);
-                // SAFETY: as above.
-                let domains = unsafe { khr.get_physical_device_calibrateable_time_domains(physical) };
-                (Functions::Khr(ash::khr::calibrated_timestamps::Device::new(raw, device)), domains)
+                let domains = unsafe {
+                    match &self.functions {
+                        Functions::Ext(instance, _) => {
+                            instance.get_physical_device_calibrateable_time_domains(self.physical)
+                        }
+                        Functions::Khr(instance, _) => {
+                            instance.get_physical_device_calibrateable_time_domains(self.physical)
+                        }
+                    }
+                };
+                let command = match &self.functions {
+                    Functions::Ext(..) => "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT",
+                    Functions::Khr(..) => "vkGetPhysicalDeviceCalibrateableTimeDomainsKHR",
+                };
+                let clock = HostClock::choose(&domains.map_err(Error::vulkan(command, CLOCKS))?);
+                *self.clock.get_or_init(|| Some((clock?, clock?.frequency()?)))
             }
         };
-        let clock = HostClock::choose(&domains.unwrap_or_default())?;
-        Some(Self { functions, clock, frequency: clock.frequency()? })
+        clock.ok_or_else(|| {
+            Error::unsupported(CLOCKS, "the driver reads no clock of the host that this system has")
+        })
     }
 
     /// Reads both clocks; `milliseconds` converts ticks of the device.
     pub(crate) fn read(&self, milliseconds: impl FnOnce(u64) -> f64) -> Result<CalibratedTimestamps> {
+        let (clock, frequency) = self.clock()?;
         let before = Instant::now();
-        let (device, host, deviation) = self.read_ticks()?;
+        let (device, host, deviation) = self.read_ticks(clock)?;
         let half = before.elapsed() / 2;
         Ok(CalibratedTimestamps {
             gpu_ms: milliseconds(device),
-            host: duration_of_ticks(host, self.frequency),
-            clock: self.clock,
+            host: duration_of_ticks(host, frequency),
+            clock,
             deviation: Duration::from_nanos(deviation),
             instant: before + half,
             instant_deviation: half,
@@ -112,22 +141,25 @@ impl ClockReader {
     /// Returns the ticks of the device's clock at this moment.
     #[cfg(feature = "tracy")]
     pub(crate) fn device_ticks(&self) -> Result<u64> {
-        Ok(self.read_ticks()?.0)
+        Ok(self.read_ticks(self.clock()?.0)?.0)
     }
 
     /// Returns the ticks of the device, those of the host, and the maximum deviation in nanoseconds.
-    fn read_ticks(&self) -> Result<(u64, u64, u64)> {
-        let infos = [vk::TimeDomainKHR::DEVICE, self.clock.domain()]
+    fn read_ticks(&self, clock: HostClock) -> Result<(u64, u64, u64)> {
+        let infos = [vk::TimeDomainKHR::DEVICE, clock.domain()]
             .map(|domain| vk::CalibratedTimestampInfoKHR::default().time_domain(domain));
         // SAFETY: the device has the extension and both domains.
-        let read = unsafe {
+        let (read, command) = unsafe {
             match &self.functions {
-                Functions::Ext(device) => device.get_calibrated_timestamps(&infos),
-                Functions::Khr(device) => device.get_calibrated_timestamps(&infos),
+                Functions::Ext(_, device) => {
+                    (device.get_calibrated_timestamps(&infos), "vkGetCalibratedTimestampsEXT")
+                }
+                Functions::Khr(_, device) => {
+                    (device.get_calibrated_timestamps(&infos), "vkGetCalibratedTimestampsKHR")
+                }
             }
         };
-        let (values, deviation) =
-            read.map_err(Error::vulkan("vkGetCalibratedTimestamps", "clocks of device and host"))?;
+        let (values, deviation) = read.map_err(Error::vulkan(command, CLOCKS))?;
         Ok((values[0], values[1], deviation))
     }
 }

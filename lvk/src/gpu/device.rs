@@ -18,7 +18,7 @@ use super::caps::portability::{PortabilityNeed, first_missing};
 use super::caps::queues::{QueueLocation, QueueRequest, Queues};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::ray_tracing_pipeline_path::RayTracingPipelineRequest;
-use super::caps::shading_rate::ShadingRates;
+use super::caps::shading_rate::{FragmentSize, ShadingRates, query_fragment_sizes};
 use super::checkpoints::Checkpoints;
 use super::debug::debugger::has_debugger;
 use super::debug::messenger::{ValidationMode, ValidationSink};
@@ -112,16 +112,32 @@ struct DeviceParts {
     caps: Capabilities,
     features: Features,
     memory: DeviceMemory,
+    fragment_sizes: Vec<FragmentSize>,
     queues: Queues,
     is_external: bool,
+}
+
+/// Returns the sizes of fragments that shade several pixels; none without shading rates of pipelines.
+fn fragment_sizes(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    caps: &Capabilities,
+) -> Result<Vec<FragmentSize>> {
+    if caps.has(OptionalFeature::PipelineShadingRate) {
+        query_fragment_sizes(&instance.entry, &instance.raw, physical)
+    } else {
+        Ok(Vec::new())
+    }
 }
 
 impl Gpu {
     pub(crate) fn new(instance: Instance, request: &DeviceRequest<'_>) -> Result<Self> {
         let chosen = choose_device(&instance, request)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
-        let memory = match DeviceMemory::new(&instance.raw, &device, chosen.raw) {
-            Ok(memory) => memory,
+        let prepared = DeviceMemory::new(&instance.raw, &device, chosen.raw)
+            .and_then(|memory| Ok((memory, fragment_sizes(&instance, chosen.raw, &caps)?)));
+        let (memory, fragment_sizes) = match prepared {
+            Ok(prepared) => prepared,
             Err(error) => {
                 // SAFETY: nothing was created from the device yet.
                 with_exclusive_device_lock(caps.driver_id, || unsafe { device.destroy_device(None) });
@@ -133,7 +149,7 @@ impl Gpu {
             (unsafe { device.get_device_queue(family, index) }, family)
         });
         let queues = Queues::new(raw, request.queues);
-        let made = DeviceParts { device, caps, features, memory, queues, is_external: false };
+        let made = DeviceParts { device, caps, features, memory, fragment_sizes, queues, is_external: false };
         let mut gpu = Self::from_parts(instance, chosen.raw, made, request.debug_names);
         gpu.profile = request.profile.cloned().unwrap_or_default();
         gpu.extra_capabilities = request.extra.capabilities().to_vec();
@@ -168,6 +184,7 @@ impl Gpu {
         let features = enabled_features(&chosen, &caps, false);
         let made = DeviceParts {
             memory: DeviceMemory::new(&instance.raw, &raw.device, chosen.raw)?,
+            fragment_sizes: fragment_sizes(&instance, chosen.raw, &caps)?,
             device: raw.device,
             caps,
             features,
@@ -183,7 +200,7 @@ impl Gpu {
         made: DeviceParts,
         debug_names: Option<bool>,
     ) -> Self {
-        let DeviceParts { device, mut caps, features, memory, queues, is_external } = made;
+        let DeviceParts { device, mut caps, features, memory, fragment_sizes, queues, is_external } = made;
         let raw = &instance.raw;
         let structures = caps.builds_device_structures();
         let host_copies = HostImageCopy::new(raw, &device, physical, &caps);
@@ -200,7 +217,7 @@ impl Gpu {
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
             shading_rates: caps
                 .has(OptionalFeature::PipelineShadingRate)
-                .then(|| ShadingRates::new(&instance.entry, raw, &device, physical)),
+                .then(|| ShadingRates::new(raw, &device, fragment_sizes)),
             local_read: caps
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),

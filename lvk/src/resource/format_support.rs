@@ -28,7 +28,8 @@ pub struct FormatSupport {
     pub blit_source: bool,
     /// Blits can write to it.
     pub blit_target: bool,
-    /// Sum of the sample counts per pixel that targets may have: 5 is 1 and 4. 0 if the format cannot be a target.
+    /// Sum of the sample counts per pixel that targets may have: 5 is 1 and 4. 0 if the format cannot be a target; 1 where
+    /// the driver lacks memory for the answer.
     pub samples: u32,
 }
 
@@ -58,7 +59,9 @@ fn samples(gpu: &Gpu, format: Format) -> u32 {
         .format(format.raw())
         .tiling(vk::ImageTiling::OPTIMAL)
         .usage(raw_usage(TextureUsage::TARGET, format));
-    // Lack of memory is no answer; the next query may have one.
-    let limits = gpu.image_limits(&info, "texture").ok().flatten();
-    limits.map_or(0, |limits| limits.sample_counts.as_raw())
+    match gpu.image_limits(&info, "texture") {
+        Ok(limits) => limits.map_or(0, |limits| limits.sample_counts.as_raw()),
+        // The driver lacks memory for the answer; every target may have one sample.
+        Err(_) => vk::SampleCountFlags::TYPE_1.as_raw(),
+    }
 }

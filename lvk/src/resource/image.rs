@@ -338,7 +338,7 @@ fn create_opaque(
     let mut list = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
     let mut info = plan.info(desc);
     let object = format!("texture '{}' with shared memory", desc.debug_name);
-    sharing.check(&object, external_features(gpu, &info, sharing.fd_type(), None))?;
+    sharing.check(&object, external_features(gpu, &info, sharing.fd_type(), None, desc.debug_name)?)?;
     if !desc.view_formats.is_empty() {
         info = info.push_next(&mut list);
     }
@@ -356,7 +356,7 @@ fn create_in_dma_buf(
     let object = format!("texture '{}' in a dma-buf", desc.debug_name);
     gpu.require(OptionalFeature::DrmFormatModifier, &object)?;
     let info = plan.info(desc);
-    let modifiers = shareable_modifiers(gpu, &info, sharing);
+    let modifiers = shareable_modifiers(gpu, &info, sharing, desc.debug_name)?;
     if modifiers.is_empty() {
         let why = "the driver shares no such image; choose another format, usage or DRM layout";
         return Err(Error::unsupported(object, why));

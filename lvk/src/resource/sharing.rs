@@ -88,18 +88,27 @@ pub(crate) fn check_shared_texture(desc: &TextureDesc<'_>, sharing: &Sharing) ->
     }
 }
 
-/// Returns the DRM format modifiers with which the device shares an image of this description.
-pub(crate) fn shareable_modifiers(gpu: &Gpu, info: &vk::ImageCreateInfo<'_>, sharing: &Sharing) -> Vec<u64> {
+/// Returns the DRM format modifiers with which the device shares an image of this description. `name` is the object in the error.
+pub(crate) fn shareable_modifiers(
+    gpu: &Gpu,
+    info: &vk::ImageCreateInfo<'_>,
+    sharing: &Sharing,
+    name: &str,
+) -> Result<Vec<u64>> {
     let all = format_modifiers(gpu, info.format);
     let wanted: Vec<_> = match sharing {
         Sharing::Export(_) => all.iter().map(|found| found.drm_format_modifier).collect(),
         Sharing::Import(memory) => memory.drm_layout.iter().map(|layout| layout.modifier).collect(),
     };
-    let usable = |modifier: &u64| {
-        all.iter().any(|found| found.drm_format_modifier == *modifier)
-            && external_features(gpu, info, sharing.fd_type(), Some(*modifier)).contains(sharing.direction())
-    };
-    wanted.into_iter().filter(usable).collect()
+    let mut usable = Vec::new();
+    for modifier in wanted {
+        let is_known = all.iter().any(|found| found.drm_format_modifier == modifier);
+        let features = external_features(gpu, info, sharing.fd_type(), Some(modifier), name)?;
+        if is_known && features.contains(sharing.direction()) {
+            usable.push(modifier);
+        }
+    }
+    Ok(usable)
 }
 
 fn format_modifiers(gpu: &Gpu, format: vk::Format) -> Vec<vk::DrmFormatModifierPropertiesEXT> {
@@ -118,13 +127,15 @@ fn format_modifiers(gpu: &Gpu, format: vk::Format) -> Vec<vk::DrmFormatModifierP
     found
 }
 
-/// Returns in which directions the memory of an image can be shared: none if the driver refuses the image.
+/// Returns in which directions the memory of an image can be shared: none if the driver does not support the image. `name` is the
+/// object in the error.
 pub(crate) fn external_features(
     gpu: &Gpu,
     info: &vk::ImageCreateInfo<'_>,
     fd_type: MemoryFdType,
     modifier: Option<u64>,
-) -> vk::ExternalMemoryFeatureFlags {
+    name: &str,
+) -> Result<vk::ExternalMemoryFeatureFlags> {
     let mut external = vk::PhysicalDeviceExternalImageFormatInfo::default().handle_type(fd_type.raw());
     let mut drm = vk::PhysicalDeviceImageDrmFormatModifierInfoEXT::default();
     let mut query = vk::PhysicalDeviceImageFormatInfo2::default()
@@ -146,8 +157,9 @@ pub(crate) fn external_features(
         instance.get_physical_device_image_format_properties2(gpu.physical(), &query, &mut all)
     };
     match answer {
-        Ok(()) => found.external_memory_properties.external_memory_features,
-        Err(_) => vk::ExternalMemoryFeatureFlags::empty(),
+        Ok(()) => Ok(found.external_memory_properties.external_memory_features),
+        Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED) => Ok(vk::ExternalMemoryFeatureFlags::empty()),
+        Err(shortage) => Err(Error::vulkan("vkGetPhysicalDeviceImageFormatProperties2", name)(shortage)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Measures BVH builds by the CPU, phase by phase, for several numbers of threads, beside those of `obvhs`. Needs no device.
 
-use lvk::test_hooks::{CpuBuild, ObvhsBuild, build_by_obvhs, build_on_threads};
+use lvk::test_hooks::{CpuBuild, ObvhsBuild, WideTree, build_by_obvhs, build_on_threads};
 
 use crate::args::{BenchArgs, BuildsArgs};
 use crate::cpu_overhead::{peak_bytes, restart_peak};
@@ -9,6 +9,7 @@ use crate::error::BenchError;
 use crate::measure::median_of;
 use crate::mesh::Mesh;
 use crate::table::{Table, format_grouped, format_ms, format_ratio};
+use crate::tree_rays::{bounce_rays, camera_rays, trace_all};
 
 /// The builds on one number of threads.
 struct ThreadRow {
@@ -46,7 +47,39 @@ pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, Ben
             row.by_embree = embree.build(&mesh.positions, &mesh.triangles, row.threads, runs)?;
         }
     }
-    Ok(table(&mesh, runs, &rows))
+    let embree_tree = embree.map(|embree| embree.tree(&mesh.positions, &mesh.triangles)).transpose()?;
+    let mut table = table(&mesh, runs, &rows);
+    add_trees(&mut table, &mesh, &rows, embree_tree, bench.quick);
+    Ok(table)
+}
+
+/// Adds the cost of the tree of each builder, and the work of the same rays in each.
+fn add_trees(table: &mut Table, mesh: &Mesh, rows: &[ThreadRow], embree: Option<WideTree>, quick: bool) {
+    let own = rows.iter().flat_map(|row| &row.builds).find_map(CpuBuild::tree);
+    let obvhs = rows.iter().flat_map(|row| &row.others).next().map(|build| build.tree.clone());
+    let trees: Vec<_> = [("lvk", own), ("obvhs", obvhs), ("Embree, medium", embree)]
+        .into_iter()
+        .filter_map(|(name, tree)| tree.map(|tree| (name, tree)))
+        .collect();
+    let Some((_, first)) = trees.first() else { return };
+    let primary = camera_rays(mesh, if quick { [16, 9] } else { [320, 180] });
+    let bounced = bounce_rays(first, &primary);
+    for (kind, rays) in [("primary", &primary), ("bounce", &bounced)] {
+        let traced = trace_all(&trees, rays, if quick { 1 } else { 5 });
+        let expected = traced[0].1;
+        for ((name, tree), (work, sum)) in trees.iter().zip(&traced) {
+            let each = |count: u64| count as f64 / rays.len().max(1) as f64;
+            table.add_note(format!(
+                "tree of {name}: SAH cost {:.5}; {} {kind} rays, each {:.2} nodes and {:.2} triangles, {:.0} ns on one thread{}",
+                tree.sah_cost(),
+                format_grouped(rays.len() as u64),
+                each(work.nodes),
+                each(work.triangles),
+                work.time * 1e6 / rays.len().max(1) as f64,
+                if (sum / expected - 1.0).abs() < 1e-6 { "" } else { ", WITH OTHER HITS" },
+            ));
+        }
+    }
 }
 
 fn measure_row(mesh: &Mesh, runs: u32, row: &mut ThreadRow) {
@@ -86,14 +119,9 @@ fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
         rows.iter().map(|row| format_ms(median_of(&row.others, |build| milliseconds(build.total)))),
     );
     add_embree(&mut table, rows);
-    if let Some(other) = rows.iter().find_map(|row| row.others.first()) {
-        table.add_note(format!("SAH cost of the tree of obvhs: {:.5}", other.sah_cost));
-    }
     let all = || rows.iter().flat_map(|row| &row.builds);
     if let Some(first) = all().next() {
-        let cost = first.sah_cost.map_or("none".to_owned(), |cost| format!("{cost:.5}"));
-        let bytes = format_grouped(first.bytes.len() as u64);
-        table.add_note(format!("SAH cost of the tree: {cost}; bytes of the BLAS: {bytes}"));
+        table.add_note(format!("bytes of the BLAS: {}", format_grouped(first.bytes.len() as u64)));
         let same = all().all(|build| build.bytes == first.bytes);
         table.add_note(if same { "all builds made the same bytes" } else { "BUILDS DIFFER" });
     }
@@ -102,7 +130,9 @@ fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
 
 /// Adds the builds by Embree, if there are any.
 fn add_embree(table: &mut Table, rows: &[ThreadRow]) {
-    let Some(first) = rows.first().and_then(|row| row.by_embree.first()) else { return };
+    if rows.iter().all(|row| row.by_embree.is_empty()) {
+        return;
+    }
     for (name, time) in [
         (
             "total of Embree, medium quality",
@@ -113,7 +143,6 @@ fn add_embree(table: &mut Table, rows: &[ThreadRow]) {
         let median = |row: &ThreadRow| median_of(&row.by_embree, |build| milliseconds(time(build)));
         table.add_row(name, rows.iter().map(|row| format_ms(median(row))));
     }
-    table.add_note(format!("SAH cost of the tree of Embree's medium builder: {:.5}", first.sah_cost));
 }
 
 fn count_text(threads: usize) -> String {

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use std::ptr;
 use std::time::{Duration, Instant};
 
+use glam::Vec3;
 use libloading::Library;
+use lvk::test_hooks::{WideChild, WideLink, WideTree};
 
 /// Embree cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -22,14 +24,12 @@ pub(super) enum EmbreeError {
 }
 
 /// A build of one mesh by Embree.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct EmbreeBuild {
     /// Time of `rtcCommitScene` with the quality `RTC_BUILD_QUALITY_MEDIUM`, the default: the whole build.
     pub(super) medium: Duration,
     /// The same with `RTC_BUILD_QUALITY_HIGH`, which splits triangles.
     pub(super) high: Duration,
-    /// Cost of the tree of `rtcBuildBVH` with eight children a node, as the cost of the library's trees.
-    pub(super) sah_cost: f64,
 }
 
 type Object = *mut c_void;
@@ -96,10 +96,12 @@ struct BuildArguments {
 #[repr(C, align(16))]
 struct Node {
     /// Number of primitives; 0 for a node.
-    primitives: u32,
+    primitive_count: u32,
+    primitives: [u32; LEAF_SIZE as usize],
     child_count: u32,
     children: [*const Node; WIDTH],
-    half_areas: [f32; WIDTH],
+    low: [Vec3; WIDTH],
+    high: [Vec3; WIDTH],
 }
 
 /// The functions of Embree that are used.
@@ -148,16 +150,24 @@ impl Embree {
         runs: u32,
     ) -> Result<Vec<EmbreeBuild>, EmbreeError> {
         let device = Device::new(&self.functions, threads)?;
-        let sah_cost = device.tree_cost(positions, triangles)?;
         // Embree reads 16 bytes of the last vertex.
         let padded = [positions, &[[0.0; 3]]].concat();
         let vertices = &padded[..positions.len()];
         let once = |_| {
             let medium = device.commit(vertices, triangles, MEDIUM)?;
             let high = device.commit(vertices, triangles, HIGH)?;
-            Ok(EmbreeBuild { medium, high, sah_cost })
+            Ok(EmbreeBuild { medium, high })
         };
         (0..runs).map(once).collect()
+    }
+
+    /// Returns the tree of `rtcBuildBVH` with medium quality, eight children a node and the costs of the library's trees.
+    pub(super) fn tree(
+        &self,
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+    ) -> Result<WideTree, EmbreeError> {
+        Device::new(&self.functions, 0)?.tree(positions, triangles)
     }
 }
 
@@ -244,13 +254,10 @@ impl<'a> Device<'a> {
         Ok(time)
     }
 
-    /// Returns the cost of a tree of the triangles.
-    fn tree_cost(&self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<f64, EmbreeError> {
+    /// Returns a tree of the triangles.
+    fn tree(&self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<WideTree, EmbreeError> {
         let mut primitives: Vec<BuildPrimitive> =
             (0..).zip(triangles).map(|(number, triangle)| bounds_of(positions, triangle, number)).collect();
-        let whole = primitives.iter().fold(([f32::MAX; 3], [f32::MIN; 3]), |(lower, upper), one| {
-            (least(lower, one.lower), most(upper, one.upper))
-        });
         // SAFETY: the device is alive.
         let bvh = unsafe { (self.functions.new_bvh)(self.raw) };
         let arguments = BuildArguments {
@@ -277,14 +284,14 @@ impl<'a> Device<'a> {
             user: self.functions,
         };
         // SAFETY: the primitives and the functions outlive the call, and the nodes live as long as the BVH.
-        let cost = unsafe {
+        let tree = unsafe {
             let root = (self.functions.build_bvh)(&raw const arguments);
-            let sum = cost_below(root);
+            let tree = tree_below(root, |number| corners_of(positions, &triangles[number as usize]));
             (self.functions.release_bvh)(bvh);
-            1.0 + sum / f64::from(half_area(whole.0, whole.1))
+            tree
         };
         self.check()?;
-        Ok(cost)
+        Ok(tree)
     }
 }
 
@@ -297,64 +304,67 @@ impl Drop for Device<'_> {
     }
 }
 
-fn least(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|axis| a[axis].min(b[axis]))
+/// Returns the corners of a triangle. Numbers of vertices beyond `positions` take the last of them.
+fn corners_of(positions: &[[f32; 3]], triangle: &[u32; 3]) -> [Vec3; 3] {
+    triangle.map(|index| {
+        let nearest = positions.get(index as usize).or(positions.last()).copied();
+        Vec3::from_array(nearest.unwrap_or_default())
+    })
 }
 
-fn most(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|axis| a[axis].max(b[axis]))
+fn bounds_of(positions: &[[f32; 3]], triangle: &[u32; 3], primitive: u32) -> BuildPrimitive {
+    let [a, b, c] = corners_of(positions, triangle);
+    let (lower, upper) = (a.min(b).min(c).to_array(), a.max(b).max(c).to_array());
+    BuildPrimitive { lower, geometry: 0, upper, primitive }
 }
 
-fn half_area(lower: [f32; 3], upper: [f32; 3]) -> f32 {
-    let [x, y, z] = [0, 1, 2].map(|axis| upper[axis] - lower[axis]);
-    x * y + y * z + z * x
-}
-
-/// Returns the bounds of a triangle. Numbers of vertices beyond `positions` take the last of them.
-fn bounds_of(positions: &[[f32; 3]], triangle: &[u32; 3], number: u32) -> BuildPrimitive {
-    let corners =
-        triangle.map(|index| positions.get(index as usize).or(positions.last()).copied().unwrap_or_default());
-    let [a, b, c] = corners;
-    BuildPrimitive {
-        lower: least(least(a, b), c),
-        geometry: 0,
-        upper: most(most(a, b), c),
-        primitive: number,
-    }
-}
-
-/// Returns the costs of all children below a node, each times the half of its area.
+/// Converts a tree; `corners` returns those of a primitive. Empty without a root, and for a single leaf.
 ///
 /// # Safety
 /// The callbacks have written the node and those below it.
-unsafe fn cost_below(root: *const Node) -> f64 {
-    let mut open = vec![root];
-    let mut sum = 0.0;
+unsafe fn tree_below(root: *const Node, corners: impl Fn(u32) -> [Vec3; 3]) -> WideTree {
+    let mut tree = WideTree::default();
+    let mut open = vec![(root, 0)];
+    tree.nodes.push([WideChild::NONE; WIDTH]);
     // SAFETY: see above.
-    while let Some(node) = open.pop().and_then(|node| unsafe { node.as_ref() }) {
+    while let Some((node, number)) = open.pop().and_then(|(node, at)| Some((unsafe { node.as_ref() }?, at))) {
         for child in 0..(node.child_count as usize).min(WIDTH) {
             // SAFETY: see above.
             let Some(below) = (unsafe { node.children[child].as_ref() }) else { continue };
-            let is_node = below.primitives == 0;
-            let cost = if is_node { 1.0 } else { PRIMITIVE_COST * below.primitives as f32 };
-            sum += f64::from(node.half_areas[child] * cost);
-            open.push(below);
+            let link = if below.primitive_count == 0 {
+                open.push((node.children[child], tree.nodes.len()));
+                tree.nodes.push([WideChild::NONE; WIDTH]);
+                WideLink::Node(tree.nodes.len() as u32 - 1)
+            } else {
+                let (first, count) = (tree.triangles.len() as u32, below.primitive_count.min(LEAF_SIZE));
+                tree.triangles.extend(below.primitives[..count as usize].iter().map(|one| corners(*one)));
+                WideLink::Leaf { first, count }
+            };
+            tree.nodes[number][child] = WideChild { low: node.low[child], high: node.high[child], link };
         }
     }
-    sum
+    tree
 }
 
-/// Allocates a node.
+/// Allocates a node, or a leaf of these primitives.
 ///
 /// # Safety
 /// `allocator` and `user` are those of the build.
-unsafe fn allocate(allocator: Object, user: Object, primitives: u32) -> Object {
-    let empty = Node { primitives, child_count: 0, children: [ptr::null(); WIDTH], half_areas: [0.0; WIDTH] };
+unsafe fn allocate(allocator: Object, user: Object, primitives: &[BuildPrimitive]) -> Object {
+    let mut made = Node {
+        primitive_count: primitives.len() as u32,
+        primitives: [0; LEAF_SIZE as usize],
+        child_count: 0,
+        children: [ptr::null(); WIDTH],
+        low: [Vec3::ZERO; WIDTH],
+        high: [Vec3::ZERO; WIDTH],
+    };
+    made.primitives.iter_mut().zip(primitives).for_each(|(to, from)| *to = from.primitive);
     // SAFETY: the user pointer is that of the build, and the memory is for one node.
     unsafe {
         let functions = &*user.cast::<Functions>();
         let node = (functions.thread_local_alloc)(allocator, size_of::<Node>(), align_of::<Node>());
-        node.cast::<Node>().write(empty);
+        node.cast::<Node>().write(made);
         node
     }
 }
@@ -362,18 +372,18 @@ unsafe fn allocate(allocator: Object, user: Object, primitives: u32) -> Object {
 /// `RTCCreateNodeFunction`.
 unsafe extern "C" fn create_node(allocator: Object, _: u32, user: Object) -> Object {
     // SAFETY: Embree gives the allocator and the user pointer of the build.
-    unsafe { allocate(allocator, user, 0) }
+    unsafe { allocate(allocator, user, &[]) }
 }
 
 /// `RTCCreateLeafFunction`.
 unsafe extern "C" fn create_leaf(
     allocator: Object,
-    _: *const BuildPrimitive,
+    primitives: *const BuildPrimitive,
     count: usize,
     user: Object,
 ) -> Object {
-    // SAFETY: as above.
-    unsafe { allocate(allocator, user, count as u32) }
+    // SAFETY: as above, and there are `count` primitives.
+    unsafe { allocate(allocator, user, std::slice::from_raw_parts(primitives, count)) }
 }
 
 /// `RTCSetNodeChildrenFunction`.
@@ -393,9 +403,9 @@ unsafe extern "C" fn set_node_bounds(node: Object, bounds: *const *const RawBoun
     unsafe {
         let node = &mut *node.cast::<Node>();
         let bounds = std::slice::from_raw_parts(bounds, count as usize);
-        for (to, from) in node.half_areas.iter_mut().zip(bounds) {
+        for (child, from) in bounds.iter().enumerate().take(WIDTH) {
             let ([a, b, c, _], [d, e, f, _]) = ((**from).lower, (**from).upper);
-            *to = half_area([a, b, c], [d, e, f]);
+            (node.low[child], node.high[child]) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
         }
     }
 }
@@ -404,27 +414,38 @@ unsafe extern "C" fn set_node_bounds(node: Object, bounds: *const *const RawBoun
 mod tests {
     use super::*;
 
+    fn node(primitives: &[u32], children: &[(*const Node, f32)]) -> Node {
+        let mut node = Node {
+            primitive_count: primitives.len() as u32,
+            primitives: [0; LEAF_SIZE as usize],
+            child_count: children.len() as u32,
+            children: [ptr::null(); WIDTH],
+            low: [Vec3::ZERO; WIDTH],
+            high: [Vec3::ZERO; WIDTH],
+        };
+        node.primitives[..primitives.len()].copy_from_slice(primitives);
+        for (place, (child, size)) in children.iter().enumerate() {
+            (node.children[place], node.high[place]) = (*child, Vec3::splat(*size));
+        }
+        node
+    }
+
     /// Leaves `a` of two and `b` of three primitives below a node, which lies below the root beside leaf `c` of one.
     #[test]
-    fn the_cost_counts_nodes_and_primitives_by_their_areas() {
-        let node = |primitives, children: &[(*const Node, f32)]| {
-            let mut node = Node {
-                primitives,
-                child_count: children.len() as u32,
-                children: [ptr::null(); WIDTH],
-                half_areas: [0.0; WIDTH],
-            };
-            for (place, (child, area)) in children.iter().enumerate() {
-                (node.children[place], node.half_areas[place]) = (*child, *area);
-            }
-            node
-        };
-        let [a, b, c] = [2, 3, 1].map(|primitives| node(primitives, &[]));
-        let inner = node(0, &[(&raw const a, 4.0), (&raw const b, 2.0)]);
-        let root = node(0, &[(&raw const inner, 8.0), (&raw const c, 10.0)]);
+    fn a_tree_has_the_nodes_and_the_triangles_of_its_leaves() {
+        let [a, b, c] = [node(&[4, 2], &[]), node(&[0, 5, 1], &[]), node(&[3], &[])];
+        let inner = node(&[], &[(&raw const a, 4.0), (&raw const b, 2.0)]);
+        let root = node(&[], &[(&raw const inner, 8.0), (&raw const c, 10.0)]);
         // SAFETY: all nodes are alive.
-        let cost = unsafe { cost_below(&raw const root) };
-        assert!((cost - (8.0 + 0.3 * (10.0 + 4.0 * 2.0 + 2.0 * 3.0))).abs() < 1e-6, "{cost}");
+        let tree = unsafe { tree_below(&raw const root, |number| [Vec3::splat(number as f32); 3]) };
+        let links: Vec<Vec<WideLink>> =
+            tree.nodes.iter().map(|node| node[..2].iter().map(|child| child.link).collect()).collect();
+        let leaf = |first, count| WideLink::Leaf { first, count };
+        assert_eq!(links, [vec![WideLink::Node(1), leaf(0, 1)], vec![leaf(1, 2), leaf(3, 3)]]);
+        assert_eq!(tree.nodes[0][1].high, Vec3::splat(10.0));
+        assert_eq!(tree.nodes[0][2], WideChild::NONE);
+        let numbers: Vec<f32> = tree.triangles.iter().map(|triangle| triangle[0].x).collect();
+        assert_eq!(numbers, [3.0, 4.0, 2.0, 0.0, 5.0, 1.0]);
     }
 
     #[test]
@@ -432,6 +453,5 @@ mod tests {
         let positions = [[0.0, 5.0, 1.0], [2.0, -1.0, 1.0], [1.0, 1.0, 4.0]];
         let found = bounds_of(&positions, &[0, 1, 900], 7);
         assert_eq!((found.lower, found.upper, found.primitive), ([0.0, -1.0, 1.0], [2.0, 5.0, 4.0], 7));
-        assert_eq!(half_area(found.lower, found.upper), 2.0 * 6.0 + 6.0 * 3.0 + 3.0 * 2.0);
     }
 }

@@ -30,6 +30,7 @@ mod synthetic;
 mod table;
 mod tlas;
 mod tracer;
+mod tree_rays;
 
 pub use args::BenchArgs;
 pub use cpu_overhead::CountingAllocator;

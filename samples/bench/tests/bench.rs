@@ -74,6 +74,10 @@ fn cpu_builds_are_timed_phase_by_phase_for_each_number_of_threads() {
     }
     assert!(table.contains("| 1 thread |") && table.contains("| 3 threads |"), "{table}");
     assert!(table.contains("all builds made the same bytes"), "{table}");
+    for builder in ["lvk", "obvhs"] {
+        assert!(table.contains(&format!("tree of {builder}: SAH cost")), "{table}");
+    }
+    assert!(table.contains(" bounce rays, each ") && !table.contains("WITH OTHER HITS"), "{table}");
     let (status, _, err) = outcome(&["builds", "--quick", "--threads", "0"]);
     assert!(status == Some(2) && err.contains("--threads"), "{err}");
     let (status, _, err) = outcome(&["builds", "--quick", "--embree", "no-such-library.so"]);

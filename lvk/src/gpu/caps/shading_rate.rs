@@ -2,6 +2,8 @@
 
 use ash::vk;
 
+use crate::error::{Error, Result};
+
 /// Combination of two rates into one (`VkFragmentShadingRateCombinerOpKHR`), separately for width and height.
 /// All but [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -204,43 +206,37 @@ pub(crate) struct ShadingRates {
 impl ShadingRates {
     /// Creates the functions, for a device with
     /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
-    pub(crate) fn new(
-        entry: &ash::Entry,
-        instance: &ash::Instance,
-        device: &ash::Device,
-        physical: vk::PhysicalDevice,
-    ) -> Self {
-        let functions = ash::khr::fragment_shading_rate::Device::new(instance, device);
-        Self { functions, sizes: query_sizes(entry, instance, physical) }
+    pub(crate) fn new(instance: &ash::Instance, device: &ash::Device, sizes: Vec<FragmentSize>) -> Self {
+        Self { functions: ash::khr::fragment_shading_rate::Device::new(instance, device), sizes }
     }
 }
 
-/// Returns the fragment sizes of the device. Empty if the query fails.
-fn query_sizes(
+/// Returns the fragment sizes of a device that has the extension.
+///
+/// # Errors
+/// Those of `vkGetPhysicalDeviceFragmentShadingRatesKHR`.
+pub(crate) fn query_fragment_sizes(
     entry: &ash::Entry,
     instance: &ash::Instance,
     physical: vk::PhysicalDevice,
-) -> Vec<FragmentSize> {
+) -> Result<Vec<FragmentSize>> {
+    let failed = || Error::vulkan("vkGetPhysicalDeviceFragmentShadingRatesKHR", "fragment sizes");
     let functions = ash::khr::fragment_shading_rate::Instance::new(entry, instance);
     let ask = functions.fp().get_physical_device_fragment_shading_rates_khr;
     let mut count = 0;
     // SAFETY: the physical device belongs to the instance and has the extension. Without a list only the
     // count is written.
-    if unsafe { ask(physical, &mut count, std::ptr::null_mut()) } != vk::Result::SUCCESS {
-        return Vec::new();
-    }
+    unsafe { ask(physical, &mut count, std::ptr::null_mut()) }.result().map_err(failed())?;
     let mut found = vec![vk::PhysicalDeviceFragmentShadingRateKHR::default(); count as usize];
     // SAFETY: as above, and the list has that length.
-    if unsafe { ask(physical, &mut count, found.as_mut_ptr()) } != vk::Result::SUCCESS {
-        return Vec::new();
-    }
+    unsafe { ask(physical, &mut count, found.as_mut_ptr()) }.result().map_err(failed())?;
     found.truncate(count as usize);
     let size = |raw: &vk::PhysicalDeviceFragmentShadingRateKHR<'_>| FragmentSize {
         size: [raw.fragment_size.width, raw.fragment_size.height],
         // Drivers set all bits for single pixels, which support every sample count.
         samples: raw.sample_counts.as_raw() & 0x7f,
     };
-    found.iter().map(size).collect()
+    Ok(found.iter().map(size).collect())
 }
 
 #[cfg(test)]

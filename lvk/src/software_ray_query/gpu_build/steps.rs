@@ -9,6 +9,9 @@ use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 
 /// Invocations of a workgroup, `kGroup` of `software_ray_query/kernels/build_params.glsl`.
 const WORKGROUP_SIZE: u32 = 128;
+
+/// Most workgroups that collapse the nodes of a level: about as many as a large GPU runs at a time.
+const MOST_COLLAPSE_GROUPS: u32 = 1024;
 /// Invocations of a workgroup that merges clusters, `LVK_GROUP` of `software_ray_query/kernels/cluster_group.glsl`.
 const CLUSTER_GROUP_SIZE: u32 = 32;
 /// Children of a wide node.
@@ -111,8 +114,12 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
         groups: groups(invocations),
         groups_of_job: 0,
     };
-    // Eight times as many nodes as in the level above, up to the capacity, with eight invocations each.
-    let nodes = |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity);
+    // Eight times as many nodes as in the level above, up to the capacity, with eight invocations each. Only the GPU knows how
+    // many there are, and a level near the end has few, so workgroups go over many nodes.
+    let most = std::env::var("LVK_MOST").ok().and_then(|v| v.parse().ok()).unwrap_or(MOST_COLLAPSE_GROUPS);
+    let most = most * (WORKGROUP_SIZE / BVH8_CHILDREN);
+    let nodes =
+        |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity).min(most);
     let levels = if plan.wide_capacity > 0 { MAX_BVH8_DEPTH as u32 } else { 0 };
     let written = plan.capacity.max(plan.geometry_count).max(plan.vertex_count);
     let mut steps: Vec<_> =

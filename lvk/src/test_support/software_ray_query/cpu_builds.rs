@@ -4,21 +4,20 @@
 
 use std::time::{Duration, Instant};
 
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::builder::build_cwbvh_from_tris;
-use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::triangle::Triangle;
 
+use super::wide_tree::WideTree;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::{GeometryBytes, IndexBytes, TriangleBytes, VertexBytes};
 use crate::format::VertexFormat;
 use crate::software_ray_query::bvh::build_threads::on_new_threads;
-use crate::software_ray_query::bvh::encode_blas::{BlasBlob, encode_blas_timed};
+use crate::software_ray_query::bvh::encode_blas::encode_blas_timed;
 use crate::software_ray_query::bvh::phase_times::PhaseTimes;
 use crate::software_ray_query::bvh::primitives::Mesh;
 use crate::software_ray_query::bvh::settings::BvhSettings;
-use crate::software_ray_query::layout::{BLOCK_BYTES, FORMAT_BVH8};
 
 /// A build of one mesh on the CPU.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,9 +28,14 @@ pub struct CpuBuild {
     pub total: Duration,
     /// The bytes of the BLAS.
     pub bytes: Vec<u8>,
-    /// Cost of the tree by the surface area heuristic: tests of nodes by a random ray that hits the bounds, plus 0.3 for
-    /// each test of a primitive. `None` for a tree without wide nodes.
-    pub sah_cost: Option<f64>,
+}
+
+impl CpuBuild {
+    /// Returns the tree. `None` for one without wide nodes.
+    #[must_use]
+    pub fn tree(&self) -> Option<WideTree> {
+        WideTree::of_blas(&self.bytes)
+    }
 }
 
 /// Builds a BLAS of triangles with vertex indices on `threads` threads, `runs` times. `done` sees each build.
@@ -46,12 +50,12 @@ pub fn build_on_threads(
 }
 
 /// A build of one mesh by a builder of the crate `obvhs`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ObvhsBuild {
     /// Time of the whole build.
     pub total: Duration,
-    /// As [`CpuBuild::sah_cost`].
-    pub sah_cost: f64,
+    /// The tree.
+    pub tree: WideTree,
 }
 
 /// Builds a BVH of eight compressed children by `obvhs` on `threads` threads, `runs` times, with its preset
@@ -78,8 +82,13 @@ pub fn build_by_obvhs(
         for _ in 0..runs {
             let mut total = Duration::ZERO;
             let bvh = build_cwbvh_from_tris(&triangles, params, &mut total);
-            let sah_cost = cost_of(bvh.nodes.into_iter(), bvh.total_aabb.half_area().into());
-            done(ObvhsBuild { total, sah_cost });
+            let of_leaf = |index: &u32| {
+                let triangle = triangles[*index as usize];
+                [triangle.v0, triangle.v1, triangle.v2].map(Vec3::from)
+            };
+            let leaves = bvh.primitive_indices.iter().map(of_leaf);
+            let tree = WideTree::of_compressed(bvh.nodes.iter().copied(), leaves);
+            done(ObvhsBuild { total, tree });
         }
     });
 }
@@ -97,42 +106,11 @@ fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> CpuBuild {
     let blob = encode_blas_timed(&mesh, settings, &mut times);
     times.run("release of the triangles", || drop(mesh));
     let total = start.elapsed();
-    CpuBuild { phases: times.into_phases(), total, sah_cost: sah_cost(&blob), bytes: blob.bytes }
-}
-
-fn sah_cost(blob: &BlasBlob) -> Option<f64> {
-    let header = blob.header();
-    if header.format != FORMAT_BVH8 || header.node_count == 0 {
-        return None;
-    }
-    let first = header.nodes as usize * BLOCK_BYTES;
-    let nodes =
-        blob.bytes.get(first..)?.chunks_exact(size_of::<CwBvhNode>()).take(header.node_count as usize);
-    Some(cost_of(nodes.map(bytemuck::pod_read_unaligned::<CwBvhNode>), blob.bounds.half_area().into()))
-}
-
-fn cost_of(nodes: impl Iterator<Item = CwBvhNode>, half_area: f64) -> f64 {
-    const PRIMITIVE_COST: f64 = 0.3;
-    let mut sum = 0.0;
-    for node in nodes {
-        for child in (0..8).filter(|child| node.child_meta[*child] != 0) {
-            let primitives = f64::from((node.child_meta[child] >> 5).count_ones());
-            let is_node = node.imask >> child & 1 == 1;
-            sum += child_half_area(&node, child) * if is_node { 1.0 } else { PRIMITIVE_COST * primitives };
-        }
-    }
-    1.0 + sum / half_area
-}
-
-fn child_half_area(node: &CwBvhNode, child: usize) -> f64 {
-    let low = [node.child_min_x[child], node.child_min_y[child], node.child_min_z[child]];
-    let high = [node.child_max_x[child], node.child_max_y[child], node.child_max_z[child]];
-    let step = |axis: usize| f64::from(f32::from_bits(u32::from(node.e[axis]) << 23));
-    let [x, y, z] = [0, 1, 2].map(|axis| f64::from(high[axis] - low[axis]) * step(axis));
-    x * y + y * z + z * x
+    CpuBuild { phases: times.into_phases(), total, bytes: blob.bytes }
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test")]
 mod tests {
     use super::*;
 
@@ -158,10 +136,11 @@ mod tests {
                 build_on_threads(&positions, &triangles, threads, 2, |build| built.push(build));
             }
             let [first, others @ ..] = &built[..] else { unreachable!("eight builds") };
-            assert!(first.sah_cost.is_some_and(|cost| cost > 1.0 && cost < 100.0), "{:?}", first.sah_cost);
+            let cost = first.tree().unwrap().sah_cost();
+            assert!(cost > 1.0 && cost < 100.0, "{cost}");
             assert!(others.iter().all(|other| other.bytes == first.bytes), "{count}");
             build_by_obvhs(&positions, &triangles, 2, 1, |other| {
-                let ratio = first.sah_cost.unwrap_or(0.0) / other.sah_cost;
+                let ratio = cost / other.tree.sah_cost();
                 assert!(ratio > 0.5 && ratio < 1.2, "{count}: {ratio}");
             });
             assert!(first.phases.iter().map(|(_, time)| *time).sum::<Duration>() <= first.total);

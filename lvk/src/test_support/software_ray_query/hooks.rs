@@ -8,6 +8,7 @@ pub use super::cluster_model::SortedPrimitives;
 pub use super::collapse_model::{BelowNode, Bvh2Child, Bvh2Reference, Bvh8Child, Bvh8Reference, any_tree};
 pub use super::cpu_builds::{CpuBuild, ObvhsBuild, build_by_obvhs, build_on_threads};
 pub use super::gpu_build_check::{CheckBounds, EMPTY, StructureFacts, check_structure};
+pub use super::wide_tree::{CHILDREN, WideChild, WideLink, WideTree};
 use crate::accel::geometry::BlasGeometry;
 use crate::context::Context;
 use crate::context::holder::Holder;

@@ -8,3 +8,4 @@ pub(crate) mod cpu_builds;
 pub(crate) mod gpu_build_check;
 pub(crate) mod hooks;
 pub(crate) mod sort_kernels;
+pub(crate) mod wide_tree;

@@ -23,7 +23,7 @@ pub(super) fn measure(setup: &Setup) -> Result<Vec<OverheadRow>, BenchError> {
     let created =
         OverheadRow::new("context created", median_of(&samples, |ms| *ms), "ms", Limit::AtMost(60.0));
     let held = resident
-        .map(|mb| OverheadRow::new("resident memory with the first context", mb, "MB", Limit::AtMost(90.0)));
+        .map(|mb| OverheadRow::new("resident memory with the first context", mb, "MB", Limit::AtMost(80.0)));
     Ok(std::iter::once(created).chain(held).collect())
 }
 

@@ -35,7 +35,7 @@ pub(super) fn measure(ctx: &Context, effort: Effort) -> Result<Group, BenchError
         let few: Vec<_> = (0..FEW).map(|number| *alive[number % alive.len()]).collect();
         let any: Vec<_> = scattered(LOOKUPS, alive.len()).into_iter().map(|index| *alive[index]).collect();
         let lookups = [look_up(ctx, effort, &few)?, look_up(ctx, effort, &any)?];
-        let submitted = empty_submission(ctx, effort)?;
+        let submitted = empty_submission(effort, || Ok(submit_empty(ctx)?))?;
         let blocks = lvk::test_hooks::memory_blocks(ctx).0 as f64;
         let costs = [all, created, destroyed, lookups[0], lookups[1], submitted, blocks];
         curves.iter_mut().zip(costs).for_each(|(curve, cost)| curve.push(count, cost));

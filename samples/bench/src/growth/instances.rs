@@ -53,6 +53,7 @@ fn curves(backend: &str) -> Vec<Curve> {
         curve("created and built", built),
         curve("one moved, refit", built),
         curve("all moved, rebuilt", built),
+        curve("of it the CPU", Expected::Grows("all are encoded")),
         curve("the same rays traced", traced),
     ]
 }
@@ -64,7 +65,7 @@ fn costs(
     count: u64,
     image: [u32; 2],
     effort: Effort,
-) -> Result<[f64; 4], BenchError> {
+) -> Result<[f64; 5], BenchError> {
     let ctx = &backend.ctx;
     let mut instances: Vec<_> = (0..count).map(|number| instance(blas, number, count, 0.0)).collect();
     let built = effort.median(|| {
@@ -81,21 +82,31 @@ fn costs(
         Ok(backend.stopwatch.time(|cmd| backend.tracer.record(cmd, &traced, RayKind::Primary))?.total)
     })?;
     let mut turn = 0.0;
-    let mut moved = |which: std::ops::Range<u64>, mode| {
+    let mut moved = |which: std::ops::Range<u64>, mode, until: Until| {
         effort.median(|| {
             turn += 0.1;
             which.clone().for_each(|i| instances[i as usize] = instance(blas, i, count, turn));
             let start = Instant::now();
             let mut cmd = ctx.acquire_command_buffer()?;
             cmd.update_tlas(*tlas, &instances, mode)?;
-            ctx.wait(ctx.submit(cmd)?)?;
-            Ok(elapsed_ms(start))
+            let submitted = ctx.submit(cmd)?;
+            let cpu = elapsed_ms(start);
+            ctx.wait(submitted)?;
+            Ok(if until == Until::Submitted { cpu } else { elapsed_ms(start) })
         })
     };
     let middle = count / 2;
-    let one = moved(middle..middle + 1, BuildMode::Refit)?;
-    let all = moved(0..count, BuildMode::Rebuild)?;
-    Ok([built, one, all, trace])
+    let one = moved(middle..middle + 1, BuildMode::Refit, Until::Done)?;
+    let all = moved(0..count, BuildMode::Rebuild, Until::Done)?;
+    let cpu = moved(0..count, BuildMode::Rebuild, Until::Submitted)?;
+    Ok([built, one, all, cpu, trace])
+}
+
+/// The end of a measured time.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Until {
+    Submitted,
+    Done,
 }
 
 fn create(ctx: &Context, instances: &[TlasInstance]) -> lvk::Result<Holder<AccelStructHandle>> {

@@ -37,11 +37,14 @@ pub(super) fn create_and_destroy<T>(
     Ok([one(0)?, one(1)?])
 }
 
-/// Returns the milliseconds of an empty submission and the wait for it.
-pub(super) fn empty_submission(ctx: &Context, effort: Effort) -> Result<f64, BenchError> {
+/// Returns the milliseconds of `submit`, an empty submission and the wait for it.
+pub(super) fn empty_submission(
+    effort: Effort,
+    submit: impl Fn() -> Result<(), BenchError>,
+) -> Result<f64, BenchError> {
     effort.median(|| {
         let start = Instant::now();
-        (0..SUBMISSIONS).try_for_each(|_| submit_empty(ctx))?;
+        (0..SUBMISSIONS).try_for_each(|_| submit())?;
         Ok(elapsed_ms(start) / f64::from(SUBMISSIONS))
     })
 }

@@ -21,7 +21,7 @@ pub(super) fn table(group: &Group, title: String) -> Table {
         group.curves.iter().filter(|curve| curve.is_violated()).map(|curve| curve.name.as_str()).collect();
     let verdict = if grown.is_empty() { "yes".to_owned() } else { format!("no: {}", grown.join("; ")) };
     table.add_note(format!(
-        "constant, where it should be: {verdict} (an exponent below {MOST_CONSTANT}, up or down, of the larger half of the sizes)"
+        "constant, where it should be: {verdict} (an exponent below {MOST_CONSTANT} of the larger half of the sizes; a cost that falls shares a fixed part)"
     ));
     table
 }

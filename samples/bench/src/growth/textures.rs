@@ -10,6 +10,7 @@ use super::group::{Group, GroupKey};
 use super::live_objects::{AT_ONCE, create_and_destroy, empty_submission, scattered, submit_empty};
 use crate::cpu_overhead::{DrawScene, Push};
 use crate::error::BenchError;
+use crate::hand_written::{RawCommands, RawDevice};
 use crate::measure::elapsed_ms;
 use crate::setup::Setup;
 use crate::table::format_grouped;
@@ -18,6 +19,8 @@ use crate::table::format_grouped;
 const NAMED: usize = 16;
 /// Dispatches of one sample.
 const DISPATCHES: u32 = 100;
+/// The curve of Vulkan calls without the library, beside the same textures: what grows there is the driver's.
+const BY_HAND: &str = "the same by hand, with a fence";
 /// Textures of the scene and of the library, beside those that are counted.
 const OTHERS: u64 = 100;
 
@@ -28,6 +31,7 @@ pub(super) fn measure(setup: &Setup, effort: Effort) -> Result<Group, BenchError
     let limit = u64::from(ctx.capabilities().limits.max_bindless_textures);
     let sizes: Vec<u64> = wanted.iter().copied().filter(|size| size + spare <= limit).collect();
     let scene = DrawScene::new(&ctx)?;
+    let by_hand = RawCommands::new(&RawDevice::new(&ctx))?;
     let mut curves = curves();
     let mut alive: Vec<Holder<TextureHandle>> = Vec::new();
     for &count in &sizes {
@@ -40,7 +44,8 @@ pub(super) fn measure(setup: &Setup, effort: Effort) -> Result<Group, BenchError
         let costs = [
             created,
             destroyed,
-            empty_submission(&ctx, effort)?,
+            empty_submission(effort, || Ok(submit_empty(&ctx)?))?,
+            empty_submission(effort, || by_hand.submit_empty())?,
             effort.median(|| Ok(draw(&ctx, &scene)?))?,
             effort.median(|| Ok(dispatches(&ctx, &scene, &[])? / f64::from(DISPATCHES)))?,
             effort.median(|| Ok(dispatches(&ctx, &scene, &named)? / f64::from(DISPATCHES)))?,
@@ -59,11 +64,13 @@ fn curves() -> Vec<Curve> {
         "create one more",
         "destroy one, with the submission that frees it",
         "empty submission and wait",
+        BY_HAND,
         "pass with a draw that names none, until done",
         "dispatch that names none, recorded",
         "dispatch with 16 in `Dependencies`, recorded",
     ];
-    names.map(|name| Curve::new(name, Unit::Milliseconds, Expected::Constant)).into()
+    let expected = |name| if name == BY_HAND { Expected::Grows("the driver") } else { Expected::Constant };
+    names.map(|name| Curve::new(name, Unit::Milliseconds, expected(name))).into()
 }
 
 fn texture(ctx: &Context) -> lvk::Result<Holder<TextureHandle>> {

@@ -199,11 +199,13 @@ fn failed_commands<'a>(fault: &'a Fault, found: &'a RunOutcome) -> BTreeSet<&'a 
     commands
 }
 
-/// Commands whose errors may be told as those of another command: the loader calls the first while it creates a device, and
-/// the result of the second is that of the command that was deferred.
-const OTHER_NAMES: [(&str, &str); 2] = [
+/// Commands whose errors may be told as those of another command: the loader calls the first while it creates a device, the
+/// result of the second is that of the command that was deferred, and the layer logs the others by the names that were promoted.
+const OTHER_NAMES: [(&str, &str); 4] = [
     ("vkEnumerateDeviceExtensionProperties", "vkCreateDevice"),
     ("vkGetDeferredOperationResultKHR", "vkCreateRayTracingPipelinesKHR"),
+    ("vkGetPhysicalDeviceCalibrateableTimeDomainsKHR", "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT"),
+    ("vkGetCalibratedTimestampsKHR", "vkGetCalibratedTimestampsEXT"),
 ];
 
 /// True if a text behind a command names its object, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`.

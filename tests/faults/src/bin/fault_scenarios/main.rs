@@ -7,6 +7,7 @@ mod blas;
 mod compute;
 mod device_fault;
 mod hot_reload;
+mod interop;
 mod leak;
 mod queues;
 mod raw_device;
@@ -45,11 +46,10 @@ fn scenario(name: &str) -> Option<Scenario> {
         "queues" => queues::three,
         "raw_device" => raw_device::guest,
         "hot_reload" => hot_reload::reload,
+        "interop" => interop::exchange,
         "device_fault" => device_fault::explained,
         "slow_work" => slow_work::outlives_its_context,
         "leak" => leak::forgotten_fence,
-        "triangle" => single_file_programs::sample,
-        "example_triangle" => single_file_programs::example,
         #[cfg(target_os = "linux")]
         "window" => window::frames_and_resize,
         _ => return None,
@@ -73,24 +73,28 @@ fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
 
 /// Runs a scenario of this program, or the sample of this name.
 fn attempt(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
-    let Some(scenario) = scenario(name) else {
-        let mut words: Vec<OsString> = args.iter().map(OsString::from).collect();
-        words.extend([OsString::from("--out"), result.into()]);
-        let status = match name {
-            "viewer" => main_with::<Viewer>([vec![name.into()], words].concat(), &mut event_loop()),
-            _ => run_line(name, words, &mut event_loop()),
-        };
-        return match status {
-            ExitCode::SUCCESS => Ok(()),
-            status => Err(status),
-        };
+    let written = if let Some(program) = single_file_programs::of_name(name) {
+        program.run(result)
+    } else if let Some(scenario) = scenario(name) {
+        library_warnings::print();
+        scenario().and_then(|bytes| Ok(std::fs::write(result, bytes)?))
+    } else {
+        return run_sample(name, args, result);
     };
-    library_warnings::print();
-    let written = scenario().and_then(|bytes| Ok(std::fs::write(result, bytes)?));
     written.map_err(|error| {
         eprintln!("error: {error}");
         ExitCode::FAILURE
     })
+}
+
+fn run_sample(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
+    let mut words: Vec<OsString> = args.iter().map(OsString::from).collect();
+    words.extend([OsString::from("--out"), result.into()]);
+    let status = match name {
+        "viewer" => main_with::<Viewer>([vec![name.into()], words].concat(), &mut event_loop()),
+        _ => run_line(name, words, &mut event_loop()),
+    };
+    if status == ExitCode::SUCCESS { Ok(()) } else { Err(status) }
 }
 
 fn main() -> ExitCode {
