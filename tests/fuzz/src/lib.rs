@@ -5,6 +5,7 @@
 //! test `mutations` drives them over the corpus and over mutations of it, as a part of `cargo test`.
 
 mod gltf;
+mod gltf_edits;
 mod input;
 mod memory;
 pub mod mutation;
