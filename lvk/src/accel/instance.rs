@@ -15,7 +15,7 @@ use crate::resource::Buffer;
 
 /// Minimum number of instances for each thread. A thread converts 200 of them in a microsecond, and takes tens of
 /// microseconds to start.
-const INSTANCES_PER_THREAD: usize = 1 << 17;
+const INSTANCES_PER_THREAD: usize = 1 << 14;
 /// Maximum number of threads. More do not write faster.
 const MAX_THREADS: usize = 8;
 
@@ -189,6 +189,36 @@ pub(crate) fn write_addresses(
         return Ok(WrittenRefs::Unchanged);
     }
     Ok(WrittenRefs::Changed(Arc::new(collector.finish().0)))
+}
+
+/// Checks `instances` and writes them with the addresses that `resolve` returns for their BLAS. Long lists are written by several
+/// threads.
+pub(crate) fn write_plain_addresses(
+    name: &str,
+    instances: &[TlasInstance],
+    resolve: &(dyn Fn(AccelStructHandle) -> Result<u64> + Sync),
+    out: &mut [u8],
+) -> Result<()> {
+    let threads = thread_count(instances.len());
+    let count = instances.len().div_ceil(threads).max(1);
+    let mut results: Vec<_> = instances.chunks(count).map(|_| Ok(())).collect();
+    let chunks =
+        instances.chunks(count).zip(out.chunks_mut(count * INSTANCE_BYTES)).zip(&mut results).enumerate();
+    parallel_for(threads, chunks, |(chunk, ((instances, out), result))| {
+        let mut last = None;
+        let instances = instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate();
+        *result = instances.into_iter().try_for_each(|(index, (instance, out))| {
+            check_instance(name, chunk * count + index, instance)?;
+            let address = match last {
+                Some((handle, address)) if handle == instance.blas => address,
+                _ => resolve(instance.blas)?,
+            };
+            last = Some((instance.blas, address));
+            out.copy_from_slice(bytemuck::bytes_of(&to_raw(instance, address)));
+            Ok(())
+        });
+    });
+    results.into_iter().collect()
 }
 
 /// As [`write_addresses`], for a few instances. Returns `false` unless all instances are valid and reference exactly

@@ -116,8 +116,7 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Build
     };
     // Eight times as many nodes as in the level above, up to the capacity, with eight invocations each. Only the GPU knows how
     // many there are, and a level near the end has few, so workgroups go over many nodes.
-    let most = std::env::var("LVK_MOST").ok().and_then(|v| v.parse().ok()).unwrap_or(MOST_COLLAPSE_GROUPS);
-    let most = most * (WORKGROUP_SIZE / BVH8_CHILDREN);
+    let most = MOST_COLLAPSE_GROUPS * (WORKGROUP_SIZE / BVH8_CHILDREN);
     let nodes =
         |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity).min(most);
     let levels = if plan.wide_capacity > 0 { MAX_BVH8_DEPTH as u32 } else { 0 };

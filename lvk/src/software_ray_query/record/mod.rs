@@ -12,7 +12,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::blas_refs::{BlasRef, BlasRefSet};
 use crate::accel::instance::{
-    DeviceInstances, INSTANCE_BYTES, TlasInstance, check_instance, instance_bytes, to_raw,
+    DeviceInstances, TlasInstance, check_instance, instance_bytes, write_plain_addresses,
 };
 use crate::command::CommandBuffer;
 use crate::software_ray_query::blas::{BvhOrigin, SoftwareBlas};
@@ -254,7 +254,11 @@ impl CommandBuffer {
         let bytes = instance_bytes(instances.len().max(1) as u32);
         let (region, written) =
             shared.staging.write_with(bytes, ALIGNMENT, self.recording.staging_key(), |out| {
-                self.write_software_instances(target, instances, out)
+                let resolve = |handle| {
+                    let blas = shared.store.accel_structs.get(handle)?;
+                    Ok(software_storage(&blas.name, blas.blas()?)?.address)
+                };
+                write_plain_addresses(&target.name, instances, &resolve, out)
             })?;
         written?;
         let count = instances.len() as u32;
@@ -325,29 +329,6 @@ impl CommandBuffer {
         let address = software_storage(&blas.name, blas.blas()?)?.address;
         let parts = blas.blas()?.software.as_ref().and_then(SoftwareBlas::rebraid_parts);
         Ok(parts.map(|parts| InstancedBlas { address, parts: Arc::clone(parts) }))
-    }
-
-    fn write_software_instances(
-        &self,
-        target: &AccelStruct,
-        instances: &[TlasInstance],
-        out: &mut [u8],
-    ) -> Result<()> {
-        let mut last: Option<(AccelStructHandle, u64)> = None;
-        for (index, (instance, out)) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate()
-        {
-            check_instance(&target.name, index, instance)?;
-            let address = match last {
-                Some((handle, address)) if handle == instance.blas => address,
-                _ => {
-                    let blas = self.shared.store.accel_structs.get(instance.blas)?;
-                    software_storage(&blas.name, blas.blas()?)?.address
-                }
-            };
-            last = Some((instance.blas, address));
-            out.copy_from_slice(bytemuck::bytes_of(&to_raw(instance, address)));
-        }
-        Ok(())
     }
 
     fn record_software_tlas(
