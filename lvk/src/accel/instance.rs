@@ -501,6 +501,7 @@ fn check_built_count(name: &str, count: u64) -> Result<()> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test")]
 mod tests {
     use proptest::prelude::*;
 
@@ -546,6 +547,35 @@ mod tests {
         ];
         assert!(check_instance("tlas", 0, &good).is_ok());
         assert!(bad.iter().all(|instance| check_instance("tlas", 0, instance).is_err()));
+    }
+
+    /// Lists that several threads write have the bytes of single instances, and errors name the instance in the whole list.
+    #[test]
+    fn long_lists_are_written_as_single_instances() {
+        let handles = [1, 2, 3].map(AccelStructHandle::from_bits);
+        let place = |handle| handles.iter().position(|own| *own == handle).unwrap() as u64;
+        let address = |handle: AccelStructHandle| Ok(0x1000 * (place(handle) + 1));
+        for count in [0, 1, 2 * INSTANCES_PER_THREAD - 1, 3 * INSTANCES_PER_THREAD + 5] {
+            let mut instances: Vec<_> = (0..count)
+                .map(|number| TlasInstance {
+                    custom_index: number as u32,
+                    ..TlasInstance::new(handles[number / 7 % 3])
+                })
+                .collect();
+            let mut out = vec![0; count * INSTANCE_BYTES];
+            write_plain_addresses("t", &instances, &address, &mut out).unwrap();
+            for (instance, out) in instances.iter().zip(out.chunks_exact(INSTANCE_BYTES)) {
+                let raw = to_raw(instance, address(instance.blas).unwrap());
+                assert_eq!(out, bytemuck::bytes_of(&raw));
+            }
+            let Some(last) = instances.last_mut() else { continue };
+            last.custom_index = 1 << 24;
+            let error = write_plain_addresses("t", &instances, &address, &mut out).unwrap_err().to_string();
+            assert!(error.contains(&format!("instance {}:", count - 1)), "{error}");
+            let lost = |_| Err(Error::usage("b", "it is gone"));
+            let error = write_plain_addresses("t", &instances[..1], &lost, &mut out).map(drop);
+            assert!(count == 1 || matches!(error, Err(Error::InvalidUsage { .. })));
+        }
     }
 
     fn blas() -> Blas {
