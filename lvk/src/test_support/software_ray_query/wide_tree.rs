@@ -31,7 +31,7 @@ pub struct WideChild {
 /// What a child is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WideLink {
-    /// There is no such child.
+    /// No child.
     None,
     /// Index of a node.
     Node(u32),
