@@ -20,6 +20,8 @@ pub enum FileKind {
     Cameras,
     /// Image file, before it is decoded.
     Picture,
+    /// Light from all directions (Radiance HDR).
+    Environment,
     /// Acceleration structure that an earlier start kept.
     Structure,
     /// A line of arguments.
@@ -34,7 +36,7 @@ impl FileKind {
             Self::Obj | Self::Structure => 4 << 30,
             Self::Mtl => 64 << 20,
             Self::Cameras => 1 << 20,
-            Self::Picture => 1 << 30,
+            Self::Picture | Self::Environment => 1 << 30,
             Self::Line => 64 << 10,
         }
     }

@@ -1,8 +1,8 @@
 //! The sample's own arguments.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use lvk_samples::app::ray_args::RayArgs;
 use lvk_samples::app::value_parsers::{positive, whole};
 
@@ -69,12 +69,17 @@ pub struct ViewerArgs {
 }
 
 /// Arguments that set the light from outside of the model.
-#[derive(Debug, Clone, Copy, PartialEq, Args)]
+#[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Light")]
 pub struct LightArgs {
-    /// The sky
-    #[arg(long, value_enum, default_value_t = SkyArg::Day)]
+    /// The sky: day, white, black, or a Radiance HDR file of all directions (.hdr), whose middle lies in +x and whose rows go from the
+    /// zenith down. A file has its sun in it
+    #[arg(long, value_name = "SKY", default_value = "day", value_parser = sky)]
     pub sky: SkyArg,
+
+    /// Angle in degrees by which a file's sky is turned around the vertical, counter-clockwise from above
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = degrees, allow_negative_numbers = true)]
+    pub sky_rotation: f32,
 
     /// Angle of the sun above the horizon in degrees, 1 to 90
     #[arg(long, value_name = "DEGREES", default_value_t = 42.0, value_parser = elevation)]
@@ -90,7 +95,7 @@ pub struct LightArgs {
 }
 
 /// The sky.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SkyArg {
     /// A clear day with its sun.
     Day,
@@ -98,6 +103,19 @@ pub enum SkyArg {
     White,
     /// No light but that of the model.
     Black,
+    /// That of a Radiance HDR file.
+    File(PathBuf),
+}
+
+fn sky(text: &str) -> Result<SkyArg, String> {
+    let is_hdr = Path::new(text).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"));
+    match text {
+        "day" => Ok(SkyArg::Day),
+        "white" => Ok(SkyArg::White),
+        "black" => Ok(SkyArg::Black),
+        _ if is_hdr => Ok(SkyArg::File(PathBuf::from(text))),
+        _ => Err("day, white, black or a file that ends with .hdr is needed".to_owned()),
+    }
 }
 
 fn seconds(text: &str) -> Result<f32, String> {

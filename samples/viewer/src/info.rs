@@ -30,6 +30,7 @@ impl SampleInfo for Viewer {
         model.glb --method pathtrace --samples 1024 | a glTF file by the path tracer
         model.gltf --camera 2 --exposure -1 | through its second camera, half as bright
         kitchen.obj --sky black | an OBJ file, lit by its lamp alone
+        model.glb --sky garden.hdr --sky-rotation 90 | under the sky of a Radiance HDR file, turned to the left by a quarter
         model.glb --window | in a window, where the picture gets better while nothing moves
         model.glb --animation walk --time 0.5 | in a pose of an animation, which --frames 0..60 and a window play from there
         --rt query --validate | ray queries in a compute shader, with validation

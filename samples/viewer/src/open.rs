@@ -9,7 +9,7 @@ use lvk_samples::hybrid::RayPath;
 
 use crate::args::{LightArgs, SkyArg, ViewerArgs};
 use crate::config::{Content, ViewerConfig};
-use crate::light::{Environment, SunSetting};
+use crate::light::{Environment, EnvironmentError, SunSetting};
 use crate::model::{ModelError, load, showcase};
 use crate::names::{animation_place, camera_place};
 use crate::viewer::{Viewer, ViewerScene};
@@ -49,7 +49,7 @@ impl Request {
         let animation = animation.transpose().map_err(RunError::input)?;
         progress.stage("uploading the model and building acceleration structures", 0);
         let config = self.config(ctx)?;
-        let scene = self.scene(model);
+        let scene = self.scene(model).map_err(RunError::input)?;
         let mut viewer = Viewer::new(ctx, &scene, &config)?;
         warn_beside(progress, viewer.warnings());
         if config.content == Content::Steps && ctx.capabilities().ray_query_path == RayQueryPath::Hardware {
@@ -87,19 +87,20 @@ impl Request {
     }
 
     /// The model with the light that the arguments ask for.
-    fn scene(&self, model: Model) -> ViewerScene {
-        let LightArgs { sky, sun_elevation, sun_azimuth, sun_radius } = self.args.light;
+    fn scene(&self, model: Model) -> Result<ViewerScene, EnvironmentError> {
+        let LightArgs { sky, sky_rotation, sun_elevation, sun_azimuth, sun_radius } = &self.args.light;
         let environment = match sky {
             SkyArg::Day => Environment::day(&SunSetting {
-                elevation_degrees: sun_elevation,
-                azimuth_degrees: sun_azimuth,
-                radius_degrees: sun_radius,
+                elevation_degrees: *sun_elevation,
+                azimuth_degrees: *sun_azimuth,
+                radius_degrees: *sun_radius,
             }),
             SkyArg::White => Environment::uniform([1.0; 3]),
             SkyArg::Black => Environment::uniform([0.0; 3]),
+            SkyArg::File(path) => Environment::from_hdr(path, *sky_rotation)?,
         };
         let name = self.args.file.as_deref().map_or_else(|| "showcase".to_owned(), lvk::readable_name);
-        ViewerScene { name, model, environment, disc_radius: sun_radius.to_radians() }
+        Ok(ViewerScene { name, model, environment, disc_radius: sun_radius.to_radians() })
     }
 }
 

@@ -133,3 +133,51 @@ fn a_lamp_of_triangles_lights_as_its_solid_angle() {
     let factor = 4.0 / PI * edge * edge.atan();
     assert_close("a glowing ceiling", actual, [1.0, 2.0, 3.0].map(|light| 0.6 * factor * light), 0.02);
 }
+
+/// A file with light from a tenth of all directions, around +x and above the horizon, lights walls and a floor as its pixels say, turned
+/// or not.
+#[test]
+fn an_environment_file_lights_from_its_directions() {
+    const SIZE: [u32; 2] = [64, 32];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sky.hdr");
+    let is_bright = |column: u32, row: u32| (26..38).contains(&column) && (6..16).contains(&row);
+    let pixels: Vec<_> = (0..SIZE[0] * SIZE[1])
+        .map(|index| image::Rgb(if is_bright(index % 64, index / 64) { [8.0, 4.0, 2.0] } else { [0.125; 3] }))
+        .collect();
+    let file = std::fs::File::create(&path).unwrap();
+    image::codecs::hdr::HdrEncoder::new(file).encode(&pixels, 64, 32).unwrap();
+    // Irradiance of a surface with this normal: the middle of the picture lies in +x, and columns go on towards +z.
+    let irradiance = |normal: [f64; 3], turned: f64| {
+        let mut sums = [0.0; 3];
+        for (index, pixel) in (0_u32..).zip(&pixels) {
+            let (around, down) = (
+                (f64::from(index % 64) + 0.5) / 64.0 * 2.0 * PI - PI,
+                (f64::from(index / 64) + 0.5) / 32.0 * PI,
+            );
+            let around = around - turned.to_radians();
+            let direction = [down.sin() * around.cos(), down.cos(), down.sin() * around.sin()];
+            let cosine: f64 = direction.iter().zip(normal).map(|(a, b)| a * b).sum();
+            let angle = down.sin() * (PI / 32.0) * (2.0 * PI / 64.0);
+            let light = cosine.max(0.0) * angle;
+            sums.iter_mut().zip(pixel.0).for_each(|(sum, channel)| *sum += light * f64::from(channel));
+        }
+        sums
+    };
+    let wall = |normal: Vec3| {
+        let side = normal.cross(Vec3::Y);
+        let corner = -40.0 * (side + Vec3::Y);
+        Builder::default().quad(corner, Vec3::Y * 80.0, side * 80.0, matte([0.5; 3])).model()
+    };
+    for (normal, turned) in
+        [(Vec3::X, 0.0), (Vec3::NEG_X, 0.0), (Vec3::Z, 0.0), (Vec3::X, 90.0), (Vec3::NEG_Z, 90.0)]
+    {
+        let environment = Environment::from_hdr(&path, turned).unwrap();
+        let eye = normal * 5.0 + Vec3::new(0.02, 0.01, 0.02);
+        let view =
+            View { camera: Camera::looking_at(eye.to_array(), [0.0; 3], 0.2), size: [8, 8], samples: 256 };
+        let Some(actual) = seen(&wall(normal), &environment, &view) else { return };
+        let expected = irradiance(normal.as_dvec3().to_array(), turned.into()).map(|sum| 0.5 / PI * sum);
+        assert_close(&format!("wall towards {normal}, turned by {turned}"), actual, expected, 0.02);
+    }
+}

@@ -1,11 +1,15 @@
 //! Light from outside of the model: the sky, and the sun in it.
 
 mod atmosphere;
+mod hdr_file;
 mod sky_map;
+
+use std::path::Path;
 
 use glam::DVec3;
 
 use atmosphere::Atmosphere;
+pub use hdr_file::EnvironmentError;
 pub use sky_map::SkyMap;
 pub(crate) use sky_map::luminance;
 
@@ -68,6 +72,15 @@ impl Environment {
         let irradiance = (sun * scale).as_vec3().to_array();
         let radius = setting.radius_degrees.to_radians();
         Self { sky, sun: Some(Sun { direction: to_sun.as_vec3().to_array(), irradiance, radius }) }
+    }
+
+    /// The light of a Radiance HDR file, whose picture shows all directions (equirectangular). The sun is part of the picture.
+    /// `rotation_degrees` turns it around the vertical, counter-clockwise from above.
+    ///
+    /// # Errors
+    /// [`EnvironmentError`], which names the file and what is wrong with it.
+    pub fn from_hdr(path: &Path, rotation_degrees: f32) -> Result<Self, EnvironmentError> {
+        Ok(Self { sky: hdr_file::read(path, rotation_degrees)?, sun: None })
     }
 
     /// The same radiance from everywhere, without a sun.

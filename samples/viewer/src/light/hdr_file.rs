@@ -1,0 +1,170 @@
+//! Light from all directions in a Radiance HDR file (Ward, 1991).
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::codecs::hdr::HdrDecoder;
+use image::{DynamicImage, ImageDecoder, ImageError};
+use lvk_samples::app::input_file::{self, FileKind};
+
+use super::sky_map::SkyMap;
+
+/// Most texels in a row of a file, and of the map that is made of it: finer ones are averaged.
+const MOST_WIDTH: [u32; 2] = [8192, 2048];
+/// Largest radiance that is kept: a sun in the picture is a few texels.
+const MOST_RADIANCE: f32 = 1e8;
+
+/// Errors of reading an environment file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EnvironmentError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is no Radiance HDR file, or it is damaged.
+    #[error("{file} is no whole Radiance HDR file ({source}); export the picture again, as .hdr")]
+    Decode {
+        /// The file.
+        file: String,
+        /// Why.
+        source: ImageError,
+    },
+    /// The picture does not show all directions, or it is too large.
+    #[error(
+        "{file} has {width} x {height} texels; an environment is twice as wide as high, 2 to {} texels wide",
+        MOST_WIDTH[0]
+    )]
+    Size {
+        /// The file.
+        file: String,
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+}
+
+/// Reads a file as a map of the sky, turned around the vertical.
+pub(super) fn read(path: &Path, rotation_degrees: f32) -> Result<SkyMap, EnvironmentError> {
+    let file = || lvk::readable_name(path);
+    let bytes = input_file::read_named_by_user(path, FileKind::Environment)
+        .map_err(|source| EnvironmentError::Read { file: file(), source })?;
+    let failed = |source| EnvironmentError::Decode { file: file(), source };
+    let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(failed)?;
+    let (width, height) = decoder.dimensions();
+    if width != 2 * height || !(2..=MOST_WIDTH[0]).contains(&width) {
+        return Err(EnvironmentError::Size { file: file(), width, height });
+    }
+    let picture = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgb32f();
+    let texels = picture.pixels().map(|texel| texel.0.map(radiance)).collect();
+    let mut map = SkyMap { width, height, texels };
+    while map.width > MOST_WIDTH[1] {
+        map = halved(&map);
+    }
+    turn(&mut map, rotation_degrees);
+    Ok(map)
+}
+
+/// Radiance that can be summed: no number is 0.
+fn radiance(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(0.0, MOST_RADIANCE) }
+}
+
+/// The means of squares of four texels. A last column or row without a partner is left out.
+fn halved(map: &SkyMap) -> SkyMap {
+    let (width, height) = (map.width / 2, map.height / 2);
+    let texel = |index: u32| {
+        let (x, y) = (2 * (index % width), 2 * (index / width));
+        let of = |x: u32, y: u32| map.texels[(y * map.width + x) as usize];
+        let four = [of(x, y), of(x + 1, y), of(x, y + 1), of(x + 1, y + 1)];
+        [0, 1, 2].map(|channel| four.iter().map(|texel| texel[channel]).sum::<f32>() / 4.0)
+    };
+    SkyMap { width, height, texels: (0..width * height).map(texel).collect() }
+}
+
+/// Turns the map around the vertical, by whole texels.
+fn turn(map: &mut SkyMap, degrees: f32) {
+    let columns = (degrees / 360.0 * map.width as f32).round() as i64;
+    // Columns go from -x over +x, where the middle is, to -x again, clockwise from above; see `direction_at`.
+    let steps = (-columns).rem_euclid(i64::from(map.width)) as usize;
+    map.texels.chunks_mut(map.width as usize).for_each(|row| row.rotate_right(steps));
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::path::PathBuf;
+
+    use image::Rgb;
+    use image::codecs::hdr::HdrEncoder;
+
+    use super::*;
+
+    fn written(folder: &Path, name: &str, width: usize, texels: &[[f32; 3]]) -> PathBuf {
+        let path = folder.join(name);
+        let pixels: Vec<_> = texels.iter().map(|texel| Rgb(*texel)).collect();
+        let height = texels.len() / width;
+        HdrEncoder::new(File::create(&path).unwrap()).encode(&pixels, width, height).unwrap();
+        path
+    }
+
+    #[test]
+    fn a_file_gives_its_radiance_from_its_directions() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut texels = vec![[0.25, 0.5, 1.0]; 16 * 8];
+        texels[3 * 16 + 10] = [64.0, 32.0, 16.0];
+        let path = written(folder.path(), "sky.hdr", 16, &texels);
+        assert_eq!(read(&path, 0.0).unwrap(), SkyMap { width: 16, height: 8, texels: texels.clone() });
+        // A quarter is four of sixteen columns.
+        let turned = read(&path, 90.0).unwrap();
+        assert_eq!(turned.texels[3 * 16 + 6], [64.0, 32.0, 16.0]);
+        assert_eq!(read(&path, -270.0).unwrap(), turned);
+    }
+
+    #[test]
+    fn fine_files_are_averaged_to_the_same_light() {
+        let (width, height) = (4096_u32, 2048_u32);
+        let mut texels = vec![[1.0; 3]; (width * height) as usize];
+        texels[(700 * width + 900) as usize] = [1024.0; 3];
+        let fine = SkyMap { width, height, texels };
+        let coarse = halved(&fine);
+        assert_eq!((coarse.width, coarse.height), (2048, 1024));
+        assert!((coarse.mean() / fine.mean() - 1.0).abs().max_element() < 1e-4);
+        assert_eq!(coarse.texels[350 * 2048 + 450], [(1024.0 + 3.0) / 4.0; 3]);
+    }
+
+    #[test]
+    fn files_that_are_no_environment_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        assert!(matches!(read(&place("absent.hdr"), 0.0), Err(EnvironmentError::Read { .. })));
+        std::fs::write(place("text.hdr"), "P6 1 1").unwrap();
+        std::fs::write(place("huge.hdr"), "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 16384\n")
+            .unwrap();
+        let square = written(folder.path(), "square.hdr", 4, &[[1.0; 3]; 16]);
+        let whole = std::fs::read(written(folder.path(), "cut.hdr", 64, &vec![[1.0; 3]; 64 * 32])).unwrap();
+        std::fs::write(place("cut.hdr"), &whole[..whole.len() - 9]).unwrap();
+        assert!(matches!(read(&square, 0.0), Err(EnvironmentError::Size { width: 4, height: 4, .. })));
+        let error = read(&place("huge.hdr"), 0.0).unwrap_err().to_string();
+        assert!(error.contains("16384 x 8192"), "{error}");
+        for name in ["text.hdr", "cut.hdr"] {
+            let error = read(&place(name), 0.0).unwrap_err();
+            assert!(
+                matches!(error, EnvironmentError::Decode { .. }) && error.to_string().contains(name),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn values_that_are_no_radiance_do_not_get_through() {
+        for (value, expected) in [(f32::NAN, 0.0), (-1.0, 0.0), (f32::INFINITY, MOST_RADIANCE), (2.0, 2.0)] {
+            assert_eq!(radiance(value), expected);
+        }
+    }
+}
