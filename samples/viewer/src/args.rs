@@ -103,7 +103,7 @@ pub enum SkyArg {
     White,
     /// No light but that of the model.
     Black,
-    /// That of a Radiance HDR file.
+    /// The picture of a Radiance HDR file.
     File(PathBuf),
 }
 
