@@ -193,6 +193,7 @@ pub(crate) fn write_addresses(
 
 /// Checks `instances` and writes them with the addresses that `resolve` returns for their BLAS. Long lists are written by several
 /// threads.
+#[cfg(feature = "software-ray-query")]
 pub(crate) fn write_plain_addresses(
     name: &str,
     instances: &[TlasInstance],
@@ -550,6 +551,7 @@ mod tests {
     }
 
     /// Lists that several threads write have the bytes of single instances, and errors name the instance in the whole list.
+    #[cfg(feature = "software-ray-query")]
     #[test]
     fn long_lists_are_written_as_single_instances() {
         let handles = [1, 2, 3].map(AccelStructHandle::from_bits);

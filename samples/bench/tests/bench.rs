@@ -364,3 +364,29 @@ fn cpu_overhead_is_compared_with_its_limits() {
     assert_positive(&table, "empty submission", 0..2);
     assert!(table.contains("60 ms") && !table.contains("NaN"), "{table}");
 }
+
+#[test]
+fn images_are_compared_by_three_measures() {
+    let folder = tempfile::tempdir().unwrap();
+    let [ramp, other] = [("ramp.png", 0), ("other.png", 40)].map(|(name, more)| {
+        let path = folder.path().join(name);
+        let picture =
+            image::RgbImage::from_fn(64, 32, |x, y| image::Rgb([(x * 3) as u8, (y * 5) as u8, more]));
+        picture.save(&path).unwrap();
+        path
+    });
+    let compare = |paths: [&std::path::Path; 2]| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_compare")).args(paths).output().unwrap();
+        (
+            output.status.code(),
+            String::from_utf8(output.stdout).unwrap() + &String::from_utf8(output.stderr).unwrap(),
+        )
+    };
+    let (status, same) = compare([&ramp, &ramp]);
+    assert!(status == Some(0) && same.contains("SSIM 1.00000") && same.ends_with("FLIP 0.0000\n"), "{same}");
+    let (status, differs) = compare([&ramp, &other]);
+    let flip = differs.trim_end().rsplit_once("FLIP ").and_then(|(_, flip)| flip.parse::<f64>().ok());
+    assert!(status == Some(0) && flip.is_some_and(|flip| (0.01..0.5).contains(&flip)), "{differs}");
+    let (status, error) = compare([&ramp, &folder.path().join("absent.png")]);
+    assert!(status == Some(2) && error.contains("absent.png"), "{error}");
+}

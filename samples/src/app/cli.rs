@@ -35,6 +35,8 @@ use lvk_dev_driver::{DriverRequest, prepare};
 const GPU_FRAMES: u32 = 60;
 /// Frames that a GPU renders before any is timed, so that its clocks are up.
 const WARM_UP_FRAMES: u32 = 5;
+/// Most steps of a frame that is rendered more than once to be timed where nobody asks for it.
+const MOST_TIMED_STEPS: u64 = 16;
 
 /// Width of the commands in the examples of a help.
 const EXAMPLE_WIDTH: usize = 55;
@@ -289,7 +291,7 @@ fn attempt<S: Sample>(
     let context = sample.context().clone();
     drop(setup);
     print_line(&summary);
-    if context.capabilities().is_cpu {
+    if context.capabilities().is_cpu || sample.steps_per_frame() > MOST_TIMED_STEPS {
         request.warm_up = 0;
         request.frames = args.frames.clone().unwrap_or(Frames::Still(1));
     }

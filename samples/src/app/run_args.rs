@@ -14,7 +14,8 @@ pub const MAX_SIZE: u32 = 16_384;
 /// Arguments that all samples share: frames, pictures and device.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct RunArgs {
-    /// A number: render the first frame that many times and time it [default: 60, or 1 on a driver that runs on the CPU].
+    /// A number: render the first frame that many times and time it [default: 60, or 1 on a driver that runs on the CPU and
+    /// for frames of more than 16 steps].
     /// A range as 0..240, without its end: render each frame once as its own picture
     #[arg(long, value_name = "N|FIRST..END", help_heading = "Frames")]
     pub frames: Option<Frames>,

@@ -1,4 +1,4 @@
-//! Compares two images: `compare FIRST.png SECOND.png` prints PSNR, SSIM and the share of differing pixels.
+//! Compares two images: `compare FIRST.png SECOND.png` prints PSNR, SSIM, FLIP and the share of differing pixels.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -7,6 +7,7 @@ use clap::Parser;
 use image::RgbaImage;
 use lvk_samples::app::metrics;
 use lvk_samples::picture::{self, Bounds};
+use nv_flip::FlipImageRgb8;
 
 /// Compares two images of the same size.
 #[derive(Parser)]
@@ -14,7 +15,7 @@ use lvk_samples::picture::{self, Bounds};
 struct Args {
     /// First image
     first: PathBuf,
-    /// Second image
+    /// Second image, the reference of FLIP
     second: PathBuf,
 }
 
@@ -39,7 +40,19 @@ fn compare(args: &Args) -> Result<String, String> {
     }
     let (width, height) = first.dimensions();
     let found = metrics::compare(first.as_raw(), second.as_raw(), width, height);
-    found.map(|difference| difference.to_string()).map_err(|error| error.to_string())
+    let found = found.map_err(|error| error.to_string())?;
+    Ok(format!("{found}, FLIP {:.4}", flip(&first, &second)))
+}
+
+/// Returns the mean of FLIP's errors (Andersson et al., 2020): 0 for images that look the same, 1 for black beside white. The second
+/// image is the reference.
+fn flip(first: &RgbaImage, reference: &RgbaImage) -> f64 {
+    let [first, reference] = [first, reference].map(|image| {
+        let rgb: Vec<u8> = image.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        FlipImageRgb8::with_data(image.width(), image.height(), &rgb)
+    });
+    let errors = nv_flip::flip(reference, first, nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec();
+    errors.iter().map(|error| f64::from(*error)).sum::<f64>() / errors.len().max(1) as f64
 }
 
 fn read(path: &Path) -> Result<RgbaImage, String> {
