@@ -7,6 +7,7 @@ mod blas;
 mod compute;
 mod device_fault;
 mod hot_reload;
+#[cfg(target_os = "linux")]
 mod interop;
 mod leak;
 mod queues;
@@ -46,6 +47,7 @@ fn scenario(name: &str) -> Option<Scenario> {
         "queues" => queues::three,
         "raw_device" => raw_device::guest,
         "hot_reload" => hot_reload::reload,
+        #[cfg(target_os = "linux")]
         "interop" => interop::exchange,
         "device_fault" => device_fault::explained,
         "slow_work" => slow_work::outlives_its_context,
