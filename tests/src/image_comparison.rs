@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use image::RgbaImage;
 use lvk::{Context, RayQueryRequest};
+use lvk_bench::flip::flip_errors;
 use lvk_samples::app::metrics::{self, Difference};
-use nv_flip::FlipImageRgb8;
 
 use crate::device_with;
 use crate::subprocess::on_swiftshader;
@@ -167,14 +167,6 @@ fn difference_image(actual: &RgbaImage, expected: &RgbaImage) -> RgbaImage {
         .to_vec();
     let rgb = image::RgbImage::from_raw(width, height, colors).expect("FLIP keeps the size");
     image::DynamicImage::from(rgb).into_rgba8()
-}
-
-fn flip_errors(actual: &RgbaImage, expected: &RgbaImage) -> Vec<f32> {
-    let [actual, expected] = [actual, expected].map(|picture| {
-        let rgb: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        FlipImageRgb8::with_data(picture.width(), picture.height(), &rgb)
-    });
-    nv_flip::flip(expected, actual, nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec()
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ pub(crate) mod desc;
 pub(crate) mod flags;
 pub(crate) mod geometry;
 pub(crate) mod instance;
+pub(crate) mod instance_writing;
 pub(crate) mod micromap;
 pub(crate) mod micromap_desc;
 pub(crate) mod partition;

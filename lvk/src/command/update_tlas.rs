@@ -11,9 +11,9 @@ use super::recording_state::RecordingState;
 use crate::accel::AccelStruct;
 use crate::accel::blas_refs::{BitSet, BlasRefSet};
 use crate::accel::flags::BuildMode;
-use crate::accel::instance::{
-    DeviceInstances, INSTANCE_BYTES, InstanceSource, TlasInstance, WrittenRefs, first_needs_only_address,
-    instance_bytes, write_addresses, write_unchanged,
+use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, InstanceSource, TlasInstance, instance_bytes};
+use crate::accel::instance_writing::{
+    WrittenRefs, first_needs_only_address, write_addresses, write_unchanged,
 };
 use crate::accel::tlas::Tlas;
 use crate::accel::tlas_tracker::{RecordedTlasBuild, TlasChange, TlasEntry, TlasTrackers};

@@ -98,28 +98,32 @@ impl ClockReader {
         let clock = match self.clock.get() {
             Some(clock) => *clock,
             None => {
-                // SAFETY: the physical device belongs to the instance and has the extension.
-                let domains = unsafe {
-                    match &self.functions {
-                        Functions::Ext(instance, _) => {
-                            instance.get_physical_device_calibrateable_time_domains(self.physical)
-                        }
-                        Functions::Khr(instance, _) => {
-                            instance.get_physical_device_calibrateable_time_domains(self.physical)
-                        }
-                    }
-                };
-                let command = match &self.functions {
-                    Functions::Ext(..) => "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT",
-                    Functions::Khr(..) => "vkGetPhysicalDeviceCalibrateableTimeDomainsKHR",
-                };
-                let clock = HostClock::choose(&domains.map_err(Error::vulkan(command, CLOCKS))?);
+                let clock = HostClock::choose(&self.domains()?);
                 *self.clock.get_or_init(|| Some((clock?, clock?.frequency()?)))
             }
         };
         clock.ok_or_else(|| {
             Error::unsupported(CLOCKS, "the driver reads no clock of the host that this system has")
         })
+    }
+
+    /// Returns the clocks that the driver reads.
+    fn domains(&self) -> Result<Vec<vk::TimeDomainKHR>> {
+        let physical = self.physical;
+        // SAFETY: the physical device belongs to the instance and has the extension.
+        let (found, command) = unsafe {
+            match &self.functions {
+                Functions::Ext(instance, _) => (
+                    instance.get_physical_device_calibrateable_time_domains(physical),
+                    "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT",
+                ),
+                Functions::Khr(instance, _) => (
+                    instance.get_physical_device_calibrateable_time_domains(physical),
+                    "vkGetPhysicalDeviceCalibrateableTimeDomainsKHR",
+                ),
+            }
+        };
+        found.map_err(Error::vulkan(command, CLOCKS))
     }
 
     /// Reads both clocks; `milliseconds` converts ticks of the device.

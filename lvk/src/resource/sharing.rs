@@ -103,8 +103,10 @@ pub(crate) fn shareable_modifiers(
     let mut usable = Vec::new();
     for modifier in wanted {
         let is_known = all.iter().any(|found| found.drm_format_modifier == modifier);
-        let features = external_features(gpu, info, sharing.fd_type(), Some(modifier), name)?;
-        if is_known && features.contains(sharing.direction()) {
+        if is_known
+            && external_features(gpu, info, sharing.fd_type(), Some(modifier), name)?
+                .contains(sharing.direction())
+        {
             usable.push(modifier);
         }
     }

@@ -1,5 +1,7 @@
 //! Measures BVH builds by the CPU, phase by phase, for several numbers of threads, beside those of `obvhs`. Needs no device.
 
+use std::time::Duration;
+
 use lvk::test_hooks::{CpuBuild, ObvhsBuild, WideTree, build_by_obvhs, build_on_threads};
 
 use crate::args::{BenchArgs, BuildsArgs};
@@ -15,8 +17,9 @@ use crate::tree_rays::{bounce_rays, camera_rays, trace_all};
 struct ThreadRow {
     threads: usize,
     builds: Vec<CpuBuild>,
-    /// The same by `obvhs`.
-    others: Vec<ObvhsBuild>,
+    /// Times of the same by `obvhs`, and the tree of one of these builds.
+    others: Vec<Duration>,
+    tree_of_obvhs: Option<WideTree>,
     /// The same by Embree, if it is named.
     by_embree: Vec<EmbreeBuild>,
     /// Heap bytes that a build had at most, beside the mesh of the caller.
@@ -36,6 +39,7 @@ pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, Ben
             threads,
             builds: Vec::new(),
             others: Vec::new(),
+            tree_of_obvhs: None,
             by_embree: Vec::new(),
             peak: 0,
         })
@@ -49,33 +53,31 @@ pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, Ben
     }
     let embree_tree = embree.map(|embree| embree.tree(&mesh.positions, &mesh.triangles)).transpose()?;
     let mut table = table(&mesh, runs, &rows);
-    add_trees(&mut table, &mesh, &rows, embree_tree, bench.quick);
+    let own = rows.iter().flat_map(|row| &row.builds).find_map(CpuBuild::tree);
+    let obvhs = rows.into_iter().find_map(|row| row.tree_of_obvhs);
+    let trees = [("lvk", own), ("obvhs", obvhs), ("Embree, medium", embree_tree)];
+    let trees: Vec<_> = trees.into_iter().filter_map(|(name, tree)| Some((name, tree?))).collect();
+    add_trees(&mut table, &mesh, &trees, bench.quick);
     Ok(table)
 }
 
 /// Adds the cost of the tree of each builder, and the work of the same rays in each.
-fn add_trees(table: &mut Table, mesh: &Mesh, rows: &[ThreadRow], embree: Option<WideTree>, quick: bool) {
-    let own = rows.iter().flat_map(|row| &row.builds).find_map(CpuBuild::tree);
-    let obvhs = rows.iter().flat_map(|row| &row.others).next().map(|build| build.tree.clone());
-    let trees: Vec<_> = [("lvk", own), ("obvhs", obvhs), ("Embree, medium", embree)]
-        .into_iter()
-        .filter_map(|(name, tree)| tree.map(|tree| (name, tree)))
-        .collect();
+fn add_trees(table: &mut Table, mesh: &Mesh, trees: &[(&str, WideTree)], quick: bool) {
     let Some((_, first)) = trees.first() else { return };
+    let costs: Vec<f64> = trees.iter().map(|(_, tree)| tree.sah_cost()).collect();
     let primary = camera_rays(mesh, if quick { [16, 9] } else { [320, 180] });
     let bounced = bounce_rays(first, &primary);
     for (kind, rays) in [("primary", &primary), ("bounce", &bounced)] {
-        let traced = trace_all(&trees, rays, if quick { 1 } else { 5 });
+        let traced = trace_all(trees, rays, if quick { 1 } else { 5 });
         let expected = traced[0].1;
-        for ((name, tree), (work, sum)) in trees.iter().zip(&traced) {
-            let each = |count: u64| count as f64 / rays.len().max(1) as f64;
+        for (((name, _), cost), (work, sum)) in trees.iter().zip(&costs).zip(&traced) {
+            let each = |count: f64| count / rays.len().max(1) as f64;
             table.add_note(format!(
-                "tree of {name}: SAH cost {:.5}; {} {kind} rays, each {:.2} nodes and {:.2} triangles, {:.0} ns on one thread{}",
-                tree.sah_cost(),
+                "tree of {name}: SAH cost {cost:.5}; {} {kind} rays, each {:.2} nodes and {:.2} triangles, {:.0} ns on one thread{}",
                 format_grouped(rays.len() as u64),
-                each(work.nodes),
-                each(work.triangles),
-                work.time * 1e6 / rays.len().max(1) as f64,
+                each(work.nodes as f64),
+                each(work.triangles as f64),
+                each(work.time * 1e6),
                 if (sum / expected - 1.0).abs() < 1e-6 { "" } else { ", WITH OTHER HITS" },
             ));
         }
@@ -88,7 +90,10 @@ fn measure_row(mesh: &Mesh, runs: u32, row: &mut ThreadRow) {
     build_on_threads(&mesh.positions, &mesh.triangles, threads, 1, |_| {});
     row.peak = peak_bytes().saturating_sub(before);
     build_on_threads(&mesh.positions, &mesh.triangles, threads, runs, |build| builds.push(build));
-    build_by_obvhs(&mesh.positions, &mesh.triangles, threads, runs, |build| row.others.push(build));
+    build_by_obvhs(&mesh.positions, &mesh.triangles, threads, runs, |ObvhsBuild { total, tree }| {
+        row.others.push(total);
+        row.tree_of_obvhs = Some(tree);
+    });
 }
 
 fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
@@ -116,7 +121,7 @@ fn table(mesh: &Mesh, runs: u32, rows: &[ThreadRow]) -> Table {
     table.add_row("peak heap memory, times the BLAS", rows.iter().map(peak_ratio));
     table.add_row(
         "total of obvhs 0.4, slow_build",
-        rows.iter().map(|row| format_ms(median_of(&row.others, |build| milliseconds(build.total)))),
+        rows.iter().map(|row| format_ms(median_of(&row.others, |total| milliseconds(*total)))),
     );
     add_embree(&mut table, rows);
     let all = || rows.iter().flat_map(|row| &row.builds);
@@ -134,10 +139,7 @@ fn add_embree(table: &mut Table, rows: &[ThreadRow]) {
         return;
     }
     for (name, time) in [
-        (
-            "total of Embree, medium quality",
-            (|build| build.medium) as fn(&EmbreeBuild) -> std::time::Duration,
-        ),
+        ("total of Embree, medium quality", (|build| build.medium) as fn(&EmbreeBuild) -> Duration),
         ("total of Embree, high quality", |build| build.high),
     ] {
         let median = |row: &ThreadRow| median_of(&row.by_embree, |build| milliseconds(time(build)));
@@ -154,6 +156,6 @@ fn peak_ratio(row: &ThreadRow) -> String {
     if row.peak == 0 { String::new() } else { format_ratio(row.peak as f64 / bytes.max(1) as f64) }
 }
 
-fn milliseconds(time: std::time::Duration) -> f64 {
+fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }

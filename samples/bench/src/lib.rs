@@ -11,6 +11,7 @@ mod compaction;
 mod cpu_overhead;
 mod embree;
 mod error;
+pub mod flip;
 mod growth;
 mod hand_written;
 mod instance_record;

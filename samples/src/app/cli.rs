@@ -35,7 +35,7 @@ use lvk_dev_driver::{DriverRequest, prepare};
 const GPU_FRAMES: u32 = 60;
 /// Frames that a GPU renders before any is timed, so that its clocks are up.
 const WARM_UP_FRAMES: u32 = 5;
-/// Most steps of a frame that is rendered more than once to be timed where nobody asks for it.
+/// Frames of more steps are rendered without those, and once unless `--frames` asks for more.
 const MOST_TIMED_STEPS: u64 = 16;
 
 /// Width of the commands in the examples of a help.

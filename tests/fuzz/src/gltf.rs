@@ -1,15 +1,13 @@
 //! The target `gltf`: what programs rely on of any model that loads.
 
-use crate::gltf_edits::edited_model;
 use lvk_gltf::{LoadOptions, MemoryLimit, Model, Primitive, TextureRef};
+
+use crate::gltf_edits::edited_model;
 
 /// A `.gltf` or `.glb` file that may name no others. A first byte below 16 is a number of a model, whose JSON the rest edits: so
 /// inputs get behind the container and the parser.
 pub(crate) fn read_gltf(bytes: &[u8]) {
-    match edited_model(bytes) {
-        Some(edited) => loads(&edited),
-        None => loads(bytes),
-    };
+    loads(edited_model(bytes).as_deref().unwrap_or(bytes));
 }
 
 /// Reads a file, and checks what programs rely on. True if it loads. Within the bound of the target lie that of the load, and the

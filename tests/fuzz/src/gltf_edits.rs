@@ -2,8 +2,6 @@
 
 use serde_json::{Value, json};
 
-use crate::input::Input;
-
 /// Models of the corpus, each with other features.
 const MODELS: [&[u8]; 8] = [
     include_bytes!("../corpus/gltf/rich.glb"),
@@ -24,14 +22,11 @@ const MOST_EDITS: usize = 8;
 /// Returns the `.glb` of an input whose first byte is below 16: the model of that number, after edits of four bytes each. The first
 /// two choose a value, the third what becomes of it, and the fourth by what. `None` for other inputs.
 pub(crate) fn edited_model(bytes: &[u8]) -> Option<Vec<u8>> {
-    let mut input = Input::new(bytes);
-    let model = bytes.first().filter(|first| **first < 16)?;
-    input.byte();
+    let (model, edits) = bytes.split_first().filter(|(first, _)| **first < 16)?;
     let (json, binary) = parts_of(MODELS[usize::from(*model) % MODELS.len()])?;
     let mut json: Value = serde_json::from_slice(json).ok()?;
     let mut binary = binary.to_vec();
-    for edit in input.rest().chunks_exact(4).take(MOST_EDITS) {
-        let [low, high, kind, value] = [0, 1, 2, 3].map(|at| edit[at]);
+    for [low, high, kind, value] in edits.as_chunks().0.iter().copied().take(MOST_EDITS) {
         let place = u16::from_le_bytes([low, high]);
         if kind % 8 == 7 {
             let at = usize::from(place) % binary.len().max(1);

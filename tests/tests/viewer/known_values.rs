@@ -134,8 +134,7 @@ fn a_lamp_of_triangles_lights_as_its_solid_angle() {
     assert_close("a glowing ceiling", actual, [1.0, 2.0, 3.0].map(|light| 0.6 * factor * light), 0.02);
 }
 
-/// A file with light from a tenth of all directions, around +x and above the horizon, lights walls and a floor as its pixels say, turned
-/// or not.
+/// A file with light from a tenth of all directions, around +x and above the horizon, lights walls as its pixels say, turned or not.
 #[test]
 fn an_environment_file_lights_from_its_directions() {
     const SIZE: [u32; 2] = [64, 32];

@@ -11,9 +11,8 @@ use ash::vk;
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::blas_refs::{BlasRef, BlasRefSet};
-use crate::accel::instance::{
-    DeviceInstances, TlasInstance, check_instance, instance_bytes, write_plain_addresses,
-};
+use crate::accel::instance::{DeviceInstances, TlasInstance, check_instance, instance_bytes};
+use crate::accel::instance_writing::write_plain_addresses;
 use crate::command::CommandBuffer;
 use crate::software_ray_query::blas::{BvhOrigin, SoftwareBlas};
 use crate::software_ray_query::gpu_build::geometry::{GpuGeometry, gpu_geometries};

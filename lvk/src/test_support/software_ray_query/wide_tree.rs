@@ -28,7 +28,7 @@ pub struct WideChild {
     pub link: WideLink,
 }
 
-/// What a child is.
+/// A place for a child: empty, a node or a leaf.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WideLink {
     /// No child.

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use image::RgbaImage;
+use lvk_bench::flip::flip_errors;
 use lvk_samples::app::metrics;
 use lvk_samples::picture::{self, Bounds};
-use nv_flip::FlipImageRgb8;
 
 /// Compares two images of the same size.
 #[derive(Parser)]
@@ -41,18 +41,9 @@ fn compare(args: &Args) -> Result<String, String> {
     let (width, height) = first.dimensions();
     let found = metrics::compare(first.as_raw(), second.as_raw(), width, height);
     let found = found.map_err(|error| error.to_string())?;
-    Ok(format!("{found}, FLIP {:.4}", flip(&first, &second)))
-}
-
-/// Returns the mean of FLIP's errors (Andersson et al., 2020): 0 for images that look the same, 1 for black beside white. The second
-/// image is the reference.
-fn flip(first: &RgbaImage, reference: &RgbaImage) -> f64 {
-    let [first, reference] = [first, reference].map(|image| {
-        let rgb: Vec<u8> = image.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        FlipImageRgb8::with_data(image.width(), image.height(), &rgb)
-    });
-    let errors = nv_flip::flip(reference, first, nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec();
-    errors.iter().map(|error| f64::from(*error)).sum::<f64>() / errors.len().max(1) as f64
+    let errors = flip_errors(&first, &second);
+    let flip = errors.iter().map(|error| f64::from(*error)).sum::<f64>() / errors.len().max(1) as f64;
+    Ok(format!("{found}, FLIP {flip:.4}"))
 }
 
 fn read(path: &Path) -> Result<RgbaImage, String> {

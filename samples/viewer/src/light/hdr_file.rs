@@ -9,8 +9,10 @@ use lvk_samples::app::input_file::{self, FileKind};
 
 use super::sky_map::SkyMap;
 
-/// Most texels in a row of a file, and of the map that is made of it: finer ones are averaged.
-const MOST_WIDTH: [u32; 2] = [8192, 2048];
+/// Most texels in a row of a file.
+const MOST_FILE_WIDTH: u32 = 8192;
+/// Most texels in a row of the map that is made of a file: finer files are averaged.
+const MOST_MAP_WIDTH: u32 = 2048;
 /// Largest radiance that is kept: a sun in the picture is a few texels.
 const MOST_RADIANCE: f32 = 1e8;
 
@@ -37,7 +39,7 @@ pub enum EnvironmentError {
     /// The picture does not show all directions, or it is too large.
     #[error(
         "{file} has {width} x {height} texels; an environment is twice as wide as high, 2 to {} texels wide",
-        MOST_WIDTH[0]
+        MOST_FILE_WIDTH
     )]
     Size {
         /// The file.
@@ -57,13 +59,13 @@ pub(super) fn read(path: &Path, rotation_degrees: f32) -> Result<SkyMap, Environ
     let failed = |source| EnvironmentError::Decode { file: file(), source };
     let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(failed)?;
     let (width, height) = decoder.dimensions();
-    if width != 2 * height || !(2..=MOST_WIDTH[0]).contains(&width) {
+    if width != 2 * height || !(2..=MOST_FILE_WIDTH).contains(&width) {
         return Err(EnvironmentError::Size { file: file(), width, height });
     }
     let picture = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgb32f();
     let texels = picture.pixels().map(|texel| texel.0.map(radiance)).collect();
     let mut map = SkyMap { width, height, texels };
-    while map.width > MOST_WIDTH[1] {
+    while map.width > MOST_MAP_WIDTH {
         map = halved(&map);
     }
     turn(&mut map, rotation_degrees);
