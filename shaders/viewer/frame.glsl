@@ -74,6 +74,9 @@ struct TextureSlot {
     uint tex;
     uint smp;
     uint set; // 0 or 1: which texture coordinates
+    uint image; // whose levels are resident from firstMip on
+    uint firstMip;
+    uvec2 extent; // texels of the largest level of the image
     vec4 columns;
     vec2 offset;
 };
@@ -121,6 +124,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Slo
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightArray { Light at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer EmitterArray { Emitter at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FloatArray { float at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) coherent buffer LevelArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { vec4 at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
@@ -154,6 +158,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     Camera seen; // the camera without the shift within a pixel
     Camera seenBefore; // of the frame before, likewise
     SumArray planes; // of plane.glsl
+    uvec2 wantedMips; // of each image the finest level that was read; 0 if all levels are resident
     uint frameNumber; // since the camera was chosen; 0: there is no frame before
     uint stillCount; // frames since the camera moved
     uint view; // what the picture shows: kViewLight or another of plane.glsl

@@ -9,6 +9,8 @@
 
 // Surfaces of a path before chance may end it.
 const uint kSureBounces = 3u;
+// Angle of the cone that a scattered ray stands for, over the root of the solid angle of one that is as likely.
+const float kConeShare = 0.25;
 
 vec3 leaveTo(Surface surface, vec3 direction) {
     bool isAbove = dot(direction, surface.geometricNormal) > 0.0;
@@ -55,10 +57,12 @@ struct Path {
     vec3 from; // the surface that the direction was drawn at
     vec3 extinction; // of the volume that the path is in
     float squeezed; // radiance is eta^2 as much inside of a volume, which comes back at its end
+    float spread; // of the cone that the path stands for, over its length; 0: textures are read unfiltered
+    float width; // of the cone at the origin
 };
 
 Path firstPath(vec3 origin, vec3 direction) {
-    return Path(origin, direction, -1.0, origin, vec3(0.0), 1.0);
+    return Path(origin, direction, -1.0, origin, vec3(0.0), 1.0, 0.0, 0.0);
 }
 
 // Goes on from a surface.
@@ -70,6 +74,9 @@ void follow(inout Path path, Surface surface, Bsdf bsdf, Scattered scattered) {
     path.extinction = extinctionTowards(surface, scattered.direction, path.extinction);
     if (!isThin && dot(scattered.direction, surface.geometricNormal) < 0.0) {
         path.squeezed *= bsdf.eta * bsdf.eta;
+    }
+    if (path.spread > 0.0 && !scattered.isPane) {
+        path.spread = max(path.spread, kConeShare * inversesqrt(max(scattered.density, 1e-6)));
     }
     path.origin = leaveTo(surface, scattered.direction);
     path.direction = scattered.direction;
@@ -96,7 +103,8 @@ vec3 pathRadiance(Path path, uint bounce, inout Random random) {
             radiance += throughput * missedLight(path.direction, path.density);
             break;
         }
-        Surface surface = surfaceAt(hit, path.direction, 0.0);
+        path.width += path.spread * hit.distance;
+        Surface surface = surfaceAt(hit, path.direction, path.width);
         throughput *= exp(-path.extinction * hit.distance);
         if ((surface.flags & kUnlit) != 0u) {
             radiance += throughput * surface.baseColor;

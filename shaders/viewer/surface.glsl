@@ -90,8 +90,8 @@ void setMaterial(inout Surface surface, Texcoords texcoords, float footprint) {
     surface.sheenRoughness = all.at[number].sheenRoughness * texelOf(number, kSlotSheenRoughness, texcoords, footprint).a;
 }
 
-// `spread`: width of the ray at the surface over its distance; 0 for texels of the largest mip.
-Surface surfaceAt(Hit hit, vec3 direction, float spread) {
+// `width`: of the ray at the surface; 0 for texels of the largest mip.
+Surface surfaceAt(Hit hit, vec3 direction, float width) {
     Instance instance = frame.instances.at[hit.instance];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + hit.geometry];
     uvec3 corners = CornerArray(geometry.indices).at[hit.primitive];
@@ -115,11 +115,11 @@ Surface surfaceAt(Hit hit, vec3 direction, float spread) {
     surface.geometricNormal = surface.isFront ? front : -front;
     Texcoords texcoords = texcoordsOf(all, corners, weights);
     float footprint = 0.0;
-    if (spread > 0.0) {
+    if (width > 0.0) {
         vec2 e1 = all.at[corners.y].texcoords[0] - all.at[corners.x].texcoords[0];
         vec2 e2 = all.at[corners.z].texcoords[0] - all.at[corners.x].texcoords[0];
         float density = sqrt(abs(e1.x * e2.y - e1.y * e2.x) / max(area, 1e-30));
-        footprint = density * spread * hit.distance / sqrt(max(abs(dot(front, direction)), 0.05));
+        footprint = density * width / sqrt(max(abs(dot(front, direction)), 0.05));
     }
     surface.baseColor = baseColorOf(surface.material, all, corners, weights, texcoords, footprint).rgb;
     setMaterial(surface, texcoords, footprint);

@@ -1,4 +1,5 @@
 // The triangle that a pixel shows.
+#define VIEWER_RASTERISES
 #include "viewer/candidate.glsl"
 
 layout(location = 0) flat in uvec2 inTriangle;

@@ -73,7 +73,7 @@ void visibleLightPixel(uvec2 pixel) {
         return;
     }
     Hit hit = visibleHit(visible, frame.camera.eye, direction);
-    Surface surface = surfaceAt(hit, direction, frame.camera.pixelSpread);
+    Surface surface = surfaceAt(hit, direction, frame.camera.pixelSpread * hit.distance);
     Seen seen = Seen(surface.normal, hit.distance, hit.instance, surface.roughness);
     storePoint(place, pointBefore(hit, frame.camera.eye + hit.distance * direction));
     if ((surface.flags & kUnlit) != 0u) {
@@ -92,6 +92,8 @@ void visibleLightPixel(uvec2 pixel) {
     vec3 mirrored = direct.all - direct.matte;
     if (any(greaterThan(scattered.weight, none))) {
         Path path = firstPath(surface.position, direction);
+        path.spread = frame.camera.pixelSpread;
+        path.width = path.spread * hit.distance;
         follow(path, surface, bsdf, scattered);
         vec3 light = pathRadiance(path, 1u, random);
         matte += scattered.matte * light;

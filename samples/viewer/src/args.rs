@@ -59,6 +59,10 @@ pub struct ViewerArgs {
     #[arg(long, value_enum, default_value_t = ToneMapping::Neutral)]
     pub tone: ToneMapping,
 
+    /// Most memory of textures in MiB, 1 to 65536: mip levels come and go by what the picture needs [default: all levels stay]
+    #[arg(long, value_name = "MIB", value_parser = whole(1..=65536))]
+    pub texture_budget: Option<u32>,
+
     /// Light from outside of the model
     #[command(flatten)]
     pub light: LightArgs,

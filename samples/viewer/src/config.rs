@@ -72,6 +72,9 @@ pub struct ViewerConfig {
     pub tone_mapping: ToneMapping,
     /// Contents of the picture.
     pub content: Content,
+    /// Most bytes of textures, whose mip levels then come and go by what shaders read; all levels stay if there is none. It is that of
+    /// the model for as long as the model is shown.
+    pub texture_budget: Option<u64>,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
     pub is_progressive: bool,
 }
@@ -97,6 +100,7 @@ impl ViewerConfig {
             exposure_stops: 0.0,
             tone_mapping: ToneMapping::default(),
             content: Content::default(),
+            texture_budget: None,
             is_progressive: false,
         }
     }

@@ -26,4 +26,5 @@ mod viewer_sample;
 
 pub use args::{LightArgs, SkyArg, ViewerArgs};
 pub use config::{Content, Method, ToneMapping, ViewerConfig};
+pub use gpu::TextureMemory;
 pub use viewer::{Viewer, ViewerScene};

@@ -81,6 +81,7 @@ impl Request {
             bounces: args.bounces,
             exposure_stops: args.exposure,
             tone_mapping: args.tone,
+            texture_budget: args.texture_budget.map(|mib| u64::from(mib) << 20),
             is_progressive: self.is_for_window,
             ..ViewerConfig::new(path, width, height)
         })

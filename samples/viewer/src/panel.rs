@@ -4,6 +4,7 @@ use egui::{Color32, RichText};
 use lvk_gltf::Animation;
 
 use crate::config::{Content, Method, ToneMapping, ViewerConfig};
+use crate::gpu::TextureMemory;
 use crate::model::ModelCamera;
 
 /// Lays out the name of the model, and why the last file that was dropped is not shown, if so.
@@ -23,6 +24,13 @@ pub(crate) fn show_error(ui: &mut egui::Ui, error: Option<&str>) {
 pub(crate) fn show_memory(ui: &mut egui::Ui, bytes: [u64; 2]) {
     let [meshes, top] = bytes.map(|bytes| bytes as f64 / 1024.0 / 1024.0);
     ui.label(format!("structures: {meshes:.2} MiB of meshes, {top:.2} MiB of the top level"));
+}
+
+/// Lays out the memory of textures, if it is bounded.
+pub(crate) fn show_textures(ui: &mut egui::Ui, memory: Option<TextureMemory>) {
+    let Some(TextureMemory { budget, resident, coarse_count }) = memory else { return };
+    let [budget, resident] = [budget, resident].map(|bytes| bytes as f64 / 1024.0 / 1024.0);
+    ui.label(format!("textures: {resident:.1} of {budget:.1} MiB; {coarse_count} coarser than seen"));
 }
 
 /// Lays out the list of animations. Returns another choice than `chosen`.

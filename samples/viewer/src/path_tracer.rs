@@ -7,6 +7,7 @@ use lvk::{
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::pipelines::SampleStage;
 
+use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, SCENE_LAYOUTS};
 use crate::pipelines::{CANDIDATE, NEAREST_HIT, NEAREST_MISS, PATH_QUERY, PATH_RAYS, SAMPLE};
 
@@ -27,17 +28,20 @@ impl PathTracer {
         })
     }
 
-    /// Records a pass over a picture of `extent` pixels whose sums are `sums`. It reads what was `written` before.
+    /// Records a pass over a picture of `extent` pixels whose sums are `sums`.
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
         sums: BufferHandle,
-        written: &[BufferHandle],
+        scene: FrameScene<'_>,
         extent: [u32; 2],
     ) -> lvk::Result<()> {
-        let dependencies =
-            Dependencies { buffers: &[sums], read_buffers: written, ..Dependencies::default() };
+        let dependencies = Dependencies {
+            buffers: &scene.buffers(sums),
+            read_buffers: scene.written,
+            ..Dependencies::default()
+        };
         match self {
             Self::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;

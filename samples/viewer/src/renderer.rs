@@ -69,7 +69,7 @@ impl Renderer {
             Self::Hybrid(hybrid) => hybrid.record(to, frame, scene),
             Self::PathTrace { tracer, sums } => {
                 let push = Push { frame, argument: 0, _padding: 0 };
-                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, scene.written, extent))
+                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, scene, extent))
             }
         }
     }

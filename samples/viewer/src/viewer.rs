@@ -11,7 +11,7 @@ use lvk_samples::scene::{Camera, GpuCamera};
 use crate::config::{Content, Method, ViewerConfig};
 use crate::dropped::DroppedFile;
 use crate::gpu::layout::{FrameConstants, Push};
-use crate::gpu::{FrameScene, GpuScene};
+use crate::gpu::{FrameScene, GpuScene, TextureMemory};
 use crate::light::Environment;
 use crate::model::{self, ModelCamera};
 use crate::playback::Playback;
@@ -79,7 +79,7 @@ impl Viewer {
         let pose = scene.model.pose(None, 0.0);
         let bounds = model::bounds(&scene.model, shown, &pose);
         let light = (&scene.environment, scene.disc_radius);
-        let gpu = GpuScene::new(ctx, (&scene.model, shown), &pose, light, &bounds)?;
+        let gpu = GpuScene::new(ctx, (&scene.model, shown), &pose, light, &bounds, config.texture_budget)?;
         let cameras = model::cameras_around(&scene.model, shown, &pose, &bounds);
         let camera = cameras[0].camera;
         Ok(Self {
@@ -179,6 +179,12 @@ impl Viewer {
         (self.scene.triangle_count, self.scene.instance_count())
     }
 
+    /// What textures take; `None` without a budget.
+    #[must_use]
+    pub fn texture_memory(&self) -> Option<TextureMemory> {
+        self.scene.texture_memory()
+    }
+
     /// What the picture leaves out, for the user to read.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
@@ -213,7 +219,7 @@ impl Viewer {
         if config.bounces != before.bounces {
             self.done = 0;
         }
-        self.config = *config;
+        self.config = ViewerConfig { texture_budget: before.texture_budget, ..*config };
         Ok(())
     }
 
@@ -279,6 +285,7 @@ impl Viewer {
             seen,
             seen_before: gpu(if self.is_first() { &self.camera } else { &self.before }),
             planes: addresses.planes,
+            wanted_mips: self.scene.wanted_mips().map_or(Ok(0), |buffer| self.ctx.buffer_address(buffer))?,
             frame_number: self.frame_number,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
@@ -297,7 +304,11 @@ impl Viewer {
     ) -> lvk::Result<()> {
         self.scene.record_motion(frame, self.is_first())?;
         let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
-        let scene = FrameScene { draws: self.scene.draws(), written: &self.scene.written() };
+        let scene = FrameScene {
+            draws: self.scene.draws(),
+            written: &self.scene.written(),
+            wanted_mips: self.scene.wanted_mips(),
+        };
         self.renderer.record(frame, constants, extent, scene)?;
         if is_shown {
             let (push, sums, image) = (

@@ -15,12 +15,50 @@ use crate::present::Present;
 use crate::renderer::Renderer;
 use crate::viewer::Viewer;
 
+/// Most rounds of frames that look for the mip levels of a picture. Other levels may bend rays, which read other levels then.
+const MOST_ROUNDS: u32 = 4;
+/// Frames of a round.
+const FRAMES_OF_ROUND: u32 = 4;
+
 impl Viewer {
     /// One more sample, or one more frame of the real-time method, which never ends.
-    fn record_progress(&mut self, frame: &mut Frame<'_>) -> lvk::Result<()> {
+    fn record_progress(&mut self, frame: &mut Frame<'_>) -> Result<(), RunError> {
+        if self.scene.stream_textures(&self.ctx)? {
+            self.done = 0;
+        }
+        self.scene.clear_wanted_mips(&mut frame.cmd)?;
         let is_whole = self.config.method == Method::PathTrace && self.done >= self.config.samples;
         let count = if is_whole { 0 } else { 1 };
-        if count > 0 { self.add_samples(frame, count, true) } else { Ok(()) }
+        if count > 0 {
+            self.add_samples(frame, count, true)?;
+        }
+        Ok(())
+    }
+
+    /// Begins a picture anew.
+    fn begin(&mut self) {
+        (self.done, self.frame_number, self.before) = (0, 0, self.camera);
+    }
+
+    /// Renders a few frames that nobody sees until the mip levels are resident that they read.
+    fn settle_textures(&mut self) -> lvk::Result<()> {
+        if self.scene.texture_memory().is_none() {
+            return Ok(());
+        }
+        for round in 0..MOST_ROUNDS {
+            let mut frame = Frame::free(&self.ctx)?;
+            self.scene.clear_wanted_mips(&mut frame.cmd)?;
+            for _ in 0..FRAMES_OF_ROUND {
+                self.add_samples(&mut frame, 1, false)?;
+                frame.next_step()?;
+            }
+            frame.finish()?;
+            self.begin();
+            if !self.scene.settle_textures(&self.ctx, round == 0)? {
+                break;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -37,7 +75,7 @@ impl Sample for Viewer {
         let phase = if self.playback.animation.is_some() { 0.0 } else { time.phase() };
         self.set_camera(&around(&self.cameras[self.chosen].camera, phase));
         if !self.config.is_progressive {
-            (self.done, self.frame_number, self.before) = (0, 0, self.camera);
+            self.begin();
         }
     }
 
@@ -56,7 +94,8 @@ impl Sample for Viewer {
             self.record_progress(frame)?;
             return Ok(self.target.image());
         }
-        (self.done, self.frame_number, self.before) = (0, 0, self.camera);
+        self.begin();
+        self.settle_textures()?;
         while self.done < self.config.samples {
             if self.done > 0 {
                 frame.next_step()?;
@@ -115,6 +154,7 @@ impl Sample for Viewer {
         let (triangles, instances) = self.counts();
         ui.label(format!("samples: {}; {triangles} triangles, {instances} instances", self.done));
         panel::show_memory(ui, self.scene.structure_bytes);
+        panel::show_textures(ui, self.texture_memory());
     }
 
     fn overlay(&mut self, ui: &egui::Context) {

@@ -13,3 +13,4 @@ mod reference;
 mod reference_tracer;
 mod scenes;
 mod still_life;
+mod texture_budget;

@@ -93,6 +93,9 @@ lvk::shader_struct! {
         pub(crate) tex: u32,
         pub(crate) sampler as smp: u32,
         pub(crate) set: u32,
+        pub(crate) image: u32,
+        pub(crate) first_mip: u32,
+        pub(crate) extent: [u32; 2],
         pub(crate) columns: [f32; 4],
         pub(crate) offset: [f32; 2],
     }
@@ -190,6 +193,7 @@ lvk::shader_struct! {
         pub(crate) seen: GpuCamera,
         pub(crate) seen_before: GpuCamera,
         pub(crate) planes: u64,
+        pub(crate) wanted_mips: u64,
         pub(crate) frame_number: u32,
         pub(crate) still_count: u32,
         pub(crate) view: u32,

@@ -56,24 +56,8 @@ impl GpuMaterials {
     }
 
     fn slots(&mut self, material: &Material, textures: &GpuTextures) -> [u32; slot::COUNT] {
-        let coat = material.clearcoat.as_ref();
-        let (specular, sheen) = (material.specular.as_ref(), material.sheen.as_ref());
-        let transmission = material.transmission.as_ref();
         let mut slots = [NO_TEXTURE; slot::COUNT];
-        let uses = [
-            (slot::BASE_COLOR, material.base_color_texture),
-            (slot::METAL_ROUGH, material.metallic_roughness_texture),
-            (slot::NORMAL, material.normal_texture),
-            (slot::EMISSION, material.emissive_texture),
-            (slot::TRANSMISSION, transmission.and_then(|transmission| transmission.texture)),
-            (slot::SPECULAR, specular.and_then(|specular| specular.texture)),
-            (slot::SPECULAR_COLOR, specular.and_then(|specular| specular.color_texture)),
-            (slot::COAT, coat.and_then(|coat| coat.texture)),
-            (slot::COAT_ROUGHNESS, coat.and_then(|coat| coat.roughness_texture)),
-            (slot::SHEEN_COLOR, sheen.and_then(|sheen| sheen.color_texture)),
-            (slot::SHEEN_ROUGHNESS, sheen.and_then(|sheen| sheen.roughness_texture)),
-        ];
-        for (place, texture) in uses {
+        for (place, texture) in textures_of(material) {
             if let Some(texture) = texture {
                 slots[place] = self.slot(&texture, textures);
             }
@@ -82,17 +66,36 @@ impl GpuMaterials {
     }
 
     fn slot(&mut self, texture: &TextureRef, textures: &GpuTextures) -> u32 {
-        let Some((tex, sampler)) = textures.indices(texture) else { return NO_TEXTURE };
+        let Some(slot) = textures.slot(texture) else { return NO_TEXTURE };
         let (columns, offset) = texture.transform.as_ref().map_or((Mat2::IDENTITY, Vec2::ZERO), affine);
         self.slots.push(GpuTextureSlot {
-            tex,
-            sampler,
             set: texture.tex_coord.min(1) as u32,
             columns: columns.to_cols_array(),
             offset: offset.to_array(),
+            ..slot
         });
         self.slots.len() as u32 - 1
     }
+}
+
+/// The textures that the viewer reads of a material, and their places among its slots.
+pub(super) fn textures_of(material: &Material) -> [(usize, Option<TextureRef>); slot::COUNT] {
+    let coat = material.clearcoat.as_ref();
+    let (specular, sheen) = (material.specular.as_ref(), material.sheen.as_ref());
+    let transmission = material.transmission.as_ref();
+    [
+        (slot::BASE_COLOR, material.base_color_texture),
+        (slot::METAL_ROUGH, material.metallic_roughness_texture),
+        (slot::NORMAL, material.normal_texture),
+        (slot::EMISSION, material.emissive_texture),
+        (slot::TRANSMISSION, transmission.and_then(|transmission| transmission.texture)),
+        (slot::SPECULAR, specular.and_then(|specular| specular.texture)),
+        (slot::SPECULAR_COLOR, specular.and_then(|specular| specular.color_texture)),
+        (slot::COAT, coat.and_then(|coat| coat.texture)),
+        (slot::COAT_ROUGHNESS, coat.and_then(|coat| coat.roughness_texture)),
+        (slot::SHEEN_COLOR, sheen.and_then(|sheen| sheen.color_texture)),
+        (slot::SHEEN_ROUGHNESS, sheen.and_then(|sheen| sheen.roughness_texture)),
+    ]
 }
 
 /// Properties of a material that the viewer does not show, a line each.

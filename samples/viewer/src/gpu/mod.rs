@@ -15,6 +15,7 @@ mod vertices;
 
 pub(crate) use instances::Draw;
 pub(crate) use scene::GpuScene;
+pub use textures::TextureMemory;
 
 /// What a frame rasterises and traces.
 #[derive(Debug, Clone, Copy)]
@@ -23,4 +24,13 @@ pub(crate) struct FrameScene<'a> {
     pub(crate) draws: &'a [Draw],
     /// Buffers that commands before have written.
     pub(crate) written: &'a [lvk::BufferHandle],
+    /// The buffer that shaders write the mip levels to that they want, if levels come and go.
+    pub(crate) wanted_mips: Option<lvk::BufferHandle>,
+}
+
+impl FrameScene<'_> {
+    /// Buffers that a pass writes which reads textures and writes `own`.
+    pub(crate) fn buffers(&self, own: lvk::BufferHandle) -> Vec<lvk::BufferHandle> {
+        [Some(own), self.wanted_mips].into_iter().flatten().collect()
+    }
 }

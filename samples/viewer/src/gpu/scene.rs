@@ -4,6 +4,8 @@ use lvk::{AccelStructHandle, BufferHandle, BufferUsage, CommandBuffer, Context, 
 use lvk_gltf::{Bounds, Model, Placement, Pose};
 use lvk_samples::app::array_buffer::array;
 use lvk_samples::app::frame::Frame;
+use lvk_samples::app::run_error::RunError;
+use lvk_samples::app::sample_error::SampleError;
 
 use super::albedo_table::albedo_table;
 use super::emitters::Emitters;
@@ -13,7 +15,7 @@ use super::layout::{EmissionConstants, GpuTextureSlot, LightConstants, SceneCons
 use super::lights::{GpuLights, LightSetting};
 use super::materials::GpuMaterials;
 use super::motion::SceneMotion;
-use super::textures::GpuTextures;
+use super::textures::{GpuTextures, TextureMemory};
 use crate::light::Environment;
 use crate::model::rig;
 
@@ -43,7 +45,9 @@ pub(crate) struct GpuScene {
     /// `None` if the model has no animations.
     motion: Option<SceneMotion>,
     meshes: GpuMeshes,
-    _textures: GpuTextures,
+    textures: GpuTextures,
+    /// Texture slots of the materials. Those on the GPU are the same unless mip levels come and go.
+    slots: Vec<GpuTextureSlot>,
     _buffers: Vec<Holder<BufferHandle>>,
 }
 
@@ -56,8 +60,9 @@ impl GpuScene {
         pose: &Pose,
         (environment, disc_radius): (&Environment, f32),
         bounds: &Bounds,
-    ) -> lvk::Result<Self> {
-        let textures = GpuTextures::new(ctx, model)?;
+        texture_budget: Option<u64>,
+    ) -> Result<Self, SampleError> {
+        let textures = GpuTextures::new(ctx, model, texture_budget)?;
         let placements = model.placements(shown, pose);
         let keys: Vec<MeshKey> = placements.iter().map(|placement| MeshKey::new(model, placement)).collect();
         let UploadedMeshes { meshes, deformation } = GpuMeshes::upload(ctx, model, pose, &unique(&keys))?;
@@ -88,7 +93,8 @@ impl GpuScene {
             light_setting,
             motion: (!model.animations.is_empty()).then_some(motion),
             meshes,
-            _textures: textures,
+            textures,
+            slots: materials.slots,
             _buffers: arrays.held,
         })
     }
@@ -145,8 +151,13 @@ impl GpuScene {
 
     /// Uploads what moves, and returns what leads to the scene in this step of a frame.
     pub(crate) fn constants(&self, cmd: &mut CommandBuffer, is_first: bool) -> lvk::Result<SceneConstants> {
+        let slots = match self.textures.is_streaming() && !self.slots.is_empty() {
+            true => cmd.upload_slice(&self.slots)?,
+            false => self.constants.slots,
+        };
+        let constants = SceneConstants { slots, ..self.constants };
         let Some(motion) = self.motion.as_ref().filter(|_| !self.instances.table.is_empty()) else {
-            return Ok(self.constants);
+            return Ok(constants);
         };
         let (lights, emitters) = (&self.lights.lights, &self.emitters.triangles);
         Ok(SceneConstants {
@@ -155,8 +166,42 @@ impl GpuScene {
                 .upload_slice(&motion.transforms_before(self.instances.transforms(), is_first))?,
             lights: if lights.is_empty() { self.constants.lights } else { cmd.upload_slice(lights)? },
             emitters: if emitters.is_empty() { self.constants.emitters } else { cmd.upload_slice(emitters)? },
-            ..self.constants
+            ..constants
         })
+    }
+
+    /// What textures take; `None` without a budget.
+    pub(crate) fn texture_memory(&self) -> Option<TextureMemory> {
+        self.textures.memory()
+    }
+
+    /// The buffer that shaders write the mip levels to that they want, if levels come and go.
+    pub(crate) fn wanted_mips(&self) -> Option<BufferHandle> {
+        self.textures.report()
+    }
+
+    /// Records that shaders have wanted no mip level so far.
+    pub(crate) fn clear_wanted_mips(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        self.textures.clear_report(cmd)
+    }
+
+    /// Takes mip levels that a thread has loaded. Returns true if other levels are resident now.
+    pub(crate) fn stream_textures(&mut self, ctx: &Context) -> Result<bool, RunError> {
+        let changes = self.textures.go_on(ctx)?;
+        self.update_slots();
+        Ok(changes)
+    }
+
+    /// Waits for what shaders have wanted, and loads it. `is_first`: nothing that they wanted before counts. Returns true if other
+    /// levels are resident now.
+    pub(crate) fn settle_textures(&mut self, ctx: &Context, is_first: bool) -> lvk::Result<bool> {
+        let changes = self.textures.settle(ctx, is_first)?;
+        self.update_slots();
+        Ok(changes)
+    }
+
+    fn update_slots(&mut self) {
+        self.slots.iter_mut().for_each(|slot| self.textures.update(slot));
     }
 
     /// How light of triangles is looked for.

@@ -71,13 +71,13 @@ impl Hybrid {
         to.pass("visible triangles", |cmd| self.visibility.record(cmd, frame, scene))?;
         let (planes, visible) = (*self.planes, self.visibility.triangles());
         to.pass("light", |cmd| {
-            self.passes.record_light(cmd, &push(0), planes, (visible, scene.written), self.extent)
+            self.passes.record_light(cmd, &push(0), planes, (visible, scene), self.extent)
         })?;
         to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
         match self.passes.counts_steps() {
-            true => to.pass("steps", |cmd| {
-                self.passes.record_steps(cmd, &push(0), planes, scene.written, self.extent)
-            }),
+            true => {
+                to.pass("steps", |cmd| self.passes.record_steps(cmd, &push(0), planes, scene, self.extent))
+            }
             false => Ok(()),
         }
     }

@@ -7,6 +7,7 @@ use lvk::{
 use lvk_samples::hybrid::RayPath;
 
 use crate::config::{Content, ViewerConfig};
+use crate::gpu::FrameScene;
 use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
 use crate::path_tracer::{compute, groups, ray_pipeline};
 use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, LIGHT_QUERY, LIGHT_RAYS, STEPS, TEMPORAL};
@@ -47,18 +48,18 @@ impl Passes {
         })
     }
 
-    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`. They read what was `written` before.
+    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`.
     pub(crate) fn record_light(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
         planes: BufferHandle,
-        (visible, written): (TextureHandle, &[BufferHandle]),
+        (visible, scene): (TextureHandle, FrameScene<'_>),
         extent: [u32; 2],
     ) -> lvk::Result<()> {
         let dependencies = Dependencies {
-            buffers: &[planes],
-            read_buffers: written,
+            buffers: &scene.buffers(planes),
+            read_buffers: scene.written,
             sampled_images: &[visible],
             ..Dependencies::default()
         };
@@ -81,21 +82,23 @@ impl Passes {
         self.steps.is_some()
     }
 
-    /// Records the rays whose steps are counted, which read what was `written` before. Their picture takes the place of the
-    /// filters'.
+    /// Records the rays whose steps are counted. Their picture takes the place of the filters'.
     pub(crate) fn record_steps(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
         planes: BufferHandle,
-        written: &[BufferHandle],
+        scene: FrameScene<'_>,
         extent: [u32; 2],
     ) -> lvk::Result<()> {
         let Some(steps) = &self.steps else { return Ok(()) };
         cmd.bind_compute_pipeline(**steps)?;
         cmd.push_constants(push)?;
-        let dependencies =
-            Dependencies { buffers: &[planes], read_buffers: written, ..Dependencies::default() };
+        let dependencies = Dependencies {
+            buffers: &scene.buffers(planes),
+            read_buffers: scene.written,
+            ..Dependencies::default()
+        };
         cmd.dispatch(groups(extent), &dependencies)
     }
 
