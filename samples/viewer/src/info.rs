@@ -81,7 +81,7 @@ fn in_background(
 /// The device is opened when it is known how many textures it is to have room for.
 fn at_once(request: &Request, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Loading<Viewer>>, RunError> {
     let model = request.model(&mut setup.progress)?;
-    let textures = model.images.len() as u32 + OTHER_TEXTURES;
+    let textures = model.model.images.len() as u32 + OTHER_TEXTURES;
     let tracing = DeviceNeeds::tracing(request.args.tracing.rt);
     let context = setup.device(&DeviceNeeds { textures, ..tracing })?;
     let ReadySample { sample, summary } = request.viewer(&context, model, &mut setup.progress)?;

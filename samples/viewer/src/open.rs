@@ -1,5 +1,7 @@
 //! Opens the model that the arguments name.
 
+use std::time::{Duration, Instant};
+
 use lvk::{Context, RayQueryPath};
 use lvk_gltf::Model;
 use lvk_samples::app::cli::{ReadySample, warn};
@@ -22,6 +24,12 @@ pub(crate) struct Request {
     pub(crate) is_for_window: bool,
 }
 
+/// A model, and how long it took to load.
+pub(crate) struct LoadedModel {
+    pub(crate) model: Model,
+    time: Duration,
+}
+
 /// The model that the arguments name.
 pub(crate) fn model(args: &ViewerArgs, progress: &mut Progress) -> Result<Model, ModelError> {
     args.file.as_deref().map_or_else(|| Ok(showcase()), |file| load(file, progress))
@@ -29,28 +37,30 @@ pub(crate) fn model(args: &ViewerArgs, progress: &mut Progress) -> Result<Model,
 
 impl Request {
     /// Loads the model and prints its warnings.
-    pub(crate) fn model(&self, progress: &mut Progress) -> Result<Model, RunError> {
+    pub(crate) fn model(&self, progress: &mut Progress) -> Result<LoadedModel, RunError> {
+        let start = Instant::now();
         let model = model(&self.args, progress).map_err(RunError::input)?;
         progress.go_on()?;
         let warnings: Vec<String> = model.warnings.iter().map(ToString::to_string).collect();
         warn_beside(progress, &warnings);
-        Ok(model)
+        Ok(LoadedModel { model, time: start.elapsed() })
     }
 
     /// Uploads the model, chooses its camera and animation, and makes all pipelines.
     pub(crate) fn viewer(
         &self,
         ctx: &Context,
-        model: Model,
+        LoadedModel { model, time }: LoadedModel,
         progress: &mut Progress,
     ) -> Result<ReadySample<Viewer>, RunError> {
-        let args = &self.args;
+        let (args, start) = (&self.args, Instant::now());
         let animation = args.animation.as_deref().map(|wish| animation_place(&model, wish));
         let animation = animation.transpose().map_err(RunError::input)?;
         progress.stage("uploading the model and building acceleration structures", 0);
         let config = self.config(ctx)?;
         let scene = self.scene(model).map_err(RunError::input)?;
         let mut viewer = Viewer::new(ctx, &scene, &config)?;
+        let times = [time, start.elapsed()].map(|time| time.as_secs_f64());
         warn_beside(progress, viewer.warnings());
         if config.content == Content::Steps && ctx.capabilities().ray_query_path == RayQueryPath::Hardware {
             let text = "--view steps is black: the device counts no steps of its rays; --rt software does";
@@ -63,8 +73,9 @@ impl Request {
         }
         let (triangles, instances) = viewer.counts();
         let text = format!(
-            "{}: {triangles} triangles, {instances} instances; {} samples a pixel, paths of {} surfaces at most",
-            scene.name, config.samples, config.bounces
+            "{}: {triangles} triangles, {instances} instances, read in {:.2} s and made ready in {:.2} s; {} samples a pixel, \
+             paths of {} surfaces at most",
+            scene.name, times[0], times[1], config.samples, config.bounces
         );
         progress.pause();
         Ok(ReadySample::ray_traced(viewer, config.path, "a compute shader", &text))

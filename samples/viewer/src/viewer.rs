@@ -56,6 +56,8 @@ pub struct Viewer {
     /// True if another was chosen, until the window knows.
     pub(crate) has_chosen_camera: bool,
     pub(crate) dropped: DroppedFile,
+    /// True if a warning has told of textures that are coarser than a picture needs.
+    pub(crate) has_warned_of_textures: bool,
     /// Why the configuration that the panel asked for last cannot be, if so.
     pub(crate) refused: Option<String>,
     pub(crate) camera: Camera,
@@ -98,6 +100,7 @@ impl Viewer {
             chosen: 0,
             has_chosen_camera: false,
             dropped: DroppedFile::default(),
+            has_warned_of_textures: false,
             refused: None,
             camera,
             before: camera,

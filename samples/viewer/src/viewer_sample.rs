@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{Quat, Vec3};
 use lvk::{Context, TextureHandle};
+use lvk_samples::app::cli::warn;
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::run_error::RunError;
 use lvk_samples::app::sample::{FrameTime, Sample};
@@ -41,7 +42,7 @@ impl Viewer {
     }
 
     /// Renders a few frames that nobody sees until the mip levels are resident that they read.
-    fn settle_textures(&mut self) -> lvk::Result<()> {
+    fn load_wanted_textures(&mut self) -> lvk::Result<()> {
         if self.scene.texture_memory().is_none() {
             return Ok(());
         }
@@ -54,9 +55,16 @@ impl Viewer {
             }
             frame.finish()?;
             self.begin();
-            if !self.scene.settle_textures(&self.ctx, round == 0)? {
+            if !self.scene.load_wanted_textures(&self.ctx, round == 0)? {
                 break;
             }
+        }
+        let count = self.texture_memory().map_or(0, |memory| memory.coarse_count);
+        if count > 0 && !self.has_warned_of_textures {
+            self.has_warned_of_textures = true;
+            warn(&[format!(
+                "{count} images are coarser than the picture needs; a larger --texture-budget shows them"
+            )]);
         }
         Ok(())
     }
@@ -95,7 +103,7 @@ impl Sample for Viewer {
             return Ok(self.target.image());
         }
         self.begin();
-        self.settle_textures()?;
+        self.load_wanted_textures()?;
         while self.done < self.config.samples {
             if self.done > 0 {
                 frame.next_step()?;

@@ -11,6 +11,7 @@ mod moving_model;
 mod paths;
 mod reference;
 mod reference_tracer;
+mod sample_models;
 mod scenes;
 mod still_life;
 mod texture_budget;

@@ -30,7 +30,7 @@ const WALLS: usize = 6;
 /// Squares of two colours of which the fine levels show the most.
 fn checks(source: usize, color: [u8; 3]) -> Image {
     let texel = |place: u32| {
-        let is_dark = (place / SIDE / 3 + place % SIDE / 3) % 2 == 0;
+        let is_dark = (place / SIDE / 3 + place % SIDE / 3).is_multiple_of(2);
         let [red, green, blue] = if is_dark { color.map(|channel| channel / 3) } else { color };
         [red, green, blue, 255]
     };

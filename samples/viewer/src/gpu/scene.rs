@@ -194,8 +194,8 @@ impl GpuScene {
 
     /// Waits for what shaders have wanted, and loads it. `is_first`: nothing that they wanted before counts. Returns true if other
     /// levels are resident now.
-    pub(crate) fn settle_textures(&mut self, ctx: &Context, is_first: bool) -> lvk::Result<bool> {
-        let changes = self.textures.settle(ctx, is_first)?;
+    pub(crate) fn load_wanted_textures(&mut self, ctx: &Context, is_first: bool) -> lvk::Result<bool> {
+        let changes = self.textures.load_wanted(ctx, is_first)?;
         self.update_slots();
         Ok(changes)
     }

@@ -126,10 +126,10 @@ impl GpuTextures {
 
     /// Waits for what shaders have wanted, and loads it. `is_first`: nothing that they wanted before counts. Returns true if other
     /// levels are resident now.
-    pub(crate) fn settle(&mut self, ctx: &Context, is_first: bool) -> lvk::Result<bool> {
+    pub(crate) fn load_wanted(&mut self, ctx: &Context, is_first: bool) -> lvk::Result<bool> {
         let first_mips = self.first_mips();
         let Some(streaming) = &mut self.streaming else { return Ok(false) };
-        let changes = streaming.settle(ctx, &first_mips, is_first)?;
+        let changes = streaming.plan(ctx, &first_mips, is_first)?;
         let has_changes = !changes.is_empty();
         for (image, first_mip) in changes {
             let Some(streaming) = &self.streaming else { break };

@@ -122,7 +122,7 @@ impl TextureStreaming {
 
     /// Waits for the report of the commands so far. Returns the images that should have other levels, and their first ones: those that
     /// are too fine before the others. `is_first`: reports before do not count.
-    pub(super) fn settle(
+    pub(super) fn plan(
         &mut self,
         ctx: &Context,
         resident: &[u32],

@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_longer_read_is_forgotten_after_one_to_two_periods() {
+    fn levels_no_longer_read_are_forgotten_after_one_to_two_periods() {
         let mut wanted = WantedMips::new(2);
         assert_eq!(wanted.levels(), [UNREAD; 2]);
         wanted.add(&[3, UNREAD]);
