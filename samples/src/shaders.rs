@@ -114,6 +114,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/frame",
     "viewer/ggx",
     "viewer/hit",
+    "viewer/iridescence",
     "viewer/lights",
     "viewer/material",
     "viewer/path",

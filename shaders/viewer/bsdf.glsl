@@ -27,8 +27,8 @@ struct Bsdf {
     mat3 coatBasis;
     vec3 view; // in the basis
     vec3 coatView;
-    float alpha;
-    float coatAlpha;
+    vec2 alpha;
+    vec2 coatAlpha;
     float coat; // weights of the layers
     vec3 sheen;
     vec3 metal;
@@ -64,6 +64,17 @@ mat3 basisOf(vec3 n) {
     return mat3(vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x), vec3(b, side + n.y * n.y * a, -n.y), n);
 }
 
+// A basis whose first column is along `tangent`, or anywhere where that is 0.
+mat3 basisAlong(vec3 n, vec3 tangent) {
+    vec3 t = tangent - dot(tangent, n) * n;
+    float length2 = dot(t, t);
+    if (length2 < 1e-12) {
+        return basisOf(n);
+    }
+    t *= inversesqrt(length2);
+    return mat3(t, cross(n, t), n);
+}
+
 float largest(vec3 v) {
     return max(v.x, max(v.y, v.z));
 }
@@ -81,7 +92,7 @@ void setLayers(inout Bsdf bsdf, Surface surface, float below, vec3 split) {
     vec3 left = max(1.0 - reflectedShare(surface.f0, f90, split), 0.0);
     bool isVolume = surface.transmission > 0.0 && (surface.flags & kThin) == 0u;
     float glass = isVolume ? surface.transmission : 0.0;
-    bsdf.metal = below * metalness * rescattering(surface.baseColor, split);
+    bsdf.metal = below * metalness * rescattering(surface.metalF0, split);
     bsdf.dielectric = below * (1.0 - metalness) * (1.0 - glass) * rescattering(surface.f0, split);
     // Where the boundary bends nothing, light goes straight on.
     bool isStraight = abs(bsdf.eta - 1.0) < kStraightEta;
@@ -95,7 +106,7 @@ void setLayers(inout Bsdf bsdf, Surface surface, float below, vec3 split) {
         bsdf.pane = isPane(surface) ? matte * surface.transmission : vec3(0.0);
         bsdf.thin = isPane(surface) ? vec3(0.0) : matte * surface.transmission / max(split.x, 1e-4);
     }
-    vec3 metal = below * metalness * reflectedShare(surface.baseColor, vec3(1.0), split);
+    vec3 metal = below * metalness * reflectedShare(surface.metalF0, vec3(1.0), split);
     vec3 dielectric = below * (1.0 - metalness) * (1.0 - glass) * reflectedShare(surface.f0, f90, split);
     bsdf.reflected = metal + dielectric + bsdf.lobes[kCoatLobe] + bsdf.glass + bsdf.pane + bsdf.thin * split.x;
     bsdf.lobes[kSpecularLobe] = largest(metal) + largest(dielectric);
@@ -108,16 +119,16 @@ void setLayers(inout Bsdf bsdf, Surface surface, float below, vec3 split) {
 // `view`: where the ray came from.
 Bsdf bsdfOf(Surface surface, vec3 view) {
     Bsdf bsdf;
-    bsdf.basis = basisOf(surface.normal);
+    bsdf.basis = basisAlong(surface.normal, surface.tangent);
     bsdf.coatBasis = basisOf(surface.coatNormal);
     bsdf.view = view * bsdf.basis;
     bsdf.coatView = view * bsdf.coatBasis;
-    bsdf.alpha = alphaOf(surface.roughness);
-    bsdf.coatAlpha = alphaOf(surface.coatRoughness);
+    bsdf.alpha = surface.alpha;
+    bsdf.coatAlpha = vec2(alphaOf(surface.coatRoughness));
     bsdf.sheen = vec3(0.0);
     bsdf.thin = vec3(0.0);
     bsdf.pane = vec3(0.0);
-    bsdf.metalF0 = surface.baseColor;
+    bsdf.metalF0 = surface.metalF0;
     bsdf.f0 = surface.f0;
     bsdf.f90 = surface.f90;
     bsdf.glassTint = surface.baseColor;

@@ -15,6 +15,7 @@ const uint kAlphaMask = 1u; // holes where alpha is below the cutoff
 const uint kAlphaBlend = 2u; // alpha is the share of light that meets the surface
 const uint kDoubleSided = 4u;
 const uint kUnlit = 8u;
+const uint kTangents = 32u; // the surface has a direction: a normal map or anisotropy
 const uint kThin = 16u; // light that passes keeps its direction: there is no volume behind the surface
 
 // What a texture multiplies (places in Material.slots).
@@ -29,7 +30,11 @@ const uint kSlotCoat = 7u;
 const uint kSlotCoatRoughness = 8u;
 const uint kSlotSheenColor = 9u;
 const uint kSlotSheenRoughness = 10u;
-const uint kSlotCount = 11u;
+const uint kSlotCoatNormal = 11u;
+const uint kSlotAnisotropy = 12u;
+const uint kSlotFilm = 13u;
+const uint kSlotFilmThickness = 14u;
+const uint kSlotCount = 15u;
 
 // Kinds of lights.
 const uint kLightDisc = 0u; // infinitely far away, a disc in the sky
@@ -97,6 +102,12 @@ struct Material {
     float normalScale;
     float coat;
     float coatRoughness;
+    float coatNormalScale;
+    float anisotropy;
+    vec2 anisotropyDirection; // in the plane of the tangent
+    float film; // share of the surface that a thin film covers
+    float filmIor;
+    vec2 filmThickness; // in nanometres, where the texture is 0 and where it is 1
     uint flags;
     uint slots[kSlotCount]; // indices into the texture slots, or kNoTexture
 };

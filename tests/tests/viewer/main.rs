@@ -7,6 +7,7 @@ mod emitters;
 mod furnace;
 mod hybrid;
 mod known_values;
+mod layers;
 mod moving_model;
 mod paths;
 mod reference;

@@ -17,6 +17,7 @@ pub(crate) mod material_flag {
     pub(crate) const DOUBLE_SIDED: u32 = 4;
     pub(crate) const UNLIT: u32 = 8;
     pub(crate) const THIN: u32 = 16;
+    pub(crate) const TANGENTS: u32 = 32;
 }
 
 /// Places in `Material.slots`.
@@ -32,7 +33,11 @@ pub(crate) mod slot {
     pub(crate) const COAT_ROUGHNESS: usize = 8;
     pub(crate) const SHEEN_COLOR: usize = 9;
     pub(crate) const SHEEN_ROUGHNESS: usize = 10;
-    pub(crate) const COUNT: usize = 11;
+    pub(crate) const COAT_NORMAL: usize = 11;
+    pub(crate) const ANISOTROPY: usize = 12;
+    pub(crate) const FILM: usize = 13;
+    pub(crate) const FILM_THICKNESS: usize = 14;
+    pub(crate) const COUNT: usize = 15;
 }
 
 /// Values of `Light.kind`.
@@ -119,6 +124,12 @@ lvk::shader_struct! {
         pub(crate) normal_scale: f32,
         pub(crate) coat: f32,
         pub(crate) coat_roughness: f32,
+        pub(crate) coat_normal_scale: f32,
+        pub(crate) anisotropy: f32,
+        pub(crate) anisotropy_direction: [f32; 2],
+        pub(crate) film: f32,
+        pub(crate) film_ior: f32,
+        pub(crate) film_thickness: [f32; 2],
         pub(crate) flags: u32,
         pub(crate) slots: [u32; slot::COUNT],
     }

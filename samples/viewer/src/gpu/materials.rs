@@ -1,7 +1,7 @@
 //! Materials of a model as shaders read them.
 
 use glam::{Mat2, Vec2, Vec3};
-use lvk_gltf::{AlphaMode, Material, Model, TextureRef, TextureTransform};
+use lvk_gltf::{AlphaMode, Iridescence, Material, Model, TextureRef, TextureTransform};
 
 use super::layout::{GpuMaterial, GpuTextureSlot, NO_TEXTURE, material_flag, slot};
 use super::textures::GpuTextures;
@@ -10,16 +10,13 @@ use super::textures::GpuTextures;
 pub(crate) struct GpuMaterials {
     pub(crate) materials: Vec<GpuMaterial>,
     pub(crate) slots: Vec<GpuTextureSlot>,
-    /// What the picture leaves out, for the user to read.
-    pub(crate) warnings: Vec<String>,
 }
 
 impl GpuMaterials {
     /// The materials of a model, and the default material after them.
     pub(crate) fn new(model: &Model, textures: &GpuTextures) -> Self {
-        let mut all = Self { materials: Vec::new(), slots: Vec::new(), warnings: Vec::new() };
+        let mut all = Self { materials: Vec::new(), slots: Vec::new() };
         for material in model.materials.iter().chain([&Material::default()]) {
-            all.warnings.extend(ignored(material));
             let material = all.material(material, textures);
             all.materials.push(material);
         }
@@ -31,6 +28,7 @@ impl GpuMaterials {
         let specular = material.specular.unwrap_or(DEFAULT_SPECULAR);
         let coat = material.clearcoat.as_ref();
         let sheen = material.sheen.as_ref();
+        let (anisotropy, film) = (material.anisotropy.as_ref(), material.iridescence.as_ref());
         GpuMaterial {
             base_color: material.base_color,
             emission: emission.to_array(),
@@ -50,6 +48,15 @@ impl GpuMaterials {
             normal_scale: material.normal_scale,
             coat: coat.map_or(0.0, |coat| coat.factor),
             coat_roughness: coat.map_or(0.0, |coat| coat.roughness),
+            coat_normal_scale: coat.map_or(1.0, |coat| coat.normal_scale),
+            anisotropy: anisotropy.map_or(0.0, |anisotropy| anisotropy.strength),
+            anisotropy_direction: anisotropy.map_or([1.0, 0.0], |anisotropy| {
+                let (sine, cosine) = anisotropy.rotation.sin_cos();
+                [cosine, sine]
+            }),
+            film: film.map_or(0.0, |film| film.factor),
+            film_ior: film.map_or(1.0, |film| film.ior),
+            film_thickness: film.map_or([0.0; 2], film_thickness),
             flags: flags(material),
             slots: self.slots(material, textures),
         }
@@ -82,7 +89,7 @@ impl GpuMaterials {
 pub(super) fn textures_of(material: &Material) -> [(usize, Option<TextureRef>); slot::COUNT] {
     let coat = material.clearcoat.as_ref();
     let (specular, sheen) = (material.specular.as_ref(), material.sheen.as_ref());
-    let transmission = material.transmission.as_ref();
+    let (transmission, film) = (material.transmission.as_ref(), material.iridescence.as_ref());
     [
         (slot::BASE_COLOR, material.base_color_texture),
         (slot::METAL_ROUGH, material.metallic_roughness_texture),
@@ -95,21 +102,25 @@ pub(super) fn textures_of(material: &Material) -> [(usize, Option<TextureRef>); 
         (slot::COAT_ROUGHNESS, coat.and_then(|coat| coat.roughness_texture)),
         (slot::SHEEN_COLOR, sheen.and_then(|sheen| sheen.color_texture)),
         (slot::SHEEN_ROUGHNESS, sheen.and_then(|sheen| sheen.roughness_texture)),
+        (slot::COAT_NORMAL, coat.and_then(|coat| coat.normal_texture)),
+        (slot::ANISOTROPY, material.anisotropy.as_ref().and_then(|anisotropy| anisotropy.texture)),
+        (slot::FILM, film.and_then(|film| film.texture)),
+        (slot::FILM_THICKNESS, film.and_then(|film| film.thickness_texture)),
     ]
 }
 
-/// Properties of a material that the viewer does not show, a line each.
-fn ignored(material: &Material) -> Vec<String> {
-    let name =
-        material.name.as_deref().map_or_else(|| "a material".to_owned(), |name| format!("material '{name}'"));
-    let has_coat_normals = material.clearcoat.as_ref().is_some_and(|coat| coat.normal_texture.is_some());
-    let all = [
-        (material.anisotropy.is_some(), "KHR_materials_anisotropy"),
-        (material.iridescence.is_some(), "KHR_materials_iridescence"),
-        (has_coat_normals, "clearcoatNormalTexture"),
-    ];
-    let shown = all.into_iter().filter(|(has, _)| *has);
-    shown.map(|(_, what)| format!("{}: {what} is ignored", lvk::readable_name(&name))).collect()
+/// Nanometres of a film where its texture is 0 and where it is 1; without a texture the film is everywhere as thick as at most.
+fn film_thickness(film: &Iridescence) -> [f32; 2] {
+    [
+        if film.thickness_texture.is_some() { film.thickness_min } else { film.thickness_max },
+        film.thickness_max,
+    ]
+}
+
+/// True if the surface has a direction.
+fn has_tangents(material: &Material) -> bool {
+    let coat_normal = material.clearcoat.as_ref().and_then(|coat| coat.normal_texture.as_ref());
+    material.normal_texture.is_some() || coat_normal.is_some() || material.anisotropy.is_some()
 }
 
 const DEFAULT_SPECULAR: lvk_gltf::Specular =
@@ -153,6 +164,7 @@ fn flags(material: &Material) -> u32 {
         | set(material.double_sided, material_flag::DOUBLE_SIDED)
         | set(material.unlit, material_flag::UNLIT)
         | set(is_thin(material), material_flag::THIN)
+        | set(has_tangents(material), material_flag::TANGENTS)
 }
 
 #[cfg(test)]

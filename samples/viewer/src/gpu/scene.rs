@@ -83,7 +83,7 @@ impl GpuScene {
             offset_extent: (largest / OFFSET_SHARE).max(f32::MIN_POSITIVE),
             triangle_count: meshes.triangle_counts.iter().map(|count| u64::from(*count)).sum(),
             structure_bytes: structure_bytes(ctx, &meshes, *tlas)?,
-            warnings: [textures.warnings.as_slice(), &materials.warnings].concat(),
+            warnings: textures.warnings.clone(),
             tlas,
             rig: rig(model),
             shown,
