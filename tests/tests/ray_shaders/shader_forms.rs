@@ -91,3 +91,151 @@ fn shaders_read_the_cull_mask() -> Result<()> {
     }
     Ok(())
 }
+
+/// Stands in front of closest-hit shaders that trace.
+const HIT: &str = "
+    layout(buffer_reference, scalar) buffer Words { uint at[]; };
+    layout(push_constant, scalar) uniform Push { Words results; uint tlas; uint hits; uint misses; };
+    layout(location = 0) rayPayloadInEXT uint value;
+    layout(location = 1) rayPayloadEXT uint inner;
+    void trace(uint flags, float z) {
+        traceRayEXT(kTLAS[tlas], flags, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, vec3(0, 0, z), 10.0, 1);
+    }";
+
+/// Returns the sums, over three rays each whose payload starts with 0, 1 and 2, of rays that hit and that miss. Each miss adds 1,000.
+fn sums(ctx: &Context, hit: &str) -> Result<Vec<u32>> {
+    const RAYS: &str = "
+        void main() {
+            uint sum = 0;
+            for (uint ray = 0; ray < 3; ++ray) {
+                value = ray;
+                traceRayEXT(kTLAS[tlas], 0, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, direction(), 10.0, 0);
+                sum += value;
+            }
+            results.at[gl_LaunchIDEXT.x] = sum;
+        }";
+    let ray_gen = shader(ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
+    let miss = "layout(location = 0) rayPayloadInEXT uint value; void main() { value += 1000; }";
+    let miss = shader(ctx, ShaderStage::Miss, miss)?;
+    let hit = shader(ctx, ShaderStage::ClosestHit, hit)?;
+    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &[*ray_gen],
+        miss: &[*miss],
+        hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }],
+        max_recursion: 4,
+        ..Default::default()
+    })?;
+    GroupScene::new(ctx)?.run(*pipeline, 0, COUNTS)
+}
+
+/// The shadow ray of tutorials: it runs no closest-hit shader, and a miss says that there is light.
+#[test]
+fn closest_hit_shaders_trace_shadow_rays() -> Result<()> {
+    const FLAGS: &str = "gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT";
+    let shadow = |flags: &str| {
+        format!(
+            "{HIT}
+            void main() {{
+                inner = 7;
+                trace({flags}, value % 2 == 0 ? 1 : -1);
+                value = value * 10 + inner;
+            }}"
+        )
+    };
+    let direct = shadow(FLAGS).replace("trace(gl", "traceRayEXT(kTLAS[tlas], gl").replace(
+        "EXT, value % 2 == 0 ? 1 : -1)",
+        "EXT, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, vec3(0, 0, value % 2 == 0 ? 1 : -1), 10.0, 1)",
+    );
+    let also_onward = format!(
+        "{HIT}
+        void main() {{
+            inner = 7;
+            traceRayEXT(kTLAS[tlas], {FLAGS}, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, vec3(0, 0, value % 2 == 0 ? 1 : -1), 10.0, 1);
+            uint shadow = inner;
+            if (value < 6) {{ inner = value + 5; trace(0, 1); shadow += inner; }}
+            value = value * 10 + shadow + uint(gl_HitTEXT);
+        }}"
+    );
+    for (path, ctx) in pipeline_devices() {
+        for text in [&direct, &shadow(FLAGS), &shadow(&format!("{FLAGS} | (misses & 0)"))] {
+            assert_eq!(sums(&ctx, text)?, [30 + 7 + 1007 + 7, 3003], "{path:?}");
+        }
+        // A ray with 5, 6 or 7 hits once or twice more.
+        let depth = |value: u32| if value % 2 == 0 { 7 } else { 1007 };
+        fn known(value: u32, depth: &dyn Fn(u32) -> u32) -> u32 {
+            let onward = if value < 6 { known(value + 5, depth) } else { 0 };
+            value * 10 + depth(value) + onward + 1
+        }
+        let hits = (0..3).map(|value| known(value, &depth)).sum();
+        assert_eq!(sums(&ctx, &also_onward)?, [hits, 3003], "{path:?}");
+    }
+    Ok(())
+}
+
+/// Variables of a shader that waits for rays start anew in each of its runs.
+#[test]
+fn variables_have_their_initial_values_in_each_run() -> Result<()> {
+    let hit = format!(
+        "#extension GL_EXT_null_initializer : require
+        {HIT}
+        void main() {{
+            uint counts[4] = {{}};
+            counts[value & 3] += 1 + value;
+            inner = value + 4;
+            if (value < 8) {{ trace(0, 1); }}
+            counts[(value + 1) & 3] += inner;
+            value = counts[0] + counts[1] + counts[2] + counts[3];
+        }}"
+    );
+    fn known(value: u32) -> u32 {
+        1 + value + if value < 8 { known(value + 4) } else { value + 4 }
+    }
+    for (path, ctx) in pipeline_devices() {
+        assert_eq!(sums(&ctx, &hit)?, [(0..3).map(known).sum(), 3003], "{path:?}");
+    }
+    Ok(())
+}
+
+/// Barycentrics lie in the first two floats of what a shader declares for them.
+#[test]
+fn attributes_of_triangles_have_many_types() -> Result<()> {
+    let types = [
+        ("vec2 a;", "a.x", "a.y"),
+        ("vec3 a;", "a.x", "a.y"),
+        ("float a[2];", "a[0]", "a[1]"),
+        ("uvec2 a;", "uintBitsToFloat(a.x)", "uintBitsToFloat(a.y)"),
+        ("Pair a;", "a.u", "a.v"),
+        ("Wide a;", "a.both.x", "a.both.y"),
+    ];
+    for (path, ctx) in pipeline_devices() {
+        for (ty, first, second) in types {
+            let hit = format!(
+                "{HIT}
+                struct Pair {{ float u, v; }};
+                struct Wide {{ vec2 both; uint other; }};
+                hitAttributeEXT {ty}
+                void main() {{ value = uint(round({first} * 1024)) + 10000 * uint(round({second} * 1024)); }}"
+            );
+            let found = sums(&ctx, &hit)?;
+            assert_eq!(found, [3 * (256 + 10000 * 256), 3003], "{path:?}, {ty}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn attributes_that_cannot_hold_barycentrics_are_refused() {
+    let hit = format!(
+        "#extension GL_EXT_shader_explicit_arithmetic_types_float64 : require
+        {HIT}
+        hitAttributeEXT f64vec2 a;
+        void main() {{ value = uint(a.x); }}"
+    );
+    for (path, ctx) in pipeline_devices() {
+        if path == RayTracingPipelinePath::Hardware {
+            continue;
+        }
+        let error = sums(&ctx, &hit).unwrap_err().to_string();
+        assert!(error.contains("OpVariable of hit attributes"), "{path:?}: {error}");
+    }
+}

@@ -16,7 +16,7 @@ use super::passed::Passed;
 use super::shaders::Shaders;
 use super::slots::Slots;
 use super::stage::Shader;
-use super::traces::{RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables};
+use super::traces::{RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables, skips_closest_hit};
 use super::{Lowering, LoweringError};
 use crate::shader::ShaderStage;
 
@@ -102,8 +102,10 @@ impl<'a> Assembly<'a> {
         }
         let [miss, closest, callable] = [ShaderStage::Miss, ShaderStage::ClosestHit, ShaderStage::Callable]
             .map(|stage| self.write_shading(stage));
-        let trace = self.write_trace(miss, closest);
-        self.call_in_place(trace, callable);
+        let trace = self.write_trace(miss, Some(closest));
+        // Closest-hit shaders may call this one: they would call themselves by the other.
+        let shadow = self.write_trace(miss, None);
+        self.call_in_place([trace, shadow], callable);
         Ok(if needs_machine { self.write_loop(trace, callable) } else { self.write_plain_main() })
     }
 
@@ -356,8 +358,9 @@ impl<'a> Assembly<'a> {
         function
     }
 
-    /// Writes the function that traces a ray and calls the shader of its result, and returns it.
-    fn write_trace(&mut self, miss: u32, closest: u32) -> u32 {
+    /// Writes the function that traces a ray and calls the shader of its result, and returns it. Without `closest` rays run no
+    /// closest-hit shader.
+    fn write_trace(&mut self, miss: u32, closest: Option<u32>) -> u32 {
         let donor = *self.variables.donor;
         let [start, hit, shade, shaded, missed, end] = [(); 6].map(|()| self.linker.new_id());
         let (uint, bool) = (self.linker.uint(), self.linker.bool());
@@ -371,36 +374,35 @@ impl<'a> Assembly<'a> {
         let is_hit = emitter.load(donor.is_hit);
         emitter.push(Op::SelectionMerge, &[end, 0]);
         emitter.push(Op::BranchConditional, &[is_hit, hit, missed]);
-        let mut emitter = Emitter::new(self.linker, of_hit);
-        let flags = emitter.load(donor.ray_flags);
-        let [skip, zero] = [RAY_FLAG_SKIP_CLOSEST_HIT, 0].map(|value| emitter.linker.constant(value));
-        let skips = emitter.value(Op::BitwiseAnd, uint, &[flags, skip]);
-        let shades = emitter.value(Op::IEqual, bool, &[skips, zero]);
-        emitter.push(Op::SelectionMerge, &[shaded, 0]);
-        emitter.push(Op::BranchConditional, &[shades, shade, shaded]);
-        let mut emitter = Emitter::new(self.linker, of_shade);
-        emitter.call(closest);
-        emitter.code.push(jump(shaded));
+        if let Some(closest) = closest {
+            let mut emitter = Emitter::new(self.linker, of_hit);
+            let flags = emitter.load(donor.ray_flags);
+            let [skip, zero] = [RAY_FLAG_SKIP_CLOSEST_HIT, 0].map(|value| emitter.linker.constant(value));
+            let skips = emitter.value(Op::BitwiseAnd, uint, &[flags, skip]);
+            let shades = emitter.value(Op::IEqual, bool, &[skips, zero]);
+            emitter.push(Op::SelectionMerge, &[shaded, 0]);
+            emitter.push(Op::BranchConditional, &[shades, shade, shaded]);
+            let mut emitter = Emitter::new(self.linker, of_shade);
+            emitter.call(closest);
+            emitter.code.push(jump(shaded));
+        }
         let mut of_miss = Vec::new();
         Emitter::new(self.linker, &mut of_miss).call(miss);
         of_miss.push(jump(end));
         let [first, of_hit, of_shade] = code;
-        let blocks = [
-            (start, first),
-            (hit, of_hit),
-            (shade, of_shade),
-            (shaded, vec![jump(end)]),
-            (missed, of_miss),
-            (end, vec![Inst::new(Op::Return, &[])]),
-        ];
+        let of_hits = match closest {
+            Some(_) => vec![(hit, of_hit), (shade, of_shade), (shaded, vec![jump(end)])],
+            None => vec![(hit, vec![jump(end)])],
+        };
+        let ends = [(missed, of_miss), (end, vec![Inst::new(Op::Return, &[])])];
+        let blocks = std::iter::once((start, first)).chain(of_hits).chain(ends);
         let function = self.linker.new_id();
-        let blocks = blocks.into_iter().map(|(label, code)| Block { label, code }).collect();
-        self.linker.push_function(function, blocks);
+        self.linker.push_function(function, blocks.map(|(label, code)| Block { label, code }).collect());
         function
     }
 
-    /// Replaces the bare instructions that no function waits at by calls.
-    fn call_in_place(&mut self, trace: u32, callable: u32) {
+    /// Replaces the bare instructions that no function waits at by calls: of `shadow` for rays that run no closest-hit shader.
+    fn call_in_place(&mut self, [trace, shadow]: [u32; 2], callable: u32) {
         let void = self.linker.void();
         let new_ids: usize =
             self.linker.module.functions.iter().map(|function| function.code().count()).sum();
@@ -411,6 +413,7 @@ impl<'a> Assembly<'a> {
         let in_functions = self.linker.module.functions.iter_mut().flat_map(Function::code_mut);
         for inst in in_functions.chain(in_pieces) {
             let function = match inst.op {
+                Op::TraceRayKHR if skips_closest_hit(inst) => shadow,
                 Op::TraceRayKHR => trace,
                 Op::ExecuteCallableKHR => callable,
                 _ => continue,

@@ -1,6 +1,6 @@
 //! Rewrites accesses of shader records and push constants, which lowered shaders read by address.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use ::spirv::{Decoration, MemoryAccess, Op, StorageClass};
 
@@ -86,13 +86,19 @@ fn add_alignment(inst: &mut Inst, alignments: &HashMap<u32, (u32, u32)>) {
 struct Layout {
     offsets: HashMap<(u32, u32), u32>,
     matrix_strides: HashMap<(u32, u32), u32>,
+    /// Members whose matrices lie row by row.
+    row_major: HashSet<(u32, u32)>,
     array_strides: HashMap<u32, u32>,
 }
 
 impl Layout {
     fn collect(linker: &Linker) -> Self {
-        let mut found =
-            Self { offsets: HashMap::new(), matrix_strides: HashMap::new(), array_strides: HashMap::new() };
+        let mut found = Self {
+            offsets: HashMap::new(),
+            matrix_strides: HashMap::new(),
+            row_major: HashSet::new(),
+            array_strides: HashMap::new(),
+        };
         for inst in &linker.module.decorations {
             let (id, second, third) = (inst.operand(0), inst.operand(1), inst.operand(2));
             let is = |word: u32, decoration: Decoration| word == decoration as u32;
@@ -102,6 +108,9 @@ impl Layout {
                 }
                 Op::MemberDecorate if is(third, Decoration::Offset) => {
                     found.offsets.insert((id, second), inst.operand(3));
+                }
+                Op::MemberDecorate if is(third, Decoration::RowMajor) => {
+                    found.row_major.insert((id, second));
                 }
                 Op::MemberDecorate if is(third, Decoration::MatrixStride) => {
                     found.matrix_strides.insert((id, second), inst.operand(3));
@@ -120,13 +129,15 @@ impl Layout {
         let Some((base, pointer)) = alignments.get(&inst.operand(2)).copied() else { return };
         let mut alignment = base;
         let mut ty = linker.pointer(pointer).map_or(0, |(_, target)| target);
-        let mut column_stride = 0;
+        // Distances of the columns of a matrix, and of the rows if they are not side by side.
+        let (mut stride, mut is_row_major, mut row_stride) = (0, false, None);
         for index in &inst.operands[3..] {
             let Some(found) = linker.global(ty) else { break };
             let step = match found.op {
                 Op::TypeStruct => {
                     let member = linker.global(*index).map_or(0, |constant| constant.operand(2));
-                    column_stride = self.matrix_strides.get(&(ty, member)).copied().unwrap_or(0);
+                    stride = self.matrix_strides.get(&(ty, member)).copied().unwrap_or(0);
+                    is_row_major = self.row_major.contains(&(ty, member));
                     let offset = self.offsets.get(&(ty, member)).copied().unwrap_or(0);
                     ty = found.operand(1 + member as usize);
                     offset
@@ -138,11 +149,13 @@ impl Layout {
                 }
                 Op::TypeMatrix => {
                     ty = found.operand(1);
-                    column_stride
+                    row_stride = is_row_major.then_some(stride);
+                    if is_row_major { scalar_bytes(linker, ty) } else { stride }
                 }
                 _ => {
+                    let scalar = scalar_bytes(linker, ty);
                     ty = found.operand(1);
-                    linker.global(ty).map_or(4, |scalar| scalar.operand(1) / 8)
+                    row_stride.take().unwrap_or(scalar)
                 }
             };
             alignment = alignment_behind(alignment, step);
@@ -151,6 +164,12 @@ impl Layout {
             alignments.insert(result, (alignment, inst.operand(0)));
         }
     }
+}
+
+/// Returns the bytes of a component of a vector.
+fn scalar_bytes(linker: &Linker, vector: u32) -> u32 {
+    let scalar = linker.global(vector).and_then(|vector| linker.global(vector.operand(1)));
+    scalar.map_or(4, |scalar| scalar.operand(1) / 8)
 }
 
 /// Returns the alignment of an address `step` bytes behind an aligned one.

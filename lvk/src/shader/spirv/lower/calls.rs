@@ -2,6 +2,7 @@
 
 use ::spirv::{BuiltIn, Op};
 
+use super::attributes::emit_barycentrics;
 use super::donor::Donor;
 use super::emit::Emitter;
 use super::passed::Passed;
@@ -87,22 +88,7 @@ impl Call<'_> {
         } else if emitter.linker.shape(types[0]) == emitter.linker.shape(types[1]) {
             emitter.copy(donor.hit_barycentrics, own);
         } else {
-            self.emit_wrapped_barycentrics(emitter, donor, own);
-        }
-    }
-
-    /// Stores barycentrics in a struct that holds them, as HLSL declares attributes.
-    fn emit_wrapped_barycentrics(&self, emitter: &mut Emitter<'_>, donor: &Donor, own: u32) {
-        let ty = emitter.linker.variable_type(own).unwrap_or(0);
-        let holds_vector = emitter.linker.variable_type(donor.hit_barycentrics).is_some_and(|vector| {
-            emitter.linker.global(ty).is_some_and(|inst| {
-                inst.op == Op::TypeStruct && inst.operands.len() == 2 && inst.operand(1) == vector
-            })
-        });
-        if holds_vector {
-            let value = emitter.load(donor.hit_barycentrics);
-            let whole = emitter.value(Op::CompositeConstruct, ty, &[value]);
-            emitter.store(own, whole);
+            emit_barycentrics(emitter, donor.hit_barycentrics, own);
         }
     }
 

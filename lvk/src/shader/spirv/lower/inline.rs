@@ -101,29 +101,22 @@ fn rename_ids(linker: &mut Linker, callee: &mut Function, call: &Inst) {
     linker.copy_decorations(&ids);
 }
 
-/// Moves the variables of the callee to the start of the caller. Where the call was, they take their initial values, or
-/// undefined ones: nothing that an earlier call has left is read.
+/// Moves the variables of the callee to the start of the caller. Where the call was, they become undefined: nothing that an earlier
+/// call has left is read. The callee stores their initial values.
 fn move_variables(linker: &mut Linker, function: &mut Function, callee: &mut Function, block: usize) {
     let Some(first) = callee.blocks.first_mut() else { return };
     let (variables, rest): (Vec<Inst>, Vec<Inst>) =
         std::mem::take(&mut first.code).into_iter().partition(|inst| inst.op == Op::Variable);
     first.code = rest;
-    for mut variable in variables {
+    for variable in variables {
         let target = linker.pointer(variable.operand(0)).map_or(0, |(_, target)| target);
         if !linker.can_store(target) {
             function.blocks[0].code.insert(0, variable);
             continue;
         }
-        let initial = match variable.operands.get(3) {
-            Some(initial) => *initial,
-            None => {
-                let undefined = linker.new_id();
-                function.blocks[block].code.push(Inst::new(Op::Undef, &[target, undefined]));
-                undefined
-            }
-        };
-        variable.operands.truncate(3);
-        function.blocks[block].code.push(Inst::new(Op::Store, &[variable.operand(1), initial]));
+        let undefined = linker.new_id();
+        function.blocks[block].code.push(Inst::new(Op::Undef, &[target, undefined]));
+        function.blocks[block].code.push(Inst::new(Op::Store, &[variable.operand(1), undefined]));
         function.blocks[0].code.insert(0, variable);
     }
 }

@@ -1,6 +1,7 @@
 //! Lowers the shaders of a ray tracing pipeline to one compute shader, which traverses in software or by ray queries.
 
 mod assemble;
+mod attributes;
 mod block_loop;
 mod block_pointers;
 mod calls;

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::Op;
 
+use super::attributes::check_barycentrics;
 use super::block_pointers::read_block_by_address;
 use super::donor::{Donor, Needs};
 use super::instruction::Inst;
@@ -51,6 +52,15 @@ impl Shaders {
             };
             let shader = link_stage(linker, module)
                 .map_err(|message| LoweringError { shader: module.name.to_owned(), message })?;
+            let is_of_triangles = |group: &HitShaders| {
+                group.intersection.is_none() && [group.closest_hit, group.any_hit].contains(&Some(index))
+            };
+            if let Some(attributes) = shader.attributes
+                && lowering.hit.iter().any(is_of_triangles)
+            {
+                check_barycentrics(linker, attributes)
+                    .map_err(|message| LoweringError { shader: module.name.to_owned(), message })?;
+            }
             narrow_switches(linker, &shader.functions);
             pass_indices(linker, &shader.functions);
             linked.insert(index, shader);

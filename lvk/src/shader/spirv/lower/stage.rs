@@ -83,15 +83,16 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     check_module(&module)?;
     let entry = take_entry(&mut module, stage.stage)?;
     freeze_constants(&mut module, stage.specialization);
-    let roles = roles(&module);
+    let roles = roles(&module, &entry);
     let initial = take_initial_values(&mut module);
+    store_initial_values(&mut module);
     convert_storage(&mut module);
     let own_functions: Vec<u32> = module.functions.iter().map(Function::id).collect();
     let ids = linker.link(module).map_err(|unknown| format!("Op{:?} cannot be lowered", unknown.0))?;
     let of = |id: u32| ids.get(&id).copied().unwrap_or(0);
     let mut shader = Shader {
         name: stage.name.to_owned(),
-        entry: of(entry),
+        entry: of(entry.function),
         functions: own_functions.into_iter().map(of).collect(),
         initial: initial.into_iter().map(|(variable, value)| (of(variable), of(value))).collect(),
         ..Shader::default()
@@ -143,8 +144,15 @@ fn check_passed(linker: &Linker, variable: u32) -> Result<(), String> {
     Ok(())
 }
 
-/// Takes the entry points and their modes out, and returns the entry function.
-fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<u32, String> {
+/// An entry point.
+struct Entry {
+    function: u32,
+    /// Variables that its functions use; `None` for the only entry point of a module.
+    interface: Option<HashSet<u32>>,
+}
+
+/// Takes the entry points and their modes out, with the functions that only others call, and returns that of the stage.
+fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<Entry, String> {
     let model = match stage {
         ShaderStage::RayGen => ExecutionModel::RayGenerationKHR,
         ShaderStage::Miss => ExecutionModel::MissKHR,
@@ -160,10 +168,31 @@ fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<u32, String> {
             && entry.operands.get(2..4) == Some(&[u32::from_le_bytes(*b"main"), 0])
     };
     let entry = entries.iter().find(is_main).ok_or("there is no entry point 'main' of the stage")?;
-    Ok(entry.operand(1))
+    let function = entry.operand(1);
+    if entries.len() == 1 {
+        return Ok(Entry { function, interface: None });
+    }
+    keep_called(module, function);
+    let interface = entry.operands.get(4..).unwrap_or(&[]).iter().copied().collect();
+    Ok(Entry { function, interface: Some(interface) })
 }
 
-fn roles(module: &Module) -> Vec<(u32, Role)> {
+/// Removes the functions that `entry` does not reach.
+fn keep_called(module: &mut Module, entry: u32) {
+    let mut called = HashSet::from([entry]);
+    loop {
+        let callers = module.functions.iter().filter(|function| called.contains(&function.id()));
+        let calls = callers.flat_map(Function::code).filter(|inst| inst.op == Op::FunctionCall);
+        let found: HashSet<u32> = calls.map(|inst| inst.operand(2)).chain(called.iter().copied()).collect();
+        if found.len() == called.len() {
+            break;
+        }
+        called = found;
+    }
+    module.functions.retain(|function| called.contains(&function.id()));
+}
+
+fn roles(module: &Module, entry: &Entry) -> Vec<(u32, Role)> {
     let decoration = |id: u32, which: Decoration| {
         let is_it = |inst: &&Inst| {
             inst.op == Op::Decorate && inst.operand(0) == id && inst.operand(1) == which as u32
@@ -172,6 +201,9 @@ fn roles(module: &Module) -> Vec<(u32, Role)> {
     };
     let role = |inst: &Inst| {
         let id = inst.operand(1);
+        if entry.interface.as_ref().is_some_and(|interface| !interface.contains(&id)) {
+            return (id, Role::Shared);
+        }
         let builtin = decoration(id, Decoration::BuiltIn).and_then(BuiltIn::from_u32);
         let role = match (StorageClass::from_u32(inst.operand(2)), builtin) {
             (Some(StorageClass::Input), Some(builtin)) if is_of_rays(builtin) => Role::BuiltIn(builtin),
@@ -232,6 +264,22 @@ fn take_initial_values(module: &mut Module) -> Vec<(u32, u32)> {
         }
     }
     taken
+}
+
+/// Makes functions store the initial values of their variables where they start, as a function that waits for rays starts more than
+/// once in an invocation.
+fn store_initial_values(module: &mut Module) {
+    for code in
+        module.functions.iter_mut().filter_map(|function| Some(&mut function.blocks.first_mut()?.code))
+    {
+        let mut stores = Vec::new();
+        for inst in code.iter_mut().filter(|inst| inst.op == Op::Variable && inst.operands.len() > 3) {
+            stores.push(Inst::new(Op::Store, &[inst.operand(1), inst.operand(3)]));
+            inst.operands.truncate(3);
+        }
+        let behind = code.iter().rposition(|inst| inst.op == Op::Variable).map_or(0, |last| last + 1);
+        code.splice(behind..behind, stores);
+    }
 }
 
 /// Gives pointers and variables the storage classes of the compute shader, and removes what decorated the old ones.

@@ -252,12 +252,33 @@ fn busy(callables: [&'static str; 2]) -> Pipeline<'static> {
     }
 }
 
+/// A closest-hit shader that traces a ray which runs no closest-hit shader.
+const SHADOWED_HIT: &str = "
+    layout(location = 0) rayPayloadInEXT vec3 color;
+    layout(location = 1) rayPayloadEXT vec3 light;
+    layout(push_constant, scalar) uniform Push { uint tlas; };
+    void main() {
+        light = vec3(0);
+        traceRayEXT(kTLAS[tlas], gl_RayFlagsSkipClosestHitShaderEXT, 0xFF, 0, 1, 0, color, 0.0, vec3(0, 1, 0), 9.0, 1);
+        color *= light;
+    }";
+
+fn shadowed() -> Pipeline<'static> {
+    let mut pipeline = simple();
+    pipeline.shaders[2].1 = SHADOWED_HIT;
+    pipeline.max_recursion = 2;
+    pipeline
+}
+
 #[test]
 fn every_kind_of_pipeline_is_lowered() {
-    for (index, pipeline) in [simple(), busy([CALLABLE; 2]), busy([CALLABLE, CALLING])].iter().enumerate() {
+    let pipelines = [simple(), shadowed(), busy([CALLABLE; 2]), busy([CALLABLE, CALLING])];
+    for (index, pipeline) in pipelines.iter().enumerate() {
         for (traversal, words) in lowered(pipeline).into_iter().enumerate() {
             let words = words.unwrap();
             crate::shader::spirv::words::validate(&words).unwrap();
+            // No function calls itself, through others either.
+            module::Module::parse(&words).unwrap();
             if let Ok(folder) = std::env::var("LVK_DUMP") {
                 let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
                 std::fs::write(format!("{folder}/lowered_{index}_{traversal}.spv"), bytes).unwrap();
@@ -356,6 +377,36 @@ fn queries_that_go_on_behind_a_trace_are_refused() {
     crate::shader::spirv::words::validate(&words).unwrap();
     let error = lowered_by_queries(&querying_hit("START;", "")).unwrap_err();
     assert!(error.message.contains("a ray query that goes on behind OpTraceRayKHR"), "{}", error.message);
+}
+
+/// The elements of a column of a matrix whose rows lie one behind another are not side by side.
+#[test]
+fn columns_of_matrices_in_rows_are_aligned_as_their_elements() {
+    use ::spirv::Op;
+
+    const HIT: &str = "
+        layout(location = 0) rayPayloadInEXT vec3 color;
+        layout(shaderRecordEXT, scalar, LAYOUT) buffer Record { uint words[4]; mat4 matrix; };
+        void main() { color = matrix[2].xyz; }";
+    let loads = |layout: &str| -> Vec<Vec<u32>> {
+        let text = HIT.replace("LAYOUT", layout);
+        let mut pipeline = simple();
+        pipeline.shaders[2].1 = &text;
+        let alignments = |words: Vec<u32>| {
+            let code = crate::shader::spirv::words::instructions(&words).map(Result::unwrap);
+            let loads = code.filter(|inst| inst.op == Some(Op::Load) && inst.words.len() == 6);
+            let mut found: Vec<u32> = loads.map(|inst| inst.operand(4)).collect();
+            found.sort_unstable();
+            found
+        };
+        lowered(&pipeline).into_iter().map(|words| alignments(words.unwrap())).collect()
+    };
+    for (rows, mut columns) in loads("row_major").into_iter().zip(loads("column_major")) {
+        let place = columns.iter().position(|alignment| *alignment == 16).unwrap();
+        columns[place] = 4;
+        columns.sort_unstable();
+        assert_eq!(rows, columns);
+    }
 }
 
 /// A module has one memory model, and the traversal has that of GLSL.
