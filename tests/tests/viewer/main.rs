@@ -2,6 +2,9 @@
 //! tracing paths; files that it loads.
 
 mod animation;
+mod cycles;
+mod cycles_description;
+mod cycles_scenes;
 mod dropped;
 mod emitters;
 mod furnace;

@@ -11,6 +11,9 @@ use lvk_samples::scene::Camera;
 use lvk_viewer::light::Environment;
 use lvk_viewer::{Method, Viewer, ViewerConfig, ViewerScene};
 
+/// Surfaces of a path at most.
+pub const BOUNCES: u32 = 64;
+
 /// A model while it is put together. Each shape is a mesh and a node of its own.
 #[derive(Default)]
 pub struct Builder {
@@ -42,6 +45,23 @@ impl Builder {
         let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
         let sides = [(low, y, x), (low, z, y), (low, x, z), (high, -x, -y), (high, -y, -z), (high, -z, -x)];
         sides.into_iter().fold(self, |builder, (corner, u, v)| builder.quad(corner, u, v, material.clone()))
+    }
+
+    /// Adds flat triangles that are seen from where they turn counter-clockwise.
+    pub fn facets(mut self, triangles: &[[Vec3; 3]], material: &Material) -> Self {
+        self.model.materials.push(material.clone());
+        let normal = |[a, b, c]: &[Vec3; 3]| [(*b - *a).cross(*c - *a).normalize().to_array(); 3];
+        let positions = triangles.as_flattened().iter().map(|position| position.to_array()).collect();
+        let primitive = Primitive {
+            positions: Positions::F32(positions),
+            normals: triangles.iter().flat_map(normal).collect(),
+            indices: (0..3 * triangles.len() as u32).collect(),
+            material: Some(self.model.materials.len() - 1),
+            ..Primitive::default()
+        };
+        self.model.meshes.push(Mesh { primitives: vec![primitive], ..Mesh::default() });
+        self.model.nodes.push(Node { mesh: Some(self.model.meshes.len() - 1), ..Node::default() });
+        self
     }
 
     /// Adds a light that stands at a point and shines down.
@@ -101,7 +121,7 @@ pub fn viewer(
     };
     let [width, height] = view.size;
     let usual = ViewerConfig::new(path, width, height);
-    let config = ViewerConfig { method, samples: view.samples, bounces: 64, ..usual };
+    let config = ViewerConfig { method, samples: view.samples, bounces: BOUNCES, ..usual };
     let mut viewer = Viewer::new(ctx, &scene, &config).unwrap();
     viewer.set_view(&view.camera);
     viewer
