@@ -25,6 +25,18 @@ vec3 extinctionTowards(Surface surface, vec3 direction, vec3 before) {
     return surface.isFront ? frame.materials.at[surface.material].extinction : vec3(0.0);
 }
 
+// The share of arriving light that nothing takes on its way. The ray does not begin on the surface but a little above it, so it is aimed
+// anew: along the direction from the surface, it would meet a light that stands low over the surface before its range ends.
+vec3 transmittanceOfLight(Surface surface, Arriving arriving) {
+    vec3 origin = leaveTo(surface, arriving.direction);
+    if (arriving.distance >= kFar) {
+        return transmittanceTo(origin, arriving.direction, kFar);
+    }
+    vec3 way = surface.position + arriving.distance * arriving.direction - origin;
+    float distance = max(length(way), 1e-6);
+    return transmittanceTo(origin, way / distance, 0.9999 * distance);
+}
+
 // Light at a surface from one light or from the sky, drawn by chance: all of it, and what the matte layer scatters.
 struct DirectLight {
     vec3 all;
@@ -38,9 +50,7 @@ DirectLight directLight(Surface surface, Bsdf bsdf, vec3 extinction, float choic
     if (!any(greaterThan(response.value * arriving.radiance, vec3(0.0)))) {
         return DirectLight(vec3(0.0), vec3(0.0));
     }
-    vec3 origin = leaveTo(surface, arriving.direction);
-    float range = arriving.distance >= kFar ? kFar : 0.9999 * arriving.distance;
-    vec3 way = transmittanceTo(origin, arriving.direction, range);
+    vec3 way = transmittanceOfLight(surface, arriving);
     if (arriving.distance < kFar) {
         way *= exp(-extinctionTowards(surface, arriving.direction, extinction) * arriving.distance);
     }

@@ -13,6 +13,10 @@ import bpy
 from mathutils import Matrix, Vector
 
 
+# Cycles finds no attribute of the name "color".
+COLORS = "paint"
+
+
 class Graph:
     """Nodes of a shader, added from the inputs to the output."""
 
@@ -85,7 +89,7 @@ def base_color(graph, material):
         image = texture_image(material["texture"])
         shown = graph.add("ShaderNodeTexImage", image=image, interpolation="Closest", extension="REPEAT").outputs["Color"]
     elif material["vertex_colors"]:
-        shown = graph.add("ShaderNodeAttribute", attribute_name="color").outputs["Color"]
+        shown = graph.add("ShaderNodeAttribute", attribute_name=COLORS).outputs["Color"]
     else:
         return factor
     return graph.add("ShaderNodeMixRGB", {0: 1.0, 1: factor, 2: shown}, blend_type="MULTIPLY").outputs[0]
@@ -146,7 +150,7 @@ def add_surface(surface):
         u, v = surface["tex_coords"][loop.vertex_index]
         places.data[loop.index].uv = (u, 1.0 - v)
     if surface["material"]["vertex_colors"]:
-        colors = mesh.color_attributes.new("color", "FLOAT_COLOR", "POINT")
+        colors = mesh.color_attributes.new(COLORS, "FLOAT_COLOR", "POINT")
         colors.data.foreach_set("color", [value for color in surface["colors"] for value in color])
     mesh.materials.append(make_material(surface["material"]))
     add_object("surface", mesh)

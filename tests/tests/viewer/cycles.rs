@@ -13,6 +13,8 @@ use crate::scenes::{View, mean, radiance};
 
 /// Side in pixels of the blocks whose means are compared.
 const BLOCK: usize = 8;
+/// Usual samples of each pixel.
+const SAMPLES: u32 = 256;
 /// Seeds of Cycles, each with half of the samples.
 const SEEDS: [u32; 2] = [1, 2];
 /// The mean relative error that is too large.
@@ -50,7 +52,8 @@ fn compare(scene: &ComparedScene) {
     let folder = tempfile::tempdir().unwrap();
     let halves = by_cycles(scene, folder.path());
     let expected: Vec<_> = halves[0].iter().zip(&halves[1]).map(|(a, b)| middle(*a, *b)).collect();
-    let view = View { camera: scene.camera, size: SIZE, samples: scene.samples };
+    let samples = samples();
+    let view = View { camera: scene.camera, size: SIZE, samples };
     let actual = radiance(&ctx, RayPath::Query, &scene.model, &scene.environment, &view);
     keep_pictures(scene, &actual, &expected);
     let [first, second] = halves.map(|half| blocks(&half));
@@ -60,7 +63,6 @@ fn compare(scene: &ComparedScene) {
     let worst = worst_error(&actual_blocks, &expected_blocks);
     let of_means = 100.0 * relative_difference(mean(&actual), mean(&expected));
     let name = scene.name;
-    let samples = scene.samples;
     eprintln!(
         "{name}: {samples} samples each, mean relative error {:.2} %, noise of Cycles {:.2} %, worst block {:.2} %, means {of_means:+.2} %",
         100.0 * error,
@@ -80,7 +82,7 @@ fn by_cycles(scene: &ComparedScene, folder: &Path) -> [Vec<[f32; 3]>; 2] {
     let done = Command::new(blender)
         .args(["--background", "--factory-startup", "--python-exit-code", "1", "--python"])
         .args([&script, Path::new("--"), &file, &out])
-        .arg((scene.samples / 2).to_string())
+        .arg((samples() / 2).to_string())
         .args(SEEDS.map(|seed| seed.to_string()))
         .output()
         .unwrap();
@@ -95,6 +97,11 @@ fn by_cycles(scene: &ComparedScene, folder: &Path) -> [Vec<[f32; 3]>; 2] {
             |bytes: &[u8]| [0, 1, 2].map(|i| f32::from_ne_bytes(bytes[4 * i..4 * i + 4].try_into().unwrap()));
         bytes.chunks(16).map(texel).collect()
     })
+}
+
+/// Samples of each pixel by either program, even.
+fn samples() -> u32 {
+    std::env::var("LVK_CYCLES_SAMPLES").map_or(SAMPLES, |number| number.parse().unwrap())
 }
 
 fn middle(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
@@ -131,7 +138,7 @@ fn relative_difference(actual: Block, expected: Block) -> f64 {
     actual.iter().sum::<f64>() / expected.iter().sum::<f64>() - 1.0
 }
 
-/// Writes both pictures, and their difference in units of a tenth of the limit's brightness, to `LVK_CYCLES_PICTURES`.
+/// Writes both pictures and the ratio of their pixels, which is grey where they agree, to `LVK_CYCLES_PICTURES`.
 fn keep_pictures(scene: &ComparedScene, actual: &[[f32; 3]], expected: &[[f32; 3]]) {
     let Some(folder) = std::env::var_os("LVK_CYCLES_PICTURES") else { return };
     let encoded = |value: f32| (255.0 * value.clamp(0.0, 1.0).powf(1.0 / 2.2)).round() as u8;

@@ -22,11 +22,9 @@ pub struct ComparedScene {
     pub model: Model,
     pub environment: Environment,
     pub camera: Camera,
-    /// Samples of each pixel by either program, even.
-    pub samples: u32,
 }
 
-/// Matte walls and blocks, lit by one lamp of an area.
+/// Matte walls and blocks, lit by one lamp of an area and, from the open side, by a dim sky.
 pub fn matte_box() -> ComparedScene {
     let white = matte([0.75, 0.74, 0.7]);
     let model = interior([matte([0.65, 0.08, 0.06]), matte([0.12, 0.45, 0.1]), white.clone()], &white)
@@ -34,7 +32,12 @@ pub fn matte_box() -> ComparedScene {
         .facets(&turned_block(Vec3::new(-0.75, 1.2, -0.8), Vec3::new(0.6, 1.2, 0.6), 0.3), &matte([0.5; 3]))
         .facets(&turned_block(Vec3::new(0.8, 0.6, 0.5), Vec3::splat(0.6), -0.3), &matte([0.85, 0.8, 0.3]))
         .model();
-    ComparedScene { name: "box", model, environment: dark(), camera: before_the_interior(), samples: 1024 }
+    ComparedScene {
+        name: "box",
+        model,
+        environment: Environment::uniform([0.1; 3]),
+        camera: before_the_interior(),
+    }
 }
 
 /// A floor of tiles with matte blocks under a sky of two colours, a sun and a lamp.
@@ -59,7 +62,7 @@ pub fn terrace() -> ComparedScene {
     let sun = Sun { direction, irradiance: [2.6, 2.3, 1.9], radius: 0.03 };
     let environment = Environment { sky: sky([0.35, 0.5, 0.9], [0.25, 0.2, 0.15]), sun: Some(sun) };
     let camera = Camera::looking_at([0.6, 2.2, 5.2], [0.1, 0.8, 0.0], 38.0);
-    ComparedScene { name: "terrace", model, environment, camera, samples: 1024 }
+    ComparedScene { name: "terrace", model, environment, camera }
 }
 
 /// Smooth dielectrics and metals in a box that is lit from above and from the open side.
@@ -85,7 +88,7 @@ pub fn cabinet() -> ComparedScene {
         .quad(Vec3::new(0.2, 0.01, 1.0), Vec3::X * 1.2, Vec3::Y * 0.9, pane)
         .model();
     let environment = Environment { sky: sky([0.5, 0.6, 0.8], [0.3, 0.28, 0.25]), sun: None };
-    ComparedScene { name: "cabinet", model, environment, camera: before_the_interior(), samples: 1024 }
+    ComparedScene { name: "cabinet", model, environment, camera: before_the_interior() }
 }
 
 /// White metals of several roughnesses in the same light.
@@ -107,7 +110,7 @@ pub fn metals() -> ComparedScene {
         })
         .model();
     let environment = Environment { sky: sky([0.5, 0.6, 0.8], [0.3, 0.28, 0.25]), sun: None };
-    ComparedScene { name: "metals", model, environment, camera: before_the_interior(), samples: 1024 }
+    ComparedScene { name: "metals", model, environment, camera: before_the_interior() }
 }
 
 /// A box of 4 units that is open towards +z: walls on the left, on the right, and behind and above; and the floor.
@@ -128,10 +131,6 @@ fn before_the_interior() -> Camera {
 
 fn glowing(emissive: [f32; 3]) -> Material {
     Material { emissive, ..matte([0.0; 3]) }
-}
-
-fn dark() -> Environment {
-    Environment::uniform([0.0; 3])
 }
 
 fn sky(upper: [f32; 3], lower: [f32; 3]) -> SkyMap {

@@ -40,6 +40,23 @@ fn small_lights_light_as_their_form_factor() {
     assert_close("a small lamp", actual, [1.0, 2.0, 3.0].map(|light| 0.6 * 50.0 * factor * light), 0.01);
 }
 
+#[test]
+fn a_light_just_above_the_floor_lights_it_beside_as_its_form_factor() {
+    let Some(ctx) = software_device() else { return };
+    let glowing = Material { emissive: [1.0, 2.0, 3.0], emissive_strength: 10.0, ..matte([0.0; 3]) };
+    for (near, height) in [(0.05, 0.02), (0.2, 0.02), (0.5, 0.02)] {
+        let lamp = Vec3::new(near, height, -0.6);
+        let model = floor(matte([0.6; 3])).quad(lamp, Vec3::X * 1.2, Vec3::Z * 1.2, glowing.clone()).model();
+        let camera = Camera::looking_at([0.0, 1.5, 0.0001], [0.0; 3], 0.2);
+        let view = View { camera, size: [8, 8], samples: 512 };
+        let actual = mean(&radiance(&ctx, RayPath::Query, &model, &Environment::uniform([0.0; 3]), &view));
+        let corner = |a: f32, b| corner_factor([f64::from(a), b], f64::from(height));
+        let factor = 2.0 * (corner(near + 1.2, 0.6) - corner(near, 0.6));
+        let expected = [1.0, 2.0, 3.0].map(|light| 0.6 * 10.0 * factor * light);
+        assert_close(&format!("a lamp {near} beside and {height} above"), actual, expected, 0.02);
+    }
+}
+
 /// A room of a rough mirror, a pane and fog, with lamps of several sizes, two of them in instances that stretch them.
 fn room(alpha_mode: AlphaMode) -> Model {
     let glowing = |emissive| Material { emissive, emissive_strength: 4.0, alpha_mode, ..matte([0.2; 3]) };
