@@ -14,7 +14,7 @@ use crate::scenes::{View, mean, radiance};
 /// Side in pixels of the blocks whose means are compared.
 const BLOCK: usize = 8;
 /// Usual samples of each pixel.
-const SAMPLES: u32 = 256;
+const SAMPLES: u32 = 1024;
 /// Seeds of Cycles, each with half of the samples.
 const SEEDS: [u32; 2] = [1, 2];
 /// The mean relative error that is too large.
