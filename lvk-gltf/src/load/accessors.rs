@@ -1,5 +1,7 @@
 //! Accessors: typed elements in buffer views, sparse ones included.
 
+use std::borrow::Cow;
+
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::validation::Checked;
 
@@ -7,6 +9,7 @@ use super::budget::Budget;
 use super::buffers::Buffers;
 use super::document::Document;
 use super::place::place;
+use super::source::Source;
 use crate::Problem;
 
 /// What reads accessors.
@@ -39,7 +42,8 @@ pub(super) struct Accessor<'a> {
 /// Elements at equal distances.
 #[derive(Debug, Clone, Copy)]
 struct Strided<'a> {
-    bytes: &'a [u8],
+    source: Source<'a>,
+    count: u64,
     stride: usize,
     size: usize,
 }
@@ -47,16 +51,33 @@ struct Strided<'a> {
 /// Elements that take the place of others.
 #[derive(Debug, Clone)]
 struct Sparse<'a> {
-    count: u64,
-    indices: Strided<'a>,
+    /// Which elements are replaced. They rise.
+    indices: Vec<u32>,
     values: Strided<'a>,
 }
 
-impl<'a> Strided<'a> {
-    /// Returns an element, which is in range.
-    fn get(&self, index: usize) -> &'a [u8] {
-        let start = index * self.stride;
-        &self.bytes[start..start + self.size]
+/// Bytes of a file that are read at once.
+const READ_BYTES: u64 = 1 << 18;
+
+impl Strided<'_> {
+    /// Calls `visit` with each element and its index, in order. Of a file only a few elements are in memory at a time.
+    fn each(&self, mut visit: impl FnMut(usize, &[u8])) -> Result<(), Problem> {
+        let (stride, size) = (self.stride.max(1) as u64, self.size as u64);
+        let most = match self.source {
+            Source::Memory(_) => u64::MAX,
+            Source::File { .. } => (READ_BYTES / stride).max(1),
+        };
+        let mut first = 0;
+        while first < self.count {
+            let count = most.min(self.count - first);
+            let part = self.source.part(first * stride, (count - 1) * stride + size);
+            let bytes = part.map_or(Ok(Cow::default()), |part| part.read())?;
+            for (number, element) in bytes.chunks(self.stride.max(1)).enumerate() {
+                visit(first as usize + number, &element[..self.size.min(element.len())]);
+            }
+            first += count;
+        }
+        Ok(())
     }
 }
 
@@ -109,7 +130,7 @@ impl<'a> Accessors<'a> {
         size: usize,
         place: &dyn Fn() -> String,
     ) -> Result<Strided<'a>, Problem> {
-        let bytes = self.buffers.view(self.document, view)?;
+        let source = self.buffers.view(self.document, view)?;
         let stride = self.document.root.buffer_views[view].byte_stride.map_or(size, |stride| stride.0);
         if stride < size {
             let rule = format!("its elements of {size} bytes overlap, as they are {stride} bytes apart");
@@ -117,12 +138,13 @@ impl<'a> Accessors<'a> {
         }
         let length = if count == 0 { 0 } else { u128::from(count - 1) * stride as u128 + size as u128 };
         let end = u128::from(offset) + length;
-        let length = bytes.len() as u64;
-        let bytes = usize::try_from(offset).ok().and_then(|offset| bytes.get(offset..));
-        match bytes {
-            Some(bytes) if end <= u128::from(length) => Ok(Strided { bytes, stride, size }),
-            _ => Err(Problem::Truncated { place: place(), end, what: format!("buffer view {view}"), length }),
-        }
+        let part = u64::try_from(length).ok().and_then(|length| source.part(offset, length));
+        part.map(|source| Strided { source, count, stride, size }).ok_or_else(|| Problem::Truncated {
+            place: place(),
+            end,
+            what: format!("buffer view {view}"),
+            length: source.length(),
+        })
     }
 
     fn open_sparse(
@@ -150,33 +172,30 @@ impl<'a> Accessors<'a> {
             self.strided(view, indices.byte_offset.0, sparse.count.0, index_bytes, &part("indices"))?;
         let view = values.buffer_view.value();
         let values = self.strided(view, values.byte_offset.0, sparse.count.0, size, &part("values"))?;
-        let sparse = Sparse { count: sparse.count.0, indices, values };
-        sparse.check(count, place)?;
-        Ok(sparse)
+        let indices = self.sparse_indices(&indices, count, place)?;
+        Ok(Sparse { indices, values })
     }
-}
 
-impl<'a> Sparse<'a> {
-    fn check(&self, count: u64, place: &dyn Fn() -> String) -> Result<(), Problem> {
-        let mut least = 0;
-        for (index, _) in self.entries() {
-            if index >= count {
-                return Err(Problem::OutOfRange { place: place(), what: "sparse index", index, count });
-            }
-            if index < least {
-                return Err(Problem::Rule { place: place(), rule: "its sparse indices do not rise".into() });
-            }
-            least = index + 1;
+    fn sparse_indices(
+        &self,
+        elements: &Strided<'_>,
+        count: u64,
+        place: &dyn Fn() -> String,
+    ) -> Result<Vec<u32>, Problem> {
+        let mut indices: Vec<u32> = self.budget.list(elements.count, place)?;
+        elements.each(|_, bytes| {
+            let mut index = [0; 4];
+            index.iter_mut().zip(bytes).for_each(|(byte, of_file)| *byte = *of_file);
+            indices.push(u32::from_le_bytes(index));
+        })?;
+        if let Some(index) = indices.iter().find(|index| u64::from(**index) >= count) {
+            let index = u64::from(*index);
+            return Err(Problem::OutOfRange { place: place(), what: "sparse index", index, count });
         }
-        Ok(())
-    }
-
-    fn entries(&self) -> impl Iterator<Item = (u64, &'a [u8])> + '_ {
-        (0..self.count as usize).map(|entry| {
-            let mut index = [0; 8];
-            index[..self.indices.size].copy_from_slice(self.indices.get(entry));
-            (u64::from_le_bytes(index), self.values.get(entry))
-        })
+        if !indices.is_sorted_by(|before, after| before < after) {
+            return Err(Problem::Rule { place: place(), rule: "its sparse indices do not rise".into() });
+        }
+        Ok(indices)
     }
 }
 
@@ -185,14 +204,14 @@ impl Accessor<'_> {
     pub(super) fn read<T: Clone>(&self, convert: impl Fn(&[u8]) -> T) -> Result<Vec<T>, Problem> {
         let mut list = self.budget.list(self.count, || self.place.clone())?;
         match &self.elements {
-            Some(elements) => list.extend((0..self.count as usize).map(|index| convert(elements.get(index)))),
+            Some(elements) => elements.each(|_, bytes| list.push(convert(bytes)))?,
             None => {
                 let size = self.component.size() * self.shape.multiplicity();
                 list.resize(self.count as usize, convert(&vec![0; size]));
             }
         }
-        for (index, value) in self.sparse.iter().flat_map(Sparse::entries) {
-            list[index as usize] = convert(value);
+        if let Some(Sparse { indices, values }) = &self.sparse {
+            values.each(|entry, bytes| list[indices[entry] as usize] = convert(bytes))?;
         }
         Ok(list)
     }

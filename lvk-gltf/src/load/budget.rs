@@ -1,8 +1,10 @@
 //! The memory that a load may still take.
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::MemoryLimit;
+use super::source::Source;
 use crate::Problem;
 
 /// The memory that a load may still take. Every allocation whose size the file decides is charged before it is made, and none is
@@ -46,6 +48,18 @@ impl Budget {
                 limit: self.limit.load(Ordering::Relaxed),
             }),
         }
+    }
+
+    /// Reads all bytes of a source. Those of a file are charged.
+    pub(super) fn read<'a>(
+        &self,
+        source: Source<'a>,
+        place: impl FnOnce() -> String,
+    ) -> Result<Cow<'a, [u8]>, Problem> {
+        if matches!(source, Source::File { .. }) {
+            self.charge(source.length(), place)?;
+        }
+        source.read()
     }
 
     /// Makes an empty list for this number of entries.

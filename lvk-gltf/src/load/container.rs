@@ -1,28 +1,47 @@
 //! The two forms of a file: JSON alone, or GLB with JSON and a buffer.
 
+use std::borrow::Cow;
+
+use super::source::Source;
 use crate::Problem;
 
 const MAGIC: &[u8] = b"glTF";
-const HEADER_BYTES: usize = 12;
+const HEADER_BYTES: u64 = 12;
+const CHUNK_HEADER_BYTES: u64 = 8;
+/// The byte order mark of UTF-8.
+const MARK: &[u8] = b"\xef\xbb\xbf";
 const JSON_CHUNK: u32 = u32::from_le_bytes(*b"JSON");
 const BIN_CHUNK: u32 = u32::from_le_bytes(*b"BIN\0");
 
 /// The parts of a file.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub(super) struct Container<'a> {
     /// The JSON.
-    pub(super) json: &'a [u8],
+    pub(super) json: Cow<'a, [u8]>,
     /// The buffer of a GLB.
-    pub(super) bin: Option<&'a [u8]>,
+    pub(super) bin: Option<Source<'a>>,
 }
 
 impl<'a> Container<'a> {
-    /// Finds the parts of a file. The content decides what it is, not its name.
-    pub(super) fn split(bytes: &'a [u8]) -> Result<Self, Problem> {
-        if bytes.starts_with(MAGIC) {
-            return Self::split_glb(bytes);
+    /// Finds the parts of a file and reads its JSON. The content decides what it is, not its name.
+    pub(super) fn read(file: Source<'a>) -> Result<Self, Problem> {
+        let start = file.part(0, file.length().min(HEADER_BYTES)).map_or(Ok(Cow::default()), |it| it.read())?;
+        if start.starts_with(MAGIC) {
+            return Self::read_glb(file, &start);
         }
-        let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        // A file that is neither is not read as a whole.
+        let is_json = |bytes: &[u8]| {
+            let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
+            let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+            first.is_none_or(|byte| *byte == b'{')
+        };
+        if !is_json(&start) {
+            return Err(Problem::NotGltf);
+        }
+        let mut json = file.read()?;
+        if json.starts_with(MARK) {
+            json = Cow::Owned(json[MARK.len()..].to_vec());
+        }
         match json.iter().find(|byte| !byte.is_ascii_whitespace()) {
             Some(b'{') => Ok(Self { json, bin: None }),
             _ => Err(Problem::NotGltf),
@@ -30,33 +49,33 @@ impl<'a> Container<'a> {
     }
 
     /// Chunks of unknown types are left out, as the specification demands.
-    fn split_glb(bytes: &'a [u8]) -> Result<Self, Problem> {
-        let word =
-            |at: usize| bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
+    fn read_glb(file: Source<'a>, header: &[u8]) -> Result<Self, Problem> {
         let damaged = |what: &str| Problem::Container { what: what.into() };
-        let (Some(version), Some(length)) = (word(4), word(8)) else {
+        let (Some(version), Some(length)) = (word(header, 4), word(header, 8)) else {
             return Err(damaged("its header is cut off"));
         };
         if version != 2 {
             return Err(Problem::Version { version: version.to_string() });
         }
-        let (length, has) = (length as usize, bytes.len());
+        let (length, has) = (u64::from(length), file.length());
         if length > has {
             return Err(Problem::Container { what: format!("it states {length} bytes and has {has}") });
         }
         let (mut json, mut bin, mut at) = (None, None, HEADER_BYTES);
         while at < length {
-            let (Some(size), Some(kind)) = (word(at), word(at + 4)) else {
+            let Some(head) = file.part(at, CHUNK_HEADER_BYTES) else {
                 return Err(damaged("a chunk is cut off"));
             };
-            let (start, size) = (at + 8, size as usize);
-            if start > length || size > length - start {
+            let head = head.read()?;
+            let (size, kind) = (u64::from(word(&head, 0).unwrap_or(0)), word(&head, 4).unwrap_or(0));
+            let start = at + CHUNK_HEADER_BYTES;
+            let chunk = file.part(start, size).filter(|_| start + size <= length);
+            let Some(chunk) = chunk else {
                 let what = format!("a chunk of {size} bytes starts at byte {start} of {length}");
                 return Err(Problem::Container { what });
-            }
-            let chunk = &bytes[start..start + size];
-            match (kind, json) {
-                (JSON_CHUNK, None) => json = Some(chunk),
+            };
+            match (kind, &json) {
+                (JSON_CHUNK, None) => json = Some(chunk.read()?),
                 (BIN_CHUNK, Some(_)) if bin.is_none() => bin = Some(chunk),
                 (_, None) => return Err(damaged("its first chunk is not JSON")),
                 _ => {}
@@ -66,6 +85,10 @@ impl<'a> Container<'a> {
         let json = json.ok_or_else(|| damaged("it has no JSON"))?;
         Ok(Self { json, bin })
     }
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u32> {
+    bytes.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes)
 }
 
 #[cfg(test)]
@@ -80,33 +103,40 @@ mod tests {
         [MAGIC, &2_u32.to_le_bytes(), &(12 + body.len() as u32).to_le_bytes(), &body].concat()
     }
 
+    /// The JSON and the buffer.
+    type Parts = (Vec<u8>, Option<Vec<u8>>);
+
+    fn split(bytes: &[u8]) -> Result<Parts, Problem> {
+        let Container { json, bin } = Container::read(Source::Memory(bytes))?;
+        let bin = bin.map(|bin| bin.read()).transpose()?;
+        Ok((json.into_owned(), bin.map(Cow::into_owned)))
+    }
+
     #[test]
     fn parts_of_both_forms_are_found() {
         let file = glb(&[(b"JSON", b"{}  "), (b"BIN\0", b"1234"), (b"NEW!", b"more")]);
-        assert_eq!(Container::split(&file).unwrap(), Container { json: b"{}  ", bin: Some(b"1234") });
-        assert_eq!(
-            Container::split(&glb(&[(b"JSON", b"{}")])).unwrap(),
-            Container { json: b"{}", bin: None }
-        );
-        assert_eq!(Container::split(b" \n{}").unwrap().json, b" \n{}");
-        assert_eq!(Container::split(b"\xef\xbb\xbf{}").unwrap().json, b"{}");
+        assert_eq!(split(&file).unwrap(), (b"{}  ".to_vec(), Some(b"1234".to_vec())));
+        assert_eq!(split(&glb(&[(b"JSON", b"{}")])).unwrap(), (b"{}".to_vec(), None));
+        assert_eq!(split(b" \n{}").unwrap().0, b" \n{}");
+        assert_eq!(split(b"\n              {}").unwrap().0, b"\n              {}");
+        assert_eq!(split(b"\xef\xbb\xbf{}").unwrap().0, b"{}");
         let trailing = [&file[..], b"rubbish"].concat();
-        assert_eq!(Container::split(&trailing).unwrap().bin, Some(&b"1234"[..]));
+        assert_eq!(split(&trailing).unwrap().1.unwrap(), b"1234");
     }
 
     #[test]
     fn every_cut_is_an_error() {
         let file = glb(&[(b"JSON", b"{}  "), (b"BIN\0", b"1234")]);
         for length in 0..file.len() {
-            assert!(Container::split(&file[..length]).is_err(), "{length}");
+            assert!(split(&file[..length]).is_err(), "{length}");
         }
-        assert!(matches!(Container::split(b"OBJ"), Err(Problem::NotGltf)));
-        assert!(matches!(Container::split(&glb(&[(b"BIN\0", b"1234")])), Err(Problem::Container { .. })));
+        assert!(matches!(split(b"OBJ"), Err(Problem::NotGltf)));
+        assert!(matches!(split(&glb(&[(b"BIN\0", b"1234")])), Err(Problem::Container { .. })));
         let mut version = file.clone();
         version[4] = 1;
-        assert!(matches!(Container::split(&version), Err(Problem::Version { .. })));
+        assert!(matches!(split(&version), Err(Problem::Version { .. })));
         let mut chunk = file;
         chunk[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
-        assert!(matches!(Container::split(&chunk), Err(Problem::Container { .. })));
+        assert!(matches!(split(&chunk), Err(Problem::Container { .. })));
     }
 }

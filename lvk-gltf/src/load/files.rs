@@ -1,45 +1,36 @@
 //! Files that a model consists of: regular files of bounded size, data URIs, and paths inside of the model's folder.
 
 use std::collections::HashSet;
-use std::fs::{self, File};
-use std::io::{self, ErrorKind, Read as _};
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use super::budget::Budget;
 use super::place::{shortened, shortened_path};
+use super::source::{OpenFile, Source};
 use crate::Problem;
 
-/// Most bytes of a file. GLB can state no more.
-const MAX_FILE_BYTES: u64 = 1 << 32;
-
-/// Reads a regular file of at most 4 GiB, as long as it was when it was opened.
-pub(super) fn read(path: &Path, budget: &Budget) -> Result<Vec<u8>, Problem> {
+/// Opens a regular file of at most 4 GiB.
+pub(super) fn open(path: &Path, budget: &Budget) -> Result<OpenFile, Problem> {
     let named = |source| Problem::File { name: shortened_path(path), source };
-    read_regular(path, MAX_FILE_BYTES).map_err(named).inspect(|bytes| budget.add_file(bytes.len() as u64))
+    OpenFile::open(path, u64::MAX).map_err(named).inspect(|file| budget.add_file(file.length()))
 }
 
-fn read_regular(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
-    // Opening a named pipe would wait for its writer.
-    let not_regular = || io::Error::new(ErrorKind::InvalidInput, "it is not a regular file");
-    if !fs::metadata(path)?.is_file() {
-        return Err(not_regular());
+/// What a URI names.
+#[derive(Debug)]
+pub(super) enum Resolved {
+    /// The bytes inside of it.
+    Bytes(Vec<u8>),
+    /// A file in the folder.
+    File(OpenFile),
+}
+
+impl Resolved {
+    pub(super) fn source(&self) -> Source<'_> {
+        match self {
+            Self::Bytes(bytes) => Source::Memory(bytes),
+            Self::File(file) => file.whole(),
+        }
     }
-    let file = File::open(path)?;
-    let about = file.metadata()?;
-    if !about.is_file() {
-        return Err(not_regular());
-    }
-    let most_bytes = most_bytes.min(MAX_FILE_BYTES);
-    if about.len() > most_bytes {
-        let message = format!("it has {} bytes, more than the {most_bytes} that may be read", about.len());
-        return Err(io::Error::new(ErrorKind::FileTooLarge, message));
-    }
-    let mut bytes = Vec::new();
-    let size = usize::try_from(about.len()).map_err(|_| ErrorKind::OutOfMemory)?;
-    bytes.try_reserve_exact(size).map_err(|_| ErrorKind::OutOfMemory)?;
-    file.take(about.len()).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// The folder of a model, and the files of it that were read.
@@ -54,34 +45,34 @@ impl<'a> Files<'a> {
         Self { folder, read: Mutex::default() }
     }
 
-    /// Returns the bytes that a URI names: those inside of it, or those of a file in the folder.
+    /// Returns what a URI names.
     pub(super) fn resolve(
         &self,
         uri: &str,
         budget: &Budget,
         place: &dyn Fn() -> String,
-    ) -> Result<Vec<u8>, Problem> {
+    ) -> Result<Resolved, Problem> {
         let refuse = |why| Problem::Uri { place: place(), uri: shortened(uri), why };
         if let Some(data) = strip_scheme(uri, "data:") {
             budget.charge(data.len() as u64, place)?;
-            return data_uri(data).map_err(refuse);
+            return data_uri(data).map(Resolved::Bytes).map_err(refuse);
         }
         let relative = relative_path(uri).map_err(refuse)?;
         let without_folder = "names a file, and bytes in memory have no folder; load the model from its file";
         let path = self.folder.ok_or(without_folder).map_err(refuse)?.join(relative);
-        let bytes = read_regular(&path, budget.left()).map_err(|source| {
+        let file = OpenFile::open(&path, budget.left()).map_err(|source| {
             let name = format!("{}, which is {}", shortened_path(&path), place());
             Problem::File { name, source }
         })?;
         // A file that is named again brings no more memory.
         let is_first = self.read.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
-        let length = bytes.len() as u64;
+        let length = file.length();
         if is_first {
             budget.add_file(length)
         } else {
             budget.charge(length, place)?
         }
-        Ok(bytes)
+        Ok(Resolved::File(file))
     }
 }
 
@@ -227,16 +218,6 @@ mod tests {
             "%ff",
         ] {
             assert!(relative_path(uri).is_err(), "{uri}");
-        }
-    }
-
-    #[test]
-    fn a_folder_and_a_missing_file_are_refused() {
-        let budget = Budget::new(super::super::MemoryLimit::default());
-        let folder = std::env::temp_dir();
-        for path in [folder.clone(), folder.join("lvk-gltf-no-such-file")] {
-            let error = read(&path, &budget).unwrap_err();
-            assert!(matches!(error, Problem::File { .. }), "{error}");
         }
     }
 }

@@ -29,9 +29,10 @@ impl Images<'_> {
     pub(super) fn decode(&self, index: usize) -> Result<(ImageData, Vec<Warning>), Problem> {
         let json = &self.document.root.images[index];
         let name = || place("image", index, json.name.as_deref());
+        let decode = |source| self.decode_bytes(&self.budget.read(source, name)?, &name());
         match (&json.uri, json.buffer_view) {
-            (Some(uri), _) => self.decode_bytes(&self.files.resolve(uri, self.budget, &name)?, &name()),
-            (None, Some(view)) => self.decode_bytes(self.buffers.view(self.document, view.value())?, &name()),
+            (Some(uri), _) => decode(self.files.resolve(uri, self.budget, &name)?.source()),
+            (None, Some(view)) => decode(self.buffers.view(self.document, view.value())?),
             (None, None) => {
                 let rule = "it has neither a URI nor a buffer view".into();
                 Err(Problem::Rule { place: name(), rule })

@@ -18,6 +18,7 @@ mod parallel;
 mod place;
 mod scan;
 mod scene;
+mod source;
 mod textures;
 mod topology;
 mod vertices;
@@ -36,6 +37,7 @@ use self::document::Document;
 use self::files::Files;
 use self::images::Images;
 use self::place::place;
+use self::source::Source;
 use self::textures::Textures;
 use crate::{Error, Image, ImageData, Mesh, Model, Node, Problem, Result, Warning};
 
@@ -79,7 +81,8 @@ impl Default for MemoryLimit {
 
 impl Model {
     /// Reads a `.gltf` or `.glb` file. Its content says which of the two it is. Buffers and images that it names by a
-    /// relative path are read from its folder and the folders inside of it.
+    /// relative path are read from its folder and the folders inside of it. Vertices are read as they are decoded, a mesh at a time:
+    /// the bytes of the file are never in memory as a whole.
     ///
     /// # Errors
     /// [`Error`], if a file cannot be read, breaks a rule of the format, requires an unknown extension, or would take more
@@ -87,7 +90,8 @@ impl Model {
     pub fn load(path: &Path, options: &LoadOptions<'_>) -> Result<Self> {
         let budget = Budget::new(options.memory);
         let folder = path.parent().unwrap_or(Path::new(""));
-        let model = files::read(path, &budget).and_then(|bytes| load(&bytes, Some(folder), options, &budget));
+        let file = files::open(path, &budget);
+        let model = file.and_then(|file| load(file.whole(), Some(folder), options, &budget));
         model.map_err(|problem| Error { file: place::shortened_path(path), problem })
     }
 
@@ -99,20 +103,22 @@ impl Model {
     pub fn from_bytes(bytes: &[u8], folder: Option<&Path>, options: &LoadOptions<'_>) -> Result<Self> {
         let budget = Budget::new(options.memory);
         budget.add_file(bytes.len() as u64);
-        load(bytes, folder, options, &budget).map_err(|problem| Error { file: "model".into(), problem })
+        load(Source::Memory(bytes), folder, options, &budget)
+            .map_err(|problem| Error { file: "model".into(), problem })
     }
 }
 
 fn load(
-    bytes: &[u8],
+    file: Source<'_>,
     folder: Option<&Path>,
     options: &LoadOptions<'_>,
     budget: &Budget,
 ) -> Result<Model, Problem> {
-    let container = Container::split(bytes)?;
-    let document = Document::parse(container.json, budget)?;
+    let Container { json, bin } = Container::read(file)?;
+    let document = Document::parse(&json, budget)?;
+    drop(json);
     let files = Files::new(folder);
-    let buffers = Buffers::read(&document, container.bin, &files, budget)?;
+    let buffers = Buffers::read(&document, bin, &files, budget)?;
     let accessors = Accessors { document: &document, buffers: &buffers, budget };
     let root = &document.root;
 

@@ -3,9 +3,10 @@
 //!
 //! [`Viewer`] is the sample for programs and tests, `viewer_sample.rs` what it does in each frame, `info.rs` describes its program and
 //! `open.rs` opens what the arguments name. [`model`] loads models or makes the one that needs no file, [`light`] makes the sky and the
-//! sun, `gpu` uploads both and moves what an animation moves, `path_tracer.rs` traces paths and `hybrid` is the real-time method.
+//! sun, [`city`] writes a large model for measurements, `gpu` uploads both and moves what an animation moves, `path_tracer.rs` traces paths and `hybrid` is the real-time method.
 
 mod args;
+pub mod city;
 mod config;
 mod dropped;
 mod gpu;
