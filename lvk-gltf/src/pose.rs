@@ -54,8 +54,9 @@ impl Model {
     /// Meshes without skin are enclosed by the corners of their own box.
     #[must_use]
     pub fn bounds(&self, scene: usize, pose: &Pose) -> Option<Bounds> {
-        let placements = self.placements(scene, pose);
-        placements.iter().filter_map(|placement| self.placement_bounds(placement, pose)).reduce(Bounds::union)
+        let mut at_rest: Vec<Option<Vec<Bounds>>> = vec![None; self.meshes.len()];
+        let around = |placement: Placement| self.placement_bounds(&placement, pose, &mut at_rest);
+        self.placements(scene, pose).into_iter().filter_map(around).reduce(Bounds::union)
     }
 
     fn weights_of(&self, node: &Node) -> Vec<f32> {
@@ -94,17 +95,34 @@ impl Model {
         }
     }
 
-    fn placement_bounds(&self, placement: &Placement, pose: &Pose) -> Option<Bounds> {
+    /// `at_rest` keeps the boxes of the primitives of meshes whose vertices nothing moves.
+    fn placement_bounds(
+        &self,
+        placement: &Placement,
+        pose: &Pose,
+        at_rest: &mut [Option<Vec<Bounds>>],
+    ) -> Option<Bounds> {
         let weights = pose.weights.get(placement.node).map_or(&[][..], |weights| weights);
         let joints = placement.skin.and_then(|skin| pose.joints.get(skin)).map_or(&[][..], |joints| joints);
         let primitives = &self.meshes.get(placement.mesh)?.primitives;
-        let boxes = primitives.iter().filter_map(|primitive| {
-            let count = primitive.vertex_count();
-            let bounds =
-                Bounds::around((0..count).map(|vertex| primitive.position_at(vertex, weights, joints)));
-            bounds.map(|bounds| bounds.transformed(&placement.transform))
-        });
-        boxes.reduce(Bounds::union)
+        let boxes = || -> Vec<Bounds> {
+            let around = |primitive: &Primitive| {
+                let vertices = 0..primitive.vertex_count();
+                Bounds::around(vertices.map(|vertex| primitive.position_at(vertex, weights, joints)))
+            };
+            primitives.iter().filter_map(around).collect()
+        };
+        let moved;
+        let boxes = match at_rest.get_mut(placement.mesh) {
+            Some(known) if joints.is_empty() && weights.iter().all(|weight| *weight == 0.0) => {
+                known.get_or_insert_with(boxes)
+            }
+            _ => {
+                moved = boxes();
+                &moved
+            }
+        };
+        boxes.iter().map(|bounds| bounds.transformed(&placement.transform)).reduce(Bounds::union)
     }
 }
 

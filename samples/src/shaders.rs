@@ -15,6 +15,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "bench/view",
     "common/arrays",
     "common/camera",
+    "common/count_up_to_here",
     "common/for_each_pixel",
     "common/fresnel",
     "common/group_pixel",

@@ -1,10 +1,8 @@
 // A work group for each view: leaves the draws whose boxes its frustum may show, in their order.
+#include "common/count_up_to_here.glsl"
 #include "sponza/frame.glsl"
 
-const uint kGroup = 256u;
 layout(local_size_x = 256) in;
-
-shared uint sums[kGroup];
 
 // False only where the box is beyond one of the planes.
 bool isSeen(uint view, uint number) {
@@ -17,20 +15,6 @@ bool isSeen(uint view, uint number) {
         seen = seen && dot(plane.xyz, innermost) + plane.w >= 0.0;
     }
     return seen;
-}
-
-// Number of threads up to and including this one that have a 1.
-uint countUpToHere(uint one) {
-    uint here = gl_LocalInvocationID.x;
-    sums[here] = one;
-    barrier();
-    for (uint step = 1u; step < kGroup; step *= 2u) {
-        uint before = here >= step ? sums[here - step] : 0u;
-        barrier();
-        sums[here] += before;
-        barrier();
-    }
-    return sums[here];
 }
 
 void main() {

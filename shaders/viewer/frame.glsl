@@ -41,6 +41,8 @@ const uint kLightDisc = 0u; // infinitely far away, a disc in the sky
 const uint kLightPoint = 1u;
 const uint kLightSpot = 2u;
 
+const uint kAllInstances = 0xffffffffu;
+
 struct Instance {
     vec4 rows[3]; // to the world
     vec3 normalColumns[3]; // of normals to the world
@@ -57,6 +59,16 @@ struct Geometry {
     uint flags;
     float emissionWeight; // of its triangles among all that shadow rays look for; 0 if they do not
     uint padding;
+};
+
+// A mesh and its instances, which culling looks at.
+struct MeshRun {
+    vec3 middle; // of the box around the mesh
+    uint firstInstance;
+    vec3 extent; // half of its edges; negative where its vertices move, so that it is always drawn
+    uint instanceCount;
+    uint firstDraw;
+    uint drawCount; // of geometries
 };
 
 // A triangle that shadow rays look for.
@@ -138,6 +150,11 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Flo
 layout(buffer_reference, scalar, buffer_reference_align = 4) coherent buffer LevelArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { vec4 at[]; };
 
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MeshRunArray { MeshRun at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer NumberArray { uint at[]; };
+// Vertices, instances, first vertex and first instance of an indirect draw.
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ArgumentArray { uvec4 at[]; };
+
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
     InstanceArray instances;
@@ -151,6 +168,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     FloatArray skyColumns; // of each row, one after another
     PositionArray sky; // radiance of the texels of its map, row by row
     PositionArray albedos; // of a rough reflector: the table of albedo.glsl
+    MeshRunArray runs;
+    NumberArray visible; // instances that culling leaves, from the first place of their mesh on
+    ArgumentArray drawArguments; // of the geometries of all meshes
+    NumberArray drawnCounts; // instances that culling leaves of each mesh
     SumArray sums; // radiance of all samples so far and their number, for each pixel
     uint lightCount;
     uint discCount; // lights that are discs, which come first
@@ -182,6 +203,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
 layout(push_constant, scalar) uniform PushConstants {
     Frame frame;
     uint argument; // of the pass
+    uint firstVisible; // of a draw: where its instances begin among those that culling leaves; kAllInstances without culling
 };
 
 #endif

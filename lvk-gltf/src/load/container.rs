@@ -25,7 +25,8 @@ pub(super) struct Container<'a> {
 impl<'a> Container<'a> {
     /// Finds the parts of a file and reads its JSON. The content decides what it is, not its name.
     pub(super) fn read(file: Source<'a>) -> Result<Self, Problem> {
-        let start = file.part(0, file.length().min(HEADER_BYTES)).map_or(Ok(Cow::default()), |it| it.read())?;
+        let start =
+            file.part(0, file.length().min(HEADER_BYTES)).map_or(Ok(Cow::default()), |it| it.read())?;
         if start.starts_with(MAGIC) {
             return Self::read_glb(file, &start);
         }

@@ -37,7 +37,8 @@ impl OpenFile {
         }
         let most_bytes = most_bytes.min(MAX_FILE_BYTES);
         if about.len() > most_bytes {
-            let message = format!("it has {} bytes, more than the {most_bytes} that may be read", about.len());
+            let message =
+                format!("it has {} bytes, more than the {most_bytes} that may be read", about.len());
             return Err(io::Error::new(ErrorKind::FileTooLarge, message));
         }
         Ok(Self { name: shortened_path(path), file: Mutex::new(file), length: about.len() })
@@ -70,11 +71,7 @@ impl OpenFile {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Source<'a> {
     Memory(&'a [u8]),
-    File {
-        file: &'a OpenFile,
-        start: u64,
-        length: u64,
-    },
+    File { file: &'a OpenFile, start: u64, length: u64 },
 }
 
 impl<'a> Source<'a> {

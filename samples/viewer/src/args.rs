@@ -63,6 +63,10 @@ pub struct ViewerArgs {
     #[arg(long, value_name = "MIB", value_parser = whole(1..=65536))]
     pub texture_budget: Option<u32>,
 
+    /// Rasterise all instances, visible or not; the picture is the same
+    #[arg(long)]
+    pub no_culling: bool,
+
     /// Light from outside of the model
     #[command(flatten)]
     pub light: LightArgs,

@@ -75,6 +75,8 @@ pub struct ViewerConfig {
     /// Most bytes of textures, whose mip levels then come and go by what shaders read; all levels stay if there is none. It is that of
     /// the model for as long as the model is shown.
     pub texture_budget: Option<u64>,
+    /// True if the hybrid method does not rasterise instances that the camera does not see. The picture is the same.
+    pub culls: bool,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
     pub is_progressive: bool,
 }
@@ -101,6 +103,7 @@ impl ViewerConfig {
             tone_mapping: ToneMapping::default(),
             content: Content::default(),
             texture_budget: None,
+            culls: true,
             is_progressive: false,
         }
     }

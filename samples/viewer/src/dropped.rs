@@ -92,7 +92,7 @@ impl Request {
         warn(&model.warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
         let Self { ctx, path, environment, disc_radius, config } = self;
         let scene = ViewerScene { name: lvk::readable_name(&path), model, environment, disc_radius };
-        let viewer = Viewer::new(&ctx, &scene, &config)?;
+        let viewer = Viewer::new(&ctx, scene, &config)?;
         warn(viewer.warnings());
         Ok(viewer)
     }

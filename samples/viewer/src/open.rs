@@ -59,7 +59,7 @@ impl Request {
         progress.stage("uploading the model and building acceleration structures", 0);
         let config = self.config(ctx)?;
         let scene = self.scene(model).map_err(RunError::input)?;
-        let mut viewer = Viewer::new(ctx, &scene, &config)?;
+        let mut viewer = Viewer::new(ctx, scene, &config)?;
         let times = [time, start.elapsed()].map(|time| time.as_secs_f64());
         warn_beside(progress, viewer.warnings());
         if config.content == Content::Steps && ctx.capabilities().ray_query_path == RayQueryPath::Hardware {
@@ -75,7 +75,11 @@ impl Request {
         let text = format!(
             "{}: {triangles} triangles, {instances} instances, read in {:.2} s and made ready in {:.2} s; {} samples a pixel, \
              paths of {} surfaces at most",
-            scene.name, times[0], times[1], config.samples, config.bounces
+            viewer.name(),
+            times[0],
+            times[1],
+            config.samples,
+            config.bounces
         );
         progress.pause();
         Ok(ReadySample::ray_traced(viewer, config.path, "a compute shader", &text))
@@ -93,6 +97,7 @@ impl Request {
             exposure_stops: args.exposure,
             tone_mapping: args.tone,
             texture_budget: args.texture_budget.map(|mib| u64::from(mib) << 20),
+            culls: !args.no_culling,
             is_progressive: self.is_for_window,
             ..ViewerConfig::new(path, width, height)
         })

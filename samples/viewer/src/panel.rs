@@ -20,6 +20,13 @@ pub(crate) fn show_error(ui: &mut egui::Ui, error: Option<&str>) {
     }
 }
 
+/// Lays out how many instances a frame some time ago has rasterised.
+pub(crate) fn show_drawn(ui: &mut egui::Ui, drawn: Option<u32>) {
+    if let Some(drawn) = drawn {
+        ui.label(format!("{drawn} instances rasterised"));
+    }
+}
+
 /// Lays out the memory of the structures of meshes and of the top level, in bytes.
 pub(crate) fn show_memory(ui: &mut egui::Ui, bytes: [u64; 2]) {
     let [meshes, top] = bytes.map(|bytes| bytes as f64 / 1024.0 / 1024.0);
@@ -91,6 +98,7 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
             }
         });
     }
+    ui.checkbox(&mut config.culls, "culling");
     ui.add(egui::Slider::new(&mut config.exposure_stops, -6.0..=6.0).text("stops"));
     ui.add(egui::Slider::new(&mut config.bounces, 1..=64).text("bounces"));
     ui.horizontal(|ui| {

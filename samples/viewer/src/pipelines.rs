@@ -22,6 +22,7 @@ pub(crate) const NEAREST_MISS: SampleStage = stage!("nearest.rmiss");
 pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
 pub(crate) const CANDIDATE: SampleStage = stage!("candidate.rahit");
 pub(crate) const DEFORM: SampleStage = stage!("deform.comp");
+pub(crate) const CULL: SampleStage = stage!("cull.comp");
 pub(crate) const VISIBILITY_VERTEX: SampleStage = stage!("visibility.vert");
 pub(crate) const VISIBILITY_FRAGMENT: SampleStage = stage!("visibility.frag");
 pub(crate) const LIGHT_RAYS: SampleStage = stage!("visible_light.rgen");
@@ -39,6 +40,7 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
         SamplePipeline::new("viewer: paths by pipeline", &[PATH_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
         SamplePipeline::new("viewer: paths by query", &[PATH_QUERY]),
         SamplePipeline::new("viewer: morph targets and joints", &[DEFORM]),
+        SamplePipeline::new("viewer: culling", &[CULL]),
         SamplePipeline::raster(
             "viewer: visible triangles",
             &[VISIBILITY_VERTEX, VISIBILITY_FRAGMENT],

@@ -11,7 +11,7 @@ use lvk_samples::scene::{Camera, GpuCamera};
 use crate::config::{Content, Method, ViewerConfig};
 use crate::dropped::DroppedFile;
 use crate::gpu::layout::{FrameConstants, Push};
-use crate::gpu::{FrameScene, GpuScene, TextureMemory};
+use crate::gpu::{DrawnInstances, FrameScene, GpuScene, TextureMemory};
 use crate::light::Environment;
 use crate::model::{self, ModelCamera};
 use crate::playback::Playback;
@@ -67,32 +67,35 @@ pub struct Viewer {
     pub(crate) done: u32,
     /// Frames since the renderer was made or began anew.
     pub(crate) frame_number: u32,
+    /// Instances that culling has left.
+    pub(crate) drawn: DrawnInstances,
 }
 
 impl Viewer {
-    /// Uploads the scene, builds its acceleration structures and makes all pipelines. The first camera looks.
+    /// Uploads the scene, builds its acceleration structures and makes all pipelines. The first camera looks. Vertices are freed as
+    /// they are uploaded, so that they are in the host's memory once.
     ///
     /// # Errors
     /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, scene: &ViewerScene, config: &ViewerConfig) -> Result<Self, SampleError> {
+    pub fn new(ctx: &Context, scene: ViewerScene, config: &ViewerConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
+        let ViewerScene { name, model, environment, disc_radius } = scene;
         let target = RenderTarget::storage(ctx, config.extent())?;
-        let shown = scene.model.default_scene.unwrap_or(0);
-        let pose = scene.model.pose(None, 0.0);
-        let bounds = model::bounds(&scene.model, shown, &pose);
-        let light = (&scene.environment, scene.disc_radius);
-        let gpu = GpuScene::new(ctx, (&scene.model, shown), &pose, light, &bounds, config.texture_budget)?;
-        let cameras = model::cameras_around(&scene.model, shown, &pose, &bounds);
+        let shown = model.default_scene.unwrap_or(0);
+        let pose = model.pose(None, 0.0);
+        let bounds = model::bounds(&model, shown, &pose);
+        let gpu = GpuScene::new(ctx, (model, shown), &pose, (&environment, disc_radius), &bounds, config.texture_budget)?;
+        let cameras = model::cameras_around(gpu.rig(), shown, &pose, &bounds);
         let camera = cameras[0].camera;
         Ok(Self {
             scene: gpu,
             renderer: Renderer::new(ctx, config)?,
             present: Present::new(ctx)?,
             ctx: ctx.clone(),
-            name: scene.name.clone(),
+            name,
             config: *config,
-            environment: scene.environment.clone(),
-            disc_radius: scene.disc_radius,
+            environment,
+            disc_radius,
             target,
             bounds,
             playback: Playback::default(),
@@ -106,6 +109,7 @@ impl Viewer {
             before: camera,
             done: 0,
             frame_number: 0,
+            drawn: DrawnInstances::default(),
         })
     }
 
@@ -186,6 +190,23 @@ impl Viewer {
     #[must_use]
     pub fn texture_memory(&self) -> Option<TextureMemory> {
         self.scene.texture_memory()
+    }
+
+    /// True if frames are rasterised and culled.
+    pub(crate) fn culls(&self) -> bool {
+        self.config.culls && self.config.method == Method::Hybrid
+    }
+
+    /// Instances that the last frame has rasterised; `None` where all are drawn, or none are. Waits for the frame.
+    ///
+    /// # Errors
+    /// [`SampleError::Device`].
+    pub fn drawn_instances(&mut self) -> Result<Option<u32>, SampleError> {
+        if !self.culls() {
+            return Ok(None);
+        }
+        self.drawn.read(&self.ctx, self.scene.culling())?;
+        Ok(self.drawn.count())
     }
 
     /// What the picture leaves out, for the user to read.
@@ -309,6 +330,7 @@ impl Viewer {
         let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
         let scene = FrameScene {
             draws: self.scene.draws(),
+            culling: self.config.culls.then(|| self.scene.culling()),
             written: &self.scene.written(),
             wanted_mips: self.scene.wanted_mips(),
         };

@@ -114,6 +114,16 @@ impl Sample for Viewer {
         Ok(self.target.image())
     }
 
+    fn after_frame(&mut self) -> Result<(), RunError> {
+        self.drawn_instances()?;
+        Ok(())
+    }
+
+    fn remark(&self) -> Option<String> {
+        let drawn = self.drawn.count().filter(|_| self.culls())?;
+        Some(format!("culling   {drawn} of {} instances rasterised", self.counts().1))
+    }
+
     fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), RunError> {
         Ok(self.configure(&ViewerConfig { width, height, ..self.config })?)
     }
@@ -161,6 +171,9 @@ impl Sample for Viewer {
         panel::show_error(ui, self.refused.as_deref());
         let (triangles, instances) = self.counts();
         ui.label(format!("samples: {}; {triangles} triangles, {instances} instances", self.done));
+        if self.culls() && self.drawn.poll(&self.ctx, self.scene.culling()).is_ok() {
+            panel::show_drawn(ui, self.drawn.count());
+        }
         panel::show_memory(ui, self.scene.structure_bytes);
         panel::show_textures(ui, self.texture_memory());
     }

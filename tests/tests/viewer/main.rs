@@ -2,6 +2,7 @@
 //! tracing paths; files that it loads.
 
 mod animation;
+mod city;
 mod cycles;
 mod cycles_description;
 mod cycles_scenes;

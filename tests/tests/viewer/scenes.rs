@@ -122,7 +122,7 @@ pub fn viewer(
     let [width, height] = view.size;
     let usual = ViewerConfig::new(path, width, height);
     let config = ViewerConfig { method, samples: view.samples, bounces: BOUNCES, ..usual };
-    let mut viewer = Viewer::new(ctx, &scene, &config).unwrap();
+    let mut viewer = Viewer::new(ctx, scene, &config).unwrap();
     viewer.set_view(&view.camera);
     viewer
 }

@@ -61,11 +61,6 @@ impl Wall {
         ]
     }
 
-    /// The same wall, farther up.
-    pub(super) fn above(self, height: f32) -> Self {
-        Self { corner: self.corner + height * Vec3::Y, ..self }
-    }
-
     fn at(&self, x: f32, y: f32, z: f32) -> Vec3 {
         self.corner + x * self.along + y * Vec3::Y + z * self.out
     }

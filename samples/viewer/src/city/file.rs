@@ -116,7 +116,7 @@ fn write_kind(glb: &mut Glb, kind: &Kind) {
         json!({
             "name": kind.name,
             "mesh": mesh,
-            "scale": [scale; 3],
+            "scale": [scale, scale, scale],
             "extensions": { "EXT_mesh_gpu_instancing": { "attributes": attributes } },
         }),
     );

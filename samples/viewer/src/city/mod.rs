@@ -38,7 +38,7 @@ impl CityConfig {
 impl Default for CityConfig {
     /// A kilometre and a half square: more than 10 million triangles by instances.
     fn default() -> Self {
-        Self { blocks: 14, kinds: 64, seed: 1 }
+        Self { blocks: 14, kinds: 40, seed: 1 }
     }
 }
 

@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 
+use glam::Vec3;
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, Context, GeometryFlags,
-    Holder, IndexFormat, Indices, Triangles, VertexFormat,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, Context,
+    GeometryFlags, Holder, IndexFormat, Indices, Triangles, VertexFormat,
 };
-use lvk_gltf::{AlphaMode, Material, Model, Pose, Primitive};
-use lvk_samples::app::array_buffer::array;
+use lvk_gltf::{AlphaMode, Bounds, Material, Model, Pose, Primitive};
 
 use super::deformation::{Deformation, MovedArrays, POSITION, RestArrays};
 use super::emitters::{EmissiveMeshes, emission_weight};
@@ -15,6 +15,10 @@ use super::instances::MeshKey;
 use super::layout::{GpuAttributes, GpuGeometry, QUANTISED};
 use super::vertices::{PackedPositions, attributes};
 use crate::model::{moved, movers};
+
+/// Bytes of a position of four signed normalised numbers of 16 bits, and of an index.
+const QUANTISED_POSITION: u64 = 8;
+const INDEX: u64 = 4;
 
 /// Meshes on the GPU.
 pub(crate) struct GpuMeshes {
@@ -33,18 +37,19 @@ pub(crate) struct GpuMeshes {
 pub(crate) struct GpuMesh {
     pub(crate) first_geometry: u32,
     pub(crate) geometry_count: u32,
+    /// The box around it; `None` if its vertices move.
+    pub(crate) bounds: Option<Bounds>,
     pub(crate) blas: Holder<AccelStructHandle>,
 }
 
-/// Arrays while they are collected.
+/// Where the primitives of all meshes have their places in the arrays.
 #[derive(Default)]
 struct Arena {
-    floats: Vec<[f32; 3]>,
-    quantised: Vec<[i16; 4]>,
-    attributes: Vec<GpuAttributes>,
-    indices: Vec<u32>,
     parts: Vec<Part>,
-    emissive: EmissiveMeshes,
+    float_count: usize,
+    quantised_count: usize,
+    vertex_count: usize,
+    index_count: usize,
 }
 
 /// A primitive in the arrays.
@@ -64,59 +69,53 @@ struct Part {
 }
 
 impl Arena {
-    /// Adds the primitives of a mesh that have triangles, in a pose; those that move in other poses also go to `rest`.
-    fn add_mesh(&mut self, model: &Model, pose: &Pose, key: MeshKey, rest: &mut RestArrays) {
-        let (default, first) = (Material::default(), self.parts.len());
+    /// Gives the primitives of a mesh that have triangles their places. Returns the number of them.
+    fn add_mesh(&mut self, model: &Model, key: MeshKey) -> usize {
+        let default = Material::default();
         let primitives = model.meshes.get(key.mesh).map_or(&[][..], |mesh| &mesh.primitives);
-        for primitive in primitives.iter().filter(|primitive| !primitive.indices.is_empty()) {
+        let before = self.parts.len();
+        for primitive in shown(primitives) {
             let number = primitive.material.unwrap_or(model.materials.len());
             let material = model.materials.get(number).unwrap_or(&default);
-            let is_opaque = is_opaque(material);
-            let Some(node) = key.deformed_by else {
-                self.add(primitive, number as u32, is_opaque);
-                self.add_emission(first, primitive, emission_weight(material, model));
-                continue;
-            };
-            let (weights, joints) = movers(model, node, pose);
-            self.add(&moved(primitive, weights, joints), number as u32, is_opaque);
-            if let Some(part) = self.parts.last_mut().filter(|_| !model.animations.is_empty()) {
-                let places = [part.first_position, part.first_attributes];
-                part.first_before = Some(rest.add((model, node), primitive, places));
-            }
+            let is_quantised =
+                key.deformed_by.is_none() && PackedPositions::is_quantised(&primitive.positions);
+            let is_still = key.deformed_by.is_none();
+            let emission_weight = if is_still { emission_weight(material, model) } else { 0.0 };
+            self.add(primitive, (number as u32, is_opaque(material)), is_quantised, emission_weight);
         }
+        self.parts.len() - before
     }
 
-    /// Shadow rays look for light of the last geometry, of a mesh whose first one has the place `first`.
-    fn add_emission(&mut self, first: usize, primitive: &Primitive, weight: f32) {
-        if let Some(part) = self.parts.last_mut().filter(|_| weight > 0.0) {
-            part.emission_weight = weight;
-            let geometry = self.parts.len() - 1 - first;
-            self.emissive.add(first as u32, geometry as u32, primitive, weight);
-        }
-    }
-
-    fn add(&mut self, primitive: &Primitive, material: u32, is_opaque: bool) {
-        let packed = PackedPositions::new(&primitive.positions);
-        let is_quantised = matches!(packed, PackedPositions::Quantised(_));
+    fn add(
+        &mut self,
+        primitive: &Primitive,
+        (material, is_opaque): (u32, bool),
+        is_quantised: bool,
+        emission_weight: f32,
+    ) {
+        let vertex_count = primitive.vertex_count();
+        let position_count = if is_quantised { &mut self.quantised_count } else { &mut self.float_count };
         self.parts.push(Part {
             first_before: None,
-            emission_weight: 0.0,
+            emission_weight,
             is_quantised,
-            first_position: if is_quantised { self.quantised.len() } else { self.floats.len() },
-            first_attributes: self.attributes.len(),
-            first_index: self.indices.len(),
-            vertex_count: primitive.vertex_count() as u32,
+            first_position: *position_count,
+            first_attributes: self.vertex_count,
+            first_index: self.index_count,
+            vertex_count: vertex_count as u32,
             triangle_count: primitive.triangle_count() as u32,
             material,
             is_opaque,
         });
-        match packed {
-            PackedPositions::Floats(all) => self.floats.extend_from_slice(&all),
-            PackedPositions::Quantised(all) => self.quantised.extend_from_slice(all),
-        }
-        self.attributes.extend(attributes(primitive));
-        self.indices.extend_from_slice(&primitive.indices);
+        *position_count += vertex_count;
+        self.vertex_count += vertex_count;
+        self.index_count += primitive.indices.len();
     }
+}
+
+/// Primitives that have triangles.
+fn shown(primitives: &[Primitive]) -> impl Iterator<Item = &Primitive> {
+    primitives.iter().filter(|primitive| !primitive.indices.is_empty())
 }
 
 /// The buffers of an [`Arena`].
@@ -128,31 +127,50 @@ struct ArenaBuffers {
 }
 
 impl ArenaBuffers {
-    fn new(ctx: &Context, mut arena: Arena) -> lvk::Result<(Self, Vec<Part>)> {
-        // A buffer has at least one element.
-        arena.floats.push([0.0; 3]);
-        arena.quantised.push([0; 4]);
+    /// Buffers without contents.
+    fn new(ctx: &Context, arena: &Arena) -> lvk::Result<Self> {
         let read = BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT;
-        let buffers = Self {
-            floats: array(ctx, "positions", read, &arena.floats)?,
-            quantised: array(ctx, "quantised positions", read, &arena.quantised)?,
-            attributes: array(ctx, "attributes", BufferUsage::STORAGE, &arena.attributes)?,
-            indices: array(ctx, "indices", read, &arena.indices)?,
+        // A buffer has at least one element.
+        let buffer = |debug_name, usage, count: usize, stride: u64| {
+            let size_bytes = stride * count.max(1) as u64;
+            ctx.create_buffer(&BufferDesc { usage, size_bytes, debug_name, ..BufferDesc::default() })
         };
-        Ok((buffers, arena.parts))
+        let attributes_bytes = size_of::<GpuAttributes>() as u64;
+        Ok(Self {
+            floats: buffer("positions", read, arena.float_count, POSITION)?,
+            quantised: buffer("quantised positions", read, arena.quantised_count, QUANTISED_POSITION)?,
+            attributes: buffer("attributes", BufferUsage::STORAGE, arena.vertex_count, attributes_bytes)?,
+            indices: buffer("indices", read, arena.index_count, INDEX)?,
+        })
+    }
+
+    /// Writes a primitive to its places.
+    fn write(&self, ctx: &Context, part: &Part, primitive: &Primitive) -> lvk::Result<()> {
+        let packed = PackedPositions::new(&primitive.positions);
+        let (positions, stride) = self.positions(part);
+        ctx.upload_buffer(**positions, stride * part.first_position as u64, packed.bytes())?;
+        let offset = size_of::<GpuAttributes>() * part.first_attributes;
+        let attributes = attributes(primitive);
+        ctx.upload_buffer(*self.attributes, offset as u64, bytemuck::cast_slice(&attributes))?;
+        let indices = bytemuck::cast_slice(&primitive.indices);
+        ctx.upload_buffer(*self.indices, INDEX * part.first_index as u64, indices)
+    }
+
+    /// The buffer of a primitive's positions, and the bytes of each.
+    fn positions(&self, part: &Part) -> (&Holder<BufferHandle>, u64) {
+        if part.is_quantised { (&self.quantised, QUANTISED_POSITION) } else { (&self.floats, POSITION) }
     }
 
     /// `before`: address of the positions of the frame before.
     fn geometry(&self, part: &Part, before: u64) -> lvk::Result<GpuGeometry> {
-        let (positions, stride) =
-            if part.is_quantised { (&self.quantised, 8) } else { (&self.floats, POSITION) };
+        let (positions, stride) = self.positions(part);
         let positions = positions.address()? + stride * part.first_position as u64;
         Ok(GpuGeometry {
             positions,
             positions_before: part.first_before.map_or(positions, |first| before + POSITION * first as u64),
             attributes: self.attributes.address()?
                 + (size_of::<GpuAttributes>() * part.first_attributes) as u64,
-            indices: self.indices.address()? + 4 * part.first_index as u64,
+            indices: self.indices.address()? + INDEX * part.first_index as u64,
             material: part.material,
             flags: if part.is_quantised { QUANTISED } else { 0 },
             emission_weight: part.emission_weight,
@@ -166,16 +184,14 @@ impl ArenaBuffers {
     }
 
     fn triangles(&self, part: &Part) -> BlasGeometry {
-        let (buffer, stride, format) = match part.is_quantised {
-            true => (*self.quantised, 8, VertexFormat::Snorm16x4),
-            false => (*self.floats, POSITION, VertexFormat::F32x3),
-        };
+        let (buffer, stride) = self.positions(part);
+        let format = if part.is_quantised { VertexFormat::Snorm16x4 } else { VertexFormat::F32x3 };
         let (offset, flags) = (
-            4 * part.first_index as u64,
+            INDEX * part.first_index as u64,
             if part.is_opaque { GeometryFlags::OPAQUE } else { GeometryFlags::NO_DUPLICATE_ANY_HIT },
         );
         BlasGeometry::Triangles(Triangles {
-            vertex_buffer: buffer,
+            vertex_buffer: **buffer,
             vertex_offset: stride * part.first_position as u64,
             vertex_stride: stride,
             vertex_format: format,
@@ -185,6 +201,46 @@ impl ArenaBuffers {
             transform: None,
             flags,
         })
+    }
+}
+
+/// Writes the vertices of meshes, one mesh after the other.
+struct MeshWriter<'a> {
+    ctx: &'a Context,
+    buffers: &'a ArenaBuffers,
+    pose: &'a Pose,
+    emissive: EmissiveMeshes,
+    rest: RestArrays,
+}
+
+impl MeshWriter<'_> {
+    /// Writes a mesh in a pose, whose first geometry has the number `first`; those that move in other poses also go to the vertices
+    /// at rest. Returns the box around a mesh that does not deform.
+    fn write(
+        &mut self,
+        model: &Model,
+        (key, primitives): (MeshKey, &[Primitive]),
+        (first, parts): (usize, &mut [Part]),
+    ) -> lvk::Result<Option<Bounds>> {
+        let mut bounds: Option<Bounds> = None;
+        for (geometry, (primitive, part)) in (0..).zip(shown(primitives).zip(parts)) {
+            let Some(node) = key.deformed_by else {
+                self.buffers.write(self.ctx, part, primitive)?;
+                if part.emission_weight > 0.0 {
+                    self.emissive.add(first as u32, geometry, primitive, part.emission_weight);
+                }
+                let around = Bounds::around(primitive.positions.iter().map(Vec3::from));
+                bounds = bounds.into_iter().chain(around).reduce(Bounds::union);
+                continue;
+            };
+            let (weights, joints) = movers(model, node, self.pose);
+            self.buffers.write(self.ctx, part, &moved(primitive, weights, joints))?;
+            if !model.animations.is_empty() {
+                let places = [part.first_position, part.first_attributes];
+                part.first_before = Some(self.rest.add((model, node), primitive, places));
+            }
+        }
+        Ok(bounds)
     }
 }
 
@@ -213,40 +269,43 @@ impl GpuMeshes {
         keys.iter().map(|key| *self.meshes[key].blas).collect()
     }
 
-    /// Uploads meshes in a pose and builds their structures. Primitives without triangles are left out. The default material has
-    /// the number of the model's materials.
+    fn none() -> Self {
+        Self {
+            geometries: Vec::new(),
+            triangle_counts: Vec::new(),
+            emissive: EmissiveMeshes::default(),
+            meshes: HashMap::new(),
+            _buffers: Vec::new(),
+        }
+    }
+
+    /// Uploads meshes in a pose and builds their structures. `keys` are in order. Primitives without triangles are left out. The
+    /// default material has the number of the model's materials. The model loses each mesh once it is uploaded.
     pub(crate) fn upload(
         ctx: &Context,
-        model: &Model,
+        model: &mut Model,
         pose: &Pose,
         keys: &[MeshKey],
     ) -> lvk::Result<UploadedMeshes> {
-        let (mut arena, mut rest) = (Arena::default(), RestArrays::default());
-        let mut runs = Vec::new();
-        for key in keys {
-            let before = arena.parts.len();
-            arena.add_mesh(model, pose, *key, &mut rest);
-            runs.push((*key, arena.parts.len() - before));
-        }
+        let mut arena = Arena::default();
+        let mut runs: Vec<(MeshKey, usize)> =
+            keys.iter().map(|key| (*key, arena.add_mesh(model, *key))).collect();
         runs.retain(|(_, count)| *count > 0);
         if arena.parts.is_empty() {
-            let meshes = Self {
-                geometries: Vec::new(),
-                triangle_counts: Vec::new(),
-                emissive: EmissiveMeshes::default(),
-                meshes: HashMap::new(),
-                _buffers: Vec::new(),
-            };
-            return Ok(UploadedMeshes { meshes, deformation: None });
+            return Ok(UploadedMeshes { meshes: Self::none(), deformation: None });
         }
-        let emissive = std::mem::take(&mut arena.emissive);
-        let (buffers, parts) = ArenaBuffers::new(ctx, arena)?;
+        let buffers = ArenaBuffers::new(ctx, &arena)?;
+        let mut parts = arena.parts;
+        let (emissive, rest) = (EmissiveMeshes::default(), RestArrays::default());
+        let mut writer = MeshWriter { ctx, buffers: &buffers, pose, emissive, rest };
+        let bounds = write_meshes(&mut writer, model, &runs, &mut parts)?;
+        let MeshWriter { emissive, rest, .. } = writer;
         let deformation = Deformation::new(ctx, rest, buffers.moved()?)?;
         let before = deformation.as_ref().map_or(Ok(0), Deformation::before_address)?;
         let geometries =
             parts.iter().map(|part| buffers.geometry(part, before)).collect::<lvk::Result<_>>()?;
         let triangle_counts = parts.iter().map(|part| part.triangle_count).collect();
-        let meshes = build(ctx, model, &runs, &parts, &buffers)?;
+        let meshes = build(ctx, model, (&runs, &bounds), &parts, &buffers)?;
         let ArenaBuffers { floats, quantised, attributes, indices } = buffers;
         let _buffers = vec![floats, quantised, attributes, indices];
         Ok(UploadedMeshes {
@@ -256,11 +315,32 @@ impl GpuMeshes {
     }
 }
 
+/// Writes all meshes, each of so many geometries, and frees their vertices. Returns the boxes around them.
+fn write_meshes(
+    writer: &mut MeshWriter<'_>,
+    model: &mut Model,
+    runs: &[(MeshKey, usize)],
+    parts: &mut [Part],
+) -> lvk::Result<Vec<Option<Bounds>>> {
+    let (mut bounds, mut first) = (Vec::new(), 0);
+    for (place, (key, count)) in runs.iter().enumerate() {
+        let primitives = std::mem::take(&mut model.meshes[key.mesh].primitives);
+        let own = &mut parts[first..first + count];
+        bounds.push(writer.write(model, (*key, &primitives), (first, own))?);
+        // Other nodes may show the mesh with other vertices.
+        if runs.get(place + 1).is_some_and(|(next, _)| next.mesh == key.mesh) {
+            model.meshes[key.mesh].primitives = primitives;
+        }
+        first += count;
+    }
+    Ok(bounds)
+}
+
 /// Builds a structure for each mesh, of so many geometries.
 fn build(
     ctx: &Context,
     model: &Model,
-    runs: &[(MeshKey, usize)],
+    (runs, bounds): (&[(MeshKey, usize)], &[Option<Bounds>]),
     parts: &[Part],
     buffers: &ArenaBuffers,
 ) -> lvk::Result<HashMap<MeshKey, GpuMesh>> {
@@ -277,12 +357,12 @@ fn build(
     }
     let built = ctx.create_blas_batch(&descs)?;
     let mut next = 0;
-    let pairs = runs.iter().zip(built);
+    let pairs = runs.iter().zip(bounds).zip(built);
     Ok(pairs
-        .map(|((key, count), blas)| {
+        .map(|(((key, count), bounds), blas)| {
             let (first_geometry, geometry_count) = (next, *count as u32);
             next += geometry_count;
-            (*key, GpuMesh { first_geometry, geometry_count, blas })
+            (*key, GpuMesh { first_geometry, geometry_count, bounds: *bounds, blas })
         })
         .collect())
 }

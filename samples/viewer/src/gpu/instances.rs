@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use glam::{Mat3, Mat4};
+use glam::{Mat3, Mat4, Vec3};
 use lvk::{TlasInstance, rows_from_columns};
 use lvk_gltf::{Model, Placement};
 
-use super::geometry::GpuMeshes;
-use super::layout::GpuInstance;
+use super::geometry::{GpuMesh, GpuMeshes};
+use super::layout::{GpuInstance, GpuMeshRun};
 use crate::model::deforms;
 
 /// Instances whose volume is a smaller share of that of their mesh have no inside, and are not shown.
@@ -44,6 +44,8 @@ pub(crate) struct SceneInstances {
     pub(crate) table: Vec<GpuInstance>,
     /// Everything to rasterise.
     pub(crate) draws: Vec<Draw>,
+    /// The instances of each mesh, which culling looks at.
+    pub(crate) runs: Vec<GpuMeshRun>,
     /// For the top-level structure, without those that have no inside.
     structures: Vec<TlasInstance>,
     /// Places among the placements of the scene.
@@ -53,8 +55,8 @@ pub(crate) struct SceneInstances {
 impl SceneInstances {
     /// Instances of the meshes of `keys`, one for each placement.
     pub(crate) fn new(placements: &[Placement], keys: &[MeshKey], meshes: &GpuMeshes) -> Self {
-        let mut shown =
-            Self { table: Vec::new(), draws: Vec::new(), structures: Vec::new(), order: Vec::new() };
+        let (table, draws, runs) = (Vec::new(), Vec::new(), Vec::new());
+        let mut shown = Self { table, draws, runs, structures: Vec::new(), order: Vec::new() };
         let mut order: Vec<usize> = (0..placements.len().min(keys.len())).collect();
         order.sort_by_key(|place| keys[*place]);
         for same in order.chunk_by(|a, b| keys[*a] == keys[*b]) {
@@ -69,6 +71,7 @@ impl SceneInstances {
                     ..bytemuck::Zeroable::zeroed()
                 });
             }
+            shown.runs.push(run(mesh, &instances, shown.draws.len()));
             shown.draws.extend((0..mesh.geometry_count).map(|geometry| {
                 let triangle_count = meshes.triangle_counts[(mesh.first_geometry + geometry) as usize];
                 Draw { geometry, triangle_count, instances: instances.clone() }
@@ -100,6 +103,20 @@ impl SceneInstances {
     /// Transforms of all instances.
     pub(crate) fn transforms(&self) -> Vec<[f32; 12]> {
         self.table.iter().map(|instance| instance.rows).collect()
+    }
+}
+
+/// The instances of a mesh, whose first geometry is the draw with this number.
+fn run(mesh: &GpuMesh, instances: &Range<u32>, first_draw: usize) -> GpuMeshRun {
+    let bounds = mesh.bounds.map(|bounds| (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min)));
+    let (middle, extent) = bounds.unwrap_or((Vec3::ZERO, Vec3::NEG_ONE));
+    GpuMeshRun {
+        middle: middle.to_array(),
+        first_instance: instances.start,
+        extent: extent.to_array(),
+        instance_count: instances.end - instances.start,
+        first_draw: first_draw as u32,
+        draw_count: mesh.geometry_count,
     }
 }
 

@@ -71,6 +71,18 @@ lvk::shader_struct! {
         pub(crate) _padding: u32,
     }
 
+    /// `MeshRun`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuMeshRun {
+        pub(crate) middle: [f32; 3],
+        pub(crate) first_instance: u32,
+        pub(crate) extent: [f32; 3],
+        pub(crate) instance_count: u32,
+        pub(crate) first_draw: u32,
+        pub(crate) draw_count: u32,
+    }
+
     /// `Emitter`.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
@@ -148,6 +160,16 @@ lvk::shader_struct! {
         pub(crate) range: f32,
     }
 
+    /// `Frame`: what culling reads and writes.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct CullingConstants {
+        pub(crate) runs: u64,
+        pub(crate) visible: u64,
+        pub(crate) draw_arguments: u64,
+        pub(crate) drawn_counts: u64,
+    }
+
     /// `Frame`: what leads to the scene, the same in every frame.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
@@ -163,6 +185,7 @@ lvk::shader_struct! {
         pub(crate) sky_columns: u64,
         pub(crate) sky: u64,
         pub(crate) albedos: u64,
+        pub(crate) culling: CullingConstants,
     }
 
     /// `Frame`: light.
@@ -221,10 +244,29 @@ lvk::shader_struct! {
         pub(crate) argument: u32,
         pub(crate) _padding: u32,
     }
+
+    /// `PushConstants` of a draw.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct DrawPush {
+        pub(crate) frame: u64,
+        pub(crate) argument: u32,
+        pub(crate) first_visible: u32,
+    }
 }
+
+/// Value of `DrawPush::first_visible` without culling.
+pub(crate) const ALL_INSTANCES: u32 = u32::MAX;
 
 /// The layout that pipelines compare with their shaders which read the frame alone.
 pub(crate) const FRAME_LAYOUT: &[BlockLayout] = &[BlockLayout::buffer_reference::<FrameConstants>("Frame")];
+
+/// Layouts that the pipeline of culling compares with its shader.
+pub(crate) const CULLING_LAYOUTS: &[BlockLayout] = &[
+    BlockLayout::buffer_reference::<FrameConstants>("Frame"),
+    BlockLayout::buffer_reference::<GpuInstance>("InstanceArray"),
+    BlockLayout::buffer_reference::<GpuMeshRun>("MeshRunArray"),
+];
 
 /// Layouts that pipelines compare with their shaders which read the scene.
 pub(crate) const SCENE_LAYOUTS: &[BlockLayout] = &[

@@ -1,6 +1,7 @@
 //! A model on the GPU.
 
 mod albedo_table;
+mod culling;
 mod deformation;
 mod emitters;
 mod geometry;
@@ -13,15 +14,18 @@ mod scene;
 mod textures;
 mod vertices;
 
+pub(crate) use culling::{Culling, DrawnInstances};
 pub(crate) use instances::Draw;
 pub(crate) use scene::GpuScene;
 pub use textures::TextureMemory;
 
 /// What a frame rasterises and traces.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(crate) struct FrameScene<'a> {
     /// Everything to rasterise.
     pub(crate) draws: &'a [Draw],
+    /// What leaves out instances; `None` to rasterise all.
+    pub(crate) culling: Option<&'a Culling>,
     /// Buffers that commands before have written.
     pub(crate) written: &'a [lvk::BufferHandle],
     /// The buffer that shaders write the mip levels to that they want, if levels come and go.

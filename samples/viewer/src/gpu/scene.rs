@@ -8,6 +8,7 @@ use lvk_samples::app::run_error::RunError;
 use lvk_samples::app::sample_error::SampleError;
 
 use super::albedo_table::albedo_table;
+use super::culling::Culling;
 use super::emitters::Emitters;
 use super::geometry::{GpuMeshes, UploadedMeshes};
 use super::instances::{Draw, MeshKey, SceneInstances};
@@ -45,6 +46,7 @@ pub(crate) struct GpuScene {
     /// `None` if the model has no animations.
     motion: Option<SceneMotion>,
     meshes: GpuMeshes,
+    culling: Culling,
     textures: GpuTextures,
     /// Texture slots of the materials. Those on the GPU are the same unless mip levels come and go.
     slots: Vec<GpuTextureSlot>,
@@ -53,30 +55,33 @@ pub(crate) struct GpuScene {
 
 impl GpuScene {
     /// Uploads the scene `shown` of `model` in a pose and builds its structures. Directional lights are discs of the radius
-    /// `disc_radius`, in radians. All of it is inside of `bounds`.
+    /// `disc_radius`, in radians. All of it is inside of `bounds`. Vertices of the model are freed as they are uploaded.
     pub(crate) fn new(
         ctx: &Context,
-        (model, shown): (&Model, usize),
+        (mut model, shown): (Model, usize),
         pose: &Pose,
         (environment, disc_radius): (&Environment, f32),
         bounds: &Bounds,
         texture_budget: Option<u64>,
     ) -> Result<Self, SampleError> {
-        let textures = GpuTextures::new(ctx, model, texture_budget)?;
+        let textures = GpuTextures::new(ctx, &model, texture_budget)?;
         let placements = model.placements(shown, pose);
-        let keys: Vec<MeshKey> = placements.iter().map(|placement| MeshKey::new(model, placement)).collect();
-        let UploadedMeshes { meshes, deformation } = GpuMeshes::upload(ctx, model, pose, &unique(&keys))?;
+        let keys: Vec<MeshKey> = placements.iter().map(|placement| MeshKey::new(&model, placement)).collect();
+        let UploadedMeshes { meshes, deformation } =
+            GpuMeshes::upload(ctx, &mut model, pose, &unique(&keys))?;
         let instances = SceneInstances::new(&placements, &keys, &meshes);
-        let light_setting = LightSetting::new(model, environment, disc_radius, *bounds);
+        let light_setting = LightSetting::new(&model, environment, disc_radius, *bounds);
         let emitters = meshes.emissive.emitters(&instances.table);
-        let lights = GpuLights::new((model, shown), pose, &emitters, &light_setting);
+        let lights = GpuLights::new((&model, shown), pose, &emitters, &light_setting);
+        let culling = Culling::new(ctx, &instances)?;
         let mut arrays = Arrays { ctx, held: Vec::new() };
-        let materials = GpuMaterials::new(model, &textures);
-        let constants =
-            arrays.constants(&meshes, &instances, &materials, (&lights, &emitters), environment)?;
+        let materials = GpuMaterials::new(&model, &textures);
+        let shown_meshes = (&meshes, &instances, &culling);
+        let constants = arrays.constants(shown_meshes, &materials, (&lights, &emitters), environment)?;
         let tlas = tlas(ctx, &instances)?;
         let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
         let motion = SceneMotion::new(deformation, meshes.deformed(), pose.clone());
+        let motion = (!model.animations.is_empty()).then_some(motion);
         Ok(Self {
             constants,
             light: light_constants(&lights, environment),
@@ -91,8 +96,9 @@ impl GpuScene {
             lights,
             emitters,
             light_setting,
-            motion: (!model.animations.is_empty()).then_some(motion),
+            motion,
             meshes,
+            culling,
             textures,
             slots: materials.slots,
             _buffers: arrays.held,
@@ -117,6 +123,11 @@ impl GpuScene {
     /// Everything to rasterise.
     pub(crate) fn draws(&self) -> &[Draw] {
         &self.instances.draws
+    }
+
+    /// What leaves out instances that the camera does not see.
+    pub(crate) fn culling(&self) -> &Culling {
+        &self.culling
     }
 
     /// Moves nodes, lights and vertices to another pose, in the next frame. Returns false if nothing moves.
@@ -278,8 +289,7 @@ impl Arrays<'_> {
 
     fn constants(
         &mut self,
-        meshes: &GpuMeshes,
-        instances: &SceneInstances,
+        (meshes, instances, culling): (&GpuMeshes, &SceneInstances, &Culling),
         materials: &GpuMaterials,
         (lights, emitters): (&GpuLights, &Emitters),
         environment: &Environment,
@@ -297,6 +307,7 @@ impl Arrays<'_> {
             sky_columns: self.upload("columns of the sky", &sky.columns)?,
             sky: self.upload("sky", &environment.sky.texels)?,
             albedos: self.upload("albedos", &albedo_table())?,
+            culling: culling.constants()?,
         })
     }
 }

@@ -21,6 +21,19 @@ impl<'a> PackedPositions<'a> {
             other => Self::Floats(other.iter().collect::<Vec<_>>().into()),
         }
     }
+
+    /// True if positions are taken as signed normalised numbers.
+    pub(crate) fn is_quantised(positions: &Positions) -> bool {
+        matches!(positions, Positions::Snorm16(_))
+    }
+
+    /// Their bytes, one position after the other.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Floats(all) => bytemuck::cast_slice(all),
+            Self::Quantised(all) => bytemuck::cast_slice(all),
+        }
+    }
 }
 
 /// The attributes of all vertices of a primitive.

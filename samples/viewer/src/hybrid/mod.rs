@@ -68,6 +68,9 @@ impl Hybrid {
     /// Records a frame, whose constants are at `frame`.
     pub(crate) fn record(&self, to: &mut Frame<'_>, frame: u64, scene: FrameScene<'_>) -> lvk::Result<()> {
         let push = |argument| Push { frame, argument, _padding: 0 };
+        if let Some(culling) = scene.culling {
+            to.pass("culling", |cmd| culling.record(cmd, &push(0)))?;
+        }
         to.pass("visible triangles", |cmd| self.visibility.record(cmd, frame, scene))?;
         let (planes, visible) = (*self.planes, self.visibility.triangles());
         to.pass("light", |cmd| {

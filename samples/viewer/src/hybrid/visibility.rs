@@ -6,8 +6,8 @@ use lvk::{
     TextureDesc, TextureHandle, TextureUsage,
 };
 
-use crate::gpu::FrameScene;
-use crate::gpu::layout::{Push, SCENE_LAYOUTS};
+use crate::gpu::layout::{ALL_INSTANCES, DrawPush, SCENE_LAYOUTS};
+use crate::gpu::{Culling, FrameScene};
 use crate::pipelines::{SAMPLE, VISIBILITY_FRAGMENT, VISIBILITY_VERTEX};
 
 /// Format of the target: instance, geometry and primitive of each pixel.
@@ -65,17 +65,23 @@ impl Visibility {
             store: true,
             resolve: None,
         };
+        let reads = scene.culling.map(Culling::reads);
+        let read_buffers: Vec<_> = scene.written.iter().copied().chain(reads.into_iter().flatten()).collect();
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &[color],
             depth: Some(DepthAttachment { store: false, ..DepthAttachment::clear(*self.depth, 0.0) }),
-            dependencies: Dependencies { read_buffers: scene.written, ..Dependencies::default() },
+            dependencies: Dependencies { read_buffers: &read_buffers, ..Dependencies::default() },
             debug_name: "visible triangles",
             ..RenderPassDesc::default()
         })?;
         pass.bind_render_pipeline(*self.pipeline)?;
-        for draw in scene.draws {
-            pass.push_constants(&Push { frame, argument: draw.geometry, _padding: 0 })?;
-            pass.draw(0..3 * draw.triangle_count, draw.instances.clone())?;
+        for (number, draw) in scene.draws.iter().enumerate() {
+            let first_visible = scene.culling.map_or(ALL_INSTANCES, |_| draw.instances.start);
+            pass.push_constants(&DrawPush { frame, argument: draw.geometry, first_visible })?;
+            match scene.culling {
+                Some(culling) => culling.draw(&mut pass, number)?,
+                None => pass.draw(0..3 * draw.triangle_count, draw.instances.clone())?,
+            }
         }
         Ok(())
     }

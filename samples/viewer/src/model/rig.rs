@@ -3,19 +3,15 @@
 use lvk_gltf::{Mesh, Model, Primitive};
 
 /// Returns the model without vertices, images and materials: enough for its poses, placements, cameras and lights.
-pub(crate) fn rig(model: &Model) -> Model {
-    let mesh =
-        |mesh: &Mesh| Mesh { name: mesh.name.clone(), weights: mesh.weights.clone(), primitives: Vec::new() };
+pub(crate) fn rig(model: Model) -> Model {
+    let mesh = |mesh: Mesh| Mesh { primitives: Vec::new(), ..mesh };
     Model {
-        scenes: model.scenes.clone(),
-        default_scene: model.default_scene,
-        nodes: model.nodes.clone(),
-        meshes: model.meshes.iter().map(mesh).collect(),
-        cameras: model.cameras.clone(),
-        lights: model.lights.clone(),
-        skins: model.skins.clone(),
-        animations: model.animations.clone(),
-        ..Model::default()
+        meshes: model.meshes.into_iter().map(mesh).collect(),
+        materials: Vec::new(),
+        images: Vec::new(),
+        samplers: Vec::new(),
+        warnings: Vec::new(),
+        ..model
     }
 }
 
