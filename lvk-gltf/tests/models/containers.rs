@@ -53,6 +53,58 @@ fn all_forms_of_a_file_give_the_same_model() {
     }
 }
 
+/// A strip of so many vertices that a file of them is read in several parts: interleaved, and some of them replaced.
+fn large() -> Glb {
+    const COUNT: usize = 60_000;
+    Glb::with_primitive(|glb| {
+        let place = |vertex: usize| [vertex as f32, (vertex % 2) as f32, 0.25 * vertex as f32];
+        let interleaved: Vec<[f32; 6]> = (0..COUNT)
+            .map(|vertex| {
+                let [x, y, z] = place(vertex);
+                [x, y, z, 0.6, 0.0, 0.8]
+            })
+            .collect();
+        let view = glb.view(bytemuck::cast_slice(interleaved.as_flattened()));
+        glb.json["bufferViews"][view]["byteStride"] = json!(24);
+        let replaced: Vec<u32> = (0..COUNT as u32).step_by(3).collect();
+        let indices = glb.view(bytemuck::cast_slice(&replaced));
+        let values: Vec<[f32; 3]> = replaced.iter().map(|vertex| [-(*vertex as f32), 1.0, 2.0]).collect();
+        let values = glb.view(bytemuck::cast_slice(values.as_flattened()));
+        let sparse = json!({ "count": replaced.len(), "indices": { "bufferView": indices, "componentType": 5125 },
+                             "values": { "bufferView": values } });
+        let accessor = json!({ "bufferView": view, "componentType": 5126, "type": "VEC3", "count": COUNT });
+        let mut positions = accessor.clone();
+        positions["sparse"] = sparse;
+        let positions = glb.push("accessors", positions);
+        let mut normals = accessor;
+        normals["byteOffset"] = json!(12);
+        let normals = glb.push("accessors", normals);
+        json!({ "attributes": { "POSITION": positions, "NORMAL": normals }, "mode": 5 })
+    })
+}
+
+#[test]
+fn a_large_file_is_read_in_parts_as_its_bytes_are() {
+    let glb = large();
+    let wanted = glb.load_cleanly();
+    let positions = &wanted.meshes[0].primitives[0].positions;
+    assert_eq!(positions.get(59_998), Some([59_998.0, 0.0, 14_999.5]));
+    assert_eq!(positions.get(59_997), Some([-59_997.0, 1.0, 2.0]));
+    let folder = tempfile::tempdir().unwrap();
+    let (path, bytes) = (folder.path().join("large.glb"), glb.to_glb());
+    std::fs::write(&path, &bytes).unwrap();
+    assert_eq!(load_file(&path).unwrap(), wanted);
+    std::fs::write(folder.path().join("large.bin"), &glb.bin).unwrap();
+    let external = folder.path().join("large.gltf");
+    std::fs::write(&external, glb.to_gltf("large.bin")).unwrap();
+    assert_eq!(load_file(&external).unwrap(), wanted);
+    for length in [13, 500, bytes.len() / 2, bytes.len() - 1] {
+        std::fs::write(&path, &bytes[..length]).unwrap();
+        let (of_file, of_bytes) = (load_file(&path).unwrap_err(), load(&bytes[..length]).unwrap_err());
+        assert_eq!(of_file.problem.to_string(), of_bytes.to_string());
+    }
+}
+
 #[test]
 fn errors_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
