@@ -77,11 +77,11 @@ fn a_camera_that_moves_through_the_city_sees_the_same_with_culling() {
 fn nothing_is_drawn_of_what_lies_behind_and_all_of_what_lies_ahead() {
     let Some(ctx) = device() else { return };
     let model = tiny_city(2, 2);
-    let far = Camera::looking_at([0.0, 60.0, 700.0], [0.0, 20.0, 0.0], 40.0);
+    let far = Camera::looking_at([0.0, 60.0, 1300.0], [0.0, 20.0, 0.0], 40.0);
     let view = View { camera: far, size: [48, 32], samples: 1 };
     let mut viewer = hybrid(&ctx, RayPath::Query, &model, &view);
     // The ground reaches behind the camera.
-    for (target, expected) in [([0.0, 20.0, 0.0], viewer.counts().1), ([0.0, 60.0, 1500.0], 1)] {
+    for (target, expected) in [([0.0, 20.0, 0.0], viewer.counts().1), ([0.0, 60.0, 2100.0], 1)] {
         viewer.set_view(&Camera { target, ..far });
         assert_eq!(frame(&mut viewer, true).1, Some(expected));
     }

@@ -48,7 +48,7 @@ pub(super) fn building(kind: usize, seed: u64) -> Solid {
     let half = Vec2::new(random.within(10.6..0.5 * LOT - 0.02), random.within(9.0..11.2));
     // The front of all buildings is on one line.
     let middle = Vec2::new(0.0, 0.5 * LOT - half.y);
-    let look = look(class, &mut random);
+    let look = choose_look(class, &mut random);
     let (floors, storey) = match class {
         Class::House => (2 + random.below(3), 3.1),
         Class::Apartments => (4 + random.below(4), 3.2),
@@ -79,29 +79,33 @@ pub(super) fn building(kind: usize, seed: u64) -> Solid {
     solid
 }
 
-fn look(class: Class, random: &mut Random) -> Look {
+fn choose_look(class: Class, random: &mut Random) -> Look {
     use Surface::{
         Brick, Bronze, Concrete, DarkBrick, Frame, Kerb, Limestone, Ochre, Plaster, Rose, Sandstone, Steel,
     };
     let light = [Limestone, Plaster, Kerb];
     match class {
         Class::House | Class::Apartments => Look {
-            style: if class == Class::House { Style::Sash } else { random.of([Style::Sash, Style::Balcony]) },
-            wall: random.of([Brick, Plaster, Ochre, Rose, Sandstone, DarkBrick, Limestone]),
-            trim: random.of(light),
-            frame: random.of([Frame, Frame, Bronze]),
+            style: if class == Class::House {
+                Style::Sash
+            } else {
+                random.entry([Style::Sash, Style::Balcony])
+            },
+            wall: random.entry([Brick, Plaster, Ochre, Rose, Sandstone, DarkBrick, Limestone]),
+            trim: random.entry(light),
+            frame: random.entry([Frame, Frame, Bronze]),
         },
         Class::Office => Look {
-            style: random.of([Style::Wide, Style::Wide, Style::Curtain]),
-            wall: random.of([Limestone, Sandstone, Concrete, Brick]),
-            trim: random.of(light),
-            frame: random.of([Bronze, Steel]),
+            style: random.entry([Style::Wide, Style::Wide, Style::Curtain]),
+            wall: random.entry([Limestone, Sandstone, Concrete, Brick]),
+            trim: random.entry(light),
+            frame: random.entry([Bronze, Steel]),
         },
         Class::Tower => Look {
-            style: random.of([Style::Curtain, Style::Curtain, Style::Wide]),
-            wall: random.of([Concrete, Surface::Slate, Limestone]),
+            style: random.entry([Style::Curtain, Style::Curtain, Style::Wide]),
+            wall: random.entry([Concrete, Surface::Slate, Limestone]),
             trim: Concrete,
-            frame: random.of([Steel, Bronze]),
+            frame: random.entry([Steel, Bronze]),
         },
     }
 }
@@ -183,7 +187,7 @@ fn air_conditioner(solid: &mut Solid, at: Vec3, random: &mut Random) {
 /// A hipped roof with rows of tiles, dormers and chimneys.
 fn pitched_roof(solid: &mut Solid, [low, high]: [Vec2; 2], height: f32, random: &mut Random) {
     const OVERHANG: f32 = 0.45;
-    let surface = random.of([Surface::Tiles, Surface::Slate, Surface::Tiles]);
+    let surface = random.entry([Surface::Tiles, Surface::Slate, Surface::Tiles]);
     let (low, high) = (low - Vec2::splat(OVERHANG), high + Vec2::splat(OVERHANG));
     let inset = 0.42 * (high - low).min_element();
     let rows = 22;

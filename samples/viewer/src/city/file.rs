@@ -21,7 +21,7 @@ pub enum CityError {
     OutOfRange {
         /// The option.
         option: &'static str,
-        /// Its value.
+        /// Value of the option.
         value: u32,
         /// The largest value.
         most: u32,

@@ -36,9 +36,9 @@ impl CityConfig {
 }
 
 impl Default for CityConfig {
-    /// A kilometre and a half square: more than 10 million triangles by instances.
+    /// A square kilometre: more than 10 million triangles by instances.
     fn default() -> Self {
-        Self { blocks: 14, kinds: 40, seed: 1 }
+        Self { blocks: 10, kinds: 40, seed: 1 }
     }
 }
 

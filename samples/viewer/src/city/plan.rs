@@ -179,7 +179,7 @@ impl Planner {
 
     fn park(&mut self, middle: Vec2) {
         let inner = 0.5 * BLOCK - PAVEMENT;
-        for _ in 0..46 {
+        for _ in 0..80 {
             let at = Vec2::new(self.random.within(-inner..inner), self.random.within(-inner..inner));
             let is_free = at.abs().min_element() > 4.0 && at.length() > 12.0;
             if is_free {
@@ -247,23 +247,64 @@ impl Planner {
     }
 }
 
-/// From the middle of a street, from a roof, and from above all.
+/// From a sunny street, from a roof, and from above all.
 fn views(config: &CityConfig, half: f32) -> Vec<View> {
-    let line = (config.blocks / 2) as f32 * PITCH - half;
-    let street = Vec3::new(line + 4.6, 1.75, 0.5 * PITCH + line);
+    let line = |number: u32| number as f32 * PITCH - half;
+    let middle = line(config.blocks / 2);
+    let street = line(config.blocks / 2 + config.blocks / 5);
+    let eye = Vec3::new(-0.72 * half, 1.75, street + 3.4);
     vec![
-        View { name: "street", eye: street, target: street + Vec3::new(-14.0, 9.0, -80.0), fov: 1.0 },
+        View { name: "street", eye, target: eye + Vec3::new(80.0, 9.0, -17.0), fov: 1.0 },
         View {
             name: "roofs",
-            eye: Vec3::new(line + 150.0, 95.0, line + 170.0).min(Vec3::new(half, 95.0, half)),
-            target: Vec3::new(line, 20.0, line),
+            eye: Vec3::new(middle - 190.0, 70.0, middle + 190.0).clamp(Vec3::splat(-half), Vec3::splat(half)),
+            target: Vec3::new(middle + 40.0, 25.0, middle - 40.0),
             fov: 0.85,
         },
         View {
             name: "above",
-            eye: Vec3::new(0.62 * half, 0.42 * half + 80.0, 1.15 * half),
-            target: Vec3::new(-0.05 * half, 0.0, 0.1 * half),
-            fov: 0.7,
+            eye: Vec3::new(-0.35 * half, 0.28 * half + 80.0, 1.0 * half),
+            target: Vec3::new(0.0, 0.0, -0.05 * half),
+            fov: 0.75,
         },
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_are_counter_clockwise_seen_from_where_their_normals_point() {
+        let plan = plan(&CityConfig { blocks: 4, kinds: 16, seed: 2 });
+        assert!(plan.kinds.len() > 30);
+        for kind in &plan.kinds {
+            for (surface, part) in kind.solid.parts() {
+                let turned = part.indices.chunks_exact(3).filter(|corners| {
+                    let [a, b, c] = [0, 1, 2].map(|corner| part.positions[corners[corner] as usize]);
+                    (b - a).cross(c - a).dot(part.normals[corners[0] as usize]) < 0.0
+                });
+                assert_eq!(turned.count(), 0, "{} {surface:?}", kind.name);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_but_traffic_stands_on_streets_and_towers_are_in_the_middle() {
+        let plan = plan(&CityConfig { blocks: 6, kinds: 16, seed: 2 });
+        let half = 3.0 * PITCH;
+        let mut heights = [Vec::new(), Vec::new()];
+        for kind in plan.kinds.iter().filter(|kind| kind.name.starts_with("building")) {
+            let height = kind.solid.bounds()[1].y;
+            for place in &kind.places {
+                let offset = [place.position.x, place.position.z]
+                    .map(|at| (at + half).rem_euclid(PITCH) - 0.5 * PITCH);
+                assert!(offset.iter().all(|offset| offset.abs() < LOT + 0.1), "{} {offset:?}", kind.name);
+                let is_outer = place.position.x.abs().max(place.position.z.abs()) > 0.6 * half;
+                heights[usize::from(is_outer)].push(height);
+            }
+        }
+        let mean = |heights: &[f32]| heights.iter().sum::<f32>() / heights.len() as f32;
+        assert!(mean(&heights[0]) > 1.5 * mean(&heights[1]));
+    }
 }

@@ -44,7 +44,7 @@ impl Random {
     }
 
     /// An entry of a list.
-    pub(super) fn of<T: Copy, const N: usize>(&mut self, list: [T; N]) -> T {
+    pub(super) fn entry<T: Copy, const N: usize>(&mut self, list: [T; N]) -> T {
         list[self.below(N)]
     }
 }

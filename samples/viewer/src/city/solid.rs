@@ -23,7 +23,7 @@ pub(super) struct Part {
 }
 
 impl Solid {
-    /// Its materials and their triangles.
+    /// Returns each material and its triangles.
     pub(super) fn parts(&self) -> impl Iterator<Item = (Surface, &Part)> {
         self.parts.iter().map(|(surface, part)| (*surface, part))
     }

@@ -92,7 +92,7 @@ pub(super) fn ground(side: f32) -> Solid {
         solid.quad(surface, Vec3::new(-half, y, -half), Vec3::Z * (2.0 * half), Vec3::X * (2.0 * half));
     };
     flat(&mut solid, Surface::Asphalt, 0.5 * side + STREET, 0.0);
-    flat(&mut solid, Surface::Grass, 0.5 * side + 900.0, -0.4);
+    flat(&mut solid, Surface::Grass, 0.5 * side + 1_500.0, -0.4);
     solid
 }
 

@@ -62,7 +62,7 @@ fn leaf(solid: &mut Solid, (middle, radius): (Vec3, f32), green: Surface, random
     let along = normal.cross(turn).normalize_or(normal.any_orthonormal_vector());
     let (u, v) = (along * random.within(0.20..0.34), normal.cross(along) * random.within(0.13..0.20));
     let surface = if random.chance(0.75) { green } else { Surface::Leaf };
-    solid.quad_with_normal(surface, [at - u, at + v, at - v, at + u], normal);
+    solid.quad_with_normal(surface, [at - u, at - v, at + v, at + u], normal);
 }
 
 fn direction(random: &mut Random) -> Vec3 {

@@ -20,6 +20,9 @@ use crate::model::{moved, movers};
 const QUANTISED_POSITION: u64 = 8;
 const INDEX: u64 = 4;
 
+/// Most triangles of structures that are built at once, unless one has more. Software ray queries on a CPU build in host memory.
+const MOST_BUILT: usize = 1 << 17;
+
 /// Meshes on the GPU.
 pub(crate) struct GpuMeshes {
     /// The table of geometries.
@@ -346,16 +349,23 @@ fn build(
 ) -> lvk::Result<HashMap<MeshKey, GpuMesh>> {
     let all: Vec<BlasGeometry> = parts.iter().map(|part| buffers.triangles(part)).collect();
     let mut rest = all.as_slice();
-    let mut descs = Vec::new();
+    let (mut descs, mut sizes) = (Vec::new(), Vec::new());
+    let mut next = 0;
     for (key, count) in runs {
         let (geometries, after) = rest.split_at(*count);
         rest = after;
+        let own = &parts[next..next + count];
+        sizes.push(own.iter().map(|part| part.triangle_count as usize).sum());
+        next += count;
         let debug_name = model.meshes[key.mesh].name.as_deref().unwrap_or("mesh");
         let update = if key.deformed_by.is_some() { BuildFlags::ALLOW_UPDATE } else { BuildFlags::empty() };
         let flags = BuildFlags::default() | update;
         descs.push(BlasDesc { geometries, flags, debug_name, ..BlasDesc::default() });
     }
-    let built = ctx.create_blas_batch(&descs)?;
+    let mut built = Vec::new();
+    for batch in batches(&descs, &sizes) {
+        built.extend(ctx.create_blas_batch(batch)?);
+    }
     let mut next = 0;
     let pairs = runs.iter().zip(bounds).zip(built);
     Ok(pairs
@@ -367,10 +377,40 @@ fn build(
         .collect())
 }
 
+/// Cuts a list into runs of elements whose sizes sum up to at most [`MOST_BUILT`], or of one element.
+fn batches<'a, T>(mut list: &'a [T], mut sizes: &[usize]) -> Vec<&'a [T]> {
+    let mut batches = Vec::new();
+    while !list.is_empty() {
+        let mut sum = 0;
+        let fits = |size: &&usize| {
+            sum += **size;
+            sum <= MOST_BUILT
+        };
+        let count = sizes.iter().take_while(fits).count().clamp(1, list.len());
+        let (batch, rest) = list.split_at(count);
+        batches.push(batch);
+        (list, sizes) = (rest, sizes.get(count..).unwrap_or_default());
+    }
+    batches
+}
+
 /// True if no ray goes on behind a surface of the material without a bend.
 fn is_opaque(material: &Material) -> bool {
     let is_thin = material.volume.as_ref().is_none_or(|volume| volume.thickness <= 0.0);
     let is_pane =
         is_thin && material.transmission.as_ref().is_some_and(|transmission| transmission.factor > 0.0);
     material.alpha_mode == AlphaMode::Opaque && !is_pane
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn batches_have_all_elements_in_order_and_no_more_triangles_than_they_may() {
+        let sizes = [5, MOST_BUILT - 5, 1, 2 * MOST_BUILT, MOST_BUILT, 0, 7];
+        let all: Vec<usize> = (0..sizes.len()).collect();
+        assert_eq!(batches(&all, &sizes), [&all[..2], &all[2..3], &all[3..4], &all[4..6], &all[6..]]);
+        assert!(batches::<usize>(&[], &[]).is_empty());
+    }
 }
