@@ -84,7 +84,14 @@ impl Viewer {
         let shown = model.default_scene.unwrap_or(0);
         let pose = model.pose(None, 0.0);
         let bounds = model::bounds(&model, shown, &pose);
-        let gpu = GpuScene::new(ctx, (model, shown), &pose, (&environment, disc_radius), &bounds, config.texture_budget)?;
+        let gpu = GpuScene::new(
+            ctx,
+            (model, shown),
+            &pose,
+            (&environment, disc_radius),
+            &bounds,
+            config.texture_budget,
+        )?;
         let cameras = model::cameras_around(gpu.rig(), shown, &pose, &bounds);
         let camera = cameras[0].camera;
         Ok(Self {

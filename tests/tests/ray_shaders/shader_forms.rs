@@ -161,7 +161,7 @@ fn closest_hit_shaders_trace_shadow_rays() -> Result<()> {
             assert_eq!(sums(&ctx, text)?, [30 + 7 + 1007 + 7, 3003], "{path:?}");
         }
         // A ray with 5, 6 or 7 hits once or twice more.
-        let depth = |value: u32| if value % 2 == 0 { 7 } else { 1007 };
+        let depth = |value: u32| if value.is_multiple_of(2) { 7 } else { 1007 };
         fn known(value: u32, depth: &dyn Fn(u32) -> u32) -> u32 {
             let onward = if value < 6 { known(value + 5, depth) } else { 0 };
             value * 10 + depth(value) + onward + 1

@@ -43,7 +43,7 @@ fn sample_models_are_rendered() {
         for method in [Method::Hybrid, Method::PathTrace] {
             let config =
                 ViewerConfig { method, samples: 2, bounces: 4, ..ViewerConfig::new(RayPath::Query, 32, 24) };
-            let mut viewer = Viewer::new(&ctx, &scene, &config).unwrap();
+            let mut viewer = Viewer::new(&ctx, scene.clone(), &config).unwrap();
             viewer.play(animation, 0.3);
             headless::picture(&mut viewer).unwrap();
             let radiance = viewer.radiance().unwrap();

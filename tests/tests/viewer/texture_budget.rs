@@ -105,7 +105,7 @@ fn viewer(
     let View { camera, size: [width, height], samples } = view(2);
     let usual = ViewerConfig::new(path, width, height);
     let config = ViewerConfig { method, samples, bounces: 4, texture_budget: budget, ..usual };
-    let mut viewer = Viewer::new(ctx, &scene, &config)?;
+    let mut viewer = Viewer::new(ctx, scene, &config)?;
     viewer.set_view(&camera);
     Ok(viewer)
 }

@@ -76,6 +76,7 @@ fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
 /// Runs a scenario of this program, or the sample of this name.
 fn attempt(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
     let written = if let Some(program) = single_file_programs::of_name(name) {
+        library_warnings::print();
         program.run(result)
     } else if let Some(scenario) = scenario(name) {
         library_warnings::print();
