@@ -1,5 +1,5 @@
 //! The path tracer against Cycles, the path tracer of Blender. `LVK_BLENDER` names the program; `.ci/cycles` fetches one.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;
 use std::process::Command;
@@ -70,6 +70,8 @@ fn compare(scene: &ComparedScene) {
         100.0 * worst
     );
     assert!(error < LIMIT, "{name}: the mean relative error is {error}, the limit is {LIMIT}");
+    let most = scene.block_limit;
+    assert!(worst < most, "{name}: the relative error of a block is {worst}, the limit is {most}");
 }
 
 /// The radiance of each pixel by Cycles, rows from the top, for each seed.

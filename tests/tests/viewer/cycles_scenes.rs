@@ -22,6 +22,8 @@ pub struct ComparedScene {
     pub model: Model,
     pub environment: Environment,
     pub camera: Camera,
+    /// The relative error of a block that is too large: twice what 1,024 samples have, so that something local is seen.
+    pub block_limit: f64,
 }
 
 /// Matte walls and blocks, lit by one lamp of an area and, from the open side, by a dim sky.
@@ -37,6 +39,7 @@ pub fn matte_box() -> ComparedScene {
         model,
         environment: Environment::uniform([0.1; 3]),
         camera: before_the_interior(),
+        block_limit: 0.06,
     }
 }
 
@@ -62,7 +65,7 @@ pub fn terrace() -> ComparedScene {
     let sun = Sun { direction, irradiance: [2.6, 2.3, 1.9], radius: 0.03 };
     let environment = Environment { sky: sky([0.35, 0.5, 0.9], [0.25, 0.2, 0.15]), sun: Some(sun) };
     let camera = Camera::looking_at([0.6, 2.2, 5.2], [0.1, 0.8, 0.0], 38.0);
-    ComparedScene { name: "terrace", model, environment, camera }
+    ComparedScene { name: "terrace", model, environment, camera, block_limit: 0.03 }
 }
 
 /// Smooth dielectrics and metals in a box that is lit from above and from the open side.
@@ -88,7 +91,7 @@ pub fn cabinet() -> ComparedScene {
         .quad(Vec3::new(0.2, 0.01, 1.0), Vec3::X * 1.2, Vec3::Y * 0.9, pane)
         .model();
     let environment = Environment { sky: sky([0.5, 0.6, 0.8], [0.3, 0.28, 0.25]), sun: None };
-    ComparedScene { name: "cabinet", model, environment, camera: before_the_interior() }
+    ComparedScene { name: "cabinet", model, environment, camera: before_the_interior(), block_limit: 0.06 }
 }
 
 /// White metals of several roughnesses in the same light.
@@ -110,7 +113,7 @@ pub fn metals() -> ComparedScene {
         })
         .model();
     let environment = Environment { sky: sky([0.5, 0.6, 0.8], [0.3, 0.28, 0.25]), sun: None };
-    ComparedScene { name: "metals", model, environment, camera: before_the_interior() }
+    ComparedScene { name: "metals", model, environment, camera: before_the_interior(), block_limit: 0.13 }
 }
 
 /// A box of 4 units that is open towards +z: walls on the left, on the right, and behind and above; and the floor.

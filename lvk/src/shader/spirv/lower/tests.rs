@@ -381,7 +381,7 @@ fn queries_that_go_on_behind_a_trace_are_refused() {
 
 /// The elements of a column of a matrix whose rows lie one behind another are not side by side.
 #[test]
-fn columns_of_matrices_in_rows_are_aligned_as_their_elements() {
+fn columns_of_row_major_matrices_are_aligned_as_their_elements() {
     use ::spirv::Op;
 
     const HIT: &str = "
