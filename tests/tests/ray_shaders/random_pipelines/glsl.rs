@@ -4,9 +4,12 @@ use std::fmt::Write;
 
 use lvk::ShaderStage;
 
-use super::program::{Condition, MAX_CALLABLE_DEPTH, MAX_DEPTH, Operand, Operation, Shader, Statement};
+use super::program::{
+    Condition, ELEMENTS, MAX_CALLABLE_DEPTH, MAX_DEPTH, Operand, Operation, Shader, Statement,
+};
 
 const HEADER: &str = "
+    #extension GL_EXT_null_initializer : require
     struct Passed { uint value; uint depth; float unused[2]; };
     layout(buffer_reference, scalar) buffer Words { uint at[]; };
     layout(push_constant, scalar) uniform Push { Words results; uint tlas; uint hits; uint misses; };
@@ -17,14 +20,13 @@ const HEADER: &str = "
 ";
 
 const TRACE: &str = "
-    layout(location = 2) rayPayloadEXT Passed sent;
     uint traced(uint v) {
         if (gDepth >= MAX_DEPTH) return v * 3u;
         uint target = v % (hits + misses);
         bool isHit = target < hits;
         sent.value = v;
         sent.depth = gDepth + 1u;
-        traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 0, isHit ? 0u : target - hits, vec3(target + 0.25, 0.25, -1), 0.0,
+        traceRayEXT(kTLAS[tlas], FLAGS, 0xFF, 0, 0, isHit ? 0u : target - hits, vec3(target + 0.25, 0.25, -1), 0.0,
             vec3(0, 0, isHit ? 1 : -1), 10.0, 2);
         return sent.value;
     }
@@ -52,7 +54,10 @@ pub fn text(shader: &Shader, stage: ShaderStage, callables: usize) -> String {
         format!("{HEADER}#define MAX_DEPTH {MAX_DEPTH}u\n#define MAX_CALLABLE_DEPTH {MAX_CALLABLE_DEPTH}u\n");
     writeln!(text, "#define CALLABLES {callables}u\n#define BUILT_IN ({builtin})").ok();
     if stage != ShaderStage::Callable {
-        text.push_str(TRACE);
+        text.push_str("layout(location = 2) rayPayloadEXT Passed sent;\n");
+        let shadow = "gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT";
+        text.push_str(&TRACE.replace("FLAGS", "0"));
+        text.push_str(&TRACE.replace("traced", "tracedShadow").replace("FLAGS", shadow));
     }
     text.push_str(CALL);
     match stage {
@@ -61,9 +66,13 @@ pub fn text(shader: &Shader, stage: ShaderStage, callables: usize) -> String {
         _ => text.push_str("layout(location = 0) rayPayloadInEXT Passed given;\n"),
     }
     for (index, body) in shader.functions.iter().enumerate() {
-        writeln!(text, "uint f{index}(uint v0) {{ uint v1 = v0 + 1u; uint v2 = 7u;").ok();
+        writeln!(
+            text,
+            "uint f{index}(uint v0) {{ uint v1 = v0 + 1u; uint v2 = 7u; uint a[{ELEMENTS}] = {{}};"
+        )
+        .ok();
         write_statements(&mut text, body, 0);
-        writeln!(text, "return v0 ^ v1 * 3u ^ v2; }}").ok();
+        writeln!(text, "return v0 ^ v1 * 3u ^ v2 ^ a[1]; }}").ok();
     }
     let last = shader.functions.len() - 1;
     let main = match stage {
@@ -90,6 +99,9 @@ fn write_statement(text: &mut String, statement: &Statement, loops: u32) {
             writeln!(text, "v{target} = v{target} {symbol} {};", operand_text(*operand)).ok();
         }
         Statement::SetGlobal(variable) => _ = writeln!(text, "g ^= v{variable};"),
+        Statement::SetElement(index, variable) => {
+            writeln!(text, "a[v{index} % {ELEMENTS}u] += v{variable};").ok();
+        }
         Statement::If(condition, yes, no) => {
             writeln!(text, "if ({}) {{", condition_text(*condition)).ok();
             write_statements(text, yes, loops);
@@ -120,6 +132,9 @@ fn write_statement(text: &mut String, statement: &Statement, loops: u32) {
             text.push_str("break; }\n");
         }
         Statement::Trace(variable) => _ = writeln!(text, "v{variable} = traced(v{variable});"),
+        Statement::TraceShadow(variable) => {
+            writeln!(text, "v{variable} = tracedShadow(v{variable});").ok();
+        }
         Statement::Callable(variable) => _ = writeln!(text, "v{variable} = called(v{variable});"),
         Statement::Call(function, variable) => {
             writeln!(text, "v{variable} = f{function}(v{variable});").ok();
@@ -137,6 +152,7 @@ fn operand_text(operand: Operand) -> String {
         Operand::BuiltIn => "BUILT_IN".to_owned(),
         Operand::Record => "tag".to_owned(),
         Operand::Global => "g".to_owned(),
+        Operand::Element(index) => format!("a[v{index} % {ELEMENTS}u]"),
     }
 }
 

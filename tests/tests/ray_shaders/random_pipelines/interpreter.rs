@@ -1,7 +1,8 @@
 //! Interprets random pipelines: the semantics of traces and callable shaders, in Rust.
 
 use super::program::{
-    Condition, MAX_CALLABLE_DEPTH, MAX_DEPTH, Operand, Operation, Pipeline, Shader, Statement, VARIABLES,
+    Condition, ELEMENTS, MAX_CALLABLE_DEPTH, MAX_DEPTH, Operand, Operation, Pipeline, Shader, Statement,
+    VARIABLES,
 };
 
 /// The record of a shader: kind and index give its number.
@@ -35,6 +36,12 @@ struct Invocation<'a> {
     calls: u32,
 }
 
+/// What a call of a function has for itself.
+struct Locals {
+    variables: [u32; VARIABLES],
+    array: [u32; ELEMENTS],
+}
+
 /// How a list of statements ended.
 enum End {
     Next,
@@ -49,17 +56,20 @@ impl Invocation<'_> {
     }
 
     fn call(&mut self, function: usize, argument: u32) -> u32 {
-        let mut variables = [argument, argument.wrapping_add(1), 7];
+        let mut locals = Locals { variables: [argument, argument.wrapping_add(1), 7], array: [0; ELEMENTS] };
         let body = &self.shader.functions[function];
-        match self.statements(body, &mut variables) {
+        match self.statements(body, &mut locals) {
             End::Return(value) => value,
-            _ => variables[0] ^ variables[1].wrapping_mul(3) ^ variables[2],
+            _ => {
+                let [first, second, third] = locals.variables;
+                first ^ second.wrapping_mul(3) ^ third ^ locals.array[1]
+            }
         }
     }
 
-    fn statements(&mut self, statements: &[Statement], variables: &mut [u32; VARIABLES]) -> End {
+    fn statements(&mut self, statements: &[Statement], locals: &mut Locals) -> End {
         for statement in statements {
-            match self.statement(statement, variables) {
+            match self.statement(statement, locals) {
                 End::Next => {}
                 end => return end,
             }
@@ -67,10 +77,11 @@ impl Invocation<'_> {
         End::Next
     }
 
-    fn statement(&mut self, statement: &Statement, v: &mut [u32; VARIABLES]) -> End {
+    fn statement(&mut self, statement: &Statement, locals: &mut Locals) -> End {
         let holds = |condition: &Condition, v: &[u32; VARIABLES]| {
             v[condition.variable].is_multiple_of(condition.divisor)
         };
+        let v = &mut locals.variables;
         match statement {
             Statement::Set(target, operation, operand) => {
                 let operand = match operand {
@@ -79,6 +90,7 @@ impl Invocation<'_> {
                     Operand::BuiltIn => self.builtin,
                     Operand::Record => self.record,
                     Operand::Global => self.global,
+                    Operand::Element(index) => locals.array[v[*index] as usize % ELEMENTS],
                 };
                 v[*target] = match operation {
                     Operation::Add => v[*target].wrapping_add(operand),
@@ -87,23 +99,27 @@ impl Invocation<'_> {
                 };
             }
             Statement::SetGlobal(variable) => self.global ^= v[*variable],
+            Statement::SetElement(index, variable) => {
+                let element = &mut locals.array[v[*index] as usize % ELEMENTS];
+                *element = element.wrapping_add(v[*variable]);
+            }
             Statement::If(condition, yes, no) => {
-                return self.statements(if holds(condition, v) { yes } else { no }, v);
+                return self.statements(if holds(condition, v) { yes } else { no }, locals);
             }
             Statement::Loop(count, body, leave, skip) => {
                 for index in 0..*count {
-                    if skip.is_some_and(|condition| holds(&condition, v)) {
-                        v[2] = v[2].wrapping_add(1);
+                    if skip.is_some_and(|condition| holds(&condition, &locals.variables)) {
+                        locals.variables[2] = locals.variables[2].wrapping_add(1);
                         continue;
                     }
-                    match self.statements(body, v) {
+                    match self.statements(body, locals) {
                         End::Next => {}
                         end => return end,
                     }
-                    if leave.is_some_and(|condition| holds(&condition, v)) {
+                    if leave.is_some_and(|condition| holds(&condition, &locals.variables)) {
                         break;
                     }
-                    v[1] = v[1].wrapping_add(index);
+                    locals.variables[1] = locals.variables[1].wrapping_add(index);
                 }
             }
             Statement::Switch(variable, cases) => {
@@ -113,13 +129,14 @@ impl Invocation<'_> {
                     _ => 2..3,
                 };
                 for case in chosen {
-                    match self.statements(&cases[case], v) {
+                    match self.statements(&cases[case], locals) {
                         End::Next => {}
                         end => return end,
                     }
                 }
             }
-            Statement::Trace(variable) => v[*variable] = self.trace(v[*variable]),
+            Statement::Trace(variable) => v[*variable] = self.trace(v[*variable], false),
+            Statement::TraceShadow(variable) => v[*variable] = self.trace(v[*variable], true),
             Statement::Callable(variable) => v[*variable] = self.callable(v[*variable]),
             Statement::Call(function, variable) => v[*variable] = self.call(*function, v[*variable]),
             Statement::ReturnIf(condition) if holds(condition, v) => {
@@ -130,12 +147,15 @@ impl Invocation<'_> {
         End::Next
     }
 
-    fn trace(&self, value: u32) -> u32 {
+    fn trace(&self, value: u32, skips_closest_hit: bool) -> u32 {
         if self.depth >= MAX_DEPTH {
             return value.wrapping_mul(3);
         }
         let (hits, misses) = (self.pipeline.hits.len(), self.pipeline.misses.len());
         let target = value as usize % (hits + misses);
+        if skips_closest_hit && target < hits {
+            return value;
+        }
         let (shader, record, builtin) = match target.checked_sub(hits) {
             // The ray starts one unit in front of the triangle.
             None => (&self.pipeline.hits[target], record(2, target), target as u32 + 1 + self.launch),

@@ -4,6 +4,8 @@ use lvk_tests::random::Random;
 
 /// Numbers of variables that each function has.
 pub const VARIABLES: usize = 3;
+/// Elements of the array that each function has, which are 0 at first.
+pub const ELEMENTS: usize = 3;
 /// Deepest recursion of traces.
 pub const MAX_DEPTH: u32 = 4;
 /// Deepest nesting of callable shaders.
@@ -22,6 +24,8 @@ pub enum Operand {
     Record,
     /// The global variable of the shader.
     Global,
+    /// An element of the function's array, by a variable modulo its length.
+    Element(usize),
 }
 
 /// An operation on two numbers, which wraps.
@@ -51,6 +55,8 @@ pub enum Statement {
     Set(usize, Operation, Operand),
     /// `global ^= variable`.
     SetGlobal(usize),
+    /// `array[variable % length] += variable`, of the first and the second variable.
+    SetElement(usize, usize),
     /// A selection.
     If(Condition, Vec<Statement>, Vec<Statement>),
     /// A loop of a fixed number of iterations, left or continued on conditions.
@@ -59,6 +65,8 @@ pub enum Statement {
     Switch(usize, [Vec<Statement>; 3]),
     /// Traces a ray, with the variable as target and payload.
     Trace(usize),
+    /// Traces a ray that runs no closest-hit shader, likewise.
+    TraceShadow(usize),
     /// Calls a callable shader, with the variable as index and data.
     Callable(usize),
     /// Calls a function of the shader, with the variable as argument and result.
@@ -91,26 +99,39 @@ pub struct Pipeline {
 #[derive(Clone, Copy)]
 struct Allowed {
     traces: bool,
+    /// All rays run no closest-hit shader.
+    only_shadows: bool,
+    /// There are elements of arrays, and rays that run no closest-hit shader.
+    extras: bool,
     callables: bool,
 }
 
 impl Pipeline {
-    /// Returns the pipeline of a seed.
-    pub fn random(seed: u64) -> Self {
+    /// Returns the pipeline of a seed, with or without elements of arrays and rays that run no closest-hit shader.
+    pub fn random(seed: u64, extras: bool) -> Self {
         let mut random = Random::new(seed);
         let few = |random: &mut Random, most: u64| 1 + random.bits() % most;
         // Few pipelines have traces or calls in all kinds of shaders.
-        let inner = Allowed { traces: !one_in(&mut random, 3), callables: !one_in(&mut random, 2) };
-        let nested = Allowed { traces: false, callables: !one_in(&mut random, 2) };
-        let outer = Allowed { traces: true, callables: true };
+        let (traces, callables) = (!one_in(&mut random, 3), !one_in(&mut random, 2));
+        let misses = Allowed {
+            traces: traces && !(extras && one_in(&mut random, 3)),
+            only_shadows: false,
+            extras,
+            callables,
+        };
+        let only_shadows = extras && one_in(&mut random, 3);
+        let hits = Allowed { traces, only_shadows, extras, callables };
+        let nested =
+            Allowed { traces: false, only_shadows: false, extras, callables: !one_in(&mut random, 2) };
+        let outer = Allowed { traces: true, only_shadows: false, extras, callables: true };
         let shaders = |random: &mut Random, most, allowed| {
             let count = few(random, most);
             (0..count).map(|_| shader(random, allowed)).collect()
         };
         Self {
             ray_gen: shader(&mut random, outer),
-            misses: shaders(&mut random, 2, inner),
-            hits: shaders(&mut random, 3, inner),
+            misses: shaders(&mut random, 2, misses),
+            hits: shaders(&mut random, 3, hits),
             callables: shaders(&mut random, 2, nested),
         }
     }
@@ -163,10 +184,17 @@ fn statement(
         }
         2 if nesting > 0 => Statement::Switch(variable, [inner(random), inner(random), inner(random)]),
         3 => Statement::ReturnIf(condition(random)),
+        4 if allowed.extras && one_in(random, 2) => {
+            Statement::SetElement(variable, random.bits() as usize % VARIABLES)
+        }
         4 => Statement::SetGlobal(variable),
         5 | 6 if allowed.traces && *waits > 0 => {
             *waits -= 1;
-            Statement::Trace(variable)
+            if allowed.only_shadows || (allowed.extras && one_in(random, 4)) {
+                Statement::TraceShadow(variable)
+            } else {
+                Statement::Trace(variable)
+            }
         }
         7 if allowed.callables && *waits > 0 => {
             *waits -= 1;
@@ -176,7 +204,7 @@ fn statement(
             *waits -= 1;
             Statement::Call(random.bits() as usize % callees, variable)
         }
-        _ => Statement::Set(variable, operation(random), operand(random)),
+        _ => Statement::Set(variable, operation(random), operand(random, allowed.extras)),
     }
 }
 
@@ -193,8 +221,9 @@ fn operation(random: &mut Random) -> Operation {
     [Operation::Add, Operation::Multiply, Operation::Xor][random.bits() as usize % 3]
 }
 
-fn operand(random: &mut Random) -> Operand {
-    match random.bits() % 6 {
+fn operand(random: &mut Random, extras: bool) -> Operand {
+    match random.bits() % if extras { 7 } else { 6 } {
+        6 => Operand::Element(random.bits() as usize % VARIABLES),
         0 | 1 => Operand::Variable(random.bits() as usize % VARIABLES),
         2 => Operand::BuiltIn,
         3 => Operand::Record,
