@@ -1,5 +1,10 @@
 //! The path tracer against Cycles, the path tracer of Blender. `LVK_BLENDER` names the program; `.ci/cycles` fetches one.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
 
 use std::path::Path;
 use std::process::Command;

@@ -1,5 +1,10 @@
 //! The description of a scene for Cycles, which `cycles.py` reads: JSON. Lists of numbers are printed by `Debug`, which writes JSON.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
 
 use lvk_gltf::{LightKind, Material, Model, Primitive};
 use lvk_viewer::light::{Environment, SkyMap};
