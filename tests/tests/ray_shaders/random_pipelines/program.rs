@@ -101,7 +101,7 @@ struct Allowed {
     traces: bool,
     /// All rays run no closest-hit shader.
     only_shadows: bool,
-    /// There are elements of arrays, and rays that run no closest-hit shader.
+    /// True if there are elements of arrays, and rays that run no closest-hit shader.
     extras: bool,
     callables: bool,
 }
