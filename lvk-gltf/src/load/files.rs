@@ -15,7 +15,7 @@ pub(super) fn open(path: &Path, budget: &Budget) -> Result<OpenFile, Problem> {
     OpenFile::open(path, u64::MAX).map_err(named).inspect(|file| budget.add_file(file.length()))
 }
 
-/// What a URI names.
+/// A buffer or image that a URI names.
 #[derive(Debug)]
 pub(super) enum Resolved {
     /// The bytes inside of it.

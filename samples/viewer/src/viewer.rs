@@ -193,7 +193,7 @@ impl Viewer {
         (self.scene.triangle_count, self.scene.instance_count())
     }
 
-    /// What textures take; `None` without a budget.
+    /// Memory of textures; `None` without a budget.
     #[must_use]
     pub fn texture_memory(&self) -> Option<TextureMemory> {
         self.scene.texture_memory()

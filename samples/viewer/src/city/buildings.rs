@@ -12,7 +12,7 @@ pub(super) const LOT: f32 = 24.0;
 /// Height of the ground floor.
 const SHOPS: f32 = 4.2;
 
-/// What a building is like.
+/// The class of a building, by its height.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Class {
     /// Three to five floors under tiles or slate.
@@ -145,7 +145,7 @@ fn ground_floor(solid: &mut Solid, [low, high]: [Vec2; 2], look: &Look, random: 
     }
 }
 
-/// What lies on top of a storey that is larger than the one above.
+/// The roof of a storey that is larger than the one above.
 fn roof_slab(solid: &mut Solid, [low, high]: [Vec2; 2], height: f32, trim: Surface) {
     solid.cuboid(Surface::Felt, [low.x, height - 0.3, low.y], [high.x, height, high.y]);
     for wall in Wall::around(low, high, height) {

@@ -18,7 +18,7 @@ pub(super) struct Wall {
     pub(super) length: f32,
 }
 
-/// What fills the openings of a wall.
+/// The style of the windows in a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
     /// Upright windows, each with a cross of bars and a sill.

@@ -17,7 +17,7 @@ mod trees;
 
 pub use file::CityError;
 
-/// What a city is like.
+/// The numbers that a city follows from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CityConfig {
     /// Blocks along each side, 1 to [`CityConfig::MOST_BLOCKS`].

@@ -1,4 +1,4 @@
-//! What stands where in a city: a grid of blocks with eight buildings each, parks, and streets.
+//! Places of all objects of a city: a grid of blocks with eight buildings each, parks, and streets.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 

@@ -1,4 +1,4 @@
-//! What stands on streets: cars, lamps, benches; and the ground.
+//! Objects on streets: cars, lamps, benches; and the ground.
 
 use glam::{Vec2, Vec3};
 

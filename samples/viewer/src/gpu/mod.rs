@@ -24,7 +24,7 @@ pub use textures::TextureMemory;
 pub(crate) struct FrameScene<'a> {
     /// Everything to rasterise.
     pub(crate) draws: &'a [Draw],
-    /// What leaves out instances; `None` to rasterise all.
+    /// The pass that leaves out instances; `None` to rasterise all.
     pub(crate) culling: Option<&'a Culling>,
     /// Buffers that commands before have written.
     pub(crate) written: &'a [lvk::BufferHandle],

@@ -125,7 +125,7 @@ impl GpuScene {
         &self.instances.draws
     }
 
-    /// What leaves out instances that the camera does not see.
+    /// The pass that leaves out instances that the camera does not see.
     pub(crate) fn culling(&self) -> &Culling {
         &self.culling
     }
@@ -181,7 +181,7 @@ impl GpuScene {
         })
     }
 
-    /// What textures take; `None` without a budget.
+    /// Memory of textures; `None` without a budget.
     pub(crate) fn texture_memory(&self) -> Option<TextureMemory> {
         self.textures.memory()
     }
@@ -199,7 +199,7 @@ impl GpuScene {
     /// Takes mip levels that a thread has loaded. Returns true if other levels are resident now.
     pub(crate) fn stream_textures(&mut self, ctx: &Context) -> Result<bool, RunError> {
         let changes = self.textures.go_on(ctx)?;
-        self.update_slots();
+        self.update_slots(changes);
         Ok(changes)
     }
 
@@ -207,12 +207,14 @@ impl GpuScene {
     /// levels are resident now.
     pub(crate) fn load_wanted_textures(&mut self, ctx: &Context, is_first: bool) -> lvk::Result<bool> {
         let changes = self.textures.load_wanted(ctx, is_first)?;
-        self.update_slots();
+        self.update_slots(changes);
         Ok(changes)
     }
 
-    fn update_slots(&mut self) {
-        self.slots.iter_mut().for_each(|slot| self.textures.update(slot));
+    fn update_slots(&mut self, has_changes: bool) {
+        if has_changes {
+            self.slots.iter_mut().for_each(|slot| self.textures.update(slot));
+        }
     }
 
     /// How light of triangles is looked for.

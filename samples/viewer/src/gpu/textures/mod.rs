@@ -35,7 +35,7 @@ struct ResidentImage {
     extent: [u32; 2],
 }
 
-/// What textures take.
+/// Memory of textures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextureMemory {
     /// Most bytes that may be resident.
@@ -99,7 +99,7 @@ impl GpuTextures {
         self.streaming.is_some()
     }
 
-    /// What textures take; `None` without a budget.
+    /// Memory of textures; `None` without a budget.
     pub(crate) fn memory(&self) -> Option<TextureMemory> {
         let (streaming, first_mips) = (self.streaming.as_ref()?, self.first_mips());
         let [budget, resident] = streaming.usage(&first_mips);
@@ -118,6 +118,9 @@ impl GpuTextures {
 
     /// Takes what has been loaded, without waiting, and begins the next load. Returns true if other levels are resident now.
     pub(crate) fn go_on(&mut self, ctx: &Context) -> Result<bool, RunError> {
+        if !self.is_streaming() {
+            return Ok(false);
+        }
         let first_mips = self.first_mips();
         let Some(streaming) = &mut self.streaming else { return Ok(false) };
         let loaded = streaming.go_on(ctx, &first_mips)?;

@@ -73,8 +73,8 @@ pub(super) fn plan(chains: &[MipChain], wanted: &[u32], budget: u64) -> Vec<u32>
     levels
 }
 
-/// The next image to load anew, and from which level on, on the way from the levels that are resident to a plan. What nobody wants
-/// stays until its room is needed. `None`: every image is as fine as planned.
+/// The next image to load anew, and from which level on, on the way from the levels that are resident to a plan. Levels that no shader
+/// wants stay until their room is needed. `None`: every image is as fine as planned.
 pub(super) fn next_change(
     chains: &[MipChain],
     resident: &[u32],

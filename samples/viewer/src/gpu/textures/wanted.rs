@@ -2,7 +2,7 @@
 
 /// Reports after which what was wanted before the last so many is forgotten.
 const PERIOD: u32 = 16;
-/// What shaders have not read has this level.
+/// Level of images that shaders have not read.
 pub(super) const UNREAD: u32 = u32::MAX;
 
 /// The finest level of each image that shaders wanted to read in the last 16 to 32 reports. Rays are random, so a report lacks levels
