@@ -1,42 +1,18 @@
 //! Memory that the decoding of large pictures takes. The heap is counted, so this program has one test.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use lvk_samples::picture::{self, Bounds};
-
-/// The system's allocator with a count of the bytes in use, and the most there were.
-struct Counted;
-
-static IN_USE: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: all calls go to the system's allocator with the same arguments.
-unsafe impl GlobalAlloc for Counted {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let bytes = IN_USE.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-        MOST.fetch_max(bytes, Ordering::Relaxed);
-        // SAFETY: the caller vouches for the layout.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        IN_USE.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller vouches for the pointer and its layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+use peak_alloc::PeakAlloc;
 
 #[global_allocator]
-static ALLOCATOR: Counted = Counted;
+static HEAP: PeakAlloc = PeakAlloc;
 
 /// Most bytes in use during `work`, beyond those before it.
 fn most_bytes<R>(work: impl FnOnce() -> R) -> (R, usize) {
-    let before = IN_USE.load(Ordering::Relaxed);
-    MOST.store(before, Ordering::Relaxed);
+    let before = HEAP.current_usage();
+    HEAP.reset_peak_usage();
     let result = work();
-    (result, MOST.load(Ordering::Relaxed) - before)
+    (result, HEAP.peak_usage() - before)
 }
 
 /// A PNG of black texels with one bit each.

@@ -1,37 +1,14 @@
 //! Memory that the loading of large OBJ files takes. The heap is counted, so this program has one test.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write as _;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use lvk_samples::app::progress::Progress;
 use lvk_samples::scene::{ObjOptions, Scene};
-
-/// The system's allocator with a count of the bytes in use, and the most there were.
-struct Counted;
-
-static IN_USE: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: all calls go to the system's allocator with the same arguments.
-unsafe impl GlobalAlloc for Counted {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let bytes = IN_USE.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-        MOST.fetch_max(bytes, Ordering::Relaxed);
-        // SAFETY: the caller vouches for the layout.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        IN_USE.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller vouches for the pointer and its layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+use peak_alloc::PeakAlloc;
 
 #[global_allocator]
-static ALLOCATOR: Counted = Counted;
+static HEAP: PeakAlloc = PeakAlloc;
 
 /// Quads along an edge of the grid.
 const SIDE: u32 = 350;
@@ -105,10 +82,10 @@ fn a_large_file_takes_at_most_three_times_the_memory_of_its_mesh() {
         Style { is_complete: true, has_quads: true, has_glass: true, has_creases: true },
     ] {
         std::fs::write(&path, grid(style)).unwrap();
-        let before = IN_USE.load(Ordering::Relaxed);
-        MOST.store(before, Ordering::Relaxed);
+        let before = HEAP.current_usage();
+        HEAP.reset_peak_usage();
         let scene = Scene::from_obj(&path, &ObjOptions::default(), &mut Progress::hidden()).unwrap();
-        let most = MOST.load(Ordering::Relaxed) - before;
+        let most = HEAP.peak_usage() - before;
         assert_eq!(scene.triangles.len() as u32, 2 * SIDE * SIDE, "{style:?}");
         assert_eq!(
             (scene.opaque_triangle_count as usize) < scene.triangles.len(),

@@ -4,46 +4,22 @@
 //! memory of the GPU, which is host memory where the GPU is the CPU.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use lvk_gltf::{LoadOptions, Model};
 use lvk_samples::hybrid::RayPath;
 use lvk_tests::device;
 use lvk_viewer::city::{CityConfig, city};
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::{Viewer, ViewerConfig, ViewerScene};
-
-/// The system's allocator with a count of the bytes in use, and the most there were.
-struct Counted;
-
-static IN_USE: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: all calls go to the system's allocator with the same arguments.
-unsafe impl GlobalAlloc for Counted {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let bytes = IN_USE.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-        MOST.fetch_max(bytes, Ordering::Relaxed);
-        // SAFETY: the caller vouches for the layout.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        IN_USE.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller vouches for the pointer and its layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+use peak_alloc::PeakAlloc;
 
 #[global_allocator]
-static ALLOCATOR: Counted = Counted;
+static HEAP: PeakAlloc = PeakAlloc;
 
 /// Runs `work`. Returns the most bytes in use meanwhile beyond `before`.
 fn most_bytes<R>(before: usize, work: impl FnOnce() -> R) -> (R, usize) {
-    MOST.store(IN_USE.load(Ordering::Relaxed), Ordering::Relaxed);
+    HEAP.reset_peak_usage();
     let result = work();
-    (result, MOST.load(Ordering::Relaxed).saturating_sub(before))
+    (result, HEAP.peak_usage().saturating_sub(before))
 }
 
 #[test]
@@ -57,13 +33,13 @@ fn a_city_is_loaded_within_twice_the_size_of_its_file() {
     drop(glb);
     assert!(file_bytes > 8_000_000, "{file_bytes} bytes are too few to measure by");
 
-    let before = IN_USE.load(Ordering::Relaxed);
+    let before = HEAP.current_usage();
     let (model, loading) = most_bytes(before, || Model::load(&path, &LoadOptions::default()).unwrap());
     let environment = Environment::day(&SunSetting::default());
     let scene = ViewerScene { name: "city".into(), model, environment, disc_radius: 0.01 };
     let config = ViewerConfig::new(RayPath::Query, 64, 36);
     let (viewer, showing) = most_bytes(before, || Viewer::new(&ctx, scene, &config).unwrap());
-    let kept = IN_USE.load(Ordering::Relaxed) - before;
+    let kept = HEAP.current_usage() - before;
     let times = |bytes: usize| bytes as f64 / file_bytes as f64;
     eprintln!(
         "{file_bytes} bytes of the file; times that: {:.2} while it is loaded, {:.2} while it is uploaded, {:.2} kept",

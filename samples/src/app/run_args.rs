@@ -84,7 +84,7 @@ pub struct RunArgs {
     pub list_devices: bool,
 
     /// Run with Vulkan validation; a message is an error
-    #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, default_missing_value = "core")]
+    #[arg(long, value_enum, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "core")]
     #[arg(help_heading = "Device")]
     pub validate: Option<ValidationArg>,
 }

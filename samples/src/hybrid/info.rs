@@ -190,7 +190,7 @@ mod tests {
     #[test]
     fn validation_has_a_plain_and_a_deep_kind() {
         assert_eq!(parsed("--validate").unwrap().run.validate, Some(ValidationArg::Core));
-        assert_eq!(parsed("--validate gpu --camera 2").unwrap().run.validate, Some(ValidationArg::Gpu));
+        assert_eq!(parsed("--validate=gpu --camera 2").unwrap().run.validate, Some(ValidationArg::Gpu));
         assert_eq!(parsed("--validate --camera 2").unwrap().run.validate, Some(ValidationArg::Core));
     }
 
@@ -228,7 +228,8 @@ mod tests {
             "--cameras c.txt",
             "--rt mesh",
             "--method both",
-            "--validate all",
+            "--validate=all",
+            "--validate gpu",
             "extra",
         ]);
         assert_eq!(parsed("--width 16384 --height 1 --depth 0").unwrap().run.width, 16_384);

@@ -116,6 +116,12 @@ mod tests {
     }
 
     #[test]
+    fn a_file_behind_the_flag_of_validation_is_the_model() {
+        let args = parsed("--validate model.glb").unwrap();
+        assert_eq!(args.file.as_deref(), Some(Path::new("model.glb")));
+    }
+
+    #[test]
     fn values_out_of_range_are_refused() {
         for line in [
             "--samples 0",

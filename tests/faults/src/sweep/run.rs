@@ -13,8 +13,8 @@ use crate::call_log::{Call, CallLog};
 use crate::fault::{Fault, Span};
 use crate::layer::{FAULT_VARIABLE, LOG_VARIABLE};
 
-/// Longest time of one run.
-const TIMEOUT: Duration = Duration::from_secs(120);
+/// Longest time of one run: a busy machine needs a minute for a program that starts in two seconds.
+const TIMEOUT: Duration = Duration::from_secs(600);
 /// File of the first result, in the folder that the program gets as its first argument.
 pub const FIRST: &str = "first.png";
 /// File of the second result.
