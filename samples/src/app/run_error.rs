@@ -147,6 +147,7 @@ impl RunError {
     }
 }
 
+#[cfg(feature = "window")]
 impl From<lvk_egui::Error> for RunError {
     fn from(error: lvk_egui::Error) -> Self {
         match error {

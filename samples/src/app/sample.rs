@@ -165,9 +165,11 @@ pub trait Sample {
     fn drop_file(&mut self, _path: &Path) {}
 
     /// Lays out the sample's own switches in the panel of its window.
+    #[cfg(feature = "window")]
     fn panel(&mut self, _ui: &mut egui::Ui) {}
 
     /// Lays out what stands over the picture and beside the panel, seen or not.
+    #[cfg(feature = "window")]
     fn overlay(&mut self, _ui: &egui::Context) {}
 
     /// True if it is still being loaded by another thread, asked before every frame of a window: then its frames are no

@@ -13,7 +13,7 @@ use lvk::{
 use super::hall::{Hall, MATERIALS};
 use super::pipelines::{Draw, Pipelines};
 use super::targets::Targets;
-use super::{DeferredConfig, Passes, View};
+use super::{DeferredConfig, Passes};
 use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
@@ -244,6 +244,7 @@ impl Sample for Deferred {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         let there = Passes::supported(&self.ctx);
         if there.len() > 1 {
@@ -255,7 +256,7 @@ impl Sample for Deferred {
             self.set_passes(Some(passes));
         }
         ui.horizontal_wrapped(|ui| {
-            for view in View::ALL {
+            for view in super::View::ALL {
                 ui.radio_value(&mut self.config.view, view, format!("{view:?}").to_lowercase());
             }
         });

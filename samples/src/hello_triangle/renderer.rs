@@ -77,6 +77,7 @@ impl Sample for HelloTriangle {
         Ok(())
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         ui.label("backdrop");
         ui.color_edit_button_rgb(&mut self.backdrop);

@@ -21,6 +21,7 @@ pub(crate) mod half_float;
 mod hardware_raster;
 mod info;
 mod launch_tiles;
+#[cfg(feature = "window")]
 mod panel;
 mod pipelines;
 mod pixel_order;
@@ -41,6 +42,7 @@ pub use config::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, 
 pub(crate) use frame::{Lighting, SceneAddresses, SceneFrame, near_plane};
 pub use frame_timings::FrameTimings;
 pub(crate) use gpu_scene::{GpuScene, HitGroups};
+#[cfg(feature = "window")]
 pub(crate) use panel::path_switch;
 pub use raster_choice::RasterChoice;
 pub use renderer::HybridRenderer;

@@ -5,7 +5,9 @@ use glam::Vec3;
 use lvk::{Context, TextureHandle};
 
 use super::renderer::goes_on;
-use super::{HybridConfig, HybridRenderer, Raster, panel};
+use super::{HybridConfig, HybridRenderer};
+#[cfg(feature = "window")]
+use super::{Raster, panel};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::ui::PendingSettings;
@@ -52,6 +54,7 @@ impl HybridSequence {
         }
     }
 
+    #[cfg(feature = "window")]
     fn show_rasters(&mut self, ui: &mut egui::Ui, mut raster: Raster) {
         ui.add_enabled_ui(self.renderer.can_choose_raster(), |ui| {
             ui.horizontal(|ui| {
@@ -104,6 +107,7 @@ impl Sample for HybridSequence {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         if ui.checkbox(&mut self.lamp_moves, "the lamp goes round").changed() && !self.lamp_moves {
             self.renderer.move_lamp(self.lamp.at(0.0));

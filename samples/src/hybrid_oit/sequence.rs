@@ -1,14 +1,12 @@
 //! The sample as an animation.
 
 use crate::app::run_error::RunError;
-use egui::Slider;
 use lvk::{Context, TextureHandle};
 
 use super::{HybridOit, HybridOitConfig, NodeUse, PERIOD_SECONDS};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::ui::PendingSettings;
-use crate::hybrid::path_switch;
 use crate::scene::Camera;
 
 /// The sample in an animation.
@@ -88,10 +86,11 @@ impl Sample for HybridOitSequence {
         self.sample.set_camera(camera);
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         let can_be = |config: &HybridOitConfig| self.sample.can_be(config);
         self.wanted.show(ui, |ui, config| show_switches(ui, config, can_be));
-        let start = Slider::new(&mut self.start, 0.0..=PERIOD_SECONDS);
+        let start = egui::Slider::new(&mut self.start, 0.0..=PERIOD_SECONDS);
         if ui.add(start.text("seconds ahead").fixed_decimals(1)).changed() {
             self.pose();
         }
@@ -106,17 +105,18 @@ impl Sample for HybridOitSequence {
     }
 }
 
+#[cfg(feature = "window")]
 fn show_switches(ui: &mut egui::Ui, config: &mut HybridOitConfig, can_be: impl Fn(&HybridOitConfig) -> bool) {
     let before = *config;
-    path_switch(ui, &mut config.path, |path| can_be(&HybridOitConfig { path, ..before }));
+    crate::hybrid::path_switch(ui, &mut config.path, |path| can_be(&HybridOitConfig { path, ..before }));
     let most = HybridOitConfig::MAX_SUPERSAMPLING;
-    ui.add(Slider::new(&mut config.supersampling, 1..=most).text("samples a side of a pixel"));
+    ui.add(egui::Slider::new(&mut config.supersampling, 1..=most).text("samples a side of a pixel"));
     let most = HybridOitConfig::MAX_SHADOW_RAYS;
-    ui.add(Slider::new(&mut config.shadow_rays, 1..=most).text("shadow rays a sample"));
+    ui.add(egui::Slider::new(&mut config.shadow_rays, 1..=most).text("shadow rays a sample"));
     let mut is_bounded = config.node_capacity.is_some();
     ui.checkbox(&mut is_bounded, "so many nodes for glass:");
     let (mut nodes, usual) = (config.nodes(), HybridOitConfig { node_capacity: None, ..*config }.nodes());
-    let slider = Slider::new(&mut nodes, 0..=usual.max(config.nodes())).logarithmic(true).text("nodes");
+    let slider = egui::Slider::new(&mut nodes, 0..=usual.max(config.nodes())).logarithmic(true).text("nodes");
     ui.add_enabled(is_bounded, slider);
     config.node_capacity = is_bounded.then_some(nodes);
 }

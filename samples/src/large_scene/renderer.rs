@@ -6,11 +6,11 @@ use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{CommandBuffer, Context, TextureHandle};
 
-use super::figures::{Figures, Origin, bytes, number};
+use super::LargeSceneConfig;
+use super::figures::Figures;
 use super::gpu_world::GpuWorld;
 use super::pipelines::RAYS;
 use super::world::World;
-use super::{LargeSceneConfig, Show};
 use crate::app::frame::Frame;
 use crate::app::progress::Progress;
 use crate::app::sample::{FrameTime, Sample};
@@ -146,10 +146,11 @@ impl Sample for LargeScene {
         Some(&mut self.tour.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         let LargeSceneConfig { depth, samples, show, .. } = &mut self.config;
         ui.horizontal(|ui| {
-            for which in Show::ALL {
+            for which in super::Show::ALL {
                 ui.selectable_value(show, which, format!("{which:?}").to_lowercase());
             }
         });
@@ -164,7 +165,10 @@ impl Sample for LargeScene {
     }
 }
 
+#[cfg(feature = "window")]
 fn show_figures(ui: &mut egui::Ui, figures: &Figures) {
+    use super::figures::{Origin, bytes, number};
+
     egui::CollapsingHeader::new("Memory").default_open(true).show(ui, |ui| {
         for (name, value) in figures.entries() {
             ui.label(format!("{name} {value}"));

@@ -182,6 +182,7 @@ impl Sample for MeshShaders {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         ui.label(self.culling_text());
         let (mut culls, mut is_held) = (self.constants.culls == 1, self.held.is_some());

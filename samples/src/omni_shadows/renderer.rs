@@ -6,7 +6,7 @@ use crate::app::sample_error::SampleError;
 use bytemuck::Zeroable;
 use lvk::{BufferHandle, BufferUsage, CommandBuffer, Context, Holder, SamplerHandle, TextureHandle};
 
-use super::config::{OmniShadowsConfig, ShadowFaces, ShadowFilter};
+use super::config::OmniShadowsConfig;
 use super::frame::FrameConstants;
 use super::models::{self, Draw, Models};
 use super::scene_pass::ScenePass;
@@ -162,7 +162,10 @@ impl Sample for OmniShadows {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
+        use super::config::{ShadowFaces, ShadowFilter};
+
         let mut is_multiview = self.is_multiview();
         let can = ShadowFaces::can_be_one_pass(&self.ctx);
         let config = &mut self.config;

@@ -25,6 +25,7 @@ mod gpu_scene;
 mod image_passes;
 mod info;
 mod meshes;
+#[cfg(feature = "window")]
 mod panel;
 mod pipelines;
 mod procedural_textures;

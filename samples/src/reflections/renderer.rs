@@ -12,6 +12,7 @@ use super::config::ReflectionsConfig;
 use super::frame::{FrameConstants, Indices, NEAR_PLANE, WorldConstants, light_constants};
 use super::gpu_scene::{GeometryArena, GpuScene};
 use super::image_passes::ImagePasses;
+#[cfg(feature = "window")]
 use super::panel;
 use super::procedural_textures::Picture;
 use super::raster_passes::{Drawn, RasterPasses};
@@ -251,6 +252,7 @@ impl Sample for Reflections {
         self.set_camera(camera);
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         let capabilities = self.ctx.capabilities();
         self.wanted.show(ui, |ui, config| panel::show_settings(ui, config, capabilities));

@@ -175,6 +175,7 @@ impl Sample for RenderToCubeMap {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         let RenderToCubeMapConfig { faces, roughness, .. } = &mut self.config;
         ui.radio_value(faces, CubeMapFaces::SixPasses, "six passes");

@@ -247,6 +247,7 @@ impl Sample for RtxAo {
         self.show(&View { camera: *camera, ..self.view });
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         let RtxAoConfig { passes, rays, .. } = &mut self.config;
         ui.add(egui::Slider::new(passes, 1..=64).text("passes a frame"));

@@ -49,6 +49,7 @@ impl RtxHelloSettings {
     }
 
     /// Lays them out.
+    #[cfg(feature = "window")]
     pub(super) fn show(&mut self, ui: &mut egui::Ui) {
         for (is_seen, name) in
             self.is_seen.iter_mut().zip(["triangle in the middle", "inner ring", "outer ring"])

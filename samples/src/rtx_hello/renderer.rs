@@ -118,6 +118,7 @@ impl Sample for RtxHello {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         self.settings.show(ui);
     }

@@ -11,6 +11,7 @@ pub struct RtxPipelineSettings {
 
 impl RtxPipelineSettings {
     /// Lays them out; `most` is what they begin with.
+    #[cfg(feature = "window")]
     pub(super) fn show(&mut self, ui: &mut egui::Ui, most: &Self) {
         ui.add(egui::Slider::new(&mut self.depth, 0..=most.depth).text("mirrored or bent"));
         ui.add(egui::Slider::new(&mut self.lights, 0..=most.lights).text("lights"));

@@ -143,6 +143,7 @@ impl Sample for RtxPipeline {
         Some(&mut self.tour.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         let most = self.default_settings();
         self.settings.show(ui, &most);

@@ -34,6 +34,7 @@ impl RtxTexturesSettings {
     }
 
     /// Lays them out.
+    #[cfg(feature = "window")]
     pub(super) fn show(&mut self, ui: &mut egui::Ui) {
         ui.add(egui::Slider::new(&mut self.instances, 1..=INSTANCE_COUNT).text("instances"));
         ui.add(egui::Slider::new(&mut self.handed_on, 0..=TEXTURES as u32 - 1).text("textures handed on"));

@@ -198,6 +198,7 @@ impl Sample for RtxTextures {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         self.settings.show(ui);
     }

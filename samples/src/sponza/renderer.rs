@@ -275,6 +275,7 @@ impl Sample for Sponza {
         Some(&mut self.tour.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         ui.checkbox(&mut self.config.culls, "culling");
         ui.checkbox(&mut self.config.normal_maps, "normal maps");

@@ -139,6 +139,7 @@ impl Triplanar {
         }
     }
 
+    #[cfg(feature = "window")]
     fn texture_switch(&mut self, ui: &mut egui::Ui, number: usize) {
         let residency = self.textures.residency(number);
         ui.horizontal(|ui| match residency {
@@ -184,6 +185,7 @@ impl Sample for Triplanar {
         Some(&mut self.camera)
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         egui::Grid::new("textures").show(ui, |ui| {
             for (number, name) in Self::texture_names().into_iter().enumerate() {

@@ -9,7 +9,7 @@ use lvk::{
     SamplerHandle, TextureHandle, Topology,
 };
 
-use super::config::{YuvConfig, YuvFormat, YuvModel, YuvRange};
+use super::config::{YuvConfig, YuvFormat};
 use super::pipelines::PLANES;
 use super::video_texture::{VideoFormat, VideoTexture, supported};
 use crate::app::frame::Frame;
@@ -147,7 +147,10 @@ impl Sample for Yuv {
         self.config.format = self.formats.get(next).copied();
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
+        use super::config::{YuvModel, YuvRange};
+
         let config = &mut self.config;
         ui.horizontal(|ui| {
             for format in YuvFormat::ALL {

@@ -68,6 +68,7 @@ impl DroppedFile {
     }
 
     /// Lays out how far the load is.
+    #[cfg(feature = "window")]
     pub(crate) fn show(&self, ui: &egui::Context) {
         if let Some(thread) = &self.thread {
             thread.show(ui);

@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn a_file_behind_the_flag_of_validation_is_the_model() {
         let args = parsed("--validate model.glb").unwrap();
-        assert_eq!(args.file.as_deref(), Some(Path::new("model.glb")));
+        assert_eq!(args.file.as_deref(), Some(std::path::Path::new("model.glb")));
     }
 
     #[test]

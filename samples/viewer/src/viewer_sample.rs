@@ -11,6 +11,7 @@ use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::scene::Camera;
 
 use crate::config::{Method, ViewerConfig};
+#[cfg(feature = "window")]
 use crate::panel;
 use crate::present::Present;
 use crate::renderer::Renderer;
@@ -154,6 +155,7 @@ impl Sample for Viewer {
         self.dropped.load(&self.ctx, path, light, &self.config);
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         panel::show_model(ui, &self.name, self.dropped.error());
         if let Some(chosen) = panel::choose_camera(ui, &self.cameras, self.chosen) {
@@ -178,6 +180,7 @@ impl Sample for Viewer {
         panel::show_textures(ui, self.texture_memory());
     }
 
+    #[cfg(feature = "window")]
     fn overlay(&mut self, ui: &egui::Context) {
         self.dropped.show(ui);
     }

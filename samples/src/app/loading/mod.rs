@@ -1,6 +1,7 @@
 //! Samples that take long to load, in a window: a thread loads while frames show how far it is.
 
 mod background;
+#[cfg(feature = "window")]
 mod overlay;
 mod sample;
 mod status;

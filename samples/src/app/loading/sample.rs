@@ -160,12 +160,14 @@ impl<S: Sample> Sample for Loading<S> {
         }
     }
 
+    #[cfg(feature = "window")]
     fn panel(&mut self, ui: &mut egui::Ui) {
         if let Some(sample) = self.sample_mut() {
             sample.panel(ui);
         }
     }
 
+    #[cfg(feature = "window")]
     fn overlay(&mut self, ui: &egui::Context) {
         match &mut self.state {
             State::Ready(sample) => sample.overlay(ui),

@@ -4,6 +4,7 @@ use std::panic::resume_unwind;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+#[cfg(feature = "window")]
 use super::overlay;
 use super::status::Status;
 use crate::app::progress::Progress;
@@ -50,6 +51,7 @@ impl<T> LoadThread<T> {
     }
 
     /// Lays out how far it is, in the middle of the window.
+    #[cfg(feature = "window")]
     pub fn show(&self, ui: &egui::Context) {
         overlay::show(ui, &self.status.stage(), self.elapsed());
     }

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+#[cfg(feature = "window")]
 use egui::{Color32, RichText, Ui};
 
 /// A configuration that a panel edits and a sample takes over between two frames.
@@ -23,6 +24,7 @@ impl<C: Copy + PartialEq> PendingSettings<C> {
     }
 
     /// Lays out `switches` of it, and why the last wish was refused, if it was.
+    #[cfg(feature = "window")]
     pub fn show(&mut self, ui: &mut Ui, switches: impl FnOnce(&mut Ui, &mut C)) {
         switches(ui, &mut self.config);
         self.is_held = ui.input(|input| input.pointer.any_down());
@@ -45,6 +47,7 @@ impl<C: Copy + PartialEq> PendingSettings<C> {
 }
 
 /// A button for one of several values. It can be pressed where `can_be` holds of the configuration that `set` makes.
+#[cfg(feature = "window")]
 pub(crate) fn option_button<C: Copy + PartialEq>(
     ui: &mut Ui,
     config: &mut C,
