@@ -239,3 +239,91 @@ fn attributes_that_cannot_hold_barycentrics_are_refused() {
         assert!(error.contains("OpVariable of hit attributes"), "{path:?}: {error}");
     }
 }
+
+/// GLSL declares payloads as structs or as blocks.
+#[test]
+fn payloads_are_blocks() -> Result<()> {
+    const RAYS: &str = "
+        layout(location = 1) rayPayloadEXT Block { uint number; vec3 color; } sent;
+        void main() {
+            sent.number = 3;
+            sent.color = vec3(1, 2, 4);
+            traceRayEXT(kTLAS[tlas], 0, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, direction(), 10.0, 1);
+            results.at[gl_LaunchIDEXT.x] = sent.number + uint(sent.color.z);
+        }";
+    const ANSWER: &str = "
+        layout(location = 1) rayPayloadInEXT Block { uint number; vec3 color; } sent;
+        void main() { sent.number *= FACTOR; sent.color += float(FACTOR); }";
+    for (path, ctx) in pipeline_devices() {
+        let answer = |stage, factor: &str| shader(&ctx, stage, &ANSWER.replace("FACTOR", factor));
+        let ray_gen = shader(&ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
+        let (hit, miss) = (answer(ShaderStage::ClosestHit, "10")?, answer(ShaderStage::Miss, "100")?);
+        let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+            ray_gen: &[*ray_gen],
+            miss: &[*miss],
+            hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }],
+            ..Default::default()
+        })?;
+        assert_eq!(GroupScene::new(&ctx)?.run(*pipeline, 0, COUNTS)?, [44, 404], "{path:?}");
+    }
+    Ok(())
+}
+
+/// Compute shaders have no scope of related shader calls.
+#[test]
+fn barriers_and_atomics_have_the_scope_of_shader_calls() -> Result<()> {
+    let hit = format!(
+        "#extension GL_KHR_memory_scope_semantics : require
+        {HIT}
+        void main() {{
+            memoryBarrier(gl_ScopeShaderCallEXT, gl_StorageSemanticsBuffer, gl_SemanticsAcquireRelease);
+            uint before = atomicLoad(results.at[1], gl_ScopeShaderCallEXT, gl_StorageSemanticsBuffer, gl_SemanticsAcquire);
+            value = 6 * value + (before & 0);
+        }}"
+    );
+    for (path, ctx) in pipeline_devices() {
+        assert_eq!(sums(&ctx, &hit)?, [18, 3003], "{path:?}");
+    }
+    Ok(())
+}
+
+/// The any-hit shader may end in functions whose results are the addresses of buffers, alone and in structs.
+#[test]
+fn functions_that_ignore_hits_return_addresses() -> Result<()> {
+    const RAYS: &str = "
+        void main() {
+            value = 7;
+            traceRayEXT(kTLAS[tlas], gl_RayFlagsNoOpaqueEXT, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, direction(), 10.0, 0);
+            results.at[gl_LaunchIDEXT.x] = value;
+        }";
+    const ANY_HIT: &str = "
+        layout(buffer_reference, scalar) buffer Words { uint at[]; };
+        layout(push_constant, scalar) uniform Push { Words results; uint tlas; uint hits; uint misses; };
+        struct Pair { Words words; uint number; };
+        Words alone(uint number) { if (number == IGNORED) ignoreIntersectionEXT; return results; }
+        Pair both(uint number) { if (number == IGNORED + 1) ignoreIntersectionEXT; return Pair(results, number); }
+        void main() {
+            Words first = alone(hits);
+            Pair pair = both(hits);
+            if (first.at[0] == 77 && pair.words.at[0] == 77) terminateRayEXT;
+        }";
+    for (path, ctx) in pipeline_devices() {
+        let scene = GroupScene::new(&ctx)?;
+        let ray_gen = shader(&ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
+        let hit = answering(&ctx, ShaderStage::ClosestHit, "", "20u")?;
+        let miss = answering(&ctx, ShaderStage::Miss, "", "30u")?;
+        // One hit is asked for: the first function ignores it, the second, or none.
+        for (ignored, expected) in [("1u", 30), ("0u", 30), ("5u", 20)] {
+            let any = shader(&ctx, ShaderStage::AnyHit, &ANY_HIT.replace("IGNORED", ignored))?;
+            let group = HitGroup { closest_hit: Some(*hit), any_hit: Some(*any), ..Default::default() };
+            let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+                ray_gen: &[*ray_gen],
+                miss: &[*miss],
+                hit_groups: &[group],
+                ..Default::default()
+            })?;
+            assert_eq!(scene.run(*pipeline, 0, COUNTS)?, [expected, 30], "{path:?}, {ignored}");
+        }
+    }
+    Ok(())
+}

@@ -181,7 +181,8 @@ fn emit_return(emitter: &mut Emitter<'_>, result: u32) {
     if result == emitter.linker.void() {
         emitter.push(Op::Return, &[]);
     } else {
-        let value = emitter.linker.null(result);
+        // No constant is null for the address of a buffer.
+        let value = emitter.linker.undefined(result);
         emitter.push(Op::ReturnValue, &[value]);
     }
 }

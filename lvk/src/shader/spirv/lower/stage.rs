@@ -10,6 +10,7 @@ use super::instruction::Inst;
 use super::linker::{Linker, MAX_PASSED};
 use super::module::{Function, Module};
 use super::passed::Passed;
+use super::scopes::widen_scopes;
 use crate::bindless::layout;
 use crate::shader::ShaderStage;
 
@@ -87,6 +88,7 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     let initial = take_initial_values(&mut module);
     store_initial_values(&mut module);
     convert_storage(&mut module);
+    widen_scopes(&mut module);
     let own_functions: Vec<u32> = module.functions.iter().map(Function::id).collect();
     let ids = linker.link(module).map_err(|unknown| format!("Op{:?} cannot be lowered", unknown.0))?;
     let of = |id: u32| ids.get(&id).copied().unwrap_or(0);
@@ -284,6 +286,7 @@ fn store_initial_values(module: &mut Module) {
 
 /// Gives pointers and variables the storage classes of the compute shader, and removes what decorated the old ones.
 fn convert_storage(module: &mut Module) {
+    remove_block_decorations(module);
     for inst in &mut module.globals {
         let at = match inst.op {
             Op::TypePointer => 1,
@@ -307,6 +310,20 @@ fn convert_storage(module: &mut Module) {
     module.decorations.retain(|inst| {
         let is_gone = gone.iter().any(|decoration| *decoration as u32 == inst.operand(1));
         inst.op != Op::Decorate || !is_gone || !converted.contains(&inst.operand(0))
+    });
+}
+
+/// Makes the blocks of payloads, callable data and attributes plain structs: variables of the invocation have no layout.
+fn remove_block_decorations(module: &mut Module) {
+    let is_converted = |storage: u32| {
+        storage != StorageClass::Input as u32 && converted_storage(storage) == StorageClass::Private as u32
+    };
+    let pointers = module.globals.iter().filter(|inst| inst.op == Op::TypePointer);
+    let blocks: HashSet<u32> =
+        pointers.filter(|inst| is_converted(inst.operand(1))).map(|inst| inst.operand(2)).collect();
+    module.decorations.retain(|inst| {
+        let is_block = inst.op == Op::Decorate && inst.operand(1) == Decoration::Block as u32;
+        !is_block || !blocks.contains(&inst.operand(0))
     });
 }
 
