@@ -19,7 +19,10 @@ pub(super) fn inline_calls(
     function: &mut Function,
     wanted: &HashSet<u32>,
 ) -> Result<(), String> {
-    while let Some((block, place)) = find_call(function, wanted) {
+    let mut start = 0;
+    while let Some((block, place)) = find_call(function, wanted, start) {
+        // Blocks before that one have no more calls.
+        start = block;
         let callee = function.blocks[block].code[place].operand(2);
         let Some(callee) = linker.function(callee).cloned() else { break };
         inline_call(linker, function, (block, place), callee);
@@ -36,12 +39,14 @@ pub(super) fn inline_calls(
 /// Most blocks of a function with its calls in place.
 const MOST_BLOCKS: usize = 16_384;
 
-fn find_call(function: &Function, wanted: &HashSet<u32>) -> Option<(usize, usize)> {
+/// Finds the first call of a wanted function in the blocks from `start` on.
+fn find_call(function: &Function, wanted: &HashSet<u32>, start: usize) -> Option<(usize, usize)> {
     let is_call = |inst: &Inst| inst.op == Op::FunctionCall && wanted.contains(&inst.operand(2));
     function
         .blocks
         .iter()
         .enumerate()
+        .skip(start)
         .find_map(|(block, Block { code, .. })| code.iter().position(is_call).map(|place| (block, place)))
 }
 
@@ -89,15 +94,16 @@ fn rename_ids(linker: &mut Linker, callee: &mut Function, call: &Inst) {
             ids.insert(id, linker.new_id());
         }
     }
-    let wide = linker.module.wide.clone();
+    let wide = &linker.module.wide;
     let renamed = |id: u32| ids.get(&id).copied().unwrap_or(id);
     for block in &mut callee.blocks {
         block.label = renamed(block.label);
         for inst in &mut block.code {
-            let _ = for_each_id(inst, &wide, |id| *id = renamed(*id));
+            let _ = for_each_id(inst, wide, |id| *id = renamed(*id));
         }
     }
-    linker.module.wide.extend(wide.iter().filter_map(|id| ids.get(id)));
+    let wide: Vec<u32> = wide.iter().filter_map(|id| ids.get(id)).copied().collect();
+    linker.module.wide.extend(wide);
     linker.copy_decorations(&ids);
 }
 

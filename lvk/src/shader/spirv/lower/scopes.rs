@@ -36,7 +36,7 @@ fn scope_place(op: Op) -> Option<usize> {
         Op::MemoryBarrier => Some(0),
         Op::AtomicStore => Some(1),
         Op::AtomicFAddEXT | Op::AtomicFMinEXT | Op::AtomicFMaxEXT => Some(3),
-        _ => matches!(op as u32, 227 | 229..=242).then_some(3),
+        _ => (Op::AtomicLoad as u32..=Op::AtomicXor as u32).contains(&(op as u32)).then_some(3),
     }
 }
 
