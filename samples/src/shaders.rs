@@ -118,8 +118,10 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/iridescence",
     "viewer/lights",
     "viewer/material",
+    "viewer/occlusion",
     "viewer/path",
     "viewer/plane",
+    "viewer/pyramid",
     "viewer/random",
     "viewer/sky",
     "viewer/surface",
@@ -128,6 +130,7 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/trace_pipeline",
     "viewer/trace_query",
     "viewer/visible_light",
+    "viewer/visible_triangle",
     "yuv/push",
 ];
 

@@ -135,6 +135,12 @@ struct Light {
     float range; // of a point or spot light; 0 for no end
 };
 
+// What a pass over the visible surfaces draws to.
+struct VisibleTargets {
+    uint triangles; // an index into kTexturesU2D: instance, geometry and primitive of each pixel
+    uint depth; // an index into kTextures2D, reversed
+};
+
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer InstanceArray { Instance at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RowsArray { vec4 at[][3]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer GeometryArray { Geometry at[]; };
@@ -171,7 +177,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     MeshRunArray runs;
     NumberArray visible; // instances that culling leaves, from the first place of their mesh on
     ArgumentArray drawArguments; // of the geometries of all meshes
-    NumberArray drawnCounts; // instances that culling leaves of each mesh
+    NumberArray drawnCounts; // of each mesh: instances that culling leaves, and those in the frustum
+    NumberArray wasVisible; // of each instance: not 0 if the last frame that looked for hidden ones found it visible
     SumArray sums; // radiance of all samples so far and their number, for each pixel
     uint lightCount;
     uint discCount; // lights that are discs, which come first
@@ -186,12 +193,14 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     float offsetExtent; // the unit of length of rounding errors near the origin
     uint toneMapping;
     // Of the real-time method:
-    uint visibility; // an index into kTexturesU2D: the triangle of each pixel
+    uint frameNumber; // since the camera was chosen; 0: there is no frame before
     Camera seen; // the camera without the shift within a pixel
     Camera seenBefore; // of the frame before, likewise
+    VisibleTargets visible1;
+    VisibleTargets visible2; // of what occlusion culling draws in its second pass; kNoTexture without it
+    FloatArray pyramid; // of pyramid.glsl, with the depth of the first pass
     SumArray planes; // of plane.glsl
     uvec2 wantedMips; // of each image the finest level that was read; 0 if all levels are resident
-    uint frameNumber; // since the camera was chosen; 0: there is no frame before
     uint stillCount; // frames since the camera moved
     uint view; // what the picture shows: kViewLight or another of plane.glsl
     uint sceneMoves; // not 0: something is elsewhere than in the frame before

@@ -6,6 +6,7 @@
 
 #include "viewer/path.glsl"
 #include "viewer/plane.glsl"
+#include "viewer/visible_triangle.glsl"
 
 // A sample that is brighter would leave a bright spot for many frames.
 const float kBrightestSample = 12.0;
@@ -65,7 +66,7 @@ void storePoint(uint place, vec3 point) {
 void visibleLightPixel(uvec2 pixel) {
     uint place = pixelPlace(ivec2(pixel));
     vec3 direction = cameraDirection(frame.camera, pixel);
-    uvec4 visible = texelFetch(kTexturesU2D[frame.visibility], ivec2(pixel), 0);
+    uvec4 visible = visibleTriangle(ivec2(pixel));
     const vec3 none = vec3(0.0);
     if (visible.x == kNothing) {
         storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);

@@ -6,7 +6,7 @@ use clap::Args;
 use lvk_samples::app::ray_args::RayArgs;
 use lvk_samples::app::value_parsers::{positive, whole};
 
-use crate::config::{Content, Method, ToneMapping, ViewerConfig};
+use crate::config::{Content, CullingMode, Method, ToneMapping, ViewerConfig};
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -63,9 +63,9 @@ pub struct ViewerArgs {
     #[arg(long, value_name = "MIB", value_parser = whole(1..=65536))]
     pub texture_budget: Option<u32>,
 
-    /// Rasterise all instances, visible or not; the picture is the same
-    #[arg(long)]
-    pub no_culling: bool,
+    /// Instances that the hybrid method leaves out when it rasterises; the picture is the same
+    #[arg(long, value_enum, default_value_t = CullingMode::Auto)]
+    pub culling: CullingMode,
 
     /// Light from outside of the model
     #[command(flatten)]

@@ -51,6 +51,23 @@ pub enum Content {
     Steps,
 }
 
+/// What leaves out instances that the picture does not show, before the hybrid method rasterises. The picture is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum CullingMode {
+    /// Occlusion for models with at least 64 instances, the frustum for others.
+    #[default]
+    Auto,
+    /// All are rasterised.
+    None,
+    /// Those outside of the camera's frustum are left out.
+    Frustum,
+    /// Those that others hide are left out too.
+    Occlusion,
+}
+
+/// Fewest instances for which looking for hidden ones is worth its passes.
+const FEWEST_FOR_OCCLUSION: u32 = 64;
+
 /// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewerConfig {
@@ -75,8 +92,8 @@ pub struct ViewerConfig {
     /// Most bytes of textures, whose mip levels then come and go by what shaders read; all levels stay if there is none. It is that of
     /// the model for as long as the model is shown.
     pub texture_budget: Option<u64>,
-    /// True if the hybrid method does not rasterise instances that the camera does not see. The picture is the same.
-    pub culls: bool,
+    /// What leaves out instances that the picture does not show.
+    pub culling: CullingMode,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
     pub is_progressive: bool,
 }
@@ -103,7 +120,7 @@ impl ViewerConfig {
             tone_mapping: ToneMapping::default(),
             content: Content::default(),
             texture_budget: None,
-            culls: true,
+            culling: CullingMode::default(),
             is_progressive: false,
         }
     }
@@ -111,6 +128,21 @@ impl ViewerConfig {
     /// Width and height.
     pub(crate) fn extent(&self) -> [u32; 2] {
         [self.width, self.height]
+    }
+
+    /// True if frames are rasterised and culled.
+    pub(crate) fn culls(&self) -> bool {
+        self.method == Method::Hybrid && self.culling != CullingMode::None
+    }
+
+    /// True if frames of a model with this many instances leave out what others hide.
+    pub(crate) fn occludes(&self, instance_count: u32) -> bool {
+        let is_on = match self.culling {
+            CullingMode::Auto => instance_count >= FEWEST_FOR_OCCLUSION,
+            CullingMode::Occlusion => true,
+            CullingMode::None | CullingMode::Frustum => false,
+        };
+        self.method == Method::Hybrid && is_on
     }
 
     pub(crate) fn check(&self, capabilities: &Capabilities) -> Result<(), SampleError> {

@@ -34,6 +34,6 @@ mod viewer;
 mod viewer_sample;
 
 pub use args::{LightArgs, SkyArg, ViewerArgs};
-pub use config::{Content, Method, ToneMapping, ViewerConfig};
-pub use gpu::TextureMemory;
+pub use config::{Content, CullingMode, Method, ToneMapping, ViewerConfig};
+pub use gpu::{DrawnInstances, TextureMemory};
 pub use viewer::{Viewer, ViewerScene};

@@ -3,8 +3,8 @@
 use egui::{Color32, RichText};
 use lvk_gltf::Animation;
 
-use crate::config::{Content, Method, ToneMapping, ViewerConfig};
-use crate::gpu::TextureMemory;
+use crate::config::{Content, CullingMode, Method, ToneMapping, ViewerConfig};
+use crate::gpu::{DrawnInstances, TextureMemory};
 use crate::model::ModelCamera;
 
 /// Lays out the name of the model, and why the last file that was dropped is not shown, if so.
@@ -21,9 +21,11 @@ pub(crate) fn show_error(ui: &mut egui::Ui, error: Option<&str>) {
 }
 
 /// Lays out how many instances a frame some time ago has rasterised.
-pub(crate) fn show_drawn(ui: &mut egui::Ui, drawn: Option<u32>) {
-    if let Some(drawn) = drawn {
-        ui.label(format!("{drawn} instances rasterised"));
+pub(crate) fn show_drawn(ui: &mut egui::Ui, drawn: Option<DrawnInstances>) {
+    if let Some(DrawnInstances { count, triangle_count, in_frustum }) = drawn {
+        ui.label(format!(
+            "{count} instances rasterised ({triangle_count} triangles), {in_frustum} in the frustum"
+        ));
     }
 }
 
@@ -98,7 +100,18 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
             }
         });
     }
-    ui.checkbox(&mut config.culls, "culling");
+    if config.method == Method::Hybrid {
+        egui::ComboBox::from_label("culling").selected_text(format!("{:?}", config.culling)).show_ui(
+            ui,
+            |ui| {
+                for culling in
+                    [CullingMode::Auto, CullingMode::None, CullingMode::Frustum, CullingMode::Occlusion]
+                {
+                    ui.selectable_value(&mut config.culling, culling, format!("{culling:?}"));
+                }
+            },
+        );
+    }
     ui.add(egui::Slider::new(&mut config.exposure_stops, -6.0..=6.0).text("stops"));
     ui.add(egui::Slider::new(&mut config.bounces, 1..=64).text("bounces"));
     ui.horizontal(|ui| {

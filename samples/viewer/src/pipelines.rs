@@ -23,6 +23,7 @@ pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
 pub(crate) const CANDIDATE: SampleStage = stage!("candidate.rahit");
 pub(crate) const DEFORM: SampleStage = stage!("deform.comp");
 pub(crate) const CULL: SampleStage = stage!("cull.comp");
+pub(crate) const DEPTH_PYRAMID: SampleStage = stage!("depth_pyramid.comp");
 pub(crate) const VISIBILITY_VERTEX: SampleStage = stage!("visibility.vert");
 pub(crate) const VISIBILITY_FRAGMENT: SampleStage = stage!("visibility.frag");
 pub(crate) const LIGHT_RAYS: SampleStage = stage!("visible_light.rgen");
@@ -41,6 +42,7 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
         SamplePipeline::new("viewer: paths by query", &[PATH_QUERY]),
         SamplePipeline::new("viewer: morph targets and joints", &[DEFORM]),
         SamplePipeline::new("viewer: culling", &[CULL]),
+        SamplePipeline::new("viewer: depth pyramid", &[DEPTH_PYRAMID]),
         SamplePipeline::raster(
             "viewer: visible triangles",
             &[VISIBILITY_VERTEX, VISIBILITY_FRAGMENT],

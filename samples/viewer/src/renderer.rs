@@ -1,12 +1,13 @@
 //! Either method, with its data for pictures of one size.
 
+use bytemuck::Zeroable as _;
 use lvk::{BufferHandle, Context, Holder};
 use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
 use crate::config::{Method, ViewerConfig};
 use crate::gpu::FrameScene;
-use crate::gpu::layout::Push;
+use crate::gpu::layout::{Push, VisibilityConstants};
 use crate::hybrid::Hybrid;
 use crate::path_tracer::PathTracer;
 
@@ -20,14 +21,15 @@ pub(crate) enum Renderer {
 pub(crate) struct Addresses {
     pub(crate) sums: u64,
     pub(crate) planes: u64,
-    pub(crate) visibility: u32,
+    pub(crate) visibility: VisibilityConstants,
 }
 
 impl Renderer {
-    pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
+    /// The method of a configuration. `occludes`: culling leaves out what others hide.
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig, occludes: bool) -> lvk::Result<Self> {
         let [width, height] = config.extent();
         Ok(match config.method {
-            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config)?),
+            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config, occludes)?),
             Method::PathTrace => Self::PathTrace {
                 tracer: PathTracer::new(ctx, config.path)?,
                 sums: buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))?,
@@ -40,13 +42,21 @@ impl Renderer {
             Self::Hybrid(hybrid) => Addresses {
                 sums: hybrid.picture_address()?,
                 planes: hybrid.planes_address()?,
-                visibility: hybrid.visibility_index(),
+                visibility: hybrid.visibility()?,
             },
             Self::PathTrace { sums, .. } => {
                 let sums = sums.address()?;
-                Addresses { sums, planes: sums, visibility: 0 }
+                Addresses { sums, planes: sums, visibility: VisibilityConstants::zeroed() }
             }
         })
+    }
+
+    /// Leaves out what others hide, or no longer, without beginning anew.
+    pub(crate) fn set_occlusion(&mut self, ctx: &Context, is_on: bool) -> lvk::Result<()> {
+        match self {
+            Self::Hybrid(hybrid) => hybrid.set_occlusion(ctx, is_on),
+            Self::PathTrace { .. } => Ok(()),
+        }
     }
 
     /// The buffer that the picture is made of, and the bytes before its first pixel.

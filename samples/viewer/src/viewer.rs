@@ -11,7 +11,7 @@ use lvk_samples::scene::{Camera, GpuCamera};
 use crate::config::{Content, Method, ViewerConfig};
 use crate::dropped::DroppedFile;
 use crate::gpu::layout::{FrameConstants, Push};
-use crate::gpu::{DrawnInstances, FrameScene, GpuScene, TextureMemory};
+use crate::gpu::{DrawnCounts, DrawnInstances, FrameScene, GpuScene, TextureMemory};
 use crate::light::Environment;
 use crate::model::{self, ModelCamera};
 use crate::playback::Playback;
@@ -68,7 +68,7 @@ pub struct Viewer {
     /// Frames since the renderer was made or began anew.
     pub(crate) frame_number: u32,
     /// Instances that culling has left.
-    pub(crate) drawn: DrawnInstances,
+    pub(crate) drawn: DrawnCounts,
 }
 
 impl Viewer {
@@ -94,9 +94,10 @@ impl Viewer {
         )?;
         let cameras = model::cameras_around(gpu.rig(), shown, &pose, &bounds);
         let camera = cameras[0].camera;
+        let occludes = config.occludes(gpu.instance_count());
         Ok(Self {
             scene: gpu,
-            renderer: Renderer::new(ctx, config)?,
+            renderer: Renderer::new(ctx, config, occludes)?,
             present: Present::new(ctx)?,
             ctx: ctx.clone(),
             name,
@@ -116,7 +117,7 @@ impl Viewer {
             before: camera,
             done: 0,
             frame_number: 0,
-            drawn: DrawnInstances::default(),
+            drawn: DrawnCounts::default(),
         })
     }
 
@@ -199,21 +200,16 @@ impl Viewer {
         self.scene.texture_memory()
     }
 
-    /// True if frames are rasterised and culled.
-    pub(crate) fn culls(&self) -> bool {
-        self.config.culls && self.config.method == Method::Hybrid
-    }
-
     /// Instances that the last frame has rasterised; `None` where all are drawn, or none are. Waits for the frame.
     ///
     /// # Errors
     /// [`SampleError::Device`].
-    pub fn drawn_instances(&mut self) -> Result<Option<u32>, SampleError> {
-        if !self.culls() {
+    pub fn drawn_instances(&mut self) -> Result<Option<DrawnInstances>, SampleError> {
+        if !self.config.culls() {
             return Ok(None);
         }
         self.drawn.read(&self.ctx, self.scene.culling())?;
-        Ok(self.drawn.count())
+        Ok(self.drawn.known())
     }
 
     /// What the picture leaves out, for the user to read.
@@ -240,13 +236,15 @@ impl Viewer {
         let needs_others = config.method != before.method
             || config.path != before.path
             || counts_steps(config) != counts_steps(before);
+        let occludes = config.occludes(self.counts().1);
         if is_resized || needs_others {
-            let renderer = Renderer::new(&self.ctx, config)?;
+            let renderer = Renderer::new(&self.ctx, config, occludes)?;
             if is_resized {
                 self.target = RenderTarget::storage(&self.ctx, config.extent())?;
             }
             (self.renderer, self.frame_number, self.done) = (renderer, 0, 0);
         }
+        self.renderer.set_occlusion(&self.ctx, occludes)?;
         if config.bounces != before.bounces {
             self.done = 0;
         }
@@ -312,17 +310,16 @@ impl Viewer {
             exposure: exposure_stops.exp2(),
             offset_extent: self.scene.offset_extent,
             tone_mapping: tone_mapping as u32,
-            visibility: addresses.visibility,
+            frame_number: self.frame_number,
             seen,
             seen_before: gpu(if self.is_first() { &self.camera } else { &self.before }),
+            visibility: addresses.visibility,
             planes: addresses.planes,
             wanted_mips: self.scene.wanted_mips().map_or(Ok(0), |buffer| self.ctx.buffer_address(buffer))?,
-            frame_number: self.frame_number,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
             scene_moves: u32::from(self.scene.moves()),
             emission: self.scene.emission(),
-            _padding: 0,
         })
     }
 
@@ -337,7 +334,7 @@ impl Viewer {
         let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
         let scene = FrameScene {
             draws: self.scene.draws(),
-            culling: self.config.culls.then(|| self.scene.culling()),
+            culling: self.config.culls().then(|| self.scene.culling()),
             written: &self.scene.written(),
             wanted_mips: self.scene.wanted_mips(),
         };

@@ -11,6 +11,7 @@ use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::scene::Camera;
 
 use crate::config::{Method, ViewerConfig};
+use crate::gpu::DrawnInstances;
 #[cfg(feature = "window")]
 use crate::panel;
 use crate::present::Present;
@@ -121,8 +122,12 @@ impl Sample for Viewer {
     }
 
     fn remark(&self) -> Option<String> {
-        let drawn = self.drawn.count().filter(|_| self.culls())?;
-        Some(format!("culling   {drawn} of {} instances rasterised", self.counts().1))
+        let DrawnInstances { count, triangle_count, in_frustum } =
+            self.drawn.known().filter(|_| self.config.culls())?;
+        let all = self.counts().1;
+        Some(format!(
+            "culling   {count} of {all} instances rasterised ({triangle_count} triangles), {in_frustum} in the frustum"
+        ))
     }
 
     fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), RunError> {
@@ -173,8 +178,8 @@ impl Sample for Viewer {
         panel::show_error(ui, self.refused.as_deref());
         let (triangles, instances) = self.counts();
         ui.label(format!("samples: {}; {triangles} triangles, {instances} instances", self.done));
-        if self.culls() && self.drawn.poll(&self.ctx, self.scene.culling()).is_ok() {
-            panel::show_drawn(ui, self.drawn.count());
+        if self.config.culls() && self.drawn.poll(&self.ctx, self.scene.culling()).is_ok() {
+            panel::show_drawn(ui, self.drawn.known());
         }
         panel::show_memory(ui, self.scene.structure_bytes);
         panel::show_textures(ui, self.texture_memory());
@@ -186,7 +191,9 @@ impl Sample for Viewer {
     }
 
     fn reload(&mut self) -> Result<(), RunError> {
-        let (renderer, present) = (Renderer::new(&self.ctx, &self.config)?, Present::new(&self.ctx)?);
+        let occludes = self.config.occludes(self.counts().1);
+        let (renderer, present) =
+            (Renderer::new(&self.ctx, &self.config, occludes)?, Present::new(&self.ctx)?);
         (self.renderer, self.present, self.done, self.frame_number) = (renderer, present, 0, 0);
         Ok(())
     }

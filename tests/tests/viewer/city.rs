@@ -12,9 +12,10 @@ use lvk_tests::hybrid::paths;
 use lvk_tests::{device, device_with};
 use lvk_viewer::city::{CityConfig, city};
 use lvk_viewer::light::{Environment, SunSetting};
-use lvk_viewer::{Method, Viewer, ViewerConfig};
+use lvk_viewer::{CullingMode, Method, Viewer, ViewerConfig};
 
 use crate::moving_model::{DURATION, moving_model};
+use crate::occlusion::frame;
 use crate::paths::assert_alike;
 use crate::scenes::{View, viewer};
 
@@ -34,27 +35,19 @@ fn hybrid(ctx: &Context, path: RayPath, model: &Model, view: &View) -> Viewer {
     viewer(ctx, (Method::Hybrid, path), model, &environment(), view)
 }
 
-/// The radiance of a frame, bit by bit, and the number of instances that were rasterised.
-fn frame(viewer: &mut Viewer, culls: bool) -> (Vec<[u32; 3]>, Option<u32>) {
-    viewer.configure(&ViewerConfig { culls, ..*viewer.config() }).unwrap();
-    headless::picture(viewer).unwrap();
-    let bits = viewer.radiance().unwrap().iter().map(|pixel| pixel.map(f32::to_bits)).collect();
-    (bits, viewer.drawn_instances().unwrap())
-}
-
 #[test]
 fn a_camera_that_moves_through_the_city_sees_the_same_with_culling() {
     let Some(ctx) = device() else { return };
     let model = tiny_city(2, 5);
     let start = Camera::looking_at([4.6, 1.75, 60.0], [-9.0, 10.0, -20.0], 57.0);
     let view = View { camera: start, size: [72, 40], samples: 1 };
-    let [mut culled, mut whole] = [0, 1].map(|_| {
+    let [mut culled, mut occluded, mut whole] = [0; 3].map(|_| {
         let mut viewer = hybrid(&ctx, RayPath::Query, &model, &view);
         viewer.configure(&ViewerConfig { is_progressive: true, ..*viewer.config() }).unwrap();
         viewer
     });
     let all = culled.counts().1;
-    let mut fewest = all;
+    let (mut fewest, mut visible) = (all, 0);
     for step in 0..8_u8 {
         // Forward while it turns once around, up and down.
         let turn = Quat::from_rotation_y(std::f32::consts::TAU * f32::from(step) / 8.0);
@@ -62,15 +55,25 @@ fn a_camera_that_moves_through_the_city_sees_the_same_with_culling() {
         let ahead = turn * (Vec3::from(start.target) - Vec3::from(start.eye));
         let target = eye + Vec3::new(ahead.x, ahead.y * (3.0 - f32::from(step)), ahead.z);
         let camera = Camera { eye: eye.to_array(), target: target.to_array(), ..start };
-        culled.set_view(&camera);
-        whole.set_view(&camera);
-        let ((picture, drawn), (expected, none)) = (frame(&mut culled, true), frame(&mut whole, false));
+        let mut shown = |viewer: &mut Viewer, mode| {
+            viewer.set_view(&camera);
+            frame(viewer, mode)
+        };
+        let (expected, none) = shown(&mut whole, CullingMode::None);
+        let (picture, by_frustum) = shown(&mut culled, CullingMode::Frustum);
         assert!(picture == expected, "step {step}");
+        let (picture, by_occlusion) = shown(&mut occluded, CullingMode::Occlusion);
+        assert!(picture == expected, "step {step} with occlusion");
+        let (by_frustum, by_occlusion) = (by_frustum.unwrap(), by_occlusion.unwrap());
+        eprintln!("step {step}: {by_frustum:?}, {by_occlusion:?}");
         assert_eq!(none, None);
-        fewest = fewest.min(drawn.unwrap());
+        assert_eq!(by_frustum.count, by_frustum.in_frustum);
+        assert_eq!(by_frustum.in_frustum, by_occlusion.in_frustum);
+        fewest = fewest.min(by_frustum.count);
+        visible += by_occlusion.count;
     }
-    eprintln!("{fewest} of {all} instances");
     assert!(0 < fewest && 2 * fewest < all, "{fewest} of {all} instances are drawn");
+    assert!(visible < 4 * all, "{visible} instances are drawn in eight frames");
 }
 
 #[test]
@@ -83,7 +86,7 @@ fn nothing_is_drawn_of_what_lies_behind_and_all_of_what_lies_ahead() {
     // The ground reaches behind the camera.
     for (target, expected) in [([0.0, 20.0, 0.0], viewer.counts().1), ([0.0, 60.0, 2100.0], 1)] {
         viewer.set_view(&Camera { target, ..far });
-        assert_eq!(frame(&mut viewer, true).1, Some(expected));
+        assert_eq!(frame(&mut viewer, CullingMode::Frustum).1.unwrap().count, expected);
     }
 }
 
@@ -101,8 +104,10 @@ fn meshes_that_deform_and_nodes_that_move_look_the_same_with_culling() {
         for step in 0..4_u8 {
             viewer.play(Some(0), DURATION * f32::from(step) / 4.0);
             viewer.set_view(&view.camera);
-            let ((culled, _), (whole, _)) = (frame(&mut viewer, true), frame(&mut viewer, false));
-            assert!(culled == whole, "from {eye:?} at step {step}");
+            let (whole, _) = frame(&mut viewer, CullingMode::None);
+            for mode in [CullingMode::Frustum, CullingMode::Occlusion] {
+                assert!(frame(&mut viewer, mode).0 == whole, "{mode:?} from {eye:?} at step {step}");
+            }
         }
     }
 }

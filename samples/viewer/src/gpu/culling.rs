@@ -1,4 +1,4 @@
-//! Culling of instances by the camera's frustum, and the draws that it leaves.
+//! Culling of instances by the camera's frustum and by what hides them, and the draws that it leaves.
 
 use lvk::{
     BufferDesc, BufferHandle, BufferUsage, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle,
@@ -6,22 +6,29 @@ use lvk::{
 };
 use lvk_samples::app::array_buffer::{array, buffer};
 
-use super::instances::SceneInstances;
-use super::layout::{CULLING_LAYOUTS, CullingConstants, Push};
+use super::instances::{Draw, SceneInstances};
+use super::layout::{CULLING_LAYOUTS, CullingConstants, GpuMeshRun, Push};
 use crate::pipelines::{CULL, SAMPLE};
 
 /// Vertices, instances, first vertex and first instance of an indirect draw.
 type Arguments = [u32; 4];
 
+/// Numbers that the shader counts for each mesh: instances that are drawn, and those in the frustum.
+const COUNTS: usize = 2;
+
 /// Leaves out instances that the camera does not see when surfaces are rasterised. Rays meet all of them: what is beside or behind
-/// the camera casts shadows and is reflected.
+/// the camera, or hidden, casts shadows and is reflected.
 pub(crate) struct Culling {
     pipeline: Holder<ComputePipelineHandle>,
     runs: Holder<BufferHandle>,
     visible: Holder<BufferHandle>,
     arguments: Holder<BufferHandle>,
     counts: Holder<BufferHandle>,
-    run_count: u32,
+    /// A number for each instance: not 0 if it was visible. All are at first: the frame that draws most then hides most of the
+    /// next. With none, the first depth would be empty, hide nothing, and call all of the frustum visible a frame later.
+    was_visible: Holder<BufferHandle>,
+    /// Triangles of an instance of each mesh.
+    triangles: Vec<u64>,
 }
 
 impl Culling {
@@ -40,8 +47,14 @@ impl Culling {
             runs: array(ctx, "instances of meshes", BufferUsage::STORAGE, &runs)?,
             visible: buffer(ctx, "visible instances", 4 * (instances.table.len() as u64 + 1))?,
             arguments: ctx.create_buffer(&desc)?,
-            counts: buffer(ctx, "counts of instances", 4 * runs.len() as u64)?,
-            run_count: instances.runs.len() as u32,
+            counts: buffer(ctx, "counts of instances", (4 * COUNTS * runs.len()) as u64)?,
+            was_visible: array(
+                ctx,
+                "instances that were visible",
+                BufferUsage::STORAGE,
+                &vec![1_u32; instances.table.len() + 1],
+            )?,
+            triangles: instances.runs.iter().map(|run| triangles_of(run, &instances.draws)).collect(),
         })
     }
 
@@ -51,18 +64,26 @@ impl Culling {
             visible: self.visible.address()?,
             draw_arguments: self.arguments.address()?,
             drawn_counts: self.counts.address()?,
+            was_visible: self.was_visible.address()?,
         })
     }
 
-    /// Records the dispatch: a work group for each mesh.
-    pub(crate) fn record(&self, cmd: &mut CommandBuffer, push: &Push) -> lvk::Result<()> {
-        if self.run_count == 0 {
+    /// Records the dispatch of a step: a work group for each mesh. The last step reads `depths`.
+    pub(crate) fn record(
+        &self,
+        cmd: &mut CommandBuffer,
+        push: &Push,
+        depths: Option<BufferHandle>,
+    ) -> lvk::Result<()> {
+        if self.triangles.is_empty() {
             return Ok(());
         }
-        let buffers = [*self.visible, *self.arguments, *self.counts];
+        let buffers = [*self.visible, *self.arguments, *self.counts, *self.was_visible];
+        let read_buffers = depths.as_slice();
+        let dependencies = Dependencies { buffers: &buffers, read_buffers, ..Dependencies::default() };
         cmd.bind_compute_pipeline(*self.pipeline)?;
         cmd.push_constants(push)?;
-        cmd.dispatch([self.run_count, 1, 1], &Dependencies { buffers: &buffers, ..Dependencies::default() })
+        cmd.dispatch([self.triangles.len() as u32, 1, 1], &dependencies)
     }
 
     /// Buffers that draws read.
@@ -77,37 +98,58 @@ impl Culling {
     }
 
     fn counts_bytes(&self) -> u64 {
-        4 * u64::from(self.run_count)
+        (4 * COUNTS * self.triangles.len()) as u64
+    }
+
+    /// Sums what the shader has counted.
+    fn sum(&self, counts: &[[u32; COUNTS]]) -> DrawnInstances {
+        let pairs = counts.iter().zip(&self.triangles);
+        pairs.fold(DrawnInstances::default(), |sum, ([drawn, in_frustum], triangles)| DrawnInstances {
+            count: sum.count + drawn,
+            triangle_count: sum.triangle_count + u64::from(*drawn) * triangles,
+            in_frustum: sum.in_frustum + in_frustum,
+        })
     }
 }
 
-/// The number of instances that a frame has drawn.
+/// What a frame has rasterised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DrawnInstances {
+    /// Instances that were rasterised.
+    pub count: u32,
+    /// Their triangles.
+    pub triangle_count: u64,
+    /// Instances whose boxes reach into the camera's frustum.
+    pub in_frustum: u32,
+}
+
+/// The number of instances that a frame has drawn, once it is known.
 #[derive(Default)]
-pub(crate) struct DrawnInstances {
-    count: Option<u32>,
+pub(crate) struct DrawnCounts {
+    known: Option<DrawnInstances>,
     coming: Option<Readback>,
 }
 
-impl DrawnInstances {
-    /// The number, once there is one.
-    pub(crate) fn count(&self) -> Option<u32> {
-        self.count
+impl DrawnCounts {
+    /// The numbers, once there are any.
+    pub(crate) fn known(&self) -> Option<DrawnInstances> {
+        self.known
     }
 
-    /// Reads the number of the last frame. Waits for the frame.
+    /// Reads the numbers of the last frame. Waits for the frame.
     pub(crate) fn read(&mut self, ctx: &Context, culling: &Culling) -> lvk::Result<()> {
-        let mut counts = vec![0_u32; culling.run_count as usize];
+        let mut counts = vec![[0_u32; COUNTS]; culling.triangles.len()];
         if !counts.is_empty() {
             ctx.download_buffer(*culling.counts, 0, bytemuck::cast_slice_mut(&mut counts))?;
         }
-        self.count = Some(counts.iter().sum());
+        self.known = Some(culling.sum(&counts));
         Ok(())
     }
 
-    /// Keeps the last number that has arrived, of a frame some time ago, and asks for the next.
+    /// Keeps the last numbers that have arrived, of a frame some time ago, and asks for the next.
     pub(crate) fn poll(&mut self, ctx: &Context, culling: &Culling) -> lvk::Result<()> {
-        if culling.run_count == 0 {
-            self.count = Some(0);
+        if culling.triangles.is_empty() {
+            self.known = Some(DrawnInstances::default());
             return Ok(());
         }
         if let Some(coming) = self.coming.take() {
@@ -115,12 +157,18 @@ impl DrawnInstances {
                 self.coming = Some(coming);
                 return Ok(());
             }
-            let bytes = coming.wait()?;
-            self.count = Some(bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned::<u32>).sum());
+            let counts = bytemuck::pod_collect_to_vec(&coming.wait()?);
+            self.known = Some(culling.sum(&counts));
         }
         self.coming = Some(ctx.read_buffer_later(*culling.counts, 0..culling.counts_bytes())?);
         Ok(())
     }
+}
+
+/// Triangles of an instance of a mesh.
+fn triangles_of(run: &GpuMeshRun, draws: &[Draw]) -> u64 {
+    let own = draws.iter().skip(run.first_draw as usize).take(run.draw_count as usize);
+    own.map(|draw| u64::from(draw.triangle_count)).sum()
 }
 
 fn pipeline(ctx: &Context) -> lvk::Result<Holder<ComputePipelineHandle>> {

@@ -168,6 +168,24 @@ lvk::shader_struct! {
         pub(crate) visible: u64,
         pub(crate) draw_arguments: u64,
         pub(crate) drawn_counts: u64,
+        pub(crate) was_visible: u64,
+    }
+
+    /// `VisibleTargets`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct VisibleTargets {
+        pub(crate) triangles: u32,
+        pub(crate) depth: u32,
+    }
+
+    /// `Frame`: visible surfaces.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct VisibilityConstants {
+        pub(crate) visible1: VisibleTargets,
+        pub(crate) visible2: VisibleTargets,
+        pub(crate) pyramid: u64,
     }
 
     /// `Frame`: what leads to the scene, the same in every frame.
@@ -223,17 +241,16 @@ lvk::shader_struct! {
         pub(crate) exposure: f32,
         pub(crate) offset_extent: f32,
         pub(crate) tone_mapping: u32,
-        pub(crate) visibility: u32,
+        pub(crate) frame_number: u32,
         pub(crate) seen: GpuCamera,
         pub(crate) seen_before: GpuCamera,
+        pub(crate) visibility: VisibilityConstants,
         pub(crate) planes: u64,
         pub(crate) wanted_mips: u64,
-        pub(crate) frame_number: u32,
         pub(crate) still_count: u32,
         pub(crate) view: u32,
         pub(crate) scene_moves: u32,
         pub(crate) emission: EmissionConstants,
-        pub(crate) _padding: u32,
     }
 
     /// `PushConstants`.
@@ -253,6 +270,23 @@ lvk::shader_struct! {
         pub(crate) argument: u32,
         pub(crate) first_visible: u32,
     }
+}
+
+/// Value of `Push::argument` of `cull.comp.glsl`: the instances that are left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub(crate) enum CullingStep {
+    /// All in the frustum.
+    Frustum = 0,
+    /// Those of them that the frame before has found visible.
+    LastVisible = 1,
+    /// Those of the others that the depth pyramid does not hide.
+    Pyramid = 2,
+}
+
+impl VisibleTargets {
+    /// Those of a pass that is not there.
+    pub(crate) const NONE: Self = Self { triangles: NO_TEXTURE, depth: NO_TEXTURE };
 }
 
 /// Value of `DrawPush::first_visible` without culling.

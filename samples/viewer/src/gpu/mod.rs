@@ -14,7 +14,8 @@ mod scene;
 mod textures;
 mod vertices;
 
-pub(crate) use culling::{Culling, DrawnInstances};
+pub use culling::DrawnInstances;
+pub(crate) use culling::{Culling, DrawnCounts};
 pub(crate) use instances::Draw;
 pub(crate) use scene::GpuScene;
 pub use textures::TextureMemory;

@@ -1,5 +1,6 @@
 //! The real-time method: rasterised surfaces, a few rays for each, and filters over time and space.
 
+mod depth_pyramid;
 mod passes;
 mod visibility;
 
@@ -8,7 +9,8 @@ use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
 use crate::config::ViewerConfig;
-use crate::gpu::{FrameScene, layout::Push};
+use crate::gpu::FrameScene;
+use crate::gpu::layout::{Push, VisibilityConstants};
 use passes::Passes;
 use visibility::Visibility;
 pub(crate) use visibility::{DEPTH_FORMAT, TRIANGLE_FORMAT};
@@ -29,11 +31,14 @@ pub(crate) struct Hybrid {
 }
 
 impl Hybrid {
-    pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
+    /// Passes for pictures of a configuration. `occludes`: culling leaves out what others hide.
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig, occludes: bool) -> lvk::Result<Self> {
         let extent = config.extent();
         let size_bytes = PLANES * plane_bytes(extent);
+        let mut visibility = Visibility::new(ctx, extent)?;
+        visibility.set_occlusion(ctx, occludes)?;
         Ok(Self {
-            visibility: Visibility::new(ctx, extent)?,
+            visibility,
             passes: Passes::new(ctx, config)?,
             planes: buffer(ctx, "planes", size_bytes)?,
             extent,
@@ -60,21 +65,23 @@ impl Hybrid {
         SHOWN * plane_bytes(self.extent)
     }
 
-    /// Bindless index of the target of triangles.
-    pub(crate) fn visibility_index(&self) -> u32 {
-        self.visibility.index()
+    /// What leads to the visible triangles.
+    pub(crate) fn visibility(&self) -> lvk::Result<VisibilityConstants> {
+        self.visibility.constants()
+    }
+
+    /// Leaves out what others hide, or no longer.
+    pub(crate) fn set_occlusion(&mut self, ctx: &Context, is_on: bool) -> lvk::Result<()> {
+        self.visibility.set_occlusion(ctx, is_on)
     }
 
     /// Records a frame, whose constants are at `frame`.
     pub(crate) fn record(&self, to: &mut Frame<'_>, frame: u64, scene: FrameScene<'_>) -> lvk::Result<()> {
         let push = |argument| Push { frame, argument, _padding: 0 };
-        if let Some(culling) = scene.culling {
-            to.pass("culling", |cmd| culling.record(cmd, &push(0)))?;
-        }
-        to.pass("visible triangles", |cmd| self.visibility.record(cmd, frame, scene))?;
-        let (planes, visible) = (*self.planes, self.visibility.triangles());
+        self.visibility.record(to, frame, scene)?;
+        let (planes, visible) = (*self.planes, self.visibility.textures());
         to.pass("light", |cmd| {
-            self.passes.record_light(cmd, &push(0), planes, (visible, scene), self.extent)
+            self.passes.record_light(cmd, &push(0), planes, (&visible, scene), self.extent)
         })?;
         to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
         match self.passes.counts_steps() {

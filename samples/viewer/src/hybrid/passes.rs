@@ -48,19 +48,19 @@ impl Passes {
         })
     }
 
-    /// Records the rays of a picture of `extent` pixels whose triangles are `visible`.
+    /// Records the rays of a picture of `extent` pixels whose triangles are in the textures `visible`.
     pub(crate) fn record_light(
         &self,
         cmd: &mut CommandBuffer,
         push: &Push,
         planes: BufferHandle,
-        (visible, scene): (TextureHandle, FrameScene<'_>),
+        (visible, scene): (&[TextureHandle], FrameScene<'_>),
         extent: [u32; 2],
     ) -> lvk::Result<()> {
         let dependencies = Dependencies {
             buffers: &scene.buffers(planes),
             read_buffers: scene.written,
-            sampled_images: &[visible],
+            sampled_images: visible,
             ..Dependencies::default()
         };
         match &self.light {

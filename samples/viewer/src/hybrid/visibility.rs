@@ -5,8 +5,12 @@ use lvk::{
     DepthAttachment, DepthTest, Format, Holder, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
     TextureDesc, TextureHandle, TextureUsage,
 };
+use lvk_samples::app::frame::Frame;
 
-use crate::gpu::layout::{ALL_INSTANCES, DrawPush, SCENE_LAYOUTS};
+use super::depth_pyramid::DepthPyramid;
+use crate::gpu::layout::{
+    ALL_INSTANCES, CullingStep, DrawPush, Push, SCENE_LAYOUTS, VisibilityConstants, VisibleTargets,
+};
 use crate::gpu::{Culling, FrameScene};
 use crate::pipelines::{SAMPLE, VISIBILITY_FRAGMENT, VISIBILITY_VERTEX};
 
@@ -20,56 +24,94 @@ const NOTHING: u32 = u32::MAX;
 /// The rasteriser and its targets.
 pub(crate) struct Visibility {
     pipeline: Holder<RenderPipelineHandle>,
+    targets: Targets,
+    occlusion: Option<Occlusion>,
+    extent: [u32; 2],
+}
+
+/// What a pass draws to.
+struct Targets {
     triangles: Holder<TextureHandle>,
     depth: Holder<TextureHandle>,
 }
 
+/// What occlusion culling needs beside: the depth of the first pass, and the targets of the second.
+struct Occlusion {
+    pyramid: DepthPyramid,
+    targets: Targets,
+}
+
 impl Visibility {
     pub(crate) fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
-        let target = |format, debug_name, usage| {
-            ctx.create_texture(&TextureDesc { format, extent, usage, debug_name, ..TextureDesc::default() })
-        };
-        Ok(Self {
-            pipeline: pipeline(ctx)?,
-            triangles: target(
-                TRIANGLE_FORMAT,
-                "visible triangles",
-                TextureUsage::TARGET | TextureUsage::SAMPLED,
-            )?,
-            depth: target(DEPTH_FORMAT, "depth", TextureUsage::TARGET)?,
+        let (pipeline, targets) = (pipeline(ctx)?, Targets::new(ctx, extent)?);
+        Ok(Self { pipeline, targets, occlusion: None, extent })
+    }
+
+    /// Leaves out what others hide, or no longer. It may be on only while frames are culled.
+    pub(crate) fn set_occlusion(&mut self, ctx: &Context, is_on: bool) -> lvk::Result<()> {
+        if is_on != self.occlusion.is_some() {
+            self.occlusion = is_on.then(|| Occlusion::new(ctx, self.extent)).transpose()?;
+        }
+        Ok(())
+    }
+
+    /// Textures that hold the visible triangles.
+    pub(crate) fn textures(&self) -> Vec<TextureHandle> {
+        let Some(occlusion) = &self.occlusion else { return vec![*self.targets.triangles] };
+        let targets = [&self.targets, &occlusion.targets];
+        targets.iter().flat_map(|targets| [*targets.triangles, *targets.depth]).collect()
+    }
+
+    /// What leads to the visible triangles, and to the pyramid.
+    pub(crate) fn constants(&self) -> lvk::Result<VisibilityConstants> {
+        let second = self.occlusion.as_ref().map(|occlusion| occlusion.targets.indices());
+        Ok(VisibilityConstants {
+            visible1: self.targets.indices(),
+            visible2: second.unwrap_or(VisibleTargets::NONE),
+            pyramid: self.occlusion.as_ref().map_or(Ok(0), |occlusion| occlusion.pyramid.address())?,
         })
     }
 
-    /// The target of triangles.
-    pub(crate) fn triangles(&self) -> TextureHandle {
-        *self.triangles
+    /// Records all passes, with constants at `frame`.
+    pub(crate) fn record(&self, to: &mut Frame<'_>, frame: u64, scene: FrameScene<'_>) -> lvk::Result<()> {
+        let push = |step: CullingStep| Push { frame, argument: step as u32, _padding: 0 };
+        let Self { targets, occlusion, .. } = self;
+        if let Some(culling) = scene.culling {
+            let step = occlusion.as_ref().map_or(CullingStep::Frustum, |_| CullingStep::LastVisible);
+            to.pass("culling", |cmd| culling.record(cmd, &push(step), None))?;
+        }
+        to.pass("visible triangles", |cmd| self.draw(cmd, frame, scene, targets))?;
+        let (Some(Occlusion { pyramid, targets: second }), Some(culling)) = (occlusion, scene.culling) else {
+            return Ok(());
+        };
+        to.pass("depth pyramid", |cmd| pyramid.record(cmd, &targets.depth))?;
+        let depths = Some(pyramid.depths());
+        to.pass("occlusion culling", |cmd| culling.record(cmd, &push(CullingStep::Pyramid), depths))?;
+        to.pass("newly visible triangles", |cmd| self.draw(cmd, frame, scene, second))
     }
 
-    /// The bindless index of the target.
-    pub(crate) fn index(&self) -> u32 {
-        self.triangles.index()
-    }
-
-    /// Records the pass.
-    pub(crate) fn record(
+    /// Draws what culling has left, or everything.
+    fn draw(
         &self,
         cmd: &mut CommandBuffer,
         frame: u64,
         scene: FrameScene<'_>,
+        targets: &Targets,
     ) -> lvk::Result<()> {
         let color = ColorAttachment {
-            texture: *self.triangles,
+            texture: *targets.triangles,
             mip: 0,
             layer: 0,
             load: ColorLoadOp::ClearUint([NOTHING; 4]),
             store: true,
             resolve: None,
         };
-        let reads = scene.culling.map(Culling::reads);
-        let read_buffers: Vec<_> = scene.written.iter().copied().chain(reads.into_iter().flatten()).collect();
+        let store = self.occlusion.is_some();
+        let culled = scene.culling.map(Culling::reads).into_iter().flatten();
+        let read_buffers: Vec<_> = scene.written.iter().copied().chain(culled).collect();
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &[color],
-            depth: Some(DepthAttachment { store: false, ..DepthAttachment::clear(*self.depth, 0.0) }),
+            depth: Some(DepthAttachment { store, ..DepthAttachment::clear(*targets.depth, 0.0) }),
             dependencies: Dependencies { read_buffers: &read_buffers, ..Dependencies::default() },
             debug_name: "visible triangles",
             ..RenderPassDesc::default()
@@ -84,6 +126,29 @@ impl Visibility {
             }
         }
         Ok(())
+    }
+}
+
+impl Targets {
+    fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
+        let usage = TextureUsage::TARGET | TextureUsage::SAMPLED;
+        let target = |format, debug_name| {
+            ctx.create_texture(&TextureDesc { format, extent, usage, debug_name, ..TextureDesc::default() })
+        };
+        Ok(Self {
+            triangles: target(TRIANGLE_FORMAT, "visible triangles")?,
+            depth: target(DEPTH_FORMAT, "depth")?,
+        })
+    }
+
+    fn indices(&self) -> VisibleTargets {
+        VisibleTargets { triangles: self.triangles.index(), depth: self.depth.index() }
+    }
+}
+
+impl Occlusion {
+    fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
+        Ok(Self { pyramid: DepthPyramid::new(ctx, extent)?, targets: Targets::new(ctx, extent)? })
     }
 }
 

@@ -1,0 +1,226 @@
+//! Occlusion culling: what is hidden is not rasterised, and every picture is the same to the bit as without culling.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use glam::{Mat4, Vec3};
+use lvk::Context;
+use lvk_gltf::{AlphaMode, Material, Model, Node, Transform};
+use lvk_samples::app::headless;
+use lvk_samples::app::sample::Sample as _;
+use lvk_samples::hybrid::RayPath;
+use lvk_samples::scene::Camera;
+use lvk_tests::device;
+use lvk_viewer::light::Environment;
+use lvk_viewer::{CullingMode, DrawnInstances, Method, Viewer, ViewerConfig};
+
+use crate::moving_model::{DURATION, moving_model};
+use crate::scenes::{Builder, View, colored, viewer};
+
+/// Boxes behind the wall: columns and rows.
+const BOXES: [u16; 2] = [24, 16];
+
+/// The radiance of a frame, bit by bit, and what was rasterised.
+pub fn frame(viewer: &mut Viewer, culling: CullingMode) -> (Vec<[u32; 3]>, Option<DrawnInstances>) {
+    viewer.configure(&ViewerConfig { culling, ..*viewer.config() }).unwrap();
+    headless::picture(viewer).unwrap();
+    let bits = viewer.radiance().unwrap().iter().map(|pixel| pixel.map(f32::to_bits)).collect();
+    (bits, viewer.drawn_instances().unwrap())
+}
+
+/// Frames that follow each other, by two viewers: one culls by occlusion, the other draws all.
+struct Pair {
+    culled: Viewer,
+    whole: Viewer,
+}
+
+impl Pair {
+    fn new(ctx: &Context, model: &Model, size: [u32; 2]) -> Self {
+        let view = View { camera: ahead(0.0), size, samples: 1 };
+        let [culled, whole] = [0; 2].map(|_| {
+            let by = (Method::Hybrid, RayPath::Query);
+            let mut viewer = viewer(ctx, by, model, &Environment::uniform([1.0; 3]), &view);
+            let config = ViewerConfig { is_progressive: true, bounces: 2, ..*viewer.config() };
+            viewer.configure(&config).unwrap();
+            viewer
+        });
+        Self { culled, whole }
+    }
+
+    /// Both play the first animation from a time on.
+    fn play(&mut self, seconds: f32) {
+        [&mut self.culled, &mut self.whole].into_iter().for_each(|viewer| viewer.play(Some(0), seconds));
+    }
+
+    /// Asserts that both frames are the same. Returns what was rasterised, and the picture.
+    fn frame(&mut self, camera: &Camera, what: &str) -> (DrawnInstances, Vec<[u32; 3]>) {
+        self.culled.set_view(camera);
+        self.whole.set_view(camera);
+        let (picture, drawn) = frame(&mut self.culled, CullingMode::Occlusion);
+        let (expected, _) = frame(&mut self.whole, CullingMode::None);
+        let differing = picture.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert_eq!(differing, 0, "{what}: {differing} of {} pixels differ", expected.len());
+        (drawn.unwrap(), picture)
+    }
+}
+
+/// A camera before the wall, moved to the right.
+fn ahead(right: f32) -> Camera {
+    Camera::looking_at([right, 0.3, 6.0], [right, 0.3, 0.0], 60.0)
+}
+
+/// A wall in the plane z = 2, before which cameras stand.
+fn wall(builder: Builder, material: Material) -> Builder {
+    builder.quad(Vec3::new(-5.0, -4.0, 2.0), Vec3::X * 10.0, Vec3::Y * 8.0, material)
+}
+
+/// Hundreds of squares behind the wall, which reach to the right of it by `beyond`.
+fn squares(mut model: Model, beyond: f32) -> Model {
+    let corner = Vec3::new(-0.08, -0.08, 0.0);
+    let square =
+        Builder::default().quad(corner, Vec3::X * 0.16, Vec3::Y * 0.16, colored([0.2, 0.6, 0.9], 0.0, 0.5));
+    let mut square = square.model();
+    square.meshes[0].primitives[0].material = Some(model.materials.len());
+    model.materials.append(&mut square.materials);
+    model.meshes.append(&mut square.meshes);
+    let mesh = Some(model.meshes.len() - 1);
+    for (column, row) in (0..BOXES[0]).flat_map(|column| (0..BOXES[1]).map(move |row| (column, row))) {
+        let along = f32::from(column) / f32::from(BOXES[0] - 1);
+        let place =
+            Vec3::new(-2.0 + (7.0 + beyond) * along, -1.5 + 0.2 * f32::from(row), -0.1 * f32::from(row));
+        model.scenes[0].roots.push(model.nodes.len());
+        let transform = Transform::Matrix(Mat4::from_translation(place));
+        model.nodes.push(Node { mesh, transform, ..Node::default() });
+    }
+    model
+}
+
+fn square_count() -> u32 {
+    u32::from(BOXES[0] * BOXES[1])
+}
+
+#[test]
+fn a_wall_hides_hundreds_and_they_are_drawn_in_the_frame_that_shows_them() {
+    let Some(ctx) = device() else { return };
+    let model = squares(wall(Builder::default(), colored([0.8; 3], 0.0, 1.0)).model(), 0.0);
+    let mut pair = Pair::new(&ctx, &model, [64, 40]);
+    // The first frame has no frame before: it draws all of the frustum, and finds out what is hidden.
+    let first = pair.frame(&ahead(0.0), "the first frame").0;
+    assert_eq!((first.count, first.in_frustum), (square_count() + 1, square_count() + 1));
+    for number in 0..3 {
+        let (drawn, _) = pair.frame(&ahead(0.01 * number as f32), "behind the wall");
+        assert_eq!((drawn.count, drawn.triangle_count), (1, 2), "the wall alone is drawn");
+        assert_eq!(drawn.in_frustum, square_count() + 1);
+    }
+    // At once so far to the right that many squares show beside the wall.
+    let beside = Camera::looking_at([14.0, 0.3, 4.0], [4.0, 0.3, -0.5], 60.0);
+    let (drawn, shown) = pair.frame(&beside, "beside the wall");
+    let (_, without) =
+        Pair::new(&ctx, &wall(Builder::default(), colored([0.8; 3], 0.0, 1.0)).model(), [64, 40])
+            .frame(&beside, "beside the wall alone");
+    assert_ne!(shown, without, "squares show");
+    assert!((10..square_count()).contains(&drawn.count), "{drawn:?}");
+    let again = pair.frame(&beside, "still beside the wall").0;
+    assert!(again.count <= drawn.count, "{again:?} after {drawn:?}");
+    assert_eq!(pair.frame(&ahead(0.0), "behind the wall again").0.in_frustum, square_count() + 1);
+    assert_eq!(pair.frame(&ahead(0.0), "still behind the wall").0.count, 1);
+}
+
+#[test]
+fn cameras_of_odd_pictures_move_along_across_and_through_the_wall() {
+    let Some(ctx) = device() else { return };
+    let model = squares(wall(Builder::default(), colored([0.8; 3], 0.0, 1.0)).model(), 3.0);
+    for size in [[61, 37], [1, 1], [130, 3], [33, 65]] {
+        let mut pair = Pair::new(&ctx, &model, size);
+        let mut fewest = u32::MAX;
+        for step in 0..12_u8 {
+            let along = f32::from(step) / 11.0;
+            let camera = Camera { eye: [6.5 * along, 0.3, 6.0 - 7.0 * along], ..ahead(2.0 * along) };
+            let (drawn, _) = pair.frame(&camera, &format!("{size:?} at step {step}"));
+            fewest = fewest.min(drawn.count);
+        }
+        assert!(fewest < square_count() / 2, "{size:?}: {fewest}");
+    }
+}
+
+#[test]
+fn holes_and_coverage_hide_only_where_they_are_solid() {
+    let Some(ctx) = device() else { return };
+    for alpha_mode in [AlphaMode::Mask { cutoff: 0.5 }, AlphaMode::Blend] {
+        let material = Material { alpha_mode, ..colored([0.8; 3], 0.0, 1.0) };
+        let mut model = wall(Builder::default(), material).model();
+        // Solid on the left, nothing on the right.
+        model.meshes[0].primitives[0].colors =
+            [1.0, 0.0, 0.0, 1.0].map(|alpha| [1.0, 1.0, 1.0, alpha]).to_vec();
+        let model = squares(model, 0.0);
+        let mut pair = Pair::new(&ctx, &model, [61, 37]);
+        let counts = [-4.0, -4.0, 0.0, 0.5, 1.5, -2.0]
+            .map(|right| pair.frame(&ahead(right), &format!("{alpha_mode:?} at {right}")).0);
+        let seen = counts.map(|drawn| drawn.count);
+        assert!(seen[4] > 20, "{alpha_mode:?}: {seen:?} show through the holes");
+        assert!(seen[1] < counts[1].in_frustum || alpha_mode == AlphaMode::Blend, "{alpha_mode:?}: {seen:?}");
+    }
+}
+
+#[test]
+fn meshes_that_deform_and_nodes_that_move_show_behind_and_beside_a_wall() {
+    let Some(ctx) = device() else { return };
+    let mut model = moving_model();
+    let screen = Builder::default()
+        .quad(Vec3::new(-0.4, 0.0, 1.2), Vec3::X * 1.2, Vec3::Y * 1.2, colored([0.4; 3], 0.0, 0.8))
+        .model();
+    let [mesh, material] = [model.meshes.len(), model.materials.len()];
+    model.meshes.extend(screen.meshes);
+    model.materials.extend(screen.materials);
+    model.meshes[mesh].primitives[0].material = Some(material);
+    model.scenes[0].roots.push(model.nodes.len());
+    model.nodes.push(Node { mesh: Some(mesh), ..Node::default() });
+    let mut pair = Pair::new(&ctx, &model, [61, 37]);
+    let mut counts = Vec::new();
+    for step in 0..16_u8 {
+        let along = f32::from(step) / 15.0;
+        pair.play(DURATION * along);
+        let camera = Camera::looking_at([0.9 - along, 0.6, 3.0], [0.5 - along, 0.5, 0.0], 35.0);
+        counts.push(pair.frame(&camera, &format!("step {step}")).0.count);
+    }
+    let (fewest, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+    assert!(fewest < most, "{counts:?}: something is hidden for a while");
+}
+
+/// A screen that hides what is left of x = 0 from cameras with an eye at x > 0, and two pairs of surfaces in one plane. Of each pair
+/// a single pass draws first what the screen hides first.
+fn one_plane(builder: Builder, has_one_mesh: bool) -> Model {
+    let [red, blue] = [[0.9, 0.1, 0.1], [0.1, 0.1, 0.9]].map(|color| colored(color, 0.0, 1.0));
+    let small = Vec3::new(-1.0, -0.5, 0.0);
+    let large = Vec3::new(-1.5, -1.0, 0.0);
+    let builder =
+        builder.quad(small, Vec3::X * 0.8, Vec3::Y, red).quad(large, Vec3::X * 6.0, Vec3::Y * 2.0, blue);
+    let builder =
+        builder.quad(Vec3::new(-2.0, -2.0, 1.0), Vec3::X * 2.0, Vec3::Y * 4.0, colored([0.4; 3], 0.0, 1.0));
+    let mut model = builder.model();
+    if has_one_mesh {
+        // Instance 0 shows its second geometry where instance 1, drawn with the first geometry, is too.
+        let second = model.meshes[0].primitives.remove(0);
+        model.meshes[1].primitives.push(second);
+        model.meshes[0].primitives.push(model.meshes[1].primitives[0].clone());
+        let far = Transform::Matrix(Mat4::from_translation(Vec3::new(0.0, 3.2, 0.0)));
+        let first = model.nodes[0].clone();
+        model.nodes[0] = Node { mesh: Some(1), transform: far, ..first };
+    }
+    model
+}
+
+#[test]
+fn surfaces_in_one_plane_are_shown_in_the_order_of_a_single_pass() {
+    let Some(ctx) = device() else { return };
+    for has_one_mesh in [false, true] {
+        let mut pair = Pair::new(&ctx, &one_plane(Builder::default(), has_one_mesh), [61, 37]);
+        let hidden = Camera::looking_at([0.5, 0.0, 3.0], [0.5, 0.0, 0.0], 60.0);
+        let mut counts = Vec::new();
+        for (eye, what) in
+            [(0.5, "hidden"), (0.5, "hidden"), (-1.6, "shown"), (0.5, "hidden"), (-2.5, "shown")]
+        {
+            let camera = Camera { eye: [eye, 0.0, 3.0], target: [eye, 0.0, 0.0], ..hidden };
+            counts.push(pair.frame(&camera, what).0.count);
+        }
+        eprintln!("{counts:?}");
+    }
+}
