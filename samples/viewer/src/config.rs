@@ -156,3 +156,23 @@ impl ViewerConfig {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config(method: Method, culling: CullingMode) -> ViewerConfig {
+        ViewerConfig { method, culling, ..ViewerConfig::new(RayPath::Query, 8, 8) }
+    }
+
+    #[test]
+    fn few_instances_are_not_worth_the_passes_of_occlusion_unless_it_is_asked_for() {
+        let occludes = |culling, count| config(Method::Hybrid, culling).occludes(count);
+        assert_eq!([63, 64].map(|count| occludes(CullingMode::Auto, count)), [false, true]);
+        assert_eq!([0, 1].map(|count| occludes(CullingMode::Occlusion, count)), [true; 2]);
+        assert_eq!([64, 10_000].map(|count| occludes(CullingMode::Frustum, count)), [false; 2]);
+        assert!(!config(Method::Hybrid, CullingMode::None).culls());
+        let traced = config(Method::PathTrace, CullingMode::Occlusion);
+        assert!(!traced.culls() && !traced.occludes(64), "paths rasterise nothing");
+    }
+}

@@ -91,7 +91,7 @@ fn at_once(request: &Request, setup: &mut SampleSetup<'_>) -> Result<ReadySample
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::ViewerConfig;
+    use crate::config::{CullingMode, ViewerConfig};
     use crate::light::SunSetting;
     use lvk_samples::app::cli::{command, parse};
 
@@ -113,6 +113,8 @@ mod tests {
         assert_eq!(args.light.sun_azimuth, sun.azimuth_degrees);
         assert_eq!(args.light.sun_radius, sun.radius_degrees);
         assert_eq!(parsed("model.glb --exposure -1.5").unwrap().exposure, -1.5);
+        assert_eq!(args.culling, CullingMode::default());
+        assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
     }
 
     #[test]
@@ -132,6 +134,7 @@ mod tests {
             "--sun-elevation 0",
             "--sun-radius 0",
             "--tone film",
+            "--culling everything",
             "a.glb b.glb",
         ] {
             assert_eq!(parsed(line), None, "{line}");

@@ -55,7 +55,7 @@ fn a_camera_that_moves_through_the_city_sees_the_same_with_culling() {
         let ahead = turn * (Vec3::from(start.target) - Vec3::from(start.eye));
         let target = eye + Vec3::new(ahead.x, ahead.y * (3.0 - f32::from(step)), ahead.z);
         let camera = Camera { eye: eye.to_array(), target: target.to_array(), ..start };
-        let mut shown = |viewer: &mut Viewer, mode| {
+        let shown = |viewer: &mut Viewer, mode| {
             viewer.set_view(&camera);
             frame(viewer, mode)
         };

@@ -197,14 +197,17 @@ struct View {
 }
 
 impl View {
+    /// Reads the numbers as `common/camera.glsl` lays them out.
     fn new(camera: &GpuCamera) -> Self {
-        let [right, down, forward] =
-            [camera.clip_right, camera.clip_down, camera.forward].map(|axis| Vec3::from(axis).as_dvec3());
+        let words: [u32; 24] = bytemuck::cast(*camera);
+        let number = |place: usize| f64::from(f32::from_bits(words[place]));
+        let [forward, right, down] =
+            [4, 16, 19].map(|first| DVec3::from([0, 1, 2].map(|axis| number(first + axis))));
         Self {
             axes: DMat3::from_cols(right, down, forward).transpose(),
-            shift: camera.shift.map(f64::from),
-            size: [camera.width, camera.height].map(f64::from),
-            near: camera.near_plane.into(),
+            shift: [number(22), number(23)],
+            size: [words[11], words[15]].map(f64::from),
+            near: number(3),
         }
     }
 
@@ -224,9 +227,8 @@ fn check(view: &View, GpuBox { middle, axes, .. }: &GpuBox, found: &Found) {
         middle.as_dvec3() + steps.sum::<DVec3>()
     };
     let sides = [-1.0, -0.3, 0.5, 1.0];
-    let points: Vec<_> = sides
-        .iter()
-        .flat_map(|x| sides.iter().flat_map(move |y| sides.iter().map(move |z| [*x, *y, *z])))
+    let points: Vec<_> = (0..64)
+        .map(|number: usize| [number % 4, number / 4 % 4, number / 16].map(|place| sides[place]))
         .map(|signs| view.project(corner(signs)))
         .collect();
     let nearest = points.iter().map(|(_, distance)| *distance).fold(f64::INFINITY, f64::min);

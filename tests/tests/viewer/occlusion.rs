@@ -185,25 +185,37 @@ fn meshes_that_deform_and_nodes_that_move_show_behind_and_beside_a_wall() {
     assert!(fewest < most, "{counts:?}: something is hidden for a while");
 }
 
-/// A screen that hides what is left of x = 0 from cameras with an eye at x > 0, and two pairs of surfaces in one plane. Of each pair
-/// a single pass draws first what the screen hides first.
-fn one_plane(builder: Builder, has_one_mesh: bool) -> Model {
-    let [red, blue] = [[0.9, 0.1, 0.1], [0.1, 0.1, 0.9]].map(|color| colored(color, 0.0, 1.0));
-    let small = Vec3::new(-1.0, -0.5, 0.0);
-    let large = Vec3::new(-1.5, -1.0, 0.0);
-    let builder =
-        builder.quad(small, Vec3::X * 0.8, Vec3::Y, red).quad(large, Vec3::X * 6.0, Vec3::Y * 2.0, blue);
-    let builder =
-        builder.quad(Vec3::new(-2.0, -2.0, 1.0), Vec3::X * 2.0, Vec3::Y * 4.0, colored([0.4; 3], 0.0, 1.0));
-    let mut model = builder.model();
-    if has_one_mesh {
-        // Instance 0 shows its second geometry where instance 1, drawn with the first geometry, is too.
-        let second = model.meshes[0].primitives.remove(0);
-        model.meshes[1].primitives.push(second);
-        model.meshes[0].primitives.push(model.meshes[1].primitives[0].clone());
-        let far = Transform::Matrix(Mat4::from_translation(Vec3::new(0.0, 3.2, 0.0)));
-        let first = model.nodes[0].clone();
-        model.nodes[0] = Node { mesh: Some(1), transform: far, ..first };
+/// A square of the plane z = 0 from x = `left` to `right`.
+fn strip(builder: Builder, [left, right]: [f32; 2], material: Material) -> Builder {
+    builder.quad(Vec3::new(left, -0.5, 0.0), Vec3::X * (right - left), Vec3::Y, material)
+}
+
+/// A screen in the plane z = 2, which hides what is left of x = 1.5 from a camera at z = 3.
+fn screen(builder: Builder) -> Builder {
+    builder.quad(Vec3::new(-4.0, -3.0, 2.0), Vec3::X * 4.5, Vec3::Y * 6.0, colored([0.4; 3], 0.0, 1.0))
+}
+
+fn red_and_blue() -> [Material; 2] {
+    [[0.9, 0.1, 0.1], [0.1, 0.1, 0.9]].map(|color| colored(color, 0.0, 1.0))
+}
+
+/// A red square that the screen hides, and then a blue one in its plane that is never hidden.
+fn two_meshes_in_a_plane() -> Model {
+    let [red, blue] = red_and_blue();
+    screen(strip(strip(Builder::default(), [-1.2, -0.4], red), [-1.2, 2.8], blue)).model()
+}
+
+/// Two instances of a mesh with a blue geometry and then a red one. The red square of the first is in the plane of the blue square of
+/// the second; the screen hides the first.
+fn two_geometries_in_a_plane() -> Model {
+    let [red, blue] = red_and_blue();
+    let mut model = screen(strip(strip(Builder::default(), [0.0, 1.0], blue), [2.0, 2.8], red)).model();
+    let second = model.meshes[1].primitives.clone();
+    model.meshes[0].primitives.extend(second);
+    let first = Mat4::from_translation(Vec3::new(-3.2, 0.0, 0.0));
+    let wide = Mat4::from_translation(Vec3::new(-1.2, 0.0, 0.0)) * Mat4::from_scale(Vec3::new(4.0, 1.0, 1.0));
+    for (node, transform) in model.nodes.iter_mut().zip([first, wide]) {
+        (node.mesh, node.transform) = (Some(0), Transform::Matrix(transform));
     }
     model
 }
@@ -211,16 +223,23 @@ fn one_plane(builder: Builder, has_one_mesh: bool) -> Model {
 #[test]
 fn surfaces_in_one_plane_are_shown_in_the_order_of_a_single_pass() {
     let Some(ctx) = device() else { return };
-    for has_one_mesh in [false, true] {
-        let mut pair = Pair::new(&ctx, &one_plane(Builder::default(), has_one_mesh), [61, 37]);
-        let hidden = Camera::looking_at([0.5, 0.0, 3.0], [0.5, 0.0, 0.0], 60.0);
-        let mut counts = Vec::new();
-        for (eye, what) in
-            [(0.5, "hidden"), (0.5, "hidden"), (-1.6, "shown"), (0.5, "hidden"), (-2.5, "shown")]
+    for (model, is_red) in [(two_meshes_in_a_plane(), true), (two_geometries_in_a_plane(), false)] {
+        let mut pair = Pair::new(&ctx, &model, [61, 37]);
+        for (height, is_hidden) in
+            [(3.0, true), (3.0, true), (1.5, false), (3.0, true), (3.0, true), (1.4, false)]
         {
-            let camera = Camera { eye: [eye, 0.0, 3.0], target: [eye, 0.0, 0.0], ..hidden };
-            counts.push(pair.frame(&camera, what).0.count);
+            let camera = Camera::looking_at([0.0, 0.0, height], [0.0; 3], 60.0);
+            let (drawn, picture) = pair.frame(&camera, &format!("from {height}"));
+            if is_hidden {
+                continue;
+            }
+            // The screen is behind the camera now, and both squares are drawn.
+            assert_eq!(drawn.count, 2, "{drawn:?}");
+            let [red, _, blue] = picture[18 * 61 + 13].map(f32::from_bits);
+            assert_eq!(red > blue, is_red, "{red} and {blue}");
         }
-        eprintln!("{counts:?}");
+        let camera = Camera::looking_at([0.0, 0.0, 3.0], [0.0; 3], 60.0);
+        pair.frame(&camera, "before");
+        assert_eq!(pair.frame(&camera, "hidden").0.count, 2, "the screen and what is beside it are drawn");
     }
 }
