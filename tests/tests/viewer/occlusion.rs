@@ -111,7 +111,7 @@ fn a_wall_hides_hundreds_and_they_are_drawn_in_the_frame_that_shows_them() {
         assert_eq!(drawn.in_frustum, square_count() + 1);
     }
     // At once so far to the right that many squares show beside the wall.
-    let beside = Camera::looking_at([14.0, 0.3, 4.0], [4.0, 0.3, -0.5], 60.0);
+    let beside = Camera::looking_at([7.0, 0.3, 6.0], [5.0, 0.3, 0.0], 60.0);
     let (drawn, shown) = pair.frame(&beside, "beside the wall");
     let (_, without) =
         Pair::new(&ctx, &wall(Builder::default(), colored([0.8; 3], 0.0, 1.0)).model(), [64, 40])
@@ -128,11 +128,11 @@ fn a_wall_hides_hundreds_and_they_are_drawn_in_the_frame_that_shows_them() {
 fn cameras_of_odd_pictures_move_along_across_and_through_the_wall() {
     let Some(ctx) = device() else { return };
     let model = squares(wall(Builder::default(), colored([0.8; 3], 0.0, 1.0)).model(), 3.0);
-    for size in [[61, 37], [1, 1], [130, 3], [33, 65]] {
+    for size in [[61, 37], [1, 1], [130, 3]] {
         let mut pair = Pair::new(&ctx, &model, size);
         let mut fewest = u32::MAX;
-        for step in 0..12_u8 {
-            let along = f32::from(step) / 11.0;
+        for step in 0..8_u8 {
+            let along = f32::from(step) / 7.0;
             let camera = Camera { eye: [6.5 * along, 0.3, 6.0 - 7.0 * along], ..ahead(2.0 * along) };
             let (drawn, _) = pair.frame(&camera, &format!("{size:?} at step {step}"));
             fewest = fewest.min(drawn.count);
@@ -175,8 +175,8 @@ fn meshes_that_deform_and_nodes_that_move_show_behind_and_beside_a_wall() {
     model.nodes.push(Node { mesh: Some(mesh), ..Node::default() });
     let mut pair = Pair::new(&ctx, &model, [61, 37]);
     let mut counts = Vec::new();
-    for step in 0..16_u8 {
-        let along = f32::from(step) / 15.0;
+    for step in 0..10_u8 {
+        let along = f32::from(step) / 9.0;
         pair.play(DURATION * along);
         let camera = Camera::looking_at([0.9 - along, 0.6, 3.0], [0.5 - along, 0.5, 0.0], 35.0);
         counts.push(pair.frame(&camera, &format!("step {step}")).0.count);
@@ -239,7 +239,8 @@ fn surfaces_in_one_plane_are_shown_in_the_order_of_a_single_pass() {
             assert_eq!(red > blue, is_red, "{red} and {blue}");
         }
         let camera = Camera::looking_at([0.0, 0.0, 3.0], [0.0; 3], 60.0);
-        pair.frame(&camera, "before");
+        // The screen comes back in the second pass of a frame, and hides in the next.
+        (0..2).for_each(|_| drop(pair.frame(&camera, "behind the screen again")));
         assert_eq!(pair.frame(&camera, "hidden").0.count, 2, "the screen and what is beside it are drawn");
     }
 }
