@@ -13,7 +13,7 @@ use crate::path_tracer::PathTracer;
 
 /// Either method.
 pub(crate) enum Renderer {
-    Hybrid(Hybrid),
+    Hybrid(Box<Hybrid>),
     PathTrace { tracer: PathTracer, sums: Holder<BufferHandle> },
 }
 
@@ -29,7 +29,7 @@ impl Renderer {
     pub(crate) fn new(ctx: &Context, config: &ViewerConfig, occludes: bool) -> lvk::Result<Self> {
         let [width, height] = config.extent();
         Ok(match config.method {
-            Method::Hybrid => Self::Hybrid(Hybrid::new(ctx, config, occludes)?),
+            Method::Hybrid => Self::Hybrid(Box::new(Hybrid::new(ctx, config, occludes)?)),
             Method::PathTrace => Self::PathTrace {
                 tracer: PathTracer::new(ctx, config.path)?,
                 sums: buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))?,

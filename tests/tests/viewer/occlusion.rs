@@ -117,9 +117,10 @@ fn a_wall_hides_hundreds_and_they_are_drawn_in_the_frame_that_shows_them() {
         Pair::new(&ctx, &wall(Builder::default(), colored([0.8; 3], 0.0, 1.0)).model(), [64, 40])
             .frame(&beside, "beside the wall alone");
     assert_ne!(shown, without, "squares show");
-    assert!((10..square_count()).contains(&drawn.count), "{drawn:?}");
     let again = pair.frame(&beside, "still beside the wall").0;
-    assert!(again.count <= drawn.count, "{again:?} after {drawn:?}");
+    for drawn in [drawn, again] {
+        assert!((10..square_count() / 2).contains(&drawn.count), "{drawn:?}");
+    }
     assert_eq!(pair.frame(&ahead(0.0), "behind the wall again").0.in_frustum, square_count() + 1);
     assert_eq!(pair.frame(&ahead(0.0), "still behind the wall").0.count, 1);
 }
