@@ -17,13 +17,13 @@ const PYRAMID: &str = include_str!("../../../shaders/viewer/depth_pyramid.comp.g
 /// Levels that a dispatch makes.
 const LEVELS: u32 = 5;
 
-/// Boxes, and for each the pixels, the depth and the level that are found.
+/// Boxes, and for each the pixels, the depth and the level.
 const BOUNDS: &str = "
 #include \"viewer/occlusion.glsl\"
 layout(local_size_x = 64) in;
-struct Found { uint hasBounds; uvec2 low; uvec2 high; float depth; uint level; uint padding; };
+struct ScreenBounds { uint hasBounds; uvec2 low; uvec2 high; float depth; uint level; uint padding; };
 layout(buffer_reference, scalar) readonly buffer Boxes { Box at[]; };
-layout(buffer_reference, scalar) buffer Results { Found at[]; };
+layout(buffer_reference, scalar) buffer Results { ScreenBounds at[]; };
 layout(buffer_reference, scalar) readonly buffer Cameras { Camera at; };
 layout(push_constant, scalar) uniform Push { Boxes boxes; Results results; Cameras camera; uint count; uint padding; };
 void main() {
@@ -31,7 +31,7 @@ void main() {
     if (number < count) {
         PixelBounds bounds;
         bool hasBounds = boundsOf(boxes.at[number], camera.at, bounds);
-        results.at[number] = Found(uint(hasBounds), bounds.low, bounds.high, bounds.depth, levelOf(bounds), 0u);
+        results.at[number] = ScreenBounds(uint(hasBounds), bounds.low, bounds.high, bounds.depth, levelOf(bounds), 0u);
     }
 }";
 
@@ -64,7 +64,7 @@ struct GpuBox {
 
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Found {
+struct ScreenBounds {
     has_bounds: u32,
     low: [u32; 2],
     high: [u32; 2],
@@ -165,11 +165,11 @@ fn boxes(count: usize) -> Vec<GpuBox> {
         .collect()
 }
 
-fn bounds_by_shader(ctx: &Context, camera: &GpuCamera, boxes: &[GpuBox]) -> Vec<Found> {
+fn bounds_by_shader(ctx: &Context, camera: &GpuCamera, boxes: &[GpuBox]) -> Vec<ScreenBounds> {
     let pipeline = pipeline(ctx, BOUNDS);
     let [boxes_buffer, camera_buffer] = [bytemuck::cast_slice(boxes), bytemuck::bytes_of(camera)]
         .map(|bytes| words_buffer(ctx, &bytemuck::pod_collect_to_vec::<u8, u32>(bytes)));
-    let words = boxes.len() * size_of::<Found>() / 4;
+    let words = boxes.len() * size_of::<ScreenBounds>() / 4;
     let results = words_buffer(ctx, &vec![0; words]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.bind_compute_pipeline(*pipeline).unwrap();
@@ -220,8 +220,8 @@ impl View {
     }
 }
 
-/// Asserts that what was found holds every point of a box, and no level is coarser than it needs to be.
-fn check(view: &View, GpuBox { middle, axes, .. }: &GpuBox, found: &Found) {
+/// Asserts that what the shader says holds every point of a box, and no level is coarser than it needs to be.
+fn check(view: &View, GpuBox { middle, axes, .. }: &GpuBox, bounds: &ScreenBounds) {
     let corner = |signs: [f64; 3]| {
         let steps = axes.iter().zip(signs).map(|(axis, sign)| sign * axis.as_dvec3());
         middle.as_dvec3() + steps.sum::<DVec3>()
@@ -232,31 +232,35 @@ fn check(view: &View, GpuBox { middle, axes, .. }: &GpuBox, found: &Found) {
         .map(|signs| view.project(corner(signs)))
         .collect();
     let nearest = points.iter().map(|(_, distance)| *distance).fold(f64::INFINITY, f64::min);
-    if found.has_bounds == 0 {
+    if bounds.has_bounds == 0 {
         assert!(nearest < view.near * 1.001 + 1e-3, "{nearest} is before the near plane");
         return;
     }
     assert!(nearest > 0.999 * view.near, "{nearest} is behind the near plane");
     let depth = view.near / nearest;
-    assert!((depth..1.01 * depth).contains(&f64::from(found.depth)), "{depth}, {found:?}");
+    assert!((depth..1.01 * depth).contains(&f64::from(bounds.depth)), "{depth}, {bounds:?}");
     for axis in 0..2 {
         let places = points.iter().map(|(place, _)| place[axis]);
         let clamped = |place: f64| place.clamp(0.0, view.size[axis] - 1.0).floor();
         let [low, high] =
             [places.clone().fold(f64::INFINITY, f64::min), places.fold(f64::NEG_INFINITY, f64::max)];
-        let [found_low, found_high] = [found.low[axis], found.high[axis]].map(f64::from);
-        assert!(found_low <= clamped(low) && clamped(high) <= found_high, "{low} to {high}, {found:?}");
+        let [found_low, found_high] = [bounds.low[axis], bounds.high[axis]].map(f64::from);
+        assert!(
+            found_low <= clamped(low) && clamped(high) <= found_high,
+            "{low} to {high}, {bounds:?}"
+        );
         assert!(
             clamped(low - 2.0) <= found_low && found_high <= clamped(high + 2.0),
-            "{low} to {high}, {found:?}"
+            "{low} to {high}, {bounds:?}"
         );
     }
     let texels = |level: u32| {
-        let along = |axis: usize| (found.high[axis] >> level) - (found.low[axis] >> level) + 1;
+        let along =
+            |axis: usize| (bounds.high[axis] >> level) - (bounds.low[axis] >> level) + 1;
         along(0).max(along(1))
     };
-    assert!(texels(found.level) <= 4, "{found:?}");
-    assert!(found.level == 1 || texels(found.level - 1) > 4, "{found:?}");
+    assert!(texels(bounds.level) <= 4, "{bounds:?}");
+    assert!(bounds.level == 1 || texels(bounds.level - 1) > 4, "{bounds:?}");
 }
 
 #[test]
@@ -271,9 +275,9 @@ fn bounds_hold_every_point_of_a_box_and_little_more() {
         let camera = Camera::looking_at([0.0; 3], target, fov);
         let camera = GpuCamera::new(&camera, width, height, 0.01).for_sample(3, u32::MAX);
         let view = View::new(&camera);
-        let found = bounds_by_shader(&ctx, &camera, &boxes);
-        boxes.iter().zip(&found).for_each(|(one, found)| check(&view, one, found));
-        let count = found.iter().filter(|found| found.has_bounds != 0).count();
+        let bounds = bounds_by_shader(&ctx, &camera, &boxes);
+        boxes.iter().zip(&bounds).for_each(|(one, bounds)| check(&view, one, bounds));
+        let count = bounds.iter().filter(|bounds| bounds.has_bounds != 0).count();
         assert!((boxes.len() / 10..boxes.len()).contains(&count), "{count} boxes have bounds");
     }
 }

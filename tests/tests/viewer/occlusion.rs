@@ -222,7 +222,7 @@ fn two_geometries_in_a_plane() -> Model {
 }
 
 #[test]
-fn surfaces_in_one_plane_are_shown_in_the_order_of_a_single_pass() {
+fn surfaces_in_one_plane_stay_in_the_order_of_a_single_pass() {
     let Some(ctx) = device() else { return };
     for (model, is_red) in [(two_meshes_in_a_plane(), true), (two_geometries_in_a_plane(), false)] {
         let mut pair = Pair::new(&ctx, &model, [61, 37]);
