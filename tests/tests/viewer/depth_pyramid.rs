@@ -245,18 +245,14 @@ fn check(view: &View, GpuBox { middle, axes, .. }: &GpuBox, bounds: &ScreenBound
         let [low, high] =
             [places.clone().fold(f64::INFINITY, f64::min), places.fold(f64::NEG_INFINITY, f64::max)];
         let [found_low, found_high] = [bounds.low[axis], bounds.high[axis]].map(f64::from);
-        assert!(
-            found_low <= clamped(low) && clamped(high) <= found_high,
-            "{low} to {high}, {bounds:?}"
-        );
+        assert!(found_low <= clamped(low) && clamped(high) <= found_high, "{low} to {high}, {bounds:?}");
         assert!(
             clamped(low - 2.0) <= found_low && found_high <= clamped(high + 2.0),
             "{low} to {high}, {bounds:?}"
         );
     }
     let texels = |level: u32| {
-        let along =
-            |axis: usize| (bounds.high[axis] >> level) - (bounds.low[axis] >> level) + 1;
+        let along = |axis: usize| (bounds.high[axis] >> level) - (bounds.low[axis] >> level) + 1;
         along(0).max(along(1))
     };
     assert!(texels(bounds.level) <= 4, "{bounds:?}");
