@@ -26,6 +26,10 @@ pub struct CallLog {
     pub told_others: BTreeSet<String>,
     /// Objects that were alive at the end, by type. An instance among them says that others may be, too.
     pub live: BTreeMap<String, i64>,
+    /// Objects that were alive when their device or instance was destroyed, by type.
+    pub orphans: BTreeMap<String, i64>,
+    /// Devices and instances that were destroyed before their objects.
+    pub orphaning: i64,
 }
 
 impl CallLog {
@@ -44,6 +48,12 @@ impl CallLog {
                 Some("failed") => log.failed.extend(words.next().map(str::to_owned)),
                 Some("told") => log.told_others.extend(words.next().map(str::to_owned)),
                 Some("live") => log.live = words.filter_map(live_count).collect(),
+                Some("orphans") => {
+                    log.orphaning += 1;
+                    for (kind, count) in words.filter_map(live_count) {
+                        *log.orphans.entry(kind).or_default() += count;
+                    }
+                }
                 _ => {}
             }
         }
@@ -78,8 +88,17 @@ pub(crate) fn told_line(command: &str) -> String {
 
 /// Returns the line for the live objects, at the creation and at the end of an instance.
 pub(crate) fn live_line(live: &BTreeMap<&'static str, i64>) -> String {
-    let counts = live.iter().filter(|(_, count)| **count != 0);
-    counts.fold("live".to_owned(), |line, (kind, count)| format!("{line} {kind}={count}"))
+    counts_line("live", live)
+}
+
+/// Returns the line for objects of a device or instance that is destroyed before them.
+pub(crate) fn orphans_line(orphans: &BTreeMap<&'static str, i64>) -> String {
+    counts_line("orphans", orphans)
+}
+
+fn counts_line(word: &str, objects: &BTreeMap<&'static str, i64>) -> String {
+    let counts = objects.iter().filter(|(_, count)| **count != 0);
+    counts.fold(word.to_owned(), |line, (kind, count)| format!("{line} {kind}={count}"))
 }
 
 #[cfg(test)]
@@ -98,6 +117,8 @@ mod tests {
             told_line("vkWaitSemaphores"),
             failed_line("vkWaitSemaphores"),
             live_line(&BTreeMap::from([("VkInstance", 0), ("VkBuffer", 2)])),
+            orphans_line(&BTreeMap::from([("VkFence", 1)])),
+            orphans_line(&BTreeMap::from([("VkFence", 2), ("VkImage", -1)])),
             "ca".to_owned(),
         ];
         let expected = CallLog {
@@ -106,6 +127,8 @@ mod tests {
             failed: ["vkCreateBuffer", "vkWaitSemaphores"].map(str::to_owned).into(),
             told_others: BTreeSet::from(["vkWaitSemaphores".to_owned()]),
             live: BTreeMap::from([("VkBuffer".to_owned(), 2)]),
+            orphans: BTreeMap::from([("VkFence".to_owned(), 3), ("VkImage".to_owned(), -1)]),
+            orphaning: 2,
         };
         assert_eq!(CallLog::parse(&text.join("\n")), expected);
         assert_eq!(CallLog::parse(""), CallLog::default());

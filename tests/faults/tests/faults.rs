@@ -2,6 +2,7 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -63,7 +64,9 @@ where
 fn whole(name: &str, line: &str, program: &Program) {
     let report = sweep(program, &whole_plan(), WHOLE).unwrap();
     println!("{line}: {report}\n{}", report.row(name));
-    assert!(report.flawed.is_empty() && report.reached > 0, "{line}: {report}");
+    // Threads change the order of calls, so that a few faults are not reached.
+    let is_reached = 20 * report.reached >= 19 * report.runs && report.reached > 0;
+    assert!(report.flawed.is_empty() && is_reached, "{line}: {report}");
     assert_eq!(report.runs, report.planned, "{line}: {report}");
 }
 
@@ -251,6 +254,29 @@ fn shortages_in_questions_are_no_lack_of_support() {
             assert_told(&program("interop"), &format!("{command} {number} host-memory once"));
         }
     }
+}
+
+/// Every fault of commands that few programs call: handles of shader groups, sizes of fragments, modifiers of shared images.
+#[test]
+fn commands_of_few_programs_fail_as_others_do() {
+    let hybrid = "hybrid --width 64 --height 36 --frames 1 --rt hardware --scene SCENE";
+    let few = [
+        "vkGetRayTracingShaderGroupHandlesKHR",
+        "vkGetPhysicalDeviceFragmentShadingRatesKHR",
+        "vkGetImageDrmFormatModifierPropertiesEXT",
+    ];
+    let mut reached = BTreeSet::new();
+    for line in [hybrid, "interop"] {
+        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+        let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
+        let of_few = SweepPlan::full().faults(&calls).into_iter();
+        for fault in of_few.filter(|fault| few.contains(&&*fault.command)) {
+            assert_told(&program(line), &fault.to_string());
+            reached.insert(fault.command);
+        }
+    }
+    println!("reached: {reached:?}");
+    assert!(reached.contains(few[0]), "{reached:?}");
 }
 
 /// Returns the scenario whose context ends before its work. The C library overwrites memory that is freed, so that a driver

@@ -202,6 +202,9 @@ commands! {
         PFN_vkCopyAccelerationStructureToMemoryKHR three;
         PFN_vkCopyMemoryToAccelerationStructureKHR three;
         PFN_vkWriteAccelerationStructuresPropertiesKHR seven;
+        PFN_vkGetRayTracingShaderGroupHandlesKHR six;
+        PFN_vkGetPhysicalDeviceFragmentShadingRatesKHR three;
+        PFN_vkGetImageDrmFormatModifierPropertiesEXT three;
         PFN_vkCreateRayTracingPipelinesKHR seven makes "VkPipeline" times 3;
         PFN_vkCreateSamplerYcbcrConversion four makes "VkSamplerYcbcrConversion" alias "vkCreateSamplerYcbcrConversionKHR";
         PFN_vkBindBufferMemory2 three alias "vkBindBufferMemory2KHR";
@@ -263,6 +266,10 @@ commands! {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    use std::collections::BTreeSet;
+    use std::path::{Path, PathBuf};
+
     use super::*;
 
     #[test]
@@ -274,6 +281,59 @@ mod tests {
                 assert!(ends.contains(&kind), "{}", command.name);
             }
         }
+    }
+
+    /// Commands that `lvk` names in errors without a wrapper: with functions of their own in this layer, for windows of other systems,
+    /// and without a `VkResult`.
+    const WITHOUT_WRAPPER: [&str; 12] = [
+        "vkCreateInstance",
+        "vkCreateDevice",
+        "vkEnumerateInstanceVersion",
+        "vkEnumerateInstanceExtensionProperties",
+        "vkEnumerateInstanceLayerProperties",
+        "vkCreateAndroidSurfaceKHR",
+        "vkCreateMetalSurfaceEXT",
+        "vkCreateWaylandSurfaceKHR",
+        "vkCreateWin32SurfaceKHR",
+        "vkGetInstanceProcAddr",
+        "vkCmdBuildMicromapsEXT",
+        "vkGetMicromapBuildSizesEXT",
+    ];
+
+    /// Returns each command that a text names at the start of a string literal.
+    fn commands_of(text: &str) -> impl Iterator<Item = &str> {
+        text.match_indices("\"vk").filter_map(|(start, _)| {
+            let name = text[start + 1..].split(|letter: char| !letter.is_ascii_alphanumeric()).next()?;
+            name[2..].starts_with(|letter: char| letter.is_ascii_uppercase()).then_some(name)
+        })
+    }
+
+    fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                rust_files(&path, found);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                found.push(path);
+            }
+        }
+    }
+
+    #[test]
+    fn every_command_that_the_library_names_is_wrapped() {
+        let commands = commands();
+        let wrapped: BTreeSet<&str> =
+            commands.iter().flat_map(|command| [Some(command.name), command.alias]).flatten().collect();
+        let mut files = Vec::new();
+        rust_files(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../lvk/src")), &mut files);
+        let texts: Vec<String> = files.iter().map(|path| std::fs::read_to_string(path).unwrap()).collect();
+        let named: BTreeSet<&str> =
+            texts.iter().flat_map(|text| commands_of(text)).filter(|name| *name != "vkCmd").collect();
+        assert!(named.len() > 60, "{named:?}");
+        let missing: Vec<_> =
+            named.difference(&wrapped).filter(|name| !WITHOUT_WRAPPER.contains(name)).collect();
+        assert_eq!(missing, [] as [&&str; 0]);
+        assert!(WITHOUT_WRAPPER.iter().all(|name| named.contains(name)), "an exception is not needed");
     }
 
     #[test]

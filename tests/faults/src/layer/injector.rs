@@ -39,7 +39,8 @@ pub(super) struct Injector {
 #[derive(Default)]
 struct Counts {
     calls: HashMap<&'static str, u32>,
-    live: BTreeMap<&'static str, i64>,
+    /// Live objects by the handle of their device or instance, and by kind.
+    live: BTreeMap<(u64, &'static str), i64>,
     failed: BTreeSet<&'static str>,
 }
 
@@ -153,27 +154,44 @@ impl Injector {
         for index in 0..count {
             // SAFETY: by contract there are `count` handles.
             if unsafe { handles.add(index).read() } != 0 {
-                self.count(kind, 1);
+                self.count(words[0], kind, 1);
             }
         }
     }
 
-    /// Counts the object that a call destroys.
-    pub(super) fn destroyed(&self, number: usize, object: u64) {
+    /// Counts the object that a call destroys, of the device or instance `owner`.
+    pub(super) fn destroyed(&self, number: usize, owner: u64, object: u64) {
         if let Some(kind) = COMMANDS[number].destroys.filter(|_| object != 0) {
-            self.count(kind, -1);
+            self.count(owner, kind, -1);
         }
     }
 
-    /// Adds to the number of live objects of a kind.
-    pub(super) fn count(&self, kind: &'static str, change: i64) {
-        *self.counts().live.entry(kind).or_default() += change;
+    /// Adds to the number of live objects of a kind. Devices and instances have the owner 0.
+    pub(super) fn count(&self, owner: u64, kind: &'static str, change: i64) {
+        *self.counts().live.entry((owner, kind)).or_default() += change;
+    }
+
+    /// Logs the objects of a device or instance that is being destroyed before them, and counts them no longer.
+    pub(super) fn count_orphans(&self, owner: u64) {
+        let mut orphans = BTreeMap::new();
+        self.counts().live.retain(|&(of, kind), &mut count| {
+            if of == owner && count != 0 {
+                orphans.insert(kind, count);
+            }
+            of != owner
+        });
+        if !orphans.is_empty() {
+            self.write(&call_log::orphans_line(&orphans));
+        }
     }
 
     /// Adds to the number of live instances, and logs all live objects.
     pub(super) fn count_instance(&self, change: i64) {
-        self.count("VkInstance", change);
-        let live = self.counts().live.clone();
+        self.count(0, "VkInstance", change);
+        let mut live = BTreeMap::new();
+        for (&(_, kind), count) in &self.counts().live {
+            *live.entry(kind).or_default() += count;
+        }
         self.write(&call_log::live_line(&live));
     }
 }

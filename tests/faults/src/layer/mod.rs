@@ -132,6 +132,7 @@ unsafe extern "system" fn destroy_instance(
         return;
     }
     let Some(table) = remove(instance.as_raw()) else { return };
+    injector().count_orphans(instance.as_raw());
     // SAFETY: the address is that of the command in the next layer.
     let destroy = unsafe { std::mem::transmute::<usize, vk::PFN_vkDestroyInstance>(table.destroy) };
     // SAFETY: the arguments are the caller's.
@@ -168,7 +169,7 @@ unsafe extern "system" fn create_device(
             let wait = find("vkDeviceWaitIdle");
             table.finish = Some((std::mem::transmute::<usize, vk::PFN_vkDeviceWaitIdle>(wait), *device));
             insert((*device).as_raw(), table);
-            injector().count("VkDevice", 1);
+            injector().count(0, "VkDevice", 1);
         }
         result
     }
@@ -179,11 +180,12 @@ unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const v
         return;
     }
     let Some(table) = remove(device.as_raw()) else { return };
+    injector().count_orphans(device.as_raw());
     // SAFETY: the address is that of the command in the next layer.
     let destroy = unsafe { std::mem::transmute::<usize, vk::PFN_vkDestroyDevice>(table.destroy) };
     // SAFETY: the arguments are the caller's.
     unsafe { destroy(device, allocator) };
-    injector().count("VkDevice", -1);
+    injector().count(0, "VkDevice", -1);
 }
 
 /// Returns the layer's own functions that no table has.

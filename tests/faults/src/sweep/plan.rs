@@ -9,7 +9,7 @@ use crate::fault::{Fault, FaultError, Span};
 /// Selection of faults.
 #[derive(Clone, Debug)]
 pub struct SweepPlan {
-    /// Most faults to try. If there are more, those tried are spread evenly.
+    /// Most faults to try. If there are more, those tried are spread evenly over the calls, for each error and each span.
     pub most: usize,
     /// Part of these faults to try, so that several runs share a sweep.
     pub part: Part,
@@ -76,6 +76,10 @@ impl SweepPlan {
             }
         }
         let stride = faults.len().div_ceil(self.most.max(1)).max(1);
+        if stride > 1 {
+            // The errors and spans of a call follow each other: a stride could meet the same ones at every call.
+            faults.sort_by_key(|fault| (fault.span, fault.error));
+        }
         let chosen = faults.into_iter().step_by(stride);
         chosen.skip(self.part.index).step_by(self.part.count.max(1)).collect()
     }
@@ -110,6 +114,11 @@ mod tests {
         assert_eq!(SweepPlan::full().faults(&calls).len(), 12);
         let second = SweepPlan { part: "2/3".parse().unwrap(), ..once.clone() };
         assert_eq!(texts(&second), "b 1 host-memory once");
+        // Of 12 faults two of each error and span: two spans, one error of every call and two of one call each.
+        let half: Vec<Fault> = SweepPlan { most: 6, ..SweepPlan::full() }.faults(&calls);
+        for span in [Span::Once, Span::Stays] {
+            assert_eq!(half.iter().filter(|fault| fault.span == span).count(), 3, "{half:?}");
+        }
         for bad in ["0/3", "4/3", "1", "/", "-1/2"] {
             assert!(bad.parse::<Part>().is_err(), "{bad}");
         }

@@ -124,6 +124,8 @@ pub fn run(
         failed: log.failed,
         told_others: log.told_others,
         live: log.live,
+        orphans: log.orphans,
+        orphaning: log.orphaning,
         result: fs::read(out.join(FIRST)).ok(),
         second_result: fs::read(out.join(SECOND)).ok(),
         files,

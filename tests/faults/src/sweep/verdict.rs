@@ -31,6 +31,10 @@ pub struct RunOutcome {
     pub told_others: BTreeSet<String>,
     /// Live objects at the end, by type.
     pub live: BTreeMap<String, i64>,
+    /// Objects that were alive when their device or instance was destroyed, by type.
+    pub orphans: BTreeMap<String, i64>,
+    /// Devices and instances that were destroyed before their objects.
+    pub orphaning: i64,
     /// The result of the first try, a picture or values. `None` if it was not written.
     pub result: Option<Vec<u8>>,
     /// The result of the second try, in the same process after the first has failed.
@@ -103,10 +107,10 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
     if found.stderr.contains("panicked at") {
         flaws.push(Flaw::Panic);
     }
-    let live: Vec<_> = found.live.iter().filter(|(_, count)| **count != 0).collect();
-    if !live.is_empty() && !leaks_on_purpose(fault, found) {
-        let texts: Vec<_> = live.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
-        flaws.push(Flaw::Leak(texts.join(", ")));
+    let leaked = found.orphans.iter().chain(&found.live).filter(|(_, count)| **count != 0);
+    let leaked: Vec<_> = leaked.map(|(kind, count)| format!("{count} {kind}")).collect();
+    if !leaked.is_empty() && !leaks_on_purpose(fault, found) {
+        flaws.push(Flaw::Leak(leaked.join(", ")));
     }
     // A fallback may compile other shaders, whose cache files are complete.
     let fell_back = found.ending == Ending::Status(0);
@@ -119,13 +123,16 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
 }
 
 /// True if the library says that it leaks a context whose work cannot be waited for: every wait and every question fails for
-/// want of memory, so that the device may still use the objects.
+/// want of memory, so that the device may still use the objects. Each such context accounts for one device that is alive, or that an
+/// engine has destroyed before the objects of its guest: what others leak is a flaw.
 #[must_use]
 pub fn leaks_on_purpose(fault: Option<&Fault>, found: &RunOutcome) -> bool {
     let fails_on = fault.is_some_and(|fault| {
         fault.span != Span::Once && matches!(fault.error, FaultError::HostMemory | FaultError::DeviceMemory)
     });
-    fails_on && found.stderr.contains(LEAKED)
+    let devices = found.live.get("VkDevice").copied().unwrap_or_default() + found.orphaning;
+    let contexts = found.stderr.matches(LEAKED).count() as i64;
+    fails_on && contexts > 0 && devices <= contexts
 }
 
 /// The end of the warning about a context that is leaked.
@@ -245,6 +252,8 @@ mod tests {
             failed: BTreeSet::new(),
             told_others: BTreeSet::new(),
             live: BTreeMap::new(),
+            orphans: BTreeMap::new(),
+            orphaning: 0,
             result: Some(b"picture".to_vec()),
             second_result: None,
             files: BTreeSet::from(["caches/pipelines".to_owned()]),
@@ -386,6 +395,15 @@ mod tests {
             judged(FaultError::HostMemory, Span::Once, &leaked),
             std::slice::from_ref(&leak),
             "the next wait succeeds"
+        );
+        let orphans = BTreeMap::from([("VkBuffer".to_owned(), 1)]);
+        let guest = RunOutcome { live: BTreeMap::new(), orphans, orphaning: 1, ..leaked.clone() };
+        assert_eq!(judged(FaultError::HostMemory, Span::Stays, &guest), [], "the engine destroys its device");
+        let other_context = RunOutcome { live: leaked.live.clone(), ..guest };
+        assert_eq!(
+            judged(FaultError::HostMemory, Span::Stays, &other_context),
+            [Flaw::Leak("1 VkBuffer, 1 VkDevice".into())],
+            "one context is leaked on purpose, and another leaks a buffer"
         );
         let silent = RunOutcome { stderr: refused().stderr, ..leaked.clone() };
         assert_eq!(judged(FaultError::HostMemory, Span::Stays, &silent), [leak]);
