@@ -9,6 +9,8 @@ pub enum Rule {
     Exact,
     /// The median of the last third is at most this share, in thousandths, above the median of the middle third.
     Slope(i64),
+    /// The median of the last third is at most this much above the median of the middle third.
+    Rise(i64),
     /// The series is reported only.
     Reported,
 }
@@ -44,6 +46,9 @@ impl Series {
             Rule::Slope(thousandths) if (last - middle) * 1000 > middle * thousandths => {
                 Err(format!("grows from {middle} to {last}, more than {thousandths} thousandths"))
             }
+            Rule::Rise(most) if last - middle > most => {
+                Err(format!("grows from {middle} to {last}, by more than {most}"))
+            }
             _ => Ok(()),
         }
     }
@@ -58,6 +63,9 @@ fn median(values: &[i64]) -> i64 {
 /// One quantity at one sample: name, rule and value.
 pub type Quantity = (String, Rule, i64);
 
+/// Samples for which a series has memory from the beginning, so that it takes no more while bytes are counted.
+const MOST_SAMPLES: usize = 256;
+
 /// All series of a run. A quantity that a sample does not name is 0 there.
 #[derive(Debug, Default)]
 pub struct Samples {
@@ -70,8 +78,10 @@ impl Samples {
     pub fn add(&mut self, quantities: Vec<Quantity>) {
         for (name, rule, value) in quantities {
             let count = self.count;
-            let new = || Series { rule, values: vec![0; count] };
-            self.series.entry(name).or_insert_with(new).values.push(value);
+            let new = || Series { rule, values: Vec::with_capacity(MOST_SAMPLES) };
+            let values = &mut self.series.entry(name).or_insert_with(new).values;
+            values.resize(count, 0);
+            values.push(value);
         }
         self.count += 1;
         self.series.values_mut().for_each(|series| series.values.resize(self.count, 0));
@@ -130,13 +140,15 @@ mod tests {
             peaks[peak] *= 3;
         }
         assert_eq!(series(Rule::Slope(20), peaks).check(3), Ok(()));
+        assert_eq!(series(Rule::Rise(16), noisy(1)).check(3), Ok(()));
+        assert!(series(Rule::Rise(16), noisy(30)).check(3).is_err());
         let step = (0..30).map(|at| if at < 20 { 100 } else { 103 });
         assert!(series(Rule::Slope(20), step).check(3).is_err());
     }
 
     #[test]
     fn too_few_samples_are_no_proof() {
-        for rule in [Rule::Exact, Rule::Slope(20), Rule::Reported] {
+        for rule in [Rule::Exact, Rule::Slope(20), Rule::Rise(16), Rule::Reported] {
             for count in 0..9 {
                 let check = series(rule, vec![7; count]).check(3);
                 assert!(check.unwrap_err().contains("too few"), "{count}");

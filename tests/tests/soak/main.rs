@@ -14,3 +14,7 @@ mod rays;
 mod run;
 mod sample;
 mod scene;
+
+/// Counts the bytes that the library, the tests and their dependencies hold, to the byte.
+#[global_allocator]
+static HEAP: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;

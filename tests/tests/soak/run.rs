@@ -42,7 +42,7 @@ pub struct Soak {
     pub sample_every: u32,
     /// True with the validation layer, which keeps memory of its own.
     pub validation: bool,
-    /// Frames after which one buffer is leaked on purpose.
+    /// Frames after which one buffer is leaked on purpose; 64 bytes of the host's memory are leaked in each frame then.
     pub leak_every: Option<u32>,
 }
 
@@ -111,6 +111,10 @@ impl Soak {
             if self.leak_every.is_some_and(|every| number.is_multiple_of(every)) {
                 ctx.create_buffer(&BufferDesc { size_bytes: 4096, ..Default::default() })?.release();
                 tally.count("buffers leaked on purpose");
+            }
+            if self.leak_every.is_some() {
+                // A leak of few bytes, which only a count of all bytes shows.
+                std::hint::black_box(Box::leak(Box::new([0_u8; 64])));
             }
             if (number + 1).is_multiple_of(self.sample_every) {
                 frames.finish(0, &mut tally)?;
