@@ -69,8 +69,7 @@ fn library(ctx: &Context) -> Result<Vec<Quantity>> {
 }
 
 /// Returns the number of threads by name, once those of the library's background work have ended; none where the system tells no names.
-/// A driver of Mesa starts one for a queue, under the name of the thread that submits, when a submission first waits for a value that
-/// nothing has signalled yet: at any time, but once.
+/// Drivers may start some late, as Mesa does for its cache of shaders, `disk$1` to `disk$3`, when the first falls behind.
 fn settled_threads() -> BTreeMap<String, i64> {
     let start = Instant::now();
     loop {
