@@ -118,6 +118,9 @@ fn random_programs_on_four_threads_of_one_context_do_what_the_model_says() {
             let seeds: Vec<u64> = (1_000_000..1_000_000 + BOUNDED_SEEDS / 2).collect();
             let Some(total) = run_on_threads(queues, &seeds, 4, dog) else { return };
             eprintln!("{queues:?}, four threads: {total}");
+            let programs = seeds.len() as u64;
+            assert!(total.executed > programs * LENGTH as u64 / 2, "most operations find nothing to work on");
+            assert!(total.refused > 5 * programs && total.hits > 5 * programs, "errors or rays are too rare");
         }
     });
 }
