@@ -399,7 +399,7 @@ mod tests {
         let orphans = BTreeMap::from([("VkBuffer".to_owned(), 1)]);
         let guest = RunOutcome { live: BTreeMap::new(), orphans, orphaning: 1, ..leaked.clone() };
         assert_eq!(judged(FaultError::HostMemory, Span::Stays, &guest), [], "the engine destroys its device");
-        let other_context = RunOutcome { live: leaked.live.clone(), ..guest };
+        let other_context = RunOutcome { live: leaked.live.clone(), ..guest.clone() };
         assert_eq!(
             judged(FaultError::HostMemory, Span::Stays, &other_context),
             [Flaw::Leak("1 VkBuffer, 1 VkDevice".into())],
