@@ -67,6 +67,11 @@ pub enum PictureError {
         /// Bytes of the decoded image.
         bytes: u64,
     },
+    /// The file is a Radiance HDR file.
+    #[error(
+        "it is a Radiance HDR file, and pictures of high dynamic range are not read here; convert it to PNG"
+    )]
+    HighDynamicRange,
     /// The header states more texels than a file of this length can have.
     #[error(
         "the file has {bytes} bytes, too few for the {width}x{height} texels that it states: it is cut off or damaged"
@@ -147,6 +152,8 @@ pub fn read(path: &Path, bounds: &Bounds) -> Result<Picture, PictureError> {
             file.rewind()?;
             whole::read(ImageReader::with_format(file, ImageFormat::Jpeg), file_bytes, bounds)?
         }
+        // The decoder of `image` keeps every line of a header, and markers of no repeats overflow in it.
+        Some(ImageFormat::Hdr) => return Err(PictureError::HighDynamicRange),
         _ => whole::read(reader, file_bytes, bounds)?,
     };
     warnings.extend(picture.warnings);

@@ -252,6 +252,12 @@ fn files_that_are_no_images_say_so() {
     {
         assert!(read(&stored(folder.path(), name, bytes), &Bounds::default()).is_err(), "{name}");
     }
+    // By contents and by name.
+    let radiance = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x09\x09\x09\x81";
+    for (name, bytes) in [("a.png", &radiance[..]), ("a.hdr", b"text")] {
+        let error = read(&stored(folder.path(), name, bytes), &Bounds::default()).unwrap_err();
+        assert!(matches!(error, PictureError::HighDynamicRange), "{name}: {error}");
+    }
     let error = read(folder.path(), &Bounds::default()).unwrap_err();
     assert_eq!(error.to_string(), "it is a directory, no file");
     let huge = folder.path().join("huge.png");

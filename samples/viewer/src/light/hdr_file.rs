@@ -1,12 +1,10 @@
 //! Light from all directions in a Radiance HDR file (Ward, 1991).
 
-use std::io::Cursor;
 use std::path::Path;
 
-use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageDecoder, ImageError};
 use lvk_samples::app::input_file::{self, FileKind};
 
+use super::radiance_picture::{RadianceError, RadiancePicture};
 use super::sky_map::SkyMap;
 
 /// Most texels in a row of a file.
@@ -34,7 +32,7 @@ pub enum EnvironmentError {
         /// The file.
         file: String,
         /// Why.
-        source: ImageError,
+        source: RadianceError,
     },
     /// The picture does not show all directions, or it is too large.
     #[error(
@@ -49,6 +47,23 @@ pub enum EnvironmentError {
         /// Rows.
         height: u32,
     },
+    /// The header states more texels than a file of this length can have.
+    #[error(
+        "{file} has {bytes} bytes of texels, too few for the {width} x {height} texels that it states, which take {least} at \
+         least; it is cut off or damaged: export the picture again, as .hdr"
+    )]
+    TooFewBytes {
+        /// The file.
+        file: String,
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Bytes behind the header.
+        bytes: u64,
+        /// Fewest bytes of so many texels.
+        least: u64,
+    },
 }
 
 /// Reads a file as a map of the sky, turned around the vertical.
@@ -57,17 +72,21 @@ pub(super) fn read(path: &Path, rotation_degrees: f32) -> Result<SkyMap, Environ
     let bytes = input_file::read_named_by_user(path, FileKind::Environment)
         .map_err(|source| EnvironmentError::Read { file: file(), source })?;
     let failed = |source| EnvironmentError::Decode { file: file(), source };
-    let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(failed)?;
-    let (width, height) = decoder.dimensions();
-    if width != 2 * height || !(2..=MOST_FILE_WIDTH).contains(&width) {
+    let mut picture = RadiancePicture::new(&bytes).map_err(failed)?;
+    let (width, height) = (picture.width, picture.height);
+    if u64::from(width) != 2 * u64::from(height) || !(2..=MOST_FILE_WIDTH).contains(&width) {
         return Err(EnvironmentError::Size { file: file(), width, height });
     }
-    let picture = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgb32f();
-    let texels = picture.pixels().map(|texel| texel.0.map(radiance)).collect();
-    let mut map = SkyMap { width, height, texels };
-    while map.width > MOST_MAP_WIDTH {
-        map = halved(&map);
+    let (bytes, least) = (picture.bytes_left(), picture.least_bytes());
+    if bytes < least {
+        return Err(EnvironmentError::TooFewBytes { file: file(), width, height, bytes, least });
     }
+    let mut averaged = AveragedScanlines::new(width, height);
+    for _ in 0..height {
+        let row = picture.next_scanline().map_err(failed)?;
+        averaged.push(row.into_iter().map(|texel| texel.map(radiance)).collect());
+    }
+    let mut map = averaged.map;
     turn(&mut map, rotation_degrees);
     Ok(map)
 }
@@ -77,16 +96,46 @@ fn radiance(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, MOST_RADIANCE) }
 }
 
-/// The means of squares of four texels. A last column or row without a partner is left out.
-fn halved(map: &SkyMap) -> SkyMap {
-    let (width, height) = (map.width / 2, map.height / 2);
-    let texel = |index: u32| {
-        let (x, y) = (2 * (index % width), 2 * (index / width));
-        let of = |x: u32, y: u32| map.texels[(y * map.width + x) as usize];
-        let four = [of(x, y), of(x + 1, y), of(x, y + 1), of(x + 1, y + 1)];
-        [0, 1, 2].map(|channel| four.iter().map(|texel| texel[channel]).sum::<f32>() / 4.0)
+/// A map that is made of the rows of a picture, one after another. Of a wide picture, squares of four texels are averaged, once or
+/// more; no other rows are kept than those that wait for the next one.
+struct AveragedScanlines {
+    map: SkyMap,
+    /// A row of each finer size, the finest first, that waits for the next one; empty without one.
+    waiting: Vec<Vec<[f32; 3]>>,
+}
+
+impl AveragedScanlines {
+    /// No rows of a picture of this size.
+    fn new(mut width: u32, mut height: u32) -> Self {
+        let mut waiting = Vec::new();
+        while width > MOST_MAP_WIDTH {
+            (width, height) = (width / 2, height / 2);
+            waiting.push(Vec::new());
+        }
+        let texels = Vec::with_capacity(width as usize * height as usize);
+        Self { map: SkyMap { width, height, texels }, waiting }
+    }
+
+    /// Adds the next row of the picture.
+    fn push(&mut self, mut row: Vec<[f32; 3]>) {
+        for upper in &mut self.waiting {
+            if upper.is_empty() {
+                *upper = row;
+                return;
+            }
+            row = halved(&std::mem::take(upper), &row);
+        }
+        self.map.texels.extend(row);
+    }
+}
+
+/// The means of squares of four texels of two rows. A last column without a partner is left out.
+fn halved(upper: &[[f32; 3]], lower: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+    let mean = |([a, b], [c, d]): (&[[f32; 3]; 2], &[[f32; 3]; 2])| {
+        [0, 1, 2].map(|channel| (a[channel] + b[channel] + c[channel] + d[channel]) / 4.0)
     };
-    SkyMap { width, height, texels: (0..width * height).map(texel).collect() }
+    pairs.map(mean).collect()
 }
 
 /// Turns the map around the vertical, by whole texels.
@@ -134,10 +183,25 @@ mod tests {
         let mut texels = vec![[1.0; 3]; (width * height) as usize];
         texels[(700 * width + 900) as usize] = [1024.0; 3];
         let fine = SkyMap { width, height, texels };
-        let coarse = halved(&fine);
-        assert_eq!((coarse.width, coarse.height), (2048, 1024));
+        let mut averaged = AveragedScanlines::new(width, height);
+        fine.texels.chunks(4096).for_each(|row| averaged.push(row.to_vec()));
+        let coarse = averaged.map;
+        assert_eq!((coarse.width, coarse.height, coarse.texels.len()), (2048, 1024, 2048 * 1024));
         assert!((coarse.mean() / fine.mean() - 1.0).abs().max_element() < 1e-4);
         assert_eq!(coarse.texels[350 * 2048 + 450], [(1024.0 + 3.0) / 4.0; 3]);
+    }
+
+    #[test]
+    fn a_last_row_and_column_without_a_partner_are_left_out() {
+        let mut averaged = AveragedScanlines::new(4098, 2049);
+        for row in 0..2049_u16 {
+            averaged.push((0..4098_u16).map(|column| [f32::from(column), f32::from(row), 1.0]).collect());
+        }
+        assert_eq!(
+            (averaged.map.width, averaged.map.height, averaged.map.texels.len()),
+            (1024, 512, 1024 * 512)
+        );
+        assert_eq!(averaged.map.texels.last(), Some(&[4093.5, 2045.5, 1.0]));
     }
 
     #[test]

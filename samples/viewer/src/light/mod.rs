@@ -2,6 +2,7 @@
 
 mod atmosphere;
 mod hdr_file;
+mod radiance_picture;
 mod sky_map;
 
 use std::path::Path;
@@ -10,6 +11,7 @@ use glam::DVec3;
 
 use atmosphere::Atmosphere;
 pub use hdr_file::EnvironmentError;
+pub use radiance_picture::RadianceError;
 pub use sky_map::SkyMap;
 pub(crate) use sky_map::luminance;
 
