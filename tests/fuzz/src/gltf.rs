@@ -2,25 +2,49 @@
 
 use lvk_gltf::{LoadOptions, MemoryLimit, Model, Primitive, TextureRef};
 
+use crate::files::with_files;
 use crate::gltf_edits::edited_model;
 
-/// A `.gltf` or `.glb` file that may name no others. A first byte below 16 is a number of a model, whose JSON the rest edits: so
-/// inputs get behind the container and the parser.
+/// Where a target reads a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// Bytes in memory, which may name no other files.
+    Memory,
+    /// A file, read a part at a time as programs do. It may name `a.bin` beside it, which has the same bytes, and itself, `model`.
+    File,
+}
+
+/// A `.gltf` or `.glb` file. A first byte below 16 is a number of a model, whose JSON the rest edits: so inputs get behind the
+/// container and the parser. Bit 3 of that number, or else bit 2 of the input's length, tells whether the model is read in a file;
+/// the length of a `.glb` file is a multiple of 4.
 pub(crate) fn read_gltf(bytes: &[u8]) {
-    loads(edited_model(bytes).as_deref().unwrap_or(bytes));
+    let place = |is_file: bool| if is_file { Place::File } else { Place::Memory };
+    match edited_model(bytes) {
+        Some(model) => loads(&model, place(bytes.first().is_some_and(|first| first & 8 != 0))),
+        None => loads(bytes, place(bytes.len() & 4 != 0)),
+    };
 }
 
 /// Reads a file, and checks what programs rely on. True if it loads. Within the bound of the target lie that of the load, and the
 /// tables of decoders of images.
-fn loads(bytes: &[u8]) -> bool {
+fn loads(bytes: &[u8], place: Place) -> bool {
     let memory = MemoryLimit { fixed_bytes: 2 << 20, multiple: 64 };
     let options = LoadOptions { memory, most_threads: Some(1), ..LoadOptions::default() };
-    let model = Model::from_bytes(bytes, None, &options);
-    match &model {
-        Ok(model) => check_model(model),
-        Err(error) => drop(error.to_string()),
+    let mut is_loaded = false;
+    let mut check = |model: lvk_gltf::Result<Model>| {
+        is_loaded = model.is_ok();
+        match model {
+            Ok(model) => check_model(&model),
+            Err(error) => drop(error.to_string()),
+        }
+    };
+    match place {
+        Place::Memory => check(Model::from_bytes(bytes, None, &options)),
+        Place::File => with_files(&[("model", bytes), ("a.bin", bytes)], |folder| {
+            check(Model::load(&folder.join("model"), &options));
+        }),
     }
-    model.is_ok()
+    is_loaded
 }
 
 fn check_model(model: &Model) {
@@ -83,13 +107,22 @@ mod tests {
     /// Most mutations of a file are no JSON. Of edited models a quarter loads, and the rest fails behind the parser.
     #[test]
     fn edited_models_get_behind_the_parser() {
-        let mut random = Random::new(11);
-        let mut count = 0;
-        for number in 0..300 {
-            let edits: Vec<u8> = (0..12).map(|_| random.below(256) as u8).collect();
-            let input = mutated(&[&[number as u8 % 16], &edits[..]].concat(), &[], &mut random);
-            count += u32::from(edited_model(&input).is_some_and(|edited| loads(&edited)));
+        for place in [Place::Memory, Place::File] {
+            let mut random = Random::new(11);
+            let mut count = 0;
+            for number in 0..300 {
+                let edits: Vec<u8> = (0..12).map(|_| random.below(256) as u8).collect();
+                let input = mutated(&[&[number as u8 % 16], &edits[..]].concat(), &[], &mut random);
+                count += u32::from(edited_model(&input).is_some_and(|edited| loads(&edited, place)));
+            }
+            assert!(count >= 75, "{count} of 300 in {place:?}");
         }
-        assert!(count >= 75, "{count} of 300");
+    }
+
+    #[test]
+    fn models_in_files_name_others() {
+        let model = include_bytes!("../corpus/gltf/names-a-file.gltf");
+        assert!(loads(model, Place::File) && !loads(model, Place::Memory));
+        assert!(model.len() & 4 != 0, "it is read in memory");
     }
 }

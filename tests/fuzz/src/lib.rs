@@ -4,6 +4,7 @@
 //! [`TARGETS`] lists them. libFuzzer drives them through the programs in `fuzz_targets`, which `.ci/fuzz` builds and runs; the
 //! test `mutations` drives them over the corpus and over mutations of it, as a part of `cargo test`.
 
+mod files;
 mod gltf;
 mod gltf_edits;
 mod input;

@@ -6,8 +6,10 @@ use lvk::test_hooks::{outside_bytes, outside_pipelines};
 use lvk_samples::app::progress::Progress;
 use lvk_samples::picture::{self, Bounds};
 use lvk_samples::scene::{ObjOptions, Scene};
+use lvk_viewer::light::Environment;
 
 use crate::Target;
+use crate::files::with_files;
 use crate::gltf::read_gltf;
 use crate::input::Input;
 use crate::memory::MemoryBound;
@@ -20,6 +22,11 @@ pub const TARGETS: &[Target] = &[
     Target { name: "mtl", memory: MemoryBound { fixed: 2048 * KIB, multiple: 256 }, read: read_mtl },
     Target { name: "cameras", memory: MemoryBound { fixed: 2048 * KIB, multiple: 64 }, read: read_cameras },
     Target { name: "image", memory: MemoryBound { fixed: 256 * KIB, multiple: 16 << 14 }, read: read_image },
+    Target {
+        name: "environment",
+        memory: MemoryBound { fixed: 512 * KIB, multiple: 2304 },
+        read: read_environment,
+    },
     Target { name: "spirv", memory: MemoryBound { fixed: 1024 * KIB, multiple: 512 }, read: read_spirv },
     Target {
         name: "ray_pipeline",
@@ -41,18 +48,6 @@ pub const TARGETS: &[Target] = &[
     Target { name: "gltf", memory: MemoryBound { fixed: 4096 * KIB, multiple: 128 }, read: read_gltf },
     Target { name: "tree", memory: MemoryBound { fixed: 16 * KIB, multiple: 32 }, read: read_tree },
 ];
-
-/// Writes files into a new folder in memory, where the system has one, and passes the folder to `read`.
-fn with_files(files: &[(&str, &[u8])], read: impl FnOnce(&Path)) {
-    let memory = Path::new("/dev/shm");
-    let parent = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
-    let folder = tempfile::Builder::new().prefix("lvk-fuzz-").tempdir_in(parent);
-    let Ok(folder) = folder else { return };
-    let written = files.iter().try_for_each(|(name, bytes)| std::fs::write(folder.path().join(name), bytes));
-    if written.is_ok() {
-        read(folder.path());
-    }
-}
 
 fn load_scene(folder: &Path, options: &ObjOptions) {
     match Scene::from_obj(&folder.join("mesh.obj"), options, &mut Progress::hidden()) {
@@ -117,6 +112,19 @@ fn read_image(bytes: &[u8]) {
             let texels = picture.width as usize * picture.height as usize;
             assert!(texels > 0 && picture.rgba.len() == 4 * texels);
             assert!(picture.width <= bounds.max_side && picture.height <= bounds.max_side);
+        }
+        Err(error) => drop(error.to_string()),
+    });
+}
+
+/// A Radiance HDR file of light from all directions.
+fn read_environment(bytes: &[u8]) {
+    with_files(&[("sky.hdr", bytes)], |folder| match Environment::from_hdr(&folder.join("sky.hdr"), 90.0) {
+        Ok(environment) => {
+            let sky = environment.sky;
+            assert!(sky.width > 0 && sky.width <= 2048);
+            assert_eq!(sky.texels.len(), sky.width as usize * sky.height as usize);
+            assert!(sky.texels.iter().flatten().all(|channel| (0.0..=1e8).contains(channel)));
         }
         Err(error) => drop(error.to_string()),
     });
