@@ -30,7 +30,7 @@
 //! ```
 //!
 //! For a window, a sample also implements [`resize`](Sample::resize), [`camera_mut`](Sample::camera_mut),
-//! [`panel`](Sample::panel), [`reload`](Sample::reload) and [`drop_file`](Sample::drop_file). A sample that takes long to create is
+//! `panel`, which needs the feature `window`, [`reload`](Sample::reload) and [`drop_file`](Sample::drop_file). A sample that takes long to create is
 //! [`Loading`](super::loading::Loading) there: a thread creates it while the window displays the progress.
 
 use std::path::Path;
