@@ -51,7 +51,7 @@ pub enum Content {
     Steps,
 }
 
-/// What leaves out instances that the picture does not show, before the hybrid method rasterises. The picture is the same.
+/// Culling of instances before the hybrid method rasterises them. The picture is the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum CullingMode {
     /// Occlusion for models with at least 64 instances, the frustum for others.
@@ -92,7 +92,7 @@ pub struct ViewerConfig {
     /// Most bytes of textures, whose mip levels then come and go by what shaders read; all levels stay if there is none. It is that of
     /// the model for as long as the model is shown.
     pub texture_budget: Option<u64>,
-    /// What leaves out instances that the picture does not show.
+    /// Culling of instances.
     pub culling: CullingMode,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
     pub is_progressive: bool,

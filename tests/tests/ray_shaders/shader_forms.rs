@@ -18,6 +18,22 @@ const PUSH: &str = "
     layout(location = 0) rayPayloadEXT uint value;
     vec3 direction() { return vec3(0, 0, gl_LaunchIDEXT.x < hits ? 1 : -1); }";
 
+/// Returns the results of a launch by a pipeline with one hit group.
+fn launch(
+    ctx: &Context,
+    ray_gen: ShaderModuleHandle,
+    miss: ShaderModuleHandle,
+    group: HitGroup<'_>,
+) -> Result<Vec<u32>> {
+    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &[ray_gen],
+        miss: &[miss],
+        hit_groups: &[group],
+        ..Default::default()
+    })?;
+    GroupScene::new(ctx)?.run(*pipeline, 0, COUNTS)
+}
+
 /// Returns the results of a launch whose rays hit and miss. The closest-hit shader answers 20, the miss shader 30.
 fn results(ctx: &Context, ray_gen: &str, mask: Option<&str>) -> Result<Vec<u32>> {
     let ray_gen = shader(ctx, ShaderStage::RayGen, &format!("{PUSH}\n{ray_gen}"))?;
@@ -31,13 +47,7 @@ fn results(ctx: &Context, ray_gen: &str, mask: Option<&str>) -> Result<Vec<u32>>
         }
     };
     let (hit, miss) = (answers(ShaderStage::ClosestHit, "20u")?, answers(ShaderStage::Miss, "30u")?);
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }],
-        ..Default::default()
-    })?;
-    GroupScene::new(ctx)?.run(*pipeline, 0, COUNTS)
+    launch(ctx, *ray_gen, *miss, HitGroup { closest_hit: Some(*hit), ..Default::default() })
 }
 
 /// Two functions deep, with early returns, and with indices of several types.
@@ -258,13 +268,8 @@ fn payloads_are_blocks() -> Result<()> {
         let answer = |stage, factor: &str| shader(&ctx, stage, &ANSWER.replace("FACTOR", factor));
         let ray_gen = shader(&ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
         let (hit, miss) = (answer(ShaderStage::ClosestHit, "10")?, answer(ShaderStage::Miss, "100")?);
-        let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-            ray_gen: &[*ray_gen],
-            miss: &[*miss],
-            hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }],
-            ..Default::default()
-        })?;
-        assert_eq!(GroupScene::new(&ctx)?.run(*pipeline, 0, COUNTS)?, [44, 404], "{path:?}");
+        let group = HitGroup { closest_hit: Some(*hit), ..Default::default() };
+        assert_eq!(launch(&ctx, *ray_gen, *miss, group)?, [44, 404], "{path:?}");
     }
     Ok(())
 }
@@ -308,7 +313,6 @@ fn functions_that_ignore_hits_return_addresses() -> Result<()> {
             if (first.at[0] == 77 && pair.words.at[0] == 77) terminateRayEXT;
         }";
     for (path, ctx) in pipeline_devices() {
-        let scene = GroupScene::new(&ctx)?;
         let ray_gen = shader(&ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
         let hit = answering(&ctx, ShaderStage::ClosestHit, "", "20u")?;
         let miss = answering(&ctx, ShaderStage::Miss, "", "30u")?;
@@ -316,13 +320,7 @@ fn functions_that_ignore_hits_return_addresses() -> Result<()> {
         for (ignored, expected) in [("1u", 30), ("0u", 30), ("5u", 20)] {
             let any = shader(&ctx, ShaderStage::AnyHit, &ANY_HIT.replace("IGNORED", ignored))?;
             let group = HitGroup { closest_hit: Some(*hit), any_hit: Some(*any), ..Default::default() };
-            let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-                ray_gen: &[*ray_gen],
-                miss: &[*miss],
-                hit_groups: &[group],
-                ..Default::default()
-            })?;
-            assert_eq!(scene.run(*pipeline, 0, COUNTS)?, [expected, 30], "{path:?}, {ignored}");
+            assert_eq!(launch(&ctx, *ray_gen, *miss, group)?, [expected, 30], "{path:?}, {ignored}");
         }
     }
     Ok(())

@@ -112,7 +112,7 @@ impl Culling {
     }
 }
 
-/// What a frame has rasterised.
+/// Counts of the instances and triangles that a frame has rasterised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DrawnInstances {
     /// Instances that were rasterised.

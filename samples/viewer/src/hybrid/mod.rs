@@ -65,7 +65,7 @@ impl Hybrid {
         SHOWN * plane_bytes(self.extent)
     }
 
-    /// What leads to the visible triangles.
+    /// Indices of the textures with the visible triangles, and the address of the pyramid.
     pub(crate) fn visibility(&self) -> lvk::Result<VisibilityConstants> {
         self.visibility.constants()
     }

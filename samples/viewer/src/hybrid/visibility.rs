@@ -29,13 +29,13 @@ pub(crate) struct Visibility {
     extent: [u32; 2],
 }
 
-/// What a pass draws to.
+/// Textures that a pass draws to.
 struct Targets {
     triangles: Holder<TextureHandle>,
     depth: Holder<TextureHandle>,
 }
 
-/// What occlusion culling needs beside: the depth of the first pass, and the targets of the second.
+/// Data of occlusion culling: the depth pyramid of the first pass, and the targets of the second.
 struct Occlusion {
     pyramid: DepthPyramid,
     targets: Targets,
@@ -62,7 +62,7 @@ impl Visibility {
         targets.iter().flat_map(|targets| [*targets.triangles, *targets.depth]).collect()
     }
 
-    /// What leads to the visible triangles, and to the pyramid.
+    /// Indices of the textures with the visible triangles, and the address of the pyramid.
     pub(crate) fn constants(&self) -> lvk::Result<VisibilityConstants> {
         let second = self.occlusion.as_ref().map(|occlusion| occlusion.targets.indices());
         Ok(VisibilityConstants {

@@ -9,7 +9,7 @@ const TEXEL_BYTES: usize = 4;
 /// Most characters of a header that a message repeats.
 const MOST_QUOTED: usize = 24;
 
-/// What is wrong with the bytes of a Radiance HDR picture.
+/// Defects of the bytes of a Radiance HDR picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RadianceError {
@@ -38,7 +38,7 @@ pub enum RadianceError {
         row: u32,
         /// Rows of the picture.
         height: u32,
-        /// What is wrong with it.
+        /// The defect of the row.
         why: &'static str,
     },
 }

@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(SweepPlan::full().faults(&calls).len(), 12);
         let second = SweepPlan { part: "2/3".parse().unwrap(), ..once.clone() };
         assert_eq!(texts(&second), "b 1 host-memory once");
-        // Of 12 faults two of each error and span: two spans, one error of every call and two of one call each.
+        // Half of the faults have half of those of each span.
         let half: Vec<Fault> = SweepPlan { most: 6, ..SweepPlan::full() }.faults(&calls);
         for span in [Span::Once, Span::Stays] {
             assert_eq!(half.iter().filter(|fault| fault.span == span).count(), 3, "{half:?}");
