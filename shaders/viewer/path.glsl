@@ -1,6 +1,5 @@
-// The light of a pixel by paths from the camera. At each surface a shadow ray looks for light, and the path goes on in a direction
-// that the surface prefers; light that both can find is shared between them. The including file provides traceNearest() and
-// transmittanceTo().
+// Paths of light from the camera. At each surface a shadow ray looks for light, and the path goes on in a direction that the surface
+// prefers; light that both can find is shared between them. The including file provides traceNearest() and transmittanceTo().
 #ifndef VIEWER_PATH
 #define VIEWER_PATH
 
@@ -59,7 +58,7 @@ DirectLight directLight(Surface surface, Bsdf bsdf, vec3 extinction, float choic
     return DirectLight(light * response.value, light * response.matte);
 }
 
-// A path under way.
+// A path under way, and the light that it has found so far.
 struct Path {
     vec3 origin;
     vec3 direction;
@@ -69,27 +68,32 @@ struct Path {
     float squeezed; // radiance is eta^2 as much inside of a volume, which comes back at its end
     float spread; // of the cone that the path stands for, over its length; 0: textures are read unfiltered
     float width; // of the cone at the origin
+    uint bounce; // number of the next surface, from 0
+    vec3 throughput;
+    vec3 radiance;
 };
 
-Path firstPath(vec3 origin, vec3 direction) {
-    return Path(origin, direction, -1.0, origin, vec3(0.0), 1.0, 0.0, 0.0);
+// A path from the eye.
+Path cameraPath(vec3 direction) {
+    vec3 eye = frame.camera.eye;
+    return Path(eye, direction, -1.0, eye, vec3(0.0), 1.0, 0.0, 0.0, 0u, vec3(1.0), vec3(0.0));
 }
 
-// Goes on from a surface.
-void follow(inout Path path, Surface surface, Bsdf bsdf, Scattered scattered) {
-    // Shadow rays go through panes, but not through what bounds a volume.
-    bool isThin = (surface.flags & kThin) != 0u;
-    path.density = !scattered.isPane ? scattered.density : isThin ? path.density : -1.0;
-    path.from = scattered.isPane ? path.from : surface.position;
-    path.extinction = extinctionTowards(surface, scattered.direction, path.extinction);
-    if (!isThin && dot(scattered.direction, surface.geometricNormal) < 0.0) {
-        path.squeezed *= bsdf.eta * bsdf.eta;
-    }
-    if (path.spread > 0.0 && !scattered.isPane) {
-        path.spread = max(path.spread, kConeShare * inversesqrt(max(scattered.density, 1e-6)));
-    }
-    path.origin = leaveTo(surface, scattered.direction);
-    path.direction = scattered.direction;
+// The next surface on the way of a path.
+Hit nextHit(Path path, Random random) {
+    return traceNearest(path.origin, path.direction, hashWords(random.seed + path.bounce, random.number));
+}
+
+// The surface at a hit. The path loses what the volume before it takes.
+Surface reach(inout Path path, Hit hit) {
+    path.width += path.spread * hit.distance;
+    path.throughput *= exp(-path.extinction * hit.distance);
+    return surfaceAt(hit, path.direction, path.width);
+}
+
+// Light that comes along a path from where it meets nothing.
+vec3 lightBeyond(Path path) {
+    return path.throughput * missedLight(path.direction, path.density);
 }
 
 // The share of the light of a surface that shadow rays do not find.
@@ -103,63 +107,74 @@ float emissionShare(Path path, Hit hit, Surface surface) {
     return powerShare(path.density, density);
 }
 
-// Light that comes against the direction of a path whose next surface has the number `bounce`.
-vec3 pathRadiance(Path path, uint bounce, inout Random random) {
-    vec3 radiance = vec3(0.0);
-    vec3 throughput = vec3(1.0);
-    for (; bounce <= frame.maxBounces; ++bounce) {
-        Hit hit = traceNearest(path.origin, path.direction, hashWords(random.seed + bounce, random.number));
-        if (hit.instance == kNothing) {
-            radiance += throughput * missedLight(path.direction, path.density);
-            break;
-        }
-        path.width += path.spread * hit.distance;
-        Surface surface = surfaceAt(hit, path.direction, path.width);
-        throughput *= exp(-path.extinction * hit.distance);
-        if ((surface.flags & kUnlit) != 0u) {
-            radiance += throughput * surface.baseColor;
-            break;
-        }
-        radiance += throughput * emissionShare(path, hit, surface) * surface.emission;
-        Bsdf bsdf = bsdfOf(surface, -path.direction);
-        vec2 lightChoices = nextPair(random);
-        vec2 lightPlace = nextPair(random);
-        radiance += throughput * directLight(surface, bsdf, path.extinction, lightChoices.x, lightPlace).all;
-        vec2 choices = nextPair(random);
-        vec2 u = nextPair(random);
-        Scattered scattered = scatter(surface, bsdf, -path.direction, choices, u);
-        throughput *= scattered.weight;
-        follow(path, surface, bsdf, scattered);
-        float chance = min(largest(throughput) * path.squeezed, 1.0);
-        if (bounce >= kSureBounces) {
-            chance = min(chance, 0.95);
-            if (lightChoices.y >= chance) {
-                break;
-            }
-            throughput /= chance;
-        } else if (chance <= 0.0) {
-            break;
-        }
-    }
-    bool isNumber = !any(isnan(radiance)) && !any(isinf(radiance));
-    return isNumber ? radiance : vec3(0.0);
+// What a path finds at a surface by a shadow ray, and how it goes on from there.
+struct Bounce {
+    Bsdf bsdf;
+    DirectLight direct;
+    Scattered scattered;
+    float choice; // whether chance ends the path
+};
+
+Bounce bounceAt(Path path, Surface surface, inout Random random) {
+    Bsdf bsdf = bsdfOf(surface, -path.direction);
+    vec2 lightChoices = nextPair(random);
+    vec2 lightPlace = nextPair(random);
+    DirectLight direct = directLight(surface, bsdf, path.extinction, lightChoices.x, lightPlace);
+    vec2 choices = nextPair(random);
+    vec2 u = nextPair(random);
+    return Bounce(bsdf, direct, scatter(surface, bsdf, -path.direction, choices, u), lightChoices.y);
 }
 
-// Samples of a pixel are spread over all of it.
-vec3 sampleRadiance(uvec2 pixel, uint number) {
-    Random random = randomOf(pixel, number);
-    vec2 ndc = (vec2(pixel) + nextPair(random)) / vec2(frame.camera.width, frame.camera.height) * 2.0 - 1.0;
-    vec3 direction = normalize(frame.camera.forward + ndc.x * frame.camera.right + ndc.y * frame.camera.down);
-    return pathRadiance(firstPath(frame.camera.eye, direction), 0u, random);
+// Leads a path on from a surface. False: it ends there.
+bool follow(inout Path path, Surface surface, Bounce bounce) {
+    Scattered scattered = bounce.scattered;
+    // Shadow rays go through panes, but not through what bounds a volume.
+    bool isThin = (surface.flags & kThin) != 0u;
+    path.density = !scattered.isPane ? scattered.density : isThin ? path.density : -1.0;
+    path.from = scattered.isPane ? path.from : surface.position;
+    path.extinction = extinctionTowards(surface, scattered.direction, path.extinction);
+    if (!isThin && dot(scattered.direction, surface.geometricNormal) < 0.0) {
+        path.squeezed *= bounce.bsdf.eta * bounce.bsdf.eta;
+    }
+    if (path.spread > 0.0 && !scattered.isPane) {
+        path.spread = max(path.spread, kConeShare * inversesqrt(max(scattered.density, 1e-6)));
+    }
+    path.origin = leaveTo(surface, scattered.direction);
+    path.direction = scattered.direction;
+    float chance = min(largest(path.throughput) * path.squeezed, 1.0);
+    bool isSure = path.bounce < kSureBounces;
+    chance = isSure ? chance : min(chance, 0.95);
+    if (chance <= 0.0 || (!isSure && bounce.choice >= chance)) {
+        return false;
+    }
+    path.throughput = isSure ? path.throughput : path.throughput / chance;
+    path.bounce += 1u;
+    return path.bounce <= frame.maxBounces;
 }
 
-void pathPixel(uvec2 pixel) {
-    uint place = pixel.y * frame.camera.width + pixel.x;
-    vec3 sum = frame.sampleNumber == 0u ? vec3(0.0) : frame.sums.at[place].rgb;
-    for (uint i = 0u; i < frame.sampleCount; ++i) {
-        sum += sampleRadiance(pixel, frame.sampleNumber + i);
+// Leads a path from its origin to the next surface, and on from there. False: it ends.
+bool advance(inout Path path, inout Random random) {
+    Hit hit = nextHit(path, random);
+    if (hit.instance == kNothing) {
+        path.radiance += lightBeyond(path);
+        return false;
     }
-    frame.sums.at[place] = vec4(sum, float(frame.sampleNumber + frame.sampleCount));
+    Surface surface = reach(path, hit);
+    if ((surface.flags & kUnlit) != 0u) {
+        path.radiance += path.throughput * surface.baseColor;
+        return false;
+    }
+    path.radiance += path.throughput * emissionShare(path, hit, surface) * surface.emission;
+    Bounce bounce = bounceAt(path, surface, random);
+    path.radiance += path.throughput * bounce.direct.all;
+    path.throughput *= bounce.scattered.weight;
+    return follow(path, surface, bounce);
+}
+
+// The light of a path that has ended.
+vec3 radianceOf(Path path) {
+    bool isNumber = !any(isnan(path.radiance)) && !any(isinf(path.radiance));
+    return isNumber ? path.radiance : vec3(0.0);
 }
 
 #endif

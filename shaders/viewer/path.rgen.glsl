@@ -1,7 +1,8 @@
 // Paths of a pixel, by the ray tracing pipeline.
+#define VIEWER_RAYGEN
 #include "viewer/trace_pipeline.glsl"
-#include "viewer/path.glsl"
+#include "viewer/sample_paths.glsl"
 
 void main() {
-    pathPixel(gl_LaunchIDEXT.xy);
+    samplePaths();
 }

@@ -3,5 +3,6 @@
 #include "viewer/trace_query.glsl"
 #include "viewer/visible_light.glsl"
 
-#define PIXEL_FUNCTION visibleLightPixel
-#include "common/for_each_pixel.glsl"
+void main() {
+    visibleLight();
+}

@@ -1,18 +1,23 @@
-// The light of what each pixel shows, of one sample: rays for shadows, for one direction that its surface prefers, and along a path
-// that goes on from there. Matte layers and all others are kept apart, without their colours, for the filter. The including file
-// provides traceNearest() and transmittanceTo().
+// The light of what each pixel of an invocation shows, of one sample: a shadow ray, and a path in a direction that the surface prefers.
+// Matte layers and all others are kept apart, without their colours, for the filter. As in sample_paths.glsl all paths share a loop.
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 
 #include "viewer/path.glsl"
+#include "viewer/pixel_loop.glsl"
 #include "viewer/plane.glsl"
 #include "viewer/visible_triangle.glsl"
 
 // A sample that is brighter would leave a bright spot for many frames.
 const float kBrightestSample = 12.0;
 
-// Where the ray of a pixel meets the plane of its triangle.
-Hit visibleHit(uvec4 visible, vec3 origin, vec3 direction) {
+// Where the ray of a pixel meets the plane of the triangle that the pixel shows.
+Hit visibleHit(uvec2 pixel, vec3 direction) {
+    uvec4 visible = visibleTriangle(ivec2(pixel));
+    if (visible.x == kNothing) {
+        return Hit(kNothing, 0u, 0u, vec2(0.0), 0.0);
+    }
+    vec3 origin = frame.camera.eye;
     Instance instance = frame.instances.at[visible.x];
     Geometry geometry = frame.geometries.at[instance.firstGeometry + visible.y];
     uvec3 corners = CornerArray(geometry.indices).at[visible.z];
@@ -50,60 +55,119 @@ vec3 clamped(vec3 light) {
     return most > kBrightestSample ? light * (kBrightestSample / most) : light;
 }
 
-void storeLight(uint place, Seen seen, vec3 base, vec3 matte, vec3 matteAlbedo, vec3 mirrored, vec3 share) {
+// What later passes need of a pixel, beside its light.
+void storeSurface(uint place, Seen seen, vec3 base, vec3 matteAlbedo, vec3 share) {
     frame.planes.at[currentPlane(kPlaneSurface, place)] = packedSeen(seen);
     frame.planes.at[planePlace(kPlaneBase, place)] = vec4(base, 0.0);
     frame.planes.at[planePlace(kPlaneMatteAlbedo, place)] = vec4(matteAlbedo, 0.0);
     frame.planes.at[planePlace(kPlaneMirroredShare, place)] = vec4(share, 0.0);
-    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(clamped(matte / max(matteAlbedo, 1e-3)), 0.0);
-    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(clamped(mirrored / max(share, 1e-3)), 0.0);
 }
 
 void storePoint(uint place, vec3 point) {
     frame.planes.at[planePlace(kPlaneBefore, place)] = vec4(point, 0.0);
 }
 
-void visibleLightPixel(uvec2 pixel) {
-    uint place = pixelPlace(ivec2(pixel));
-    vec3 direction = cameraDirection(frame.camera, pixel);
-    uvec4 visible = visibleTriangle(ivec2(pixel));
-    const vec3 none = vec3(0.0);
-    if (visible.x == kNothing) {
-        storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
-        storeLight(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), none, none, none, none);
-        return;
-    }
-    Hit hit = visibleHit(visible, frame.camera.eye, direction);
-    Surface surface = surfaceAt(hit, direction, frame.camera.pixelSpread * hit.distance);
-    Seen seen = Seen(surface.normal, hit.distance, hit.instance, surface.roughness);
-    storePoint(place, pointBefore(hit, frame.camera.eye + hit.distance * direction));
-    if ((surface.flags & kUnlit) != 0u) {
-        storeLight(place, seen, surface.baseColor, none, none, none, none);
-        return;
-    }
-    Random random = randomOf(pixel, frame.sampleNumber);
-    Bsdf bsdf = bsdfOf(surface, -direction);
-    vec2 lightChoices = nextPair(random);
-    vec2 lightPlace = nextPair(random);
-    DirectLight direct = directLight(surface, bsdf, vec3(0.0), lightChoices.x, lightPlace);
-    vec2 choices = nextPair(random);
-    vec2 u = nextPair(random);
-    Scattered scattered = scatter(surface, bsdf, -direction, choices, u);
-    vec3 matte = direct.matte;
-    vec3 mirrored = direct.all - direct.matte;
-    if (any(greaterThan(scattered.weight, none))) {
-        Path path = firstPath(surface.position, direction);
-        path.spread = frame.camera.pixelSpread;
-        path.width = path.spread * hit.distance;
-        follow(path, surface, bsdf, scattered);
-        vec3 light = pathRadiance(path, 1u, random);
-        matte += scattered.matte * light;
-        mirrored += (scattered.weight - scattered.matte) * light;
-    }
+void storeSky(uint place, vec3 direction) {
+    storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
+    storeSurface(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), vec3(0.0), vec3(0.0));
+}
+
+// What the surface of a pixel returns of its own shadow ray, and of the light of the path beyond.
+struct FirstLight {
+    vec3 matte;
+    vec3 mirrored;
+    vec3 matteWeight;
+    vec3 mirroredWeight;
+};
+
+void storeLight(uint place, FirstLight first, vec3 beyond) {
+    vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
+    vec3 share = frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
+    vec3 matte = first.matte + first.matteWeight * beyond;
+    vec3 mirrored = first.mirrored + first.mirroredWeight * beyond;
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(clamped(matte / max(matteAlbedo, 1e-3)), 0.0);
+    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(clamped(mirrored / max(share, 1e-3)), 0.0);
+}
+
+FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen, uint place) {
+    Bsdf bsdf = bounce.bsdf;
+    vec3 weight = bounce.scattered.weight;
     bool isClear = bsdf.lobes[kGlassLobe] + bsdf.lobes[kPaneLobe] > 0.0;
-    vec3 share = isClear ? vec3(1.0) : bsdf.reflected;
     seen.roughness = surface.coat > 0.0 ? min(surface.roughness, surface.coatRoughness) : surface.roughness;
-    storeLight(place, seen, surface.emission, matte, bsdf.diffuse + bsdf.sheen, mirrored, share);
+    storeSurface(place, seen, surface.emission, bsdf.diffuse + bsdf.sheen, isClear ? vec3(1.0) : bsdf.reflected);
+    path.throughput = vec3(any(greaterThan(weight, vec3(0.0))));
+    DirectLight direct = bounce.direct;
+    return FirstLight(direct.matte, direct.all - direct.matte, bounce.scattered.matte, weight - bounce.scattered.matte);
+}
+
+// Leads a path to the next surface, of which the rasteriser knows the first, and on from there. False: it ends.
+bool advanceLight(inout Path path, inout FirstLight first, uvec2 pixel, inout Random random) {
+    uint place = pixelPlace(ivec2(pixel));
+    bool isFirst = path.bounce == 0u;
+    Hit hit;
+    if (isFirst) {
+        hit = visibleHit(pixel, path.direction);
+    } else {
+        hit = nextHit(path, random);
+    }
+    if (hit.instance == kNothing) {
+        if (isFirst) {
+            storeSky(place, path.direction);
+        } else {
+            path.radiance += lightBeyond(path);
+        }
+        return false;
+    }
+    Surface surface = reach(path, hit);
+    bool isUnlit = (surface.flags & kUnlit) != 0u;
+    Seen seen = Seen(surface.normal, hit.distance, hit.instance, surface.roughness);
+    if (isFirst) {
+        storePoint(place, pointBefore(hit, frame.camera.eye + hit.distance * path.direction));
+        if (isUnlit) {
+            storeSurface(place, seen, surface.baseColor, vec3(0.0), vec3(0.0));
+            return false;
+        }
+    } else {
+        vec3 emitted = isUnlit ? surface.baseColor : emissionShare(path, hit, surface) * surface.emission;
+        path.radiance += path.throughput * emitted;
+        if (isUnlit) {
+            return false;
+        }
+    }
+    Bounce bounce = bounceAt(path, surface, random);
+    if (isFirst) {
+        first = leaveFirst(path, surface, bounce, seen, place);
+    } else {
+        path.radiance += path.throughput * bounce.direct.all;
+        path.throughput *= bounce.scattered.weight;
+    }
+    return follow(path, surface, bounce);
+}
+
+void visibleLight() {
+    uint pixels = pixelCount();
+    Path path;
+    FirstLight first;
+    Random random;
+    bool isUnderWay = false;
+    for (uint i = 0u; i < pixels;) {
+        uvec2 pixel = pixelAt(i);
+        if (!isUnderWay) {
+            if (!isInPicture(pixel)) {
+                ++i;
+                continue;
+            }
+            random = randomOf(pixel, frame.sampleNumber);
+            path = cameraPath(cameraDirection(frame.camera, pixel));
+            path.spread = frame.camera.pixelSpread;
+            first = FirstLight(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+        }
+        isUnderWay = advanceLight(path, first, pixel, random);
+        if (!isUnderWay) {
+            storeLight(pixelPlace(ivec2(pixel)), first, radianceOf(path));
+            ++i;
+        }
+    }
 }
 
 #endif

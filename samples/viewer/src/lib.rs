@@ -25,7 +25,7 @@ mod names;
 mod open;
 #[cfg(feature = "window")]
 mod panel;
-mod path_tracer;
+mod path_pass;
 mod pipelines;
 mod playback;
 mod present;

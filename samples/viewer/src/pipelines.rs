@@ -1,6 +1,7 @@
 //! The sample's stages and pipelines as data.
 
 use crate::hybrid::{DEPTH_FORMAT, TRIANGLE_FORMAT};
+use crate::path_pass::PathStages;
 use lvk_samples::pipelines::{SamplePipeline, SampleStage};
 
 /// Name of the sample, and of its folder of shaders.
@@ -16,8 +17,15 @@ macro_rules! stage {
     };
 }
 
-pub(crate) const PATH_RAYS: SampleStage = stage!("path.rgen");
-pub(crate) const PATH_QUERY: SampleStage = stage!("path.comp");
+/// Paths of the path tracer.
+pub(crate) const PATHS: PathStages =
+    PathStages { rays: stage!("path.rgen"), query: stage!("path.comp"), debug_name: "viewer paths" };
+/// Paths of the real-time method.
+pub(crate) const LIGHT: PathStages = PathStages {
+    rays: stage!("visible_light.rgen"),
+    query: stage!("visible_light.comp"),
+    debug_name: "viewer light",
+};
 pub(crate) const NEAREST_MISS: SampleStage = stage!("nearest.rmiss");
 pub(crate) const NEAREST_HIT: SampleStage = stage!("nearest.rchit");
 pub(crate) const CANDIDATE: SampleStage = stage!("candidate.rahit");
@@ -26,8 +34,6 @@ pub(crate) const CULL: SampleStage = stage!("cull.comp");
 pub(crate) const DEPTH_PYRAMID: SampleStage = stage!("depth_pyramid.comp");
 pub(crate) const VISIBILITY_VERTEX: SampleStage = stage!("visibility.vert");
 pub(crate) const VISIBILITY_FRAGMENT: SampleStage = stage!("visibility.frag");
-pub(crate) const LIGHT_RAYS: SampleStage = stage!("visible_light.rgen");
-pub(crate) const LIGHT_QUERY: SampleStage = stage!("visible_light.comp");
 pub(crate) const TEMPORAL: SampleStage = stage!("temporal.comp");
 pub(crate) const FILTER: SampleStage = stage!("filter.comp");
 pub(crate) const COMPOSITE: SampleStage = stage!("composite.comp");
@@ -38,8 +44,8 @@ pub(crate) const PRESENT: SampleStage = stage!("present.comp");
 /// Returns every pipeline of the sample.
 pub(crate) fn pipelines() -> Vec<SamplePipeline> {
     vec![
-        SamplePipeline::new("viewer: paths by pipeline", &[PATH_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
-        SamplePipeline::new("viewer: paths by query", &[PATH_QUERY]),
+        SamplePipeline::new("viewer: paths by pipeline", &[PATHS.rays, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
+        SamplePipeline::new("viewer: paths by query", &[PATHS.query]),
         SamplePipeline::new("viewer: morph targets and joints", &[DEFORM]),
         SamplePipeline::new("viewer: culling", &[CULL]),
         SamplePipeline::new("viewer: depth pyramid", &[DEPTH_PYRAMID]),
@@ -49,8 +55,8 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
             &[TRIANGLE_FORMAT],
             Some(DEPTH_FORMAT),
         ),
-        SamplePipeline::new("viewer: light by pipeline", &[LIGHT_RAYS, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
-        SamplePipeline::new("viewer: light by query", &[LIGHT_QUERY]),
+        SamplePipeline::new("viewer: light by pipeline", &[LIGHT.rays, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
+        SamplePipeline::new("viewer: light by query", &[LIGHT.query]),
         SamplePipeline::new("viewer: means over time", &[TEMPORAL]),
         SamplePipeline::new("viewer: filter", &[FILTER]),
         SamplePipeline::new("viewer: composite", &[COMPOSITE]),

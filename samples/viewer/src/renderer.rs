@@ -1,7 +1,7 @@
 //! Either method, with its data for pictures of one size.
 
 use bytemuck::Zeroable as _;
-use lvk::{BufferHandle, Context, Holder};
+use lvk::{BufferHandle, Context, Dependencies, Holder};
 use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
@@ -9,12 +9,13 @@ use crate::config::{Method, ViewerConfig};
 use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, VisibilityConstants};
 use crate::hybrid::Hybrid;
-use crate::path_tracer::PathTracer;
+use crate::path_pass::PathPass;
+use crate::pipelines::PATHS;
 
 /// Either method.
 pub(crate) enum Renderer {
     Hybrid(Box<Hybrid>),
-    PathTrace { tracer: PathTracer, sums: Holder<BufferHandle> },
+    PathTrace { paths: PathPass, sums: Holder<BufferHandle> },
 }
 
 /// Addresses and indices of a method's data.
@@ -31,7 +32,7 @@ impl Renderer {
         Ok(match config.method {
             Method::Hybrid => Self::Hybrid(Box::new(Hybrid::new(ctx, config, occludes)?)),
             Method::PathTrace => Self::PathTrace {
-                tracer: PathTracer::new(ctx, config.path)?,
+                paths: PathPass::new(ctx, config.path, &PATHS)?,
                 sums: buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))?,
             },
         })
@@ -77,9 +78,14 @@ impl Renderer {
     ) -> lvk::Result<()> {
         match self {
             Self::Hybrid(hybrid) => hybrid.record(to, frame, scene),
-            Self::PathTrace { tracer, sums } => {
+            Self::PathTrace { paths, sums } => {
                 let push = Push { frame, argument: 0, _padding: 0 };
-                to.pass("paths", |cmd| tracer.record(cmd, &push, **sums, scene, extent))
+                let dependencies = Dependencies {
+                    buffers: &scene.buffers(**sums),
+                    read_buffers: scene.written,
+                    ..Dependencies::default()
+                };
+                to.pass("paths", |cmd| paths.record(cmd, &push, &dependencies, extent))
             }
         }
     }

@@ -1,23 +1,19 @@
 //! Rays and filters of the real-time method.
 
-use lvk::{
-    BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder,
-    RayTracingPipelineHandle, TextureHandle,
-};
-use lvk_samples::hybrid::RayPath;
+use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, TextureHandle};
 
 use crate::config::{Content, ViewerConfig};
 use crate::gpu::FrameScene;
 use crate::gpu::layout::{FRAME_LAYOUT, Push, SCENE_LAYOUTS};
-use crate::path_tracer::{compute, groups, ray_pipeline};
-use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, LIGHT_QUERY, LIGHT_RAYS, STEPS, TEMPORAL};
+use crate::path_pass::{PathPass, compute, groups};
+use crate::pipelines::{ANTIALIAS, COMPOSITE, FILTER, LIGHT, STEPS, TEMPORAL};
 
 /// Steps of the filter in space.
 const FILTER_STEPS: u32 = 4;
 
 /// The pipelines.
 pub(crate) struct Passes {
-    light: LightPass,
+    light: PathPass,
     temporal: Holder<ComputePipelineHandle>,
     filter: Holder<ComputePipelineHandle>,
     composite: Holder<ComputePipelineHandle>,
@@ -26,20 +22,12 @@ pub(crate) struct Passes {
     steps: Option<Holder<ComputePipelineHandle>>,
 }
 
-enum LightPass {
-    Pipeline(Holder<RayTracingPipelineHandle>),
-    Query(Holder<ComputePipelineHandle>),
-}
-
 impl Passes {
     pub(crate) fn new(ctx: &Context, config: &ViewerConfig) -> lvk::Result<Self> {
         let is_of_steps = config.content == Content::Steps;
         let filter = |stage| compute(ctx, stage, FRAME_LAYOUT);
         Ok(Self {
-            light: match config.path {
-                RayPath::Pipeline => LightPass::Pipeline(ray_pipeline(ctx, &[LIGHT_RAYS], "viewer light")?),
-                RayPath::Query => LightPass::Query(compute(ctx, LIGHT_QUERY, SCENE_LAYOUTS)?),
-            },
+            light: PathPass::new(ctx, config.path, &LIGHT)?,
             temporal: filter(TEMPORAL)?,
             filter: filter(FILTER)?,
             composite: filter(COMPOSITE)?,
@@ -63,18 +51,7 @@ impl Passes {
             sampled_images: visible,
             ..Dependencies::default()
         };
-        match &self.light {
-            LightPass::Pipeline(pipeline) => {
-                cmd.bind_ray_tracing_pipeline(**pipeline)?;
-                cmd.push_constants(push)?;
-                cmd.trace_rays([extent[0], extent[1], 1], &dependencies)
-            }
-            LightPass::Query(pipeline) => {
-                cmd.bind_compute_pipeline(**pipeline)?;
-                cmd.push_constants(push)?;
-                cmd.dispatch(groups(extent), &dependencies)
-            }
-        }
+        self.light.record(cmd, push, &dependencies, extent)
     }
 
     /// True if the picture is of the steps of rays.
