@@ -179,7 +179,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     ArgumentArray drawArguments; // of the geometries of all meshes
     NumberArray drawnCounts; // of each mesh: instances that culling leaves, and those in the frustum
     NumberArray wasVisible; // of each instance: not 0 if the last frame that looked for hidden ones found it visible
-    SumArray sums; // radiance of all samples so far and their number, for each pixel
+    SumArray sums; // radiance of all samples so far and their rays, for each pixel; of the real-time method the picture
     uint lightCount;
     uint discCount; // lights that are discs, which come first
     float skyProbability; // likewise

@@ -36,10 +36,11 @@ vec3 transmittanceOfLight(Surface surface, Arriving arriving) {
     return transmittanceTo(origin, way / distance, 0.9999 * distance);
 }
 
-// Light at a surface from one light or from the sky, drawn by chance: all of it, and what the matte layer scatters.
+// Light at a surface from one light or from the sky, drawn by chance.
 struct DirectLight {
     vec3 all;
-    vec3 matte;
+    vec3 matte; // of it what the matte layer scatters
+    uint rayCount; // shadow rays
 };
 
 // `extinction`: of the volume that the path came through.
@@ -47,7 +48,7 @@ DirectLight directLight(Surface surface, Bsdf bsdf, vec3 extinction, float choic
     Arriving arriving = drawLight(surface.position, choice, u);
     Response response = respond(surface, bsdf, arriving.direction);
     if (!any(greaterThan(response.value * arriving.radiance, vec3(0.0)))) {
-        return DirectLight(vec3(0.0), vec3(0.0));
+        return DirectLight(vec3(0.0), vec3(0.0), 0u);
     }
     vec3 way = transmittanceOfLight(surface, arriving);
     if (arriving.distance < kFar) {
@@ -55,7 +56,7 @@ DirectLight directLight(Surface surface, Bsdf bsdf, vec3 extinction, float choic
     }
     float share = arriving.density > 0.0 ? powerShare(arriving.density, response.density) : 1.0;
     vec3 light = share * way * arriving.radiance;
-    return DirectLight(light * response.value, light * response.matte);
+    return DirectLight(light * response.value, light * response.matte, 1u);
 }
 
 // A path under way, and the light that it has found so far.
@@ -69,6 +70,7 @@ struct Path {
     float spread; // of the cone that the path stands for, over its length; 0: textures are read unfiltered
     float width; // of the cone at the origin
     uint bounce; // number of the next surface, from 0
+    uint rayCount; // traced so far, shadow rays too
     vec3 throughput;
     vec3 radiance;
 };
@@ -76,11 +78,12 @@ struct Path {
 // A path from the eye.
 Path cameraPath(vec3 direction) {
     vec3 eye = frame.camera.eye;
-    return Path(eye, direction, -1.0, eye, vec3(0.0), 1.0, 0.0, 0.0, 0u, vec3(1.0), vec3(0.0));
+    return Path(eye, direction, -1.0, eye, vec3(0.0), 1.0, 0.0, 0.0, 0u, 0u, vec3(1.0), vec3(0.0));
 }
 
 // The next surface on the way of a path.
-Hit nextHit(Path path, Random random) {
+Hit nextHit(inout Path path, Random random) {
+    path.rayCount += 1u;
     return traceNearest(path.origin, path.direction, hashWords(random.seed + path.bounce, random.number));
 }
 
@@ -115,11 +118,12 @@ struct Bounce {
     float choice; // whether chance ends the path
 };
 
-Bounce bounceAt(Path path, Surface surface, inout Random random) {
+Bounce bounceAt(inout Path path, Surface surface, inout Random random) {
     Bsdf bsdf = bsdfOf(surface, -path.direction);
     vec2 lightChoices = nextPair(random);
     vec2 lightPlace = nextPair(random);
     DirectLight direct = directLight(surface, bsdf, path.extinction, lightChoices.x, lightPlace);
+    path.rayCount += direct.rayCount;
     vec2 choices = nextPair(random);
     vec2 u = nextPair(random);
     return Bounce(bsdf, direct, scatter(surface, bsdf, -path.direction, choices, u), lightChoices.y);

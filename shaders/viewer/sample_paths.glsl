@@ -15,7 +15,7 @@ Path samplePath(uvec2 pixel, inout Random random) {
 
 void samplePaths() {
     uint pixels = pixelCount();
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0); // radiance, and rays
     Path path;
     Random random;
     bool isUnderWay = false;
@@ -29,17 +29,17 @@ void samplePaths() {
                 continue;
             }
             if (sampled == 0u) {
-                sum = frame.sampleNumber == 0u ? vec3(0.0) : frame.sums.at[place].rgb;
+                sum = frame.sampleNumber == 0u ? vec4(0.0) : frame.sums.at[place];
             }
             random = randomOf(pixel, frame.sampleNumber + sampled);
             path = samplePath(pixel, random);
         }
         isUnderWay = advance(path, random);
         if (!isUnderWay) {
-            sum += radianceOf(path);
+            sum += vec4(radianceOf(path), float(path.rayCount));
             sampled += 1u;
             if (sampled == frame.sampleCount) {
-                frame.sums.at[place] = vec4(sum, float(frame.sampleNumber + sampled));
+                frame.sums.at[place] = sum;
                 sampled = 0u;
                 ++i;
             }

@@ -19,7 +19,7 @@ use crate::present::Present;
 use crate::renderer::Renderer;
 
 /// Samples of a pass of the path tracer, so that none takes long: on a GPU, and on a CPU.
-const GPU_PASS: u32 = 4;
+const GPU_PASS: u32 = 16;
 const CPU_PASS: u32 = 16;
 /// Distance of the near plane over the distance of what the camera looks at.
 const NEAR_SHARE: f32 = 1e-3;
@@ -257,14 +257,37 @@ impl Viewer {
     /// # Errors
     /// [`SampleError::Device`].
     pub fn radiance(&self) -> Result<Vec<[f32; 3]>, SampleError> {
+        let count = self.summed_samples().max(1) as f32;
+        let mean = |[red, green, blue, _]: [f32; 4]| [red, green, blue].map(|sum| sum / count);
+        Ok(self.sums()?.into_iter().map(mean).collect())
+    }
+
+    /// The number of rays of the last frame, shadow rays too. Only the path tracer counts them.
+    ///
+    /// # Errors
+    /// [`SampleError::Device`].
+    pub fn ray_count(&self) -> Result<Option<u64>, SampleError> {
+        if self.config.method == Method::Hybrid {
+            return Ok(None);
+        }
+        Ok(Some(self.sums()?.iter().map(|[.., rays]| *rays as u64).sum()))
+    }
+
+    /// Sums of all pixels: radiance, and the path tracer's rays.
+    fn sums(&self) -> Result<Vec<[f32; 4]>, SampleError> {
         let [width, height] = self.config.extent();
         let mut sums = vec![[0.0_f32; 4]; width as usize * height as usize];
         let (buffer, offset) = self.renderer.sums();
         self.ctx.download_buffer(buffer, offset, bytemuck::cast_slice_mut(&mut sums))?;
-        Ok(sums
-            .iter()
-            .map(|[red, green, blue, count]| [red, green, blue].map(|sum| sum / count.max(1.0)))
-            .collect())
+        Ok(sums)
+    }
+
+    /// Samples in the sums of the last frame. The hybrid method's picture is a mean already.
+    fn summed_samples(&self) -> u32 {
+        match self.config.method {
+            Method::Hybrid => 1,
+            Method::PathTrace => self.done,
+        }
     }
 
     pub(crate) fn set_camera(&mut self, camera: &Camera) {
@@ -339,16 +362,13 @@ impl Viewer {
             wanted_mips: self.scene.wanted_mips(),
         };
         self.renderer.record(frame, constants, extent, scene)?;
+        self.done += count;
         if is_shown {
-            let (push, sums, image) = (
-                Push { frame: constants, argument: 0, _padding: 0 },
-                self.renderer.sums().0,
-                self.target.image(),
-            );
+            let push = Push { frame: constants, argument: self.summed_samples(), _padding: 0 };
+            let (sums, image) = (self.renderer.sums().0, self.target.image());
             frame.pass("picture", |cmd| self.present.record(cmd, &push, sums, image, extent))?;
         }
         self.scene.end_frame(self.is_first());
-        self.done += count;
         self.frame_number = self.frame_number.wrapping_add(1);
         self.before = self.camera;
         Ok(())

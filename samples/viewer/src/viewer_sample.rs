@@ -122,6 +122,11 @@ impl Sample for Viewer {
     }
 
     fn remark(&self) -> Option<String> {
+        if let Some(rays) = self.ray_count().ok().flatten() {
+            let paths = f64::from(self.config.width) * f64::from(self.config.height) * f64::from(self.done);
+            let (rays, mean) = (rays as f64 / 1e6, rays as f64 / paths);
+            return Some(format!("rays      {rays:.1} million a frame, {mean:.1} a path"));
+        }
         let DrawnInstances { count, triangle_count, in_frustum } =
             self.drawn.known().filter(|_| self.config.culls())?;
         let all = self.counts().1;
