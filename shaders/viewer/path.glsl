@@ -24,39 +24,35 @@ vec3 extinctionTowards(Surface surface, vec3 direction, vec3 before) {
     return surface.isFront ? frame.materials.at[surface.material].extinction : vec3(0.0);
 }
 
-// The share of arriving light that nothing takes on its way. The ray does not begin on the surface but a little above it, so it is aimed
-// anew: along the direction from the surface, it would meet a light that stands low over the surface before its range ends.
-vec3 transmittanceOfLight(Surface surface, Arriving arriving) {
-    vec3 origin = leaveTo(surface, arriving.direction);
-    if (arriving.distance >= kFar) {
-        return transmittanceTo(origin, arriving.direction, kFar);
-    }
-    vec3 way = surface.position + arriving.distance * arriving.direction - origin;
-    float distance = max(length(way), 1e-6);
-    return transmittanceTo(origin, way / distance, 0.9999 * distance);
-}
-
-// Light at a surface from one light or from the sky, drawn by chance.
-struct DirectLight {
-    vec3 all;
+// A shadow ray that is to be traced when the path knows its way on, so that the surface need not be kept meanwhile: what is alive while
+// a ray is traced lies in memory.
+struct ShadowRay {
+    vec3 origin;
+    vec3 direction;
+    float range;
+    vec3 light; // that the surface returns where nothing is in the way of the ray
     vec3 matte; // of it what the matte layer scatters
-    uint rayCount; // shadow rays
 };
 
-// `extinction`: of the volume that the path came through.
-DirectLight directLight(Surface surface, Bsdf bsdf, vec3 extinction, float choice, vec2 u) {
+// A ray to one light or to the sky, drawn by chance. `extinction`: of the volume that the path came through. The ray does not begin on
+// the surface but a little above it, so it is aimed anew: along the direction from the surface, it would meet a light that stands low
+// over the surface before its range ends.
+ShadowRay shadowRay(Surface surface, Bsdf bsdf, vec3 extinction, float choice, vec2 u) {
     Arriving arriving = drawLight(surface.position, choice, u);
     Response response = respond(surface, bsdf, arriving.direction);
-    if (!any(greaterThan(response.value * arriving.radiance, vec3(0.0)))) {
-        return DirectLight(vec3(0.0), vec3(0.0), 0u);
-    }
-    vec3 way = transmittanceOfLight(surface, arriving);
-    if (arriving.distance < kFar) {
-        way *= exp(-extinctionTowards(surface, arriving.direction, extinction) * arriving.distance);
-    }
     float share = arriving.density > 0.0 ? powerShare(arriving.density, response.density) : 1.0;
-    vec3 light = share * way * arriving.radiance;
-    return DirectLight(light * response.value, light * response.matte, 1u);
+    vec3 light = share * arriving.radiance;
+    ShadowRay ray = ShadowRay(leaveTo(surface, arriving.direction), arriving.direction, kFar, vec3(0.0), vec3(0.0));
+    if (arriving.distance < kFar) {
+        light *= exp(-extinctionTowards(surface, arriving.direction, extinction) * arriving.distance);
+        vec3 way = surface.position + arriving.distance * arriving.direction - ray.origin;
+        float distance = max(length(way), 1e-6);
+        ray.direction = way / distance;
+        ray.range = 0.9999 * distance;
+    }
+    ray.light = light * response.value;
+    ray.matte = light * response.matte;
+    return ray;
 }
 
 // A path under way, and the light that it has found so far.
@@ -110,23 +106,22 @@ float emissionShare(Path path, Hit hit, Surface surface) {
     return powerShare(path.density, density);
 }
 
-// What a path finds at a surface by a shadow ray, and how it goes on from there.
+// How a path goes on from a surface.
 struct Bounce {
     Bsdf bsdf;
-    DirectLight direct;
+    ShadowRay shadow;
     Scattered scattered;
     float choice; // whether chance ends the path
 };
 
-Bounce bounceAt(inout Path path, Surface surface, inout Random random) {
+Bounce bounceAt(Path path, Surface surface, inout Random random) {
     Bsdf bsdf = bsdfOf(surface, -path.direction);
     vec2 lightChoices = nextPair(random);
     vec2 lightPlace = nextPair(random);
-    DirectLight direct = directLight(surface, bsdf, path.extinction, lightChoices.x, lightPlace);
-    path.rayCount += direct.rayCount;
+    ShadowRay shadow = shadowRay(surface, bsdf, path.extinction, lightChoices.x, lightPlace);
     vec2 choices = nextPair(random);
     vec2 u = nextPair(random);
-    return Bounce(bsdf, direct, scatter(surface, bsdf, -path.direction, choices, u), lightChoices.y);
+    return Bounce(bsdf, shadow, scatter(surface, bsdf, -path.direction, choices, u), lightChoices.y);
 }
 
 // Leads a path on from a surface. False: it ends there.
@@ -156,6 +151,15 @@ bool follow(inout Path path, Surface surface, Bounce bounce) {
     return path.bounce <= frame.maxBounces;
 }
 
+// The share of the light of a shadow ray that nothing takes.
+vec3 transmittanceOf(ShadowRay ray, inout Path path) {
+    if (!any(greaterThan(ray.light, vec3(0.0)))) {
+        return vec3(0.0);
+    }
+    path.rayCount += 1u;
+    return transmittanceTo(ray.origin, ray.direction, ray.range);
+}
+
 // Leads a path from its origin to the next surface, and on from there. False: it ends.
 bool advance(inout Path path, inout Random random) {
     Hit hit = nextHit(path, random);
@@ -170,9 +174,11 @@ bool advance(inout Path path, inout Random random) {
     }
     path.radiance += path.throughput * emissionShare(path, hit, surface) * surface.emission;
     Bounce bounce = bounceAt(path, surface, random);
-    path.radiance += path.throughput * bounce.direct.all;
+    vec3 light = path.throughput * bounce.shadow.light;
     path.throughput *= bounce.scattered.weight;
-    return follow(path, surface, bounce);
+    bool goesOn = follow(path, surface, bounce);
+    path.radiance += light * transmittanceOf(bounce.shadow, path);
+    return goesOn;
 }
 
 // The light of a path that has ended.

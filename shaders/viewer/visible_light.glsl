@@ -96,8 +96,8 @@ FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen
     seen.roughness = surface.coat > 0.0 ? min(surface.roughness, surface.coatRoughness) : surface.roughness;
     storeSurface(place, seen, surface.emission, bsdf.diffuse + bsdf.sheen, isClear ? vec3(1.0) : bsdf.reflected);
     path.throughput = vec3(any(greaterThan(weight, vec3(0.0))));
-    DirectLight direct = bounce.direct;
-    return FirstLight(direct.matte, direct.all - direct.matte, bounce.scattered.matte, weight - bounce.scattered.matte);
+    ShadowRay shadow = bounce.shadow;
+    return FirstLight(shadow.matte, shadow.light - shadow.matte, bounce.scattered.matte, weight - bounce.scattered.matte);
 }
 
 // Leads a path to the next surface, of which the rasteriser knows the first, and on from there. False: it ends.
@@ -135,13 +135,21 @@ bool advanceLight(inout Path path, inout FirstLight first, uvec2 pixel, inout Ra
         }
     }
     Bounce bounce = bounceAt(path, surface, random);
+    vec3 light = path.throughput * bounce.shadow.light;
     if (isFirst) {
         first = leaveFirst(path, surface, bounce, seen, place);
     } else {
-        path.radiance += path.throughput * bounce.direct.all;
         path.throughput *= bounce.scattered.weight;
     }
-    return follow(path, surface, bounce);
+    bool goesOn = follow(path, surface, bounce);
+    vec3 share = transmittanceOf(bounce.shadow, path);
+    if (isFirst) {
+        first.matte *= share;
+        first.mirrored *= share;
+    } else {
+        path.radiance += light * share;
+    }
+    return goesOn;
 }
 
 void visibleLight() {
