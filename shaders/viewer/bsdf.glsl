@@ -136,8 +136,11 @@ Bsdf bsdfOf(Surface surface, vec3 view) {
     float ior = max(surface.ior, 1.0);
     bsdf.eta = surface.isFront ? ior : 1.0 / ior;
     float below = belowCoat(surface, view);
-    vec3 coatSplit = splitAlbedo(bsdf.coatView.z, surface.coatRoughness);
-    bsdf.coat = surface.coat * rescattering(vec3(kCoatF0), coatSplit).x;
+    bsdf.coat = 0.0;
+    if (surface.coat > 0.0) {
+        vec3 coatSplit = splitAlbedo(bsdf.coatView.z, surface.coatRoughness);
+        bsdf.coat = surface.coat * rescattering(vec3(kCoatF0), coatSplit).x;
+    }
     bsdf.lobes[kCoatLobe] = 1.0 - below;
     setLayers(bsdf, surface, below, splitAlbedo(bsdf.view.z, surface.roughness));
     float sum = 0.0;

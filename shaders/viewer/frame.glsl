@@ -17,6 +17,7 @@ const uint kDoubleSided = 4u;
 const uint kUnlit = 8u;
 const uint kTangents = 32u; // the surface has a direction: a normal map or anisotropy
 const uint kThin = 16u; // light that passes keeps its direction: there is no volume behind the surface
+const uint kExtensions = 64u; // more than base colour, metalness, roughness, emission, normals and anisotropy
 
 // What a texture multiplies (places in Material.slots).
 const uint kSlotBaseColor = 0u;

@@ -1,6 +1,4 @@
-// Samples of the pixels of an invocation: paths from the camera, in one loop. Where a path ends the next begins, so that invocations
-// that run together wait for their sums of paths and not for the longest path of each sample (Novak et al., "Path Regeneration for
-// Interactive Path Tracing", 2010).
+// Samples of the pixels of an invocation: paths from the camera, in one loop.
 #ifndef VIEWER_SAMPLE_PATHS
 #define VIEWER_SAMPLE_PATHS
 

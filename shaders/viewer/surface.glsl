@@ -123,7 +123,7 @@ void setRoughness(inout Surface surface, Texcoords texcoords, float footprint) {
 void addFilm(inout Surface surface, Texcoords texcoords, float footprint, vec3 view) {
     MaterialArray all = frame.materials;
     uint number = surface.material;
-    if (all.at[number].film <= 0.0) {
+    if ((surface.flags & kExtensions) == 0u || all.at[number].film <= 0.0) {
         return;
     }
     float share = all.at[number].film * texelOf(number, kSlotFilm, texcoords, footprint).r;
@@ -134,6 +134,21 @@ void addFilm(inout Surface surface, Texcoords texcoords, float footprint, vec3 v
     surface.f0 = mix(surface.f0, filmF0(surface.f0, all.at[number].filmIor, thickness, cosine), share);
 }
 
+// What most materials lack. `straight`: reflectance straight on by the index of refraction.
+void setExtensions(inout Surface surface, float straight, Texcoords texcoords, float footprint) {
+    uint number = surface.material;
+    MaterialArray all = frame.materials;
+    surface.transmission = all.at[number].transmission * texelOf(number, kSlotTransmission, texcoords, footprint).r;
+    float specular = all.at[number].specular * texelOf(number, kSlotSpecular, texcoords, footprint).a;
+    vec3 specularColor = all.at[number].specularColor * texelOf(number, kSlotSpecularColor, texcoords, footprint).rgb;
+    surface.f0 = min(straight * specularColor, vec3(1.0)) * specular;
+    surface.f90 = specular;
+    surface.coat = all.at[number].coat * texelOf(number, kSlotCoat, texcoords, footprint).r;
+    surface.coatRoughness = all.at[number].coatRoughness * texelOf(number, kSlotCoatRoughness, texcoords, footprint).g;
+    surface.sheenColor = all.at[number].sheenColor * texelOf(number, kSlotSheenColor, texcoords, footprint).rgb;
+    surface.sheenRoughness = all.at[number].sheenRoughness * texelOf(number, kSlotSheenRoughness, texcoords, footprint).a;
+}
+
 void setMaterial(inout Surface surface, Texcoords texcoords, float footprint) {
     uint number = surface.material;
     MaterialArray all = frame.materials;
@@ -142,18 +157,19 @@ void setMaterial(inout Surface surface, Texcoords texcoords, float footprint) {
     surface.roughness = clamp(all.at[number].roughness * metalRough.g, 0.0, 1.0);
     setRoughness(surface, texcoords, footprint);
     surface.emission = all.at[number].emission * texelOf(number, kSlotEmission, texcoords, footprint).rgb;
-    surface.transmission = all.at[number].transmission * texelOf(number, kSlotTransmission, texcoords, footprint).r;
     surface.ior = all.at[number].ior;
-    float specular = all.at[number].specular * texelOf(number, kSlotSpecular, texcoords, footprint).a;
-    vec3 specularColor = all.at[number].specularColor * texelOf(number, kSlotSpecularColor, texcoords, footprint).rgb;
-    float straight = (surface.ior - 1.0) / (surface.ior + 1.0);
-    surface.f0 = min(straight * straight * specularColor, vec3(1.0)) * specular;
-    surface.f90 = specular;
     surface.metalF0 = surface.baseColor;
-    surface.coat = all.at[number].coat * texelOf(number, kSlotCoat, texcoords, footprint).r;
-    surface.coatRoughness = all.at[number].coatRoughness * texelOf(number, kSlotCoatRoughness, texcoords, footprint).g;
-    surface.sheenColor = all.at[number].sheenColor * texelOf(number, kSlotSheenColor, texcoords, footprint).rgb;
-    surface.sheenRoughness = all.at[number].sheenRoughness * texelOf(number, kSlotSheenRoughness, texcoords, footprint).a;
+    float straight = (surface.ior - 1.0) / (surface.ior + 1.0);
+    surface.f0 = vec3(min(straight * straight, 1.0));
+    surface.f90 = 1.0;
+    surface.transmission = 0.0;
+    surface.coat = 0.0;
+    surface.coatRoughness = 0.0;
+    surface.sheenColor = vec3(0.0);
+    surface.sheenRoughness = 0.0;
+    if ((surface.flags & kExtensions) != 0u) {
+        setExtensions(surface, straight * straight, texcoords, footprint);
+    }
 }
 
 // `width`: of the ray at the surface; 0 for texels of the largest mip.

@@ -1,5 +1,5 @@
 // The light of what each pixel of an invocation shows, of one sample: a shadow ray, and a path in a direction that the surface prefers.
-// Matte layers and all others are kept apart, without their colours, for the filter. As in sample_paths.glsl all paths share a loop.
+// Matte layers and all others are kept apart, without their colours, for the filter. All paths share a loop.
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 

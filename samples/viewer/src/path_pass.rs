@@ -12,7 +12,9 @@ use crate::pipelines::{CANDIDATE, NEAREST_HIT, NEAREST_MISS, SAMPLE};
 
 /// Side of a work group in pixels.
 const GROUP: u32 = 8;
-/// Pixels of an invocation (`shaders/viewer/pixel_loop.glsl`), below each other in as many parts of the picture.
+/// Pixels of an invocation of queries on a GPU (`shaders/viewer/pixel_loop.glsl`), in as many parts of the picture. With 1, 2, 4 and
+/// 8 of them an H100 takes 39.7, 38.0, 34.9 and 34.1 ms for the light of the kitchen in software, and a pipeline 28.9, 43.6, 49.1 and
+/// 51.6 ms.
 const PIXELS_EACH: u32 = 4;
 
 /// The shaders of paths, either of which is enough.
@@ -22,7 +24,7 @@ pub(crate) struct PathStages {
     pub(crate) debug_name: &'static str,
 }
 
-/// A launch whose invocations follow the paths of several pixels each.
+/// A launch that follows the paths of all pixels.
 pub(crate) enum PathPass {
     Pipeline(Holder<RayTracingPipelineHandle>),
     /// The second member is true on a CPU, where a work group goes through its own block of pixels.
@@ -47,17 +49,17 @@ impl PathPass {
         dependencies: &Dependencies<'_>,
         [width, height]: [u32; 2],
     ) -> lvk::Result<()> {
-        let rows = height.div_ceil(PIXELS_EACH);
         match self {
             Self::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
-                cmd.trace_rays([width, rows, 1], dependencies)
+                cmd.trace_rays([width, height, 1], dependencies)
             }
             Self::Query(pipeline, is_cpu) => {
                 cmd.bind_compute_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
-                cmd.dispatch(groups([width, if *is_cpu { height } else { rows }]), dependencies)
+                let rows = if *is_cpu { height } else { height.div_ceil(PIXELS_EACH) };
+                cmd.dispatch(groups([width, rows]), dependencies)
             }
         }
     }

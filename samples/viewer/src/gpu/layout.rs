@@ -18,6 +18,7 @@ pub(crate) mod material_flag {
     pub(crate) const UNLIT: u32 = 8;
     pub(crate) const THIN: u32 = 16;
     pub(crate) const TANGENTS: u32 = 32;
+    pub(crate) const EXTENSIONS: u32 = 64;
 }
 
 /// Places in `Material.slots`.

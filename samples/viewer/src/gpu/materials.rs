@@ -165,6 +165,17 @@ fn flags(material: &Material) -> u32 {
         | set(material.unlit, material_flag::UNLIT)
         | set(is_thin(material), material_flag::THIN)
         | set(has_tangents(material), material_flag::TANGENTS)
+        | set(has_extensions(material), material_flag::EXTENSIONS)
+}
+
+/// True if the surface needs more than its base colour, metalness, roughness, emission, normals and anisotropy.
+fn has_extensions(material: &Material) -> bool {
+    let Material { clearcoat, sheen, transmission, specular, iridescence, .. } = material;
+    clearcoat.is_some()
+        || sheen.is_some()
+        || transmission.is_some()
+        || specular.is_some()
+        || iridescence.is_some()
 }
 
 #[cfg(test)]
