@@ -142,10 +142,14 @@ pub mod bench {
     pub const BUILT_IN_NUMBERS: &[(&str, &str)] = &[("BENCH_BUILT_IN", "1")];
     /// Macros of the compute stage that traces shadow rays.
     pub const SHADOW_RAYS: &[(&str, &str)] = &[("BENCH_SHADOW", "1")];
+    /// Macros of the compute stage that traces bounce rays.
+    pub const BOUNCE_RAYS: &[(&str, &str)] = &[("BENCH_BOUNCE", "1")];
     /// A primary ray of a pixel.
     pub const PRIMARY_RGEN: &str = include_str!("../../shaders/bench/primary.rgen.glsl");
     /// A shadow ray of a pixel.
     pub const SHADOW_RGEN: &str = include_str!("../../shaders/bench/shadow.rgen.glsl");
+    /// A bounce ray of a pixel.
+    pub const BOUNCE_RGEN: &str = include_str!("../../shaders/bench/bounce.rgen.glsl");
     /// A primary ray that left the scene.
     pub const PRIMARY_RMISS: &str = include_str!("../../shaders/bench/primary.rmiss.glsl");
     /// A shadow ray that reached the light.

@@ -1,4 +1,4 @@
-// Primary rays by query, or with BENCH_SHADOW those towards the light.
+// Primary rays by query, or with BENCH_SHADOW those towards the light, or with BENCH_BOUNCE those that go on from their hits.
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 #include "common/group_pixel.glsl"
@@ -19,16 +19,29 @@ void trace(uvec2 pixel, uint index) {
     lit.at[index] = lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_NONE ? 1u : 0u;
 }
 #else
-void trace(uvec2 pixel, uint index) {
+Hit nearest(vec3 origin, vec3 direction) {
     LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, eye, 0.0, pixelDirection(pixel), kFar);
+    lvkRayQueryInitialize(rq, tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, origin, 0.0, direction, kFar);
     while (lvkRayQueryProceed(rq)) {}
     Hit hit = Hit(kNoHit, 0u);
     if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
         hit = Hit(lvkRayQueryT(rq, LVK_COMMITTED), uint(lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED, tlas)));
     }
-    hits.at[index] = hit;
+    return hit;
 }
+
+#ifdef BENCH_BOUNCE
+void trace(uvec2 pixel, uint index) {
+    BounceRay ray = bounceRays.at[index];
+    if (ray.direction != vec3(0.0)) {
+        bounceHits.at[index] = nearest(ray.origin, ray.direction);
+    }
+}
+#else
+void trace(uvec2 pixel, uint index) {
+    hits.at[index] = nearest(eye, pixelDirection(pixel));
+}
+#endif
 #endif
 
 void main() {

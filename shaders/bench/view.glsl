@@ -10,9 +10,18 @@ struct Hit {
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer Hits { Hit at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Lit { uint at[]; };
 
+struct BounceRay {
+    vec3 origin;
+    vec3 direction; // 0 where the primary ray left the scene
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BounceRays { BounceRay at[]; };
+
 layout(push_constant, scalar) uniform Push {
     Hits hits;
     Lit lit;
+    BounceRays bounceRays;
+    Hits bounceHits;
     uint tlas;
     uint width;
     uint height;

@@ -11,7 +11,7 @@ use crate::error::BenchError;
 use crate::measure::median_of;
 use crate::mesh::Mesh;
 use crate::table::{Table, format_grouped, format_ms, format_ratio};
-use crate::tree_rays::{bounce_rays, camera_rays, trace_all};
+use crate::tree_rays::{all_camera_rays, bounce_rays, trace_all};
 
 /// The builds on one number of threads.
 struct ThreadRow {
@@ -65,7 +65,7 @@ pub(super) fn measure(bench: &BenchArgs, args: &BuildsArgs) -> Result<Table, Ben
 fn add_trees(table: &mut Table, mesh: &Mesh, trees: &[(&str, WideTree)], quick: bool) {
     let Some((_, first)) = trees.first() else { return };
     let costs: Vec<f64> = trees.iter().map(|(_, tree)| tree.sah_cost()).collect();
-    let primary = camera_rays(mesh, if quick { [16, 9] } else { [320, 180] });
+    let primary = all_camera_rays(mesh, if quick { [16, 9] } else { [320, 180] });
     let bounced = bounce_rays(first, &primary);
     for (kind, rays) in [("primary", &primary), ("bounce", &bounced)] {
         let traced = trace_all(trees, rays, if quick { 1 } else { 5 });

@@ -16,6 +16,7 @@ pub fn pipelines() -> Vec<SamplePipeline> {
         tracing("bench: rays by pipeline, built-in numbers", texts::BUILT_IN_NUMBERS),
         compute("bench: primary rays by query", &[]),
         compute("bench: shadow rays by query", texts::SHADOW_RAYS),
+        compute("bench: bounce rays by query", texts::BOUNCE_RAYS),
     ]
 }
 
@@ -23,12 +24,13 @@ fn tracing(name: &'static str, defines: &'static [(&'static str, &'static str)])
     SamplePipeline { name, stages: stages(defines).to_vec(), color: Vec::new(), depth: None }
 }
 
-/// Returns the stages for primary and shadow rays: two ray generation shaders, two miss shaders, one closest-hit shader.
-pub(super) fn stages(defines: &'static [(&'static str, &'static str)]) -> [SampleStage; 5] {
+/// Returns the stages for primary, shadow and bounce rays: three ray generation shaders, two miss shaders, one closest-hit shader.
+pub(super) fn stages(defines: &'static [(&'static str, &'static str)]) -> [SampleStage; 6] {
     let stage = |stage, text, name| SampleStage { stage, text, defines, name };
     [
         stage(ShaderStage::RayGen, texts::PRIMARY_RGEN, "primary.rgen"),
         stage(ShaderStage::RayGen, texts::SHADOW_RGEN, "shadow.rgen"),
+        stage(ShaderStage::RayGen, texts::BOUNCE_RGEN, "bounce.rgen"),
         stage(ShaderStage::Miss, texts::PRIMARY_RMISS, "primary.rmiss"),
         stage(ShaderStage::Miss, texts::SHADOW_RMISS, "shadow.rmiss"),
         stage(ShaderStage::ClosestHit, texts::PRIMARY_RCHIT, "primary.rchit"),
@@ -39,7 +41,7 @@ fn compute(name: &'static str, defines: &'static [(&'static str, &'static str)])
     SamplePipeline { name, stages: vec![query_stage(defines)], color: Vec::new(), depth: None }
 }
 
-/// Returns the compute stage that traces by ray query: primary rays, or shadow rays by `defines`.
+/// Returns the compute stage that traces by ray query: primary rays, or shadow or bounce rays by `defines`.
 pub(super) fn query_stage(defines: &'static [(&'static str, &'static str)]) -> SampleStage {
     SampleStage { stage: ShaderStage::Compute, text: texts::RAYS_COMP, defines, name: "rays.comp" }
 }

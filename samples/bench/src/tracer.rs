@@ -1,4 +1,4 @@
-//! Traces the primary rays of an image and a shadow ray from each hit, by ray tracing pipeline or by ray query.
+//! Traces the primary rays of an image, and a shadow ray and a bounce ray from each hit, by ray tracing pipeline or by ray query.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
 use glam::Vec3;
@@ -10,6 +10,7 @@ use lvk::{
 
 use crate::mesh::Mesh;
 use crate::pipelines::{SAMPLE, query_stage, stages};
+use crate::tree_rays::{Ray, bounce, camera_rays};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::pipelines::SampleStage;
 use lvk_samples::shaders::bench as texts;
@@ -24,10 +25,14 @@ pub(super) enum RayKind {
     Primary,
     /// One ray from each hit to the light.
     Shadow,
+    /// One ray from each hit in a direction around its surface, as of diffuse light.
+    Bounce,
 }
 
 impl RayKind {
-    /// Both kinds, in tracing order.
+    /// All kinds, in tracing order.
+    pub(super) const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Bounce];
+    /// The kinds that need nothing but an image.
     pub(super) const BOTH: [Self; 2] = [Self::Primary, Self::Shadow];
 
     /// Returns the name for tables.
@@ -35,6 +40,7 @@ impl RayKind {
         match self {
             Self::Primary => "primary rays",
             Self::Shadow => "shadow rays",
+            Self::Bounce => "bounce rays",
         }
     }
 }
@@ -55,6 +61,8 @@ pub(super) struct Hit {
 pub(super) struct View {
     hits: u64,
     lit: u64,
+    bounce_rays: u64,
+    bounce_hits: u64,
     tlas: u32,
     size: [u32; 2],
     eye: [f32; 3],
@@ -69,8 +77,15 @@ pub(super) struct TracedImage {
     ctx: Context,
     hits: Holder<BufferHandle>,
     lit: Holder<BufferHandle>,
+    bounces: Option<Bounces>,
     pub(super) size: [u32; 2],
     pub(super) view: View,
+}
+
+/// Bounce rays and their hits.
+struct Bounces {
+    rays: Holder<BufferHandle>,
+    hits: Holder<BufferHandle>,
 }
 
 /// The pipelines of one ray tracing path.
@@ -80,7 +95,8 @@ pub(super) struct MeshTracer {
 
 enum Pipelines {
     Tracing(Holder<RayTracingPipelineHandle>),
-    Compute { primary: Holder<ComputePipelineHandle>, shadow: Holder<ComputePipelineHandle> },
+    /// For each of [`RayKind::ALL`].
+    Compute([Holder<ComputePipelineHandle>; 3]),
 }
 
 impl TracedImage {
@@ -94,7 +110,42 @@ impl TracedImage {
         let lit = buffer(pixels * size_of::<u32>() as u64, "lit pixels")?;
         let addresses = [ctx.buffer_address(*hits)?, ctx.buffer_address(*lit)?];
         let view = View::new(mesh, addresses, size, tlas);
-        Ok(Self { ctx: ctx.clone(), hits, lit, size, view })
+        Ok(Self { ctx: ctx.clone(), hits, lit, bounces: None, size, view })
+    }
+
+    /// Sets the bounce ray of each pixel. A direction of 0 is none.
+    pub(super) fn set_bounce_rays(&mut self, rays: &[Ray]) -> lvk::Result<()> {
+        let words: Vec<_> = rays.iter().flat_map(|ray| [ray.origin, ray.direction]).collect();
+        let rays = self.ctx.create_buffer(&BufferDesc {
+            data: Some(bytemuck::cast_slice(&words)),
+            debug_name: "bounce rays",
+            ..BufferDesc::default()
+        })?;
+        let size_bytes = (words.len() / 2 * size_of::<Hit>()) as u64;
+        let hits = self.ctx.create_buffer(&BufferDesc {
+            size_bytes,
+            debug_name: "hits of bounce rays",
+            ..BufferDesc::default()
+        })?;
+        self.view.bounce_rays = self.ctx.buffer_address(*rays)?;
+        self.view.bounce_hits = self.ctx.buffer_address(*hits)?;
+        self.bounces = Some(Bounces { rays, hits });
+        Ok(())
+    }
+
+    /// Returns a bounce ray for each pixel whose primary ray hit the mesh, and a direction of 0 for the others.
+    pub(super) fn bounce_rays(&self, mesh: &Mesh) -> lvk::Result<Vec<Ray>> {
+        let rays = camera_rays(&mesh.camera, self.size);
+        let bounced =
+            |(number, (ray, hit)): (usize, (Ray, Hit))| match mesh.triangles.get(hit.primitive as usize) {
+                Some(corners) if hit.t >= 0.0 => {
+                    let triangle = corners.map(|corner| Vec3::from(mesh.positions[corner as usize]));
+                    let ray = Ray { direction: ray.direction.normalize(), ..ray };
+                    bounce(number, &ray, hit.t, triangle)
+                }
+                _ => Ray { origin: Vec3::ZERO, direction: Vec3::ZERO },
+            };
+        Ok(rays.into_iter().zip(self.hits()?).enumerate().map(bounced).collect())
     }
 
     /// Downloads the hits of the primary rays.
@@ -116,7 +167,7 @@ impl TracedImage {
         let hits = self.hits()?;
         Ok(match rays {
             RayKind::Primary => hits.len(),
-            RayKind::Shadow => hits.iter().filter(|hit| hit.t >= 0.0).count(),
+            RayKind::Shadow | RayKind::Bounce => hits.iter().filter(|hit| hit.t >= 0.0).count(),
         })
     }
 
@@ -138,6 +189,8 @@ impl View {
         Self {
             hits,
             lit,
+            bounce_rays: 0,
+            bounce_hits: 0,
             tlas,
             size,
             eye: mesh.camera.eye,
@@ -157,10 +210,11 @@ impl MeshTracer {
                     stages(&[]).iter().map(|stage| stage.create(ctx, SAMPLE)).collect();
                 Pipelines::Tracing(tracing_pipeline(ctx, &modules?)?)
             }
-            RayPath::Query => Pipelines::Compute {
-                primary: compute_pipeline(ctx, &[])?,
-                shadow: compute_pipeline(ctx, texts::SHADOW_RAYS)?,
-            },
+            RayPath::Query => Pipelines::Compute([
+                compute_pipeline(ctx, &[])?,
+                compute_pipeline(ctx, texts::SHADOW_RAYS)?,
+                compute_pipeline(ctx, texts::BOUNCE_RAYS)?,
+            ]),
         };
         Ok(Self { pipelines })
     }
@@ -168,7 +222,7 @@ impl MeshTracer {
     /// Creates a ray tracing pipeline from compiled SPIR-V, one module for each of [`stages`].
     pub(super) fn from_spirv(
         ctx: &Context,
-        stages: &[SampleStage; 5],
+        stages: &[SampleStage; 6],
         words: &[Vec<u32>],
     ) -> lvk::Result<Self> {
         let module = |(stage, words): (&SampleStage, &Vec<u32>)| {
@@ -179,7 +233,7 @@ impl MeshTracer {
         Ok(Self { pipelines: Pipelines::Tracing(tracing_pipeline(ctx, &modules?)?) })
     }
 
-    /// Records a trace of the image. Trace the primary rays before the shadow rays.
+    /// Records a trace of the image. Trace the primary rays before the shadow rays, and set bounce rays before they are traced.
     pub(super) fn record(
         &self,
         cmd: &mut CommandBuffer,
@@ -188,7 +242,13 @@ impl MeshTracer {
     ) -> lvk::Result<()> {
         let [width, height] = image.size;
         let writes = [*image.hits, *image.lit];
+        let bounces: Vec<_> =
+            image.bounces.iter().flat_map(|bounces| [*bounces.rays, *bounces.hits]).collect();
+        let (bounce_rays, bounce_hits) = bounces.split_at(bounces.len() / 2);
         let dependencies = match rays {
+            RayKind::Bounce => {
+                Dependencies { read_buffers: bounce_rays, buffers: bounce_hits, ..Dependencies::default() }
+            }
             RayKind::Primary => Dependencies { buffers: &writes[..1], ..Dependencies::default() },
             RayKind::Shadow => {
                 Dependencies { read_buffers: &writes[..1], buffers: &writes[1..], ..Dependencies::default() }
@@ -200,8 +260,8 @@ impl MeshTracer {
                 cmd.push_constants(&image.view)?;
                 cmd.trace_rays_with(rays as u32, [width, height, 1], &dependencies)
             }
-            Pipelines::Compute { primary, shadow } => {
-                cmd.bind_compute_pipeline(if rays == RayKind::Primary { **primary } else { **shadow })?;
+            Pipelines::Compute(pipelines) => {
+                cmd.bind_compute_pipeline(*pipelines[rays as usize])?;
                 cmd.push_constants(&image.view)?;
                 cmd.dispatch(
                     [width.div_ceil(WORKGROUP_SIDE), height.div_ceil(WORKGROUP_SIDE), 1],
@@ -221,9 +281,9 @@ fn tracing_pipeline(
         modules[range].iter().map(Holder::handle).collect()
     };
     ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &handles(0..2),
-        miss: &handles(2..4),
-        hit_groups: &[HitGroup { closest_hit: Some(modules[4].handle()), ..HitGroup::default() }],
+        ray_gen: &handles(0..3),
+        miss: &handles(3..5),
+        hit_groups: &[HitGroup { closest_hit: Some(modules[5].handle()), ..HitGroup::default() }],
         debug_name: "bench rays",
         ..RayTracingPipelineDesc::default()
     })

@@ -10,6 +10,7 @@ use lvk::test_hooks::{CHILDREN, WideChild, WideLink, WideTree};
 
 use crate::measure::{elapsed_ms, median_of};
 use crate::mesh::Mesh;
+use lvk_samples::scene::Camera;
 
 /// A ray; the direction has any length, and distances count lengths of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,21 +28,23 @@ pub(super) struct RayWork {
     pub(super) time: f64,
 }
 
+/// Returns the rays of the pixels of a camera, row by row from the top.
+pub(super) fn camera_rays(camera: &Camera, [width, height]: [u32; 2]) -> Vec<Ray> {
+    let [right, up, forward] = camera.frame().map(Vec3::from_array);
+    let half = (camera.vertical_fov_degrees.to_radians() / 2.0).tan();
+    let aspect = width as f32 / height as f32;
+    let ray = |number: u32| {
+        let share = |at: u32, of: u32| (at as f32 + 0.5) / of as f32 * 2.0 - 1.0;
+        let (x, y) = (share(number % width, width), share(number / width, height));
+        let direction = forward + right * (x * half * aspect) - up * (y * half);
+        Ray { origin: Vec3::from_array(camera.eye), direction }
+    };
+    (0..width * height).map(ray).collect()
+}
+
 /// Returns rays of all cameras of the mesh, `size` each.
-pub(super) fn camera_rays(mesh: &Mesh, [width, height]: [u32; 2]) -> Vec<Ray> {
-    let mut rays = Vec::new();
-    for camera in mesh.cameras {
-        let [right, up, forward] = camera.frame().map(Vec3::from_array);
-        let half = (camera.vertical_fov_degrees.to_radians() / 2.0).tan();
-        let aspect = width as f32 / height as f32;
-        for number in 0..width * height {
-            let share = |at: u32, of: u32| (at as f32 + 0.5) / of as f32 * 2.0 - 1.0;
-            let (x, y) = (share(number % width, width), share(number / width, height));
-            let direction = forward + right * (x * half * aspect) - up * (y * half);
-            rays.push(Ray { origin: Vec3::from_array(camera.eye), direction });
-        }
-    }
-    rays
+pub(super) fn all_camera_rays(mesh: &Mesh, size: [u32; 2]) -> Vec<Ray> {
+    mesh.cameras.iter().flat_map(|camera| camera_rays(camera, size)).collect()
 }
 
 /// Returns rays that go on from where `rays` end, in directions around the surface, for diffuse light.
@@ -49,21 +52,24 @@ pub(super) fn bounce_rays(tree: &WideTree, rays: &[Ray]) -> Vec<Ray> {
     let mut bounced = Vec::new();
     for (number, ray) in rays.iter().enumerate() {
         let Some(hit) = closest(tree, ray, &mut RayWork::default()) else { continue };
-        let [a, b, c] = tree.triangles[hit.triangle];
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-        // Cosine distribution: a point of the unit sphere, moved by the normal. The points are a lattice.
-        let share = |step: u64| {
-            ((number as u64 + 1).wrapping_mul(step) & u64::from(u32::MAX)) as f32 / 2_f32.powi(32)
-        };
-        let (height, turn) = (share(0x9e37_79b9) * 2.0 - 1.0, share(0x85eb_ca77) * std::f32::consts::TAU);
-        let around = (1.0 - height * height).max(0.0).sqrt();
-        let on_sphere = Vec3::new(around * turn.cos(), around * turn.sin(), height);
-        let at = ray.origin + ray.direction * hit.distance;
-        let offset = 1e-4 * (1.0 + at.abs().max_element());
-        bounced.push(Ray { origin: at + normal * offset, direction: normal + on_sphere * 0.999 });
+        bounced.push(bounce(number, ray, hit.distance, tree.triangles[hit.triangle]));
     }
     bounced
+}
+
+/// Returns the ray that goes on from where ray `number` meets a triangle.
+pub(super) fn bounce(number: usize, ray: &Ray, distance: f32, [a, b, c]: [Vec3; 3]) -> Ray {
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
+    // Cosine distribution: a point of the unit sphere, moved by the normal. The points are a lattice.
+    let share =
+        |step: u64| ((number as u64 + 1).wrapping_mul(step) & u64::from(u32::MAX)) as f32 / 2_f32.powi(32);
+    let (height, turn) = (share(0x9e37_79b9) * 2.0 - 1.0, share(0x85eb_ca77) * std::f32::consts::TAU);
+    let around = (1.0 - height * height).max(0.0).sqrt();
+    let on_sphere = Vec3::new(around * turn.cos(), around * turn.sin(), height);
+    let at = ray.origin + ray.direction * distance;
+    let offset = 1e-4 * (1.0 + at.abs().max_element());
+    Ray { origin: at + normal * offset, direction: normal + on_sphere * 0.999 }
 }
 
 /// Traces all rays through each tree, `runs` times in turns. Returns for each tree the work, with the median of the times, and
@@ -177,7 +183,7 @@ mod tests {
         let mut trees = Vec::new();
         build_on_threads(&mesh.positions, &mesh.triangles, 1, 1, |build| trees.push(build.tree().unwrap()));
         build_by_obvhs(&mesh.positions, &mesh.triangles, 1, 1, |build| trees.push(build.tree));
-        let primary = camera_rays(&mesh, [16, 9]);
+        let primary = all_camera_rays(&mesh, [16, 9]);
         let bounced = bounce_rays(&trees[0], &primary);
         assert!(bounced.len() > 100);
         for ray in primary.iter().chain(&bounced) {

@@ -21,8 +21,8 @@ pub(super) struct TraversalResult {
     pub(super) name: String,
     pub(super) layout: Layout,
     pub(super) backend: Backend,
-    /// Millions of rays per second for each of [`RayKind::BOTH`]: the mean over all cameras.
-    pub(super) rates: [f64; 2],
+    /// Millions of rays per second for each of [`RayKind::ALL`]: the mean over all cameras.
+    pub(super) rates: [f64; 3],
     /// Agreement with the driver's pipeline on the same layout in the given order; `None` for that pipeline itself, and without
     /// ray tracing pipelines.
     pub(super) agreement: Option<HitAgreement>,
@@ -40,8 +40,15 @@ pub(super) fn measure_traversal(
         mesh.camera = *camera;
         let image =
             |case: &TracerCase| TracedImage::new(&case.ctx, &mesh, plan.size, case.scene.tlas.index());
-        let images = cases.iter().map(image).collect::<lvk::Result<Vec<_>>>()?;
-        for (kind, rays) in RayKind::BOTH.into_iter().enumerate() {
+        let mut images = cases.iter().map(image).collect::<lvk::Result<Vec<_>>>()?;
+        for (kind, rays) in RayKind::ALL.into_iter().enumerate() {
+            if rays == RayKind::Bounce {
+                // Of the whole mesh, whose primitives are those of the file.
+                let whole = images.iter().zip(cases).find(|(_, case)| case.layout == Layout::SingleInstance);
+                let bounces =
+                    whole.map(|(image, _)| image.bounce_rays(&mesh)).transpose()?.unwrap_or_default();
+                images.iter_mut().try_for_each(|image| image.set_bounce_rays(&bounces))?;
+            }
             let rates = measure_rates(cases, &images, rays, plan.runs)?;
             let share = 1.0 / plan.cameras.len() as f64;
             results.iter_mut().zip(rates).for_each(|(results, rate)| results.rates[kind] += share * rate);
@@ -57,7 +64,7 @@ impl TraversalResult {
             name: case.name.clone(),
             layout: case.layout,
             backend: case.backend,
-            rates: [0.0; 2],
+            rates: [0.0; 3],
             agreement: None,
         }
     }
