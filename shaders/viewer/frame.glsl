@@ -136,6 +136,28 @@ struct Light {
     float range; // of a point or spot light; 0 for no end
 };
 
+// A path under way, and the light that it has found so far.
+struct Path {
+    vec3 origin;
+    vec3 direction;
+    float density; // of the direction; below 0 where nothing else looks for light along it
+    vec3 from; // the surface that the direction was drawn at
+    vec3 extinction; // of the volume that the path is in
+    float squeezed; // radiance is eta^2 as much inside of a volume, which comes back at its end
+    float spread; // of the cone that the path stands for, over its length; 0: textures are read unfiltered
+    float width; // of the cone at the origin
+    uint bounce; // number of the next surface, from 0
+    uint rayCount; // traced so far, shadow rays too
+    vec3 throughput;
+    vec3 radiance;
+};
+
+// A path between two launches.
+struct StoredPath {
+    Path path;
+    uint pair; // random numbers drawn so far, in pairs
+};
+
 // What a pass over the visible surfaces draws to.
 struct VisibleTargets {
     uint triangles; // an index into kTexturesU2D: instance, geometry and primitive of each pixel
@@ -156,6 +178,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Emi
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FloatArray { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) coherent buffer LevelArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { vec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer StoredPathArray { StoredPath at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MeshRunArray { MeshRun at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer NumberArray { uint at[]; };
@@ -201,6 +224,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     VisibleTargets visible2; // of what occlusion culling draws in its second pass; kNoTexture without it
     FloatArray pyramid; // of pyramid.glsl, with the depth of the first pass
     SumArray planes; // of plane.glsl
+    NumberArray pathLists; // of path_launch.glsl
+    StoredPathArray paths; // of each pixel
     uvec2 wantedMips; // of each image the finest level that was read; 0 if all levels are resident
     uint stillCount; // frames since the camera moved
     uint view; // what the picture shows: kViewLight or another of plane.glsl

@@ -1,8 +1,7 @@
-// Paths of a pixel, by ray queries.
+// Paths of the path tracer, by ray queries.
 #include "common/group_pixel.glsl"
 #include "viewer/trace_query.glsl"
-#include "viewer/sample_paths.glsl"
+#include "viewer/sample_path.glsl"
 
-void main() {
-    samplePaths();
-}
+#define PIXEL_FUNCTION pathLaunch
+#include "common/for_each_pixel.glsl"

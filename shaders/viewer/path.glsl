@@ -55,26 +55,20 @@ ShadowRay shadowRay(Surface surface, Bsdf bsdf, vec3 extinction, float choice, v
     return ray;
 }
 
-// A path under way, and the light that it has found so far.
-struct Path {
-    vec3 origin;
-    vec3 direction;
-    float density; // of the direction; below 0 where nothing else looks for light along it
-    vec3 from; // the surface that the direction was drawn at
-    vec3 extinction; // of the volume that the path is in
-    float squeezed; // radiance is eta^2 as much inside of a volume, which comes back at its end
-    float spread; // of the cone that the path stands for, over its length; 0: textures are read unfiltered
-    float width; // of the cone at the origin
-    uint bounce; // number of the next surface, from 0
-    uint rayCount; // traced so far, shadow rays too
-    vec3 throughput;
-    vec3 radiance;
-};
-
 // A path from the eye.
 Path cameraPath(vec3 direction) {
     vec3 eye = frame.camera.eye;
     return Path(eye, direction, -1.0, eye, vec3(0.0), 1.0, 0.0, 0.0, 0u, 0u, vec3(1.0), vec3(0.0));
+}
+
+Path loadPath(uint place, inout Random random) {
+    random.pair = frame.paths.at[place].pair;
+    return frame.paths.at[place].path;
+}
+
+void storePath(uint place, Path path, Random random) {
+    frame.paths.at[place].path = path;
+    frame.paths.at[place].pair = random.pair;
 }
 
 // The next surface on the way of a path.
@@ -158,27 +152,6 @@ vec3 transmittanceOf(ShadowRay ray, inout Path path) {
     }
     path.rayCount += 1u;
     return transmittanceTo(ray.origin, ray.direction, ray.range);
-}
-
-// Leads a path from its origin to the next surface, and on from there. False: it ends.
-bool advance(inout Path path, inout Random random) {
-    Hit hit = nextHit(path, random);
-    if (hit.instance == kNothing) {
-        path.radiance += lightBeyond(path);
-        return false;
-    }
-    Surface surface = reach(path, hit);
-    if ((surface.flags & kUnlit) != 0u) {
-        path.radiance += path.throughput * surface.baseColor;
-        return false;
-    }
-    path.radiance += path.throughput * emissionShare(path, hit, surface) * surface.emission;
-    Bounce bounce = bounceAt(path, surface, random);
-    vec3 light = path.throughput * bounce.shadow.light;
-    path.throughput *= bounce.scattered.weight;
-    bool goesOn = follow(path, surface, bounce);
-    path.radiance += light * transmittanceOf(bounce.shadow, path);
-    return goesOn;
 }
 
 // The light of a path that has ended.

@@ -1,8 +1,7 @@
-// Paths of a pixel, by the ray tracing pipeline.
-#define VIEWER_RAYGEN
+// Paths of the path tracer, by the ray tracing pipeline.
 #include "viewer/trace_pipeline.glsl"
-#include "viewer/sample_paths.glsl"
+#include "viewer/sample_path.glsl"
 
 void main() {
-    samplePaths();
+    pathLaunch(gl_LaunchIDEXT.xy);
 }

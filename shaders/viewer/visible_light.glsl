@@ -1,10 +1,9 @@
-// The light of what each pixel of an invocation shows, of one sample: a shadow ray, and a path in a direction that the surface prefers.
-// Matte layers and all others are kept apart, without their colours, for the filter. All paths share a loop.
+// The light of what each pixel shows, of one sample: a shadow ray, and a path in a direction that the surface prefers. Matte layers and
+// all others are kept apart, without their colours, for the filter.
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 
 #include "viewer/path.glsl"
-#include "viewer/pixel_loop.glsl"
 #include "viewer/plane.glsl"
 #include "viewer/visible_triangle.glsl"
 
@@ -12,8 +11,8 @@
 const float kBrightestSample = 12.0;
 
 // Where the ray of a pixel meets the plane of the triangle that the pixel shows.
-Hit visibleHit(uvec2 pixel, vec3 direction) {
-    uvec4 visible = visibleTriangle(ivec2(pixel));
+Hit visibleHit(uint place, vec3 direction) {
+    uvec4 visible = visibleTriangle(ivec2(place % frame.camera.width, place / frame.camera.width));
     if (visible.x == kNothing) {
         return Hit(kNothing, 0u, 0u, vec2(0.0), 0.0);
     }
@@ -67,12 +66,8 @@ void storePoint(uint place, vec3 point) {
     frame.planes.at[planePlace(kPlaneBefore, place)] = vec4(point, 0.0);
 }
 
-void storeSky(uint place, vec3 direction) {
-    storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
-    storeSurface(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), vec3(0.0), vec3(0.0));
-}
-
-// What the surface of a pixel returns of its own shadow ray, and of the light of the path beyond.
+// What the surface of a pixel returns of its own shadow ray, and of the light of the path beyond. It waits for the end of the path in
+// planes that the filter writes later.
 struct FirstLight {
     vec3 matte;
     vec3 mirrored;
@@ -80,13 +75,39 @@ struct FirstLight {
     vec3 mirroredWeight;
 };
 
-void storeLight(uint place, FirstLight first, vec3 beyond) {
-    vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
-    vec3 share = frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
-    vec3 matte = first.matte + first.matteWeight * beyond;
-    vec3 mirrored = first.mirrored + first.mirroredWeight * beyond;
-    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(clamped(matte / max(matteAlbedo, 1e-3)), 0.0);
-    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(clamped(mirrored / max(share, 1e-3)), 0.0);
+const uint kPlaneMatteWeight = kPlaneMatte + 1u;
+const uint kPlaneMirroredWeight = kPlaneMirrored + 1u;
+
+void storeFirst(uint place, FirstLight first) {
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(first.matte, 0.0);
+    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(first.mirrored, 0.0);
+    frame.planes.at[planePlace(kPlaneMatteWeight, place)] = vec4(first.matteWeight, 0.0);
+    frame.planes.at[planePlace(kPlaneMirroredWeight, place)] = vec4(first.mirroredWeight, 0.0);
+}
+
+FirstLight storedFirst(uint place) {
+    return FirstLight(frame.planes.at[planePlace(kPlaneMatte, place)].rgb, frame.planes.at[planePlace(kPlaneMirrored, place)].rgb,
+                      frame.planes.at[planePlace(kPlaneMatteWeight, place)].rgb,
+                      frame.planes.at[planePlace(kPlaneMirroredWeight, place)].rgb);
+}
+
+Path beginPath(uvec2 pixel, inout Random random) {
+    Path path = cameraPath(cameraDirection(frame.camera, pixel));
+    path.spread = frame.camera.pixelSpread;
+    return path;
+}
+
+// A pixel that shows the sky.
+void endInSky(uint place, vec3 direction) {
+    storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
+    storeSurface(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), vec3(0.0), vec3(0.0));
+    storeFirst(place, FirstLight(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)));
+}
+
+// A pixel that shows an unlit surface.
+void endUnlit(uint place, Seen seen, vec3 color) {
+    storeSurface(place, seen, color, vec3(0.0), vec3(0.0));
+    storeFirst(place, FirstLight(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)));
 }
 
 FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen, uint place) {
@@ -101,18 +122,17 @@ FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen
 }
 
 // Leads a path to the next surface, of which the rasteriser knows the first, and on from there. False: it ends.
-bool advanceLight(inout Path path, inout FirstLight first, uvec2 pixel, inout Random random) {
-    uint place = pixelPlace(ivec2(pixel));
+bool advance(inout Path path, uint place, inout Random random) {
     bool isFirst = path.bounce == 0u;
     Hit hit;
     if (isFirst) {
-        hit = visibleHit(pixel, path.direction);
+        hit = visibleHit(place, path.direction);
     } else {
         hit = nextHit(path, random);
     }
     if (hit.instance == kNothing) {
         if (isFirst) {
-            storeSky(place, path.direction);
+            endInSky(place, path.direction);
         } else {
             path.radiance += lightBeyond(path);
         }
@@ -124,7 +144,7 @@ bool advanceLight(inout Path path, inout FirstLight first, uvec2 pixel, inout Ra
     if (isFirst) {
         storePoint(place, pointBefore(hit, frame.camera.eye + hit.distance * path.direction));
         if (isUnlit) {
-            storeSurface(place, seen, surface.baseColor, vec3(0.0), vec3(0.0));
+            endUnlit(place, seen, surface.baseColor);
             return false;
         }
     } else {
@@ -135,6 +155,7 @@ bool advanceLight(inout Path path, inout FirstLight first, uvec2 pixel, inout Ra
         }
     }
     Bounce bounce = bounceAt(path, surface, random);
+    FirstLight first;
     vec3 light = path.throughput * bounce.shadow.light;
     if (isFirst) {
         first = leaveFirst(path, surface, bounce, seen, place);
@@ -144,38 +165,24 @@ bool advanceLight(inout Path path, inout FirstLight first, uvec2 pixel, inout Ra
     bool goesOn = follow(path, surface, bounce);
     vec3 share = transmittanceOf(bounce.shadow, path);
     if (isFirst) {
-        first.matte *= share;
-        first.mirrored *= share;
+        storeFirst(place, FirstLight(first.matte * share, first.mirrored * share, first.matteWeight, first.mirroredWeight));
     } else {
         path.radiance += light * share;
     }
     return goesOn;
 }
 
-void visibleLight() {
-    uint pixels = pixelCount();
-    Path path;
-    FirstLight first;
-    Random random;
-    bool isUnderWay = false;
-    for (uint i = 0u; i < pixels;) {
-        uvec2 pixel = pixelAt(i);
-        if (!isUnderWay) {
-            if (!isInPicture(pixel)) {
-                ++i;
-                continue;
-            }
-            random = randomOf(pixel, frame.sampleNumber);
-            path = cameraPath(cameraDirection(frame.camera, pixel));
-            path.spread = frame.camera.pixelSpread;
-            first = FirstLight(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
-        }
-        isUnderWay = advanceLight(path, first, pixel, random);
-        if (!isUnderWay) {
-            storeLight(pixelPlace(ivec2(pixel)), first, radianceOf(path));
-            ++i;
-        }
-    }
+void endPath(Path path, uint place) {
+    FirstLight first = storedFirst(place);
+    vec3 beyond = radianceOf(path);
+    vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
+    vec3 share = frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
+    vec3 matte = first.matte + first.matteWeight * beyond;
+    vec3 mirrored = first.mirrored + first.mirroredWeight * beyond;
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(clamped(matte / max(matteAlbedo, 1e-3)), 0.0);
+    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(clamped(mirrored / max(share, 1e-3)), 0.0);
 }
+
+#include "viewer/path_launch.glsl"
 
 #endif

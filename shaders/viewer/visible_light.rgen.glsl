@@ -1,8 +1,7 @@
-// Light of a pixel, by the ray tracing pipeline.
-#define VIEWER_RAYGEN
+// Light of what pixels show, by the ray tracing pipeline.
 #include "viewer/trace_pipeline.glsl"
 #include "viewer/visible_light.glsl"
 
 void main() {
-    visibleLight();
+    pathLaunch(gl_LaunchIDEXT.xy);
 }

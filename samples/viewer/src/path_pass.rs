@@ -1,21 +1,26 @@
 //! Paths of all pixels by a ray tracing pipeline, or by a compute shader with ray queries.
 
 use lvk::{
-    BlockLayout, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
-    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle,
+    BlockLayout, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
+    Dependencies, HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, TextureHandle,
 };
+use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::pipelines::SampleStage;
 
+use crate::config::ViewerConfig;
+use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, SCENE_LAYOUTS};
 use crate::pipelines::{CANDIDATE, NEAREST_HIT, NEAREST_MISS, SAMPLE};
 
 /// Side of a work group in pixels.
 const GROUP: u32 = 8;
-/// Pixels of an invocation of queries on a GPU (`shaders/viewer/pixel_loop.glsl`), in as many parts of the picture. With 1, 2, 4 and
-/// 8 of them an H100 takes 39.7, 38.0, 34.9 and 34.1 ms for the light of the kitchen in software, and a pipeline 28.9, 43.6, 49.1 and
-/// 51.6 ms.
-const PIXELS_EACH: u32 = 4;
+/// Surfaces that each launch leads its paths on by; the last has all that are left. Most paths are short.
+const STEPS: [u32; 8] = [1, 1, 1, 1, 2, 2, 4, 4];
+/// Bytes of a path between launches (`StoredPath` in `shaders/viewer/frame.glsl`).
+const PATH_BYTES: u64 = 100;
+/// Bytes before the lists of paths (`kListHead` in `shaders/viewer/path_launch.glsl`).
+const LIST_HEAD_BYTES: u64 = 16;
 
 /// The shaders of paths, either of which is enough.
 pub(crate) struct PathStages {
@@ -24,45 +29,94 @@ pub(crate) struct PathStages {
     pub(crate) debug_name: &'static str,
 }
 
-/// A launch that follows the paths of all pixels.
-pub(crate) enum PathPass {
-    Pipeline(Holder<RayTracingPipelineHandle>),
-    /// The second member is true on a CPU, where a work group goes through its own block of pixels.
-    Query(Holder<ComputePipelineHandle>, bool),
+/// Launches that follow the paths of all pixels, and the paths between them.
+pub(crate) struct PathPass {
+    pipeline: PathPipeline,
+    paths: Holder<BufferHandle>,
+    extent: [u32; 2],
+    steps: Vec<u32>,
+}
+
+enum PathPipeline {
+    Rays(Holder<RayTracingPipelineHandle>),
+    Query(Holder<ComputePipelineHandle>),
+}
+
+/// Addresses of the lists of paths, and of the paths.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PathAddresses {
+    pub(crate) lists: u64,
+    pub(crate) paths: u64,
 }
 
 impl PathPass {
-    pub(crate) fn new(ctx: &Context, path: RayPath, stages: &PathStages) -> lvk::Result<Self> {
-        Ok(match path {
-            RayPath::Pipeline => Self::Pipeline(ray_pipeline(ctx, stages)?),
-            RayPath::Query => {
-                Self::Query(compute(ctx, stages.query, SCENE_LAYOUTS)?, ctx.capabilities().is_cpu)
-            }
-        })
+    pub(crate) fn new(ctx: &Context, config: &ViewerConfig, stages: &PathStages) -> lvk::Result<Self> {
+        let pipeline = match config.path {
+            RayPath::Pipeline => PathPipeline::Rays(ray_pipeline(ctx, stages)?),
+            RayPath::Query => PathPipeline::Query(compute(ctx, stages.query, SCENE_LAYOUTS)?),
+        };
+        let [width, height] = config.extent();
+        let size_bytes = list_bytes(config.extent()) + PATH_BYTES * u64::from(width) * u64::from(height);
+        let paths = buffer(ctx, "paths", size_bytes)?;
+        Ok(Self { pipeline, paths, extent: config.extent(), steps: steps_of_launches(config.bounces) })
     }
 
-    /// Records a launch for a picture of `extent` pixels.
+    pub(crate) fn addresses(&self) -> lvk::Result<PathAddresses> {
+        let lists = self.paths.address()?;
+        Ok(PathAddresses { lists, paths: lists + list_bytes(self.extent) })
+    }
+
+    /// Records `samples` samples of all pixels, whose shaders write the buffers of the scene and `own`.
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,
-        push: &Push,
-        dependencies: &Dependencies<'_>,
-        [width, height]: [u32; 2],
+        frame: u64,
+        samples: u32,
+        own: BufferHandle,
+        (visible, scene): (&[TextureHandle], FrameScene<'_>),
     ) -> lvk::Result<()> {
-        match self {
-            Self::Pipeline(pipeline) => {
-                cmd.bind_ray_tracing_pipeline(**pipeline)?;
-                cmd.push_constants(push)?;
-                cmd.trace_rays([width, height, 1], dependencies)
-            }
-            Self::Query(pipeline, is_cpu) => {
-                cmd.bind_compute_pipeline(**pipeline)?;
-                cmd.push_constants(push)?;
-                let rows = if *is_cpu { height } else { height.div_ceil(PIXELS_EACH) };
-                cmd.dispatch(groups([width, rows]), dependencies)
+        let mut buffers = scene.buffers(own);
+        buffers.push(*self.paths);
+        let dependencies = Dependencies {
+            buffers: &buffers,
+            read_buffers: scene.written,
+            sampled_images: visible,
+            ..Dependencies::default()
+        };
+        cmd.fill_buffer(*self.paths, 0, LIST_HEAD_BYTES, 0)?;
+        match &self.pipeline {
+            PathPipeline::Rays(pipeline) => cmd.bind_ray_tracing_pipeline(**pipeline)?,
+            PathPipeline::Query(pipeline) => cmd.bind_compute_pipeline(**pipeline)?,
+        }
+        for sample in 0..samples {
+            for (launch, steps) in (0..).zip(&self.steps) {
+                let argument = launch | steps << 8 | sample << 16;
+                cmd.push_constants(&Push { frame, argument, _padding: 0 })?;
+                match self.pipeline {
+                    PathPipeline::Rays(_) => {
+                        cmd.trace_rays([self.extent[0], self.extent[1], 1], &dependencies)?;
+                    }
+                    PathPipeline::Query(_) => cmd.dispatch(groups(self.extent), &dependencies)?,
+                }
             }
         }
+        Ok(())
     }
+}
+
+/// Bytes of the numbers of listed paths, and of two lists.
+fn list_bytes([width, height]: [u32; 2]) -> u64 {
+    LIST_HEAD_BYTES + 2 * 4 * u64::from(width) * u64::from(height)
+}
+
+/// Surfaces of each launch for paths of at most `bounces`; 0 for the last, which goes on to the end.
+fn steps_of_launches(bounces: u32) -> Vec<u32> {
+    let mut led = 0;
+    let is_before_end = |steps: &u32| {
+        led += steps;
+        led < bounces
+    };
+    STEPS.into_iter().take_while(is_before_end).chain([0]).collect()
 }
 
 /// Work groups that cover a picture.
@@ -100,4 +154,17 @@ fn ray_pipeline(ctx: &Context, stages: &PathStages) -> lvk::Result<Holder<RayTra
         debug_name: stages.debug_name,
         ..RayTracingPipelineDesc::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn launches_have_all_surfaces_of_a_path_and_the_last_is_not_idle() {
+        assert_eq!(steps_of_launches(1), [0]);
+        assert_eq!(steps_of_launches(2), [1, 0]);
+        assert_eq!(steps_of_launches(8), [1, 1, 1, 1, 2, 0]);
+        assert_eq!(steps_of_launches(u32::MAX - 1), [1, 1, 1, 1, 2, 2, 4, 4, 0]);
+    }
 }

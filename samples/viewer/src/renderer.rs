@@ -1,15 +1,15 @@
 //! Either method, with its data for pictures of one size.
 
 use bytemuck::Zeroable as _;
-use lvk::{BufferHandle, Context, Dependencies, Holder};
+use lvk::{BufferHandle, Context, Holder};
 use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
 
 use crate::config::{Method, ViewerConfig};
 use crate::gpu::FrameScene;
-use crate::gpu::layout::{Push, VisibilityConstants};
+use crate::gpu::layout::VisibilityConstants;
 use crate::hybrid::Hybrid;
-use crate::path_pass::PathPass;
+use crate::path_pass::{PathAddresses, PathPass};
 use crate::pipelines::PATHS;
 
 /// Either method.
@@ -22,6 +22,7 @@ pub(crate) enum Renderer {
 pub(crate) struct Addresses {
     pub(crate) sums: u64,
     pub(crate) planes: u64,
+    pub(crate) paths: PathAddresses,
     pub(crate) visibility: VisibilityConstants,
 }
 
@@ -32,7 +33,7 @@ impl Renderer {
         Ok(match config.method {
             Method::Hybrid => Self::Hybrid(Box::new(Hybrid::new(ctx, config, occludes)?)),
             Method::PathTrace => Self::PathTrace {
-                paths: PathPass::new(ctx, config.path, &PATHS)?,
+                paths: PathPass::new(ctx, config, &PATHS)?,
                 sums: buffer(ctx, "sums", 16 * u64::from(width) * u64::from(height))?,
             },
         })
@@ -43,11 +44,12 @@ impl Renderer {
             Self::Hybrid(hybrid) => Addresses {
                 sums: hybrid.picture_address()?,
                 planes: hybrid.planes_address()?,
+                paths: hybrid.path_addresses()?,
                 visibility: hybrid.visibility()?,
             },
-            Self::PathTrace { sums, .. } => {
-                let sums = sums.address()?;
-                Addresses { sums, planes: sums, visibility: VisibilityConstants::zeroed() }
+            Self::PathTrace { paths, sums } => {
+                let (sums, paths) = (sums.address()?, paths.addresses()?);
+                Addresses { sums, planes: sums, paths, visibility: VisibilityConstants::zeroed() }
             }
         })
     }
@@ -68,24 +70,18 @@ impl Renderer {
         }
     }
 
-    /// Records a frame, or a pass over a picture of `extent` pixels. The constants are at `frame`.
+    /// Records a frame, or `samples` samples of the path tracer. The constants are at `frame`.
     pub(crate) fn record(
         &self,
         to: &mut Frame<'_>,
         frame: u64,
-        extent: [u32; 2],
+        samples: u32,
         scene: FrameScene<'_>,
     ) -> lvk::Result<()> {
         match self {
             Self::Hybrid(hybrid) => hybrid.record(to, frame, scene),
             Self::PathTrace { paths, sums } => {
-                let push = Push { frame, argument: 0, _padding: 0 };
-                let dependencies = Dependencies {
-                    buffers: &scene.buffers(**sums),
-                    read_buffers: scene.written,
-                    ..Dependencies::default()
-                };
-                to.pass("paths", |cmd| paths.record(cmd, &push, &dependencies, extent))
+                to.pass("paths", |cmd| paths.record(cmd, frame, samples, **sums, (&[], scene)))
             }
         }
     }

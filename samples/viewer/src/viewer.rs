@@ -338,6 +338,8 @@ impl Viewer {
             seen_before: gpu(if self.is_first() { &self.camera } else { &self.before }),
             visibility: addresses.visibility,
             planes: addresses.planes,
+            path_lists: addresses.paths.lists,
+            paths: addresses.paths.paths,
             wanted_mips: self.scene.wanted_mips().map_or(Ok(0), |buffer| self.ctx.buffer_address(buffer))?,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
@@ -361,7 +363,7 @@ impl Viewer {
             written: &self.scene.written(),
             wanted_mips: self.scene.wanted_mips(),
         };
-        self.renderer.record(frame, constants, extent, scene)?;
+        self.renderer.record(frame, constants, count, scene)?;
         self.done += count;
         if is_shown {
             let push = Push { frame: constants, argument: self.summed_samples(), _padding: 0 };

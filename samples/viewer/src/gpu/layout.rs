@@ -247,6 +247,8 @@ lvk::shader_struct! {
         pub(crate) seen_before: GpuCamera,
         pub(crate) visibility: VisibilityConstants,
         pub(crate) planes: u64,
+        pub(crate) path_lists: u64,
+        pub(crate) paths: u64,
         pub(crate) wanted_mips: u64,
         pub(crate) still_count: u32,
         pub(crate) view: u32,

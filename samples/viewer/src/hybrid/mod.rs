@@ -11,6 +11,7 @@ use lvk_samples::app::frame::Frame;
 use crate::config::ViewerConfig;
 use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, VisibilityConstants};
+use crate::path_pass::PathAddresses;
 use passes::Passes;
 use visibility::Visibility;
 pub(crate) use visibility::{DEPTH_FORMAT, TRIANGLE_FORMAT};
@@ -50,6 +51,11 @@ impl Hybrid {
         self.planes.address()
     }
 
+    /// Addresses of the paths of light.
+    pub(crate) fn path_addresses(&self) -> lvk::Result<PathAddresses> {
+        self.passes.light().addresses()
+    }
+
     /// Address of the plane that the picture is made of.
     pub(crate) fn picture_address(&self) -> lvk::Result<u64> {
         Ok(self.planes.address()? + SHOWN * plane_bytes(self.extent))
@@ -80,9 +86,7 @@ impl Hybrid {
         let push = |argument| Push { frame, argument, _padding: 0 };
         self.visibility.record(to, frame, scene)?;
         let (planes, visible) = (*self.planes, self.visibility.textures());
-        to.pass("light", |cmd| {
-            self.passes.record_light(cmd, &push(0), planes, (&visible, scene), self.extent)
-        })?;
+        to.pass("light", |cmd| self.passes.light().record(cmd, frame, 1, planes, (&visible, scene)))?;
         to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
         match self.passes.counts_steps() {
             true => {

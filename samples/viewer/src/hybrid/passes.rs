@@ -1,6 +1,6 @@
 //! Rays and filters of the real-time method.
 
-use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, TextureHandle};
+use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder};
 
 use crate::config::{Content, ViewerConfig};
 use crate::gpu::FrameScene;
@@ -27,7 +27,7 @@ impl Passes {
         let is_of_steps = config.content == Content::Steps;
         let filter = |stage| compute(ctx, stage, FRAME_LAYOUT);
         Ok(Self {
-            light: PathPass::new(ctx, config.path, &LIGHT)?,
+            light: PathPass::new(ctx, config, &LIGHT)?,
             temporal: filter(TEMPORAL)?,
             filter: filter(FILTER)?,
             composite: filter(COMPOSITE)?,
@@ -36,22 +36,9 @@ impl Passes {
         })
     }
 
-    /// Records the rays of a picture of `extent` pixels whose triangles are in the textures `visible`.
-    pub(crate) fn record_light(
-        &self,
-        cmd: &mut CommandBuffer,
-        push: &Push,
-        planes: BufferHandle,
-        (visible, scene): (&[TextureHandle], FrameScene<'_>),
-        extent: [u32; 2],
-    ) -> lvk::Result<()> {
-        let dependencies = Dependencies {
-            buffers: &scene.buffers(planes),
-            read_buffers: scene.written,
-            sampled_images: visible,
-            ..Dependencies::default()
-        };
-        self.light.record(cmd, push, &dependencies, extent)
+    /// The launches of paths.
+    pub(crate) fn light(&self) -> &PathPass {
+        &self.light
     }
 
     /// True if the picture is of the steps of rays.
