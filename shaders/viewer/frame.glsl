@@ -211,7 +211,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint tlas;
     uint image;
     uint sampleNumber; // of the first sample of this pass
-    uint sampleCount; // of this pass
+    uint pixelCount; // of the picture
     uint maxBounces;
     float exposure;
     float offsetExtent; // the unit of length of rounding errors near the origin

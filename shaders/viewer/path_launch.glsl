@@ -1,7 +1,8 @@
 // A launch over the paths of a picture. The first begins a path for each pixel. Each leads its paths on by a few surfaces and lists
 // those that have not ended for the next, so that invocations which run together all have a path to follow: in one long loop most would
-// wait for the longest of their group (Laine et al., "Megakernels Considered Harmful", 2013). `argument`: number of the launch, surfaces
-// of each path in it (0: all that are left) and number of the sample, in 8, 8 and 16 bits.
+// wait for the longest of their group (Laine et al., "Megakernels Considered Harmful", 2013). `argument`, from the lowest bit:
+// the turn of the launch among the three numbers and the two lists, from 0 to 5 (3 bits); whether the launch begins paths (1 bit); surfaces
+// of each path in it, or 0 for all that are left (8 bits from bit 8 on); and the number of the sample (16 bits).
 //
 // The including file provides beginPath(), advance() and endPath().
 #ifndef VIEWER_PATH_LAUNCH
@@ -9,33 +10,31 @@
 
 #include "viewer/path.glsl"
 
+const uint kBeginsPaths = 8u;
 // Words before the lists: three numbers of listed paths, of this launch, of the next, and of the one after that, in turn.
 const uint kListHead = 4u;
 
-uint pictureSize() {
-    return frame.camera.width * frame.camera.height;
-}
-
-// The word of a launch's list with the pixel of its path `index`.
-uint listPlace(uint launch, uint index) {
-    return kListHead + (launch & 1u) * pictureSize() + index;
+// The word of the list of a turn with the pixel of path `index`.
+uint listPlace(uint turn, uint index) {
+    return kListHead + (turn & 1u) * frame.pixelCount + index;
 }
 
 void pathLaunch(uvec2 at) {
     NumberArray lists = frame.pathLists;
-    uint launch = argument & 0xffu;
+    uint turn = argument & 7u;
+    bool begins = (argument & kBeginsPaths) != 0u;
     uint index = at.y * frame.camera.width + at.x;
     if (index == 0u) {
-        lists.at[(launch + 2u) % 3u] = 0u;
+        lists.at[(turn + 2u) % 3u] = 0u;
     }
-    if (launch > 0u && index >= lists.at[launch % 3u]) {
+    if (!begins && index >= lists.at[turn % 3u]) {
         return;
     }
-    uint place = launch > 0u ? lists.at[listPlace(launch, index)] : index;
+    uint place = begins ? index : lists.at[listPlace(turn, index)];
     uvec2 pixel = uvec2(place % frame.camera.width, place / frame.camera.width);
     Random random = randomOf(pixel, frame.sampleNumber + (argument >> 16));
     Path path;
-    if (launch == 0u) {
+    if (begins) {
         path = beginPath(pixel, random);
     } else {
         path = loadPath(place, random);
@@ -49,8 +48,8 @@ void pathLaunch(uvec2 at) {
     } while (isUnderWay && step != steps);
     if (isUnderWay) {
         storePath(place, path, random);
-        uint next = atomicAdd(lists.at[(launch + 1u) % 3u], 1u);
-        lists.at[listPlace(launch + 1u, next)] = place;
+        uint next = atomicAdd(lists.at[(turn + 1u) % 3u], 1u);
+        lists.at[listPlace(turn + 1u, next)] = place;
     } else {
         endPath(path, place);
     }

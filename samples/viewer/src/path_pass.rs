@@ -15,8 +15,10 @@ use crate::pipelines::{CANDIDATE, NEAREST_HIT, NEAREST_MISS, SAMPLE};
 
 /// Side of a work group in pixels.
 const GROUP: u32 = 8;
-/// Surfaces that each launch leads its paths on by; the last has all that are left. Most paths are short.
-const STEPS: [u32; 8] = [1, 1, 1, 1, 2, 2, 4, 4];
+/// Surfaces that each launch leads its paths on by, before the last, which has all that are left. More launches keep more of a GPU's
+/// invocations at work; on a CPU each costs more.
+const GPU_STEPS: &[u32] = &[1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 4, 4];
+const CPU_STEPS: &[u32] = &[2, 2, 4, 4];
 /// Bytes of a path between launches (`StoredPath` in `shaders/viewer/frame.glsl`).
 const PATH_BYTES: u64 = 100;
 /// Bytes before the lists of paths (`kListHead` in `shaders/viewer/path_launch.glsl`).
@@ -34,7 +36,18 @@ pub(crate) struct PathPass {
     pipeline: PathPipeline,
     paths: Holder<BufferHandle>,
     extent: [u32; 2],
-    steps: Vec<u32>,
+    steps: &'static [u32],
+}
+
+/// The work of a frame for paths.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PathWork {
+    /// Address of the frame's constants.
+    pub(crate) frame: u64,
+    /// Samples of each pixel.
+    pub(crate) samples: u32,
+    /// Surfaces of a path at most.
+    pub(crate) bounces: u32,
 }
 
 enum PathPipeline {
@@ -58,7 +71,8 @@ impl PathPass {
         let [width, height] = config.extent();
         let size_bytes = list_bytes(config.extent()) + PATH_BYTES * u64::from(width) * u64::from(height);
         let paths = buffer(ctx, "paths", size_bytes)?;
-        Ok(Self { pipeline, paths, extent: config.extent(), steps: steps_of_launches(config.bounces) })
+        let steps = if ctx.capabilities().is_cpu { CPU_STEPS } else { GPU_STEPS };
+        Ok(Self { pipeline, paths, extent: config.extent(), steps })
     }
 
     pub(crate) fn addresses(&self) -> lvk::Result<PathAddresses> {
@@ -66,12 +80,11 @@ impl PathPass {
         Ok(PathAddresses { lists, paths: lists + list_bytes(self.extent) })
     }
 
-    /// Records `samples` samples of all pixels, whose shaders write the buffers of the scene and `own`.
+    /// Records the samples of all pixels, whose shaders write the buffers of the scene and `own`.
     pub(crate) fn record(
         &self,
         cmd: &mut CommandBuffer,
-        frame: u64,
-        samples: u32,
+        work: PathWork,
         own: BufferHandle,
         (visible, scene): (&[TextureHandle], FrameScene<'_>),
     ) -> lvk::Result<()> {
@@ -88,16 +101,13 @@ impl PathPass {
             PathPipeline::Rays(pipeline) => cmd.bind_ray_tracing_pipeline(**pipeline)?,
             PathPipeline::Query(pipeline) => cmd.bind_compute_pipeline(**pipeline)?,
         }
-        for sample in 0..samples {
-            for (launch, steps) in (0..).zip(&self.steps) {
-                let argument = launch | steps << 8 | sample << 16;
-                cmd.push_constants(&Push { frame, argument, _padding: 0 })?;
-                match self.pipeline {
-                    PathPipeline::Rays(_) => {
-                        cmd.trace_rays([self.extent[0], self.extent[1], 1], &dependencies)?;
-                    }
-                    PathPipeline::Query(_) => cmd.dispatch(groups(self.extent), &dependencies)?,
+        for argument in launches(self.steps, work) {
+            cmd.push_constants(&Push { frame: work.frame, argument, _padding: 0 })?;
+            match self.pipeline {
+                PathPipeline::Rays(_) => {
+                    cmd.trace_rays([self.extent[0], self.extent[1], 1], &dependencies)?;
                 }
+                PathPipeline::Query(_) => cmd.dispatch(groups(self.extent), &dependencies)?,
             }
         }
         Ok(())
@@ -109,14 +119,24 @@ fn list_bytes([width, height]: [u32; 2]) -> u64 {
     LIST_HEAD_BYTES + 2 * 4 * u64::from(width) * u64::from(height)
 }
 
+/// Arguments of all launches (`shaders/viewer/path_launch.glsl`).
+fn launches(steps: &[u32], work: PathWork) -> impl Iterator<Item = u32> {
+    let steps = steps_of_launches(steps, work.bounces);
+    let count = steps.len() as u32;
+    (0..work.samples * count).map(move |number| {
+        let (sample, launch) = (number / count, number % count);
+        (number % 6) | (u32::from(launch == 0) << 3) | (steps[launch as usize] << 8) | (sample << 16)
+    })
+}
+
 /// Surfaces of each launch for paths of at most `bounces`; 0 for the last, which goes on to the end.
-fn steps_of_launches(bounces: u32) -> Vec<u32> {
+fn steps_of_launches(steps: &[u32], bounces: u32) -> Vec<u32> {
     let mut led = 0;
     let is_before_end = |steps: &u32| {
         led += steps;
         led < bounces
     };
-    STEPS.into_iter().take_while(is_before_end).chain([0]).collect()
+    steps.iter().copied().take_while(is_before_end).chain([0]).collect()
 }
 
 /// Work groups that cover a picture.
@@ -162,9 +182,22 @@ mod tests {
 
     #[test]
     fn launches_have_all_surfaces_of_a_path_and_the_last_is_not_idle() {
-        assert_eq!(steps_of_launches(1), [0]);
-        assert_eq!(steps_of_launches(2), [1, 0]);
-        assert_eq!(steps_of_launches(8), [1, 1, 1, 1, 2, 0]);
-        assert_eq!(steps_of_launches(u32::MAX - 1), [1, 1, 1, 1, 2, 2, 4, 4, 0]);
+        for (bounces, steps) in [(1, vec![0]), (2, vec![0]), (3, vec![2, 0]), (9, vec![2, 2, 4, 0])] {
+            assert_eq!(steps_of_launches(CPU_STEPS, bounces), steps, "{bounces}");
+        }
+        assert_eq!(steps_of_launches(CPU_STEPS, u32::MAX - 1), [2, 2, 4, 4, 0]);
+        assert_eq!(steps_of_launches(GPU_STEPS, 3), [1, 1, 0]);
+    }
+
+    #[test]
+    fn launches_take_turns_from_one_sample_to_the_next() {
+        let work = PathWork { frame: 0, samples: 3, bounces: 5 };
+        let all: Vec<_> = launches(CPU_STEPS, work).collect();
+        let turns: Vec<_> = all.iter().map(|argument| argument & 7).collect();
+        assert_eq!(turns, [0, 1, 2, 3, 4, 5, 0, 1, 2]);
+        let begins: Vec<_> = all.iter().map(|argument| argument & 8 != 0).collect();
+        assert_eq!(begins, [true, false, false].repeat(3));
+        let samples: Vec<_> = all.iter().map(|argument| argument >> 16).collect();
+        assert_eq!(samples, [0, 0, 0, 1, 1, 1, 2, 2, 2]);
     }
 }

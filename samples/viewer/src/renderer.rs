@@ -9,7 +9,7 @@ use crate::config::{Method, ViewerConfig};
 use crate::gpu::FrameScene;
 use crate::gpu::layout::VisibilityConstants;
 use crate::hybrid::Hybrid;
-use crate::path_pass::{PathAddresses, PathPass};
+use crate::path_pass::{PathAddresses, PathPass, PathWork};
 use crate::pipelines::PATHS;
 
 /// Either method.
@@ -70,18 +70,17 @@ impl Renderer {
         }
     }
 
-    /// Records a frame, or `samples` samples of the path tracer. The constants are at `frame`.
+    /// Records a frame, or samples of the path tracer.
     pub(crate) fn record(
         &self,
         to: &mut Frame<'_>,
-        frame: u64,
-        samples: u32,
+        work: PathWork,
         scene: FrameScene<'_>,
     ) -> lvk::Result<()> {
         match self {
-            Self::Hybrid(hybrid) => hybrid.record(to, frame, scene),
+            Self::Hybrid(hybrid) => hybrid.record(to, work, scene),
             Self::PathTrace { paths, sums } => {
-                to.pass("paths", |cmd| paths.record(cmd, frame, samples, **sums, (&[], scene)))
+                to.pass("paths", |cmd| paths.record(cmd, work, **sums, (&[], scene)))
             }
         }
     }

@@ -14,6 +14,7 @@ use crate::gpu::layout::{FrameConstants, Push};
 use crate::gpu::{DrawnCounts, DrawnInstances, FrameScene, GpuScene, TextureMemory};
 use crate::light::Environment;
 use crate::model::{self, ModelCamera};
+use crate::path_pass::PathWork;
 use crate::playback::Playback;
 use crate::present::Present;
 use crate::renderer::Renderer;
@@ -311,7 +312,7 @@ impl Viewer {
         }
     }
 
-    fn upload_frame(&self, cmd: &mut CommandBuffer, sample_count: u32) -> lvk::Result<u64> {
+    fn upload_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<u64> {
         let ViewerConfig { width, height, bounces, exposure_stops, tone_mapping, content, .. } = self.config;
         let gpu = |camera: &Camera| {
             let distance = Vec3::from(camera.eye).distance(Vec3::from(camera.target));
@@ -328,7 +329,7 @@ impl Viewer {
             tlas: self.scene.tlas.index(),
             image: self.target.image_index(),
             sample_number: if self.config.method == Method::Hybrid { self.frame_number } else { self.done },
-            sample_count,
+            pixel_count: width * height,
             max_bounces: bounces - 1,
             exposure: exposure_stops.exp2(),
             offset_extent: self.scene.offset_extent,
@@ -356,14 +357,15 @@ impl Viewer {
         is_shown: bool,
     ) -> lvk::Result<()> {
         self.scene.record_motion(frame, self.is_first())?;
-        let (constants, extent) = (self.upload_frame(&mut frame.cmd, count)?, self.config.extent());
+        let (constants, extent) = (self.upload_frame(&mut frame.cmd)?, self.config.extent());
         let scene = FrameScene {
             draws: self.scene.draws(),
             culling: self.config.culls().then(|| self.scene.culling()),
             written: &self.scene.written(),
             wanted_mips: self.scene.wanted_mips(),
         };
-        self.renderer.record(frame, constants, count, scene)?;
+        let work = PathWork { frame: constants, samples: count, bounces: self.config.bounces };
+        self.renderer.record(frame, work, scene)?;
         self.done += count;
         if is_shown {
             let push = Push { frame: constants, argument: self.summed_samples(), _padding: 0 };

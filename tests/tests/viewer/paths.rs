@@ -1,12 +1,15 @@
-//! The same picture by each path of ray tracing.
+//! The same picture by each path of ray tracing, and by any number of launches.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk_samples::app::headless;
+use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::device;
 use lvk_tests::rtx_sample::{contexts_and_paths, software_device};
-use lvk_viewer::Method;
 use lvk_viewer::light::{Environment, SunSetting};
+use lvk_viewer::{Method, ViewerConfig};
 
-use crate::scenes::{View, assert_close, mean, radiance_by};
+use crate::scenes::{View, assert_close, mean, radiance_by, viewer};
 use crate::still_life::still_life;
 
 #[test]
@@ -39,4 +42,26 @@ pub fn assert_alike(what: &str, first: &[[f32; 3]], other: &[[f32; 3]]) {
     eprintln!("{what}: {count} of {} pixels differ", first.len());
     assert!(count * 20 < first.len(), "{what}: {count} pixels differ");
     assert_close(what, mean(other), mean(first), 0.02);
+}
+
+#[test]
+fn samples_have_as_many_rays_and_as_much_light_whether_they_are_alone_or_follow_others() {
+    let Some(ctx) = device() else { return };
+    let camera = Camera::looking_at([1.5, 1.7, 4.5], [-0.2, 0.5, 0.0], 40.0);
+    let environment = Environment::day(&SunSetting::default());
+    let model = still_life();
+    // More surfaces take more launches for each sample, which hand each other lists of the paths that go on.
+    for bounces in [1, 2, 3, 4, 6, 9, 13] {
+        let [alone, many] = [1, 16].map(|samples| {
+            let view = View { camera, size: [60, 40], samples };
+            let mut viewer = viewer(&ctx, (Method::PathTrace, RayPath::Query), &model, &environment, &view);
+            viewer.configure(&ViewerConfig { bounces, ..*viewer.config() }).unwrap();
+            headless::picture(&mut viewer).unwrap();
+            let rays = viewer.ray_count().unwrap().unwrap() as f64 / f64::from(samples);
+            (rays, mean(&viewer.radiance().unwrap()))
+        });
+        eprintln!("{bounces} surfaces: {} and {} rays a sample", alone.0, many.0);
+        assert!((alone.0 / many.0 - 1.0).abs() < 0.03, "{bounces} surfaces: {alone:?} and {many:?}");
+        assert_close(&format!("{bounces} surfaces"), alone.1, many.1, 0.1);
+    }
 }

@@ -237,7 +237,7 @@ lvk::shader_struct! {
         pub(crate) tlas: u32,
         pub(crate) image: u32,
         pub(crate) sample_number: u32,
-        pub(crate) sample_count: u32,
+        pub(crate) pixel_count: u32,
         pub(crate) max_bounces: u32,
         pub(crate) exposure: f32,
         pub(crate) offset_extent: f32,

@@ -11,7 +11,7 @@ use lvk_samples::app::frame::Frame;
 use crate::config::ViewerConfig;
 use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, VisibilityConstants};
-use crate::path_pass::PathAddresses;
+use crate::path_pass::{PathAddresses, PathWork};
 use passes::Passes;
 use visibility::Visibility;
 pub(crate) use visibility::{DEPTH_FORMAT, TRIANGLE_FORMAT};
@@ -81,12 +81,18 @@ impl Hybrid {
         self.visibility.set_occlusion(ctx, is_on)
     }
 
-    /// Records a frame, whose constants are at `frame`.
-    pub(crate) fn record(&self, to: &mut Frame<'_>, frame: u64, scene: FrameScene<'_>) -> lvk::Result<()> {
+    /// Records a frame.
+    pub(crate) fn record(
+        &self,
+        to: &mut Frame<'_>,
+        work: PathWork,
+        scene: FrameScene<'_>,
+    ) -> lvk::Result<()> {
+        let frame = work.frame;
         let push = |argument| Push { frame, argument, _padding: 0 };
         self.visibility.record(to, frame, scene)?;
         let (planes, visible) = (*self.planes, self.visibility.textures());
-        to.pass("light", |cmd| self.passes.light().record(cmd, frame, 1, planes, (&visible, scene)))?;
+        to.pass("light", |cmd| self.passes.light().record(cmd, work, planes, (&visible, scene)))?;
         to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
         match self.passes.counts_steps() {
             true => {
