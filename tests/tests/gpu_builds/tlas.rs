@@ -156,6 +156,32 @@ fn instances_that_no_ray_meets_are_left_out() {
     }
 }
 
+/// Areas of their unions exceed the largest float, and a side that is infinite times one that is 0 is no number.
+#[test]
+fn instances_that_are_farther_away_than_areas_have_numbers_are_each_in_one_leaf() {
+    let Some(ctx) = device() else { return };
+    let blases = TestBlases::new(&ctx);
+    for count in [2, 3, 31, 32, 33, 100, 5000] {
+        for every in [1, 2, 7] {
+            let mut records = blases.records(count, false);
+            for (i, record) in records.iter_mut().enumerate().filter(|(i, _)| i % every == 0) {
+                let far = [1e17, 1e20, 1e30, 1e35][i / 4 % 4];
+                for (row, share) in [(3, 1.0), (7, [1.0, -1.0][i % 2]), (11, [0.0, 1.0, -1.0][i % 3])] {
+                    record.rows[row] = share * far;
+                }
+            }
+            let buffer = build_input_buffer(&ctx, &records);
+            let tlas = build_tlas(&ctx, *buffer, count as u32, count as u32, None).unwrap();
+            let words = read(&ctx, &tlas).unwrap();
+            let facts = check_structure(&words, &|_| EMPTY).unwrap_or_else(|what| panic!("{count}: {what}"));
+            let mut found: Vec<_> = facts.primitives.iter().map(|(_, number)| *number as usize).collect();
+            found.sort_unstable();
+            let expected: Vec<_> = (0..count).filter(|i| i % blases.structures.len() != 3).collect();
+            assert_eq!(found, expected, "{count} instances, one of {every} far away");
+        }
+    }
+}
+
 #[test]
 fn blas_numbers_out_of_range_are_left_out() {
     let Some(ctx) = device() else { return };

@@ -115,6 +115,14 @@ uint joinHalves(uvec3 range) {
     return bitCount(bits);
 }
 
+// Returns the area of the union of two clusters, below kFar. Triangles are clamped where they are read. Instances may be so far away
+// that their areas overflow.
+float unionAreaOf(Box a, Box b) {
+    Box both = join(a, b);
+    if (job.leafKind == kInstances) both = Box(ended(both.lo), ended(both.hi));
+    return areaOf(both);
+}
+
 // Areas of the unions of each cluster with those behind it, for each distance less one.
 shared float unionArea[kReach * kGroup];
 
@@ -125,7 +133,7 @@ uint findNearest(uint count) {
     float behind[kReach];
     Box box = clusterBox(t);
     [[unroll]] for (uint step_ = 1u; step_ <= kReach; ++step_) {
-        behind[step_ - 1u] = t + step_ < count ? areaOf(join(box, clusterBox(t + step_))) : kFar;
+        behind[step_ - 1u] = t + step_ < count ? unionAreaOf(box, clusterBox(t + step_)) : kFar;
         unionArea[(step_ - 1u) * kGroup + t] = behind[step_ - 1u];
     }
     barrier();
