@@ -24,6 +24,8 @@ pub struct CallLog {
     pub failed: BTreeSet<String>,
     /// Commands that told other threads of the loss of a device, which these may report first.
     pub told_others: BTreeSet<String>,
+    /// True if an instance was created or destroyed.
+    pub counts_objects: bool,
     /// Objects that were alive at the end, by type. An instance among them says that others may be, too.
     pub live: BTreeMap<String, i64>,
     /// Objects that were alive when their device or instance was destroyed, by type.
@@ -47,7 +49,10 @@ impl CallLog {
                 Some("fault") => log.reached = true,
                 Some("failed") => log.failed.extend(words.next().map(str::to_owned)),
                 Some("told") => log.told_others.extend(words.next().map(str::to_owned)),
-                Some("live") => log.live = words.filter_map(live_count).collect(),
+                Some("live") => {
+                    log.counts_objects = true;
+                    log.live = words.filter_map(live_count).collect();
+                }
                 Some("orphans") => {
                     log.orphaning += 1;
                     for (kind, count) in words.filter_map(live_count) {
@@ -126,6 +131,7 @@ mod tests {
             reached: true,
             failed: ["vkCreateBuffer", "vkWaitSemaphores"].map(str::to_owned).into(),
             told_others: BTreeSet::from(["vkWaitSemaphores".to_owned()]),
+            counts_objects: true,
             live: BTreeMap::from([("VkBuffer".to_owned(), 2)]),
             orphans: BTreeMap::from([("VkFence".to_owned(), 3), ("VkImage".to_owned(), -1)]),
             orphaning: 2,

@@ -14,7 +14,7 @@ use lvk_faults::fault::{FaultError, Span};
 use lvk_faults::fault_report::{DESCRIPTION, FaultReport, REPORT_VARIABLE};
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
-use lvk_faults::sweep::run::{LayerFolder, Program, run};
+use lvk_faults::sweep::run::{Caches, LayerFolder, Program, run};
 use lvk_faults::sweep::verdict::{Flaw, RunOutcome, flaws};
 use x11rb::rust_connection::RustConnection;
 
@@ -30,7 +30,8 @@ const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scene.obj");
 
 fn program(line: &str) -> Program {
     let args = line.split_whitespace().map(|word| word.replace("SCENE", SCENE)).collect();
-    Program { path: PathBuf::from(env!("CARGO_BIN_EXE_fault_scenarios")), args, variables: Vec::new() }
+    let path = PathBuf::from(env!("CARGO_BIN_EXE_fault_scenarios"));
+    Program { path, args, variables: Vec::new(), caches: Caches::Warm }
 }
 
 fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Duration) {
@@ -151,6 +152,24 @@ fn whole_example_triangle() {
     );
 }
 
+/// Declares an ignored test for each program that starts without caches and writes them: of shaders, pipelines, BVHs and scenes.
+macro_rules! cold_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            whole(stringify!($test), $line, &Program { caches: Caches::Cold, ..program($line) });
+        }
+    )*};
+}
+
+cold_sweeps! {
+    whole_cold_hybrid: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
+    whole_cold_large_scene: "large_scene --width 64 --height 36 --frames 1 --rt query --triangles 2000 --copies 3 --samples 1";
+    whole_cold_rtx_hello: "rtx_hello --width 64 --height 36 --frames 1 --rt hardware";
+    whole_cold_blas_software: "blas_software";
+}
+
 #[test]
 #[ignore = "minutes: .ci/slow faults"]
 fn whole_window() {
@@ -204,6 +223,13 @@ fn some_calls_of_scenarios_fail() {
     for line in ["blas", "threads", "queues", "raw_device", "hot_reload", "interop"] {
         assert_no_flaws(line, &program(line), &some(12), SAMPLE / 2);
     }
+}
+
+#[test]
+fn some_calls_fail_while_caches_are_written() {
+    let line = "rtx_hello --width 64 --height 36 --frames 1 --rt hardware";
+    let cold = Program { caches: Caches::Cold, ..program(line) };
+    assert_no_flaws(line, &cold, &some(12), SAMPLE / 2);
 }
 
 #[test]

@@ -60,7 +60,7 @@ impl Injector {
 
     fn write(&self, line: &str) {
         if let Some(mut log) = self.log.as_ref() {
-            // The sweep notices a log that is incomplete.
+            // The sweep notices a log without an end.
             let _ = log.write_all(format!("{line}\n").as_bytes());
         }
     }
@@ -93,6 +93,13 @@ impl Injector {
         }
         self.log_failed(command.name);
         Some(vk::Result::ERROR_DEVICE_LOST)
+    }
+
+    /// True for a presentation to a surface that is lost or has changed: Vulkan still executes its waits for semaphores.
+    pub(super) fn still_executes(&self, number: usize, fault: vk::Result) -> bool {
+        let is_of_surface =
+            matches!(fault, vk::Result::ERROR_SURFACE_LOST_KHR | vk::Result::ERROR_OUT_OF_DATE_KHR);
+        COMMANDS[number].name == "vkQueuePresentKHR" && is_of_surface
     }
 
     /// Notes that a call which [`called`](Self::called) let pass has returned.

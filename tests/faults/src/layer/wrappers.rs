@@ -29,7 +29,8 @@ macro_rules! wrapper {
                 $($argument: $type),+
             ) -> vk::Result {
                 let words = [$(word($argument)),+];
-                if let Some(fault) = injector().called(N, words[0]) {
+                let fault = injector().called(N, words[0]);
+                if let Some(fault) = fault.filter(|fault| !injector().still_executes(N, *fault)) {
                     return fault;
                 }
                 let Some(next) = next(N, words[0]) else {
@@ -41,6 +42,9 @@ macro_rules! wrapper {
                 };
                 // SAFETY: the arguments are those of the caller.
                 let result = unsafe { next($($argument),+) };
+                if let Some(fault) = fault {
+                    return fault;
+                }
                 injector().returned(N, words[0]);
                 if result.as_raw() >= 0 {
                     // SAFETY: a command that creates objects has written their handles to its last argument.

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::plan::SweepPlan;
-use super::run::{LayerFolder, Program, run};
+use super::run::{Caches, LayerFolder, Program, run};
 use super::verdict::{Ending, Flaw, flaws, leaks_on_purpose};
 use crate::fault::Fault;
 
@@ -112,8 +112,12 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
     let start = Instant::now();
     let (layer, caches) = (LayerFolder::new()?, tempfile::tempdir()?);
     // The first run fills the caches.
-    run(program, &layer, caches.path(), None)?;
-    let (clean, calls) = run(program, &layer, caches.path(), None)?;
+    let first = run(program, &layer, caches.path(), None)?;
+    let empty = tempfile::tempdir()?;
+    let ((clean, calls), found_caches) = match program.caches {
+        Caches::Warm => (run(program, &layer, caches.path(), None)?, caches.path()),
+        Caches::Cold => (first, empty.path()),
+    };
     let commands: BTreeSet<_> = calls.iter().map(|call| &call.command).collect();
     let faults = plan.faults(&calls);
     let mut report = SweepReport {
@@ -137,7 +141,7 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
             if start.elapsed() > budget {
                 break;
             }
-            let (outcome, _) = run(program, &layer, caches.path(), Some(fault))?;
+            let (outcome, _) = run(program, &layer, found_caches, Some(fault))?;
             let flaws = flaws(Some(fault), &outcome, &clean);
             report.lock().unwrap_or_else(PoisonError::into_inner).add(fault, &outcome, flaws);
         }

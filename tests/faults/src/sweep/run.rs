@@ -1,6 +1,6 @@
 //! Runs a program once under the layer.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::os::unix::process::ExitStatusExt;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use super::verdict::{Ending, RunOutcome};
+use super::verdict::{Ending, NextStart, RunOutcome};
 use crate::call_log::{Call, CallLog};
 use crate::fault::{Fault, Span};
 use crate::layer::{FAULT_VARIABLE, LOG_VARIABLE};
@@ -31,6 +31,17 @@ pub struct Program {
     pub args: Vec<String>,
     /// Further environment variables.
     pub variables: Vec<(String, String)>,
+    /// Caches that the program finds when a call fails.
+    pub caches: Caches,
+}
+
+/// Caches of a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Caches {
+    /// Those of a run before.
+    Warm,
+    /// None: the program writes them while a call fails.
+    Cold,
 }
 
 /// A folder with the description of the layer, in which the Vulkan loader searches.
@@ -74,8 +85,8 @@ fn layer_library() -> io::Result<PathBuf> {
     newest.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "liblvk_faults.so was not built"))
 }
 
-/// Runs the program. Without a fault it uses `caches` itself and fills them, and the calls are returned, too; with one
-/// it uses a copy.
+/// Runs the program. Without a fault it uses `caches` itself and fills them, and the calls are returned, too. With one it uses a
+/// copy, and where that has changed the program is started once more, without a fault.
 ///
 /// # Errors
 /// Those of files and processes.
@@ -86,18 +97,35 @@ pub fn run(
     fault: Option<&Fault>,
 ) -> io::Result<(RunOutcome, Vec<Call>)> {
     let folder = tempfile::tempdir()?;
-    let (out, log) = (folder.path().join("out"), folder.path().join("log"));
-    fs::create_dir(&out)?;
     let used = match fault {
         Some(_) => copied(caches, &folder.path().join("caches"))?,
         None => caches.to_owned(),
     };
-    let stderr = fs::File::create(folder.path().join("stderr"))?;
+    let (mut outcome, calls) = run_in(folder.path(), program, layer, &used, fault)?;
+    if fault.is_some() && contents(&used)? != contents(caches)? {
+        let folder = tempfile::tempdir()?;
+        let (next, _) = run_in(folder.path(), program, layer, &used, None)?;
+        outcome.next = Some(NextStart { ending: next.ending, result: next.result, stderr: next.stderr });
+    }
+    Ok((outcome, calls))
+}
+
+/// Runs the program in `folder` with the caches `used`.
+fn run_in(
+    folder: &Path,
+    program: &Program,
+    layer: &LayerFolder,
+    used: &Path,
+    fault: Option<&Fault>,
+) -> io::Result<(RunOutcome, Vec<Call>)> {
+    let (out, log) = (folder.join("out"), folder.join("log"));
+    fs::create_dir(&out)?;
+    let stderr = fs::File::create(folder.join("stderr"))?;
     let mut command = Command::new(&program.path);
     command.arg(&out).args(&program.args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
     command.env("XDG_DATA_HOME", layer.folder.path()).env("LVK_FAULT_LAYER", "1");
     command
-        .env("LVK_CACHE", &used)
+        .env("LVK_CACHE", used)
         .env(LOG_VARIABLE, &log)
         .env_remove(FAULT_VARIABLE)
         .env_remove(AGAIN_VARIABLE);
@@ -113,22 +141,24 @@ pub fn run(
     let log = CallLog::parse(&String::from_utf8_lossy(&fs::read(&log).unwrap_or_default()));
     let mut files = BTreeSet::new();
     list(&out, "out", &mut files)?;
-    list(&used, "caches", &mut files)?;
+    list(used, "caches", &mut files)?;
     for result in [FIRST, SECOND] {
         files.remove(&format!("out/{result}"));
     }
     let outcome = RunOutcome {
         ending,
-        stderr: String::from_utf8_lossy(&fs::read(folder.path().join("stderr"))?).into_owned(),
+        stderr: String::from_utf8_lossy(&fs::read(folder.join("stderr"))?).into_owned(),
         reached: log.reached,
         failed: log.failed,
         told_others: log.told_others,
+        counts_objects: log.counts_objects,
         live: log.live,
         orphans: log.orphans,
         orphaning: log.orphaning,
         result: fs::read(out.join(FIRST)).ok(),
         second_result: fs::read(out.join(SECOND)).ok(),
         files,
+        next: None,
     };
     Ok((outcome, log.calls))
 }
@@ -151,6 +181,16 @@ fn ending(status: ExitStatus) -> Ending {
         (Some(code), _) => Ending::Status(code),
         (None, signal) => Ending::Signal(signal.unwrap_or_default()),
     }
+}
+
+/// Returns the bytes of each file of a folder, by its path.
+fn contents(folder: &Path) -> io::Result<BTreeMap<String, Vec<u8>>> {
+    let mut names = BTreeSet::new();
+    list(folder, "", &mut names)?;
+    names
+        .into_iter()
+        .map(|name| Ok((name.clone(), fs::read(folder.join(name.trim_start_matches('/')))?)))
+        .collect()
 }
 
 /// Adds the files of a folder, by paths that start with `name`.

@@ -29,6 +29,8 @@ pub struct RunOutcome {
     pub failed: BTreeSet<String>,
     /// Commands that told other threads of the loss of a device.
     pub told_others: BTreeSet<String>,
+    /// True if the layer has counted objects.
+    pub counts_objects: bool,
     /// Live objects at the end, by type.
     pub live: BTreeMap<String, i64>,
     /// Objects that were alive when their device or instance was destroyed, by type.
@@ -41,6 +43,19 @@ pub struct RunOutcome {
     pub second_result: Option<Vec<u8>>,
     /// Names of files beside the results, and in the caches.
     pub files: BTreeSet<String>,
+    /// The next start, with the caches that the run has left, if it has changed them.
+    pub next: Option<NextStart>,
+}
+
+/// A run without a fault, with the caches of a run with one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NextStart {
+    /// The end of the process.
+    pub ending: Ending,
+    /// The result.
+    pub result: Option<Vec<u8>>,
+    /// Standard error of the process.
+    pub stderr: String,
 }
 
 /// A defect of a run.
@@ -72,6 +87,10 @@ pub enum Flaw {
     UnnamedObject(String),
     /// No result of a second try in the same process, or another.
     NotRecovered,
+    /// No result of the next start, or another, or a warning.
+    BrokenCache(String),
+    /// The layer has counted no objects.
+    NoCounts,
 }
 
 impl fmt::Display for Flaw {
@@ -90,6 +109,8 @@ impl fmt::Display for Flaw {
             Self::OtherCommand(message) => write!(out, "the command that is named has not failed: {message}"),
             Self::UnnamedObject(message) => write!(out, "the object is not named: {message}"),
             Self::NotRecovered => out.write_str("a second try in the same process fails"),
+            Self::BrokenCache(stderr) => write!(out, "the next start fails or warns: {stderr}"),
+            Self::NoCounts => out.write_str("the layer has counted no objects"),
         }
     }
 }
@@ -119,7 +140,20 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
     if !litter.is_empty() {
         flaws.push(Flaw::Litter(litter.join(", ")));
     }
+    flaws.extend(found.next.as_ref().and_then(|next| judge_next(next, clean)));
+    // Without an instance there is nothing to count.
+    if !found.counts_objects && found.ending == Ending::Status(0) {
+        flaws.push(Flaw::NoCounts);
+    }
     flaws
+}
+
+/// Judges the next start: the result is right, and nothing warns of a cache that cannot be read.
+fn judge_next(next: &NextStart, clean: &RunOutcome) -> Option<Flaw> {
+    let is_right = next.ending == Ending::Status(0) && next.result == clean.result;
+    let warnings = |stderr: &str| stderr.lines().filter(|line| line.starts_with("warning: ")).count();
+    let warns = warnings(&next.stderr) > warnings(&clean.stderr);
+    (!is_right || warns).then(|| Flaw::BrokenCache(next.stderr.trim().to_owned()))
 }
 
 /// True if the library says that it leaks a context whose work cannot be waited for: every wait and every question fails for
@@ -251,12 +285,14 @@ mod tests {
             reached: false,
             failed: BTreeSet::new(),
             told_others: BTreeSet::new(),
+            counts_objects: true,
             live: BTreeMap::new(),
             orphans: BTreeMap::new(),
             orphaning: 0,
             result: Some(b"picture".to_vec()),
             second_result: None,
             files: BTreeSet::from(["caches/pipelines".to_owned()]),
+            next: None,
         }
     }
 
@@ -296,6 +332,26 @@ mod tests {
             "one try, one error"
         );
         assert_eq!(found(&twice), [Flaw::NoMessage, Flaw::NotRecovered]);
+    }
+
+    #[test]
+    fn the_next_start_with_the_caches_of_a_run_must_be_right_and_silent() {
+        let right = NextStart { ending: Ending::Status(0), result: clean().result, stderr: String::new() };
+        let started = |next: NextStart| found(&RunOutcome { next: Some(next), ..refused() });
+        assert_eq!(started(right.clone()), []);
+        let warning = "warning: the cache is damaged".to_owned();
+        for (next, told) in [
+            (NextStart { ending: Ending::Status(1), ..right.clone() }, ""),
+            (NextStart { result: Some(Vec::new()), ..right.clone() }, ""),
+            (NextStart { stderr: warning.clone(), ..right }, &*warning),
+        ] {
+            assert_eq!(started(next), [Flaw::BrokenCache(told.to_owned())]);
+        }
+    }
+
+    #[test]
+    fn a_run_whose_objects_were_not_counted_says_nothing_of_leaks() {
+        assert_eq!(found(&RunOutcome { counts_objects: false, ..clean() }), [Flaw::NoCounts]);
     }
 
     /// Judges a line of a fault at `command`, where calls of `failed` were made to fail.
