@@ -9,7 +9,8 @@ use super::dependencies::Dependencies;
 use super::push_constants::PushConstants;
 use crate::barrier::{Stages, Use};
 use crate::device_state::DeferredObject;
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit, check_limit_of};
 use crate::kernels::{Kernel, TraceSizePushConstants};
 use crate::pipeline::lowered::{LoweredPipeline, launch_offset};
 use crate::pipeline::ray_tracing::TraceRegions;
@@ -164,7 +165,7 @@ impl CommandBuffer {
 /// [`LimitExceeded`](Error::LimitExceeded) for a launch with more than `most_rays` rays, or that needs more workgroups.
 fn launch_workgroups(pipeline: &str, size: [u32; 3], most_rays: u32, most: [u32; 3]) -> Result<[u32; 3]> {
     let rays = size.iter().fold(1_u64, |all, side| all.saturating_mul((*side).into()));
-    check_limit(pipeline, "number of rays", rays, most_rays.into())?;
+    check_limit_of(LimitOrigin::Library, pipeline, "number of rays", rays, most_rays.into())?;
     let counts = match size {
         _ if size.contains(&0) => return Ok([0; 3]),
         [width, 1, 1] => {

@@ -10,7 +10,8 @@ use super::ray_tracing_desc::RayTracingPipelineDesc;
 use super::shader_groups::ShaderGroups;
 use super::shader_module::ShaderModule;
 use super::stage::{Specialization, stage_info};
-use crate::error::{Error, Result, check_limit};
+use crate::error::limit_origin::LimitOrigin;
+use crate::error::{Error, Result, check_limit, check_limit_of};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::lowered;
 
@@ -31,7 +32,7 @@ pub(super) fn check_interface(gpu: &Gpu, desc: &RayTracingPipelineDesc<'_>) -> R
     check_limit(name, "recursion depth", desc.max_recursion.into(), limits.max_ray_recursion.into())?;
     if gpu.caps.ray_tracing_pipeline_path.is_lowered() {
         let (what, most) = ("depth of callable shaders", lowered::MAX_CALLABLE_DEPTH);
-        check_limit(name, what, desc.max_callable_depth.into(), most.into())?;
+        check_limit_of(LimitOrigin::Library, name, what, desc.max_callable_depth.into(), most.into())?;
     }
     let attributes = desc.max_hit_attribute_bytes.into();
     check_limit(name, "hit attributes in bytes", attributes, limits.max_hit_attribute_bytes.into())

@@ -325,3 +325,58 @@ fn functions_that_ignore_hits_return_addresses() -> Result<()> {
     }
     Ok(())
 }
+
+/// A ray that runs no closest-hit shader, and one that does, without anything between them where the code could be split.
+#[test]
+fn a_shadow_ray_and_a_ray_that_recurses_may_follow_each_other() -> Result<()> {
+    const SHADOW_FIRST: &str = "
+        void main() {
+            uint me = value;
+            if (me >= 3) return;
+            traceRayEXT(kTLAS[tlas], 9, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, vec3(0, 0, 1), 10.0, 1);
+            inner = me + 1;
+            traceRayEXT(kTLAS[tlas], 1, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, vec3(0, 0, 1), 10.0, 1);
+            value = 10 * me + inner;
+        }";
+    for (path, ctx) in pipeline_devices() {
+        let found = sums(&ctx, &format!("{HIT}\n{SHADOW_FIRST}"))?;
+        assert_eq!(found, [33 + 33 + 23, 3003], "{path:?}");
+    }
+    Ok(())
+}
+
+/// Compilers make the pair of image and sampler before they compute the place, where a shader may end.
+#[test]
+fn a_shader_may_end_while_it_computes_the_place_of_a_texel() -> Result<()> {
+    const PAYLOAD: &str = "
+        layout(location = 0) rayPayloadInEXT uint value;
+        hitAttributeEXT vec2 barycentrics;
+        float place(float x) { if (value == 7) ignoreIntersectionEXT; return x; }
+        uint opacity() {
+            vec2 at = vec2(place(gl_HitTEXT), 0.5);
+            return uint(textureLod(sampler2D(kTextures2D[0], kSamplers[0]), at, 0.0).a * 4.0);
+        }";
+    const RAYS: &str = "
+        void main() {
+            uint sum = 0;
+            for (uint ray = 6; ray < 9; ++ray) {
+                value = ray;
+                traceRayEXT(kTLAS[tlas], 2, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, direction(), 10.0, 0);
+                sum += value;
+            }
+            results.at[gl_LaunchIDEXT.x] = sum;
+        }";
+    for (path, ctx) in pipeline_devices() {
+        let ray_gen = shader(&ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
+        let miss = "layout(location = 0) rayPayloadInEXT uint value; void main() { value += 1000; }";
+        let miss = shader(&ctx, ShaderStage::Miss, miss)?;
+        let any_hit = format!("{PAYLOAD}\nvoid main() {{ value += 100 * opacity(); }}");
+        let any_hit = shader(&ctx, ShaderStage::AnyHit, &any_hit)?;
+        let hit = "layout(location = 0) rayPayloadInEXT uint value; void main() { value += 20; }";
+        let hit = shader(&ctx, ShaderStage::ClosestHit, hit)?;
+        let group = HitGroup { closest_hit: Some(*hit), any_hit: Some(*any_hit), ..Default::default() };
+        let found = launch(&ctx, *ray_gen, *miss, group)?;
+        assert_eq!(found, [2 * 420 + 1000 + 6 + 7 + 8, 3000 + 6 + 7 + 8], "{path:?}");
+    }
+    Ok(())
+}

@@ -23,6 +23,8 @@ use crate::shader::ShaderStage;
 /// Most places of a ray generation shader that trace without a loop over states. Each place has a copy of the traversal,
 /// with the constants of the place. Two copies are faster than the loop, on GPUs and on CPUs; a third is not.
 const MOST_WAITS_WITHOUT_MACHINE: u32 = 2;
+/// Most functions that forget what others were given, since the code grows by the square of their number.
+const MOST_FORGOTTEN: usize = 32;
 
 /// A region of the shader binding table.
 struct Region {
@@ -541,8 +543,9 @@ impl<'a> Assembly<'a> {
 
     /// Makes each piece forget at its start what no piece reads behind that: slots, and what shaders were given.
     fn forget_at_starts(&mut self, machine: &StateMachine, pieces: &mut [FlattenedFunction]) {
+        let count = if pieces.len() > MOST_FORGOTTEN { 0 } else { pieces.len() };
         let given: Vec<(u32, Vec<u32>)> =
-            pieces.iter().map(|function| (function.entry, function.replaced.clone())).collect();
+            pieces[..count].iter().map(|function| (function.entry, function.replaced.clone())).collect();
         for function in pieces {
             let starts: HashMap<u32, u32> =
                 function.cases.iter().map(|(state, label)| (*label, *state)).collect();

@@ -433,7 +433,12 @@ impl Flattener<'_> {
 
     /// True for a block that ends at a trace that no closest-hit shader, and so not this function again, may follow.
     fn returns_directly(&self, block: usize) -> bool {
-        self.function.blocks[block].code.iter().any(|inst| self.frame.returns_directly(inst))
+        self.function.blocks[block]
+            .code
+            .iter()
+            .rev()
+            .nth(1)
+            .is_some_and(|inst| self.frame.returns_directly(inst))
     }
 
     /// Gives the variables that a piece reads their values, at its start.

@@ -375,8 +375,8 @@ impl Linker {
         self.counted_shape(ty).0
     }
 
-    /// Returns the number of values of a type that passes from one shader to another; `None` for more than
-    /// [`MAX_PASSED`], and for a number that is not known.
+    /// Returns the number of values of a type that passes from one shader to another, or any number above [`MAX_PASSED`] for
+    /// more; `None` for a number that is not known.
     pub(super) fn value_count(&self, ty: u32) -> Option<u32> {
         self.value_count_within(ty, MAX_NESTING)
     }
@@ -385,17 +385,21 @@ impl Linker {
     fn value_count_within(&self, ty: u32, nesting: u32) -> Option<u32> {
         let nesting = nesting.checked_sub(1)?;
         let inst = self.global(ty)?;
-        let bounded = |count: u32| Some(count).filter(|count| *count <= MAX_PASSED);
         match inst.op {
             Op::TypeArray => {
                 let of_each = self.value_count_within(inst.operand(1), nesting)?;
-                bounded(of_each.saturating_mul(self.array_length(ty)?))
+                Some(of_each.saturating_mul(self.array_length(ty)?))
             }
             Op::TypeStruct => {
-                let count = inst.operands[1..].iter().try_fold(0_u32, |sum, member| {
-                    bounded(sum.saturating_add(self.value_count_within(*member, nesting)?))
-                })?;
-                Some(count.max(1))
+                let mut sum = 0_u32;
+                for member in &inst.operands[1..] {
+                    // More is not allowed, and need not be counted.
+                    if sum > MAX_PASSED {
+                        break;
+                    }
+                    sum = sum.saturating_add(self.value_count_within(*member, nesting)?);
+                }
+                Some(sum.max(1))
             }
             _ => Some(1),
         }

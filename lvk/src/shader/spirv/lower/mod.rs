@@ -24,6 +24,7 @@ mod pointer_bits;
 mod promote;
 mod prune;
 mod push_constants;
+mod sampled_images;
 mod scopes;
 mod shaders;
 mod simplify;

@@ -13,6 +13,7 @@ use super::linker::Linker;
 use super::module::{Function, functions_that_reach};
 use super::passed::Passed;
 use super::push_constants::merge_push_constants;
+use super::sampled_images::repeat_sampled_images;
 use super::stage::{Shader, link_stage};
 use super::structure_arguments::pass_indices;
 use super::switches::narrow_switches;
@@ -61,6 +62,7 @@ impl Shaders {
                 check_barycentrics(linker, attributes)
                     .map_err(|message| LoweringError { shader: module.name.to_owned(), message })?;
             }
+            repeat_sampled_images(linker, &shader.functions);
             narrow_switches(linker, &shader.functions);
             pass_indices(linker, &shader.functions);
             linked.insert(index, shader);

@@ -137,13 +137,14 @@ fn check_module(module: &Module) -> Result<(), String> {
 /// Fails for a variable whose type cannot be compared with the type on the other side. The error is a message.
 fn check_passed(linker: &Linker, variable: u32) -> Result<(), String> {
     let ty = linker.variable_type(variable).unwrap_or(0);
-    if linker.value_count(ty).is_none() {
-        return Err(format!(
-            "OpVariable of a payload, callable data or attributes has an array whose length is not known, or more than \
-             {MAX_PASSED} values"
-        ));
+    let what = "OpVariable of a payload, callable data or attributes has";
+    match linker.value_count(ty) {
+        None => Err(format!("{what} an array whose length is not known, or a type that contains itself")),
+        Some(count) if count > MAX_PASSED => {
+            Err(format!("{what} {count} values; at most {MAX_PASSED} are passed"))
+        }
+        Some(_) => Ok(()),
     }
-    Ok(())
 }
 
 /// An entry point.

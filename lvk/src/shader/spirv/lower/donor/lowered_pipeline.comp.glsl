@@ -179,8 +179,10 @@ void lvkJudgeCandidate(LvkRayQueryParameter rq) {
     lvkCandidateMatrices(rq);
     lvkEnds = false;
     lvkUnwinds = false;
-    if (kLvkHasBoxes && lvkRayQueryType(rq, LVK_CANDIDATE) == LVK_CANDIDATE_AABB) {
-        lvkJudgeBox(rq);
+    if (lvkRayQueryType(rq, LVK_CANDIDATE) == LVK_CANDIDATE_AABB) {
+        if (kLvkHasBoxes) {
+            lvkJudgeBox(rq);
+        }
     } else {
         lvkJudgeTriangle(rq);
     }
