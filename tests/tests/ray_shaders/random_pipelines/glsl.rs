@@ -43,8 +43,31 @@ const CALL: &str = "
     }
 ";
 
-/// Returns the text of a shader in a pipeline with this number of callable shaders.
-pub fn text(shader: &Shader, stage: ShaderStage, callables: usize) -> String {
+/// A trace where it stands, without a branch, so that several may share a block.
+const IN_PLACE: &str = "
+        at = VARIABLE % (hits + misses);
+        isHit = uint(at < hits);
+        sent.value = VARIABLE;
+        sent.depth = gDepth + 1u;
+        traceRayEXT(kTLAS[tlas], FLAGS, 0xFF, 0, 0, (at - hits) * (1u - isHit), vec3(at + 0.25, 0.25, -1), 0.0,
+            vec3(0, 0, 2.0 * isHit - 1.0), 10.0, 2);
+        VARIABLE = sent.value;
+";
+const SHADOW: &str = "gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT";
+
+/// Forms of traces.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Traces {
+    /// Calls of a function.
+    Called,
+    /// Where they stand.
+    InPlace,
+    /// None: the recursion has ended.
+    Ended,
+}
+
+/// Returns the text of a shader in a pipeline with this number of callable shaders. `in_place`: its traces stand in its functions.
+pub fn text(shader: &Shader, stage: ShaderStage, callables: usize, in_place: bool) -> String {
     let builtin = match stage {
         ShaderStage::ClosestHit => "uint(gl_InstanceID) + uint(gl_HitTEXT + 0.5) + gl_LaunchIDEXT.x",
         ShaderStage::Miss => "gl_LaunchIDEXT.x + uint(gl_RayTmaxEXT)",
@@ -55,9 +78,8 @@ pub fn text(shader: &Shader, stage: ShaderStage, callables: usize) -> String {
     writeln!(text, "#define CALLABLES {callables}u\n#define BUILT_IN ({builtin})").ok();
     if stage != ShaderStage::Callable {
         text.push_str("layout(location = 2) rayPayloadEXT Passed sent;\n");
-        let shadow = "gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT";
         text.push_str(&TRACE.replace("FLAGS", "0"));
-        text.push_str(&TRACE.replace("traced", "tracedShadow").replace("FLAGS", shadow));
+        text.push_str(&TRACE.replace("traced", "tracedShadow").replace("FLAGS", SHADOW));
     }
     text.push_str(CALL);
     match stage {
@@ -71,7 +93,15 @@ pub fn text(shader: &Shader, stage: ShaderStage, callables: usize) -> String {
             "uint f{index}(uint v0) {{ uint v1 = v0 + 1u; uint v2 = 7u; uint a[{ELEMENTS}] = {{}};"
         )
         .ok();
-        write_statements(&mut text, body, 0);
+        if in_place && stage != ShaderStage::Callable {
+            text.push_str("uint at; uint isHit; if (gDepth >= MAX_DEPTH) {\n");
+            write_statements(&mut text, body, (Traces::Ended, 0));
+            text.push_str("} else {\n");
+            write_statements(&mut text, body, (Traces::InPlace, 0));
+            text.push_str("}\n");
+        } else {
+            write_statements(&mut text, body, (Traces::Called, 0));
+        }
         writeln!(text, "return v0 ^ v1 * 3u ^ v2 ^ a[1]; }}").ok();
     }
     let last = shader.functions.len() - 1;
@@ -84,11 +114,25 @@ pub fn text(shader: &Shader, stage: ShaderStage, callables: usize) -> String {
     text
 }
 
-fn write_statements(text: &mut String, statements: &[Statement], loops: u32) {
-    statements.iter().for_each(|statement| write_statement(text, statement, loops));
+fn write_statements(text: &mut String, statements: &[Statement], within: (Traces, u32)) {
+    statements.iter().for_each(|statement| write_statement(text, statement, within));
 }
 
-fn write_statement(text: &mut String, statement: &Statement, loops: u32) {
+fn write_trace(text: &mut String, variable: usize, traces: Traces, is_shadow: bool) {
+    let written = match traces {
+        Traces::Ended => format!("v{variable} = v{variable} * 3u;"),
+        Traces::Called if is_shadow => format!("v{variable} = tracedShadow(v{variable});"),
+        Traces::Called => format!("v{variable} = traced(v{variable});"),
+        Traces::InPlace => {
+            let flags = if is_shadow { SHADOW } else { "0" };
+            IN_PLACE.replace("VARIABLE", &format!("v{variable}")).replace("FLAGS", flags)
+        }
+    };
+    writeln!(text, "{written}").ok();
+}
+
+/// `traces`: their form. `loops`: around the statement.
+fn write_statement(text: &mut String, statement: &Statement, (traces, loops): (Traces, u32)) {
     match statement {
         Statement::Set(target, operation, operand) => {
             let symbol = match operation {
@@ -104,10 +148,10 @@ fn write_statement(text: &mut String, statement: &Statement, loops: u32) {
         }
         Statement::If(condition, yes, no) => {
             writeln!(text, "if ({}) {{", condition_text(*condition)).ok();
-            write_statements(text, yes, loops);
+            write_statements(text, yes, (traces, loops));
             if !no.is_empty() {
                 text.push_str("} else {\n");
-                write_statements(text, no, loops);
+                write_statements(text, no, (traces, loops));
             }
             text.push_str("}\n");
         }
@@ -116,7 +160,7 @@ fn write_statement(text: &mut String, statement: &Statement, loops: u32) {
             if let Some(condition) = skip {
                 writeln!(text, "if ({}) {{ v2 += 1u; continue; }}", condition_text(*condition)).ok();
             }
-            write_statements(text, body, loops + 1);
+            write_statements(text, body, (traces, loops + 1));
             if let Some(condition) = leave {
                 writeln!(text, "if ({}) break;", condition_text(*condition)).ok();
             }
@@ -124,17 +168,15 @@ fn write_statement(text: &mut String, statement: &Statement, loops: u32) {
         }
         Statement::Switch(variable, cases) => {
             writeln!(text, "switch (v{variable} % 3u) {{ case 0u:").ok();
-            write_statements(text, &cases[0], loops);
+            write_statements(text, &cases[0], (traces, loops));
             text.push_str("case 1u:\n");
-            write_statements(text, &cases[1], loops);
+            write_statements(text, &cases[1], (traces, loops));
             text.push_str("break;\ndefault:\n");
-            write_statements(text, &cases[2], loops);
+            write_statements(text, &cases[2], (traces, loops));
             text.push_str("break; }\n");
         }
-        Statement::Trace(variable) => _ = writeln!(text, "v{variable} = traced(v{variable});"),
-        Statement::TraceShadow(variable) => {
-            writeln!(text, "v{variable} = tracedShadow(v{variable});").ok();
-        }
+        Statement::Trace(variable) => write_trace(text, *variable, traces, false),
+        Statement::TraceShadow(variable) => write_trace(text, *variable, traces, true),
         Statement::Callable(variable) => _ = writeln!(text, "v{variable} = called(v{variable});"),
         Statement::Call(function, variable) => {
             writeln!(text, "v{variable} = f{function}(v{variable});").ok();

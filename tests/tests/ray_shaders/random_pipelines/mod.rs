@@ -54,7 +54,9 @@ fn glsl_of(pipeline: &Pipeline) -> String {
         (ShaderStage::Callable, &pipeline.callables),
     ];
     let texts = kinds.iter().flat_map(|(stage, shaders)| {
-        shaders.iter().map(move |shader| format!("// {stage:?}\n{}", glsl::text(shader, *stage, callables)))
+        shaders.iter().map(move |shader| {
+            format!("// {stage:?}\n{}", glsl::text(shader, *stage, callables, pipeline.traces_in_place))
+        })
     });
     texts.collect()
 }
@@ -63,7 +65,8 @@ fn glsl_of(pipeline: &Pipeline) -> String {
 fn run(ctx: &Context, scene: &GroupScene, pipeline: &Pipeline) -> Result<Vec<u32>> {
     let results = words_buffer(ctx, &vec![u32::MAX; LAUNCHES as usize]);
     let compiled = |shaders: &[Shader], stage: ShaderStage| {
-        let text = |one: &Shader| shader(ctx, stage, &glsl::text(one, stage, pipeline.callables.len()));
+        let (callables, in_place) = (pipeline.callables.len(), pipeline.traces_in_place);
+        let text = |one: &Shader| shader(ctx, stage, &glsl::text(one, stage, callables, in_place));
         shaders.iter().map(text).collect::<Result<Vec<_>>>()
     };
     let ray_gen = compiled(std::slice::from_ref(&pipeline.ray_gen), ShaderStage::RayGen)?;

@@ -93,6 +93,8 @@ pub struct Pipeline {
     pub hits: Vec<Shader>,
     /// Callable shaders.
     pub callables: Vec<Shader>,
+    /// True if traces stand where they are written, several to a block; else each is a call of a function.
+    pub traces_in_place: bool,
 }
 
 /// Calls that a kind of shader may have.
@@ -128,12 +130,33 @@ impl Pipeline {
             let count = few(random, most);
             (0..count).map(|_| shader(random, allowed)).collect()
         };
-        Self {
+        let mut pipeline = Self {
             ray_gen: shader(&mut random, outer),
             misses: shaders(&mut random, 2, misses),
             hits: shaders(&mut random, 3, hits),
             callables: shaders(&mut random, 2, nested),
+            traces_in_place: seed % 2 == 1,
+        };
+        if pipeline.traces_in_place && extras {
+            for function in pipeline.hits.iter_mut().flat_map(|shader| &mut shader.functions) {
+                put_shadows_before_traces(function);
+            }
         }
+        pipeline
+    }
+}
+
+/// Puts a ray that runs no closest-hit shader in front of each that does.
+fn put_shadows_before_traces(statements: &mut Vec<Statement>) {
+    for mut statement in std::mem::take(statements) {
+        match &mut statement {
+            Statement::Trace(variable) => statements.push(Statement::TraceShadow((*variable + 1) % 3)),
+            Statement::If(_, yes, no) => [yes, no].into_iter().for_each(put_shadows_before_traces),
+            Statement::Loop(_, body, ..) => put_shadows_before_traces(body),
+            Statement::Switch(_, cases) => cases.iter_mut().for_each(put_shadows_before_traces),
+            _ => {}
+        }
+        statements.push(statement);
     }
 }
 
