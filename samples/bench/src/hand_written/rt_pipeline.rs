@@ -18,7 +18,8 @@ const STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
         | vk::ShaderStageFlags::CLOSEST_HIT_KHR.as_raw(),
 );
 /// The stages of [`stages`](crate::pipelines::stages), which are also the order of the groups.
-const KINDS: [vk::ShaderStageFlags; 5] = [
+const KINDS: [vk::ShaderStageFlags; 6] = [
+    vk::ShaderStageFlags::RAYGEN_KHR,
     vk::ShaderStageFlags::RAYGEN_KHR,
     vk::ShaderStageFlags::RAYGEN_KHR,
     vk::ShaderStageFlags::MISS_KHR,
@@ -189,7 +190,7 @@ impl RawTracing {
         let usage = vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR;
         let sbt = RawBuffer::writable(&self.device, (hit_at + stride + base) as u64, usage)?;
         let first = sbt.address.next_multiple_of(base as u64);
-        for (group, place) in [(0, 0), (2, miss_at), (3, miss_at + stride), (4, hit_at)] {
+        for (group, place) in [(0, 0), (3, miss_at), (4, miss_at + stride), (5, hit_at)] {
             let offset = first - sbt.address + place as u64;
             sbt.write(offset, &handles[group * handle..(group + 1) * handle])?;
         }
