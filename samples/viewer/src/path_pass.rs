@@ -10,7 +10,7 @@ use lvk_samples::pipelines::SampleStage;
 
 use crate::config::ViewerConfig;
 use crate::gpu::FrameScene;
-use crate::gpu::layout::{Push, SCENE_LAYOUTS};
+use crate::gpu::layout::{GpuStoredPath, Push, SCENE_LAYOUTS};
 use crate::pipelines::{CANDIDATE, NEAREST_HIT, NEAREST_MISS, SAMPLE};
 
 /// Side of a work group in pixels.
@@ -19,8 +19,8 @@ const GROUP: u32 = 8;
 /// invocations at work; on a CPU each costs more.
 const GPU_STEPS: &[u32] = &[1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 4, 4];
 const CPU_STEPS: &[u32] = &[2, 2, 4, 4];
-/// Bytes of a path between launches (`StoredPath` in `shaders/viewer/frame.glsl`).
-const PATH_BYTES: u64 = 100;
+/// Bytes of a path between launches.
+const PATH_BYTES: u64 = size_of::<GpuStoredPath>() as u64;
 /// Bytes before the lists of paths (`kListHead` in `shaders/viewer/path_launch.glsl`).
 const LIST_HEAD_BYTES: u64 = 16;
 

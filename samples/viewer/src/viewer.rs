@@ -20,7 +20,7 @@ use crate::present::Present;
 use crate::renderer::Renderer;
 
 /// Samples of a pass of the path tracer, so that none takes long: on a GPU, and on a CPU.
-const GPU_PASS: u32 = 16;
+const GPU_PASS: u32 = 4;
 const CPU_PASS: u32 = 16;
 /// Distance of the near plane over the distance of what the camera looks at.
 const NEAR_SHARE: f32 = 1e-3;

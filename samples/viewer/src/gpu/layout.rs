@@ -161,6 +161,32 @@ lvk::shader_struct! {
         pub(crate) range: f32,
     }
 
+    /// `Path`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuPath {
+        pub(crate) origin: [f32; 3],
+        pub(crate) direction: [f32; 3],
+        pub(crate) density: f32,
+        pub(crate) from: [f32; 3],
+        pub(crate) extinction: [f32; 3],
+        pub(crate) squeezed: f32,
+        pub(crate) spread: f32,
+        pub(crate) width: f32,
+        pub(crate) bounce: u32,
+        pub(crate) ray_count: u32,
+        pub(crate) throughput: [f32; 3],
+        pub(crate) radiance: [f32; 3],
+    }
+
+    /// `StoredPath`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuStoredPath {
+        pub(crate) path: GpuPath,
+        pub(crate) pair: u32,
+    }
+
     /// `Frame`: what culling reads and writes.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
@@ -315,4 +341,5 @@ pub(crate) const SCENE_LAYOUTS: &[BlockLayout] = &[
     BlockLayout::buffer_reference::<GpuMaterial>("MaterialArray"),
     BlockLayout::buffer_reference::<GpuLight>("LightArray"),
     BlockLayout::buffer_reference::<GpuEmitter>("EmitterArray"),
+    BlockLayout::buffer_reference::<GpuStoredPath>("StoredPathArray"),
 ];
