@@ -48,16 +48,21 @@ fn needs_device_lock(driver: vk::DriverId) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Barrier;
     use std::sync::atomic::{AtomicU32, Ordering};
+    use std::sync::{Barrier, Mutex, PoisonError};
     use std::thread;
 
     use super::*;
 
     const NVIDIA: vk::DriverId = vk::DriverId::NVIDIA_PROPRIETARY;
 
+    /// Held by tests of the lock of devices: where a thread of another test waits to write, a second reader waits behind that
+    /// thread, and would never meet the first.
+    static ONE_TEST: Mutex<()> = Mutex::new(());
+
     #[test]
     fn pipelines_are_made_side_by_side() {
+        let _alone = ONE_TEST.lock().unwrap_or_else(PoisonError::into_inner);
         let together = Barrier::new(2);
         thread::scope(|scope| {
             for _ in 0..2 {
@@ -96,6 +101,7 @@ mod tests {
 
     #[test]
     fn no_list_is_searched_while_a_device_or_an_instance_comes_or_goes() {
+        let _alone = ONE_TEST.lock().unwrap_or_else(PoisonError::into_inner);
         let search = |call: &SharedCall| with_shared_loader_lock(|| call.run());
         assert_excluded(search, |call| with_exclusive_loader_lock(|| call.running()));
         assert_excluded(search, |call| with_exclusive_device_lock(NVIDIA, || call.running()));
@@ -103,6 +109,7 @@ mod tests {
 
     #[test]
     fn no_pipeline_is_made_while_a_device_comes_or_goes() {
+        let _alone = ONE_TEST.lock().unwrap_or_else(PoisonError::into_inner);
         assert_excluded(
             |call| with_shared_device_lock(NVIDIA, || call.run()),
             |call| with_exclusive_device_lock(NVIDIA, || call.running()),
