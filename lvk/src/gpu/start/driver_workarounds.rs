@@ -47,6 +47,7 @@ fn needs_device_lock(driver: vk::DriverId) -> bool {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_types, reason = "a lock between tests has no order among those of the library")]
 mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
     use std::sync::{Barrier, Mutex, PoisonError};
