@@ -143,7 +143,7 @@ struct Path {
     float density; // of the direction; below 0 where nothing else looks for light along it
     vec3 from; // the surface that the direction was drawn at
     vec3 extinction; // of the volume that the path is in
-    float squeezed; // radiance is eta^2 as much inside of a volume, which comes back at its end
+    float squeezed; // product of eta^2 of the boundaries that the path has passed, whose inverse is in its throughput
     float spread; // of the cone that the path stands for, over its length; 0: textures are read unfiltered
     float width; // of the cone at the origin
     uint bounce; // number of the next surface, from 0

@@ -75,6 +75,7 @@ struct FirstLight {
     vec3 mirroredWeight;
 };
 
+const FirstLight kNoLight = FirstLight(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
 const uint kPlaneMatteWeight = kPlaneMatte + 1u;
 const uint kPlaneMirroredWeight = kPlaneMirrored + 1u;
 
@@ -101,13 +102,13 @@ Path beginPath(uvec2 pixel, inout Random random) {
 void endInSky(uint place, vec3 direction) {
     storePoint(place, frame.camera.eye + kSkyDistance * frame.camera.nearPlane * direction);
     storeSurface(place, Seen(-direction, -1.0, 0xffffffu, 1.0), missedLight(direction, -1.0), vec3(0.0), vec3(0.0));
-    storeFirst(place, FirstLight(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)));
+    storeFirst(place, kNoLight);
 }
 
 // A pixel that shows an unlit surface.
 void endUnlit(uint place, Seen seen, vec3 color) {
     storeSurface(place, seen, color, vec3(0.0), vec3(0.0));
-    storeFirst(place, FirstLight(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)));
+    storeFirst(place, kNoLight);
 }
 
 FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen, uint place) {

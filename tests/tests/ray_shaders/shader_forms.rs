@@ -112,6 +112,9 @@ const HIT: &str = "
         traceRayEXT(kTLAS[tlas], flags, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, vec3(0, 0, z), 10.0, 1);
     }";
 
+/// A miss shader.
+const ADD_1000: &str = "layout(location = 0) rayPayloadInEXT uint value; void main() { value += 1000; }";
+
 /// Returns the sums, over three rays each whose payload starts with 0, 1 and 2, of rays that hit and that miss. Each miss adds 1,000.
 fn sums(ctx: &Context, hit: &str) -> Result<Vec<u32>> {
     const RAYS: &str = "
@@ -125,8 +128,7 @@ fn sums(ctx: &Context, hit: &str) -> Result<Vec<u32>> {
             results.at[gl_LaunchIDEXT.x] = sum;
         }";
     let ray_gen = shader(ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
-    let miss = "layout(location = 0) rayPayloadInEXT uint value; void main() { value += 1000; }";
-    let miss = shader(ctx, ShaderStage::Miss, miss)?;
+    let miss = shader(ctx, ShaderStage::Miss, ADD_1000)?;
     let hit = shader(ctx, ShaderStage::ClosestHit, hit)?;
     let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &[*ray_gen],
@@ -368,8 +370,7 @@ fn a_shader_may_end_while_it_computes_the_place_of_a_texel() -> Result<()> {
         }";
     for (path, ctx) in pipeline_devices() {
         let ray_gen = shader(&ctx, ShaderStage::RayGen, &format!("{PUSH}\n{RAYS}"))?;
-        let miss = "layout(location = 0) rayPayloadInEXT uint value; void main() { value += 1000; }";
-        let miss = shader(&ctx, ShaderStage::Miss, miss)?;
+        let miss = shader(&ctx, ShaderStage::Miss, ADD_1000)?;
         let any_hit = format!("{PAYLOAD}\nvoid main() {{ value += 100 * opacity(); }}");
         let any_hit = shader(&ctx, ShaderStage::AnyHit, &any_hit)?;
         let hit = "layout(location = 0) rayPayloadInEXT uint value; void main() { value += 20; }";
