@@ -9,10 +9,10 @@ use lvk::{
 };
 
 use super::caches::Caches;
+use super::print_line;
 use super::ray_args::RayTracing;
 use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
-use super::{print_line, print_message};
 use lvk_dev_driver::{self as driver, Driver, DriverError, DriverRequest};
 
 /// Requirements of a sample on the device.
@@ -218,14 +218,11 @@ pub fn pipeline_text(capabilities: &Capabilities) -> String {
     }
 }
 
-/// Fails when the validation layer was not silent.
+/// Fails when the validation layer was not silent. The messages are printed as they come ([`library_warnings`](super::library_warnings)).
 pub(super) fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
-    let messages = sink.messages();
-    for message in &messages {
-        print_message("validation", message);
-    }
-    print_line(&format!("validation messages: {}", messages.len()));
-    if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }
+    let count = sink.messages().len();
+    print_line(&format!("validation messages: {count}"));
+    if count == 0 { Ok(()) } else { Err(RunError::Validation(count)) }
 }
 
 fn validation(wish: Option<ValidationArg>) -> lvk::ValidationMode {

@@ -13,9 +13,11 @@ pub const STATUS: u8 = 130;
 /// and the second time ends the process. Either way no picture and no cache file is left in part, because files get their
 /// names when they are complete, and the temporary files are removed. On Windows, Ctrl-Break and the closing of the console
 /// count like Ctrl-C.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct Interrupt {
     flags: Arc<Flags>,
+    /// Kept for its end.
+    _listener: Option<Listener>,
 }
 
 #[derive(Debug, Default)]
@@ -25,13 +27,13 @@ struct Flags {
 }
 
 impl Interrupt {
-    /// Listens from now on. If the system does not allow it, Ctrl-C ends the process as usual.
+    /// Listens from now on, until the end of the value. If the system does not allow it, Ctrl-C ends the process as usual.
     #[must_use]
     pub fn listen() -> Self {
-        let interrupt = Self::default();
-        let heard = interrupt.clone();
-        end_when_interrupted(move || heard.ends_process());
-        interrupt
+        let flags = Arc::<Flags>::default();
+        let heard = flags.clone();
+        let listener = Listener::start(move || heard.ends_process());
+        Self { flags, _listener: listener }
     }
 
     /// A flag without signal handlers; only [`Interrupt::raise`] raises it.
@@ -55,45 +57,75 @@ impl Interrupt {
     pub fn is_raised(&self) -> bool {
         self.flags.is_raised.load(Ordering::SeqCst)
     }
+}
 
+impl Flags {
     /// Raises the flag. True if this is to end the process at once.
     fn ends_process(&self) -> bool {
-        let is_again = self.flags.is_raised.swap(true, Ordering::SeqCst);
-        is_again || !self.flags.is_deferred.load(Ordering::SeqCst)
+        let is_again = self.is_raised.swap(true, Ordering::SeqCst);
+        is_again || !self.is_deferred.load(Ordering::SeqCst)
     }
 }
 
-/// Calls `ends_process` at each signal, on a thread of its own, and ends the process where that is true.
+/// Listens to signals on a thread of its own, which its end joins.
 #[cfg(unix)]
-fn end_when_interrupted(ends_process: impl Fn() -> bool + Send + 'static) {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    use signal_hook::iterator::Signals;
+#[derive(Debug)]
+struct Listener {
+    signals: signal_hook::iterator::Handle,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
 
-    let listening = Signals::new([SIGINT, SIGTERM]).and_then(|mut signals| {
-        std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
-            if signals.forever().any(|_| ends_process()) {
+#[cfg(unix)]
+impl Listener {
+    /// Calls `ends_process` at each signal, and ends the process where that is true.
+    fn start(ends_process: impl Fn() -> bool + Send + 'static) -> Option<Self> {
+        Self::try_start(ends_process)
+            .inspect_err(|error| log::warn!("cannot listen to signals: {error}"))
+            .ok()
+    }
+
+    fn try_start(ends_process: impl Fn() -> bool + Send + 'static) -> std::io::Result<Self> {
+        use signal_hook::consts::{SIGINT, SIGTERM};
+        use signal_hook::iterator::Signals;
+
+        let mut listening = Signals::new([SIGINT, SIGTERM])?;
+        let signals = listening.handle();
+        let thread = std::thread::Builder::new().name("interrupt".to_owned()).spawn(move || {
+            if listening.forever().any(|_| ends_process()) {
                 temporary_file::remove_all_before_exit();
                 // Without the handlers of the C library: other threads still use what these destroy.
                 signal_hook::low_level::exit(STATUS.into());
             }
-        })
-    });
-    if let Err(error) = listening {
-        log::warn!("cannot listen to signals: {error}");
+        })?;
+        Ok(Self { signals, thread: Some(thread) })
     }
 }
 
-// The signals of Windows' C library know neither Ctrl-Break nor a closed console.
+#[cfg(unix)]
+impl Drop for Listener {
+    fn drop(&mut self) {
+        self.signals.close();
+        // A thread that has panicked has told so.
+        let _ = self.thread.take().map(std::thread::JoinHandle::join);
+    }
+}
+
+/// Listens until the process ends: the handler cannot be taken back.
 #[cfg(windows)]
-fn end_when_interrupted(ends_process: impl Fn() -> bool + Send + 'static) {
-    let listening = ctrlc::try_set_handler(move || {
-        if ends_process() {
-            temporary_file::remove_all_before_exit();
-            std::process::exit(STATUS.into());
-        }
-    });
-    if let Err(error) = listening {
-        log::warn!("cannot listen to Ctrl-C: {error}");
+#[derive(Debug)]
+struct Listener;
+
+#[cfg(windows)]
+impl Listener {
+    // The signals of Windows' C library know neither Ctrl-Break nor a closed console.
+    fn start(ends_process: impl Fn() -> bool + Send + 'static) -> Option<Self> {
+        let listening = ctrlc::try_set_handler(move || {
+            if ends_process() {
+                temporary_file::remove_all_before_exit();
+                std::process::exit(STATUS.into());
+            }
+        });
+        listening.inspect_err(|error| log::warn!("cannot listen to Ctrl-C: {error}")).ok().map(|()| Self)
     }
 }
 
@@ -103,11 +135,29 @@ mod tests {
 
     #[test]
     fn the_first_signal_ends_the_process_unless_it_is_deferred() {
-        assert!(Interrupt::without_handlers().ends_process());
+        assert!(Interrupt::without_handlers().flags.ends_process());
         let deferred = Interrupt::without_handlers();
         deferred.defer();
         assert!(!deferred.is_raised());
-        assert!(!deferred.ends_process() && deferred.is_raised());
-        assert!(deferred.ends_process(), "the second time");
+        assert!(!deferred.flags.ends_process() && deferred.is_raised());
+        assert!(deferred.flags.ends_process(), "the second time");
+    }
+
+    /// Its thread has a name of its own, by which the system lists it.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_listener_ends_with_its_value() -> std::io::Result<()> {
+        let threads = || -> std::io::Result<usize> {
+            let tasks = std::fs::read_dir("/proc/self/task")?;
+            let names = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("comm")).ok());
+            Ok(names.filter(|name| name.trim() == "interrupt").count())
+        };
+        let interrupt = Interrupt::listen();
+        assert_eq!(threads()?, 1);
+        drop(interrupt);
+        while threads()? > 0 {
+            std::thread::yield_now();
+        }
+        Ok(())
     }
 }

@@ -1,21 +1,21 @@
-//! Prints warnings of the library: damaged caches, refused features, leaked objects.
+//! Prints warnings of the library: damaged caches, refused features, leaked objects, validation messages.
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
 
-/// Log target of validation messages, which programs count and print themselves.
-const VALIDATION: &str = "lvk::gpu::debug";
+/// Log target of the messages of the validation layer.
+const VALIDATION: &str = "lvk::gpu::debug::messenger";
 
 struct ToStandardError;
 
 impl Log for ToStandardError {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        let target = metadata.target();
-        metadata.level() <= Level::Warn && target.starts_with("lvk") && target != VALIDATION
+        metadata.level() <= Level::Warn && metadata.target().starts_with("lvk")
     }
 
     fn log(&self, record: &Record<'_>) {
         if self.enabled(record.metadata()) {
-            super::print_message("warning", record.args());
+            let subject = if record.target() == VALIDATION { "validation" } else { "warning" };
+            super::print_message(subject, record.args());
         }
     }
 

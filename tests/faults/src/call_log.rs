@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::fault::FaultError;
+use crate::leftovers::Leftovers;
 
 /// A call of a run without fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,11 +28,15 @@ pub struct CallLog {
     /// True if an instance was created or destroyed.
     pub counts_objects: bool,
     /// Objects that were alive at the end, by type. An instance among them says that others may be, too.
-    pub live: BTreeMap<String, i64>,
+    pub live: BTreeMap<String, usize>,
     /// Objects that were alive when their device or instance was destroyed, by type.
-    pub orphans: BTreeMap<String, i64>,
+    pub orphans: BTreeMap<String, usize>,
     /// Devices and instances that were destroyed before their objects.
-    pub orphaning: i64,
+    pub orphaning: usize,
+    /// Types of objects that were destroyed though they were not alive.
+    pub dead: BTreeSet<String>,
+    /// What the process held at its end.
+    pub leftovers: Option<Leftovers>,
 }
 
 impl CallLog {
@@ -48,6 +53,8 @@ impl CallLog {
                 })),
                 Some("fault") => log.reached = true,
                 Some("failed") => log.failed.extend(words.next().map(str::to_owned)),
+                Some("dead") => log.dead.extend(words.next().map(str::to_owned)),
+                Some("left") => log.leftovers = Leftovers::parse(words),
                 Some("told") => log.told_others.extend(words.next().map(str::to_owned)),
                 Some("live") => {
                     log.counts_objects = true;
@@ -66,7 +73,7 @@ impl CallLog {
     }
 }
 
-fn live_count(word: &str) -> Option<(String, i64)> {
+fn live_count(word: &str) -> Option<(String, usize)> {
     let (kind, count) = word.split_once('=')?;
     Some((kind.to_owned(), count.parse().ok()?))
 }
@@ -92,16 +99,27 @@ pub(crate) fn told_line(command: &str) -> String {
 }
 
 /// Returns the line for the live objects, at the creation and at the end of an instance.
-pub(crate) fn live_line(live: &BTreeMap<&'static str, i64>) -> String {
+pub(crate) fn live_line(live: &BTreeMap<&'static str, usize>) -> String {
     counts_line("live", live)
 }
 
+/// Returns the line for an object that is destroyed though it is not alive.
+pub(crate) fn dead_line(kind: &str) -> String {
+    format!("dead {kind}")
+}
+
+/// Returns the line for what a process holds at its end.
+#[must_use]
+pub fn left_line(leftovers: &Leftovers) -> String {
+    format!("left {leftovers}")
+}
+
 /// Returns the line for objects of a device or instance that is destroyed before them.
-pub(crate) fn orphans_line(orphans: &BTreeMap<&'static str, i64>) -> String {
+pub(crate) fn orphans_line(orphans: &BTreeMap<&'static str, usize>) -> String {
     counts_line("orphans", orphans)
 }
 
-fn counts_line(word: &str, objects: &BTreeMap<&'static str, i64>) -> String {
+fn counts_line(word: &str, objects: &BTreeMap<&'static str, usize>) -> String {
     let counts = objects.iter().filter(|(_, count)| **count != 0);
     counts.fold(word.to_owned(), |line, (kind, count)| format!("{line} {kind}={count}"))
 }
@@ -113,6 +131,7 @@ mod tests {
     #[test]
     fn lines_come_back_and_the_last_live_objects_count() {
         let errors = [FaultError::HostMemory, FaultError::DeviceLost];
+        let left = Leftovers { file_descriptors: 9, threads: 2, heap_bytes: 1234 };
         let text = [
             call_line("vkQueueSubmit2", &errors),
             live_line(&BTreeMap::from([("VkInstance", 1)])),
@@ -123,7 +142,9 @@ mod tests {
             failed_line("vkWaitSemaphores"),
             live_line(&BTreeMap::from([("VkInstance", 0), ("VkBuffer", 2)])),
             orphans_line(&BTreeMap::from([("VkFence", 1)])),
-            orphans_line(&BTreeMap::from([("VkFence", 2), ("VkImage", -1)])),
+            orphans_line(&BTreeMap::from([("VkFence", 2), ("VkImage", 1)])),
+            dead_line("VkQueryPool"),
+            left_line(&left),
             "ca".to_owned(),
         ];
         let expected = CallLog {
@@ -133,8 +154,10 @@ mod tests {
             told_others: BTreeSet::from(["vkWaitSemaphores".to_owned()]),
             counts_objects: true,
             live: BTreeMap::from([("VkBuffer".to_owned(), 2)]),
-            orphans: BTreeMap::from([("VkFence".to_owned(), 3), ("VkImage".to_owned(), -1)]),
+            orphans: BTreeMap::from([("VkFence".to_owned(), 3), ("VkImage".to_owned(), 1)]),
             orphaning: 2,
+            dead: BTreeSet::from(["VkQueryPool".to_owned()]),
+            leftovers: Some(left.clone()),
         };
         assert_eq!(CallLog::parse(&text.join("\n")), expected);
         assert_eq!(CallLog::parse(""), CallLog::default());

@@ -35,6 +35,12 @@ impl FaultError {
         }
     }
 
+    /// True for the errors of memory.
+    #[must_use]
+    pub const fn is_want_of_memory(self) -> bool {
+        matches!(self, Self::HostMemory | Self::DeviceMemory)
+    }
+
     /// Returns the error of this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
@@ -49,13 +55,19 @@ pub enum Span {
     Once,
     /// The call and all later ones of the same command.
     Command,
-    /// The call and all later ones of every command, as far as the command may answer the error.
+    /// The call and all later ones of every command, as far as the command may answer the error. Want of memory spares
+    /// questions about the progress of work ([`PROGRESS`]), so that a context can learn that its work has ended.
     Stays,
+    /// The same, and questions about the progress of work fail too.
+    Unanswered,
 }
+
+/// The command that asks how far the work of a queue is.
+pub const PROGRESS: &str = "vkGetSemaphoreCounterValue";
 
 impl Span {
     /// Every span.
-    pub const ALL: [Self; 3] = [Self::Once, Self::Command, Self::Stays];
+    pub const ALL: [Self; 4] = [Self::Once, Self::Command, Self::Stays, Self::Unanswered];
 
     /// Returns the name of the span in texts of faults.
     #[must_use]
@@ -64,6 +76,18 @@ impl Span {
             Self::Once => "once",
             Self::Command => "command",
             Self::Stays => "stays",
+            Self::Unanswered => "unanswered",
+        }
+    }
+
+    /// True if a later call fails too: one of `command`, of a fault of `error` in the command `of`.
+    #[must_use]
+    pub fn goes_on(self, error: FaultError, of: &str, command: &str) -> bool {
+        match self {
+            Self::Once => false,
+            Self::Command => command == of,
+            Self::Stays => command != PROGRESS || !error.is_want_of_memory(),
+            Self::Unanswered => true,
         }
     }
 
@@ -97,7 +121,7 @@ impl fmt::Display for Fault {
 
 /// A text that describes no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no fault; write COMMAND CALL ERROR once|command|stays")]
+#[error("'{0}' is no fault; write COMMAND CALL ERROR once|command|stays|unanswered")]
 pub struct NoFault(String);
 
 impl FromStr for Fault {
@@ -130,6 +154,18 @@ mod tests {
                 let fault = Fault { command: "vkCreateBuffer".into(), call: 3, error, span };
                 assert_eq!(fault.to_string().parse(), Ok(fault));
             }
+        }
+    }
+
+    #[test]
+    fn only_faults_that_are_unanswered_hide_the_progress_of_work() {
+        let goes_on = |span: Span, error, command| span.goes_on(error, "vkMapMemory", command);
+        for error in FaultError::ALL {
+            assert!(!goes_on(Span::Once, error, "vkMapMemory"));
+            assert!(goes_on(Span::Command, error, "vkMapMemory") && !goes_on(Span::Command, error, PROGRESS));
+            assert!(goes_on(Span::Stays, error, "vkQueueWaitIdle"));
+            assert_eq!(goes_on(Span::Stays, error, PROGRESS), !error.is_want_of_memory());
+            assert!(goes_on(Span::Unanswered, error, PROGRESS));
         }
     }
 

@@ -9,4 +9,5 @@ pub mod call_log;
 pub mod fault;
 pub mod fault_report;
 pub mod layer;
+pub mod leftovers;
 pub mod sweep;

@@ -31,7 +31,7 @@ const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scene.obj");
 fn program(line: &str) -> Program {
     let args = line.split_whitespace().map(|word| word.replace("SCENE", SCENE)).collect();
     let path = PathBuf::from(env!("CARGO_BIN_EXE_fault_scenarios"));
-    Program { path, args, variables: Vec::new(), caches: Caches::Warm }
+    Program { path, args, variables: Vec::new(), caches: Caches::Warm, tries_again: true }
 }
 
 fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Duration) {
@@ -63,7 +63,11 @@ where
 
 /// Runs the whole sweep, as far as [`whole_plan`] goes, and prints its row of the table in `docs/reliability.md`.
 fn whole(name: &str, line: &str, program: &Program) {
-    let report = sweep(program, &whole_plan(), WHOLE).unwrap();
+    whole_of(name, line, program, &whole_plan());
+}
+
+fn whole_of(name: &str, line: &str, program: &Program, plan: &SweepPlan) {
+    let report = sweep(program, plan, WHOLE).unwrap();
     println!("{line}: {report}\n{}", report.row(name));
     // Threads change the order of calls, so that a few faults are not reached.
     let is_reached = 20 * report.reached >= 19 * report.runs && report.reached > 0;
@@ -152,6 +156,60 @@ fn whole_example_triangle() {
     );
 }
 
+/// Declares an ignored test for each program that runs with the validation layer, below the layer of the faults: what the library does
+/// after a failed call must be valid.
+macro_rules! validated_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            whole(stringify!($test), $line, &validated($line));
+        }
+    )*};
+}
+
+validated_sweeps! {
+    whole_validated_hybrid_pipeline: "hybrid --width 64 --height 36 --frames 1 --rt hardware --scene SCENE";
+    whole_validated_hybrid_lowered: "hybrid --width 64 --height 36 --frames 1 --rt pipeline --scene SCENE";
+    whole_validated_viewer: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2";
+    whole_validated_blas: "blas";
+    whole_validated_blas_software: "blas_software";
+    whole_validated_threads: "threads";
+    whole_validated_queues: "queues";
+    whole_validated_hot_reload: "hot_reload";
+    whole_validated_interop: "interop";
+}
+
+/// Returns a program with the validation layer: samples have an argument for it, scenarios a variable.
+fn validated(line: &str) -> Program {
+    let mut program = program(line);
+    match line.contains("--frames") {
+        true => program.args.push("--validate".to_owned()),
+        false => program.variables.push(("LVK_FAULT_VALIDATE".to_owned(), "1".to_owned())),
+    }
+    program
+}
+
+/// Declares an ignored test for each scenario whose context may be leaked, as questions about the progress of its work fail too.
+macro_rules! unanswered_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            let plan = SweepPlan { spans: vec![Span::Unanswered], ..whole_plan() };
+            whole_of(stringify!($test), $line, &program($line), &plan);
+        }
+    )*};
+}
+
+unanswered_sweeps! {
+    whole_unanswered_threads: "threads";
+    whole_unanswered_queues: "queues";
+    whole_unanswered_blas: "blas";
+    whole_unanswered_raw_device: "raw_device";
+    whole_unanswered_hybrid: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
+}
+
 /// Declares an ignored test for each program that starts without caches and writes them: of shaders, pipelines, BVHs and scenes.
 macro_rules! cold_sweeps {
     ($($test:ident: $line:literal;)*) => {$(
@@ -207,6 +265,24 @@ fn in_window() -> Option<(RustConnection, VirtualDisplay, Program)> {
     Some((connection, display, Program { variables, ..program("window") }))
 }
 
+/// The samples in a window: three frames of each. A process has one event loop, so there is no second try.
+#[test]
+#[ignore = "minutes: .ci/slow faults"]
+fn whole_windows_of_samples() {
+    let Some((_connection, _display, window)) = in_window() else { return };
+    for line in WINDOWED {
+        let program = Program { variables: window.variables.clone(), tries_again: false, ..program(line) };
+        whole(&format!("window of {line}"), line, &program);
+    }
+}
+
+/// Samples in a window.
+const WINDOWED: [&str; 3] = [
+    "windowed hybrid --rt software --scene SCENE",
+    "windowed hello_triangle",
+    "windowed viewer SCENE --rt query --samples 2",
+];
+
 /// Some of the faults of the whole sweeps, spread evenly.
 fn some(most: usize) -> SweepPlan {
     SweepPlan { most, ..SweepPlan::full() }
@@ -223,6 +299,18 @@ fn some_calls_of_scenarios_fail() {
     for line in ["blas", "threads", "queues", "raw_device", "hot_reload", "interop"] {
         assert_no_flaws(line, &program(line), &some(12), SAMPLE / 2);
     }
+}
+
+#[test]
+fn some_calls_fail_above_the_validation_layer() {
+    assert_no_flaws("queues", &validated("queues"), &some(12), SAMPLE / 2);
+}
+
+#[test]
+fn some_calls_of_a_sample_in_a_window_fail() {
+    let Some((_connection, _display, window)) = in_window() else { return };
+    let program = Program { variables: window.variables, tries_again: false, ..program(WINDOWED[0]) };
+    assert_no_flaws(WINDOWED[0], &program, &some(12), SAMPLE / 2);
 }
 
 #[test]
@@ -323,7 +411,7 @@ fn objects_in_use_outlive_waits_that_fail() {
 /// Where questions about the timelines fail too, the context is leaked.
 #[test]
 fn objects_that_may_be_in_use_are_leaked() {
-    let [outcome, _] = assert_told(&slow_work(), "vkQueueWaitIdle 1 device-memory stays");
+    let [outcome, _] = assert_told(&slow_work(), "vkQueueWaitIdle 1 device-memory unanswered");
     assert!(outcome.result.is_some() && leaks(&outcome), "{}", outcome.stderr);
     let said = "warning: the end of a context: out of device memory in vkQueueWaitIdle for 'graphics queue'; its objects are";
     assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
@@ -353,13 +441,29 @@ fn errors_of_recording_submission_and_waits_name_the_object() {
     }
 }
 
-/// The layer sees objects that are not destroyed.
+/// The layer sees objects that are not destroyed, and the process what else it holds.
 #[test]
-fn a_forgotten_fence_is_a_leak() {
+fn what_a_scenario_forgets_is_seen() {
     let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let (outcome, calls) = run(&program("leak"), &layer, caches.path(), None).unwrap();
-    assert_eq!(flaws(None, &outcome, &outcome), [Flaw::Leak("1 VkFence".into())], "{}", outcome.stderr);
+    let ran = |line| run(&program(line), &layer, caches.path(), None).unwrap();
+    let ((clean, _), (forgetful, calls)) = (ran("leak remembers"), ran("leak forgets"));
+    assert_eq!(flaws(None, &clean, &clean), [], "{}", clean.stderr);
+    let found = flaws(None, &forgetful, &clean);
+    let [Flaw::Leak(leak), Flaw::Held(held)] = &*found else { panic!("{found:?}") };
+    assert_eq!(leak, "1 VkFence", "{}", forgetful.stderr);
+    assert!(held.starts_with("1 file descriptors, 1 threads, 6"), "{held}");
     assert!(calls.len() > 50 && calls.iter().any(|call| call.command == "vkCreateFence"));
+}
+
+/// The layer of the faults lies above the validation layer, which sees what the library does.
+#[test]
+fn a_mistake_of_a_scenario_is_a_validation_message() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (outcome, _) = run(&validated("leak forgets"), &layer, caches.path(), None).unwrap();
+    let found = flaws(None, &outcome, &outcome);
+    let is_message =
+        |flaw: &Flaw| matches!(flaw, Flaw::Validation(text) if text.contains("VUID-vkDestroyDevice"));
+    assert!(found.iter().any(is_message), "{found:?}");
 }
 
 /// Faults are injected, and told by the name of the call; a library that goes on without ray tracing needs a device, too.

@@ -154,12 +154,13 @@ unsafe extern "system" fn on_message(
     };
     if message.error {
         log::error!("{message}");
+    } else if REMARKS.contains(&message.id.as_str()) {
+        log::debug!("{message}");
+        return vk::FALSE;
     } else {
         log::warn!("{message}");
     }
-    if message.error || !REMARKS.contains(&message.id.as_str()) {
-        sink.push(message);
-    }
+    sink.push(message);
     vk::FALSE
 }
 

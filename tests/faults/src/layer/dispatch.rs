@@ -41,13 +41,31 @@ pub(super) struct Table {
     pub(super) submissions: AtomicUsize,
 }
 
+/// What a [`Table`] has the functions of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Level {
+    Instance,
+    Device,
+}
+
+impl Level {
+    /// True if a command is of this level: the validation layer warns of a device that is asked for commands of an instance.
+    fn has(self, command: &str) -> bool {
+        let of_instance =
+            ["vkEnumerate", "vkGetPhysicalDevice", "SurfaceKHR", "SurfaceEXT", "DebugUtilsMessenger"];
+        let is_of_instance = of_instance.iter().any(|part| command.contains(part));
+        is_of_instance == (self == Self::Instance)
+    }
+}
+
 impl Table {
     /// Collects the functions by name.
-    pub(super) fn new(find: impl Fn(&str) -> usize, proc_addr: usize, destroy: &str) -> Self {
+    pub(super) fn new(level: Level, find: impl Fn(&str) -> usize, proc_addr: usize, destroy: &str) -> Self {
+        let of_level = |name: &str| if level.has(name) { find(name) } else { 0 };
         let next = COMMANDS
             .iter()
-            .map(|command| match (find(command.name), command.alias) {
-                (0, Some(alias)) => find(alias),
+            .map(|command| match (of_level(command.name), command.alias) {
+                (0, Some(alias)) => of_level(alias),
                 (found, _) => found,
             })
             .collect();
@@ -56,8 +74,8 @@ impl Table {
             proc_addr,
             destroy: find(destroy),
             finish: None,
-            features: find("vkGetPhysicalDeviceFeatures2"),
-            buffer_address: find("vkGetBufferDeviceAddress"),
+            features: of_level("vkGetPhysicalDeviceFeatures2"),
+            buffer_address: of_level("vkGetBufferDeviceAddress"),
             lost: AtomicBool::new(false),
             submissions: AtomicUsize::new(0),
         }

@@ -12,7 +12,7 @@ use ash::vk;
 use super::commands::{Creates, DATED, LOST, SURFACE};
 use super::dispatch::{COMMANDS, table_of};
 use crate::call_log;
-use crate::fault::{Fault, FaultError, Span};
+use crate::fault::{Fault, FaultError};
 
 /// Environment variable with the path of the log.
 pub const LOG_VARIABLE: &str = "LVK_FAULT_LOG";
@@ -36,11 +36,14 @@ pub(super) struct Injector {
     counts: Mutex<Counts>,
 }
 
+/// Handles of live objects. A driver may give equal objects one handle, so each has a count.
+type Handles = HashMap<u64, usize>;
+
 #[derive(Default)]
 struct Counts {
     calls: HashMap<&'static str, u32>,
     /// Live objects by the handle of their device or instance, and by kind.
-    live: BTreeMap<(u64, &'static str), i64>,
+    live: BTreeMap<(u64, &'static str), Handles>,
     failed: BTreeSet<&'static str>,
 }
 
@@ -138,8 +141,7 @@ impl Injector {
             self.write(&call_log::fault_line(name));
             true
         } else {
-            let is_later = self.reached.load(Ordering::Relaxed);
-            is_later && (fault.span == Span::Stays || fault.span == Span::Command && is_named)
+            self.reached.load(Ordering::Relaxed) && fault.span.goes_on(fault.error, &fault.command, name)
         };
         fails.then(|| {
             self.log_failed(name);
@@ -160,44 +162,57 @@ impl Injector {
         let handles = words[words.len() - 1] as usize as *const u64;
         for index in 0..count {
             // SAFETY: by contract there are `count` handles.
-            if unsafe { handles.add(index).read() } != 0 {
-                self.count(words[0], kind, 1);
+            let handle = unsafe { handles.add(index).read() };
+            if handle != 0 {
+                self.count(words[0], kind, handle);
             }
         }
     }
 
-    /// Counts the object that a call destroys, of the device or instance `owner`.
-    pub(super) fn destroyed(&self, number: usize, owner: u64, object: u64) {
+    /// Counts no longer the object that a call is about to destroy, of the device or instance `owner`.
+    pub(super) fn destroys(&self, number: usize, owner: u64, object: u64) {
         if let Some(kind) = COMMANDS[number].destroys.filter(|_| object != 0) {
-            self.count(owner, kind, -1);
+            self.uncount(owner, kind, object);
         }
     }
 
-    /// Adds to the number of live objects of a kind. Devices and instances have the owner 0.
-    pub(super) fn count(&self, owner: u64, kind: &'static str, change: i64) {
-        *self.counts().live.entry((owner, kind)).or_default() += change;
+    /// Counts a new object. Devices and instances have the owner 0.
+    pub(super) fn count(&self, owner: u64, kind: &'static str, handle: u64) {
+        *self.counts().live.entry((owner, kind)).or_default().entry(handle).or_default() += 1;
+    }
+
+    /// Counts an object no longer. Logs an object that is not alive.
+    pub(super) fn uncount(&self, owner: u64, kind: &'static str, handle: u64) {
+        let is_alive = {
+            let mut counts = self.counts();
+            let handles = counts.live.entry((owner, kind)).or_default();
+            let count = handles.get_mut(&handle).filter(|count| **count > 0);
+            count.map(|count| *count -= 1).is_some()
+        };
+        if !is_alive {
+            self.write(&call_log::dead_line(kind));
+        }
     }
 
     /// Logs the objects of a device or instance that is being destroyed before them, and counts them no longer.
     pub(super) fn count_orphans(&self, owner: u64) {
         let mut orphans = BTreeMap::new();
-        self.counts().live.retain(|&(of, kind), &mut count| {
-            if of == owner && count != 0 {
-                orphans.insert(kind, count);
+        self.counts().live.retain(|&(of, kind), handles| {
+            if of == owner {
+                orphans.insert(kind, handles.values().sum());
             }
             of != owner
         });
-        if !orphans.is_empty() {
+        if orphans.values().any(|count| *count != 0) {
             self.write(&call_log::orphans_line(&orphans));
         }
     }
 
-    /// Adds to the number of live instances, and logs all live objects.
-    pub(super) fn count_instance(&self, change: i64) {
-        self.count(0, "VkInstance", change);
+    /// Logs the number of all live objects.
+    pub(super) fn log_live(&self) {
         let mut live = BTreeMap::new();
-        for (&(_, kind), count) in &self.counts().live {
-            *live.entry(kind).or_default() += count;
+        for (&(_, kind), handles) in &self.counts().live {
+            *live.entry(kind).or_default() += handles.values().sum::<usize>();
         }
         self.write(&call_log::live_line(&live));
     }
@@ -223,5 +238,31 @@ fn result_of(error: FaultError) -> vk::Result {
         FaultError::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
         FaultError::SurfaceLost => vk::Result::ERROR_SURFACE_LOST_KHR,
         FaultError::OutOfDate => vk::Result::ERROR_OUT_OF_DATE_KHR,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+    use super::*;
+
+    #[test]
+    fn objects_are_counted_by_handle_and_owner() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let injector = Injector { log: Some(file.reopen().unwrap()), ..Injector::from_env() };
+        let lines = || std::fs::read_to_string(file.path()).unwrap();
+        for handle in [7, 7, 8] {
+            injector.count(1, "VkSampler", handle);
+        }
+        injector.uncount(1, "VkSampler", 7);
+        injector.uncount(1, "VkSampler", 7);
+        injector.log_live();
+        assert_eq!(lines(), "live VkSampler=1\n", "a driver may give equal objects one handle");
+        injector.uncount(1, "VkSampler", 7);
+        injector.uncount(2, "VkSampler", 8);
+        assert_eq!(lines(), "live VkSampler=1\ndead VkSampler\ndead VkSampler\n");
+        injector.count_orphans(1);
+        injector.log_live();
+        assert!(lines().ends_with("orphans VkSampler=1\nlive\n"), "{}", lines());
     }
 }

@@ -13,7 +13,7 @@ use ash::vk;
 use ash::vk::Handle;
 
 use commands::LOST;
-use dispatch::{Table, insert, number_of, remove, table_of};
+use dispatch::{Level, Table, insert, number_of, remove, table_of};
 use injector::injector;
 pub use injector::{FAULT_VARIABLE, LOG_VARIABLE};
 use loader::{
@@ -116,9 +116,11 @@ unsafe extern "system" fn create_instance(
         let result = create(info, allocator, instance);
         if result == vk::Result::SUCCESS {
             let find = |name: &str| address(proc_addr(*instance, c_name(name).as_ptr()));
-            let table = Table::new(find, proc_addr as *const () as usize, "vkDestroyInstance");
+            let table =
+                Table::new(Level::Instance, find, proc_addr as *const () as usize, "vkDestroyInstance");
             insert((*instance).as_raw(), table);
-            injector().count_instance(1);
+            injector().count(0, "VkInstance", (*instance).as_raw());
+            injector().log_live();
         }
         result
     }
@@ -133,11 +135,12 @@ unsafe extern "system" fn destroy_instance(
     }
     let Some(table) = remove(instance.as_raw()) else { return };
     injector().count_orphans(instance.as_raw());
+    injector().uncount(0, "VkInstance", instance.as_raw());
     // SAFETY: the address is that of the command in the next layer.
     let destroy = unsafe { std::mem::transmute::<usize, vk::PFN_vkDestroyInstance>(table.destroy) };
     // SAFETY: the arguments are the caller's.
     unsafe { destroy(instance, allocator) };
-    injector().count_instance(-1);
+    injector().log_live();
 }
 
 unsafe extern "system" fn create_device(
@@ -165,11 +168,12 @@ unsafe extern "system" fn create_device(
         let result = device_fault::without_extension(info, create);
         if result == vk::Result::SUCCESS {
             let find = |name: &str| address(get_device(*device, c_name(name).as_ptr()));
-            let mut table = Table::new(find, get_device as *const () as usize, "vkDestroyDevice");
+            let mut table =
+                Table::new(Level::Device, find, get_device as *const () as usize, "vkDestroyDevice");
             let wait = find("vkDeviceWaitIdle");
             table.finish = Some((std::mem::transmute::<usize, vk::PFN_vkDeviceWaitIdle>(wait), *device));
             insert((*device).as_raw(), table);
-            injector().count(0, "VkDevice", 1);
+            injector().count(0, "VkDevice", (*device).as_raw());
         }
         result
     }
@@ -181,11 +185,11 @@ unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const v
     }
     let Some(table) = remove(device.as_raw()) else { return };
     injector().count_orphans(device.as_raw());
+    injector().uncount(0, "VkDevice", device.as_raw());
     // SAFETY: the address is that of the command in the next layer.
     let destroy = unsafe { std::mem::transmute::<usize, vk::PFN_vkDestroyDevice>(table.destroy) };
     // SAFETY: the arguments are the caller's.
     unsafe { destroy(device, allocator) };
-    injector().count(0, "VkDevice", -1);
 }
 
 /// Returns the layer's own functions that no table has.

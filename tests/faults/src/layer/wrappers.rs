@@ -75,7 +75,7 @@ pub(super) fn end<const N: usize, A: Copy, B: Copy, C: Copy>(
         object: B,
         allocator: C,
     ) {
-        injector().destroyed(N, word(owner), word(object));
+        injector().destroys(N, word(owner), word(object));
         if let Some(next) = next(N, word(owner)) {
             // SAFETY: the address is that of the command in the next layer, which has this type.
             let next = unsafe { std::mem::transmute::<usize, unsafe extern "system" fn(A, B, C)>(next) };

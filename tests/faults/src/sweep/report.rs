@@ -15,6 +15,9 @@ use crate::fault::Fault;
 /// Environment variable with the number of processes at the same time.
 pub const JOBS_VARIABLE: &str = "LVK_FAULT_JOBS";
 
+/// Runs of a fault, until one reaches it.
+const TRIES: usize = 5;
+
 /// Returns the number of processes at the same time: that of the environment, or the number of cores and 2 at least.
 fn jobs() -> usize {
     let wish = std::env::var(JOBS_VARIABLE).ok().and_then(|text| text.parse().ok()).filter(|jobs| *jobs > 0);
@@ -141,9 +144,17 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
             if start.elapsed() > budget {
                 break;
             }
-            let (outcome, _) = run(program, &layer, found_caches, Some(fault))?;
-            let flaws = flaws(Some(fault), &outcome, &clean);
-            report.lock().unwrap_or_else(PoisonError::into_inner).add(fault, &outcome, flaws);
+            let (mut outcome, _) = run(program, &layer, found_caches, Some(fault))?;
+            let mut flaws_found = flaws(Some(fault), &outcome, &clean);
+            // Threads change the number of calls from run to run.
+            for _ in 1..TRIES {
+                if outcome.reached || !flaws_found.is_empty() {
+                    break;
+                }
+                (outcome, _) = run(program, &layer, found_caches, Some(fault))?;
+                flaws_found = flaws(Some(fault), &outcome, &clean);
+            }
+            report.lock().unwrap_or_else(PoisonError::into_inner).add(fault, &outcome, flaws_found);
         }
         Ok(())
     };

@@ -33,6 +33,8 @@ pub struct Program {
     pub variables: Vec<(String, String)>,
     /// Caches that the program finds when a call fails.
     pub caches: Caches,
+    /// True if the program can try again after a failure.
+    pub tries_again: bool,
 }
 
 /// Caches of a program.
@@ -130,13 +132,12 @@ fn run_in(
         .env_remove(FAULT_VARIABLE)
         .env_remove(AGAIN_VARIABLE);
     command.envs(program.variables.iter().map(|(name, value)| (name, value)));
-    if let Some(fault) = fault {
-        command.env(FAULT_VARIABLE, fault.to_string());
-        // A fault that stays hinders a second try, too.
-        if fault.span == Span::Once {
-            command.env(AGAIN_VARIABLE, "1");
-        }
+    // A fault that stays hinders a second try, too.
+    let tries_again = program.tries_again && fault.is_some_and(|fault| fault.span == Span::Once);
+    if tries_again {
+        command.env(AGAIN_VARIABLE, "1");
     }
+    command.envs(fault.map(|fault| (FAULT_VARIABLE, fault.to_string())));
     let ending = end(&mut command.spawn()?)?;
     let log = CallLog::parse(&String::from_utf8_lossy(&fs::read(&log).unwrap_or_default()));
     let mut files = BTreeSet::new();
@@ -155,8 +156,11 @@ fn run_in(
         live: log.live,
         orphans: log.orphans,
         orphaning: log.orphaning,
+        dead: log.dead,
+        leftovers: log.leftovers,
         result: fs::read(out.join(FIRST)).ok(),
         second_result: fs::read(out.join(SECOND)).ok(),
+        tries_again,
         files,
         next: None,
     };

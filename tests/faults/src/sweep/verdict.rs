@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use crate::fault::{Fault, FaultError, Span};
+use crate::leftovers::Leftovers;
 
 /// The end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,15 +33,21 @@ pub struct RunOutcome {
     /// True if the layer has counted objects.
     pub counts_objects: bool,
     /// Live objects at the end, by type.
-    pub live: BTreeMap<String, i64>,
+    pub live: BTreeMap<String, usize>,
     /// Objects that were alive when their device or instance was destroyed, by type.
-    pub orphans: BTreeMap<String, i64>,
+    pub orphans: BTreeMap<String, usize>,
     /// Devices and instances that were destroyed before their objects.
-    pub orphaning: i64,
+    pub orphaning: usize,
+    /// Types of objects that were destroyed though they were not alive.
+    pub dead: BTreeSet<String>,
+    /// What the process held at its end.
+    pub leftovers: Option<Leftovers>,
     /// The result of the first try, a picture or values. `None` if it was not written.
     pub result: Option<Vec<u8>>,
     /// The result of the second try, in the same process after the first has failed.
     pub second_result: Option<Vec<u8>>,
+    /// True if the program was to try again after a failure.
+    pub tries_again: bool,
     /// Names of files beside the results, and in the caches.
     pub files: BTreeSet<String>,
     /// The next start, with the caches that the run has left, if it has changed them.
@@ -71,6 +78,10 @@ pub enum Flaw {
     Status(i32),
     /// Objects that were not destroyed.
     Leak(String),
+    /// Objects that were destroyed though they were not alive.
+    Dead(String),
+    /// File descriptors, threads and memory that a run without a fault does not hold at its end.
+    Held(String),
     /// Files that a run without fault does not leave.
     Litter(String),
     /// Success with another result.
@@ -89,7 +100,9 @@ pub enum Flaw {
     NotRecovered,
     /// No result of the next start, or another, or a warning.
     BrokenCache(String),
-    /// The layer has counted no objects.
+    /// A message of the validation layer.
+    Validation(String),
+    /// The layer has counted no objects, or the process not what it holds.
     NoCounts,
 }
 
@@ -101,6 +114,8 @@ impl fmt::Display for Flaw {
             Self::Panic => out.write_str("panic"),
             Self::Status(status) => write!(out, "status {status}"),
             Self::Leak(objects) => write!(out, "leak of {objects}"),
+            Self::Dead(objects) => write!(out, "destroyed twice: {objects}"),
+            Self::Held(what) => write!(out, "held at the end: {what}"),
             Self::Litter(files) => write!(out, "left files {files}"),
             Self::WrongResult => out.write_str("wrong result"),
             Self::PartialResult => out.write_str("partial result"),
@@ -110,6 +125,7 @@ impl fmt::Display for Flaw {
             Self::UnnamedObject(message) => write!(out, "the object is not named: {message}"),
             Self::NotRecovered => out.write_str("a second try in the same process fails"),
             Self::BrokenCache(stderr) => write!(out, "the next start fails or warns: {stderr}"),
+            Self::Validation(message) => out.write_str(message),
             Self::NoCounts => out.write_str("the layer has counted no objects"),
         }
     }
@@ -128,11 +144,20 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
     if found.stderr.contains("panicked at") {
         flaws.push(Flaw::Panic);
     }
+    let messages = found.stderr.lines().filter(|line| line.starts_with("validation: "));
+    flaws.extend(messages.map(|message| Flaw::Validation(message.to_owned())));
     let leaked = found.orphans.iter().chain(&found.live).filter(|(_, count)| **count != 0);
     let leaked: Vec<_> = leaked.map(|(kind, count)| format!("{count} {kind}")).collect();
-    if !leaked.is_empty() && !leaks_on_purpose(fault, found) {
+    let on_purpose = leaks_on_purpose(fault, found);
+    if !leaked.is_empty() && !on_purpose {
         flaws.push(Flaw::Leak(leaked.join(", ")));
     }
+    if !found.dead.is_empty() {
+        flaws.push(Flaw::Dead(found.dead.iter().cloned().collect::<Vec<_>>().join(", ")));
+    }
+    let held = found.leftovers.as_ref().zip(clean.leftovers.as_ref());
+    let held = held.and_then(|(found, clean)| found.beyond(clean));
+    flaws.extend(held.filter(|_| !on_purpose).map(Flaw::Held));
     // A fallback may compile other shaders, whose cache files are complete.
     let fell_back = found.ending == Ending::Status(0);
     let is_litter = |name: &&String| !(fell_back && name.starts_with("caches/") && !name.ends_with(".tmp"));
@@ -142,7 +167,9 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
     }
     flaws.extend(found.next.as_ref().and_then(|next| judge_next(next, clean)));
     // Without an instance there is nothing to count.
-    if !found.counts_objects && found.ending == Ending::Status(0) {
+    let counts = found.counts_objects || found.ending != Ending::Status(0);
+    let has_ended = matches!(found.ending, Ending::Status(_));
+    if !counts || has_ended && found.leftovers.is_none() {
         flaws.push(Flaw::NoCounts);
     }
     flaws
@@ -156,17 +183,16 @@ fn judge_next(next: &NextStart, clean: &RunOutcome) -> Option<Flaw> {
     (!is_right || warns).then(|| Flaw::BrokenCache(next.stderr.trim().to_owned()))
 }
 
-/// True if the library says that it leaks a context whose work cannot be waited for: every wait and every question fails for
-/// want of memory, so that the device may still use the objects. Each such context accounts for one device that is alive, or that an
+/// True if the library says that it leaks a context whose work cannot be waited for: every wait and every question about its
+/// progress fails for want of memory, so that the device may still use the objects. Each such context accounts for one device that is alive, or that an
 /// engine has destroyed before the objects of its guest: what others leak is a flaw.
 #[must_use]
 pub fn leaks_on_purpose(fault: Option<&Fault>, found: &RunOutcome) -> bool {
-    let fails_on = fault.is_some_and(|fault| {
-        fault.span != Span::Once && matches!(fault.error, FaultError::HostMemory | FaultError::DeviceMemory)
-    });
+    let is_unanswered =
+        fault.is_some_and(|fault| fault.span == Span::Unanswered && fault.error.is_want_of_memory());
     let devices = found.live.get("VkDevice").copied().unwrap_or_default() + found.orphaning;
-    let contexts = found.stderr.matches(LEAKED).count() as i64;
-    fails_on && contexts > 0 && devices <= contexts
+    let contexts = found.stderr.matches(LEAKED).count();
+    is_unanswered && contexts > 0 && devices <= contexts
 }
 
 /// The end of the warning about a context that is leaked.
@@ -193,9 +219,7 @@ fn judge_result(
         [error] => flaws.extend(fault.and_then(|fault| judge_error(error, fault, found))),
         _ => flaws.push(Flaw::NoMessage),
     }
-    // A fault that goes on hinders the second try, too.
-    let tries_again = fault.is_some_and(|fault| fault.span == Span::Once);
-    if tries_again && (found.second_result.is_none() || found.second_result != clean.result) {
+    if found.tries_again && (found.second_result.is_none() || found.second_result != clean.result) {
         flaws.push(Flaw::NotRecovered);
     }
 }
@@ -289,8 +313,11 @@ mod tests {
             live: BTreeMap::new(),
             orphans: BTreeMap::new(),
             orphaning: 0,
+            dead: BTreeSet::new(),
+            leftovers: Some(Leftovers { file_descriptors: 4, threads: 1, heap_bytes: 100 }),
             result: Some(b"picture".to_vec()),
             second_result: None,
+            tries_again: false,
             files: BTreeSet::from(["caches/pipelines".to_owned()]),
             next: None,
         }
@@ -304,6 +331,7 @@ mod tests {
             failed: BTreeSet::from(["vkCreateBuffer".to_owned()]),
             result: None,
             second_result: clean().result,
+            tries_again: true,
             ..clean()
         }
     }
@@ -326,11 +354,8 @@ mod tests {
             assert_eq!(found(&outcome), []);
         }
         let twice = RunOutcome { second_result: None, stderr: refused().stderr.repeat(2), ..refused() };
-        assert_eq!(
-            flaws(Some(&fault(Span::Stays)), &twice, &clean()),
-            [Flaw::NoMessage],
-            "one try, one error"
-        );
+        let one_try = RunOutcome { tries_again: false, ..twice.clone() };
+        assert_eq!(found(&one_try), [Flaw::NoMessage], "one try, one error");
         assert_eq!(found(&twice), [Flaw::NoMessage, Flaw::NotRecovered]);
     }
 
@@ -439,34 +464,40 @@ mod tests {
         let leaked = RunOutcome { live, stderr, ..refused() };
         let leak = Flaw::Leak("1 VkDevice".into());
         let judged = |error, span, outcome| flaws(Some(&Fault { error, ..fault(span) }), outcome, &clean());
-        for span in [Span::Command, Span::Stays] {
-            assert_eq!(judged(FaultError::HostMemory, span, &leaked), [], "{span:?}");
+        assert_eq!(judged(FaultError::HostMemory, Span::Unanswered, &leaked), []);
+        let is_leak = std::slice::from_ref(&leak);
+        assert_eq!(
+            judged(FaultError::DeviceLost, Span::Unanswered, &leaked),
+            is_leak,
+            "a lost device is idle"
+        );
+        for span in [Span::Once, Span::Command, Span::Stays] {
             assert_eq!(
-                judged(FaultError::DeviceLost, span, &leaked),
-                std::slice::from_ref(&leak),
-                "a lost device is idle"
+                judged(FaultError::HostMemory, span, &leaked),
+                is_leak,
+                "the timelines answer: {span:?}"
             );
         }
-        assert_eq!(
-            judged(FaultError::HostMemory, Span::Once, &leaked),
-            std::slice::from_ref(&leak),
-            "the next wait succeeds"
-        );
         let orphans = BTreeMap::from([("VkBuffer".to_owned(), 1)]);
         let guest = RunOutcome { live: BTreeMap::new(), orphans, orphaning: 1, ..leaked.clone() };
-        assert_eq!(judged(FaultError::HostMemory, Span::Stays, &guest), [], "the engine destroys its device");
+        assert_eq!(
+            judged(FaultError::HostMemory, Span::Unanswered, &guest),
+            [],
+            "the engine destroys its device"
+        );
         let other_context = RunOutcome { live: leaked.live.clone(), ..guest.clone() };
         assert_eq!(
-            judged(FaultError::HostMemory, Span::Stays, &other_context),
+            judged(FaultError::HostMemory, Span::Unanswered, &other_context),
             [Flaw::Leak("1 VkBuffer, 1 VkDevice".into())],
             "one context is leaked on purpose, and another leaks a buffer"
         );
         let silent = RunOutcome { stderr: refused().stderr, ..leaked.clone() };
-        assert_eq!(judged(FaultError::HostMemory, Span::Stays, &silent), [leak]);
+        assert_eq!(judged(FaultError::HostMemory, Span::Unanswered, &silent), [leak]);
     }
 
     #[test]
     fn every_flaw_is_caught() {
+        let message = "validation: validation error VUID-vkDestroyBuffer: in use";
         let unnamed = "error: out of memory".to_owned();
         let without_object = "error: out of host memory in vkCreateBuffer".to_owned();
         let other = "error: out of host memory in vkCreateImage for 'rain'".to_owned();
@@ -484,6 +515,22 @@ mod tests {
             (
                 RunOutcome { live: BTreeMap::from([("VkBuffer".to_owned(), 2)]), ..clean() },
                 Flaw::Leak("2 VkBuffer".into()),
+            ),
+            (
+                RunOutcome { dead: BTreeSet::from(["VkBuffer".to_owned()]), ..clean() },
+                Flaw::Dead("VkBuffer".into()),
+            ),
+            (
+                RunOutcome {
+                    leftovers: Some(Leftovers { file_descriptors: 6, threads: 1, heap_bytes: 0 }),
+                    ..refused()
+                },
+                Flaw::Held("2 file descriptors".into()),
+            ),
+            (RunOutcome { leftovers: None, ..refused() }, Flaw::NoCounts),
+            (
+                RunOutcome { stderr: format!("{message}\n{}", refused().stderr), ..refused() },
+                Flaw::Validation(message.to_owned()),
             ),
             (
                 RunOutcome { files: BTreeSet::from([".lvk-1.partial".to_owned()]), ..clean() },

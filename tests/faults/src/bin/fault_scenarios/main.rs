@@ -17,18 +17,28 @@ mod slow_work;
 mod threads;
 #[cfg(target_os = "linux")]
 mod window;
+mod windowed;
 
 use std::error::Error;
 use std::ffi::OsString;
+use std::fs::File;
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
-use lvk::{Context, ContextDesc};
+use lvk::{Context, ContextDesc, ValidationMode};
 use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_faults::call_log::left_line;
+use lvk_faults::layer::LOG_VARIABLE;
+use lvk_faults::leftovers::Leftovers;
 use lvk_samples::app::cli::{event_loop, main_with};
 use lvk_samples::app::library_warnings;
 use lvk_samples::catalogue::run_line;
 use lvk_viewer::Viewer;
+use peak_alloc::PeakAlloc;
+
+#[global_allocator]
+static HEAP: PeakAlloc = PeakAlloc;
 
 /// Error of a scenario.
 type Failure = Box<dyn Error + Send + Sync>;
@@ -51,17 +61,18 @@ fn scenario(name: &str) -> Option<Scenario> {
         "interop" => interop::exchange,
         "device_fault" => device_fault::explained,
         "slow_work" => slow_work::outlives_its_context,
-        "leak" => leak::forgotten_fence,
         #[cfg(target_os = "linux")]
         "window" => window::frames_and_resize,
         _ => return None,
     })
 }
 
-/// Creates the context of a scenario, with caches in the folder `LVK_CACHE`.
+/// Creates the context of a scenario, with caches in the folder `LVK_CACHE`, and with the validation layer where the environment has
+/// `LVK_FAULT_VALIDATE`. Its messages are printed.
 fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
     let driver = prepare(&DriverRequest::default())?;
     let caches = std::env::var_os("LVK_CACHE").map(std::path::PathBuf::from);
+    let validates = std::env::var_os("LVK_FAULT_VALIDATE").is_some();
     let pipelines = caches.as_ref().map(|folder| folder.join("pipelines"));
     Ok(Context::new(&ContextDesc {
         application_name: "faults",
@@ -69,13 +80,20 @@ fn context(desc: ContextDesc<'_>) -> Result<Context, Failure> {
         pipeline_cache: pipelines.as_deref(),
         shader_cache: caches.as_deref(),
         tree_cache: caches.as_deref(),
+        validation: if validates { ValidationMode::Standard } else { ValidationMode::Off },
         ..desc
     })?)
 }
 
 /// Runs a scenario of this program, or the sample of this name.
 fn attempt(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode> {
-    let written = if let Some(program) = single_file_programs::of_name(name) {
+    if let ("windowed", Some((name, args))) = (name, args.split_first()) {
+        return windowed::run(name, args, result);
+    }
+    let written = if name == "leak" {
+        library_warnings::print();
+        leak::leak(args == ["forgets"]).and_then(|bytes| Ok(std::fs::write(result, bytes)?))
+    } else if let Some(program) = single_file_programs::of_name(name) {
         library_warnings::print();
         program.run(result)
     } else if let Some(scenario) = scenario(name) {
@@ -100,6 +118,14 @@ fn run_sample(name: &str, args: &[String], result: &Path) -> Result<(), ExitCode
     if status == ExitCode::SUCCESS { Ok(()) } else { Err(status) }
 }
 
+/// Adds what the process still holds to the log of the layer.
+fn log_leftovers() -> std::io::Result<()> {
+    let Some(path) = std::env::var_os(LOG_VARIABLE) else { return Ok(()) };
+    let mut log = File::options().append(true).create(true).open(path)?;
+    let left = Leftovers::of_process(HEAP.current_usage())?;
+    writeln!(log, "{}", left_line(&left))
+}
+
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let [folder, name, args @ ..] = &*words else {
@@ -107,10 +133,12 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     let [first, second] = RESULTS.map(|result| Path::new(folder).join(result));
-    let Err(status) = attempt(name, args, &first) else { return ExitCode::SUCCESS };
-    if std::env::var_os("LVK_FAULT_AGAIN").is_some() {
+    let status = attempt(name, args, &first).err();
+    if status.is_some() && std::env::var_os("LVK_FAULT_AGAIN").is_some() {
         // The result of the second try says how it went.
         let _ = attempt(name, args, &second);
     }
-    status
+    // The sweep notices a log without this line.
+    let _ = log_leftovers();
+    status.unwrap_or(ExitCode::SUCCESS)
 }
