@@ -72,6 +72,13 @@ fn cpu_builds_are_timed_phase_by_phase_for_each_number_of_threads() {
     for name in ["triangles", "Morton order", "clustering", "reinsertion", "encoding", "total"] {
         assert_positive(&table, name, 0..3);
     }
+    for cell in row(&table, "peak heap memory, times the BLAS") {
+        let ratio = number(&cell);
+        assert!(
+            (1.0..=3.0).contains(&ratio),
+            "a builder holds the BLAS, and at most three times its bytes: {table}"
+        );
+    }
     assert!(table.contains("| 1 thread |") && table.contains("| 3 threads |"), "{table}");
     assert!(table.contains("all builds made the same bytes"), "{table}");
     for builder in ["lvk", "obvhs"] {
