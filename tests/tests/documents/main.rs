@@ -5,6 +5,7 @@ mod bad_input;
 mod circles;
 mod contributing;
 mod defaults;
+mod defects;
 mod dependencies;
 mod docstrings;
 mod examples;
