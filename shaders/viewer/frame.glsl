@@ -220,7 +220,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint frameNumber; // since the camera was chosen; 0: there is no frame before
     Camera seen; // the camera without the shift within a pixel
     Camera seenBefore; // of the frame before, likewise
-    VisibleTargets visible1;
+    VisibleTargets visible1; // kNoTexture where rays find what pixels show
     VisibleTargets visible2; // of what occlusion culling draws in its second pass; kNoTexture without it
     FloatArray pyramid; // of pyramid.glsl, with the depth of the first pass
     SumArray planes; // of plane.glsl

@@ -122,11 +122,11 @@ FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen
     return FirstLight(shadow.matte, shadow.light - shadow.matte, bounce.scattered.matte, weight - bounce.scattered.matte);
 }
 
-// Leads a path to the next surface, of which the rasteriser knows the first, and on from there. False: it ends.
+// Leads a path to the next surface, of which the rasteriser may know the first, and on from there. False: it ends.
 bool advance(inout Path path, uint place, inout Random random) {
     bool isFirst = path.bounce == 0u;
     Hit hit;
-    if (isFirst) {
+    if (isFirst && isRasterised()) {
         hit = visibleHit(place, path.direction);
     } else {
         hit = nextHit(path, random);

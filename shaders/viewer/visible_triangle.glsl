@@ -6,6 +6,11 @@
 
 #include "viewer/frame.glsl"
 
+// True if there is a rasteriser; else rays find what pixels show.
+bool isRasterised() {
+    return frame.visible1.triangles != kNoTexture;
+}
+
 // True if a single pass draws `a` before `b`: meshes in the order of their instances, of a mesh all instances of a geometry.
 bool isDrawnBefore(uvec4 a, uvec4 b) {
     bool sameMesh = frame.instances.at[a.x].firstGeometry == frame.instances.at[b.x].firstGeometry;

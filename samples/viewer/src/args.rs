@@ -6,7 +6,7 @@ use clap::Args;
 use lvk_samples::app::ray_args::RayArgs;
 use lvk_samples::app::value_parsers::{positive, whole};
 
-use crate::config::{Content, CullingMode, Method, ToneMapping, ViewerConfig};
+use crate::config::{Content, CullingMode, Method, PrimaryVisibility, ToneMapping, ViewerConfig};
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -63,7 +63,11 @@ pub struct ViewerArgs {
     #[arg(long, value_name = "MIB", value_parser = whole(1..=65536))]
     pub texture_budget: Option<u32>,
 
-    /// Instances that the hybrid method leaves out when it rasterises; the picture is the same
+    /// How the hybrid method finds the surfaces that pixels show
+    #[arg(long, value_enum, default_value_t = PrimaryVisibility::Rays)]
+    pub primary: PrimaryVisibility,
+
+    /// Instances that --primary raster leaves out; the picture is the same
     #[arg(long, value_enum, default_value_t = CullingMode::Auto)]
     pub culling: CullingMode,
 

@@ -19,7 +19,7 @@ pub enum ToneMapping {
 /// The method that renders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum Method {
-    /// Rasterise surfaces, trace a few rays from each, and filter over time and space.
+    /// Trace a path from the surface of each pixel, and filter over time and space.
     #[default]
     Hybrid,
     /// Trace paths from the camera, without a bias: the reference.
@@ -49,6 +49,16 @@ pub enum Content {
     /// Steps of the ray of each pixel through the acceleration structures, from black over blue, green and red to white at 512 and
     /// more. Software ray queries count them; where a device traverses, all is black.
     Steps,
+}
+
+/// How the hybrid method finds the surfaces that pixels show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum PrimaryVisibility {
+    /// Trace a ray for each pixel. The time grows with the pixels, and little with the triangles.
+    #[default]
+    Rays,
+    /// Rasterise a visibility buffer: instance, geometry and primitive of each pixel.
+    Raster,
 }
 
 /// Culling of instances before the hybrid method rasterises them. The picture is the same.
@@ -92,7 +102,9 @@ pub struct ViewerConfig {
     /// Most bytes of textures, whose mip levels then come and go by what shaders read; all levels stay if there is none. It is that of
     /// the model for as long as the model is shown.
     pub texture_budget: Option<u64>,
-    /// Culling of instances.
+    /// How the hybrid method finds the surfaces that pixels show.
+    pub primary: PrimaryVisibility,
+    /// Culling of instances that are rasterised.
     pub culling: CullingMode,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
     pub is_progressive: bool,
@@ -120,6 +132,7 @@ impl ViewerConfig {
             tone_mapping: ToneMapping::default(),
             content: Content::default(),
             texture_budget: None,
+            primary: PrimaryVisibility::default(),
             culling: CullingMode::default(),
             is_progressive: false,
         }
@@ -130,9 +143,14 @@ impl ViewerConfig {
         [self.width, self.height]
     }
 
+    /// True if frames are rasterised.
+    pub(crate) fn rasterises(&self) -> bool {
+        self.method == Method::Hybrid && self.primary == PrimaryVisibility::Raster
+    }
+
     /// True if frames are rasterised and culled.
     pub(crate) fn culls(&self) -> bool {
-        self.method == Method::Hybrid && self.culling != CullingMode::None
+        self.rasterises() && self.culling != CullingMode::None
     }
 
     /// True if frames of a model with this many instances leave out what others hide.
@@ -142,7 +160,7 @@ impl ViewerConfig {
             CullingMode::Occlusion => true,
             CullingMode::None | CullingMode::Frustum => false,
         };
-        self.method == Method::Hybrid && is_on
+        self.rasterises() && is_on
     }
 
     pub(crate) fn check(&self, capabilities: &Capabilities) -> Result<(), SampleError> {
@@ -162,7 +180,8 @@ mod tests {
     use super::*;
 
     fn config(method: Method, culling: CullingMode) -> ViewerConfig {
-        ViewerConfig { method, culling, ..ViewerConfig::new(RayPath::Query, 8, 8) }
+        let primary = PrimaryVisibility::Raster;
+        ViewerConfig { method, primary, culling, ..ViewerConfig::new(RayPath::Query, 8, 8) }
     }
 
     #[test]
@@ -174,5 +193,7 @@ mod tests {
         assert!(!config(Method::Hybrid, CullingMode::None).culls());
         let traced = config(Method::PathTrace, CullingMode::Occlusion);
         assert!(!traced.culls() && !traced.occludes(64), "paths rasterise nothing");
+        let by_rays = ViewerConfig { method: Method::Hybrid, primary: PrimaryVisibility::Rays, ..traced };
+        assert!(!by_rays.rasterises() && !by_rays.culls() && !by_rays.occludes(64));
     }
 }

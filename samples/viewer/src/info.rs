@@ -91,7 +91,7 @@ fn at_once(request: &Request, setup: &mut SampleSetup<'_>) -> Result<ReadySample
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{CullingMode, ViewerConfig};
+    use crate::config::{CullingMode, PrimaryVisibility, ViewerConfig};
     use crate::light::SunSetting;
     use lvk_samples::app::cli::{command, parse};
 
@@ -114,6 +114,8 @@ mod tests {
         assert_eq!(args.light.sun_radius, sun.radius_degrees);
         assert_eq!(parsed("model.glb --exposure -1.5").unwrap().exposure, -1.5);
         assert_eq!(args.culling, CullingMode::default());
+        assert_eq!(args.primary, PrimaryVisibility::Rays);
+        assert_eq!(parsed("--primary raster").unwrap().primary, PrimaryVisibility::Raster);
         assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
     }
 
@@ -135,6 +137,7 @@ mod tests {
             "--sun-radius 0",
             "--tone film",
             "--culling everything",
+            "--primary guess",
             "a.glb b.glb",
         ] {
             assert_eq!(parsed(line), None, "{line}");

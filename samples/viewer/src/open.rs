@@ -97,6 +97,7 @@ impl Request {
             exposure_stops: args.exposure,
             tone_mapping: args.tone,
             texture_budget: args.texture_budget.map(|mib| u64::from(mib) << 20),
+            primary: args.primary,
             culling: args.culling,
             is_progressive: self.is_for_window,
             ..ViewerConfig::new(path, width, height)

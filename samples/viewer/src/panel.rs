@@ -3,7 +3,7 @@
 use egui::{Color32, RichText};
 use lvk_gltf::Animation;
 
-use crate::config::{Content, CullingMode, Method, ToneMapping, ViewerConfig};
+use crate::config::{Content, CullingMode, Method, PrimaryVisibility, ToneMapping, ViewerConfig};
 use crate::gpu::{DrawnInstances, TextureMemory};
 use crate::model::ModelCamera;
 
@@ -101,6 +101,13 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
         });
     }
     if config.method == Method::Hybrid {
+        ui.horizontal(|ui| {
+            ui.label("primary visibility");
+            ui.selectable_value(&mut config.primary, PrimaryVisibility::Rays, "rays");
+            ui.selectable_value(&mut config.primary, PrimaryVisibility::Raster, "raster");
+        });
+    }
+    if config.rasterises() {
         egui::ComboBox::from_label("culling").selected_text(format!("{:?}", config.culling)).show_ui(
             ui,
             |ui| {

@@ -1,6 +1,5 @@
 //! Either method, with its data for pictures of one size.
 
-use bytemuck::Zeroable as _;
 use lvk::{BufferHandle, Context, Holder};
 use lvk_samples::app::array_buffer::buffer;
 use lvk_samples::app::frame::Frame;
@@ -49,7 +48,7 @@ impl Renderer {
             },
             Self::PathTrace { paths, sums } => {
                 let (sums, paths) = (sums.address()?, paths.addresses()?);
-                Addresses { sums, planes: sums, paths, visibility: VisibilityConstants::zeroed() }
+                Addresses { sums, planes: sums, paths, visibility: VisibilityConstants::NONE }
             }
         })
     }

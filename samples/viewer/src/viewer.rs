@@ -201,7 +201,7 @@ impl Viewer {
         self.scene.texture_memory()
     }
 
-    /// Instances that the last frame has rasterised; `None` where all are drawn, or none are. Waits for the frame.
+    /// Instances that the last frame has rasterised; `None` where culling leaves out none. Waits for the frame.
     ///
     /// # Errors
     /// [`SampleError::Device`].
@@ -236,6 +236,7 @@ impl Viewer {
         let counts_steps = |config: &ViewerConfig| config.content == Content::Steps;
         let needs_others = config.method != before.method
             || config.path != before.path
+            || config.rasterises() != before.rasterises()
             || counts_steps(config) != counts_steps(before);
         let occludes = config.occludes(self.counts().1);
         if is_resized || needs_others {

@@ -30,7 +30,8 @@ fn add_declared(folder: &Path, names: &mut BTreeSet<String>) {
 /// Returns what is wrong with the rows of a page: no test, or one that is not among `names`.
 fn complaints(page: &str, names: &BTreeSet<String>) -> Vec<String> {
     let rows = page.lines().filter_map(cells);
-    let tests = rows.filter_map(|cells| cells.last().copied()).filter(|cell| !matches!(*cell, "test" | "---"));
+    let tests =
+        rows.filter_map(|cells| cells.last().copied()).filter(|cell| !matches!(*cell, "test" | "---"));
     let wrong = |cell: &str| {
         let named: Vec<&str> = cell.split('`').skip(1).step_by(2).collect();
         let missing = named.iter().find(|name| !names.contains(**name));
@@ -60,7 +61,10 @@ fn a_row_without_a_test_is_noticed() {
     let page = "| found | mended | test |\n|---|---|---|\n| a | b | `it_rains`, `whole_rain`, always |\n| a | b | none: a text |";
     assert_eq!(complaints(page, &names), Vec::<String>::new());
     let bad = format!("{page}\n| a | b | `it_snows` |\n| a | b | |\n| a | b | later |");
-    assert_eq!(complaints(&bad, &names), ["no test is called it_snows", "no test in ''", "no test in 'later'"]);
+    assert_eq!(
+        complaints(&bad, &names),
+        ["no test is called it_snows", "no test in ''", "no test in 'later'"]
+    );
     assert_eq!(declared("    fn it_rains() {"), Some("it_rains"));
     assert_eq!(declared("    whole_rain: \"rain\";"), Some("whole_rain"));
 }

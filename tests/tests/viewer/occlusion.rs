@@ -10,7 +10,7 @@ use lvk_samples::hybrid::RayPath;
 use lvk_samples::scene::Camera;
 use lvk_tests::device;
 use lvk_viewer::light::Environment;
-use lvk_viewer::{CullingMode, DrawnInstances, Method, Viewer, ViewerConfig};
+use lvk_viewer::{CullingMode, DrawnInstances, Method, PrimaryVisibility, Viewer, ViewerConfig};
 
 use crate::moving_model::{DURATION, moving_model};
 use crate::scenes::{Builder, View, colored, viewer};
@@ -18,9 +18,10 @@ use crate::scenes::{Builder, View, colored, viewer};
 /// Boxes behind the wall: columns and rows.
 const BOXES: [u16; 2] = [24, 16];
 
-/// The radiance of a frame, bit by bit, and what was rasterised.
+/// The radiance of a frame by the rasteriser, bit by bit, and what was rasterised.
 pub fn frame(viewer: &mut Viewer, culling: CullingMode) -> (Vec<[u32; 3]>, Option<DrawnInstances>) {
-    viewer.configure(&ViewerConfig { culling, ..*viewer.config() }).unwrap();
+    let primary = PrimaryVisibility::Raster;
+    viewer.configure(&ViewerConfig { primary, culling, ..*viewer.config() }).unwrap();
     headless::picture(viewer).unwrap();
     let bits = viewer.radiance().unwrap().iter().map(|pixel| pixel.map(f32::to_bits)).collect();
     (bits, viewer.drawn_instances().unwrap())

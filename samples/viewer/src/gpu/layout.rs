@@ -318,6 +318,12 @@ impl VisibleTargets {
     pub(crate) const NONE: Self = Self { triangles: NO_TEXTURE, depth: NO_TEXTURE };
 }
 
+impl VisibilityConstants {
+    /// Those without a rasteriser.
+    pub(crate) const NONE: Self =
+        Self { visible1: VisibleTargets::NONE, visible2: VisibleTargets::NONE, pyramid: 0 };
+}
+
 /// Value of `DrawPush::first_visible` without culling.
 pub(crate) const ALL_INSTANCES: u32 = u32::MAX;
 

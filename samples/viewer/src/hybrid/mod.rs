@@ -1,4 +1,4 @@
-//! The real-time method: rasterised surfaces, a few rays for each, and filters over time and space.
+//! The real-time method: visible surfaces, a path of light for each, and filters over time and space.
 
 mod depth_pyramid;
 mod passes;
@@ -25,7 +25,8 @@ const ELEMENT: u64 = 16;
 
 /// Passes and data of the real-time method, for pictures of one size.
 pub(crate) struct Hybrid {
-    visibility: Visibility,
+    /// The rasteriser; rays find the surfaces where there is none.
+    visibility: Option<Visibility>,
     passes: Passes,
     planes: Holder<BufferHandle>,
     extent: [u32; 2],
@@ -36,8 +37,10 @@ impl Hybrid {
     pub(crate) fn new(ctx: &Context, config: &ViewerConfig, occludes: bool) -> lvk::Result<Self> {
         let extent = config.extent();
         let size_bytes = PLANES * plane_bytes(extent);
-        let mut visibility = Visibility::new(ctx, extent)?;
-        visibility.set_occlusion(ctx, occludes)?;
+        let mut visibility = config.rasterises().then(|| Visibility::new(ctx, extent)).transpose()?;
+        if let Some(visibility) = &mut visibility {
+            visibility.set_occlusion(ctx, occludes)?;
+        }
         Ok(Self {
             visibility,
             passes: Passes::new(ctx, config)?,
@@ -73,12 +76,12 @@ impl Hybrid {
 
     /// Indices of the textures with the visible triangles, and the address of the pyramid.
     pub(crate) fn visibility(&self) -> lvk::Result<VisibilityConstants> {
-        self.visibility.constants()
+        self.visibility.as_ref().map_or(Ok(VisibilityConstants::NONE), Visibility::constants)
     }
 
     /// Leaves out what others hide, or no longer.
     pub(crate) fn set_occlusion(&mut self, ctx: &Context, is_on: bool) -> lvk::Result<()> {
-        self.visibility.set_occlusion(ctx, is_on)
+        self.visibility.as_mut().map_or(Ok(()), |visibility| visibility.set_occlusion(ctx, is_on))
     }
 
     /// Records a frame.
@@ -90,8 +93,12 @@ impl Hybrid {
     ) -> lvk::Result<()> {
         let frame = work.frame;
         let push = |argument| Push { frame, argument, _padding: 0 };
-        self.visibility.record(to, frame, scene)?;
-        let (planes, visible) = (*self.planes, self.visibility.textures());
+        let mut visible = Vec::new();
+        if let Some(visibility) = &self.visibility {
+            visibility.record(to, frame, scene)?;
+            visible = visibility.textures();
+        }
+        let planes = *self.planes;
         to.pass("light", |cmd| self.passes.light().record(cmd, work, planes, (&visible, scene)))?;
         to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
         match self.passes.counts_steps() {
