@@ -381,3 +381,32 @@ fn a_shader_may_end_while_it_computes_the_place_of_a_texel() -> Result<()> {
     }
     Ok(())
 }
+
+/// A return inside of a loop without a condition, as of rejection sampling, and one in a switch that is never left otherwise. Both functions
+/// use variables of the shader, and are called where the shader branches between rays.
+#[test]
+fn functions_return_from_inside_of_loops_and_switches() -> Result<()> {
+    const RETURNING: &str = "
+        uint root() { for (uint k = 0;; k++) { if (k * k >= value) return k; } }
+        uint tripled() { switch (value & 3) { case 0: value += 2; case 1: value += 1; default: return 3 * value; } }
+        void traced() { traceRayEXT(kTLAS[tlas], 0, 0xff, 0, 0, 0, vec3(0.25, 0.25, -1), 0.0, direction(), 10.0, 0); }
+        void main() {
+            uint sum = 0;
+            for (uint round = 0; round < 3; round++) {
+                traced();
+                if (round != 1) sum += root();
+                traced();
+                if (round == 1) { sum += 100 * tripled(); }
+                traced();
+                sum += value;
+                traced();
+                traced();
+            }
+            results.at[gl_LaunchIDEXT.x] = sum;
+        }";
+    for (path, ctx) in pipeline_devices() {
+        let found = results(&ctx, RETURNING, None)?;
+        assert_eq!(found, [2 * 5 + 100 * 3 * 23 + 3 * 20, 2 * 6 + 100 * 3 * 30 + 3 * 30], "{path:?}");
+    }
+    Ok(())
+}

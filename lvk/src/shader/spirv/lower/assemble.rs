@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use ::spirv::Op;
 
 use super::calls::{Call, RecordPlace, Shared};
+use super::control_flow::ControlFlow;
 use super::emit::Emitter;
 use super::flatten::{FlattenedFunction, ShaderFrame, StateMachine, flatten, state};
 use super::inline::inline_calls;
@@ -66,10 +67,15 @@ struct Target {
     is_triangle: bool,
 }
 
-/// True for a function whose code stays structured where it is called: it has no early return.
-fn returns_once(function: &Function) -> bool {
-    let is_return = |inst: &&Inst| matches!(inst.op, Op::Return | Op::ReturnValue);
-    function.code().filter(is_return).count() == 1
+/// True for a function whose code stays structured where it is called: it has one return, behind all loops and selections. The return of
+/// an endless loop stands in the loop.
+fn returns_at_its_end(function: &Function) -> bool {
+    let returns = |block: &Block| {
+        block.terminator().is_some_and(|inst| matches!(inst.op, Op::Return | Op::ReturnValue))
+    };
+    let places: Vec<usize> = (0..function.blocks.len()).filter(|at| returns(&function.blocks[*at])).collect();
+    let [place] = *places else { return false };
+    !ControlFlow::new(function).is_in_construct(function, place)
 }
 
 impl<'a> Assembly<'a> {
@@ -173,13 +179,14 @@ impl<'a> Assembly<'a> {
             |inst: &Inst| used_ids(inst, &self.linker.module.wide).iter().any(|id| own.contains(id));
         let functions = shader.functions.iter().filter_map(|id| self.linker.function(*id));
         let mut wanted = functions_that_reach(functions, uses_own);
-        wanted.retain(|id| self.linker.function(*id).is_some_and(returns_once));
+        wanted.retain(|id| self.linker.function(*id).is_some_and(returns_at_its_end));
         wanted.extend(&self.shaders.waiting);
         let mut function = entry.clone();
-        if inline_calls(self.linker, &mut function, &wanted).is_err() {
+        if inline_calls(self.linker, &mut function, &wanted, &self.shaders.waiting).is_err() {
             // The functions that wait must be in place. Those that use variables only had better be.
             function = entry;
-            inline_calls(self.linker, &mut function, &self.shaders.waiting)?;
+            let waiting = &self.shaders.waiting;
+            inline_calls(self.linker, &mut function, waiting, waiting)?;
         }
         let TraceVariables { payloads, callables, .. } = &mut self.variables;
         let results = shader.results(self.linker, payloads, callables);
@@ -406,10 +413,7 @@ impl<'a> Assembly<'a> {
     /// Replaces the bare instructions that no function waits at by calls: of `shadow` for rays that run no closest-hit shader.
     fn call_in_place(&mut self, [trace, shadow]: [u32; 2], callable: u32) {
         let void = self.linker.void();
-        let new_ids: usize =
-            self.linker.module.functions.iter().map(|function| function.code().count()).sum();
         let mut next = self.linker.module.bound;
-        self.linker.module.bound = next.saturating_add(new_ids as u32);
         let pieces = self.pieces.iter_mut().flat_map(|pieces| &mut pieces.blocks);
         let in_pieces = pieces.flat_map(|block| &mut block.code);
         let in_functions = self.linker.module.functions.iter_mut().flat_map(Function::code_mut);
@@ -421,8 +425,9 @@ impl<'a> Assembly<'a> {
                 _ => continue,
             };
             *inst = Inst::new(Op::FunctionCall, &[void, next, function]);
-            next += 1;
+            next = next.saturating_add(1);
         }
+        self.linker.module.bound = next;
     }
 
     /// Starts the ray generation shader.

@@ -10,7 +10,7 @@ use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
 use super::module::{Block, Function};
-use super::switches::emit_choice;
+use super::switches::{check_cases, emit_choice};
 
 /// Makes each block a case of a switch in a loop. No block but those of the loop has a merge instruction then, and a
 /// return may stand behind any instruction. The error is a message.
@@ -23,6 +23,7 @@ pub(super) fn run_blocks_in_loop(linker: &mut Linker, function: &mut Function) -
     let next_block = declare_variable(linker, function, uint);
     let definitions = function.definitions();
     let order = ControlFlow::new(function).order;
+    check_cases(order.len())?;
     let numbers = (0..).zip(&order).map(|(number, block)| (function.blocks[*block].label, number)).collect();
     let labels = Labels::new(linker);
     let mut cases = Cases { linker, definitions, next_block, result, numbers, end: labels.next };

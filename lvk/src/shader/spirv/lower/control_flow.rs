@@ -91,6 +91,13 @@ impl ControlFlow {
         whole
     }
 
+    /// True for a block of a loop or a selection.
+    pub(super) fn is_in_construct(&self, function: &Function, block: usize) -> bool {
+        let headers = (0..function.blocks.len()).filter(|header| self.reachable[*header]);
+        let mut constructs = headers.filter_map(|header| self.construct(function, header));
+        constructs.any(|construct| construct.members.contains(&block))
+    }
+
     /// Returns the construct of a header.
     fn construct(&self, function: &Function, header: usize) -> Option<Construct> {
         let merge_inst = function.blocks[header].merge()?;

@@ -15,6 +15,7 @@ use super::promote::{is_register, promote_variables};
 use super::simplify::simplify;
 use super::slots::Slots;
 use super::split_structs::split_structs;
+use super::switches::check_cases;
 use super::traces::{is_trace, skips_closest_hit};
 
 /// Values of the state that are no pieces of functions.
@@ -135,6 +136,7 @@ pub(super) fn flatten(
     };
     let entry = flattener.state_of(0);
     while let Some((block, state)) = flattener.waiting.pop() {
+        check_cases(flattener.machine.next_state as usize)?;
         flattener.emit_state(block, state);
     }
     let (blocks, cases) = (flattener.blocks, flattener.cases);

@@ -7,20 +7,27 @@ use ::spirv::Op;
 use super::demote::declare_variable;
 use super::instruction::{Inst, for_each_id};
 use super::linker::Linker;
+use super::loop_headers::{can_leave_header, leave_loop_header};
 use super::module::{Block, Function};
 
 /// Inlines every call of the functions in `wanted`, and calls within them, into `function`.
 ///
-/// Returns of an inlined function branch to the code behind the call, from wherever they stand.
+/// Returns of an inlined function branch to the code behind the call, from wherever they stand. Functions in `waiting`, which are among
+/// those in `wanted`, are inlined everywhere; others not in headers of loops whose code cannot leave them.
 ///
 /// The error is a message.
 pub(super) fn inline_calls(
     linker: &mut Linker,
     function: &mut Function,
     wanted: &HashSet<u32>,
+    waiting: &HashSet<u32>,
 ) -> Result<(), String> {
     let mut start = 0;
-    while let Some((block, place)) = find_call(function, wanted, start) {
+    while let Some(block) = block_with_call(function, wanted, waiting, start) {
+        let block = leave_loop_header(linker, function, block);
+        let Some(place) = function.blocks[block].code.iter().position(|inst| is_call(inst, wanted)) else {
+            break;
+        };
         // Blocks before that one have no more calls.
         start = block;
         let callee = function.blocks[block].code[place].operand(2);
@@ -39,15 +46,23 @@ pub(super) fn inline_calls(
 /// Most blocks of a function with its calls in place.
 const MOST_BLOCKS: usize = 16_384;
 
-/// Finds the first call of a wanted function in the blocks from `start` on.
-fn find_call(function: &Function, wanted: &HashSet<u32>, start: usize) -> Option<(usize, usize)> {
-    let is_call = |inst: &Inst| inst.op == Op::FunctionCall && wanted.contains(&inst.operand(2));
-    function
-        .blocks
-        .iter()
-        .enumerate()
-        .skip(start)
-        .find_map(|(block, Block { code, .. })| code.iter().position(is_call).map(|place| (block, place)))
+fn is_call(inst: &Inst, wanted: &HashSet<u32>) -> bool {
+    inst.op == Op::FunctionCall && wanted.contains(&inst.operand(2))
+}
+
+/// Finds the first block from `start` on that calls a wanted function. A call in the header of a loop counts if its code can leave the
+/// header, or if the function waits, so that the loop does not stay whole.
+fn block_with_call(
+    function: &Function,
+    wanted: &HashSet<u32>,
+    waiting: &HashSet<u32>,
+    start: usize,
+) -> Option<usize> {
+    let has_call = |at: &usize| {
+        let calls = if can_leave_header(function, *at) { wanted } else { waiting };
+        function.blocks[*at].code.iter().any(|inst| is_call(inst, calls))
+    };
+    (start..function.blocks.len()).find(has_call)
 }
 
 fn inline_call(
@@ -139,4 +154,62 @@ fn return_to(block: &mut Block, behind: u32, result: Option<u32>) {
         block.code.push(Inst::new(Op::Store, &[variable, value]));
     }
     block.code.push(Inst::new(Op::Branch, &[behind]));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The function 20 calls the function 10, which does nothing, in the header of a loop: blocks 21, the header 22, 23 and 24.
+    fn caller(linker: &mut Linker) -> Function {
+        linker.module.bound = 100;
+        let block = |label, code| Block { label, code };
+        let branch = |to| Inst::new(Op::Branch, &[to]);
+        linker.push_function(10, vec![block(11, vec![Inst::new(Op::Return, &[])])]);
+        let void = linker.void();
+        let header = vec![
+            Inst::new(Op::FunctionCall, &[void, 30, 10]),
+            Inst::new(Op::LoopMerge, &[24, 23, 0]),
+            Inst::new(Op::BranchConditional, &[31, 23, 24]),
+        ];
+        Function {
+            head: Inst::new(Op::Function, &[void, 20, 0, 32]),
+            parameters: Vec::new(),
+            blocks: vec![
+                block(21, vec![branch(22)]),
+                block(22, header),
+                block(23, vec![branch(22)]),
+                block(24, vec![Inst::new(Op::Return, &[])]),
+            ],
+        }
+    }
+
+    #[test]
+    fn the_way_back_of_a_loop_leads_to_its_merge_instruction_behind_a_call_in_its_header()
+    -> Result<(), String> {
+        let mut linker = Linker::new(0x0001_0600);
+        let mut function = caller(&mut linker);
+        inline_calls(&mut linker, &mut function, &HashSet::from([10]), &HashSet::new())?;
+        assert!(function.code().all(|inst| inst.op != Op::FunctionCall));
+        let header = function.blocks.iter().find(|block| block.label == 22);
+        let merge = header.and_then(Block::merge).map(|inst| inst.op);
+        assert_eq!(merge, Some(Op::LoopMerge));
+        Ok(())
+    }
+
+    #[test]
+    fn calls_stay_in_headers_that_their_code_cannot_leave_unless_the_function_waits() -> Result<(), String> {
+        let (called, none) = (HashSet::from([10]), HashSet::new());
+        for (waiting, stays) in [(&none, true), (&called, false)] {
+            let mut linker = Linker::new(0x0001_0600);
+            let mut function = caller(&mut linker);
+            // Neither way leaves the loop.
+            if let Some(branch) = function.blocks[1].code.last_mut() {
+                *branch = Inst::new(Op::BranchConditional, &[31, 25, 26]);
+            }
+            inline_calls(&mut linker, &mut function, &called, waiting)?;
+            assert_eq!(function.code().any(|inst| inst.op == Op::FunctionCall), stays);
+        }
+        Ok(())
+    }
 }

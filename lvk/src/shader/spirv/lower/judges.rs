@@ -10,6 +10,7 @@ use super::donor::Donor;
 use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
+use super::loop_headers::{can_leave_header, leave_loop_header};
 use super::module::{Block, Function, functions_that_reach};
 use super::passed::Passed;
 use super::stage::Shader;
@@ -112,17 +113,6 @@ fn can_return_behind(function: &Function, calls: &[u32]) -> bool {
     with_calls.all(|at| can_leave_header(function, at) && !is_on_the_way_back(function, &flow, at))
 }
 
-/// True for a block that heads no loop, and for a header whose code can move to a block of its own.
-fn can_leave_header(function: &Function, at: usize) -> bool {
-    let block = &function.blocks[at];
-    let Some(merge) = block.merge().filter(|inst| inst.op == Op::LoopMerge) else { return true };
-    let exits = [merge.operand(0), merge.operand(1)];
-    let leaves = block.terminator().is_some_and(|inst| {
-        inst.op == Op::Branch || [1, 2].iter().any(|place| exits.contains(&inst.operand(*place)))
-    });
-    leaves && !exits.contains(&block.label)
-}
-
 /// True for a block that only the way back to the start of a loop reaches, from where no return is possible.
 fn is_on_the_way_back(function: &Function, flow: &ControlFlow, at: usize) -> bool {
     let merges = function.blocks.iter().filter_map(|block| block.merge().map(|inst| (block, inst)));
@@ -157,23 +147,6 @@ fn check_behind(linker: &mut Linker, donor: &Donor, function: &mut Function, cal
     emit_return(&mut Emitter::new(linker, &mut code), result);
     let blocks = [Block { label: leave, code }, Block { label: stay, code: rest }];
     function.blocks.splice(at + 1..at + 1, blocks);
-}
-
-/// Moves the code of a loop's header to a block of its own, whose index is the result. Other blocks stay.
-fn leave_loop_header(linker: &mut Linker, function: &mut Function, at: usize) -> usize {
-    let Some(merge) = function.blocks[at].merge().filter(|inst| inst.op == Op::LoopMerge).cloned() else {
-        return at;
-    };
-    let label = function.blocks[at].label;
-    let code = std::mem::take(&mut function.blocks[at].code);
-    let (phis, mut rest): (Vec<Inst>, Vec<Inst>) = code.into_iter().partition(|inst| inst.op == Op::Phi);
-    rest.retain(|inst| inst.op != Op::LoopMerge);
-    let behind = linker.new_id();
-    function.blocks[at].code = phis;
-    function.blocks[at].code.extend([merge, Inst::new(Op::Branch, &[behind])]);
-    function.rename_predecessor(label, behind);
-    function.blocks.insert(at + 1, Block { label: behind, code: rest });
-    at + 1
 }
 
 /// Returns from a function with this result type; the result does not matter.

@@ -27,7 +27,7 @@ pub(super) struct Linker {
     shapes: HashMap<u32, (u32, u32)>,
     shape_keys: HashMap<Vec<u32>, u32>,
     /// Inputs by built-in value and type.
-    inputs: HashMap<(u32, u32), u32>,
+    inputs: HashMap<u32, u32>,
 }
 
 impl Linker {
@@ -321,9 +321,10 @@ impl Linker {
         }
     }
 
-    /// Declares an input of the shader, once for a built-in value and type.
+    /// Declares an input of the shader, once for a built-in value, as an entry point may have it once. Shaders that declare it by
+    /// another type of the same shape convert it.
     pub(super) fn input(&mut self, builtin: BuiltIn, ty: u32) -> u32 {
-        if let Some(known) = self.inputs.get(&(builtin as u32, ty)) {
+        if let Some(known) = self.inputs.get(&(builtin as u32)) {
             return *known;
         }
         let pointer = self.pointer_to(StorageClass::Input, ty);
@@ -331,7 +332,7 @@ impl Linker {
         self.push_global(Inst::new(Op::Variable, &[pointer, id, StorageClass::Input as u32]));
         let decoration = [id, Decoration::BuiltIn as u32, builtin as u32];
         self.module.decorations.push(Inst::new(Op::Decorate, &decoration));
-        self.inputs.insert((builtin as u32, ty), id);
+        self.inputs.insert(builtin as u32, id);
         id
     }
 
@@ -439,8 +440,13 @@ impl Linker {
             key.push(shape);
             count = count.saturating_add(values);
         }
-        let is_whole = !matches!(op, Op::TypeStruct | Op::TypeArray);
-        Some((key, if is_whole { 1 } else { count.saturating_mul(length) }))
+        // A struct without members counts too: an array of such structs has elements.
+        let count = match op {
+            Op::TypeStruct => count.max(1),
+            Op::TypeArray => count.saturating_mul(length),
+            _ => 1,
+        };
+        Some((key, count))
     }
 
     /// Returns the number of elements of an array type whose length is a plain constant.
@@ -553,4 +559,31 @@ fn is_unique(op: Op) -> bool {
         Op::Constant | Op::ConstantTrue | Op::ConstantFalse | Op::ConstantNull | Op::ConstantComposite
     );
     is_type(op) || is_constant
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_is_declared_once_for_all_types() {
+        let mut linker = Linker::new(0x0001_0600);
+        let uint = linker.uint();
+        let int = linker.new_id();
+        linker.push_global(Inst::new(Op::TypeInt, &[int, 32, 1]));
+        let [first, second] = [uint, int].map(|ty| linker.input(BuiltIn::SubgroupLocalInvocationId, ty));
+        assert_eq!(first, second);
+        assert_ne!(first, linker.input(BuiltIn::SubgroupSize, uint));
+    }
+
+    #[test]
+    fn arrays_of_structs_without_members_have_elements() {
+        let mut linker = Linker::new(0x0001_0600);
+        let [empty, array] = [(); 2].map(|()| linker.new_id());
+        let two = linker.constant(2);
+        linker.push_global(Inst::new(Op::TypeStruct, &[empty]));
+        linker.push_global(Inst::new(Op::TypeArray, &[array, empty, two]));
+        assert_eq!(linker.member_types(array), Some(vec![empty; 2]));
+        assert_eq!(linker.member_types(empty), Some(Vec::new()));
+    }
 }

@@ -17,6 +17,7 @@ mod judges;
 mod linker;
 mod liveness;
 mod localize;
+mod loop_headers;
 mod module;
 mod non_uniform;
 mod passed;

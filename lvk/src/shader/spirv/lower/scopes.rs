@@ -34,7 +34,7 @@ pub(super) fn widen_scopes(module: &mut Module) {
 fn scope_place(op: Op) -> Option<usize> {
     match op {
         Op::MemoryBarrier => Some(0),
-        Op::AtomicStore => Some(1),
+        Op::AtomicStore | Op::ControlBarrier => Some(1),
         Op::AtomicFAddEXT | Op::AtomicFMinEXT | Op::AtomicFMaxEXT => Some(3),
         _ => (Op::AtomicLoad as u32..=Op::AtomicXor as u32).contains(&(op as u32)).then_some(3),
     }
@@ -51,6 +51,7 @@ mod tests {
         const SIX: u32 = 2;
         let code = vec![
             Inst::new(Op::MemoryBarrier, &[SIX, 9]),
+            Inst::new(Op::ControlBarrier, &[9, SIX, 9]),
             Inst::new(Op::AtomicIAdd, &[UINT, 20, 21, SIX, 9, 22]),
             Inst::new(Op::IAdd, &[UINT, 23, SIX, SIX]),
         ];
@@ -68,7 +69,7 @@ mod tests {
         widen_scopes(&mut module);
         assert_eq!(module.globals[1], Inst::new(Op::Constant, &[UINT, 30, Scope::Device as u32]));
         let code: Vec<&Inst> = module.functions[0].code().collect();
-        assert_eq!((code[0].operand(0), code[1].operand(3)), (30, 30));
-        assert_eq!(code[2].operands, [UINT, 23, SIX, SIX], "a number");
+        assert_eq!((code[0].operand(0), code[1].operand(1), code[2].operand(3)), (30, 30, 30));
+        assert_eq!(code[3].operands, [UINT, 23, SIX, SIX], "a number");
     }
 }

@@ -1,6 +1,6 @@
 //! Links one shader of a pipeline: its variables become those of the invocation, and its roles are collected.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use ::spirv::{BuiltIn, Capability, Decoration, ExecutionModel, Op, StorageClass};
 
@@ -84,6 +84,7 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     check_module(&module)?;
     let entry = take_entry(&mut module, stage.stage)?;
     freeze_constants(&mut module, stage.specialization);
+    join_equal_branches(&mut module);
     let roles = roles(&module, &entry);
     let initial = take_initial_values(&mut module);
     store_initial_values(&mut module);
@@ -120,8 +121,8 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     Ok(shader)
 }
 
-/// Fails for modules that need other hardware of ray tracing pipelines, and for those of the Vulkan memory model: the
-/// traversal that they are linked with has the other model, and a module has one.
+/// Fails for modules that need other hardware of ray tracing pipelines, for those of the Vulkan memory model (the traversal
+/// that they are linked with has the other model, and a module has one), and for blocks of buffers that are payloads too.
 fn check_module(module: &Module) -> Result<(), String> {
     let refused = [
         Capability::ShaderInvocationReorderNV,
@@ -131,7 +132,17 @@ fn check_module(module: &Module) -> Result<(), String> {
         Capability::VulkanMemoryModel,
     ];
     let found = refused.iter().find(|capability| module.capabilities.contains(&(**capability as u32)));
-    found.map_or(Ok(()), |capability| Err(format!("OpCapability {capability:?} cannot be lowered")))
+    if let Some(capability) = found {
+        return Err(format!("OpCapability {capability:?} cannot be lowered"));
+    }
+    let [of_payloads, of_others] = [true, false].map(|is_converted| pointees(module, is_converted));
+    let is_shared = |ty: &u32| of_others.contains(ty) && block_decoration(module, *ty).is_some();
+    match of_payloads.iter().find(|ty| is_shared(ty)) {
+        Some(ty) => Err(format!(
+            "OpTypeStruct %{ty} is the block of a buffer and the type of a payload, callable data or attributes; declare two types"
+        )),
+        None => Ok(()),
+    }
 }
 
 /// Fails for a variable whose type cannot be compared with the type on the other side. The error is a message.
@@ -314,18 +325,42 @@ fn convert_storage(module: &mut Module) {
     });
 }
 
+/// Makes conditional branches with one target plain branches: SPIR-V 1.6, of which lowered modules are, allows no others.
+fn join_equal_branches(module: &mut Module) {
+    for block in module.functions.iter_mut().flat_map(|function| &mut function.blocks) {
+        let is_equal =
+            |inst: &mut Inst| inst.op == Op::BranchConditional && inst.operand(1) == inst.operand(2);
+        if let Some(branch) = block.code.pop_if(is_equal) {
+            let _ = block.code.pop_if(|inst| inst.op == Op::SelectionMerge);
+            block.code.push(Inst::new(Op::Branch, &[branch.operand(1)]));
+        }
+    }
+}
+
 /// Makes the blocks of payloads, callable data and attributes plain structs: variables of the invocation have no layout.
 fn remove_block_decorations(module: &mut Module) {
-    let is_converted = |storage: u32| {
+    let blocks = pointees(module, true);
+    module.decorations.retain(|inst| !is_block(inst) || !blocks.contains(&inst.operand(0)));
+}
+
+/// Returns the types that pointers lead to: those of payloads, callable data and attributes, which become variables of the
+/// invocation, or all others.
+fn pointees(module: &Module, is_passed: bool) -> BTreeSet<u32> {
+    let becomes_private = |storage: u32| {
         storage != StorageClass::Input as u32 && converted_storage(storage) == StorageClass::Private as u32
     };
     let pointers = module.globals.iter().filter(|inst| inst.op == Op::TypePointer);
-    let blocks: HashSet<u32> =
-        pointers.filter(|inst| is_converted(inst.operand(1))).map(|inst| inst.operand(2)).collect();
-    module.decorations.retain(|inst| {
-        let is_block = inst.op == Op::Decorate && inst.operand(1) == Decoration::Block as u32;
-        !is_block || !blocks.contains(&inst.operand(0))
-    });
+    let wanted = pointers.filter(|inst| becomes_private(inst.operand(1)) == is_passed);
+    wanted.map(|inst| inst.operand(2)).collect()
+}
+
+fn is_block(inst: &Inst) -> bool {
+    inst.op == Op::Decorate && inst.operand(1) == Decoration::Block as u32
+}
+
+/// Returns the decoration of a type that is a block.
+fn block_decoration(module: &Module, ty: u32) -> Option<&Inst> {
+    module.decorations.iter().find(|inst| is_block(inst) && inst.operand(0) == ty)
 }
 
 fn converted_storage(storage: u32) -> u32 {
@@ -350,4 +385,45 @@ fn converted_storage(storage: u32) -> u32 {
 fn declare_input(linker: &mut Linker, builtin: BuiltIn, variable: u32) -> u32 {
     let ty = linker.variable_type(variable).unwrap_or(0);
     linker.input(builtin, ty)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::module::Block;
+    use super::*;
+
+    #[test]
+    fn branches_to_one_target_have_no_condition() {
+        const CONDITION: u32 = 7;
+        let block = |ends: &[Inst]| Block { label: 1, code: ends.to_vec() };
+        let branch = |yes, no| Inst::new(Op::BranchConditional, &[CONDITION, yes, no]);
+        let (merge, head) = (Inst::new(Op::SelectionMerge, &[9, 0]), Inst::new(Op::LoopMerge, &[9, 8, 0]));
+        let blocks = vec![
+            block(&[merge.clone(), branch(9, 9)]),
+            block(&[head.clone(), branch(5, 5)]),
+            block(&[merge.clone(), branch(5, 9)]),
+        ];
+        let function =
+            Function { head: Inst::new(Op::Function, &[2, 3, 0, 4]), parameters: Vec::new(), blocks };
+        let mut module = Module { functions: vec![function], ..Module::default() };
+        join_equal_branches(&mut module);
+        let code: Vec<&[Inst]> = module.functions[0].blocks.iter().map(|block| &*block.code).collect();
+        let plain = |to| Inst::new(Op::Branch, &[to]);
+        assert_eq!(code, [&[plain(9)][..], &[head, plain(5)], &[merge, branch(5, 9)]]);
+    }
+
+    #[test]
+    fn a_block_of_a_buffer_and_of_a_payload_is_refused() {
+        let pointer = |id, class: StorageClass, ty| Inst::new(Op::TypePointer, &[id, class as u32, ty]);
+        let block = |ty| Inst::new(Op::Decorate, &[ty, Decoration::Block as u32]);
+        let module = |classes: &[(StorageClass, u32)]| Module {
+            globals: (10..).zip(classes).map(|(id, (class, ty))| pointer(id, *class, *ty)).collect(),
+            decorations: vec![block(1), block(2)],
+            ..Module::default()
+        };
+        let (buffer, payload) = (StorageClass::StorageBuffer, StorageClass::RayPayloadKHR);
+        assert_eq!(check_module(&module(&[(buffer, 1), (payload, 2), (payload, 3), (buffer, 3)])), Ok(()));
+        let refused = check_module(&module(&[(buffer, 1), (payload, 1)]));
+        assert!(refused.is_err_and(|message| message.starts_with("OpTypeStruct %1 ")));
+    }
 }

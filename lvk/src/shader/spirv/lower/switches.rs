@@ -8,6 +8,20 @@ use super::emit::Emitter;
 use super::instruction::Inst;
 use super::linker::Linker;
 
+/// Most cases of a switch (SPIR-V, universal limits).
+const MOST_CASES: usize = 16_383;
+
+/// Fails for a switch with more cases than SPIR-V allows. The error is a message.
+pub(super) fn check_cases(count: usize) -> Result<(), String> {
+    if count <= MOST_CASES {
+        return Ok(());
+    }
+    Err(format!(
+        "functions that trace rays or call shaders call each other too often: an OpSwitch over them would have {count} cases, and \
+         SPIR-V allows {MOST_CASES}"
+    ))
+}
+
 /// Makes switches over 64 bits switches over the number of the case, in 32 bits: the targets of all switches stand in the
 /// same places then.
 pub(super) fn narrow_switches(linker: &mut Linker, functions: &[u32]) {
@@ -70,6 +84,15 @@ mod tests {
     use super::*;
 
     /// GLSL has no switch over 64 bits, so the words are written here.
+    #[test]
+    fn more_cases_than_spirv_allows_are_refused() {
+        assert_eq!(check_cases(16_383), Ok(()));
+        assert!(
+            check_cases(16_384)
+                .is_err_and(|message| message.contains("OpSwitch") && message.contains("16384"))
+        );
+    }
+
     #[test]
     fn a_switch_over_64_bits_becomes_one_over_the_numbers_of_its_cases() {
         const SELECTOR: u32 = 700;

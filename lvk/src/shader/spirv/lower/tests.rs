@@ -423,3 +423,57 @@ fn shaders_of_the_vulkan_memory_model_are_refused() {
         assert_eq!(error.message, "OpCapability VulkanMemoryModel cannot be lowered");
     }
 }
+
+/// Returns a ray generation shader whose deepest function has `statement` some times, and is called through three levels.
+fn nested(statement: &str, [times, calls]: [usize; 2]) -> String {
+    let level = |name: &str, called: &str| format!("void {name}() {{ {} }}", called.repeat(calls));
+    format!(
+        "layout(location = 0) rayPayloadEXT vec3 color;
+        layout(location = 1) callableDataEXT vec3 data;
+        layout(push_constant, scalar) uniform Push {{ uint tlas; uint image; }};
+        void trace(uint flags) {{
+            traceRayEXT(kTLAS[tlas], flags, 0xFF, 0, 1, 0, vec3(0), 0.0, vec3(0, 0, 1), 100.0, 0);
+        }}
+        void a() {{ {} }}
+        {} {} {}
+        void main() {{ d(); trace(0u); trace(1u); trace(2u);
+            imageStore(kImages2D[image], ivec2(gl_LaunchIDEXT.xy), vec4(color + data, 1)); }}",
+        statement.repeat(times),
+        level("b", "a();"),
+        level("c", "b();"),
+        level("d", "c();")
+    )
+}
+
+/// Lowers a ray generation shader with a miss shader and a callable shader that does nothing more.
+fn lowered_ray_gen(text: &str) -> Vec<Result<Vec<u32>, LoweringError>> {
+    const CALLABLE: &str = "layout(location = 0) callableDataInEXT vec3 data; void main() { data += 1.0; }";
+    lowered(&Pipeline {
+        shaders: vec![
+            (ShaderStage::RayGen, text),
+            (ShaderStage::Miss, MISS),
+            (ShaderStage::Callable, CALLABLE),
+        ],
+        miss: vec![1],
+        hit: Vec::new(),
+        callable: vec![2],
+        max_recursion: 1,
+    })
+}
+
+#[test]
+fn every_id_is_defined_once_where_calls_are_replaced_in_place() {
+    let shadow = "traceRayEXT(kTLAS[tlas], 12u, 0xFF, 0, 1, 0, vec3(0), 0.0, vec3(0, 0, 1), 100.0, 0);";
+    for (statement, counts) in [("executeCallableEXT(image, 1);", [1, 10]), (shadow, [1, 8])] {
+        for words in lowered_ray_gen(&nested(statement, counts)) {
+            let module = module::Module::parse(&words.unwrap()).unwrap();
+            let code = module.functions.iter().flat_map(module::Function::code);
+            let mut ids: Vec<u32> = code.filter_map(instruction::Inst::result).collect();
+            let count = ids.len();
+            ids.sort_unstable();
+            ids.dedup();
+            assert_eq!(ids.len(), count, "{statement} {counts:?}");
+            assert!(ids.last() < Some(&module.bound));
+        }
+    }
+}
