@@ -5,17 +5,24 @@
 //! makes failing ones small, and `seeds` and `kept` are the tests: of generated programs, and of those that have failed.
 
 mod calls;
+mod calls_accel;
+mod calls_ask;
 mod cell;
 mod environment;
 mod image;
 mod kept;
 mod kit;
+mod kit_draws;
 mod memory;
 mod op;
 mod plan;
+mod plan_draws;
 mod plan_pipelines;
 mod plan_rays;
+mod plan_records;
+mod plan_targets;
 mod plan_textures;
+mod queries;
 mod run;
 mod seeds;
 mod shrink;

@@ -13,7 +13,7 @@ use super::plan::{Planned, compute_problems, graphics_problems, range, region};
 use super::world::{Picked, Problem, TextureInfo, World};
 
 /// Returns the bytes of a texel with a seed, and the word that shaders write for it.
-fn texel(format: Format, seed: u16) -> (Vec<u8>, u32) {
+pub(super) fn texel(format: Format, seed: u16) -> (Vec<u8>, u32) {
     let bytes = pattern(seed, 4);
     let word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     (bytes[..texel_bytes(format)].to_vec(), word)
@@ -31,7 +31,7 @@ fn clear_value(format: Format, seed: u16) -> ClearValue {
 }
 
 /// Returns the operation that clears a target to [`texel`] of a seed, or loads it.
-fn load_op(format: Format, seed: Option<u16>) -> ColorLoadOp {
+pub(super) fn load_op(format: Format, seed: Option<u16>) -> ColorLoadOp {
     match seed.map(|seed| clear_value(format, seed)) {
         Some(ClearValue::Uint(value)) => ColorLoadOp::ClearUint(value),
         Some(ClearValue::Color(value)) => ColorLoadOp::Clear(value),
@@ -44,7 +44,7 @@ fn is_uint(format: Format) -> bool {
 }
 
 impl World<'_> {
-    fn info(&self, texture: &Picked<TextureHandle>) -> Option<&TextureInfo> {
+    pub(super) fn info(&self, texture: &Picked<TextureHandle>) -> Option<&TextureInfo> {
         texture.live.map(|number| &self.textures[number].info)
     }
 
@@ -260,7 +260,11 @@ impl World<'_> {
     }
 
     /// Chooses a texture that is an element of the arrays of 2D textures, and the problem of one without `usage`.
-    fn flat_texture(&self, n: u16, usage: TextureUsage) -> Option<(Picked<TextureHandle>, Option<Problem>)> {
+    pub(super) fn flat_texture(
+        &self,
+        n: u16,
+        usage: TextureUsage,
+    ) -> Option<(Picked<TextureHandle>, Option<Problem>)> {
         let texture = self.pick_texture(n)?;
         let info = self.info(&texture);
         if info.is_some_and(|info| info.is_array) {

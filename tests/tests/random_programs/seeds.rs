@@ -148,14 +148,14 @@ fn an_empty_program_leaves_nothing() {
 #[test]
 fn a_wrong_model_is_detected_and_the_program_shrunk() {
     let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
-    env.lies_from = Some(1);
+    env.wrong_about = Some((Kind::FillBuffer, 1));
     let failing = (0..).map(|seed| program(seed, LENGTH)).find(|ops| run(&env, ops).is_err());
     let Some(ops) = failing else { return };
     let small = shrink(&ops, TRIES, |ops| run(&env, ops).is_err());
     assert!(small.len() <= 3, "{small:#?}");
     assert!(small.iter().any(|op| op.kind == Kind::FillBuffer), "{small:#?}");
     assert!(small.iter().any(|op| op.kind == Kind::CreateBuffer), "{small:#?}");
-    env.lies_from = None;
+    env.wrong_about = None;
     assert!(run(&env, &small).is_ok(), "the library itself is right");
 }
 

@@ -1,0 +1,591 @@
+//! Plans of passes that draw triangles of items: by index, with arguments and numbers from buffers, and by mesh shaders.
+
+use lvk::{
+    BufferHandle, ColorAttachment, Dependencies, Format, IndexFormat, IndirectCount, OptionalFeature, Queue,
+    RenderPass, RenderPassDesc, TextureUsage,
+};
+use lvk_tests::random::Random;
+
+use super::environment::Environment;
+use super::image::Place;
+use super::kit::Push;
+use super::kit_draws::{COLUMNS, FrontEnd};
+use super::memory::Effect;
+use super::plan::{Planned, graphics_problems};
+use super::plan_textures::{load_op, texel};
+use super::world::{Problem, World};
+
+/// Bytes of the buffer of vertices, indices and arguments: 24 vertices, 12 indices, arguments of [`MOST_DRAWS`] draws,
+/// and their number.
+pub const INPUT_BYTES: u64 = NUMBER + 4;
+const INDICES: u64 = 24 * 4;
+const ARGUMENTS: u64 = INDICES + 12 * 4;
+const NUMBER: u64 = ARGUMENTS + MOST_DRAWS as u64 * MOST_STRIDE as u64;
+/// Most draws of one command.
+const MOST_DRAWS: u32 = 3;
+/// Number in the buffer for draws that do not read it. Lavapipe 25.0 reads it for indirect draws behind one with a number
+/// in the same command buffer.
+const ALL_DRAWS: u32 = MOST_DRAWS;
+/// Most bytes from one draw's arguments to the next.
+const MOST_STRIDE: u32 = 24;
+
+/// A pass over one mip of a layer, and the rectangle that is drawn to.
+#[derive(Debug, Clone)]
+pub struct Pass {
+    pub target: ColorAttachment,
+    pub format: Format,
+    pub offset: [u32; 2],
+    pub extent: [u32; 2],
+    /// The rectangle, if it exists.
+    pub place: Option<Place>,
+    /// The whole mip of the layer, if it exists.
+    pub whole: Option<Place>,
+    pub problems: Vec<Problem>,
+    /// Seed of the texel that clears the target before.
+    clear: Option<u16>,
+}
+
+impl Pass {
+    /// Returns the word that fills the rectangle with the texel of a seed.
+    pub fn word(&self, seed: u16) -> u32 {
+        texel(self.format, seed).1
+    }
+
+    /// Returns the effect that fills the rectangle with the texel of a seed.
+    pub fn fill(&self, seed: u16) -> Option<Effect> {
+        self.place.map(|place| Effect::Fill { place, texel: texel(self.format, seed).0 })
+    }
+
+    /// Returns the effect of the clear.
+    fn clear(&self) -> Option<Effect> {
+        let texel = texel(self.format, self.clear?).0;
+        self.whole.map(|place| Effect::Fill { place, texel })
+    }
+
+    /// Returns the effect of an item: it paints one column of the rectangle.
+    fn paint(&self, seed: u16, item: u32) -> Option<Effect> {
+        let place = self.place?;
+        let column = item % COLUMNS;
+        let columns = place.offset[0]..place.offset[0] + place.extent[0];
+        let place = Place { offset: [column, place.offset[1]], extent: [1, place.extent[1]], ..place };
+        let texel = texel(self.format, seed + item as u16).0;
+        columns.contains(&column).then_some(Effect::Fill { place, texel })
+    }
+}
+
+/// Triangles that vertices and indices describe.
+#[derive(Debug, Clone, Copy)]
+struct Triangles {
+    /// Item of each triangle of the vertices.
+    items: [u32; 8],
+    /// Triangle of the vertices that each triangle of the indices has.
+    order: [u32; 4],
+}
+
+impl Triangles {
+    fn random(random: &mut Random) -> Self {
+        Self {
+            items: [(); 8].map(|()| (random.bits() % 16) as u32),
+            order: [(); 4].map(|()| (random.bits() % 4) as u32),
+        }
+    }
+
+    fn vertices(&self) -> Vec<u32> {
+        self.items.iter().flat_map(|item| [*item; 3]).collect()
+    }
+
+    fn indices(&self) -> Vec<u32> {
+        self.order.iter().flat_map(|triangle| (3 * triangle)..(3 * triangle + 3)).collect()
+    }
+}
+
+/// A draw of triangles.
+#[derive(Debug, Clone, Copy)]
+struct Draw {
+    /// First triangle, and their number.
+    first: u32,
+    count: u32,
+    /// Triangles that are added to those of the indices.
+    base: u32,
+    /// First instance, and their number.
+    first_instance: u32,
+    instances: u32,
+}
+
+impl Draw {
+    fn random(random: &mut Random, may_offset_instances: bool) -> Self {
+        let mut number = |most: u32| (random.bits() % u64::from(most + 1)) as u32;
+        let first = number(2);
+        Self {
+            first,
+            count: number(4 - first),
+            base: number(3),
+            first_instance: if may_offset_instances { number(2) } else { 0 },
+            instances: number(2),
+        }
+    }
+
+    /// Returns the arguments of an indirect draw.
+    fn arguments(&self, is_indexed: bool) -> Vec<u32> {
+        let Self { first, count, base, first_instance, instances } = *self;
+        let mut words = vec![3 * count, instances, 3 * first];
+        words.extend(is_indexed.then_some(3 * base));
+        words.push(first_instance);
+        words
+    }
+
+    /// Returns the items that are painted, in their order.
+    fn items(&self, triangles: &Triangles, is_indexed: bool) -> Vec<u32> {
+        let triangle = |at: u32| match is_indexed {
+            true => (triangles.order[at as usize] + self.base) as usize,
+            false => at as usize,
+        };
+        let of_instance = |instance: u32| {
+            (self.first..self.first + self.count).map(move |at| triangles.items[triangle(at)] + 2 * instance)
+        };
+        (self.first_instance..self.first_instance + self.instances).flat_map(of_instance).collect()
+    }
+}
+
+/// Mistakes of draws. Each is found after the pass has begun.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mistake {
+    NoVertices,
+    NoIndices,
+    OddVertices,
+    OddIndices,
+    NoSlot,
+    BeyondIndices,
+    Reversed,
+    Unlisted,
+    OtherPipeline,
+    OddArguments,
+    ShortStride,
+    BeyondArguments,
+    OddNumber,
+}
+
+impl Mistake {
+    const BINDING: [Self; 7] = [
+        Self::NoVertices,
+        Self::OddVertices,
+        Self::NoSlot,
+        Self::Unlisted,
+        Self::OtherPipeline,
+        Self::NoIndices,
+        Self::OddIndices,
+    ];
+    const DIRECT: [Self; 2] = [Self::BeyondIndices, Self::Reversed];
+    const INDIRECT: [Self; 3] = [Self::OddArguments, Self::ShortStride, Self::BeyondArguments];
+
+    /// Returns one of the mistakes in one of twelve cases.
+    fn choose(n: u16, all: &[Self]) -> Option<Self> {
+        n.is_multiple_of(12).then(|| all[usize::from(n / 12) % all.len()])
+    }
+}
+
+/// A draw command by vertices: what it reads, and what it paints.
+struct Command {
+    triangles: Triangles,
+    is_indexed: bool,
+    mistake: Option<Mistake>,
+    /// Arguments of indirect draws, and their distance.
+    arguments: Vec<Vec<u32>>,
+    stride: u32,
+    number: u32,
+    items: Vec<u32>,
+}
+
+impl Command {
+    /// Writes the inputs.
+    fn write(&self, cmd: &mut lvk::CommandBuffer, inputs: BufferHandle) -> lvk::Result<()> {
+        cmd.update_buffer(inputs, 0, bytemuck::cast_slice(&self.triangles.vertices()))?;
+        cmd.update_buffer(inputs, INDICES, bytemuck::cast_slice(&self.triangles.indices()))?;
+        write_arguments(cmd, inputs, &self.arguments, self.stride, self.number)
+    }
+
+    /// Binds pipeline, vertices and indices.
+    fn bind(
+        &self,
+        env: &Environment,
+        pass: &mut RenderPass<'_>,
+        inputs: BufferHandle,
+        (format, seed): (Format, u16),
+    ) -> lvk::Result<()> {
+        let front_end = match self.mistake {
+            Some(Mistake::OtherPipeline) => FrontEnd::Mesh,
+            _ => FrontEnd::Vertices,
+        };
+        if let Some(pipeline) = env.kit.draw_kit.items(front_end, format) {
+            pass.bind_render_pipeline(pipeline)?;
+            pass.push_constants(&Push { number: seed.into(), ..Default::default() })?;
+        }
+        let (slot, offset) = match self.mistake {
+            Some(Mistake::NoSlot) => (16, 0),
+            Some(Mistake::OddVertices) => (0, 2),
+            _ => (0, 0),
+        };
+        if self.mistake != Some(Mistake::NoVertices) {
+            pass.bind_vertex_buffer(slot, inputs, offset)?;
+        }
+        if self.is_indexed && self.mistake != Some(Mistake::NoIndices) {
+            let offset = INDICES + if self.mistake == Some(Mistake::OddIndices) { 2 } else { 0 };
+            pass.bind_index_buffer(inputs, offset, IndexFormat::U32)?;
+        }
+        Ok(())
+    }
+
+    /// True if the mistake is one for this command.
+    fn is_wrong(&self) -> bool {
+        match self.mistake {
+            Some(Mistake::NoIndices | Mistake::OddIndices) => self.is_indexed,
+            mistake => mistake.is_some(),
+        }
+    }
+
+    /// Returns where the arguments begin, and the bytes from one draw's to the next, with the mistake.
+    fn place(&self, draws: u32) -> (u64, u32) {
+        match self.mistake {
+            Some(Mistake::OddArguments) => (ARGUMENTS + 2, self.stride),
+            Some(Mistake::ShortStride) => (ARGUMENTS, 12),
+            Some(Mistake::BeyondArguments) => {
+                (INPUT_BYTES - u64::from(draws.saturating_sub(1) * self.stride) - 8, self.stride)
+            }
+            _ => (ARGUMENTS, self.stride),
+        }
+    }
+}
+
+/// Writes the arguments of draws, and their number.
+fn write_arguments(
+    cmd: &mut lvk::CommandBuffer,
+    inputs: BufferHandle,
+    arguments: &[Vec<u32>],
+    stride: u32,
+    number: u32,
+) -> lvk::Result<()> {
+    for (at, words) in (0..).zip(arguments) {
+        let offset = ARGUMENTS + u64::from(at * stride);
+        cmd.update_buffer(inputs, offset, bytemuck::cast_slice(words))?;
+    }
+    cmd.update_buffer(inputs, NUMBER, &number.to_le_bytes())
+}
+
+impl World<'_> {
+    /// Plans a pass over a target, which is cleared before to the texel of a seed or loaded. `None` where a wrong
+    /// rectangle would be found after the clear, which [`draw`](Self::draw) does, and for formats that are no targets.
+    pub(super) fn pass(&self, n: [u16; 3], clear: Option<u16>) -> Option<Pass> {
+        let texture = self.pick_texture(n[0])?;
+        let (region, place, place_problems) = self.place(&texture, [n[1], n[2] | 1]);
+        let info = texture.live.map(|number| &self.textures[number].info);
+        let lacks = info.is_some_and(|info| !info.usage.contains(TextureUsage::TARGET));
+        let has_layer =
+            info.is_some_and(|info| region.mip < info.part.mips && region.layer < info.part.layers);
+        if place.is_none() && has_layer || info.is_some_and(|info| info.format == Format::R8Uint) {
+            return None;
+        }
+        let problems = place_problems.into_iter().chain(lacks.then_some(Problem::Usage)).collect();
+        let format = info.map_or(Format::R32Uint, |info| info.format);
+        let whole = info.zip(place).map(|(info, place)| Place {
+            layer: place.layer,
+            layers: 1,
+            ..info.part.whole(region.mip)
+        });
+        let target = ColorAttachment {
+            texture: texture.handle,
+            mip: region.mip,
+            layer: region.layer,
+            load: load_op(format, clear),
+            store: true,
+            resolve: None,
+        };
+        Some(Pass {
+            target,
+            format,
+            offset: region.offset,
+            extent: place.map_or([1, 1], |place| place.extent),
+            place: place.map(|place| Place { layers: 1, ..place }),
+            whole,
+            problems,
+            clear,
+        })
+    }
+
+    /// Plans the pass of draws of items. Draws that are wrong do not clear: they are refused after the pass has begun.
+    fn draw_pass(&self, n: [u16; 6], queue: Queue, wrong: Vec<Problem>) -> Option<Pass> {
+        let clear = (n[3] & 1 == 1 && wrong.is_empty()).then_some(n[3]);
+        let mut pass = self.pass([n[0], n[1], n[2]], clear)?;
+        pass.problems.extend(graphics_problems(queue, []));
+        pass.problems.extend(wrong);
+        Some(pass)
+    }
+
+    /// Returns the command of a pass that paints items.
+    fn painted(
+        &self,
+        pass: Pass,
+        seed: u16,
+        items: &[u32],
+        is_listed: bool,
+        write: impl FnOnce(&mut lvk::CommandBuffer, BufferHandle) -> lvk::Result<()> + Send + 'static,
+        draw: impl FnOnce(&Environment, &mut RenderPass<'_>, BufferHandle) -> lvk::Result<()> + Send + 'static,
+    ) -> Planned {
+        let effects = match pass.problems.is_empty() {
+            true => {
+                let painted = items.iter().filter_map(|item| pass.paint(seed, *item));
+                pass.clear().into_iter().chain(painted).collect()
+            }
+            false => Vec::new(),
+        };
+        let inputs = *self.draw_inputs;
+        Planned::new(pass.problems.clone(), effects, move |env, cmd| {
+            write(cmd, inputs)?;
+            let read_buffers: &[_] = if is_listed { &[inputs] } else { &[] };
+            let dependencies = Dependencies { read_buffers, ..Default::default() };
+            let desc = RenderPassDesc { color: &[pass.target], dependencies, ..Default::default() };
+            let mut drawn = cmd.begin_rendering(&desc)?;
+            drawn.scissor(pass.offset, pass.extent)?;
+            draw(env, &mut drawn, inputs)
+        })
+    }
+
+    /// Plans a pass that draws by vertices.
+    fn vertex_draw(
+        &self,
+        n: [u16; 6],
+        queue: Queue,
+        command: Command,
+        mut others: Vec<Problem>,
+        draw: impl FnOnce(&Command, &mut RenderPass<'_>, BufferHandle) -> lvk::Result<()> + Send + 'static,
+    ) -> Option<Planned> {
+        let has_mesh = self.ctx().capabilities().mesh_shader;
+        if command.mistake == Some(Mistake::OtherPipeline) && !has_mesh {
+            return None;
+        }
+        others.extend(command.is_wrong().then_some(Problem::Usage));
+        let pass = self.draw_pass(n, queue, others)?;
+        let (format, seed) = (pass.format, n[4] % 1000);
+        let is_listed = command.mistake != Some(Mistake::Unlisted);
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "{n:?} {:?} idx {} args {:?} stride {} number {} items {:?} mistake {:?} pass {pass:?}",
+                command.triangles,
+                command.is_indexed,
+                command.arguments,
+                command.stride,
+                command.number,
+                command.items,
+                command.mistake
+            );
+        }
+        let command = std::sync::Arc::new(command);
+        let items = command.items.clone();
+        let written = std::sync::Arc::clone(&command);
+        Some(self.painted(
+            pass,
+            seed,
+            &items,
+            is_listed,
+            move |cmd, inputs| written.write(cmd, inputs),
+            move |env, pass, inputs| {
+                command.bind(env, pass, inputs, (format, seed))?;
+                draw(&command, pass, inputs)
+            },
+        ))
+    }
+
+    pub(super) fn draw_indexed(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
+        let random = &mut Random::new(n[3].into());
+        let (triangles, draw) = (Triangles::random(random), Draw::random(random, true));
+        let mistakes = [&Mistake::BINDING[..], &Mistake::DIRECT].concat();
+        let command = Command {
+            items: draw.items(&triangles, true),
+            triangles,
+            is_indexed: true,
+            mistake: Mistake::choose(n[5], &mistakes),
+            arguments: Vec::new(),
+            stride: 0,
+            number: 0,
+        };
+        let Draw { first, count, base, first_instance, instances } = draw;
+        self.vertex_draw(n, queue, command, Vec::new(), move |command, pass, _| {
+            let indices = match command.mistake {
+                Some(Mistake::BeyondIndices) => 0..(INPUT_BYTES - INDICES) as u32 / 4 + 1,
+                Some(Mistake::Reversed) => 3 * first + 1..3 * first,
+                _ => 3 * first..3 * (first + count),
+            };
+            pass.draw_indexed(indices, 3 * base as i32, first_instance..first_instance + instances)
+        })
+    }
+
+    /// Returns a command with up to three indirect draws, of which those that the number in the buffer allows are
+    /// drawn.
+    fn indirect_command(&self, n: [u16; 6], random: &mut Random, number: Option<u32>) -> Command {
+        let may_offset = self.ctx().capabilities().has(OptionalFeature::DrawIndirectFirstInstance);
+        let triangles = Triangles::random(random);
+        let is_indexed = n[3] & 2 == 2;
+        let draws: Vec<Draw> =
+            (0..n[3] / 4 % (MOST_DRAWS as u16 + 1)).map(|_| Draw::random(random, may_offset)).collect();
+        let stride = if is_indexed { 20 } else { 16 } + 4 * u32::from(n[3] / 16 % 2);
+        let executed = number.map_or(draws.len(), |number| draws.len().min(number as usize));
+        let mistakes = [&Mistake::BINDING[..], &Mistake::INDIRECT].concat();
+        let mut mistake = Mistake::choose(n[5], &mistakes);
+        if number.is_some() && n[5] % 24 == 23 {
+            mistake = Some(Mistake::OddNumber);
+        }
+        Command {
+            items: draws[..executed].iter().flat_map(|draw| draw.items(&triangles, is_indexed)).collect(),
+            triangles,
+            is_indexed,
+            mistake,
+            arguments: draws.iter().map(|draw| draw.arguments(is_indexed)).collect(),
+            stride,
+            number: number.unwrap_or(ALL_DRAWS),
+        }
+    }
+
+    pub(super) fn draw_indirect(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
+        let command = self.indirect_command(n, &mut Random::new(n[3].into()), None);
+        let (mut wrong, mut arguments) = (Vec::new(), None);
+        if n[5] % 24 == 23 {
+            let buffer = self.pick_buffer(n[4])?;
+            wrong.push(buffer.problem.unwrap_or(Problem::Usage));
+            arguments = Some(buffer.handle);
+        }
+        self.vertex_draw(n, queue, command, wrong, move |command, pass, inputs| {
+            let draws = command.arguments.len() as u32;
+            let (offset, stride) = command.place(draws);
+            let arguments = arguments.unwrap_or(inputs);
+            match command.is_indexed {
+                true => pass.draw_indexed_indirect(arguments, offset, draws, stride),
+                false => pass.draw_indirect(arguments, offset, draws, stride),
+            }
+        })
+    }
+
+    pub(super) fn draw_counted(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
+        let number = u32::from(n[3] / 64) % (MOST_DRAWS + 2);
+        let command = self.indirect_command(n, &mut Random::new(n[3].into()), Some(number));
+        let wrong = self.lack(OptionalFeature::DrawIndirectCount).into_iter().collect();
+        self.vertex_draw(n, queue, command, wrong, move |command, pass, inputs| {
+            let draws = counted(command.place(command.arguments.len() as u32), inputs, command);
+            match command.is_indexed {
+                true => pass.draw_indexed_indirect_count(&draws),
+                false => pass.draw_indirect_count(&draws),
+            }
+        })
+    }
+
+    /// Returns the problem of a feature that the device lacks.
+    fn lack(&self, feature: OptionalFeature) -> Option<Problem> {
+        (!self.ctx().capabilities().has(feature)).then_some(Problem::Unsupported)
+    }
+
+    /// Plans a pass that draws by mesh shaders, by task shaders too or not: directly, indirectly, and with a number of
+    /// draws from a buffer. The draws paint other items for other numbers of workgroups.
+    pub(super) fn draw_mesh(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
+        if !self.ctx().capabilities().mesh_shader {
+            return None;
+        }
+        let random = &mut Random::new(n[3].into());
+        let mut below = |most: u64| (random.bits() % most) as u32;
+        let is_task = n[3] & 2 == 2;
+        let form = n[3] / 4 % 3;
+        let draws = if form == 0 { 1 } else { below(u64::from(MOST_DRAWS) + 1) };
+        let groups: Vec<[u32; 3]> =
+            (0..draws).map(|_| [below(if is_task { 3 } else { 5 }), 1 + below(2), 1]).collect();
+        let (number, stride) = (below(u64::from(MOST_DRAWS) + 2), 12 + 4 * below(3));
+        let number = if form == 2 { number } else { ALL_DRAWS };
+        let executed = if form == 2 { groups.len().min(number as usize) } else { groups.len() };
+        let items: Vec<u32> =
+            groups[..executed].iter().flat_map(|groups| mesh_items(*groups, is_task)).collect();
+        let mistake = match (n[5].is_multiple_of(12).then_some(n[5] / 12 % 3), form) {
+            (Some(0), _) => Some(Mistake::OtherPipeline),
+            (Some(1), 1 | 2) => Some(Mistake::OddArguments),
+            (Some(2), 1 | 2) => Some(Mistake::Unlisted),
+            _ => None,
+        };
+        let mut wrong: Vec<_> = mistake.map(|_| Problem::Usage).into_iter().collect();
+        wrong.extend(self.lack(OptionalFeature::DrawIndirectCount).filter(|_| form == 2));
+        let limits = &self.ctx().capabilities().limits.mesh;
+        let most = limits.max_mesh_workgroups[0].max(limits.max_task_workgroups[0]);
+        let is_large = n[5] % 24 == 23 && form == 0 && most < u32::MAX;
+        wrong.extend(is_large.then_some(Problem::Limit));
+        let pass = self.draw_pass(n, queue, wrong)?;
+        let front_end = match (mistake, is_task) {
+            (Some(Mistake::OtherPipeline), _) => FrontEnd::Vertices,
+            (_, true) => FrontEnd::Task,
+            (_, false) => FrontEnd::Mesh,
+        };
+        let pipeline = self.env.kit.draw_kit.items(front_end, pass.format)?;
+        let arguments: Vec<Vec<u32>> = groups.iter().map(|groups| groups.to_vec()).collect();
+        let is_listed = mistake != Some(Mistake::Unlisted);
+        let write = move |cmd: &mut lvk::CommandBuffer, inputs| {
+            write_arguments(cmd, inputs, &arguments, stride, number)
+        };
+        let seed = n[4] % 1000;
+        let offset = ARGUMENTS + if mistake == Some(Mistake::OddArguments) { 2 } else { 0 };
+        let draw = move |_: &Environment, pass: &mut RenderPass<'_>, inputs| {
+            pass.bind_render_pipeline(pipeline)?;
+            pass.push_constants(&Push { number: seed.into(), ..Default::default() })?;
+            match form {
+                0 => pass.draw_mesh_tasks(if is_large { [u32::MAX, 1, 1] } else { groups[0] }),
+                1 => pass.draw_mesh_tasks_indirect(inputs, offset, draws, stride),
+                _ => pass.draw_mesh_tasks_indirect_count(&IndirectCount {
+                    arguments: inputs,
+                    offset,
+                    stride,
+                    count: inputs,
+                    count_offset: NUMBER,
+                    max_draws: draws,
+                }),
+            }
+        };
+        Some(self.painted(pass, seed, &items, is_listed, write, draw))
+    }
+}
+
+fn counted((offset, stride): (u64, u32), inputs: BufferHandle, command: &Command) -> IndirectCount {
+    let odd = if command.mistake == Some(Mistake::OddNumber) { 2 } else { 0 };
+    IndirectCount {
+        arguments: inputs,
+        offset,
+        stride,
+        count: inputs,
+        count_offset: NUMBER + odd,
+        max_draws: command.arguments.len() as u32,
+    }
+}
+
+/// Returns the items that the workgroups of a mesh draw paint, each in a column of its own.
+fn mesh_items([x, y, _]: [u32; 3], is_task: bool) -> Vec<u32> {
+    let of_groups = (0..x * y).map(|group| group + 8 * y);
+    match is_task {
+        true => of_groups.flat_map(|item| [item, item + 4]).collect(),
+        false => of_groups.collect(),
+    }
+}
+
+#[test]
+fn draws_paint_the_items_of_their_triangles_and_instances() {
+    let triangles = Triangles { items: [0, 10, 20, 30, 40, 50, 60, 70], order: [3, 0, 1, 2] };
+    let draw = Draw { first: 1, count: 2, base: 3, first_instance: 1, instances: 2 };
+    assert_eq!(draw.items(&triangles, false), [12, 22, 14, 24]);
+    assert_eq!(draw.items(&triangles, true), [32, 42, 34, 44]);
+    assert_eq!(draw.arguments(true), [6, 2, 3, 9, 1]);
+    assert_eq!(triangles.indices()[..4], [9, 10, 11, 0]);
+}
+
+#[test]
+fn no_two_workgroups_of_a_mesh_draw_paint_one_column() {
+    for (x, y, is_task) in
+        (0..5).flat_map(|x| [(x, 1, false), (x, 2, false), (x.min(2), 1, true), (x.min(2), 2, true)])
+    {
+        let mut columns: Vec<u32> =
+            mesh_items([x, y, 1], is_task).iter().map(|item| item % COLUMNS).collect();
+        let count = columns.len();
+        columns.sort_unstable();
+        columns.dedup();
+        assert_eq!(columns.len(), count, "{x} {y} {is_task}");
+    }
+}
