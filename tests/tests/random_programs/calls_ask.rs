@@ -1,6 +1,7 @@
 //! Calls of the context on mapped memory, samplers that take the nearest texel, cubes, and questions.
 
-use lvk::{AddressMode, Filter, MemoryKind, Queue, SamplerDesc, TextureDesc, TextureKind};
+use lvk::{AddressMode, Filter, MemoryKind, Queue, SamplerDesc, TextureDesc, TextureKind, TextureUsage};
+use lvk_tests::accel_backend::builds_device_accel_structs;
 
 use super::calls::{MOST, Outcome, choose_texture};
 use super::cell::{compare, pattern};
@@ -125,6 +126,8 @@ impl World<'_> {
             }
             5 => {
                 let heaps = ctx.memory_budget().heaps;
+                let _counts =
+                    (ctx.shader_cache_stats(), ctx.pipeline_cache_loaded_bytes(), ctx.shading_rates());
                 if heaps.is_empty() || ctx.frames_in_flight() == 0 {
                     return Err("the context has no memory or no frames".to_owned());
                 }
@@ -157,5 +160,57 @@ impl World<'_> {
             return Ok(true);
         }
         Err(format!("the first byte of a buffer belongs to {found:?}"))
+    }
+
+    /// Asks for the Vulkan objects behind handles.
+    pub(super) fn ask_raw(&mut self, n: [u16; 6]) -> Outcome {
+        let ctx = self.ctx();
+        let only = |problem: Option<Problem>| problem.into_iter().collect::<Vec<_>>();
+        let (problems, found) = match n[0] % 5 {
+            0 => {
+                let Some(buffer) = self.pick_buffer(n[1]) else { return Ok(false) };
+                let problems = only(buffer.problem);
+                let found = judge(ctx.raw_buffer(buffer.handle), &problems)?;
+                (problems, found.map(|raw| usize::from(raw != Default::default())))
+            }
+            1 => {
+                let Some(texture) = self.pick_texture(n[1]) else { return Ok(false) };
+                let problems = only(texture.problem);
+                judge(ctx.raw_image(texture.handle), &problems)?;
+                let info = self.info(&texture).copied();
+                let lacks =
+                    |usage| info.is_some_and(|info| !info.usage.contains(usage)).then_some(Problem::Usage);
+                let sampled = [&problems[..], &only(lacks(TextureUsage::SAMPLED))].concat();
+                judge(ctx.raw_image_view(texture.handle), &sampled)?;
+                let (mip, layer) = (u32::from(n[2] % 3), u32::from(n[3] % 3));
+                let exists = info.is_none_or(|info| mip < info.part.mips && layer < info.part.layers);
+                let mut drawn = [&problems[..], &only(lacks(TextureUsage::TARGET))].concat();
+                drawn.extend((!exists).then_some(Problem::Usage));
+                judge(ctx.raw_target_view(texture.handle, mip, layer), &drawn)?;
+                (drawn, None)
+            }
+            2 => {
+                let Some(sampler) = self.samplers.last() else { return Ok(false) };
+                (Vec::new(), judge(ctx.raw_sampler(sampler.handle), &[])?.map(|_| 1))
+            }
+            3 => {
+                let Some(blas) = self.pick_blas(n[1]) else { return Ok(false) };
+                let problems = only(blas.problem);
+                let count = usize::from(builds_device_accel_structs(ctx));
+                let addresses = judge(ctx.accel_struct_addresses(blas.handle), &problems)?;
+                let raw = judge(ctx.raw_accel_structs(blas.handle), &problems)?;
+                if addresses.is_some_and(|found| found.len() != count) {
+                    return Err(format!("a BLAS has not {count} addresses"));
+                }
+                (problems, raw.map(|raw| usize::from(raw.len() == count)))
+            }
+            _ => {
+                let Some(rays) = self.pick_rays(n[1]) else { return Ok(false) };
+                let problems = only(rays.problem);
+                (problems.clone(), judge(ctx.ray_tracing_stack_bytes(rays.handle), &problems)?.map(|_| 1))
+            }
+        };
+        self.note(&problems);
+        if found == Some(0) { Err("an object is not there".to_owned()) } else { Ok(true) }
     }
 }

@@ -29,8 +29,8 @@ const PAINT_ITEM: &str = "
     layout(location = 0) out TYPE result;
     void main() {
         if (uint(gl_FragCoord.x) != item % 8) discard;
-        uint word = 0;
-        for (uint i = 0; i < 4; ++i) word |= (0x21 + (number + item + 7 * i) % 0x5d) << (8 * i);
+        uint own = 0;
+        for (uint i = 0; i < 4; ++i) own |= (0x21 + (number + item + 7 * i) % 0x5d) << (8 * i);
         result = VALUE;
     }";
 
@@ -71,8 +71,14 @@ const DEEP: &str = "
         gl_Position = vec4(corner == 1 ? 3.0 : -1.0, corner == 2 ? 3.0 : -1.0, float(index) / 64.0, 1.0);
     }";
 
-/// Paints the word in the push constants.
-const PAINT_WORD: &str = "layout(location = 0) out TYPE result; void main() { result = VALUE; }";
+/// Paints the word in the push constants, or the one that they point to if their number is 1.
+const PAINT_WORD: &str = "
+    layout(location = 0) out TYPE result;
+    void main() {
+        uint own = word;
+        if (number == 1) own = from.at[0];
+        result = VALUE;
+    }";
 
 /// One pipeline for each of [`TARGETS`].
 type OfTargets = Vec<Holder<RenderPipelineHandle>>;
@@ -197,11 +203,10 @@ fn of_targets(
 ) -> lvk::Result<OfTargets> {
     let pipeline = |format: &Format| {
         let (kind, value) = match format {
-            Format::R32Uint => ("uvec4", "uvec4(word)"),
-            Format::R32Float => ("vec4", "vec4(uintBitsToFloat(word))"),
-            _ => ("vec4", "unpackUnorm4x8(word)"),
+            Format::R32Uint => ("uvec4", "uvec4(own)"),
+            Format::R32Float => ("vec4", "vec4(uintBitsToFloat(own))"),
+            _ => ("vec4", "unpackUnorm4x8(own)"),
         };
-        // The word of an item is a variable of the shader, in place of the push constant.
         let fragment = format!("{HEAD}{}", fragment.replace("TYPE", kind).replace("VALUE", value));
         let mut texts: Vec<(ShaderStage, String)> =
             stages.iter().map(|(stage, text)| (*stage, format!("{HEAD}{text}"))).collect();

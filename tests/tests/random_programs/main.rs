@@ -8,6 +8,8 @@ mod calls;
 mod calls_accel;
 mod calls_ask;
 mod cell;
+mod covered;
+mod draw_items;
 mod environment;
 mod image;
 mod kept;

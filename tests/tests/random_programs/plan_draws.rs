@@ -6,6 +6,9 @@ use lvk::{
 };
 use lvk_tests::random::Random;
 
+use super::draw_items::{
+    ALL_DRAWS, ARGUMENTS, Draw, INDICES, INPUT_BYTES, Inputs, MOST_DRAWS, NUMBER, Triangles, mesh_items,
+};
 use super::environment::Environment;
 use super::image::Place;
 use super::kit::Push;
@@ -14,20 +17,6 @@ use super::memory::Effect;
 use super::plan::{Planned, graphics_problems};
 use super::plan_textures::{load_op, texel};
 use super::world::{Problem, World};
-
-/// Bytes of the buffer of vertices, indices and arguments: 24 vertices, 12 indices, arguments of [`MOST_DRAWS`] draws,
-/// and their number.
-pub const INPUT_BYTES: u64 = NUMBER + 4;
-const INDICES: u64 = 24 * 4;
-const ARGUMENTS: u64 = INDICES + 12 * 4;
-const NUMBER: u64 = ARGUMENTS + MOST_DRAWS as u64 * MOST_STRIDE as u64;
-/// Most draws of one command.
-const MOST_DRAWS: u32 = 3;
-/// Number in the buffer for draws that do not read it. Lavapipe 25.0 reads it for indirect draws behind one with a number
-/// in the same command buffer.
-const ALL_DRAWS: u32 = MOST_DRAWS;
-/// Most bytes from one draw's arguments to the next.
-const MOST_STRIDE: u32 = 24;
 
 /// A pass over one mip of a layer, and the rectangle that is drawn to.
 #[derive(Debug, Clone)]
@@ -70,80 +59,6 @@ impl Pass {
         let place = Place { offset: [column, place.offset[1]], extent: [1, place.extent[1]], ..place };
         let texel = texel(self.format, seed + item as u16).0;
         columns.contains(&column).then_some(Effect::Fill { place, texel })
-    }
-}
-
-/// Triangles that vertices and indices describe.
-#[derive(Debug, Clone, Copy)]
-struct Triangles {
-    /// Item of each triangle of the vertices.
-    items: [u32; 8],
-    /// Triangle of the vertices that each triangle of the indices has.
-    order: [u32; 4],
-}
-
-impl Triangles {
-    fn random(random: &mut Random) -> Self {
-        Self {
-            items: [(); 8].map(|()| (random.bits() % 16) as u32),
-            order: [(); 4].map(|()| (random.bits() % 4) as u32),
-        }
-    }
-
-    fn vertices(&self) -> Vec<u32> {
-        self.items.iter().flat_map(|item| [*item; 3]).collect()
-    }
-
-    fn indices(&self) -> Vec<u32> {
-        self.order.iter().flat_map(|triangle| (3 * triangle)..(3 * triangle + 3)).collect()
-    }
-}
-
-/// A draw of triangles.
-#[derive(Debug, Clone, Copy)]
-struct Draw {
-    /// First triangle, and their number.
-    first: u32,
-    count: u32,
-    /// Triangles that are added to those of the indices.
-    base: u32,
-    /// First instance, and their number.
-    first_instance: u32,
-    instances: u32,
-}
-
-impl Draw {
-    fn random(random: &mut Random, may_offset_instances: bool) -> Self {
-        let mut number = |most: u32| (random.bits() % u64::from(most + 1)) as u32;
-        let first = number(2);
-        Self {
-            first,
-            count: number(4 - first),
-            base: number(3),
-            first_instance: if may_offset_instances { number(2) } else { 0 },
-            instances: number(2),
-        }
-    }
-
-    /// Returns the arguments of an indirect draw.
-    fn arguments(&self, is_indexed: bool) -> Vec<u32> {
-        let Self { first, count, base, first_instance, instances } = *self;
-        let mut words = vec![3 * count, instances, 3 * first];
-        words.extend(is_indexed.then_some(3 * base));
-        words.push(first_instance);
-        words
-    }
-
-    /// Returns the items that are painted, in their order.
-    fn items(&self, triangles: &Triangles, is_indexed: bool) -> Vec<u32> {
-        let triangle = |at: u32| match is_indexed {
-            true => (triangles.order[at as usize] + self.base) as usize,
-            false => at as usize,
-        };
-        let of_instance = |instance: u32| {
-            (self.first..self.first + self.count).map(move |at| triangles.items[triangle(at)] + 2 * instance)
-        };
-        (self.first_instance..self.first_instance + self.instances).flat_map(of_instance).collect()
     }
 }
 
@@ -197,13 +112,6 @@ struct Command {
 }
 
 impl Command {
-    /// Writes the inputs.
-    fn write(&self, cmd: &mut lvk::CommandBuffer, inputs: BufferHandle) -> lvk::Result<()> {
-        cmd.update_buffer(inputs, 0, bytemuck::cast_slice(&self.triangles.vertices()))?;
-        cmd.update_buffer(inputs, INDICES, bytemuck::cast_slice(&self.triangles.indices()))?;
-        write_arguments(cmd, inputs, &self.arguments, self.stride, self.number)
-    }
-
     /// Binds pipeline, vertices and indices.
     fn bind(
         &self,
@@ -254,21 +162,6 @@ impl Command {
             _ => (ARGUMENTS, self.stride),
         }
     }
-}
-
-/// Writes the arguments of draws, and their number.
-fn write_arguments(
-    cmd: &mut lvk::CommandBuffer,
-    inputs: BufferHandle,
-    arguments: &[Vec<u32>],
-    stride: u32,
-    number: u32,
-) -> lvk::Result<()> {
-    for (at, words) in (0..).zip(arguments) {
-        let offset = ARGUMENTS + u64::from(at * stride);
-        cmd.update_buffer(inputs, offset, bytemuck::cast_slice(words))?;
-    }
-    cmd.update_buffer(inputs, NUMBER, &number.to_le_bytes())
 }
 
 impl World<'_> {
@@ -326,8 +219,7 @@ impl World<'_> {
         pass: Pass,
         seed: u16,
         items: &[u32],
-        is_listed: bool,
-        write: impl FnOnce(&mut lvk::CommandBuffer, BufferHandle) -> lvk::Result<()> + Send + 'static,
+        inputs: Inputs,
         draw: impl FnOnce(&Environment, &mut RenderPass<'_>, BufferHandle) -> lvk::Result<()> + Send + 'static,
     ) -> Planned {
         let effects = match pass.problems.is_empty() {
@@ -337,15 +229,19 @@ impl World<'_> {
             }
             false => Vec::new(),
         };
-        let inputs = *self.draw_inputs;
+        let buffer = *self.draw_inputs;
         Planned::new(pass.problems.clone(), effects, move |env, cmd| {
-            write(cmd, inputs)?;
-            let read_buffers: &[_] = if is_listed { &[inputs] } else { &[] };
+            let read_buffers = inputs.write(env, cmd, &buffer)?;
             let dependencies = Dependencies { read_buffers, ..Default::default() };
             let desc = RenderPassDesc { color: &[pass.target], dependencies, ..Default::default() };
             let mut drawn = cmd.begin_rendering(&desc)?;
+            assert_eq!(pass.whole.map(|whole| whole.extent), Some(drawn.extent()));
+            drawn.push_label("items");
+            drawn.insert_label("here");
             drawn.scissor(pass.offset, pass.extent)?;
-            draw(env, &mut drawn, inputs)
+            draw(env, &mut drawn, buffer)?;
+            drawn.pop_label();
+            Ok(())
         })
     }
 
@@ -365,33 +261,14 @@ impl World<'_> {
         others.extend(command.is_wrong().then_some(Problem::Usage));
         let pass = self.draw_pass(n, queue, others)?;
         let (format, seed) = (pass.format, n[4] % 1000);
-        let is_listed = command.mistake != Some(Mistake::Unlisted);
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "{n:?} {:?} idx {} args {:?} stride {} number {} items {:?} mistake {:?} pass {pass:?}",
-                command.triangles,
-                command.is_indexed,
-                command.arguments,
-                command.stride,
-                command.number,
-                command.items,
-                command.mistake
-            );
-        }
-        let command = std::sync::Arc::new(command);
+        let arguments = (&command.arguments[..], command.stride);
+        let is_unlisted = command.mistake == Some(Mistake::Unlisted);
+        let inputs = Inputs::new(n[5], &command.triangles, arguments, command.number, is_unlisted);
         let items = command.items.clone();
-        let written = std::sync::Arc::clone(&command);
-        Some(self.painted(
-            pass,
-            seed,
-            &items,
-            is_listed,
-            move |cmd, inputs| written.write(cmd, inputs),
-            move |env, pass, inputs| {
-                command.bind(env, pass, inputs, (format, seed))?;
-                draw(&command, pass, inputs)
-            },
-        ))
+        Some(self.painted(pass, seed, &items, inputs, move |env, pass, buffer| {
+            command.bind(env, pass, buffer, (format, seed))?;
+            draw(&command, pass, buffer)
+        }))
     }
 
     pub(super) fn draw_indexed(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
@@ -519,29 +396,27 @@ impl World<'_> {
         };
         let pipeline = self.env.kit.draw_kit.items(front_end, pass.format)?;
         let arguments: Vec<Vec<u32>> = groups.iter().map(|groups| groups.to_vec()).collect();
-        let is_listed = mistake != Some(Mistake::Unlisted);
-        let write = move |cmd: &mut lvk::CommandBuffer, inputs| {
-            write_arguments(cmd, inputs, &arguments, stride, number)
-        };
+        let is_unlisted = mistake == Some(Mistake::Unlisted);
+        let inputs = Inputs::new(n[5], &Triangles::random(random), (&arguments, stride), number, is_unlisted);
         let seed = n[4] % 1000;
         let offset = ARGUMENTS + if mistake == Some(Mistake::OddArguments) { 2 } else { 0 };
-        let draw = move |_: &Environment, pass: &mut RenderPass<'_>, inputs| {
+        let draw = move |_: &Environment, pass: &mut RenderPass<'_>, buffer| {
             pass.bind_render_pipeline(pipeline)?;
             pass.push_constants(&Push { number: seed.into(), ..Default::default() })?;
             match form {
                 0 => pass.draw_mesh_tasks(if is_large { [u32::MAX, 1, 1] } else { groups[0] }),
-                1 => pass.draw_mesh_tasks_indirect(inputs, offset, draws, stride),
+                1 => pass.draw_mesh_tasks_indirect(buffer, offset, draws, stride),
                 _ => pass.draw_mesh_tasks_indirect_count(&IndirectCount {
-                    arguments: inputs,
+                    arguments: buffer,
                     offset,
                     stride,
-                    count: inputs,
+                    count: buffer,
                     count_offset: NUMBER,
                     max_draws: draws,
                 }),
             }
         };
-        Some(self.painted(pass, seed, &items, is_listed, write, draw))
+        Some(self.painted(pass, seed, &items, inputs, draw))
     }
 }
 
@@ -554,38 +429,5 @@ fn counted((offset, stride): (u64, u32), inputs: BufferHandle, command: &Command
         count: inputs,
         count_offset: NUMBER + odd,
         max_draws: command.arguments.len() as u32,
-    }
-}
-
-/// Returns the items that the workgroups of a mesh draw paint, each in a column of its own.
-fn mesh_items([x, y, _]: [u32; 3], is_task: bool) -> Vec<u32> {
-    let of_groups = (0..x * y).map(|group| group + 8 * y);
-    match is_task {
-        true => of_groups.flat_map(|item| [item, item + 4]).collect(),
-        false => of_groups.collect(),
-    }
-}
-
-#[test]
-fn draws_paint_the_items_of_their_triangles_and_instances() {
-    let triangles = Triangles { items: [0, 10, 20, 30, 40, 50, 60, 70], order: [3, 0, 1, 2] };
-    let draw = Draw { first: 1, count: 2, base: 3, first_instance: 1, instances: 2 };
-    assert_eq!(draw.items(&triangles, false), [12, 22, 14, 24]);
-    assert_eq!(draw.items(&triangles, true), [32, 42, 34, 44]);
-    assert_eq!(draw.arguments(true), [6, 2, 3, 9, 1]);
-    assert_eq!(triangles.indices()[..4], [9, 10, 11, 0]);
-}
-
-#[test]
-fn no_two_workgroups_of_a_mesh_draw_paint_one_column() {
-    for (x, y, is_task) in
-        (0..5).flat_map(|x| [(x, 1, false), (x, 2, false), (x.min(2), 1, true), (x.min(2), 2, true)])
-    {
-        let mut columns: Vec<u32> =
-            mesh_items([x, y, 1], is_task).iter().map(|item| item % COLUMNS).collect();
-        let count = columns.len();
-        columns.sort_unstable();
-        columns.dedup();
-        assert_eq!(columns.len(), count, "{x} {y} {is_task}");
     }
 }

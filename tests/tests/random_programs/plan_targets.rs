@@ -1,8 +1,8 @@
 //! Plans of passes with a depth target, of passes with several samples a pixel, and of samples of textures.
 
 use lvk::{
-    AddressMode, CompareOp, Context, Dependencies, DepthAttachment, DepthState, Format, Holder, Queue,
-    RenderPassDesc, Resolve, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
+    AddressMode, CompareOp, Context, Dependencies, DepthAttachment, DepthBias, DepthState, Format, Holder,
+    Queue, RenderPassDesc, Resolve, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
 };
 
 use super::image::texel_bytes;
@@ -78,7 +78,7 @@ impl World<'_> {
     /// Plans a pass with a depth target of its own, which is cleared, and destroyed before the pass runs. The draws
     /// replace the depth test of the pipeline, and fill the rectangle by its scissor or by its viewport.
     pub(super) fn draw_depth(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
-        let mistake = n[5].is_multiple_of(8).then_some(n[5] / 8 % 4);
+        let mistake = n[5].is_multiple_of(8).then_some(n[5] / 8 % 6);
         let mut pass = self.pass([n[0], n[1], n[2]], None)?;
         pass.problems.extend(graphics_problems(queue, []));
         pass.problems
@@ -108,19 +108,30 @@ impl World<'_> {
             let desc =
                 RenderPassDesc { color: &[pass.target], depth: Some(attachment), ..Default::default() };
             let mut drawn = cmd.begin_rendering(&desc)?;
-            if mistake == Some(3) {
-                return drawn.viewport([0.0, 0.0, 0.0, 1.0], [0.0, 1.0]);
-            }
             drawn.bind_render_pipeline(pipeline)?;
+            match mistake {
+                Some(3) => drawn.viewport([0.0, 0.0, 0.0, 1.0], [0.0, 1.0])?,
+                Some(4) => drawn.read_targets()?,
+                Some(_) => drawn.depth_bias(DepthBias::default())?,
+                None => {}
+            }
             let [x, y] = pass.offset;
             let [width, height] = pass.extent;
             match by_viewport {
                 true => drawn.viewport([x, y, width, height].map(|at| at as f32), [0.0, 1.0])?,
                 false => drawn.scissor(pass.offset, pass.extent)?,
             }
-            for (draw, word) in draws.iter().zip(&words) {
+            // State that these pipelines do not use.
+            drawn.blend_constants([0.5; 4]);
+            drawn.stencil_reference(3, 3)?;
+            for (at, (draw, word)) in (0..).zip(draws.iter().zip(&words)) {
                 drawn.depth_state(DepthState { compare: draw.compare, write: draw.write })?;
-                drawn.push_constants(&Push { index: draw.depth, word: *word, ..Default::default() })?;
+                let push = Push { index: draw.depth, ..Default::default() };
+                let push = match at % 2 {
+                    0 => Push { word: *word, ..push },
+                    _ => Push { from: drawn.upload(word)?, number: 1, ..push },
+                };
+                drawn.push_constants(&push)?;
                 drawn.draw(0..3, 0..1)?;
             }
             Ok(())
@@ -169,7 +180,8 @@ impl World<'_> {
             let mut drawn = cmd.begin_rendering(&RenderPassDesc { color: &[color], ..Default::default() })?;
             if samples == SAMPLES {
                 drawn.bind_render_pipeline(pipeline)?;
-                drawn.push_constants(&Push { index: 32, word, ..Default::default() })?;
+                let from = drawn.upload_slice(&[word])?;
+                drawn.push_constants(&Push { index: 32, from, number: 1, ..Default::default() })?;
                 let [x, y, width, height] = [offset[0], offset[1], extent[0], extent[1]].map(|at| at as f32);
                 // Lavapipe 25.0 covers samples of the pixels beside a scissor.
                 drawn.viewport([x, y, width, height], [0.0, 1.0])?;

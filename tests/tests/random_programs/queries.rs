@@ -189,8 +189,10 @@ impl World<'_> {
 
     /// Plans a write of a time, with or without a reset before it, or resets alone.
     pub(super) fn write_time(&mut self, n: [u16; 6], at: usize) -> Option<Planned> {
-        if n[3] % 8 == 7 {
-            return Some(self.reset_times(n, at));
+        match n[3] % 8 {
+            6 => return self.write_time_in_pass(n, at),
+            7 => return Some(self.reset_times(n, at)),
+            _ => {}
         }
         let queue = self.open[at].queue;
         let (query, mut resets, mut problems) = self.query_write(at, Pool::Times, [n[0], n[1]]);
@@ -214,6 +216,29 @@ impl World<'_> {
                 cmd.reset_queries(handle, query..query + 1)?;
             }
             cmd.write_timestamp(handle, query)
+        }))
+    }
+
+    /// Plans a pass without draws that writes a time.
+    fn write_time_in_pass(&mut self, n: [u16; 6], at: usize) -> Option<Planned> {
+        let pass = self.pass([n[4], n[5], n[2]], None)?;
+        let queue = self.open[at].queue;
+        let (query, resets, mut problems) = self.query_write(at, Pool::Times, [n[0], n[1]]);
+        problems.extend(graphics_problems(queue, []));
+        problems.extend(&pass.problems);
+        let has_times = self.ctx().capabilities().queue(queue).timestamp_bits > 0;
+        problems.extend((!has_times).then_some(Problem::Unsupported));
+        let resets = resets && problems.is_empty();
+        let effects =
+            self.query_effects(at, (Pool::Times, query, resets), QueryResult::Time(queue), &problems);
+        let handle = self.queries.handle(Pool::Times);
+        Some(Planned::new(problems, effects, move |_, cmd| {
+            if resets {
+                cmd.reset_queries(handle, query..query + 1)?;
+            }
+            let desc = RenderPassDesc { color: &[pass.target], ..Default::default() };
+            let mut drawn = cmd.begin_rendering(&desc)?;
+            drawn.write_timestamp(handle, query)
         }))
     }
 

@@ -94,6 +94,7 @@ impl World<'_> {
             Kind::CompactSeveral => self.compact_several(n),
             Kind::AskAccel => self.ask_accel(n),
             Kind::AskContext => self.ask_context(n),
+            Kind::AskRaw => self.ask_raw(n),
             Kind::CreateNearestSampler => self.create_nearest_sampler(n),
             Kind::CreateCube => self.create_cube(n),
             Kind::ReadQueries => self.read_queries(n),
@@ -117,7 +118,11 @@ impl World<'_> {
     }
 
     fn open_commands(&mut self, queue: Queue) -> Result<(), String> {
-        let cmd = self.ctx().acquire_command_buffer_on(queue).map_err(|error| error.to_string())?;
+        let mut cmd = self.ctx().acquire_command_buffer_on(queue).map_err(|error| error.to_string())?;
+        cmd.set_debug_name("random commands");
+        if cmd.queue() != queue {
+            return Err(format!("the command buffer is for {:?}, not for {queue:?}", cmd.queue()));
+        }
         self.open.push(Open {
             cmd,
             queue,

@@ -9,12 +9,12 @@ use lvk::{
 };
 
 use super::cell::Cell;
+use super::draw_items::INPUT_BYTES;
 use super::environment::Environment;
 use super::image::Part;
 use super::memory::{Effect, Memory};
 use super::op::Kind;
 use super::plan::Planned;
-use super::plan_draws::INPUT_BYTES;
 use super::plan_pipelines::RaysInfo;
 use super::plan_records::RECORD_BYTES;
 use super::queries::{OpenQueries, QueryPools};
