@@ -11,6 +11,7 @@ impl World<'_> {
     /// Notes the problems of the call that is made.
     pub(super) fn note(&mut self, problems: &[Problem]) {
         self.tally.note(self.kind, problems);
+        self.is_noted = true;
     }
 
     /// Creates up to three BLAS in a batch, before the next submission or on a queue. One that is wrong fails them all.

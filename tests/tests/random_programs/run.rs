@@ -38,6 +38,9 @@ pub fn run(env: &Environment, ops: &[Op]) -> Result<Tally, Failure> {
         for op in ops {
             if world.step(op).map_err(|message| format!("{op:?}: {message}"))? {
                 world.tally.executed += 1;
+                if !world.is_noted {
+                    world.note(&[]);
+                }
             }
             at += 1;
         }
@@ -56,7 +59,7 @@ impl World<'_> {
     /// Runs an operation. Returns false if it had no objects to work on.
     fn step(&mut self, op: &Op) -> Result<bool, String> {
         let n = op.n;
-        self.kind = op.kind;
+        (self.kind, self.is_noted) = (op.kind, false);
         match op.kind {
             Kind::CreateBuffer => self.create_buffer(n),
             Kind::DestroyBuffer => self.destroy_buffer(n),

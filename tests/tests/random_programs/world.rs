@@ -258,6 +258,8 @@ pub struct World<'a> {
     pub tally: Tally,
     /// Kind of the operation that runs.
     pub kind: Kind,
+    /// True if its problems are noted.
+    pub is_noted: bool,
 }
 
 impl<'a> World<'a> {
@@ -287,6 +289,7 @@ impl<'a> World<'a> {
             pending: Vec::new(),
             tally: Tally::default(),
             kind: Kind::Label,
+            is_noted: false,
         })
     }
 
