@@ -191,15 +191,15 @@ impl World<'_> {
             let is_array = info.is_array && !is_flat;
             let is_cube = info.is_cube && is_array;
             let rest = part.layers.saturating_sub(base_layer);
-            let layers = if is_cube {
-                6
-            } else if is_array {
-                rest
-            } else {
-                1
+            let layers = match (info.is_volume, is_cube, is_array) {
+                (true, _, _) => part.layers,
+                (_, true, _) => 6,
+                (_, _, true) => rest,
+                _ => 1,
             };
             let mip_count = super::image::count(base_mip, mips, part.mips);
-            let fits = layers > 0 && base_layer + layers <= part.layers;
+            let is_slice = info.is_volume && is_flat;
+            let fits = layers > 0 && base_layer + layers <= part.layers && !is_slice;
             match mip_count.filter(|_| fits) {
                 Some(mips) => {
                     let (base_mip, base_layer) = (part.base_mip + base_mip, part.base_layer + base_layer);
@@ -419,7 +419,7 @@ pub(super) fn choose_texture(n: [u16; 6], image: usize) -> (TextureInfo, Vec<Pro
         problems.push(Problem::Usage);
     }
     let part = Part { image, base_mip: 0, mips, base_layer: 0, layers, extent };
-    (TextureInfo { part, format, usage, is_array, is_cube: false }, problems)
+    (TextureInfo { part, format, usage, is_array, is_cube: false, is_volume: false }, problems)
 }
 
 /// Extents are those of the mips; keeps the model's halving next to its users.

@@ -57,39 +57,44 @@ impl World<'_> {
         Ok(true)
     }
 
-    /// Creates a cube, whose faces are layers of the model.
-    pub(super) fn create_cube(&mut self, n: [u16; 6]) -> Outcome {
+    /// Creates a cube or a volume, whose faces or slices are layers of the model.
+    pub(super) fn create_solid(&mut self, n: [u16; 6], is_volume: bool) -> Outcome {
         if self.textures.iter().filter(|texture| texture.holder.is_some()).count() >= MOST {
             return Ok(false);
         }
         let image = self.memory.images.len();
         let (info, mut problems) = choose_texture([n[0], n[1], n[2], 1, n[4], n[5]], image);
         let TextureInfo { part, format, usage, .. } = info;
-        let mut extent = [part.extent[0]; 2];
-        if n[3] % 16 == 15 {
-            extent[1] += 1;
-            problems.push(Problem::Usage);
+        let Part { mut extent, mut mips, .. } = part;
+        if is_volume {
+            mips = if problems.is_empty() { 1 } else { mips };
+        } else {
+            extent[1] = extent[0];
+            let full = 32 - extent[0].leading_zeros();
+            mips = if problems.is_empty() { mips.min(full) } else { mips };
         }
-        let longest = 32 - extent[0].max(extent[1]).leading_zeros();
-        let mips = if part.mips > longest && problems.is_empty() { longest } else { part.mips };
-        let part = Part { mips, layers: 6, extent, ..part };
+        let layers = if is_volume { u32::from(n[3] / 16 % 4) } else { 6 };
+        let is_oblong = !is_volume && n[3] % 16 == 15;
+        extent[1] += u32::from(is_oblong);
+        problems.extend((is_oblong || layers == 0).then_some(Problem::Usage));
+        let part = Part { mips, layers, extent, ..part };
         let bytes = (0..mips).map(|mip| part.whole(mip).texels() * texel_bytes(format)).sum();
         let data = (n[3] % 16 < 8).then(|| pattern(n[3], bytes));
         self.note(&problems);
         let made = self.ctx().create_texture(&TextureDesc {
-            kind: TextureKind::Cube,
+            kind: if is_volume { TextureKind::D3 { depth: layers } } else { TextureKind::Cube },
             format,
             extent,
             mips,
             usage,
             data: data.as_deref(),
             data_mips: 0,
-            debug_name: "random cube",
+            debug_name: "random solid",
             ..Default::default()
         });
         if let Some(holder) = judge(made, &problems)? {
-            let info = TextureInfo { part, is_array: true, is_cube: true, ..info };
-            self.memory.images.push(Image::new(format, extent, 6, mips));
+            let info = TextureInfo { part, is_array: true, is_cube: !is_volume, is_volume, ..info };
+            self.memory.images.push(Image::new(format, extent, layers, mips));
             self.fill_mips(&info, data.as_deref().unwrap_or_default());
             self.textures.push(Object::new(holder, info));
         }

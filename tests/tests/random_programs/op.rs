@@ -77,6 +77,7 @@ pub enum Kind {
     AskRaw,
     CreateNearestSampler,
     CreateCube,
+    CreateVolume,
     ReadQueries,
     RecordAnyOnThreads,
     DrawIndexed,
@@ -141,7 +142,7 @@ const RECORDED_LATER: [(Kind, u16); 13] = [
 ];
 
 /// Calls of the context.
-const CALLED: [(Kind, u16); 45] = [
+const CALLED: [(Kind, u16); 46] = [
     (Kind::CreateBuffer, 4),
     (Kind::DestroyBuffer, 2),
     (Kind::UploadBuffer, 5),
@@ -185,6 +186,7 @@ const CALLED: [(Kind, u16); 45] = [
     (Kind::AskRaw, 1),
     (Kind::CreateNearestSampler, 1),
     (Kind::CreateCube, 1),
+    (Kind::CreateVolume, 1),
     (Kind::ReadQueries, 3),
     (Kind::RecordAnyOnThreads, 1),
 ];

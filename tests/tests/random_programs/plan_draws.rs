@@ -172,8 +172,8 @@ impl World<'_> {
         let (region, place, place_problems) = self.place(&texture, [n[1], n[2] | 1]);
         let info = texture.live.map(|number| &self.textures[number].info);
         let lacks = info.is_some_and(|info| !info.usage.contains(TextureUsage::TARGET));
-        let has_layer =
-            info.is_some_and(|info| region.mip < info.part.mips && region.layer < info.part.layers);
+        let has_layer = info
+            .is_some_and(|info| region.mip < info.part.mips && region.layer + region.z < info.part.layers);
         if place.is_none() && has_layer || info.is_some_and(|info| info.format == Format::R8Uint) {
             return None;
         }
@@ -187,7 +187,7 @@ impl World<'_> {
         let target = ColorAttachment {
             texture: texture.handle,
             mip: region.mip,
-            layer: region.layer,
+            layer: region.layer + region.z,
             load: load_op(format, clear),
             store: true,
             resolve: None,

@@ -144,8 +144,9 @@ impl World<'_> {
         let in_pass = n[5] & 1 == 1;
         let mistake = n[5].is_multiple_of(7).then_some(n[5] / 7 % 2);
         let mut pass = self.pass([n[0], n[1], n[2]], None)?;
-        if !in_pass && pass.problems.contains(&Problem::Usage) {
-            // A resolve by a command needs no target.
+        if !in_pass && (pass.problems.contains(&Problem::Usage) || self.is_volume(&self.pick_texture(n[0])?))
+        {
+            // A resolve by a command needs no target, and counts slices in another way.
             return None;
         }
         pass.problems.extend(graphics_problems(queue, []));

@@ -144,6 +144,8 @@ pub struct TextureInfo {
     pub usage: TextureUsage,
     pub is_array: bool,
     pub is_cube: bool,
+    /// True for volumes, whose slices are the layers of the model. They have one mip.
+    pub is_volume: bool,
 }
 
 /// Properties of a BLAS in the model. The number of the BLAS is that of its contents.
