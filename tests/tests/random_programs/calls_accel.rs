@@ -1,11 +1,19 @@
 //! Calls of the context on several acceleration structures at once, and questions about them.
 
-use lvk::{AccelStructHandle, BlasDesc, BlasGeometry, BuildFlags, Queue, Triangles};
+use lvk::{AccelStructHandle, BlasDesc, BlasGeometry, BuildFlags, Holder, Queue, Triangles};
 
 use super::calls::{MOST, Outcome};
 use super::memory::{Blas, Effect};
 use super::op::Kind;
-use super::world::{BlasInfo, Object, Problem, World, judge};
+use super::world::{BlasInfo, Object, Picked, Problem, World, judge};
+
+/// Returns the flags of a BLAS of a batch.
+fn batch_flags(n: u16, at: usize) -> BuildFlags {
+    let mut flags = if n >> 8 & 1 == 1 { BuildFlags::FAST_BUILD } else { BuildFlags::FAST_TRACE };
+    flags.set(BuildFlags::ALLOW_UPDATE, n >> at & 1 == 1);
+    flags.set(BuildFlags::ALLOW_COMPACTION, n >> (4 + at) & 1 == 1);
+    flags
+}
 
 impl World<'_> {
     /// Notes the problems of the call that is made.
@@ -26,54 +34,58 @@ impl World<'_> {
         let mut problems: Vec<_> = picked.iter().filter_map(|mesh| mesh.problem).collect();
         let wrong = (n[2] % 16 == 15 && count > 0).then_some(usize::from(n[2] / 16) % count.max(1));
         problems.extend(wrong.map(|_| Problem::Usage));
-        let is_updatable = |at: usize| n[3] >> at & 1 == 1;
-        let can_compact = |at: usize| n[3] >> (4 + at) & 1 == 1;
-        let geometries: Vec<_> = (0..)
-            .zip(&picked)
-            .map(|(at, mesh)| {
-                let own = mesh.live.map_or(3, |number| 3 * self.meshes[number].info as u32);
-                let vertices = if wrong == Some(at) { own + 3 } else { own };
-                [BlasGeometry::Triangles(Triangles::packed(mesh.handle, vertices))]
-            })
-            .collect();
-        let descs: Vec<_> = (0..)
-            .zip(&geometries)
-            .map(|(at, geometries)| {
-                let mut flags =
-                    if n[3] >> 8 & 1 == 1 { BuildFlags::FAST_BUILD } else { BuildFlags::FAST_TRACE };
-                flags.set(BuildFlags::ALLOW_UPDATE, is_updatable(at));
-                flags.set(BuildFlags::ALLOW_COMPACTION, can_compact(at));
-                BlasDesc { geometries, flags, debug_name: "random BLAS", ..Default::default() }
-            })
-            .collect();
-        let made = match n[4] % 8 {
-            0..4 => self.ctx().create_blas_batch(&descs),
-            kind => {
-                let queue =
-                    [Queue::Compute, Queue::Graphics, Queue::Compute, Queue::Transfer][usize::from(kind) - 4];
-                problems.extend((queue == Queue::Transfer).then_some(Problem::WrongQueue));
-                let made = self.ctx().create_blas_batch_on(queue, &descs);
-                made.map(|(made, submission)| {
-                    self.submitted.push(submission);
-                    made
-                })
-            }
+        let geometry = |(at, mesh): (usize, &Picked<_>)| {
+            let own = mesh.live.map_or(3, |number| 3 * self.meshes[number].info as u32);
+            let vertices = if wrong == Some(at) { own + 3 } else { own };
+            [BlasGeometry::Triangles(Triangles::packed(mesh.handle, vertices))]
         };
+        let geometries: Vec<_> = picked.iter().enumerate().map(geometry).collect();
+        let desc = |(at, geometries)| {
+            let flags = batch_flags(n[3], at);
+            BlasDesc { geometries, flags, debug_name: "random BLAS", ..Default::default() }
+        };
+        let descs: Vec<_> = (0..).zip(geometries.iter().map(|of| &of[..])).map(desc).collect();
+        let queue = match n[4] % 8 {
+            0..4 => None,
+            4 | 5 => Some(Queue::Compute),
+            6 => Some(Queue::Graphics),
+            _ => Some(Queue::Transfer),
+        };
+        problems.extend((queue == Some(Queue::Transfer)).then_some(Problem::WrongQueue));
         self.note(&problems);
-        let Some(made) = judge(made, &problems)? else { return Ok(true) };
+        let Some(made) = judge(self.build_batch(queue, &descs), &problems)? else { return Ok(true) };
         if made.len() != count {
             return Err(format!("{} BLAS of a batch of {count}", made.len()));
         }
-        for (at, (holder, mesh)) in made.into_iter().zip(&picked).enumerate() {
-            let Some(mesh) = mesh.live else { continue };
-            self.memory.blas.push(Blas { mesh, ..Default::default() });
-            let effect = Effect::Build { blas: self.blas.len() };
-            self.memory.apply(&self.env.expected(Kind::CreateBlasBatch, effect));
-            let (is_updatable, can_compact) = (is_updatable(at), can_compact(at));
-            let info = BlasInfo { mesh, is_updatable, can_compact, was_compacted: false };
-            self.blas.push(Object::new(holder, info));
+        for (at, (holder, mesh)) in
+            made.into_iter().zip(picked.iter().filter_map(|mesh| mesh.live)).enumerate()
+        {
+            self.add_blas_of_batch(holder, mesh, batch_flags(n[3], at));
         }
         Ok(true)
+    }
+
+    /// Creates a batch, before the next submission or on a queue.
+    fn build_batch(
+        &mut self,
+        queue: Option<Queue>,
+        descs: &[BlasDesc<'_>],
+    ) -> lvk::Result<Vec<Holder<AccelStructHandle>>> {
+        let Some(queue) = queue else { return self.ctx().create_blas_batch(descs) };
+        let (made, submission) = self.ctx().create_blas_batch_on(queue, descs)?;
+        self.submitted.push(submission);
+        Ok(made)
+    }
+
+    /// Adds a BLAS of a batch, which was built from its mesh.
+    fn add_blas_of_batch(&mut self, holder: Holder<AccelStructHandle>, mesh: usize, flags: BuildFlags) {
+        self.memory.blas.push(Blas { mesh, ..Default::default() });
+        let effect = Effect::Build { blas: self.blas.len() };
+        self.memory.apply(&self.env.expected(Kind::CreateBlasBatch, effect));
+        let is_updatable = flags.contains(BuildFlags::ALLOW_UPDATE);
+        let can_compact = flags.contains(BuildFlags::ALLOW_COMPACTION);
+        let info = BlasInfo { mesh, is_updatable, can_compact, was_compacted: false };
+        self.blas.push(Object::new(holder, info));
     }
 
     /// Requests compaction of up to three structures, which may be one several times. One that is wrong fails them all.

@@ -19,6 +19,7 @@ mod memory;
 mod op;
 mod plan;
 mod plan_draws;
+mod plan_mesh_draws;
 mod plan_pipelines;
 mod plan_rays;
 mod plan_records;

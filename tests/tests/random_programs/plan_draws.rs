@@ -7,7 +7,7 @@ use lvk::{
 use lvk_tests::random::Random;
 
 use super::draw_items::{
-    ALL_DRAWS, ARGUMENTS, Draw, INDICES, INPUT_BYTES, Inputs, MOST_DRAWS, NUMBER, Triangles, mesh_items,
+    ALL_DRAWS, ARGUMENTS, Draw, INDICES, INPUT_BYTES, Inputs, MOST_DRAWS, NUMBER, Triangles,
 };
 use super::environment::Environment;
 use super::image::Place;
@@ -43,6 +43,17 @@ impl Pass {
     /// Returns the effect that fills the rectangle with the texel of a seed.
     pub fn fill(&self, seed: u16) -> Option<Effect> {
         self.place.map(|place| Effect::Fill { place, texel: texel(self.format, seed).0 })
+    }
+
+    /// Returns the width and height of the mip, one texel if it does not exist.
+    pub fn mip_extent(&self) -> [u32; 2] {
+        self.whole.map_or([1, 1], |whole| whole.extent)
+    }
+
+    /// Returns the rectangle of a viewport.
+    pub fn rectangle(&self) -> [f32; 4] {
+        let ([x, y], [width, height]) = (self.offset, self.extent);
+        [x, y, width, height].map(|at| at as f32)
     }
 
     /// Returns the effect of the clear.
@@ -205,7 +216,7 @@ impl World<'_> {
     }
 
     /// Plans the pass of draws of items. Draws that are wrong do not clear: they are refused after the pass has begun.
-    fn draw_pass(&self, n: [u16; 6], queue: Queue, wrong: Vec<Problem>) -> Option<Pass> {
+    pub(super) fn draw_pass(&self, n: [u16; 6], queue: Queue, wrong: Vec<Problem>) -> Option<Pass> {
         let clear = (n[3] & 1 == 1 && wrong.is_empty()).then_some(n[3]);
         let mut pass = self.pass([n[0], n[1], n[2]], clear)?;
         pass.problems.extend(graphics_problems(queue, []));
@@ -214,7 +225,7 @@ impl World<'_> {
     }
 
     /// Returns the command of a pass that paints items.
-    fn painted(
+    pub(super) fn painted(
         &self,
         pass: Pass,
         seed: u16,
@@ -356,67 +367,6 @@ impl World<'_> {
     /// Returns the problem of a feature that the device lacks.
     fn lack(&self, feature: OptionalFeature) -> Option<Problem> {
         (!self.ctx().capabilities().has(feature)).then_some(Problem::Unsupported)
-    }
-
-    /// Plans a pass that draws by mesh shaders, by task shaders too or not: directly, indirectly, and with a number of
-    /// draws from a buffer. The draws paint other items for other numbers of workgroups.
-    pub(super) fn draw_mesh(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
-        if !self.ctx().capabilities().mesh_shader {
-            return None;
-        }
-        let random = &mut Random::new(n[3].into());
-        let mut below = |most: u64| (random.bits() % most) as u32;
-        let is_task = n[3] & 2 == 2;
-        let form = n[3] / 4 % 3;
-        let draws = if form == 0 { 1 } else { below(u64::from(MOST_DRAWS) + 1) };
-        let groups: Vec<[u32; 3]> =
-            (0..draws).map(|_| [below(if is_task { 3 } else { 5 }), 1 + below(2), 1]).collect();
-        let (number, stride) = (below(u64::from(MOST_DRAWS) + 2), 12 + 4 * below(3));
-        let number = if form == 2 { number } else { ALL_DRAWS };
-        let executed = if form == 2 { groups.len().min(number as usize) } else { groups.len() };
-        let items: Vec<u32> =
-            groups[..executed].iter().flat_map(|groups| mesh_items(*groups, is_task)).collect();
-        let mistake = match (n[5].is_multiple_of(12).then_some(n[5] / 12 % 3), form) {
-            (Some(0), _) => Some(Mistake::OtherPipeline),
-            (Some(1), 1 | 2) => Some(Mistake::OddArguments),
-            (Some(2), 1 | 2) => Some(Mistake::Unlisted),
-            _ => None,
-        };
-        let mut wrong: Vec<_> = mistake.map(|_| Problem::Usage).into_iter().collect();
-        wrong.extend(self.lack(OptionalFeature::DrawIndirectCount).filter(|_| form == 2));
-        let limits = &self.ctx().capabilities().limits.mesh;
-        let most = limits.max_mesh_workgroups[0].max(limits.max_task_workgroups[0]);
-        let is_large = n[5] % 24 == 23 && form == 0 && most < u32::MAX;
-        wrong.extend(is_large.then_some(Problem::Limit));
-        let pass = self.draw_pass(n, queue, wrong)?;
-        let front_end = match (mistake, is_task) {
-            (Some(Mistake::OtherPipeline), _) => FrontEnd::Vertices,
-            (_, true) => FrontEnd::Task,
-            (_, false) => FrontEnd::Mesh,
-        };
-        let pipeline = self.env.kit.draw_kit.items(front_end, pass.format)?;
-        let arguments: Vec<Vec<u32>> = groups.iter().map(|groups| groups.to_vec()).collect();
-        let is_unlisted = mistake == Some(Mistake::Unlisted);
-        let inputs = Inputs::new(n[5], &Triangles::random(random), (&arguments, stride), number, is_unlisted);
-        let seed = n[4] % 1000;
-        let offset = ARGUMENTS + if mistake == Some(Mistake::OddArguments) { 2 } else { 0 };
-        let draw = move |_: &Environment, pass: &mut RenderPass<'_>, buffer| {
-            pass.bind_render_pipeline(pipeline)?;
-            pass.push_constants(&Push { number: seed.into(), ..Default::default() })?;
-            match form {
-                0 => pass.draw_mesh_tasks(if is_large { [u32::MAX, 1, 1] } else { groups[0] }),
-                1 => pass.draw_mesh_tasks_indirect(buffer, offset, draws, stride),
-                _ => pass.draw_mesh_tasks_indirect_count(&IndirectCount {
-                    arguments: buffer,
-                    offset,
-                    stride,
-                    count: buffer,
-                    count_offset: NUMBER,
-                    max_draws: draws,
-                }),
-            }
-        };
-        Some(self.painted(pass, seed, &items, inputs, draw))
     }
 }
 

@@ -1,10 +1,12 @@
 //! Plans of passes with a depth target, of passes with several samples a pixel, and of samples of textures.
 
 use lvk::{
-    AddressMode, CompareOp, Context, Dependencies, DepthAttachment, DepthBias, DepthState, Format, Holder,
-    Queue, RenderPassDesc, Resolve, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
+    AddressMode, ColorAttachment, ColorLoadOp, CommandBuffer, CompareOp, Context, Dependencies,
+    DepthAttachment, DepthBias, DepthState, Format, Holder, Queue, RenderPass, RenderPassDesc,
+    RenderPipelineHandle, Resolve, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
 };
 
+use super::environment::Environment;
 use super::image::texel_bytes;
 use super::kit::{Kernel, Push};
 use super::kit_draws::SAMPLES;
@@ -74,6 +76,113 @@ fn own_target(
     })
 }
 
+/// A pass with a depth target of its own.
+struct DepthPass {
+    pass: Pass,
+    mistake: Option<u16>,
+    /// Depth to which the target is cleared, in 64ths.
+    cleared: u32,
+    /// Draws, each with the word that it paints.
+    draws: Vec<(DeepDraw, u32)>,
+    by_viewport: bool,
+    format: Format,
+    pipeline: RenderPipelineHandle,
+}
+
+impl DepthPass {
+    fn record(&self, env: &Environment, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        let [width, height] = self.pass.mip_extent();
+        let extent = [width + u32::from(self.mistake == Some(1)), height];
+        let depth = own_target(env.ctx(), self.format, extent, 1)?;
+        let mut attachment = DepthAttachment::clear(*depth, self.cleared as f32 / 64.0);
+        attachment.read_only = self.mistake == Some(2);
+        if self.mistake == Some(0) {
+            drop(depth);
+        }
+        let color = [self.pass.target];
+        let desc = RenderPassDesc { color: &color, depth: Some(attachment), ..Default::default() };
+        let mut drawn = cmd.begin_rendering(&desc)?;
+        drawn.bind_render_pipeline(self.pipeline)?;
+        match self.mistake {
+            Some(3) => drawn.viewport([0.0, 0.0, 0.0, 1.0], [0.0, 1.0])?,
+            Some(4) => drawn.read_targets()?,
+            Some(_) => drawn.depth_bias(DepthBias::default())?,
+            None => {}
+        }
+        match self.by_viewport {
+            true => drawn.viewport(self.pass.rectangle(), [0.0, 1.0])?,
+            false => drawn.scissor(self.pass.offset, self.pass.extent)?,
+        }
+        self.draw(&mut drawn)
+    }
+
+    /// Draws, every other time with the word in memory.
+    fn draw(&self, drawn: &mut RenderPass<'_>) -> lvk::Result<()> {
+        // State that the pipelines do not use.
+        drawn.blend_constants([0.5; 4]);
+        drawn.stencil_reference(3, 3)?;
+        for (at, (draw, word)) in self.draws.iter().enumerate() {
+            drawn.depth_state(DepthState { compare: draw.compare, write: draw.write })?;
+            let push = Push { index: draw.depth, ..Default::default() };
+            let push = match at % 2 {
+                0 => Push { word: *word, ..push },
+                _ => Push { from: drawn.upload(word)?, number: 1, ..push },
+            };
+            drawn.push_constants(&push)?;
+            drawn.draw(0..3, 0..1)?;
+        }
+        Ok(())
+    }
+}
+
+/// A pass with several samples a pixel, in a target of its own.
+struct SamplesPass {
+    pass: Pass,
+    mistake: Option<u16>,
+    /// True if the end of the pass resolves, false if a command does.
+    in_pass: bool,
+    clear: ColorLoadOp,
+    word: u32,
+    pipeline: RenderPipelineHandle,
+}
+
+impl SamplesPass {
+    fn record(&self, env: &Environment, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        let [width, height] = self.pass.mip_extent();
+        // A larger target cannot be resolved in the pass; one of a sample cannot be resolved at all.
+        let (own_extent, samples) = match self.mistake {
+            Some(0) if self.in_pass => ([width, height + 1], SAMPLES),
+            Some(_) => ([width, height], 1),
+            None => ([width, height], SAMPLES),
+        };
+        let many = own_target(env.ctx(), self.pass.format, own_extent, samples)?;
+        let ColorAttachment { texture, mip, layer, .. } = self.pass.target;
+        let color = ColorAttachment {
+            texture: *many,
+            mip: 0,
+            layer: 0,
+            load: self.clear,
+            store: true,
+            resolve: self.in_pass.then_some(Resolve { texture, mip, layer }),
+        };
+        let mut drawn = cmd.begin_rendering(&RenderPassDesc { color: &[color], ..Default::default() })?;
+        if samples == SAMPLES {
+            drawn.bind_render_pipeline(self.pipeline)?;
+            let from = drawn.upload_slice(&[self.word])?;
+            drawn.push_constants(&Push { index: 32, from, number: 1, ..Default::default() })?;
+            // Lavapipe 25.0 covers samples of the pixels beside a scissor.
+            drawn.viewport(self.pass.rectangle(), [0.0, 1.0])?;
+            drawn.draw(0..3, 0..1)?;
+        }
+        drop(drawn);
+        if self.in_pass {
+            return Ok(());
+        }
+        let from = TextureRegion { offset: self.pass.offset, extent: self.pass.extent, ..Default::default() };
+        cmd.resolve_texture(*many, &from, texture, &TextureRegion { mip, layer, ..from })
+    }
+}
+
 impl World<'_> {
     /// Plans a pass with a depth target of its own, which is cleared, and destroyed before the pass runs. The draws
     /// replace the depth test of the pipeline, and fill the rectangle by its scissor or by its viewport.
@@ -81,61 +190,26 @@ impl World<'_> {
         let mistake = n[5].is_multiple_of(8).then_some(n[5] / 8 % 6);
         let mut pass = self.pass([n[0], n[1], n[2]], None)?;
         pass.problems.extend(graphics_problems(queue, []));
-        pass.problems
-            .extend(mistake.map(|mistake| if mistake == 0 { Problem::Stale } else { Problem::Usage }));
+        let problem = |mistake| if mistake == 0 { Problem::Stale } else { Problem::Usage };
+        pass.problems.extend(mistake.map(problem));
         let cleared = u32::from(n[3] % 4) * 16;
         let draws: Vec<DeepDraw> = (0..n[3] / 4 % 4).map(|at| DeepDraw::new(n[4] >> (3 * at))).collect();
-        let last = last_passing(&draws, cleared);
         let seed = |at: usize| n[4] % 1000 + at as u16;
-        let effects = match last {
+        let effects = match last_passing(&draws, cleared) {
             Some(at) if pass.problems.is_empty() => pass.fill(seed(at)).into_iter().collect(),
             _ => Vec::new(),
         };
-        let extent = pass.whole.map_or([1, 1], |whole| whole.extent);
-        let words: Vec<u32> = (0..draws.len()).map(|at| pass.word(seed(at))).collect();
-        let by_viewport = n[5] & 1 == 1;
-        let format = self.env.kit.draw_kit.depth_format();
-        let pipeline = self.env.kit.draw_kit.depth(pass.format)?;
-        Some(Planned::new(pass.problems, effects, move |env, cmd| {
-            let [width, height] = extent;
-            let extent = if mistake == Some(1) { [width + 1, height] } else { extent };
-            let depth = own_target(env.ctx(), format, extent, 1)?;
-            let mut attachment = DepthAttachment::clear(*depth, cleared as f32 / 64.0);
-            attachment.read_only = mistake == Some(2);
-            if mistake == Some(0) {
-                drop(depth);
-            }
-            let desc =
-                RenderPassDesc { color: &[pass.target], depth: Some(attachment), ..Default::default() };
-            let mut drawn = cmd.begin_rendering(&desc)?;
-            drawn.bind_render_pipeline(pipeline)?;
-            match mistake {
-                Some(3) => drawn.viewport([0.0, 0.0, 0.0, 1.0], [0.0, 1.0])?,
-                Some(4) => drawn.read_targets()?,
-                Some(_) => drawn.depth_bias(DepthBias::default())?,
-                None => {}
-            }
-            let [x, y] = pass.offset;
-            let [width, height] = pass.extent;
-            match by_viewport {
-                true => drawn.viewport([x, y, width, height].map(|at| at as f32), [0.0, 1.0])?,
-                false => drawn.scissor(pass.offset, pass.extent)?,
-            }
-            // State that these pipelines do not use.
-            drawn.blend_constants([0.5; 4]);
-            drawn.stencil_reference(3, 3)?;
-            for (at, (draw, word)) in (0..).zip(draws.iter().zip(&words)) {
-                drawn.depth_state(DepthState { compare: draw.compare, write: draw.write })?;
-                let push = Push { index: draw.depth, ..Default::default() };
-                let push = match at % 2 {
-                    0 => Push { word: *word, ..push },
-                    _ => Push { from: drawn.upload(word)?, number: 1, ..push },
-                };
-                drawn.push_constants(&push)?;
-                drawn.draw(0..3, 0..1)?;
-            }
-            Ok(())
-        }))
+        let words = (0..draws.len()).map(|at| pass.word(seed(at)));
+        let depth = DepthPass {
+            draws: draws.iter().copied().zip(words).collect(),
+            mistake,
+            cleared,
+            by_viewport: n[5] & 1 == 1,
+            format: self.env.kit.draw_kit.depth_format(),
+            pipeline: self.env.kit.draw_kit.depth(pass.format)?,
+            pass,
+        };
+        Some(Planned::new(depth.pass.problems.clone(), effects, move |env, cmd| depth.record(env, cmd)))
     }
 
     /// Plans a pass with several samples a pixel, in a target of its own, which is cleared, drawn to and resolved: at
@@ -144,58 +218,28 @@ impl World<'_> {
         let in_pass = n[5] & 1 == 1;
         let mistake = n[5].is_multiple_of(7).then_some(n[5] / 7 % 2);
         let mut pass = self.pass([n[0], n[1], n[2]], None)?;
-        if !in_pass && (pass.problems.contains(&Problem::Usage) || self.is_volume(&self.pick_texture(n[0])?))
-        {
+        let is_volume = self.is_volume(&self.pick_texture(n[0])?);
+        if !in_pass && (is_volume || pass.problems.contains(&Problem::Usage)) {
             // A resolve by a command needs no target, and counts slices in another way.
             return None;
         }
         pass.problems.extend(graphics_problems(queue, []));
         pass.problems.extend(mistake.map(|_| Problem::Usage));
-        let (whole, place, format) = (pass.whole, pass.place, pass.format);
-        let fill = |place, seed| Effect::Fill { place, texel: texel(format, seed).0 };
-        let effects = match (whole, place) {
-            (Some(whole), Some(place)) if pass.problems.is_empty() => match in_pass {
-                true => vec![fill(whole, n[3]), fill(place, n[4])],
-                false => vec![fill(place, n[4])],
-            },
-            _ => Vec::new(),
+        let mut effects = Vec::new();
+        if pass.problems.is_empty() {
+            let texel = texel(pass.format, n[3]).0;
+            effects.extend(pass.whole.filter(|_| in_pass).map(|place| Effect::Fill { place, texel }));
+            effects.extend(pass.fill(n[4]));
+        }
+        let samples = SamplesPass {
+            mistake,
+            in_pass,
+            clear: load_op(pass.format, Some(n[3])),
+            word: pass.word(n[4]),
+            pipeline: self.env.kit.draw_kit.samples(pass.format)?,
+            pass,
         };
-        let extent = whole.map_or([1, 1], |whole| whole.extent);
-        let word = pass.word(n[4]);
-        let pipeline = self.env.kit.draw_kit.samples(format)?;
-        let clear = load_op(format, Some(n[3]));
-        Some(Planned::new(pass.problems.clone(), effects, move |env, cmd| {
-            let [width, height] = extent;
-            // A larger target cannot be resolved in the pass; one of a sample cannot be resolved at all.
-            let (extent, samples) = match mistake {
-                Some(0) if in_pass => ([width, height + 1], SAMPLES),
-                Some(_) => (extent, 1),
-                None => (extent, SAMPLES),
-            };
-            let many = own_target(env.ctx(), format, extent, samples)?;
-            let Pass { target, offset, extent, .. } = pass;
-            let to = Resolve { texture: target.texture, mip: target.mip, layer: target.layer };
-            let resolve = in_pass.then_some(to);
-            let color =
-                lvk::ColorAttachment { texture: *many, mip: 0, layer: 0, load: clear, resolve, ..target };
-            let mut drawn = cmd.begin_rendering(&RenderPassDesc { color: &[color], ..Default::default() })?;
-            if samples == SAMPLES {
-                drawn.bind_render_pipeline(pipeline)?;
-                let from = drawn.upload_slice(&[word])?;
-                drawn.push_constants(&Push { index: 32, from, number: 1, ..Default::default() })?;
-                let [x, y, width, height] = [offset[0], offset[1], extent[0], extent[1]].map(|at| at as f32);
-                // Lavapipe 25.0 covers samples of the pixels beside a scissor.
-                drawn.viewport([x, y, width, height], [0.0, 1.0])?;
-                drawn.draw(0..3, 0..1)?;
-            }
-            drop(drawn);
-            if in_pass {
-                return Ok(());
-            }
-            let from = TextureRegion { offset, extent, ..Default::default() };
-            let to = TextureRegion { mip: target.mip, layer: target.layer, ..from };
-            cmd.resolve_texture(*many, &from, target.texture, &to)
-        }))
+        Some(Planned::new(samples.pass.problems.clone(), effects, move |env, cmd| samples.record(env, cmd)))
     }
 
     /// Plans a dispatch that samples each texel of a mip with a sampler that takes the nearest texel. The coordinates
