@@ -99,7 +99,7 @@ impl Draw {
 #[derive(Debug, Clone)]
 pub struct Inputs {
     words: [u32; WORDS],
-    /// True if a dispatch writes them, otherwise copies do.
+    /// True if a dispatch writes them, otherwise a copy does.
     by_dispatch: bool,
     /// True if the pass lists the buffer, which it need not for what copies have written.
     is_listed: bool,
@@ -127,6 +127,12 @@ impl Inputs {
         write(NUMBER, &[number]);
         let by_dispatch = is_unlisted || n.is_multiple_of(4);
         Self { words, by_dispatch, is_listed: !is_unlisted && (by_dispatch || n % 4 == 1) }
+    }
+
+    /// True if a dispatch writes them. They need a buffer of their own then: version 1.4.364 of the validation layer finds
+    /// a hazard where a copy follows such a write, which it does not see, and the barriers of both are chained.
+    pub fn by_dispatch(&self) -> bool {
+        self.by_dispatch
     }
 
     /// Writes them into the buffer. Returns the buffers that the pass lists.

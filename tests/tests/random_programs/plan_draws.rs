@@ -240,7 +240,7 @@ impl World<'_> {
             }
             false => Vec::new(),
         };
-        let buffer = *self.draw_inputs;
+        let buffer = *self.draw_inputs[usize::from(inputs.by_dispatch())];
         Planned::new(pass.problems.clone(), effects, move |env, cmd| {
             let read_buffers = inputs.write(env, cmd, &buffer)?;
             let dependencies = Dependencies { read_buffers, ..Default::default() };

@@ -251,8 +251,8 @@ pub struct World<'a> {
     pub pending: Vec<Pending>,
     /// Arguments of indirect dispatches.
     pub arguments: Holder<BufferHandle>,
-    /// Vertices, indices and arguments of draws.
-    pub draw_inputs: Holder<BufferHandle>,
+    /// Vertices, indices and arguments of draws: those that copies write, and those that dispatches write.
+    pub draw_inputs: [Holder<BufferHandle>; 2],
     /// Instances of TLAS.
     pub records: Holder<BufferHandle>,
     pub queries: QueryPools,
@@ -274,7 +274,7 @@ impl<'a> World<'a> {
         let inputs = BufferUsage::VERTEX | BufferUsage::INDEX | BufferUsage::INDIRECT;
         Ok(Self {
             arguments: own("arguments", 16, BufferUsage::INDIRECT)?,
-            draw_inputs: own("inputs of draws", INPUT_BYTES, inputs)?,
+            draw_inputs: [own("copied", INPUT_BYTES, inputs)?, own("dispatched", INPUT_BYTES, inputs)?],
             records: own("instances", RECORD_BYTES, BufferUsage::STORAGE)?,
             queries: QueryPools::new(env.ctx())?,
             env,
