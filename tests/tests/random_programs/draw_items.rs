@@ -6,20 +6,16 @@ use lvk_tests::random::Random;
 use super::environment::Environment;
 use super::kit::{Kernel, Push};
 
-/// Bytes of the buffer of vertices, indices and arguments: 24 vertices, 12 indices, arguments of [`MOST_DRAWS`] draws,
-/// and their number.
+/// Bytes of the buffer of vertices, indices and arguments: 24 vertices, 12 indices, and arguments of [`MOST_DRAWS`] draws.
 pub const INPUT_BYTES: u64 = 4 * WORDS as u64;
 const WORDS: usize = 64;
 pub const INDICES: u64 = 24 * 4;
 pub const ARGUMENTS: u64 = INDICES + 12 * 4;
-pub const NUMBER: u64 = ARGUMENTS + MOST_DRAWS as u64 * MOST_STRIDE as u64;
 /// Most draws of one command.
 pub const MOST_DRAWS: u32 = 3;
 /// Number in the buffer for draws that do not read it. Lavapipe 25.0 reads it for indirect draws behind one with a number
 /// in the same command buffer.
-pub const ALL_DRAWS: u32 = MOST_DRAWS;
-/// Most bytes from one draw's arguments to the next.
-const MOST_STRIDE: u32 = 24;
+const ALL_DRAWS: u32 = MOST_DRAWS;
 
 /// Triangles that vertices and indices describe.
 #[derive(Debug, Clone, Copy)]
@@ -95,10 +91,21 @@ impl Draw {
     }
 }
 
+/// Buffers that draws read.
+#[derive(Debug, Clone, Copy)]
+pub struct DrawBuffers {
+    /// Vertices, indices and arguments.
+    pub inputs: BufferHandle,
+    /// Number of draws.
+    pub number: BufferHandle,
+}
+
 /// What draws read.
 #[derive(Debug, Clone)]
 pub struct Inputs {
     words: [u32; WORDS],
+    /// Number of draws, which a copy writes.
+    number: u32,
     /// True if a dispatch writes them, otherwise a copy does.
     by_dispatch: bool,
     /// True if the pass lists the buffer, which it need not for what copies have written.
@@ -111,7 +118,7 @@ impl Inputs {
         n: u16,
         triangles: &Triangles,
         (arguments, stride): (&[Vec<u32>], u32),
-        number: u32,
+        number: Option<u32>,
         is_unlisted: bool,
     ) -> Self {
         let mut words = [0; WORDS];
@@ -124,24 +131,26 @@ impl Inputs {
         for (at, arguments) in (0..).zip(arguments) {
             write(ARGUMENTS + u64::from(at * stride), arguments);
         }
-        write(NUMBER, &[number]);
         let by_dispatch = is_unlisted || n.is_multiple_of(4);
-        Self { words, by_dispatch, is_listed: !is_unlisted && (by_dispatch || n % 4 == 1) }
+        let number = number.unwrap_or(ALL_DRAWS);
+        Self { words, number, by_dispatch, is_listed: !is_unlisted && (by_dispatch || n % 4 == 1) }
     }
 
-    /// True if a dispatch writes them. They need a buffer of their own then: version 1.4.364 of the validation layer finds
+    /// True if a dispatch writes all but the number. They need a buffer of their own then: version 1.4.364 of the validation layer finds
     /// a hazard where a copy follows such a write, which it does not see, and the barriers of both are chained.
     pub fn by_dispatch(&self) -> bool {
         self.by_dispatch
     }
 
-    /// Writes them into the buffer. Returns the buffers that the pass lists.
+    /// Writes them into the buffers. Returns those that the pass lists.
     pub fn write<'a>(
         &self,
         env: &Environment,
         cmd: &mut CommandBuffer,
-        to: &'a BufferHandle,
+        buffers: &'a DrawBuffers,
     ) -> lvk::Result<&'a [BufferHandle]> {
+        let to = &buffers.inputs;
+        cmd.update_buffer(buffers.number, 0, &self.number.to_le_bytes())?;
         if self.by_dispatch {
             let from = cmd.upload(&self.words)?;
             cmd.bind_compute_pipeline(env.kit.kernel(Kernel::Copy))?;

@@ -6,9 +6,7 @@ use lvk::{
 };
 use lvk_tests::random::Random;
 
-use super::draw_items::{
-    ALL_DRAWS, ARGUMENTS, Draw, INDICES, INPUT_BYTES, Inputs, MOST_DRAWS, NUMBER, Triangles,
-};
+use super::draw_items::{ARGUMENTS, Draw, DrawBuffers, INDICES, INPUT_BYTES, Inputs, MOST_DRAWS, Triangles};
 use super::environment::Environment;
 use super::image::Place;
 use super::kit::Push;
@@ -118,7 +116,7 @@ struct Command {
     /// Arguments of indirect draws, and their distance.
     arguments: Vec<Vec<u32>>,
     stride: u32,
-    number: u32,
+    number: Option<u32>,
     items: Vec<u32>,
 }
 
@@ -231,7 +229,7 @@ impl World<'_> {
         seed: u16,
         items: &[u32],
         inputs: Inputs,
-        draw: impl FnOnce(&Environment, &mut RenderPass<'_>, BufferHandle) -> lvk::Result<()> + Send + 'static,
+        draw: impl FnOnce(&Environment, &mut RenderPass<'_>, DrawBuffers) -> lvk::Result<()> + Send + 'static,
     ) -> Planned {
         let effects = match pass.problems.is_empty() {
             true => {
@@ -240,9 +238,12 @@ impl World<'_> {
             }
             false => Vec::new(),
         };
-        let buffer = *self.draw_inputs[usize::from(inputs.by_dispatch())];
+        let buffers = DrawBuffers {
+            inputs: *self.draw_inputs[usize::from(inputs.by_dispatch())],
+            number: *self.draw_number,
+        };
         Planned::new(pass.problems.clone(), effects, move |env, cmd| {
-            let read_buffers = inputs.write(env, cmd, &buffer)?;
+            let read_buffers = inputs.write(env, cmd, &buffers)?;
             let dependencies = Dependencies { read_buffers, ..Default::default() };
             let desc = RenderPassDesc { color: &[pass.target], dependencies, ..Default::default() };
             let mut drawn = cmd.begin_rendering(&desc)?;
@@ -250,7 +251,7 @@ impl World<'_> {
             drawn.push_label("items");
             drawn.insert_label("here");
             drawn.scissor(pass.offset, pass.extent)?;
-            draw(env, &mut drawn, buffer)?;
+            draw(env, &mut drawn, buffers)?;
             drawn.pop_label();
             Ok(())
         })
@@ -263,7 +264,7 @@ impl World<'_> {
         queue: Queue,
         command: Command,
         mut others: Vec<Problem>,
-        draw: impl FnOnce(&Command, &mut RenderPass<'_>, BufferHandle) -> lvk::Result<()> + Send + 'static,
+        draw: impl FnOnce(&Command, &mut RenderPass<'_>, DrawBuffers) -> lvk::Result<()> + Send + 'static,
     ) -> Option<Planned> {
         let has_mesh = self.ctx().capabilities().mesh_shader;
         if command.mistake == Some(Mistake::OtherPipeline) && !has_mesh {
@@ -276,9 +277,9 @@ impl World<'_> {
         let is_unlisted = command.mistake == Some(Mistake::Unlisted);
         let inputs = Inputs::new(n[5], &command.triangles, arguments, command.number, is_unlisted);
         let items = command.items.clone();
-        Some(self.painted(pass, seed, &items, inputs, move |env, pass, buffer| {
-            command.bind(env, pass, buffer, (format, seed))?;
-            draw(&command, pass, buffer)
+        Some(self.painted(pass, seed, &items, inputs, move |env, pass, buffers| {
+            command.bind(env, pass, buffers.inputs, (format, seed))?;
+            draw(&command, pass, buffers)
         }))
     }
 
@@ -293,7 +294,7 @@ impl World<'_> {
             mistake: Mistake::choose(n[5], &mistakes),
             arguments: Vec::new(),
             stride: 0,
-            number: 0,
+            number: None,
         };
         let Draw { first, count, base, first_instance, instances } = draw;
         self.vertex_draw(n, queue, command, Vec::new(), move |command, pass, _| {
@@ -328,7 +329,7 @@ impl World<'_> {
             mistake,
             arguments: draws.iter().map(|draw| draw.arguments(is_indexed)).collect(),
             stride,
-            number: number.unwrap_or(ALL_DRAWS),
+            number,
         }
     }
 
@@ -340,10 +341,10 @@ impl World<'_> {
             wrong.push(buffer.problem.unwrap_or(Problem::Usage));
             arguments = Some(buffer.handle);
         }
-        self.vertex_draw(n, queue, command, wrong, move |command, pass, inputs| {
+        self.vertex_draw(n, queue, command, wrong, move |command, pass, buffers| {
             let draws = command.arguments.len() as u32;
             let (offset, stride) = command.place(draws);
-            let arguments = arguments.unwrap_or(inputs);
+            let arguments = arguments.unwrap_or(buffers.inputs);
             match command.is_indexed {
                 true => pass.draw_indexed_indirect(arguments, offset, draws, stride),
                 false => pass.draw_indirect(arguments, offset, draws, stride),
@@ -355,8 +356,8 @@ impl World<'_> {
         let number = u32::from(n[3] / 64) % (MOST_DRAWS + 2);
         let command = self.indirect_command(n, &mut Random::new(n[3].into()), Some(number));
         let wrong = self.lack(OptionalFeature::DrawIndirectCount).into_iter().collect();
-        self.vertex_draw(n, queue, command, wrong, move |command, pass, inputs| {
-            let draws = counted(command.place(command.arguments.len() as u32), inputs, command);
+        self.vertex_draw(n, queue, command, wrong, move |command, pass, buffers| {
+            let draws = counted(command.place(command.arguments.len() as u32), buffers, command);
             match command.is_indexed {
                 true => pass.draw_indexed_indirect_count(&draws),
                 false => pass.draw_indirect_count(&draws),
@@ -370,14 +371,14 @@ impl World<'_> {
     }
 }
 
-fn counted((offset, stride): (u64, u32), inputs: BufferHandle, command: &Command) -> IndirectCount {
+fn counted((offset, stride): (u64, u32), buffers: DrawBuffers, command: &Command) -> IndirectCount {
     let odd = if command.mistake == Some(Mistake::OddNumber) { 2 } else { 0 };
     IndirectCount {
-        arguments: inputs,
+        arguments: buffers.inputs,
         offset,
         stride,
-        count: inputs,
-        count_offset: NUMBER + odd,
+        count: buffers.number,
+        count_offset: odd,
         max_draws: command.arguments.len() as u32,
     }
 }

@@ -1,9 +1,9 @@
 //! Plans of passes that draw by mesh shaders.
 
-use lvk::{BufferHandle, Context, IndirectCount, OptionalFeature, Queue, RenderPass, RenderPipelineHandle};
+use lvk::{Context, IndirectCount, OptionalFeature, Queue, RenderPass, RenderPipelineHandle};
 use lvk_tests::random::Random;
 
-use super::draw_items::{ALL_DRAWS, ARGUMENTS, Inputs, MOST_DRAWS, NUMBER, Triangles, mesh_items};
+use super::draw_items::{ARGUMENTS, DrawBuffers, Inputs, MOST_DRAWS, Triangles, mesh_items};
 use super::kit::Push;
 use super::kit_draws::FrontEnd;
 use super::plan::Planned;
@@ -34,8 +34,8 @@ struct MeshDraws {
     form: Form,
     /// Workgroups of each draw.
     groups: Vec<[u32; 3]>,
-    /// Number of draws in the buffer.
-    number: u32,
+    /// Number of draws in the buffer, if the draws read it.
+    number: Option<u32>,
     stride: u32,
     mistake: Option<Mistake>,
 }
@@ -57,7 +57,7 @@ impl MeshDraws {
             (1, 0, Form::Direct) if most < u32::MAX => Some(Mistake::TooMany),
             _ => None,
         };
-        let number = if form == Form::Counted { below(MOST_DRAWS + 2) } else { ALL_DRAWS };
+        let number = (form == Form::Counted).then(|| below(MOST_DRAWS + 2));
         Self { is_task, form, groups, number, stride: 12 + 4 * below(3), mistake }
     }
 
@@ -74,8 +74,8 @@ impl MeshDraws {
 
     /// Returns the items that are painted.
     fn items(&self) -> Vec<u32> {
-        let executed = self.groups.len().min(self.number as usize);
-        self.groups[..executed].iter().flat_map(|groups| mesh_items(*groups, self.is_task)).collect()
+        let executed = self.number.map_or(self.groups.len(), |number| number as usize);
+        self.groups.iter().take(executed).flat_map(|groups| mesh_items(*groups, self.is_task)).collect()
     }
 
     fn front_end(&self) -> FrontEnd {
@@ -96,7 +96,7 @@ impl MeshDraws {
     fn draw(
         &self,
         pass: &mut RenderPass<'_>,
-        buffer: BufferHandle,
+        buffers: DrawBuffers,
         pipeline: RenderPipelineHandle,
         seed: u16,
     ) -> lvk::Result<()> {
@@ -107,13 +107,13 @@ impl MeshDraws {
         match self.form {
             Form::Direct if self.mistake == Some(Mistake::TooMany) => pass.draw_mesh_tasks([u32::MAX, 1, 1]),
             Form::Direct => pass.draw_mesh_tasks(self.groups[0]),
-            Form::Indirect => pass.draw_mesh_tasks_indirect(buffer, offset, draws, stride),
+            Form::Indirect => pass.draw_mesh_tasks_indirect(buffers.inputs, offset, draws, stride),
             Form::Counted => pass.draw_mesh_tasks_indirect_count(&IndirectCount {
-                arguments: buffer,
+                arguments: buffers.inputs,
                 offset,
                 stride,
-                count: buffer,
-                count_offset: NUMBER,
+                count: buffers.number,
+                count_offset: 0,
                 max_draws: draws,
             }),
         }
@@ -132,7 +132,7 @@ impl World<'_> {
         let pass = self.draw_pass(n, queue, draws.problems(self.ctx()))?;
         let pipeline = self.env.kit.draw_kit.items(draws.front_end(), pass.format)?;
         let (seed, items, inputs) = (n[4] % 1000, draws.items(), draws.inputs(n[5], random));
-        let draw = move |_: &_, pass: &mut RenderPass<'_>, buffer| draws.draw(pass, buffer, pipeline, seed);
+        let draw = move |_: &_, pass: &mut RenderPass<'_>, buffers| draws.draw(pass, buffers, pipeline, seed);
         Some(self.painted(pass, seed, &items, inputs, draw))
     }
 }

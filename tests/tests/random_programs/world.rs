@@ -253,6 +253,8 @@ pub struct World<'a> {
     pub arguments: Holder<BufferHandle>,
     /// Vertices, indices and arguments of draws: those that copies write, and those that dispatches write.
     pub draw_inputs: [Holder<BufferHandle>; 2],
+    /// Number of draws.
+    pub draw_number: Holder<BufferHandle>,
     /// Instances of TLAS.
     pub records: Holder<BufferHandle>,
     pub queries: QueryPools,
@@ -275,6 +277,7 @@ impl<'a> World<'a> {
         Ok(Self {
             arguments: own("arguments", 16, BufferUsage::INDIRECT)?,
             draw_inputs: [own("copied", INPUT_BYTES, inputs)?, own("dispatched", INPUT_BYTES, inputs)?],
+            draw_number: own("number of draws", 8, BufferUsage::INDIRECT)?,
             records: own("instances", RECORD_BYTES, BufferUsage::STORAGE)?,
             queries: QueryPools::new(env.ctx())?,
             env,
