@@ -67,7 +67,8 @@ impl World<'_> {
         let TextureInfo { part, format, usage, .. } = info;
         let Part { mut extent, mut mips, .. } = part;
         if is_volume {
-            mips = if problems.is_empty() { 1 } else { mips };
+            // The chain of a volume may be longer than that of its slices.
+            mips = if problems.is_empty() { 1 } else { mips + 2 };
         } else {
             extent[1] = extent[0];
             let full = 32 - extent[0].leading_zeros();
