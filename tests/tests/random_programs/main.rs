@@ -1,8 +1,9 @@
 //! Random programs: sequences of calls, right and wrong, against a model of their outcomes and of every byte.
 //!
-//! `op` lists the operations, `world` holds the objects and judges outcomes, `memory` models contents, `plan`,
-//! `plan_pipelines` and `calls` say what each operation must do, `run` runs a program, `threads` runs programs on several threads, `shrink`
-//! makes failing ones small, and `seeds` and `kept` are the tests: of generated programs, and of those that have failed.
+//! `op` lists the operations, `world` holds the objects and judges outcomes, `memory` models contents, `plan` and the
+//! modules named after it, `queries` and `calls` with those named after it say what each operation must do, `run` runs a
+//! program, `threads` runs programs on several threads, `shrink` makes failing ones small, and `seeds` and `kept` are the
+//! tests: of generated programs, and of those that have failed. `covered` holds the list of calls that no program makes.
 
 mod calls;
 mod calls_accel;
