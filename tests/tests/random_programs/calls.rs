@@ -58,7 +58,7 @@ impl World<'_> {
     }
 
     /// Waits before the host writes memory that the GPU may use.
-    pub(super) fn settle(&self, memory: Option<MemoryKind>) -> Result<(), String> {
+    pub(super) fn wait_before_host_write(&self, memory: Option<MemoryKind>) -> Result<(), String> {
         if memory.is_some_and(|memory| memory != MemoryKind::Device) {
             self.ctx().wait_idle().map_err(|error| error.to_string())?;
         }
@@ -73,7 +73,7 @@ impl World<'_> {
         if !inside {
             problems.push(Problem::Usage);
         }
-        self.settle(info.map(|info| info.memory))?;
+        self.wait_before_host_write(info.map(|info| info.memory))?;
         let bytes = pattern(n[3], size as usize);
         let written = self.ctx().upload_buffer(buffer.handle, offset, &bytes);
         if let (Some(()), Some(buffer)) = (judge(written, &problems)?, buffer.live) {
@@ -354,7 +354,7 @@ impl World<'_> {
         let capacity = u32::from(n[5] % 5);
         let desc =
             TlasDesc { instances: &raw, capacity, flags, debug_name: "random TLAS", ..Default::default() };
-        self.note(&problems);
+        self.record_problems(&problems);
         if let Some(holder) = judge(self.ctx().create_tlas(&desc), &problems)? {
             let tlas = self.memory.tlas.len();
             self.memory.tlas.push(Tlas::default());
@@ -372,7 +372,7 @@ impl World<'_> {
         if blas.live.is_some_and(|number| !self.blas[number].info.can_compact) {
             problems.push(Problem::Usage);
         }
-        self.note(&problems);
+        self.record_problems(&problems);
         if let (Some(()), Some(number)) = (judge(self.ctx().compact(&[blas.handle]), &problems)?, blas.live) {
             self.blas[number].info.was_compacted = true;
         }
@@ -382,7 +382,7 @@ impl World<'_> {
     pub(super) fn accel_info(&mut self, n: [u16; 6]) -> Outcome {
         let Some(blas) = self.pick_blas(n[0]) else { return Ok(false) };
         let problems: Vec<_> = blas.problem.into_iter().collect();
-        self.note(&problems);
+        self.record_problems(&problems);
         let found = judge(self.ctx().accel_struct_info(blas.handle), &problems)?;
         if found.is_some_and(|info| info.is_top_level || info.parts != 1 || info.name != "random BLAS") {
             return Err("the BLAS is described wrongly".to_owned());

@@ -16,10 +16,10 @@ fn batch_flags(n: u16, at: usize) -> BuildFlags {
 }
 
 impl World<'_> {
-    /// Notes the problems of the call that is made.
-    pub(super) fn note(&mut self, problems: &[Problem]) {
-        self.tally.note(self.kind, problems);
-        self.is_noted = true;
+    /// Records the problems of the call that is made.
+    pub(super) fn record_problems(&mut self, problems: &[Problem]) {
+        self.tally.record_problems(self.kind, problems);
+        self.has_recorded_problems = true;
     }
 
     /// Creates up to three BLAS in a batch, before the next submission or on a queue. One that is wrong fails them all.
@@ -52,7 +52,7 @@ impl World<'_> {
             _ => Some(Queue::Transfer),
         };
         problems.extend((queue == Some(Queue::Transfer)).then_some(Problem::WrongQueue));
-        self.note(&problems);
+        self.record_problems(&problems);
         let Some(made) = judge(self.build_batch(queue, &descs), &problems)? else { return Ok(true) };
         if made.len() != count {
             return Err(format!("{} BLAS of a batch of {count}", made.len()));
@@ -99,7 +99,7 @@ impl World<'_> {
             handles.push(blas.handle);
             numbers.extend(blas.live);
         }
-        self.note(&problems);
+        self.record_problems(&problems);
         if judge(self.ctx().compact(&handles), &problems)?.is_some() {
             numbers.into_iter().for_each(|number| self.blas[number].info.was_compacted = true);
         }
@@ -121,7 +121,7 @@ impl World<'_> {
         if n[2].is_multiple_of(2) {
             judge(self.ctx().wait_idle(), &[])?;
         }
-        self.note(&problems);
+        self.record_problems(&problems);
         if let Some(progress) = judge(self.ctx().build_progress(&asked), &problems)? {
             let is_known = n[2].is_multiple_of(2);
             if progress.total != 2 || progress.built > 2 || (is_known && progress.built != 2) {

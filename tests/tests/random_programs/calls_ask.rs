@@ -22,8 +22,8 @@ impl World<'_> {
         let mut problems: Vec<_> = buffer.problem.into_iter().collect();
         let is_unmapped = info.is_some_and(|info| info.memory == MemoryKind::Device);
         problems.extend(is_unmapped.then_some(Problem::Usage));
-        self.settle(info.map(|info| info.memory))?;
-        self.note(&problems);
+        self.wait_before_host_write(info.map(|info| info.memory))?;
+        self.record_problems(&problems);
         let mapped = judge(self.ctx().map_buffer(buffer.handle), &problems)?;
         let (Some(mut mapped), Some(number)) = (mapped, buffer.live) else { return Ok(true) };
         // SAFETY: the buffer is alive, the GPU is done with it, and only this thread uses it.
@@ -52,7 +52,7 @@ impl World<'_> {
             debug_name: "nearest sampler",
             ..Default::default()
         });
-        self.note(&[]);
+        self.record_problems(&[]);
         self.samplers.extend(judge(made, &[])?.map(|holder| Object::new(holder, Some(mode))));
         Ok(true)
     }
@@ -81,7 +81,7 @@ impl World<'_> {
         let part = Part { mips, layers, extent, ..part };
         let bytes = (0..mips).map(|mip| part.whole(mip).texels() * texel_bytes(format)).sum();
         let data = (n[3] % 16 < 8).then(|| pattern(n[3], bytes));
-        self.note(&problems);
+        self.record_problems(&problems);
         let made = self.ctx().create_texture(&TextureDesc {
             kind: if is_volume { TextureKind::D3 { depth: layers } } else { TextureKind::Cube },
             format,
@@ -114,7 +114,7 @@ impl World<'_> {
                 let kind = if is_array { TextureKind::D2Array { layers } } else { TextureKind::D2 };
                 let (extent, mips) = (part.extent, part.mips);
                 let desc = TextureDesc { kind, format, extent, mips, usage, ..Default::default() };
-                self.note(&problems);
+                self.record_problems(&problems);
                 judge(ctx.supports_texture(&desc), &problems)?;
                 return Ok(true);
             }
@@ -149,7 +149,7 @@ impl World<'_> {
                 }
             }
         }
-        self.note(&[]);
+        self.record_problems(&[]);
         Ok(true)
     }
 
@@ -157,7 +157,7 @@ impl World<'_> {
     fn ask_for_buffer(&mut self, n: [u16; 6]) -> Outcome {
         let Some(buffer) = self.pick_buffer(n[1]) else { return Ok(false) };
         let problems: Vec<_> = buffer.problem.into_iter().collect();
-        self.note(&problems);
+        self.record_problems(&problems);
         let Some(address) = judge(self.ctx().buffer_address(buffer.handle), &problems)? else {
             return Ok(true);
         };
@@ -216,7 +216,7 @@ impl World<'_> {
                 (problems.clone(), judge(ctx.ray_tracing_stack_bytes(rays.handle), &problems)?.map(|_| 1))
             }
         };
-        self.note(&problems);
+        self.record_problems(&problems);
         if found == Some(0) { Err("an object is not there".to_owned()) } else { Ok(true) }
     }
 }

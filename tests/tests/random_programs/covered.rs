@@ -95,7 +95,7 @@ fn programs_call_every_method_that_the_document_does_not_name() {
 }
 
 #[test]
-fn methods_and_their_calls_are_found() {
+fn methods_and_their_calls_are_recognised() {
     let source = "
 impl Context {
     pub fn wait(&self) {

@@ -72,7 +72,8 @@ impl World<'_> {
         let is_full = tlas.live.is_some_and(|number| self.tlas[number].info.capacity == 0);
         problems.extend((is_full && n[2] % 5 == 1).then_some(Problem::Limit));
         let has_mesh = |number: usize| self.meshes[self.blas[number].info.mesh].holder.is_some();
-        problems.extend(blas.live.is_some_and(|number| !has_mesh(number)).then_some(Problem::Stale));
+        let is_stale = n[2] % 5 == 2 && blas.live.is_some_and(|number| !has_mesh(number));
+        problems.extend(is_stale.then_some(Problem::Stale));
         let (tlas, blas) = (tlas.handle, blas.handle);
         Some(Planned::new(problems, Vec::new(), move |env, cmd| {
             let instances = [TlasInstance::new(blas), TlasInstance::new(tlas)];

@@ -67,9 +67,9 @@ enum State {
     /// No submission has written or reset it.
     #[default]
     New,
-    /// It was reset last.
+    /// A reset came last.
     Reset,
-    /// It was written last. The number grows with each write of any query.
+    /// A write came last. The number grows with each write of any query.
     Written(QueryResult, u64),
 }
 
@@ -103,7 +103,7 @@ pub struct OpenQueries(HashMap<(Pool, u32), OpenQuery>);
 
 #[derive(Debug, Default, Clone, Copy)]
 struct OpenQuery {
-    /// Its first use is a write, so it must have been reset before the command buffer.
+    /// True if the first use is a write, so that the query must have been reset before the command buffer.
     needs_reset: bool,
     was_reset: bool,
     is_written: bool,
@@ -314,10 +314,10 @@ impl World<'_> {
             if pool == Pool::Samples {
                 judge(self.ctx().timestamps_ms(handle, first, count), &problems)?;
             }
-            self.note(&problems);
+            self.record_problems(&problems);
             return Ok(true);
         }
-        self.note(&problems);
+        self.record_problems(&problems);
         let mut numbers = vec![None; count as usize];
         if judge(self.ctx().read_queries(handle, first, &mut numbers), &problems)?.is_some() {
             let numbers = numbers.iter().map(|number| number.map(|number| number as f64)).collect();

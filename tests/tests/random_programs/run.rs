@@ -38,8 +38,8 @@ pub fn run(env: &Environment, ops: &[Op]) -> Result<Tally, Failure> {
         for op in ops {
             if world.step(op).map_err(|message| format!("{op:?}: {message}"))? {
                 world.tally.executed += 1;
-                if !world.is_noted {
-                    world.note(&[]);
+                if !world.has_recorded_problems {
+                    world.record_problems(&[]);
                 }
             }
             at += 1;
@@ -59,7 +59,7 @@ impl World<'_> {
     /// Runs an operation. Returns false if it had no objects to work on.
     fn step(&mut self, op: &Op) -> Result<bool, String> {
         let n = op.n;
-        (self.kind, self.is_noted) = (op.kind, false);
+        (self.kind, self.has_recorded_problems) = (op.kind, false);
         match op.kind {
             Kind::CreateBuffer => self.create_buffer(n),
             Kind::DestroyBuffer => self.destroy_buffer(n),
@@ -216,7 +216,7 @@ impl World<'_> {
             plans.push(ops.iter().filter_map(|op| self.plan(op, at)).collect());
         }
         let planned = || plans.iter().flatten();
-        planned().for_each(|planned| self.tally.note(planned.kind, &planned.problems));
+        planned().for_each(|planned| self.tally.record_problems(planned.kind, &planned.problems));
         self.tally.executed += planned().count() as u64;
         self.tally.refused += planned().filter(|planned| !planned.problems.is_empty()).count() as u64;
         let env = self.env;

@@ -209,8 +209,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Notes the problems of an operation.
-    pub fn note(&mut self, kind: Kind, problems: &[Problem]) {
+    /// Records the problems of an operation.
+    pub fn record_problems(&mut self, kind: Kind, problems: &[Problem]) {
         self.seen.extend(problems.iter().map(|problem| (kind, Some(*problem))));
         if problems.is_empty() {
             self.seen.insert((kind, None));
@@ -262,8 +262,8 @@ pub struct World<'a> {
     pub tally: Tally,
     /// Kind of the operation that runs.
     pub kind: Kind,
-    /// True if its problems are noted.
-    pub is_noted: bool,
+    /// True if its problems are recorded.
+    pub has_recorded_problems: bool,
 }
 
 impl<'a> World<'a> {
@@ -294,7 +294,7 @@ impl<'a> World<'a> {
             pending: Vec::new(),
             tally: Tally::default(),
             kind: Kind::Label,
-            is_noted: false,
+            has_recorded_problems: false,
         })
     }
 
@@ -336,7 +336,7 @@ impl<'a> World<'a> {
     /// Records a planned command into an open command buffer.
     pub fn record(&mut self, at: usize, planned: Planned) -> Result<(), String> {
         let Planned { kind, action, problems, effects } = planned;
-        self.tally.note(kind, &problems);
+        self.tally.record_problems(kind, &problems);
         let (env, open) = (self.env, &mut self.open[at]);
         match judge(action(env, &mut open.cmd), &problems)? {
             Some(()) => open.effects.extend(effects),
