@@ -12,10 +12,10 @@ use super::plan::range;
 use super::plan_rays::{triangle_bytes, triangle_depth};
 use super::world::{BlasInfo, BufferInfo, Object, Pending, Problem, TextureInfo, TlasInfo, World, judge};
 
-type Outcome = Result<bool, String>;
+pub(super) type Outcome = Result<bool, String>;
 
 /// Most live objects of a kind.
-const MOST: usize = 12;
+pub(super) const MOST: usize = 12;
 /// Most readbacks that are not finished.
 const MOST_PENDING: usize = 6;
 
@@ -58,7 +58,7 @@ impl World<'_> {
     }
 
     /// Waits before the host writes memory that the GPU may use.
-    fn settle(&self, memory: Option<MemoryKind>) -> Result<(), String> {
+    pub(super) fn wait_before_host_write(&self, memory: Option<MemoryKind>) -> Result<(), String> {
         if memory.is_some_and(|memory| memory != MemoryKind::Device) {
             self.ctx().wait_idle().map_err(|error| error.to_string())?;
         }
@@ -73,7 +73,7 @@ impl World<'_> {
         if !inside {
             problems.push(Problem::Usage);
         }
-        self.settle(info.map(|info| info.memory))?;
+        self.wait_before_host_write(info.map(|info| info.memory))?;
         let bytes = pattern(n[3], size as usize);
         let written = self.ctx().upload_buffer(buffer.handle, offset, &bytes);
         if let (Some(()), Some(buffer)) = (judge(written, &problems)?, buffer.live) {
@@ -137,7 +137,7 @@ impl World<'_> {
             return Ok(false);
         }
         let (info, mut problems) = choose_texture(n, self.memory.images.len());
-        let TextureInfo { part, format, usage, is_array } = info;
+        let TextureInfo { part, format, usage, is_array, .. } = info;
         let Part { mips, layers, extent, .. } = part;
         let bytes: usize = (0..mips).map(|mip| part.whole(mip).texels() * texel_bytes(format)).sum();
         let data = n[5].is_multiple_of(3).then(|| pattern(n[5], bytes + usize::from(n[5] % 32 == 3)));
@@ -164,7 +164,7 @@ impl World<'_> {
     }
 
     /// Writes the initial contents of a texture, as far as they reach, mip by mip.
-    fn fill_mips(&mut self, info: &TextureInfo, mut data: &[u8]) {
+    pub(super) fn fill_mips(&mut self, info: &TextureInfo, mut data: &[u8]) {
         for mip in 0..info.part.mips {
             let place = info.part.whole(mip);
             let (own, others) = data.split_at(data.len().min(place.texels() * texel_bytes(info.format)));
@@ -189,14 +189,22 @@ impl World<'_> {
         if let Some(info) = info {
             let part = info.part;
             let is_array = info.is_array && !is_flat;
-            let layers = if is_array { part.layers.saturating_sub(base_layer) } else { 1 };
+            let is_cube = info.is_cube && is_array;
+            let rest = part.layers.saturating_sub(base_layer);
+            let layers = match (info.is_volume, is_cube, is_array) {
+                (true, _, _) => part.layers,
+                (_, true, _) => 6,
+                (_, _, true) => rest,
+                _ => 1,
+            };
             let mip_count = super::image::count(base_mip, mips, part.mips);
-            let fits = layers > 0 && base_layer + layers <= part.layers;
+            let is_slice = info.is_volume && is_flat;
+            let fits = layers > 0 && base_layer + layers <= part.layers && !is_slice;
             match mip_count.filter(|_| fits) {
                 Some(mips) => {
                     let (base_mip, base_layer) = (part.base_mip + base_mip, part.base_layer + base_layer);
                     let part = Part { base_mip, mips, base_layer, layers, ..part };
-                    view = Some(TextureInfo { part, is_array, ..info });
+                    view = Some(TextureInfo { part, is_array, is_cube, ..info });
                 }
                 None => problems.push(Problem::Usage),
             }
@@ -256,7 +264,7 @@ impl World<'_> {
             let made = self
                 .ctx()
                 .create_sampler(&SamplerDesc { debug_name: "random sampler", ..Default::default() });
-            self.samplers.extend(judge(made, &[])?.map(|holder| Object::new(holder, ())));
+            self.samplers.extend(judge(made, &[])?.map(|holder| Object::new(holder, None)));
         }
         Ok(true)
     }
@@ -346,6 +354,7 @@ impl World<'_> {
         let capacity = u32::from(n[5] % 5);
         let desc =
             TlasDesc { instances: &raw, capacity, flags, debug_name: "random TLAS", ..Default::default() };
+        self.record_problems(&problems);
         if let Some(holder) = judge(self.ctx().create_tlas(&desc), &problems)? {
             let tlas = self.memory.tlas.len();
             self.memory.tlas.push(Tlas::default());
@@ -363,6 +372,7 @@ impl World<'_> {
         if blas.live.is_some_and(|number| !self.blas[number].info.can_compact) {
             problems.push(Problem::Usage);
         }
+        self.record_problems(&problems);
         if let (Some(()), Some(number)) = (judge(self.ctx().compact(&[blas.handle]), &problems)?, blas.live) {
             self.blas[number].info.was_compacted = true;
         }
@@ -372,6 +382,7 @@ impl World<'_> {
     pub(super) fn accel_info(&mut self, n: [u16; 6]) -> Outcome {
         let Some(blas) = self.pick_blas(n[0]) else { return Ok(false) };
         let problems: Vec<_> = blas.problem.into_iter().collect();
+        self.record_problems(&problems);
         let found = judge(self.ctx().accel_struct_info(blas.handle), &problems)?;
         if found.is_some_and(|info| info.is_top_level || info.parts != 1 || info.name != "random BLAS") {
             return Err("the BLAS is described wrongly".to_owned());
@@ -381,7 +392,7 @@ impl World<'_> {
 }
 
 /// Returns a texture with this number of its image, mostly one that can be created, and its problems.
-fn choose_texture(n: [u16; 6], image: usize) -> (TextureInfo, Vec<Problem>) {
+pub(super) fn choose_texture(n: [u16; 6], image: usize) -> (TextureInfo, Vec<Problem>) {
     const SIDES: [u32; 7] = [1, 2, 3, 4, 5, 6, 8];
     const FORMATS: [Format; 4] = [Format::R32Uint, Format::Rgba8Unorm, Format::R32Float, Format::R8Uint];
     let format = FORMATS[usize::from(n[0] % 4)];
@@ -408,7 +419,7 @@ fn choose_texture(n: [u16; 6], image: usize) -> (TextureInfo, Vec<Problem>) {
         problems.push(Problem::Usage);
     }
     let part = Part { image, base_mip: 0, mips, base_layer: 0, layers, extent };
-    (TextureInfo { part, format, usage, is_array }, problems)
+    (TextureInfo { part, format, usage, is_array, is_cube: false, is_volume: false }, problems)
 }
 
 /// Extents are those of the mips; keeps the model's halving next to its users.

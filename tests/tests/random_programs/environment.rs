@@ -4,12 +4,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context,
-    Holder, QueueRequest, RayTracingPipelineHandle, SubmitHandle, TextureDesc, TextureHandle, Triangles,
-    ValidationSink,
+    Holder, QueryPoolDesc, QueryPoolHandle, QueueRequest, RayTracingPipelineHandle, SubmitHandle,
+    TextureDesc, TextureHandle, Triangles, ValidationSink,
 };
 use lvk_tests::device_with;
 
 use super::kit::{Kit, ray_pipeline};
+use super::memory::Effect;
+use super::op::Kind;
 
 /// Objects of another context.
 pub struct Foreign {
@@ -18,6 +20,7 @@ pub struct Foreign {
     texture: Holder<TextureHandle>,
     blas: Holder<AccelStructHandle>,
     rays: Option<Holder<RayTracingPipelineHandle>>,
+    queries: Holder<QueryPoolHandle>,
     /// A submission.
     pub submission: SubmitHandle,
 }
@@ -34,8 +37,9 @@ impl Foreign {
         let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?;
         let texture = ctx.create_texture(&TextureDesc::default())?;
         let rays = ctx.capabilities().ray_tracing_pipeline.then(|| ray_pipeline(&ctx)).transpose()?;
+        let queries = ctx.create_query_pool(&QueryPoolDesc::default())?;
         let submission = ctx.flush()?;
-        Ok(Self { ctx, buffer, texture, blas, rays, submission })
+        Ok(Self { ctx, buffer, texture, blas, rays, queries, submission })
     }
 
     /// Returns a buffer.
@@ -58,6 +62,11 @@ impl Foreign {
         self.rays.as_deref().copied()
     }
 
+    /// Returns a pool of queries.
+    pub fn queries(&self) -> QueryPoolHandle {
+        *self.queries
+    }
+
     /// Returns a command buffer.
     pub fn command_buffer(&self) -> lvk::Result<CommandBuffer> {
         self.ctx.acquire_command_buffer()
@@ -74,8 +83,10 @@ pub struct Environment {
     sinks: [ValidationSink; 2],
     /// Bytes of acceleration structures before any program.
     own_bytes: u64,
-    /// Number of threads from which on the model is wrong on purpose: fills write another value than it expects.
-    pub lies_from: Option<usize>,
+    /// A pool of queries that was destroyed.
+    pub stale_queries: QueryPoolHandle,
+    /// Operations about which the model is wrong on purpose, and the number of threads from which on it is.
+    pub wrong_about: Option<(Kind, usize)>,
     /// Number of threads of the program that runs.
     threads: AtomicUsize,
 }
@@ -90,13 +101,15 @@ impl Environment {
         let foreign = Foreign::new(other);
         let (Ok(kit), Ok(foreign)) = (kit, foreign) else { unreachable!("the set-up of the programs fails") };
         let own_bytes = ctx.accel_memory().structure_bytes;
+        let stale_queries = ctx.create_query_pool(&QueryPoolDesc::default()).ok()?.handle();
         Some(Self {
             own_bytes,
+            stale_queries,
             kit,
             foreign,
             ctx,
             sinks: [sink, other_sink],
-            lies_from: None,
+            wrong_about: None,
             threads: AtomicUsize::new(1),
         })
     }
@@ -111,9 +124,14 @@ impl Environment {
         self.threads.store(threads, Ordering::Relaxed);
     }
 
-    /// True if the model is wrong about fills.
-    pub fn lies(&self) -> bool {
-        self.lies_from.is_some_and(|threads| self.threads.load(Ordering::Relaxed) >= threads)
+    /// Returns the effect that the model expects of an operation, which may be wrong on purpose.
+    pub fn expected(&self, kind: Kind, effect: Effect) -> Effect {
+        match self.wrong_about {
+            Some((about, threads)) if about == kind && self.threads.load(Ordering::Relaxed) >= threads => {
+                Effect::Wrong(Box::new(effect))
+            }
+            _ => effect,
+        }
     }
 
     /// Fails if the validation layer sent a message since the last call.

@@ -29,7 +29,7 @@ fn kept_programs() -> Vec<(PathBuf, Vec<Op>)> {
 #[test]
 fn kept_programs_do_what_the_model_says() {
     let programs = kept_programs();
-    assert!(programs.len() >= 7, "{} programs", programs.len());
+    assert!(programs.len() >= 9, "{} programs", programs.len());
     Watchdog::watch(|dog| {
         for queues in QUEUES {
             let Some(env) = Environment::new(queues) else { return };

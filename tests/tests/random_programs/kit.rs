@@ -9,6 +9,7 @@ use lvk::{
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::raster::render_pipeline;
 
+use super::kit_draws::DrawKit;
 use super::plan_pipelines::RayModules;
 
 /// Push constants of every pipeline.
@@ -25,13 +26,13 @@ pub struct Push {
     pub number: u32,
     /// Word of the texel.
     pub word: u32,
-    /// Bytes to a multiple of 8.
-    pub pad: u32,
+    /// Bindless index of a sampler.
+    pub sampler: u32,
 }
 
 pub(super) const HEAD: &str = "
     layout(buffer_reference, scalar) buffer Words { uint at[]; };
-    layout(push_constant, scalar) uniform Push { Words to; Words from; uint index; uint number; uint word; };
+    layout(push_constant, scalar) uniform Push { Words to; Words from; uint index; uint number; uint word; uint smp; };
     uint patternOf(uint i) { return (0x21 + (number + 7 * i) % 0x5d) * 0x01010101u; }
     uint hitWord(uint custom, uint triangle, float t) {
         uint depth = uint(t + 0.5);
@@ -86,10 +87,16 @@ pub enum Kernel {
     FetchBytes,
     /// Queries rays.
     Query,
+    /// Samples texels of unsigned integers, as many textures to the right and below as `word` says, less one.
+    SampleUint,
+    /// Samples texels of floats.
+    SampleFloat,
+    /// Samples the channels of texels as bytes.
+    SampleBytes,
 }
 
 /// Every kernel, in the order of [`Kernel`].
-const KERNELS: [(&str, &str); 9] = [
+const KERNELS: [(&str, &str); 12] = [
     ("", "to.at[i] = patternOf(i);"),
     ("", "to.at[i] = from.at[i];"),
     ("", "imageStore(kImagesU2D[index], at, uvec4(word));"),
@@ -99,6 +106,9 @@ const KERNELS: [(&str, &str); 9] = [
     ("", "to.at[flat] = floatBitsToUint(texelFetch(kTextures2D[index], at, int(number)).x);"),
     ("", "to.at[flat] = packUnorm4x8(texelFetch(kTextures2D[index], at, int(number)));"),
     ("#include <lvk/ray_query.glsl>\n", QUERY),
+    ("", "to.at[flat] = textureLod(usampler2D(kTexturesU2D[index], kSamplers[smp]), uv, float(number)).x;"),
+    ("", "to.at[flat] = floatBitsToUint(textureBindless2DLod(index, smp, uv, float(number)).x);"),
+    ("", "to.at[flat] = packUnorm4x8(textureBindless2DLod(index, smp, uv, float(number)));"),
 ];
 
 /// Formats that passes draw to.
@@ -108,6 +118,8 @@ pub const TARGETS: [Format; 3] = [Format::R32Uint, Format::R32Float, Format::Rgb
 pub struct Kit {
     kernels: Vec<Holder<ComputePipelineHandle>>,
     draws: Vec<Holder<RenderPipelineHandle>>,
+    /// Pipelines of the other draws.
+    pub draw_kit: DrawKit,
     trace: Option<Holder<RayTracingPipelineHandle>>,
     ray_modules: Option<RayModules>,
 }
@@ -123,6 +135,7 @@ impl Kit {
                      uint i = gl_GlobalInvocationID.x;
                      ivec2 at = ivec2(gl_GlobalInvocationID.xy);
                      uint flat_ = at.y * gl_NumWorkGroups.x + at.x;
+                     vec2 uv = (vec2(at) + 0.5) / vec2(gl_NumWorkGroups.xy) + float(word) - 1.0;
                      {}
                  }}",
                 body.replace("flat", "flat_")
@@ -134,13 +147,14 @@ impl Kit {
         let trace = ctx.capabilities().ray_tracing_pipeline.then(|| ray_pipeline(ctx)).transpose()?;
         let ray_modules =
             ctx.capabilities().ray_tracing_pipeline.then(|| RayModules::new(ctx)).transpose()?;
-        Ok(Self { kernels, draws, trace, ray_modules })
+        Ok(Self { kernels, draws, draw_kit: DrawKit::new(ctx)?, trace, ray_modules })
     }
 
     /// Number of its objects.
     pub fn object_count(&self) -> usize {
         let modules = self.ray_modules.iter().map(|_| RayModules::COUNT).sum::<usize>();
-        self.kernels.len() + self.draws.len() + usize::from(self.trace.is_some()) + modules
+        let draws = self.draws.len() + self.draw_kit.object_count();
+        self.kernels.len() + draws + usize::from(self.trace.is_some()) + modules
     }
 
     /// Returns a compute pipeline.

@@ -2,6 +2,7 @@
 
 use super::cell::{Cell, known, pattern_byte};
 use super::image::{Image, Place, mip_extent, texel_bytes};
+use super::queries::{Pool, Queries, QueryResult};
 use lvk::Format;
 
 /// Rays of a trace: [`SLOTS`] instances of [`TRIANGLES`] triangles.
@@ -26,6 +27,8 @@ pub struct Memory {
     pub blas: Vec<Blas>,
     /// TLAS.
     pub tlas: Vec<Tlas>,
+    /// Queries.
+    pub queries: Queries,
     /// Rays that must hit a triangle, of all traces so far.
     pub hits: u64,
 }
@@ -92,6 +95,14 @@ pub enum Effect {
     Place { tlas: usize, instances: Vec<Instance> },
     /// Traces all rays and writes a word for each.
     Trace { tlas: usize, to: (usize, usize), shading: Shading },
+    /// Copies texels to packed bytes, those of these indices.
+    Gather { place: Place, texels: Vec<usize>, to: (usize, usize) },
+    /// Resets a query.
+    Reset { pool: Pool, query: usize },
+    /// Writes the result of a query.
+    Query { pool: Pool, query: usize, result: QueryResult },
+    /// An effect about which the model is wrong on purpose.
+    Wrong(Box<Effect>),
 }
 
 /// The values that the shaders of a trace give rays.
@@ -149,6 +160,44 @@ impl Memory {
                 self.tlas[*tlas].instances = instances.iter().map(seen).collect();
             }
             Effect::Trace { tlas, to, shading } => self.trace(*tlas, *to, *shading),
+            Effect::Gather { place, texels, to } => {
+                let image = &self.images[place.image];
+                let (cells, bytes) = (image.read(place), texel_bytes(image.format));
+                let texel = |texel: &usize| &cells[texel * bytes..(texel + 1) * bytes];
+                let gathered: Vec<_> = texels.iter().flat_map(texel).copied().collect();
+                self.write(to.0, to.1, &gathered);
+            }
+            Effect::Reset { pool, query } => self.queries.reset(*pool, *query),
+            Effect::Query { pool, query, result } => self.queries.write(*pool, *query, *result),
+            Effect::Wrong(effect) => {
+                self.apply(effect);
+                self.falsify(effect);
+            }
+        }
+    }
+
+    /// Changes something that an effect has changed.
+    fn falsify(&mut self, effect: &Effect) {
+        let another = |cell: &mut Cell| *cell = Cell::known(if cell.is_known() { cell.low ^ 1 } else { 0 });
+        match effect {
+            Effect::Bytes { buffer, offset, bytes } if !bytes.is_empty() => {
+                another(&mut self.buffers[*buffer][*offset]);
+            }
+            Effect::CopyBytes { to, .. }
+            | Effect::ToBuffer { to, .. }
+            | Effect::Gather { to, .. }
+            | Effect::Trace { to, .. } => self.buffers[to.0].get_mut(to.1).into_iter().for_each(another),
+            Effect::Fill { place, .. } | Effect::Texels { place, .. } => {
+                let mut cells = self.images[place.image].read(place);
+                cells.first_mut().into_iter().for_each(another);
+                self.images[place.image].write(place, &cells);
+            }
+            Effect::Build { blas } => self.blas[*blas].depths[0] += 1,
+            Effect::Place { tlas, .. } => {
+                self.tlas[*tlas].instances.iter_mut().for_each(|(instance, _)| instance.custom += 1);
+            }
+            Effect::Query { pool, query, .. } => self.queries.reset(*pool, *query),
+            _ => {}
         }
     }
 

@@ -15,6 +15,7 @@ pub type Action = Box<dyn FnOnce(&Environment, &mut CommandBuffer) -> lvk::Resul
 
 /// A command before it is recorded.
 pub struct Planned {
+    pub kind: Kind,
     pub action: Action,
     pub problems: Vec<Problem>,
     pub effects: Vec<Effect>,
@@ -27,7 +28,7 @@ impl Planned {
         effects: Vec<Effect>,
         action: impl FnOnce(&Environment, &mut CommandBuffer) -> lvk::Result<()> + Send + 'static,
     ) -> Self {
-        Self { action: Box::new(action), problems, effects }
+        Self { kind: Kind::Label, action: Box::new(action), problems, effects }
     }
 }
 
@@ -69,6 +70,13 @@ pub fn region(info: &super::image::Part, n: [u16; 2]) -> TextureRegion {
 impl World<'_> {
     /// Plans a command for the open command buffer `at`. `None` if there are no objects for it.
     pub fn plan(&mut self, op: &Op, at: usize) -> Option<Planned> {
+        let planned = self.plan_kind(op, at)?;
+        let expected = |effect| self.env.expected(op.kind, effect);
+        let effects = planned.effects.into_iter().map(expected).collect();
+        Some(Planned { kind: op.kind, effects, ..planned })
+    }
+
+    fn plan_kind(&mut self, op: &Op, at: usize) -> Option<Planned> {
         let n = op.n;
         let queue = self.open[at].queue;
         match op.kind {
@@ -90,12 +98,23 @@ impl World<'_> {
             Kind::StoreImage => self.store_image(n, queue),
             Kind::FetchTexture => self.fetch_texture(n, queue),
             Kind::Draw => self.draw(n, queue),
-            Kind::Timestamp => self.timestamp(n, queue),
+            Kind::Timestamp => self.timestamp(n, at),
             Kind::MoveTriangle => self.move_triangle(n),
             Kind::BuildBlas => self.build_blas(n, at),
             Kind::UpdateTlas => self.update_tlas(n, at),
             Kind::Trace => self.trace(n, queue),
             Kind::TraceRays => self.trace_rays(n, queue),
+            Kind::DrawIndexed => self.draw_indexed(n, queue),
+            Kind::DrawIndirect => self.draw_indirect(n, queue),
+            Kind::DrawCounted => self.draw_counted(n, queue),
+            Kind::DrawMesh => self.draw_mesh(n, queue),
+            Kind::DrawDepth => self.draw_depth(n, queue),
+            Kind::DrawSamples => self.draw_samples(n, queue),
+            Kind::SampleTexture => self.sample_texture(n, queue),
+            Kind::WriteTime => self.write_time(n, at),
+            Kind::CountSamples => self.count_samples(n, at),
+            Kind::UpdateTlasFromBuffer => self.update_tlas_from_buffer(n, at),
+            Kind::WrongStructure => self.wrong_structure(n, queue),
             _ => Some(Planned::new(Vec::new(), Vec::new(), move |_, cmd| {
                 match n[0] % 3 {
                     0 => cmd.push_label("part"),
@@ -180,10 +199,9 @@ impl World<'_> {
         }
         debug_assert!(!inside || fits);
         let word = pattern_word(n[4], 0);
-        let expected = if self.env.lies() { pattern_word(n[4] + 1, 0) } else { word };
         let effects = match buffer.live {
             Some(number) if problems.is_empty() => {
-                let bytes = expected.repeat(size as usize / 4);
+                let bytes = word.repeat(size as usize / 4);
                 vec![Effect::Bytes { buffer: number, offset: offset as usize, bytes }]
             }
             _ => Vec::new(),
@@ -334,19 +352,6 @@ impl World<'_> {
                 [to.count as u32, 1, 1],
                 &Dependencies { buffers: &[to.handle], ..Default::default() },
             )
-        }))
-    }
-
-    fn timestamp(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
-        if queue != Queue::Graphics {
-            return None;
-        }
-        let query = u32::from(n[0] % 5);
-        let problems = if query < 4 { Vec::new() } else { vec![Problem::Usage] };
-        let pool = *self.queries;
-        Some(Planned::new(problems, Vec::new(), move |_, cmd| {
-            cmd.reset_queries(pool, query..query + 1)?;
-            cmd.write_timestamp(pool, query)
         }))
     }
 }

@@ -19,7 +19,7 @@ pub fn triangle_depth(n: u16) -> u32 {
 }
 
 /// Returns a mode: rebuild, refit, or either.
-fn mode(n: u16) -> BuildMode {
+pub(super) fn mode(n: u16) -> BuildMode {
     match n % 3 {
         0 => BuildMode::Rebuild,
         1 => BuildMode::Refit,
@@ -84,7 +84,7 @@ impl World<'_> {
     }
 
     /// Notes the versions of BLAS that a command uses.
-    fn note_versions(&mut self, at: usize, used: impl Iterator<Item = usize>) {
+    pub(super) fn note_versions(&mut self, at: usize, used: impl Iterator<Item = usize>) {
         for blas in used {
             let version = self.memory.blas[blas].version;
             self.open[at].blas.entry(blas).or_insert(version);
@@ -129,30 +129,44 @@ impl World<'_> {
         problems.extend(others);
         let mode = mode(n[4]);
         let count = raw.len() as u32;
-        let mut effects = Vec::new();
-        if let Some(number) = tlas.live {
-            let info = self.tlas[number].info;
-            if count > info.capacity {
-                problems.push(Problem::Limit);
-            }
-            let before = self.open[at].tlas.get(&number).copied();
-            let is_same = before.map_or(info.count, |open| open.count) == count;
-            if mode == BuildMode::Refit && !(info.is_updatable && is_same) {
-                problems.push(Problem::Usage);
-            }
-            if problems.is_empty() {
-                self.note_versions(at, known.iter().map(|instance| instance.blas));
-                let refits = mode != BuildMode::Rebuild && info.is_updatable && is_same;
-                let expected = match before {
-                    Some(open) => open.expected,
-                    None => refits.then_some(count),
-                };
-                self.open[at].tlas.insert(number, OpenTlas { count, expected });
-                effects.push(Effect::Place { tlas: number, instances: known });
-            }
-        }
+        let effects = match tlas.live {
+            Some(number) => self.place_instances(number, at, (known, count), mode, &mut problems),
+            None => Vec::new(),
+        };
         let handle = tlas.handle;
         Some(Planned::new(problems, effects, move |_, cmd| cmd.update_tlas(handle, &raw, mode)))
+    }
+
+    /// Returns the effect of an update of a TLAS with these instances and their number, and notes the update. Adds its
+    /// problems; with any there is no effect.
+    pub(super) fn place_instances(
+        &mut self,
+        tlas: usize,
+        at: usize,
+        (known, count): (Vec<Instance>, u32),
+        mode: BuildMode,
+        problems: &mut Vec<Problem>,
+    ) -> Vec<Effect> {
+        let info = self.tlas[tlas].info;
+        if count > info.capacity {
+            problems.push(Problem::Limit);
+        }
+        let before = self.open[at].tlas.get(&tlas).copied();
+        let is_same = before.map_or(info.count, |open| open.count) == count;
+        if mode == BuildMode::Refit && !(info.is_updatable && is_same) {
+            problems.push(Problem::Usage);
+        }
+        if !problems.is_empty() {
+            return Vec::new();
+        }
+        self.note_versions(at, known.iter().map(|instance| instance.blas));
+        let refits = mode != BuildMode::Rebuild && info.is_updatable && is_same;
+        let expected = match before {
+            Some(open) => open.expected,
+            None => refits.then_some(count),
+        };
+        self.open[at].tlas.insert(tlas, OpenTlas { count, expected });
+        vec![Effect::Place { tlas, instances: known }]
     }
 
     pub(super) fn trace(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {

@@ -13,7 +13,7 @@ use super::plan::{Planned, compute_problems, graphics_problems, range, region};
 use super::world::{Picked, Problem, TextureInfo, World};
 
 /// Returns the bytes of a texel with a seed, and the word that shaders write for it.
-fn texel(format: Format, seed: u16) -> (Vec<u8>, u32) {
+pub(super) fn texel(format: Format, seed: u16) -> (Vec<u8>, u32) {
     let bytes = pattern(seed, 4);
     let word = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     (bytes[..texel_bytes(format)].to_vec(), word)
@@ -31,7 +31,7 @@ fn clear_value(format: Format, seed: u16) -> ClearValue {
 }
 
 /// Returns the operation that clears a target to [`texel`] of a seed, or loads it.
-fn load_op(format: Format, seed: Option<u16>) -> ColorLoadOp {
+pub(super) fn load_op(format: Format, seed: Option<u16>) -> ColorLoadOp {
     match seed.map(|seed| clear_value(format, seed)) {
         Some(ClearValue::Uint(value)) => ColorLoadOp::ClearUint(value),
         Some(ClearValue::Color(value)) => ColorLoadOp::Clear(value),
@@ -44,11 +44,17 @@ fn is_uint(format: Format) -> bool {
 }
 
 impl World<'_> {
-    fn info(&self, texture: &Picked<TextureHandle>) -> Option<&TextureInfo> {
+    pub(super) fn info(&self, texture: &Picked<TextureHandle>) -> Option<&TextureInfo> {
         texture.live.map(|number| &self.textures[number].info)
     }
 
-    /// Returns a region of a texture, its place if it exists, and the problems so far.
+    /// True for volumes. Copies and blits between textures leave them out.
+    pub(super) fn is_volume(&self, texture: &Picked<TextureHandle>) -> bool {
+        self.info(texture).is_some_and(|info| info.is_volume)
+    }
+
+    /// Returns a region of a texture, its place if it exists, and the problems so far. Slices of volumes are layers of the
+    /// place.
     pub(super) fn place(
         &self,
         texture: &Picked<TextureHandle>,
@@ -57,8 +63,12 @@ impl World<'_> {
         let Some(info) = self.info(texture) else {
             return (TextureRegion::default(), None, texture.problem.into_iter().collect());
         };
-        let region = region(&info.part, n);
+        let mut region = region(&info.part, n);
         let place = info.part.place(&region);
+        if info.is_volume {
+            (region.z, region.depth) = (region.layer, region.layers);
+            (region.layer, region.layers) = (0, 1);
+        }
         (region, place, if place.is_some() { Vec::new() } else { vec![Problem::Usage] })
     }
 
@@ -134,6 +144,9 @@ impl World<'_> {
 
     pub(super) fn copy_texture(&self, n: [u16; 6]) -> Option<Planned> {
         let (source, target) = (self.pick_texture(n[0])?, self.pick_texture(n[1])?);
+        if self.is_volume(&source) || self.is_volume(&target) {
+            return None;
+        }
         let (from, from_place, mut problems) = self.place(&source, [n[2], n[3]]);
         let (mut to, _, _) = self.place(&target, [n[4], n[5]]);
         problems.extend(target.problem);
@@ -179,7 +192,10 @@ impl World<'_> {
         let (bytes, _) = texel(format, n[5]);
         let places = info.and_then(|info| {
             let mips = count(range.base_mip, range.mips, info.part.mips)?;
-            let layers = count(range.base_layer, range.layers, info.part.layers)?;
+            // A volume has one layer, with all slices.
+            let whole = if info.is_volume { 1 } else { info.part.layers };
+            let layers = count(range.base_layer, range.layers, whole)?;
+            let layers = if info.is_volume { info.part.layers } else { layers };
             let layer = info.part.base_layer + range.base_layer;
             let place = |mip| Place { layer, layers, ..info.part.whole(mip) };
             Some((range.base_mip..range.base_mip + mips).map(place).collect::<Vec<_>>())
@@ -200,6 +216,9 @@ impl World<'_> {
     /// Plans a blit of one size or of twice the size, to the nearest texel. Conversions are not modelled.
     pub(super) fn blit(&self, n: [u16; 6], queue: Queue) -> Option<Planned> {
         let (source, target) = (self.pick_texture(n[0])?, self.pick_texture(n[1])?);
+        if self.is_volume(&source) || self.is_volume(&target) {
+            return None;
+        }
         let (from, from_place, from_problems) = self.place(&source, [n[2], n[3]]);
         let (mut to, mut to_place, _) = self.place(&target, [n[4], n[5]]);
         let mut problems = graphics_problems(queue, [target.problem]);
@@ -260,7 +279,11 @@ impl World<'_> {
     }
 
     /// Chooses a texture that is an element of the arrays of 2D textures, and the problem of one without `usage`.
-    fn flat_texture(&self, n: u16, usage: TextureUsage) -> Option<(Picked<TextureHandle>, Option<Problem>)> {
+    pub(super) fn flat_texture(
+        &self,
+        n: u16,
+        usage: TextureUsage,
+    ) -> Option<(Picked<TextureHandle>, Option<Problem>)> {
         let texture = self.pick_texture(n)?;
         let info = self.info(&texture);
         if info.is_some_and(|info| info.is_array) {
@@ -341,8 +364,8 @@ impl World<'_> {
         if lack && place.is_none() {
             return None;
         }
-        let only_extent_is_wrong =
-            info.is_some_and(|info| region.mip < info.part.mips && region.layer < info.part.layers);
+        let only_extent_is_wrong = info
+            .is_some_and(|info| region.mip < info.part.mips && region.layer + region.z < info.part.layers);
         // A wrong rectangle is refused after the pass has begun, which clears.
         let clears = n[5] & 1 == 1;
         if place.is_none() && only_extent_is_wrong && (clears || region.extent[0] == 0) {
@@ -364,7 +387,8 @@ impl World<'_> {
             _ => Vec::new(),
         };
         let load = load_op(format, clears.then_some(n[3]));
-        let TextureRegion { mip, layer, offset, extent, .. } = region;
+        let TextureRegion { mip, offset, extent, .. } = region;
+        let layer = region.layer + region.z;
         let target =
             ColorAttachment { texture: texture.handle, mip, layer, load, store: true, resolve: None };
         Some(Planned::new(problems, effects, move |env, cmd| {

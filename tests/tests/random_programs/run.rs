@@ -10,6 +10,7 @@ use lvk_tests::random::Random;
 use super::cell::compare;
 use super::environment::Environment;
 use super::op::{Kind, Op};
+use super::queries::OpenQueries;
 use super::world::{Object, Open, Problem, Tally, World, judge, pick};
 
 /// Most command buffers that are recorded at once.
@@ -37,6 +38,9 @@ pub fn run(env: &Environment, ops: &[Op]) -> Result<Tally, Failure> {
         for op in ops {
             if world.step(op).map_err(|message| format!("{op:?}: {message}"))? {
                 world.tally.executed += 1;
+                if !world.has_recorded_problems {
+                    world.record_problems(&[]);
+                }
             }
             at += 1;
         }
@@ -55,6 +59,7 @@ impl World<'_> {
     /// Runs an operation. Returns false if it had no objects to work on.
     fn step(&mut self, op: &Op) -> Result<bool, String> {
         let n = op.n;
+        (self.kind, self.has_recorded_problems) = (op.kind, false);
         match op.kind {
             Kind::CreateBuffer => self.create_buffer(n),
             Kind::DestroyBuffer => self.destroy_buffer(n),
@@ -85,7 +90,18 @@ impl World<'_> {
             Kind::Acquire => self.acquire(n),
             Kind::Submit => self.submit(n),
             Kind::DropCommands => self.drop_commands(n),
-            Kind::RecordOnThreads => self.record_on_threads(n),
+            Kind::RecordOnThreads => self.record_on_threads(n, Op::random_recorded),
+            Kind::RecordAnyOnThreads => self.record_on_threads(n, Op::random_recorded_of_any_kind),
+            Kind::MapBuffer => self.map_buffer(n),
+            Kind::CreateBlasBatch => self.create_blas_batch(n),
+            Kind::CompactSeveral => self.compact_several(n),
+            Kind::AskAccel => self.ask_accel(n),
+            Kind::AskContext => self.ask_context(n),
+            Kind::AskRaw => self.ask_raw(n),
+            Kind::CreateNearestSampler => self.create_nearest_sampler(n),
+            Kind::CreateCube => self.create_solid(n, false),
+            Kind::CreateVolume => self.create_solid(n, true),
+            Kind::ReadQueries => self.read_queries(n),
             Kind::Wait => self.wait(n),
             Kind::IsDone => self.is_done(n),
             Kind::WaitIdle => self.wait_idle(),
@@ -106,8 +122,19 @@ impl World<'_> {
     }
 
     fn open_commands(&mut self, queue: Queue) -> Result<(), String> {
-        let cmd = self.ctx().acquire_command_buffer_on(queue).map_err(|error| error.to_string())?;
-        self.open.push(Open { cmd, queue, effects: Vec::new(), tlas: HashMap::new(), blas: HashMap::new() });
+        let mut cmd = self.ctx().acquire_command_buffer_on(queue).map_err(|error| error.to_string())?;
+        cmd.set_debug_name("random commands");
+        if cmd.queue() != queue {
+            return Err(format!("the command buffer is for {:?}, not for {queue:?}", cmd.queue()));
+        }
+        self.open.push(Open {
+            cmd,
+            queue,
+            effects: Vec::new(),
+            tlas: HashMap::new(),
+            blas: HashMap::new(),
+            queries: OpenQueries::default(),
+        });
         Ok(())
     }
 
@@ -140,6 +167,7 @@ impl World<'_> {
                 problems.push(Problem::Usage);
             }
         }
+        problems.extend(open.queries.problem(&self.memory.queries));
         let is_overtaken = self.is_overtaken(&open);
         let sent = match n[1] % 4 {
             0 => self.ctx().submit_in_background(open.cmd),
@@ -177,17 +205,18 @@ impl World<'_> {
     }
 
     /// Records several commands into each open command buffer, each on a thread of its own.
-    fn record_on_threads(&mut self, n: [u16; 6]) -> Result<bool, String> {
+    fn record_on_threads(&mut self, n: [u16; 6], random_op: fn(&mut Random) -> Op) -> Result<bool, String> {
         while self.open.len() < 2 {
             self.open_commands(Queue::Graphics)?;
         }
         let mut random = Random::new(u64::from(n[0]) << 16 | u64::from(n[1]));
         let mut plans: Vec<Vec<_>> = Vec::new();
         for at in 0..self.open.len() {
-            let ops: Vec<Op> = (0..2 + n[2] % 8).map(|_| Op::random_recorded(&mut random)).collect();
+            let ops: Vec<Op> = (0..2 + n[2] % 8).map(|_| random_op(&mut random)).collect();
             plans.push(ops.iter().filter_map(|op| self.plan(op, at)).collect());
         }
         let planned = || plans.iter().flatten();
+        planned().for_each(|planned| self.tally.record_problems(planned.kind, &planned.problems));
         self.tally.executed += planned().count() as u64;
         self.tally.refused += planned().filter(|planned| !planned.problems.is_empty()).count() as u64;
         let env = self.env;
@@ -322,7 +351,8 @@ impl World<'_> {
                 compare(&format!("mip {mip} of texture {number} at the end"), &bytes, &expected)?;
             }
         }
-        let (env, tally) = (self.env, Tally { hits: self.memory.hits, ..self.tally });
+        judge(self.ctx().set_profiling(false), &[])?;
+        let (env, tally) = (self.env, Tally { hits: self.memory.hits, ..std::mem::take(&mut self.tally) });
         drop(self);
         env.check_messages()?;
         Ok(tally)

@@ -14,7 +14,7 @@ use super::run::{Failure, run};
 use super::shrink::shrink;
 use super::threads::{TRIES, report, run_and_check};
 use super::watchdog::Watchdog;
-use super::world::Tally;
+use super::world::{Problem, Tally};
 
 /// Operations of a program.
 const LENGTH: usize = 400;
@@ -22,6 +22,28 @@ const LENGTH: usize = 400;
 const BOUNDED_SEEDS: u64 = 400;
 /// Programs of the bounded test by lowered pipelines, which take longer to create.
 const LOWERED_SEEDS: u64 = 60;
+/// Most programs that are tried with a model that is wrong about one kind.
+const MOST_TRIED: u64 = 60;
+/// Operations about which the model may be wrong, beside fills.
+const EFFECTS: [Kind; 17] = [
+    Kind::MapBuffer,
+    Kind::CreateBlasBatch,
+    Kind::DrawIndexed,
+    Kind::DrawIndirect,
+    Kind::DrawCounted,
+    Kind::DrawMesh,
+    Kind::DrawDepth,
+    Kind::DrawSamples,
+    Kind::SampleTexture,
+    Kind::WriteTime,
+    Kind::CountSamples,
+    Kind::UpdateTlasFromBuffer,
+    Kind::Draw,
+    Kind::BuildBlas,
+    Kind::UpdateTlas,
+    Kind::Trace,
+    Kind::CopyBuffer,
+];
 /// Programs after which objects and memory are counted.
 const CHECKED_EVERY: u64 = 16;
 /// Runs the programs of seeds one after the other. Returns what they have done.
@@ -107,8 +129,36 @@ fn random_programs_do_what_the_model_says() {
             let programs = BOUNDED_SEEDS;
             assert!(total.executed > programs * LENGTH as u64 / 2, "most operations find nothing to work on");
             assert!(total.refused > 5 * programs && total.hits > 5 * programs, "errors or rays are too rare");
+            assert_eq!(unseen(&total), [], "no program has these kinds with these problems");
         }
     });
+}
+
+/// Returns what the bounded programs must have: every kind without a problem, and BLAS that calls and commands refuse,
+/// one by one and in lists. What needs a feature is left out.
+fn unseen(total: &Tally) -> Vec<(Kind, Option<Problem>)> {
+    const WITHOUT_PROBLEM: [Kind; 6] = [
+        Kind::CreateRays,
+        Kind::DestroyRays,
+        Kind::TraceRays,
+        Kind::DrawMesh,
+        Kind::DrawCounted,
+        Kind::WrongStructure,
+    ];
+    const OF_BLAS: [Kind; 9] = [
+        Kind::CreateTlas,
+        Kind::UpdateTlas,
+        Kind::UpdateTlasFromBuffer,
+        Kind::BuildBlas,
+        Kind::Compact,
+        Kind::CompactSeveral,
+        Kind::AccelInfo,
+        Kind::AskAccel,
+        Kind::WrongStructure,
+    ];
+    let kinds = Kind::all().filter(|kind| !WITHOUT_PROBLEM.contains(kind)).map(|kind| (kind, None));
+    let of_blas = |kind| [Problem::Stale, Problem::Foreign].map(|problem| (kind, Some(problem)));
+    kinds.chain(OF_BLAS.into_iter().flat_map(of_blas)).filter(|wanted| !total.seen.contains(wanted)).collect()
 }
 
 #[test]
@@ -148,15 +198,36 @@ fn an_empty_program_leaves_nothing() {
 #[test]
 fn a_wrong_model_is_detected_and_the_program_shrunk() {
     let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
-    env.lies_from = Some(1);
+    env.wrong_about = Some((Kind::FillBuffer, 1));
     let failing = (0..).map(|seed| program(seed, LENGTH)).find(|ops| run(&env, ops).is_err());
     let Some(ops) = failing else { return };
     let small = shrink(&ops, TRIES, |ops| run(&env, ops).is_err());
     assert!(small.len() <= 3, "{small:#?}");
     assert!(small.iter().any(|op| op.kind == Kind::FillBuffer), "{small:#?}");
     assert!(small.iter().any(|op| op.kind == Kind::CreateBuffer), "{small:#?}");
-    env.lies_from = None;
+    env.wrong_about = None;
     assert!(run(&env, &small).is_ok(), "the library itself is right");
+}
+
+/// A model that is wrong about any other operation with an effect is found out too.
+#[test]
+fn a_wrong_model_of_each_operation_is_detected() {
+    let Some(mut env) = Environment::new(lvk::QueueRequest::OwnHardware) else { return };
+    let caps = env.ctx().capabilities();
+    let has = |kind| match kind {
+        Kind::DrawMesh => caps.mesh_shader,
+        Kind::DrawCounted => caps.has(lvk::OptionalFeature::DrawIndirectCount),
+        _ => true,
+    };
+    let kinds: Vec<Kind> = EFFECTS.into_iter().filter(|kind| has(*kind)).collect();
+    for kind in kinds {
+        env.wrong_about = Some((kind, 1));
+        let failing = (0..MOST_TRIED).find(|seed| run(&env, &program(*seed, LENGTH)).is_err());
+        assert!(
+            failing.is_some(),
+            "no program of {MOST_TRIED} finds out that the model of {kind:?} is wrong"
+        );
+    }
 }
 
 fn number(variable: &str, default: u64) -> u64 {

@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn a_wrong_model_beside_other_threads_is_detected_and_the_program_shrunk() {
         let Some(mut env) = Environment::new(QueueRequest::OwnHardware) else { return };
-        env.lies_from = Some(2);
+        env.wrong_about = Some((Kind::FillBuffer, 2));
         let of_thread = |thread: u8| {
             let ops = program(u64::from(thread), 300).into_iter();
             ops.map(move |op| Op { thread, ..op })
@@ -103,7 +103,7 @@ mod tests {
         assert!(small.len() <= 4, "{small:#?}");
         assert!(small.iter().any(|op| op.kind == Kind::FillBuffer), "{small:#?}");
         assert!(small.iter().any(|op| op.thread != small[0].thread), "{small:#?}");
-        env.lies_from = None;
+        env.wrong_about = None;
         assert!(run_and_check(&env, &small).is_ok(), "the library itself is right");
     }
 }

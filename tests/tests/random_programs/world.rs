@@ -1,22 +1,26 @@
 //! The objects of a program beside what the model knows of them, and the outcomes that calls must have.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use lvk::{
-    AccelStructHandle, BufferHandle, BufferUsage, CommandBuffer, Context, Destroy, Error, Format, Holder,
-    MemoryKind, QueryPoolHandle, Queue, RayTracingPipelineHandle, Readback, SamplerHandle, SubmitHandle,
+    AccelStructHandle, AddressMode, BufferHandle, BufferUsage, CommandBuffer, Context, Destroy, Error,
+    Format, Holder, MemoryKind, Queue, RayTracingPipelineHandle, Readback, SamplerHandle, SubmitHandle,
     TextureHandle, TextureUsage,
 };
 
 use super::cell::Cell;
+use super::draw_items::INPUT_BYTES;
 use super::environment::Environment;
 use super::image::Part;
 use super::memory::{Effect, Memory};
+use super::op::Kind;
 use super::plan::Planned;
 use super::plan_pipelines::RaysInfo;
+use super::plan_records::RECORD_BYTES;
+use super::queries::{OpenQueries, QueryPools};
 
 /// Reason why a call must fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Problem {
     /// The object of a handle was destroyed.
     Stale,
@@ -139,6 +143,9 @@ pub struct TextureInfo {
     pub format: Format,
     pub usage: TextureUsage,
     pub is_array: bool,
+    pub is_cube: bool,
+    /// True for volumes, whose slices are the layers of the model. They have one mip.
+    pub is_volume: bool,
 }
 
 /// Properties of a BLAS in the model. The number of the BLAS is that of its contents.
@@ -169,6 +176,8 @@ pub struct Open {
     pub tlas: HashMap<usize, OpenTlas>,
     /// The BLAS that its commands build or reference, with their versions when the first was recorded.
     pub blas: HashMap<usize, u32>,
+    /// Queries that its commands write.
+    pub queries: OpenQueries,
 }
 
 /// Updates of a TLAS in a command buffer.
@@ -187,7 +196,7 @@ pub struct Pending {
 }
 
 /// Counts of executed and refused operations.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Default, Clone, PartialEq, Eq)]
 pub struct Tally {
     /// Operations that had objects to work on.
     pub executed: u64,
@@ -195,6 +204,18 @@ pub struct Tally {
     pub refused: u64,
     /// Rays that had to hit a triangle.
     pub hits: u64,
+    /// Kinds of operations, each with the problems that their arguments had, and with none.
+    pub seen: HashSet<(Kind, Option<Problem>)>,
+}
+
+impl Tally {
+    /// Records the problems of an operation.
+    pub fn record_problems(&mut self, kind: Kind, problems: &[Problem]) {
+        self.seen.extend(problems.iter().map(|problem| (kind, Some(*problem))));
+        if problems.is_empty() {
+            self.seen.insert((kind, None));
+        }
+    }
 }
 
 impl std::ops::AddAssign for Tally {
@@ -202,12 +223,13 @@ impl std::ops::AddAssign for Tally {
         self.executed += other.executed;
         self.refused += other.refused;
         self.hits += other.hits;
+        self.seen.extend(other.seen);
     }
 }
 
 impl std::fmt::Display for Tally {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { executed, refused, hits } = self;
+        let Self { executed, refused, hits, .. } = self;
         write!(out, "{executed} operations, {refused} of them refused commands, {hits} rays with hits")
     }
 }
@@ -218,7 +240,8 @@ pub struct World<'a> {
     pub memory: Memory,
     pub buffers: Vec<Object<BufferHandle, BufferInfo>>,
     pub textures: Vec<Object<TextureHandle, TextureInfo>>,
-    pub samplers: Vec<Object<SamplerHandle, ()>>,
+    /// Samplers, those that take the nearest texel with their address mode.
+    pub samplers: Vec<Object<SamplerHandle, Option<AddressMode>>>,
     pub meshes: Vec<Object<BufferHandle, usize>>,
     pub blas: Vec<Object<AccelStructHandle, BlasInfo>>,
     pub tlas: Vec<Object<AccelStructHandle, TlasInfo>>,
@@ -228,24 +251,35 @@ pub struct World<'a> {
     pub pending: Vec<Pending>,
     /// Arguments of indirect dispatches.
     pub arguments: Holder<BufferHandle>,
-    pub queries: Holder<QueryPoolHandle>,
+    /// Vertices, indices and arguments of draws: those that copies write, and those that dispatches write.
+    pub draw_inputs: [Holder<BufferHandle>; 2],
+    /// Number of draws.
+    pub draw_number: Holder<BufferHandle>,
+    /// Instances of TLAS.
+    pub records: Holder<BufferHandle>,
+    pub queries: QueryPools,
     /// Counts so far.
     pub tally: Tally,
+    /// Kind of the operation that runs.
+    pub kind: Kind,
+    /// True if its problems are recorded.
+    pub has_recorded_problems: bool,
 }
 
 impl<'a> World<'a> {
     /// Returns the state in which a program begins.
     pub fn new(env: &'a Environment) -> lvk::Result<Self> {
-        let arguments = lvk::BufferDesc {
-            size_bytes: 16,
-            usage: BufferUsage::INDIRECT,
-            debug_name: "arguments",
-            ..Default::default()
+        let own = |debug_name, size_bytes, usage| {
+            let desc = lvk::BufferDesc { size_bytes, usage, debug_name, ..Default::default() };
+            env.ctx().create_buffer(&desc)
         };
-        let queries = lvk::QueryPoolDesc { count: 4, debug_name: "times", ..Default::default() };
+        let inputs = BufferUsage::VERTEX | BufferUsage::INDEX | BufferUsage::INDIRECT;
         Ok(Self {
-            arguments: env.ctx().create_buffer(&arguments)?,
-            queries: env.ctx().create_query_pool(&queries)?,
+            arguments: own("arguments", 16, BufferUsage::INDIRECT)?,
+            draw_inputs: [own("copied", INPUT_BYTES, inputs)?, own("dispatched", INPUT_BYTES, inputs)?],
+            draw_number: own("number of draws", 8, BufferUsage::INDIRECT)?,
+            records: own("instances", RECORD_BYTES, BufferUsage::STORAGE)?,
+            queries: QueryPools::new(env.ctx())?,
             env,
             memory: Memory::default(),
             buffers: Vec::new(),
@@ -259,6 +293,8 @@ impl<'a> World<'a> {
             submitted: Vec::new(),
             pending: Vec::new(),
             tally: Tally::default(),
+            kind: Kind::Label,
+            has_recorded_problems: false,
         })
     }
 
@@ -299,7 +335,8 @@ impl<'a> World<'a> {
 
     /// Records a planned command into an open command buffer.
     pub fn record(&mut self, at: usize, planned: Planned) -> Result<(), String> {
-        let Planned { action, problems, effects } = planned;
+        let Planned { kind, action, problems, effects } = planned;
+        self.tally.record_problems(kind, &problems);
         let (env, open) = (self.env, &mut self.open[at]);
         match judge(action(env, &mut open.cmd), &problems)? {
             Some(()) => open.effects.extend(effects),
