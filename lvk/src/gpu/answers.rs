@@ -98,7 +98,8 @@ mod tests {
             });
             assert_eq!((first, calls), (Err(error), 1));
             let mut driver = driver(&[3]);
-            let second = listed(|count, list| if list.is_null() { driver(count, list) } else { error });
+            let second =
+                listed(|count, list: *mut u32| if list.is_null() { driver(count, list) } else { error });
             assert_eq!(second, Err(error));
         }
     }
@@ -106,7 +107,7 @@ mod tests {
     /// A driver that announces more entries than the host has memory for.
     #[test]
     fn a_list_beyond_the_hosts_memory_is_an_error() {
-        let answer = listed(|count, list: *mut [u64; 1 << 20]| {
+        let answer = listed(|count, list: *mut [[[u64; 32]; 32]; 32]| {
             assert!(list.is_null());
             *count = u32::MAX;
             vk::Result::SUCCESS
