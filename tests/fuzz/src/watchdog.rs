@@ -2,7 +2,6 @@
 //!
 //! What counts is the time that the processor worked for the thread of a read, which other work of the machine does not lengthen.
 //! A read that waits takes none, so the clock counts too, for a multiple of that time.
-#![expect(clippy::disallowed_types, reason = "no lock of the library")]
 
 use std::io::Write as _;
 use std::path::PathBuf;
