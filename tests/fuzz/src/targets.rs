@@ -89,8 +89,9 @@ fn loads_with_mtl(bytes: &[u8]) -> bool {
     /// The smallest BMP: one texel.
     const IMAGE: &[u8] = b"BM\x3a\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0\0\0\0\0\
         \x04\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x10\x20\x30\0";
-    // Without a camera, most of the time goes into a search for views, which depends on the mesh alone.
-    const CAMERAS: &[u8] = b"scene mesh 1 2 3\nsun 0 1 0.5\nat 0 0 5 0 0 0 60\n";
+    // With fewer cameras, most of the time goes into a search for views, which depends on the mesh alone.
+    const CAMERAS: &[u8] = b"scene mesh 1 2 3\nat 0 0 5 0 0 0 60\nat 0 0 4 0 0 0 60\nat 0 0 3 0 0 0 60\n\
+        at 0 0 2 0 0 0 60\nat 0 0 1 0 0 0 60\n";
     let files = [("mesh.obj", MESH), ("a.mtl", bytes), ("t.bmp", IMAGE), ("cameras.txt", CAMERAS)];
     let mut is_loaded = false;
     with_files(&files, |folder| {
