@@ -1,5 +1,7 @@
 //! Queries of texture formats and texture support.
 
+use ash::vk;
+
 use super::Context;
 use super::create_texture::check_data_size;
 use crate::error::Result;
@@ -16,7 +18,11 @@ const DEPTH_STENCIL: [Format; 2] = [Format::D32FloatS8, Format::D24UnormS8];
 
 impl Context {
     /// Returns the uses of 2D textures of a format that the device supports (`vkGetPhysicalDeviceFormatProperties`).
-    pub fn format_support(&self, format: Format) -> FormatSupport {
+    ///
+    /// # Errors
+    /// Those of `vkGetPhysicalDeviceImageFormatProperties`, such as [`Error::OutOfHostMemory`](crate::Error::OutOfHostMemory), which
+    /// say nothing about the format.
+    pub fn format_support(&self, format: Format) -> Result<FormatSupport> {
         FormatSupport::new(&self.device_state().gpu, format)
     }
 
@@ -38,12 +44,11 @@ impl Context {
     }
 
     /// Returns the best depth format, with or without stencil, that can be rendered to and sampled on this device.
-    /// `None` if there is none.
+    /// `None` if there is none (`vkGetPhysicalDeviceFormatProperties`).
     pub fn depth_format(&self, stencil: bool) -> Option<Format> {
         let formats: &[Format] = if stencil { &DEPTH_STENCIL } else { &DEPTH };
-        formats.iter().copied().find(|format| {
-            let support = self.format_support(*format);
-            support.target && support.sampled
-        })
+        let needed = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
+        let gpu = &self.device_state().gpu;
+        formats.iter().copied().find(|format| gpu.format_features(*format).contains(needed))
     }
 }

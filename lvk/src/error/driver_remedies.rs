@@ -141,7 +141,7 @@ mod tests {
         let path = "libvulkan.so.1".into();
         let loader = match loader_error {
             Some(error) => LoaderReport::NotOpened { path, error: error.to_owned() },
-            None => LoaderReport::Opened { path, version: (1, 3, 0) },
+            None => LoaderReport::Opened { path, version: Some((1, 3, 0)) },
         };
         let manifest = |outcome: &ManifestOutcome| DriverManifest {
             path: "/d/toy.json".into(),
@@ -215,7 +215,7 @@ mod tests {
             *error = WINDOWS_126.to_owned();
         }
         assert_remedy(&named, "if /nowhere/libvulkan.so.1 exists, install the libraries that it needs");
-        named.loader = LoaderReport::Opened { path: "l".into(), version: (1, 2, 200) };
+        named.loader = LoaderReport::Opened { path: "l".into(), version: Some((1, 2, 200)) };
         assert_remedy(&named, "update the loader");
     }
 

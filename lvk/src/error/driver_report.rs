@@ -29,8 +29,8 @@ pub enum LoaderReport {
     Opened {
         /// File of the loader, or the name that was opened where the file is unknown.
         path: PathBuf,
-        /// Vulkan version of the loader: major, minor, patch.
-        version: (u32, u32, u32),
+        /// Vulkan version of the loader: major, minor, patch. `None` if `vkEnumerateInstanceVersion` failed, as for want of memory.
+        version: Option<(u32, u32, u32)>,
     },
     /// The loader could not be opened.
     NotOpened {
@@ -103,7 +103,7 @@ impl LoaderReport {
     /// True if the loader is older than Vulkan 1.3.
     #[must_use]
     pub fn is_too_old(&self) -> bool {
-        matches!(self, Self::Opened { version, .. } if *version < (1, 3, 0))
+        matches!(self, Self::Opened { version: Some(version), .. } if *version < (1, 3, 0))
     }
 }
 
@@ -179,7 +179,10 @@ impl VulkanReport {
 impl fmt::Display for LoaderReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Opened { path, version: (major, minor, patch) } => {
+            Self::Opened { path, version: None } => {
+                write!(out, "the loader {} does not tell its version", path.display())
+            }
+            Self::Opened { path, version: Some((major, minor, patch)) } => {
                 write!(out, "the loader {} offers Vulkan {major}.{minor}.{patch}", path.display())?;
                 if self.is_too_old() { out.write_str(", 1.3 is needed") } else { Ok(()) }
             }

@@ -71,7 +71,7 @@ mod tests {
     fn report(loader_opens: bool, manifests: Vec<DriverManifest>) -> DriverReport {
         let path = "libvulkan.so.1".into();
         let loader = if loader_opens {
-            LoaderReport::Opened { path, version: (1, 3, 239) }
+            LoaderReport::Opened { path, version: Some((1, 3, 239)) }
         } else {
             LoaderReport::NotOpened { path, error: "no such\n\tfile".to_owned() }
         };
@@ -147,9 +147,18 @@ mod tests {
     #[test]
     fn loader_older_than_needed_says_so() {
         let mut report = report(true, vec![nvidia(ManifestOutcome::Loaded)]);
-        report.loader = LoaderReport::Opened { path: "/lib/l.so".into(), version: (1, 2, 131) };
+        report.loader = LoaderReport::Opened { path: "/lib/l.so".into(), version: Some((1, 2, 131)) };
         let text = report.to_string();
         assert!(text.starts_with("the loader /lib/l.so offers Vulkan 1.2.131, 1.3 is needed; "), "{text}");
+    }
+
+    #[test]
+    fn loader_whose_version_is_unknown_is_not_too_old() {
+        let mut report = report(true, vec![nvidia(ManifestOutcome::Loaded)]);
+        report.loader = LoaderReport::Opened { path: "/lib/l.so".into(), version: None };
+        let text = report.to_string();
+        assert!(text.starts_with("the loader /lib/l.so does not tell its version; "), "{text}");
+        assert!(!report.loader.is_too_old() && !text.contains("update the loader"), "{text}");
     }
 
     #[test]

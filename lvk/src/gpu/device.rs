@@ -114,6 +114,8 @@ struct DeviceParts {
     memory: DeviceMemory,
     fragment_sizes: Vec<FragmentSize>,
     queues: Queues,
+    /// True if objects get names.
+    is_named: bool,
     is_external: bool,
 }
 
@@ -133,6 +135,7 @@ fn fragment_sizes(
 impl Gpu {
     pub(crate) fn new(instance: Instance, request: &DeviceRequest<'_>) -> Result<Self> {
         let chosen = choose_device(&instance, request)?;
+        let is_named = should_name_objects(&instance, &chosen, request.debug_names)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
         let prepared = DeviceMemory::new(&instance.raw, &device, chosen.raw)
             .and_then(|memory| Ok((memory, fragment_sizes(&instance, chosen.raw, &caps)?)));
@@ -149,8 +152,17 @@ impl Gpu {
             (unsafe { device.get_device_queue(family, index) }, family)
         });
         let queues = Queues::new(raw, request.queues);
-        let made = DeviceParts { device, caps, features, memory, fragment_sizes, queues, is_external: false };
-        let mut gpu = Self::from_parts(instance, chosen.raw, made, request.debug_names);
+        let made = DeviceParts {
+            device,
+            caps,
+            features,
+            memory,
+            fragment_sizes,
+            queues,
+            is_named,
+            is_external: false,
+        };
+        let mut gpu = Self::from_parts(instance, chosen.raw, made);
         gpu.profile = request.profile.cloned().unwrap_or_default();
         gpu.extra_capabilities = request.extra.capabilities().to_vec();
         Ok(gpu)
@@ -189,18 +201,15 @@ impl Gpu {
             caps,
             features,
             queues: Queues::new(given, request.queues),
+            is_named: should_name_objects(&instance, &chosen, request.debug_names)?,
             is_external: true,
         };
-        Ok(Self::from_parts(instance, chosen.raw, made, request.debug_names))
+        Ok(Self::from_parts(instance, chosen.raw, made))
     }
 
-    fn from_parts(
-        instance: Instance,
-        physical: vk::PhysicalDevice,
-        made: DeviceParts,
-        debug_names: Option<bool>,
-    ) -> Self {
-        let DeviceParts { device, mut caps, features, memory, fragment_sizes, queues, is_external } = made;
+    fn from_parts(instance: Instance, physical: vk::PhysicalDevice, made: DeviceParts) -> Self {
+        let DeviceParts { device, mut caps, features, memory, fragment_sizes, queues, is_named, is_external } =
+            made;
         let raw = &instance.raw;
         let structures = caps.builds_device_structures();
         let host_copies = HostImageCopy::new(raw, &device, physical, &caps);
@@ -228,8 +237,7 @@ impl Gpu {
             windows: super::start::surface::WindowFunctions::new(&instance, &device, |feature| {
                 caps.has(feature)
             }),
-            debug_utils: should_name_objects(&instance, physical, debug_names)
-                .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
+            debug_utils: is_named.then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             memory: Mutex::new(Rank::Memory, Some(memory)),
@@ -389,9 +397,17 @@ impl Drop for Gpu {
 
 /// True if objects get names: as requested by the caller, or else if the validation layer or a debugger reads
 /// them.
-fn should_name_objects(instance: &Instance, device: vk::PhysicalDevice, requested: Option<bool>) -> bool {
-    instance.debug_utils
-        && requested.unwrap_or_else(|| instance.validated || has_debugger(&instance.raw, device))
+fn should_name_objects(
+    instance: &Instance,
+    device: &PhysicalDevice,
+    requested: Option<bool>,
+) -> Result<bool> {
+    match requested {
+        _ if !instance.debug_utils => Ok(false),
+        Some(requested) => Ok(requested),
+        None if instance.validated => Ok(true),
+        None => has_debugger(&instance.raw, device.raw, &device.capabilities.device_name),
+    }
 }
 
 fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<PhysicalDevice> {

@@ -1,5 +1,6 @@
 //! One logical device: instance, selection, features, memory, debugging. It is independent of resources.
 
+pub(crate) mod answers;
 pub(crate) mod calibrated_timestamps;
 pub(crate) mod caps;
 pub(crate) mod checkpoints;

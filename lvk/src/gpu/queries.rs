@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use super::answers::image_support;
 use super::caps::format_features::format_properties;
 use super::caps::host_image_copy::host_copies_stay_optimal;
 use super::caps::optional_features::OptionalFeature;
@@ -32,11 +33,8 @@ impl Gpu {
         info: &vk::ImageCreateInfo<'_>,
         name: &str,
     ) -> Result<Option<vk::ImageFormatProperties>> {
-        match self.image_limits.image_limits(&self.instance.raw, self.physical(), info) {
-            Ok(limits) => Ok(Some(limits)),
-            Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED) => Ok(None),
-            Err(shortage) => Err(Error::vulkan("vkGetPhysicalDeviceImageFormatProperties", name)(shortage)),
-        }
+        let limits = self.image_limits.image_limits(&self.instance.raw, self.physical(), info);
+        image_support(limits, "vkGetPhysicalDeviceImageFormatProperties", name)
     }
 
     /// Returns the sample counts that a plain render target of `format` may have. Empty if the format cannot
@@ -57,9 +55,14 @@ impl Gpu {
             .map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts))
     }
 
-    /// True if the host can write images of this description without making sampling on the device slower.
-    pub(crate) fn host_copies_stay_optimal(&self, info: &vk::ImageCreateInfo<'_>) -> bool {
-        host_copies_stay_optimal(&self.instance.raw, self.physical(), info)
+    /// True if the host can write images of this description without making sampling on the device slower. `name` is the object in
+    /// the error.
+    pub(crate) fn host_copies_stay_optimal(
+        &self,
+        info: &vk::ImageCreateInfo<'_>,
+        name: &str,
+    ) -> Result<bool> {
+        host_copies_stay_optimal(&self.instance.raw, self.physical(), info, name)
     }
 
     /// Returns an error unless the device has the rate with `samples` samples per pixel. `name` is the object
@@ -89,10 +92,18 @@ impl Gpu {
         self.heap_use.query_budget(&self.instance.raw, self.physical(), is_measured)
     }
 
-    /// Returns the ticks of the device's clock at this moment; `None` where the device and the host share no clock.
+    /// Returns the ticks of the device's clock at this moment; `None` where the device and the host share no clock. A failure goes to
+    /// the `log` crate, as a profile that lacks it is no reason to fail a submission.
     #[cfg(feature = "tracy")]
     pub(crate) fn device_ticks(&self) -> Option<u64> {
-        self.clock_reader.as_ref()?.device_ticks().ok()
+        match self.clock_reader.as_ref()?.device_ticks() {
+            Ok(ticks) => Some(ticks),
+            Err(Error::Unsupported { .. }) => None,
+            Err(error) => {
+                log::warn!("Tracy gets no time of the GPU: {error}");
+                None
+            }
+        }
     }
 
     /// Queries the fault of a lost device. `None` if the driver does not provide it.

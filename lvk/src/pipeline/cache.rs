@@ -44,7 +44,7 @@ impl PipelineCache {
                 None
             }
         });
-        let (raw, data) = create_from(gpu, path, data.unwrap_or_default())?;
+        let (raw, data) = create_from(path, data.unwrap_or_default(), |data| create_cache(gpu, data))?;
         gpu.name(raw, "pipeline cache");
         let on_disk = (!data.is_empty()).then(|| checksum(&[data]));
         Ok(Self {
@@ -106,21 +106,30 @@ fn read_if_present(path: &Path) -> Option<Vec<u8>> {
     None
 }
 
-/// Creates a cache from `data`, or an empty one if the driver rejects `data`.
-fn create_from<'a>(gpu: &Gpu, path: &Path, data: &'a [u8]) -> Result<(vk::PipelineCache, &'a [u8])> {
-    match create_cache(gpu, data) {
+/// Creates a cache from `data` through `create`, or an empty one if the driver rejects `data`. Want of memory rejects nothing: a cache
+/// that is dropped for it would be lost, since the file is written again in the end.
+fn create_from<'a>(
+    path: &Path,
+    data: &'a [u8],
+    mut create: impl FnMut(&[u8]) -> Result<vk::PipelineCache, vk::Result>,
+) -> Result<(vk::PipelineCache, &'a [u8])> {
+    let failed = || Error::vulkan("vkCreatePipelineCache", path.display());
+    match create(data) {
         Ok(raw) => Ok((raw, data)),
-        Err(result) if data.is_empty() => Err(Error::vulkan("vkCreatePipelineCache", path.display())(result)),
+        Err(result) if data.is_empty() || is_shortage(result) => Err(failed()(result)),
         Err(result) => {
             log::warn!(
                 "the pipeline cache '{}' is dropped: the driver returns {result}",
                 readable_name(path)
             );
-            let raw =
-                create_cache(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache", path.display()))?;
-            Ok((raw, &[]))
+            Ok((create(&[]).map_err(failed())?, &[]))
         }
     }
+}
+
+/// True if a command failed for want of memory, which says nothing about its data.
+fn is_shortage(result: vk::Result) -> bool {
+    matches!(result, vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)
 }
 
 fn create_cache(gpu: &Gpu, data: &[u8]) -> Result<vk::PipelineCache, vk::Result> {
@@ -141,5 +150,40 @@ fn cache_owner(gpu: &Gpu) -> CacheOwner {
         driver_version: plain.driver_version,
         driver_uuid: ids.driver_uuid,
         cache_uuid: plain.pipeline_cache_uuid,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk::Handle as _;
+
+    use super::*;
+
+    /// Creates a cache of these data by a driver that fails with `failure` if there are some.
+    fn created(data: &[u8], failure: vk::Result) -> Result<(vk::PipelineCache, &[u8])> {
+        create_from(Path::new("cache"), data, |data| match data {
+            [] => Ok(vk::PipelineCache::from_raw(1)),
+            _ => Err(failure),
+        })
+    }
+
+    #[test]
+    fn want_of_memory_is_an_error_and_drops_no_data() {
+        for (failure, what) in [
+            (vk::Result::ERROR_OUT_OF_HOST_MEMORY, "host"),
+            (vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, "device"),
+        ] {
+            let error = created(b"data", failure).unwrap_err().to_string();
+            assert_eq!(error, format!("out of {what} memory in vkCreatePipelineCache for 'cache'"));
+        }
+    }
+
+    #[test]
+    fn data_that_a_driver_rejects_are_dropped() {
+        let (raw, data) = created(b"data", vk::Result::ERROR_INITIALIZATION_FAILED).unwrap();
+        assert_eq!((raw.as_raw(), data), (1, &[][..]));
+        let failure = vk::Result::ERROR_UNKNOWN;
+        let error = create_from(Path::new("cache"), b"data", |_| Err(failure)).unwrap_err().to_string();
+        assert!(error.starts_with("vkCreatePipelineCache failed for 'cache'"), "{error}");
     }
 }

@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::image_usage::raw_usage;
 use super::texture_desc::TextureUsage;
+use crate::error::Result;
 use crate::format::Format;
 use crate::gpu::Gpu;
 
@@ -28,17 +29,16 @@ pub struct FormatSupport {
     pub blit_source: bool,
     /// Blits can write to it.
     pub blit_target: bool,
-    /// Sum of the sample counts per pixel that targets may have: 5 is 1 and 4. 0 if the format cannot be a target; 1 where
-    /// the driver lacks memory for the answer.
+    /// Sum of the sample counts per pixel that targets may have: 5 is 1 and 4. 0 if the format cannot be a target.
     pub samples: u32,
 }
 
 impl FormatSupport {
-    pub(crate) fn new(gpu: &Gpu, format: Format) -> Self {
+    pub(crate) fn new(gpu: &Gpu, format: Format) -> Result<Self> {
         use vk::FormatFeatureFlags as Features;
         let features = gpu.format_features(format);
         let target = Features::COLOR_ATTACHMENT | Features::DEPTH_STENCIL_ATTACHMENT;
-        Self {
+        Ok(Self {
             sampled: features.contains(Features::SAMPLED_IMAGE),
             linear: features.contains(Features::SAMPLED_IMAGE_FILTER_LINEAR),
             min_max: features.contains(Features::SAMPLED_IMAGE_FILTER_MINMAX),
@@ -48,20 +48,12 @@ impl FormatSupport {
             blend: features.contains(Features::COLOR_ATTACHMENT_BLEND),
             blit_source: features.contains(Features::BLIT_SRC),
             blit_target: features.contains(Features::BLIT_DST),
-            samples: if features.intersects(target) { samples(gpu, format) } else { 0 },
-        }
+            samples: if features.intersects(target) { samples(gpu, format)? } else { 0 },
+        })
     }
 }
 
-fn samples(gpu: &Gpu, format: Format) -> u32 {
-    let info = vk::ImageCreateInfo::default()
-        .image_type(vk::ImageType::TYPE_2D)
-        .format(format.raw())
-        .tiling(vk::ImageTiling::OPTIMAL)
-        .usage(raw_usage(TextureUsage::TARGET, format));
-    match gpu.image_limits(&info, "texture") {
-        Ok(limits) => limits.map_or(0, |limits| limits.sample_counts.as_raw()),
-        // The driver lacks memory for the answer; every target may have one sample.
-        Err(_) => vk::SampleCountFlags::TYPE_1.as_raw(),
-    }
+fn samples(gpu: &Gpu, format: Format) -> Result<u32> {
+    let usage = raw_usage(TextureUsage::TARGET, format);
+    Ok(gpu.target_samples(format.raw(), usage, &format!("{format:?}"))?.as_raw())
 }

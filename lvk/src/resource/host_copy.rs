@@ -13,8 +13,13 @@ const MAX_BYTES: usize = 256 << 10;
 
 /// True if the host should write the contents of an image of this description. Such an image is only sampled, and the
 /// device samples it as fast as other images.
-pub(super) fn can_fill_from_host(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_>) -> bool {
-    gpu.host_copies.is_some() && is_plain(desc) && gpu.host_copies_stay_optimal(info)
+pub(super) fn can_fill_from_host(
+    gpu: &Gpu,
+    desc: &TextureDesc<'_>,
+    info: &vk::ImageCreateInfo<'_>,
+) -> Result<bool> {
+    let is_possible = gpu.host_copies.is_some() && is_plain(desc);
+    Ok(is_possible && gpu.host_copies_stay_optimal(info, desc.debug_name)?)
 }
 
 /// True if the texture has initial contents of at most [`MAX_BYTES`] and is only sampled, in its own format.

@@ -112,7 +112,7 @@ impl Image {
         if !desc.view_formats.is_empty() {
             info = info.push_next(&mut list);
         }
-        let host_filled = host_copy::can_fill_from_host(gpu, desc, &info);
+        let host_filled = host_copy::can_fill_from_host(gpu, desc, &info)?;
         if host_filled {
             info.usage |= vk::ImageUsageFlags::HOST_TRANSFER_EXT;
         }

@@ -5,6 +5,7 @@ use ash::vk;
 use super::texture_desc::{TextureDesc, TextureKind, TextureMemory};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::answers::image_support;
 use crate::gpu::memory::allocator::ObjectMemory;
 use crate::gpu::memory::external::{
     DedicatedTo, DrmLayout, DrmPlane, MemoryFd, MemoryFdType, check_shareable,
@@ -158,11 +159,10 @@ pub(crate) fn external_features(
         let instance = &gpu.instance.raw;
         instance.get_physical_device_image_format_properties2(gpu.physical(), &query, &mut all)
     };
-    match answer {
-        Ok(()) => Ok(found.external_memory_properties.external_memory_features),
-        Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED) => Ok(vk::ExternalMemoryFeatureFlags::empty()),
-        Err(shortage) => Err(Error::vulkan("vkGetPhysicalDeviceImageFormatProperties2", name)(shortage)),
-    }
+    let supported = image_support(answer, "vkGetPhysicalDeviceImageFormatProperties2", name)?;
+    Ok(supported.map_or_else(vk::ExternalMemoryFeatureFlags::empty, |()| {
+        found.external_memory_properties.external_memory_features
+    }))
 }
 
 /// Returns the planes in Vulkan's form, for the creation of an imported image.

@@ -9,6 +9,7 @@ use super::sampler::Filter;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
+use crate::gpu::answers::image_support;
 
 /// The matrix between Y'CbCr and colours (`VkSamplerYcbcrModelConversion`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -130,10 +131,10 @@ impl YuvSampler {
             return Ok(Err(lack));
         }
         let device = &gpu.device;
+        let descriptors = descriptor_count(gpu, desc.format)?;
         // SAFETY: the device has the format with this filter and these chroma locations, and the feature is on.
         let conversion = unsafe { device.create_sampler_ycbcr_conversion(&desc.info(), None) }
             .map_err(Error::vulkan("vkCreateSamplerYcbcrConversion", "yuv sampler"))?;
-        let descriptors = descriptor_count(gpu, desc.format);
         let mut made = Self { conversion, sampler: vk::Sampler::null(), descriptors, gpu: Arc::clone(gpu) };
         let mut chain = vk::SamplerYcbcrConversionInfo::default().conversion(conversion);
         let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
@@ -163,8 +164,9 @@ impl Drop for YuvSampler {
     }
 }
 
-/// Returns the number of descriptors that a texture of the format needs (`combinedImageSamplerDescriptorCount`).
-fn descriptor_count(gpu: &Gpu, format: Format) -> u32 {
+/// Returns the number of descriptors that a texture of the format needs (`combinedImageSamplerDescriptorCount`). The most that any
+/// format has, 3, if the driver supports no such texture.
+fn descriptor_count(gpu: &Gpu, format: Format) -> Result<u32> {
     let info = vk::PhysicalDeviceImageFormatInfo2::default()
         .format(format.raw())
         .ty(vk::ImageType::TYPE_2D)
@@ -177,7 +179,8 @@ fn descriptor_count(gpu: &Gpu, format: Format) -> u32 {
     let asked = unsafe {
         gpu.instance.raw.get_physical_device_image_format_properties2(gpu.physical(), &info, &mut all)
     };
-    if asked.is_ok() { yuv.combined_image_sampler_descriptor_count.max(1) } else { 3 }
+    let supported = image_support(asked, "vkGetPhysicalDeviceImageFormatProperties2", "yuv sampler")?;
+    Ok(supported.map_or(3, |()| yuv.combined_image_sampler_descriptor_count.max(1)))
 }
 
 fn raw_chroma_location(location: ChromaLocation) -> vk::ChromaLocation {

@@ -13,8 +13,11 @@ use crate::regular_file;
 
 /// Maximum nesting of includes. The compiler recurses on them, so deeper nesting is an error.
 const MAX_DEPTH: usize = 64;
-/// Maximum directives that one compilation resolves. Files that include the next one twice multiply with each level.
+/// Maximum directives that one compilation resolves, and maximum of those that fail. Files that include the next one twice multiply
+/// with each level.
 const MAX_DIRECTIVES: usize = 4096;
+/// Maximum bytes of a name in a directive. Each directive is recorded with its name.
+const MAX_NAME_BYTES: usize = 1024;
 /// Maximum bytes of all texts that one compilation includes, counted each time.
 const MAX_INCLUDED_BYTES: u64 = 4 * MAX_GLSL_BYTES;
 /// Number of failed directives with a full reason. Reasons name files and places, so their text can be far longer than the
@@ -31,7 +34,7 @@ pub(super) struct Includes<'a> {
     dirs: &'a [&'a Path],
     open: Vec<IncludeOrigin>,
     once: HashSet<IncludeOrigin>,
-    /// The error of each failed directive, in the order of the compiler's requests.
+    /// The error of each failed directive, in the order of the compiler's requests; of the first [`MAX_DIRECTIVES`].
     failures: Vec<String>,
     /// The resolved directives in order, and the included texts with their names, each once.
     included: Vec<Included>,
@@ -106,13 +109,17 @@ impl<'a> Includes<'a> {
         if self.included.len() >= MAX_DIRECTIVES {
             return Err(format!("the module includes more than {MAX_DIRECTIVES} files; {REPEATED}"));
         }
+        if name.len() > MAX_NAME_BYTES {
+            return Err(format!("the name '{}' is longer than {MAX_NAME_BYTES} bytes", readable_name(name)));
+        }
         let (place, text) = self.resolve(local, name)?;
         let shown = place.display_path();
         if self.once.contains(&place) {
             self.open.push(place);
             return Ok(IncludeResult { name: shown, data: String::new() });
         }
-        let text = sanitize::to_ascii(&text).map_err(|c| format!("{shown}:{}: {}", c.line, c.message))?;
+        let text = sanitize::to_ascii(&text)
+            .map_err(|c| format!("{}:{}: {}", readable_name(&shown), c.line, c.message))?;
         let (data, once) = without_pragma_once(&text);
         if once {
             self.once.insert(place.clone());
@@ -123,7 +130,7 @@ impl<'a> Includes<'a> {
         }
         // A file may include itself once: its include guard makes the second text empty.
         if self.open.iter().filter(|open| **open == place).count() > 1 {
-            return Err(format!("'{shown}' includes itself; put #pragma once into it"));
+            return Err(format!("'{}' includes itself; put #pragma once into it", readable_name(&shown)));
         }
         self.open.push(place);
         Ok(IncludeResult { name: shown, data })
@@ -171,9 +178,10 @@ impl<'a> Includes<'a> {
         }
         let mut places: Vec<String> = Vec::new();
         if !self.listed.is_empty() {
-            let mut names: Vec<_> = self.listed.iter().take(MAX_NAMES).map(|(name, _)| *name).collect();
+            let shown = self.listed.iter().take(MAX_NAMES).map(|(name, _)| readable_name(name));
+            let mut names: Vec<String> = shown.collect();
             if self.listed.len() > MAX_NAMES {
-                names.push("...");
+                names.push("...".to_owned());
             }
             places.push(format!("the listed includes ({})", names.join(", ")));
         }
@@ -183,6 +191,7 @@ impl<'a> Includes<'a> {
                 .chain(self.dirs.iter().copied())
                 .map(|dir| format!("'{}'", readable_name(dir))),
         );
+        let name = readable_name(name);
         if places.is_empty() {
             return format!("include '{name}' not found: the module lists no includes and no include_dirs");
         }
@@ -202,8 +211,12 @@ impl<'a> Includes<'a> {
         if self.open.is_empty() {
             return String::new();
         }
-        let chain: Vec<_> =
-            self.open.iter().rev().map(|place| format!("included by {}", place.display_path())).collect();
+        let chain: Vec<_> = self
+            .open
+            .iter()
+            .rev()
+            .map(|place| format!("included by {}", readable_name(place.display_path())))
+            .collect();
         format!(" ({})", chain.join(", "))
     }
 }
@@ -215,6 +228,10 @@ impl IncludeHandler for Includes<'_> {
         if self.refused.take() == Some((depth, name.to_owned())) && !local {
             return None;
         }
+        // Failures multiply as files do. The compiler's own text stands for the reason of each further one.
+        if self.failures.len() >= MAX_DIRECTIVES {
+            return None;
+        }
         self.open.truncate(depth.saturating_sub(1));
         match self.include_text(local, name) {
             Ok(result) => {
@@ -224,7 +241,7 @@ impl IncludeHandler for Includes<'_> {
             Err(reason) => {
                 self.failures.push(match self.failures.len() < MAX_FULL_REASONS {
                     true => reason + &self.include_chain(),
-                    false => format!("'{name}' cannot be included either"),
+                    false => format!("'{}' cannot be included either", readable_name(name)),
                 });
                 self.refused = local.then(|| (depth, name.to_owned()));
                 None
@@ -323,7 +340,7 @@ mod tests {
         let failures = requested(&listed, "0");
         let told =
             failures.iter().filter(|text| text.contains("more than 4096 files; put #pragma once")).count();
-        assert!(told > 0 && failures.len() < 3 * MAX_DIRECTIVES, "{told} of {}", failures.len());
+        assert!(told > 0 && failures.len() <= MAX_DIRECTIVES, "{told} of {}", failures.len());
     }
 
     #[test]
@@ -334,6 +351,32 @@ mod tests {
         let given = (0..6).filter(|_| includes.include(IncludeType::System, "long", "", 1).is_some()).count();
         assert_eq!(given, 4);
         assert!(includes.into_failures()[0].starts_with("the module includes more than 67108864 bytes; put"));
+    }
+
+    /// Texts that multiply, the last of which names a file that is missing: no more memory than for the first few thousand.
+    #[test]
+    fn failures_that_multiply_are_few_and_short() {
+        let long = "n".repeat(MAX_NAME_BYTES);
+        let (again, missing) = ("missing\n".repeat(60), format!("{long}\n").repeat(60));
+        let listed = [("start", &*again), ("missing", &*missing)];
+        let failures = requested(&listed, "start");
+        assert_eq!(failures.len(), 60 * 60);
+        assert!(failures.iter().all(|reason| reason.len() < 500), "{}", failures[0]);
+        let (again, missing) = ("missing\n".repeat(100), "m\n".repeat(100));
+        let listed = [("start", &*again), ("missing", &*missing)];
+        assert_eq!(requested(&listed, "start").len(), MAX_DIRECTIVES);
+    }
+
+    #[test]
+    fn names_are_bounded() {
+        let (fits, long) = ("n".repeat(MAX_NAME_BYTES), "n".repeat(MAX_NAME_BYTES + 1));
+        let listed = [(&*fits, ""), (&*long, "")];
+        assert_eq!(requested(&listed, &fits), [""; 0]);
+        let [failure] = &requested(&listed, &long)[..] else { panic!("one failure") };
+        assert!(
+            failure.starts_with("the name 'nnn") && failure.ends_with("' is longer than 1024 bytes"),
+            "{failure}"
+        );
     }
 
     #[test]

@@ -47,7 +47,7 @@ impl ShadowCube {
 
 /// Samplers of the cube map: nearest comparing, linear comparing, reading.
 pub(super) fn samplers(ctx: &Context) -> lvk::Result<[Holder<SamplerHandle>; 3]> {
-    let linear = if ctx.format_support(CUBE).linear { Filter::Linear } else { Filter::Nearest };
+    let linear = if ctx.format_support(CUBE)?.linear { Filter::Linear } else { Filter::Nearest };
     let sampler = |filter, compare, debug_name| {
         ctx.create_sampler(&SamplerDesc {
             mag_filter: filter,

@@ -6,11 +6,11 @@ use super::PictureError;
 pub const MAX_SOURCE_SIDE: u32 = 1 << 17;
 /// Most texels of an image that is read: 32,768 x 32,768. The most take some seconds.
 pub const MAX_SOURCE_TEXELS: u64 = 1 << 30;
-/// Most bytes that a decoder of whole images makes of a file.
+/// Most bytes that a decoder of whole images makes of a file, without other bounds.
 pub const MAX_DECODED_BYTES: u64 = 512 << 20;
 /// Most texels for each byte of a file. A header can state any size, and readers reserve memory for it. No format packs as many
 /// texels: PNG has 8,256 at most, where one bit is a texel.
-const MAX_TEXELS_PER_BYTE: u64 = 1 << 14;
+pub const MAX_TEXELS_PER_BYTE: u64 = 1 << 14;
 
 /// Sizes beyond which images are shrunk or refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +19,8 @@ pub struct Bounds {
     pub max_side: u32,
     /// Most texels; at least 1.
     pub max_texels: u64,
+    /// Most bytes that a decoder of whole images makes of the file: most decoders, but not that of PNG without interlacing.
+    pub max_decoded_bytes: u64,
     /// Bytes of texels that are left for this image of all that a scene may have.
     pub bytes_left: u64,
 }
@@ -26,7 +28,12 @@ pub struct Bounds {
 impl Default for Bounds {
     /// Returns the bounds of an image on a surface: 16,384 texels a side, 134,217,728 texels (512 MiB), as 16,384 x 8,192.
     fn default() -> Self {
-        Self { max_side: 16_384, max_texels: 1 << 27, bytes_left: Self::MAX_SCENE_BYTES }
+        Self {
+            max_side: 16_384,
+            max_texels: 1 << 27,
+            max_decoded_bytes: MAX_DECODED_BYTES,
+            bytes_left: Self::MAX_SCENE_BYTES,
+        }
     }
 }
 
@@ -37,7 +44,7 @@ impl Bounds {
     /// Returns bounds that shrink nothing.
     #[must_use]
     pub fn unshrunk() -> Self {
-        Self { max_side: MAX_SOURCE_SIDE, max_texels: MAX_SOURCE_TEXELS, bytes_left: Self::MAX_SCENE_BYTES }
+        Self { max_side: MAX_SOURCE_SIDE, max_texels: MAX_SOURCE_TEXELS, ..Self::default() }
     }
 
     /// Returns the size that an image of this size is shrunk to; the same size if it fits.

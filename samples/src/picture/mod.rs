@@ -16,7 +16,7 @@ use std::path::Path;
 use image::{ImageFormat, ImageReader};
 
 pub(crate) use bounds::shrunk_size;
-pub use bounds::{Bounds, MAX_DECODED_BYTES, MAX_SOURCE_SIDE, MAX_SOURCE_TEXELS};
+pub use bounds::{Bounds, MAX_DECODED_BYTES, MAX_SOURCE_SIDE, MAX_SOURCE_TEXELS, MAX_TEXELS_PER_BYTE};
 
 use crate::app::input_file::{self, FileKind};
 
@@ -56,7 +56,7 @@ pub enum PictureError {
     },
     /// The image is too large for a decoder that gives whole images only.
     #[error(
-        "it has {width}x{height} texels, which take {bytes} bytes, more than the {MAX_DECODED_BYTES} that are decoded of \
+        "it has {width}x{height} texels, which take {bytes} bytes, more than the {most} that are decoded of \
          this kind of file; shrink it, or convert it to PNG without interlacing"
     )]
     TooManyBytes {
@@ -66,6 +66,8 @@ pub enum PictureError {
         height: u32,
         /// Bytes of the decoded image.
         bytes: u64,
+        /// Most bytes, [`Bounds::max_decoded_bytes`].
+        most: u64,
     },
     /// The file is a Radiance HDR file.
     #[error(

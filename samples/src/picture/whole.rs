@@ -4,7 +4,7 @@ use std::io::{BufRead, Seek};
 
 use image::{DynamicImage, ImageDecoder as _, ImageReader, Limits};
 
-use super::bounds::{MAX_DECODED_BYTES, check_file_bytes};
+use super::bounds::check_file_bytes;
 use super::scanlines::{ScanlineSink, eight_bits};
 use super::{Bounds, Picture, PictureError};
 
@@ -16,14 +16,15 @@ pub(super) fn read<R: BufRead + Seek>(
 ) -> Result<Picture, PictureError> {
     let mut limits = Limits::no_limits();
     // Beside the image, decoders keep tables and rows.
-    limits.max_alloc = Some(2 * MAX_DECODED_BYTES);
+    limits.max_alloc = Some(bounds.max_decoded_bytes.saturating_mul(2));
     reader.limits(limits);
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let (from, bytes) = ([width, height], decoder.total_bytes());
     let to = bounds.fit(from)?;
-    if bytes > MAX_DECODED_BYTES {
-        return Err(PictureError::TooManyBytes { width, height, bytes });
+    let most = bounds.max_decoded_bytes;
+    if bytes > most {
+        return Err(PictureError::TooManyBytes { width, height, bytes, most });
     }
     check_file_bytes(from, file_bytes)?;
     let image = DynamicImage::from_decoder(decoder)?;

@@ -580,3 +580,24 @@ fn whole_losses_are_told_with_their_fault() {
     let Some((_connection, _display, program)) = in_window() else { return };
     assert_losses_are_explained("window", program, &losses(usize::MAX));
 }
+
+/// Shortages in questions about formats, tools and cached pipelines are errors too: none is an answer that the program goes on with.
+#[test]
+fn shortages_in_other_questions_are_no_answers() {
+    for (line, command) in [
+        ("interop", "vkGetPhysicalDeviceImageFormatProperties"),
+        ("interop", "vkGetPhysicalDeviceToolProperties"),
+        ("yuv --width 64 --height 36 --frames 1", "vkGetPhysicalDeviceImageFormatProperties2"),
+        ("yuv --width 64 --height 36 --frames 1", "vkCreatePipelineCache"),
+    ] {
+        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+        let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
+        let count = calls.iter().filter(|call| call.command == command).count();
+        assert!(count > 0, "{line}: {command}");
+        for number in 1..=count {
+            let [outcome, _] = assert_told(&program(line), &format!("{command} {number} host-memory once"));
+            let start = format!("error: out of host memory in {command} for '");
+            assert!(error_line(&outcome).starts_with(&start), "{line}: {}", outcome.stderr);
+        }
+    }
+}

@@ -28,7 +28,7 @@ pub(crate) fn read_gltf(bytes: &[u8]) {
 /// Reads a file, and checks what programs rely on. True if it loads. Within the bound of the target lie that of the load, and the
 /// tables of decoders of images.
 fn loads(bytes: &[u8], place: Place) -> bool {
-    let memory = MemoryLimit { fixed_bytes: 2 << 20, multiple: 64 };
+    let memory = MemoryLimit { fixed_bytes: 1 << 20, multiple: 32 };
     let options = LoadOptions { memory, most_threads: Some(1), ..LoadOptions::default() };
     let mut is_loaded = false;
     let mut check = |model: lvk_gltf::Result<Model>| {

@@ -2,21 +2,53 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::fmt;
 
-/// Most memory of a reader: a fixed part, for what every input takes, and a multiple of the bytes of the input.
-#[derive(Debug, Clone, Copy)]
+/// Most memory of a reader: a fixed part, for what every input takes, a multiple of the bytes of the input, and one of the bytes that
+/// they stand for. Never more than a ceiling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryBound {
     /// Bytes for every input.
     pub fixed: usize,
     /// Bytes for each byte of the input.
-    pub multiple: usize,
+    pub per_byte: usize,
+    /// Bytes for each byte that the reader may make of an input that states its decoded size; 0 for other readers.
+    pub per_decoded: usize,
+    /// Bytes of the longest input.
+    pub most: usize,
 }
 
 impl MemoryBound {
-    /// Returns the bound of an input of `bytes` bytes.
+    /// Returns the bound of an input of `bytes` bytes, of which the reader may make `decoded` bytes.
     #[must_use]
-    pub fn bytes_for(self, bytes: usize) -> usize {
-        self.fixed.saturating_add(self.multiple.saturating_mul(bytes))
+    pub fn bytes_for(self, bytes: usize, decoded: usize) -> usize {
+        let multiples =
+            self.per_byte.saturating_mul(bytes).saturating_add(self.per_decoded.saturating_mul(decoded));
+        self.fixed.saturating_add(multiples).min(self.most)
+    }
+}
+
+/// Shows the bound as the table in `docs/reliability.md` has it.
+impl fmt::Display for MemoryBound {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{} + {} a byte", Bytes(self.fixed), self.per_byte)?;
+        if self.per_decoded > 0 {
+            write!(out, " + {} a decoded byte", self.per_decoded)?;
+        }
+        write!(out, ", at most {}", Bytes(self.most))
+    }
+}
+
+/// A number of bytes, shown in the largest unit of which it is a whole number.
+struct Bytes(usize);
+
+impl fmt::Display for Bytes {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.trailing_zeros() {
+            20.. => write!(out, "{} MiB", self.0 >> 20),
+            10.. => write!(out, "{} KiB", self.0 >> 10),
+            _ => write!(out, "{} bytes", self.0),
+        }
     }
 }
 
@@ -116,6 +148,24 @@ unsafe impl GlobalAlloc for Counting {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_have_a_ceiling() {
+        let bound = MemoryBound { fixed: 1_000, per_byte: 10, per_decoded: 2, most: 1 << 20 };
+        assert_eq!(bound.bytes_for(0, 0), 1_000);
+        assert_eq!(bound.bytes_for(5, 7), 1_064);
+        assert_eq!(bound.bytes_for(1 << 20, 0), 1 << 20);
+        assert_eq!(bound.bytes_for(0, 1 << 20), 1 << 20);
+        assert_eq!(bound.bytes_for(usize::MAX, usize::MAX), 1 << 20);
+    }
+
+    #[test]
+    fn bounds_are_shown_with_their_units() {
+        let bound = MemoryBound { fixed: 96 << 10, per_byte: 64, per_decoded: 4, most: 32 << 20 };
+        assert_eq!(bound.to_string(), "96 KiB + 64 a byte + 4 a decoded byte, at most 32 MiB");
+        let bound = MemoryBound { fixed: 100, per_byte: 4, per_decoded: 0, most: 1_152 << 10 };
+        assert_eq!(bound.to_string(), "100 bytes + 4 a byte, at most 1152 KiB");
+    }
 
     #[test]
     fn the_peak_counts_and_not_the_end() {

@@ -46,13 +46,18 @@ fn mutations_are_read_within_the_bounds() {
     for target in TARGETS {
         let inputs = corpus(target);
         let mut random = Random::new(27);
-        let mut most = 0;
+        let (mut most, mut share) = (0, 0);
         for _ in 0..MUTATIONS {
             let [first, second] = [(); 2].map(|()| &inputs[random.below(inputs.len())]);
             let mut bytes = mutated(first, second, &mut random);
             bytes.truncate(MAX_BYTES);
-            most = run(target, &bytes).bytes.max(most);
+            let cost = run(target, &bytes);
+            most = most.max(cost.bytes);
+            share = share.max(100 * cost.bytes / cost.most);
         }
-        println!("{}: {MUTATIONS} mutations, {most} bytes at most", target.name);
+        println!(
+            "{}: {MUTATIONS} mutations, {most} bytes at most, {share} % of a bound at most",
+            target.name
+        );
     }
 }

@@ -84,7 +84,7 @@ fn drivers_that_cannot_be_loaded_are_named() {
             other => unreachable!("{other:?}"),
         };
         assert!(
-            matches!(&report.loader, LoaderReport::Opened { version, .. } if *version >= (1, 3, 0)),
+            matches!(&report.loader, LoaderReport::Opened { version: Some(version), .. } if *version >= (1, 3, 0)),
             "{report}"
         );
         let outcomes: Vec<_> = report.manifests.iter().map(|manifest| &manifest.outcome).collect();

@@ -239,7 +239,7 @@ impl World<'_> {
             } else if one.format != other.format {
                 return None;
             }
-            let supported = self.ctx().format_support(one.format);
+            let supported = self.ctx().format_support(one.format).ok()?;
             if !supported.blit_source || !supported.blit_target {
                 problems.push(Problem::Unsupported);
             }
@@ -263,7 +263,7 @@ impl World<'_> {
         let mut problems = graphics_problems(queue, [texture.problem]);
         let info = self.info(&texture);
         if let Some(info) = info {
-            let supported = self.ctx().format_support(info.format);
+            let supported = self.ctx().format_support(info.format).ok()?;
             if !(supported.linear && supported.blit_source && supported.blit_target) {
                 problems.push(Problem::Unsupported);
             }

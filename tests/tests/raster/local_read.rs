@@ -132,7 +132,7 @@ fn one_pass_is_two(ctx: &Context) {
         return;
     }
     for depth in [Format::D32Float, Format::D16Unorm, Format::D32FloatS8] {
-        if ctx.format_support(depth).target {
+        if ctx.format_support(depth).unwrap().target {
             let (one, two) = (in_one_pass(ctx, depth), in_two_passes(ctx, depth));
             assert!(one == two, "{depth:?}");
             let mut kinds = one.clone();
@@ -356,7 +356,7 @@ fn views_read_their_own_layer() {
 #[test]
 fn stencil_is_read() {
     let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) || !ctx.format_support(Format::D32FloatS8).target {
+    if !has(&ctx, OptionalFeature::LocalRead) || !ctx.format_support(Format::D32FloatS8).unwrap().target {
         return;
     }
     if ctx.capabilities().limits.max_input_attachments < 10 {

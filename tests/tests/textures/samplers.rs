@@ -264,7 +264,7 @@ fn mirrors_and_reductions_take_the_texels_they_name() {
         let found = sample(&ctx, texture.index(), &desc, "(i - 5.5) / 4.0", 12);
         assert_eq!(found, [4.0, 4.0, 4.0, 3.0, 2.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0]);
     }
-    if optional(OptionalFeature::FilterMinMax) && ctx.format_support(Format::R32Float).min_max {
+    if optional(OptionalFeature::FilterMinMax) && ctx.format_support(Format::R32Float).unwrap().min_max {
         for (reduction, expected) in
             [(SamplerReductionMode::Min, [1.0, 2.0, 3.0]), (SamplerReductionMode::Max, [2.0, 3.0, 4.0])]
         {

@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::capabilities::Capabilities;
 use crate::error::{Error, Result};
+use crate::gpu::answers::image_support;
 
 /// The layout in which images are written and remain: the layout for sampling.
 const LAYOUT: vk::ImageLayout = vk::ImageLayout::READ_ONLY_OPTIMAL;
@@ -57,13 +58,15 @@ impl HostImageCopy {
     }
 }
 
-/// True if the host can write images of this description without making sampling on the device slower.
+/// True if the host can write images of this description without making sampling on the device slower. `name` is the object in the
+/// error.
 pub(crate) fn host_copies_stay_optimal(
     instance: &ash::Instance,
     device: vk::PhysicalDevice,
     info: &vk::ImageCreateInfo<'_>,
-) -> bool {
-    has_host_transfer(instance, device, info.format) && is_optimal(instance, device, info)
+    name: &str,
+) -> Result<bool> {
+    Ok(has_host_transfer(instance, device, info.format) && is_optimal(instance, device, info, name)?)
 }
 
 fn has_host_transfer(instance: &ash::Instance, device: vk::PhysicalDevice, format: vk::Format) -> bool {
@@ -74,7 +77,12 @@ fn has_host_transfer(instance: &ash::Instance, device: vk::PhysicalDevice, forma
     more.optimal_tiling_features.contains(vk::FormatFeatureFlags2::HOST_IMAGE_TRANSFER_EXT)
 }
 
-fn is_optimal(instance: &ash::Instance, device: vk::PhysicalDevice, info: &vk::ImageCreateInfo<'_>) -> bool {
+fn is_optimal(
+    instance: &ash::Instance,
+    device: vk::PhysicalDevice,
+    info: &vk::ImageCreateInfo<'_>,
+    name: &str,
+) -> Result<bool> {
     let asked = vk::PhysicalDeviceImageFormatInfo2::default()
         .format(info.format)
         .ty(info.image_type)
@@ -85,7 +93,8 @@ fn is_optimal(instance: &ash::Instance, device: vk::PhysicalDevice, info: &vk::I
     let mut all = vk::ImageFormatProperties2::default().push_next(&mut access);
     // SAFETY: as above; if the query fails, nothing was written.
     let answer = unsafe { instance.get_physical_device_image_format_properties2(device, &asked, &mut all) };
-    answer.is_ok() && access.optimal_device_access == vk::TRUE
+    let supported = image_support(answer, "vkGetPhysicalDeviceImageFormatProperties2", name)?;
+    Ok(supported.is_some() && access.optimal_device_access == vk::TRUE)
 }
 
 /// Returns the layouts in which the host can write images.

@@ -3,6 +3,7 @@
 use ash::vk;
 
 use crate::error::{Error, Result};
+use crate::gpu::answers::listed;
 
 /// Combination of two rates into one (`VkFragmentShadingRateCombinerOpKHR`), separately for width and height.
 /// All but [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].
@@ -220,17 +221,18 @@ pub(crate) fn query_fragment_sizes(
     instance: &ash::Instance,
     physical: vk::PhysicalDevice,
 ) -> Result<Vec<FragmentSize>> {
-    let failed = || Error::vulkan("vkGetPhysicalDeviceFragmentShadingRatesKHR", "fragment sizes");
     let functions = ash::khr::fragment_shading_rate::Instance::new(entry, instance);
     let ask = functions.fp().get_physical_device_fragment_shading_rates_khr;
-    let mut count = 0;
-    // SAFETY: the physical device belongs to the instance and has the extension. Without a list only the
-    // count is written.
-    unsafe { ask(physical, &mut count, std::ptr::null_mut()) }.result().map_err(failed())?;
-    let mut found = vec![vk::PhysicalDeviceFragmentShadingRateKHR::default(); count as usize];
-    // SAFETY: as above, and the list has that length.
-    unsafe { ask(physical, &mut count, found.as_mut_ptr()) }.result().map_err(failed())?;
-    found.truncate(count as usize);
+    // SAFETY: the physical device belongs to the instance and has the extension. The list is null, or has room for the count.
+    fragment_sizes(|count, list| unsafe { ask(physical, count, list) })
+}
+
+/// Returns the fragment sizes through `ask`, which works like `vkGetPhysicalDeviceFragmentShadingRatesKHR` of one device.
+fn fragment_sizes(
+    ask: impl FnMut(&mut u32, *mut vk::PhysicalDeviceFragmentShadingRateKHR<'static>) -> vk::Result,
+) -> Result<Vec<FragmentSize>> {
+    let found =
+        listed(ask).map_err(Error::vulkan("vkGetPhysicalDeviceFragmentShadingRatesKHR", "fragment sizes"))?;
     let size = |raw: &vk::PhysicalDeviceFragmentShadingRateKHR<'_>| FragmentSize {
         size: [raw.fragment_size.width, raw.fragment_size.height],
         // Drivers set all bits for single pixels, which support every sample count.
@@ -310,6 +312,55 @@ mod tests {
             });
             let square = texel[0].max(texel[1]) <= aspect * texel[0].min(texel[1]);
             prop_assert_eq!(limits.check_texel(texel).is_ok(), sides && square);
+        }
+    }
+
+    /// Answers as a driver of two sizes would, but for the call `fails_at`, counted from 1.
+    fn two_sizes(
+        fails_at: usize,
+        error: vk::Result,
+    ) -> impl FnMut(&mut u32, *mut vk::PhysicalDeviceFragmentShadingRateKHR<'static>) -> vk::Result {
+        let mut calls = 0;
+        move |count, list| {
+            calls += 1;
+            if calls == fails_at {
+                return error;
+            }
+            *count = 2;
+            if !list.is_null() {
+                let known = |width, samples| vk::PhysicalDeviceFragmentShadingRateKHR {
+                    fragment_size: vk::Extent2D { width, height: 1 },
+                    sample_counts: vk::SampleCountFlags::from_raw(samples),
+                    ..Default::default()
+                };
+                // SAFETY: the list has room for two sizes.
+                unsafe { (*list, *list.add(1)) = (known(2, 3), known(1, u32::MAX)) };
+            }
+            vk::Result::SUCCESS
+        }
+    }
+
+    #[test]
+    fn sizes_are_listed_and_a_list_that_was_incomplete_is_asked_for_again() {
+        let expected =
+            [FragmentSize { size: [2, 1], samples: 3 }, FragmentSize { size: [1, 1], samples: 127 }];
+        assert_eq!(fragment_sizes(two_sizes(0, vk::Result::SUCCESS)).unwrap(), expected);
+        assert_eq!(fragment_sizes(two_sizes(2, vk::Result::INCOMPLETE)).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_driver_without_memory_for_its_sizes_is_no_device_without_sizes() {
+        for (error, what) in [
+            (vk::Result::ERROR_OUT_OF_HOST_MEMORY, "host"),
+            (vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, "device"),
+        ] {
+            for call in [1, 2] {
+                let told = fragment_sizes(two_sizes(call, error)).unwrap_err().to_string();
+                let expected = format!(
+                    "out of {what} memory in vkGetPhysicalDeviceFragmentShadingRatesKHR for 'fragment sizes'"
+                );
+                assert_eq!(told, expected, "call {call}");
+            }
         }
     }
 

@@ -252,9 +252,7 @@ fn imported_type(
             unsafe {
                 functions.get_memory_fd_properties(memory.fd_type.raw(), memory.fd.as_raw_fd(), &mut found)
             }
-            .map_err(|_| {
-                Error::usage(name, "the file descriptor is no dma-buf that this device can import")
-            })?;
+            .map_err(|result| refused_dma_buf(name, result))?;
             let bits = object_bits & found.memory_type_bits;
             (bits.trailing_zeros(), bits)
         }
@@ -267,6 +265,16 @@ fn imported_type(
          {object_bits:#b}; describe the object as its exporter did"
     );
     Err(Error::usage(name, message))
+}
+
+/// Returns the error of a failed `vkGetMemoryFdPropertiesKHR` for the object `name`.
+fn refused_dma_buf(name: &str, result: vk::Result) -> Error {
+    match result {
+        vk::Result::ERROR_INVALID_EXTERNAL_HANDLE => {
+            Error::usage(name, "the file descriptor is no dma-buf that this device can import")
+        }
+        other => Error::vulkan("vkGetMemoryFdPropertiesKHR", name)(other),
+    }
 }
 
 #[cfg(test)]

@@ -213,7 +213,7 @@ fn loader_version(entry: &ash::Entry) -> Result<(u32, u32, u32)> {
 }
 
 fn loader_report(entry: &ash::Entry, library: Option<&Path>) -> LoaderReport {
-    LoaderReport::opened(library, loader_version(entry).unwrap_or((1, 0, 0)))
+    LoaderReport::opened(library, loader_version(entry).ok())
 }
 
 /// Returns [`Error::NoVulkan`] in place of an error that the drivers cause: an extension is missing because no driver can be

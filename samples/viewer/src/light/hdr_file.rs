@@ -83,8 +83,9 @@ pub(super) fn read(path: &Path, rotation_degrees: f32) -> Result<SkyMap, Environ
     }
     let mut averaged = AveragedScanlines::new(width, height);
     for _ in 0..height {
-        let row = picture.next_scanline().map_err(failed)?;
-        averaged.push(row.into_iter().map(|texel| texel.map(radiance)).collect());
+        let mut row = picture.next_scanline().map_err(failed)?;
+        row.as_flattened_mut().iter_mut().for_each(|channel| *channel = radiance(*channel));
+        averaged.push(row);
     }
     let mut map = averaged.map;
     turn(&mut map, rotation_degrees);
@@ -133,7 +134,8 @@ impl AveragedScanlines {
 fn halved(upper: &[[f32; 3]], lower: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
     let mean = |([a, b], [c, d]): (&[[f32; 3]; 2], &[[f32; 3]; 2])| {
-        [0, 1, 2].map(|channel| (a[channel] + b[channel] + c[channel] + d[channel]) / 4.0)
+        let of = |channel: usize| (a[channel] + b[channel] + c[channel] + d[channel]) / 4.0;
+        [of(0), of(1), of(2)]
     };
     pairs.map(mean).collect()
 }

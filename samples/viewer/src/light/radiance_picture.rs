@@ -210,8 +210,10 @@ fn take<const N: usize>(rest: &mut &[u8]) -> Result<[u8; N], &'static str> {
 
 /// Radiance of a texel. The exponent is above the real one by 128, and the channels are 256ths.
 fn radiance_of([red, green, blue, exponent]: [u8; TEXEL_BYTES]) -> [f32; 3] {
-    let scale = if exponent == 0 { 0.0 } else { 2_f64.powi(i32::from(exponent) - 136) };
-    [red, green, blue].map(|channel| (f64::from(channel) * scale) as f32)
+    // The power of two, by its bits: the exponent of a double is above the real one by 1,023.
+    let scale = if exponent == 0 { 0.0 } else { f64::from_bits((u64::from(exponent) + 1_023 - 136) << 52) };
+    let radiance = |channel: u8| (f64::from(channel) * scale) as f32;
+    [radiance(red), radiance(green), radiance(blue)]
 }
 
 #[cfg(test)]
@@ -354,6 +356,15 @@ mod tests {
         let zeros = [&[9, 9, 9, 9], &[1, 1, 1, 0].repeat(20)[..]].concat();
         assert_eq!(row_error(4, &zeros), CUT);
         assert_eq!(row_error(4, &[&zeros[..], &[1, 1, 1, 255]].concat()), LONG_RUN);
+    }
+
+    #[test]
+    fn exponents_are_powers_of_two() {
+        for exponent in 1..=255 {
+            let expected = (200.0 * 2_f64.powi(i32::from(exponent) - 136)) as f32;
+            assert_eq!(radiance_of([200, 0, 0, exponent]), [expected, 0.0, 0.0], "{exponent}");
+        }
+        assert_eq!(radiance_of([1, 2, 3, 0]), [0.0; 3]);
     }
 
     #[test]

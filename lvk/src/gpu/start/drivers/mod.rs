@@ -47,8 +47,8 @@ impl LoaderReport {
         }
     }
 
-    /// Returns the report of an open loader.
-    pub(crate) fn opened(library: Option<&Path>, version: (u32, u32, u32)) -> Self {
+    /// Returns the report of an open loader; `version` is `None` where it is not known.
+    pub(crate) fn opened(library: Option<&Path>, version: Option<(u32, u32, u32)>) -> Self {
         let file = || mapped_file(&std::fs::read_to_string("/proc/self/maps").ok()?, LOADER_NAME);
         let path = library.map(Path::to_path_buf).or_else(file);
         Self::Opened { path: path.unwrap_or_else(|| LOADER_NAME.into()), version }

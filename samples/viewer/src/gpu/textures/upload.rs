@@ -1,6 +1,6 @@
 //! Mip levels of an image, as a texture.
 
-use lvk::{Context, Holder, TextureDesc, TextureHandle, TextureRegion};
+use lvk::{Context, Error, Holder, TextureDesc, TextureHandle, TextureRegion};
 use lvk_gltf::{Image, TexelFormat};
 
 use super::formats::format_of;
@@ -49,8 +49,13 @@ pub(super) fn texture(
         debug_name: image.name.as_deref().unwrap_or("image"),
         ..TextureDesc::default()
     };
-    if ctx.supports_texture(&desc).is_err() {
-        return Ok(None);
+    match ctx.supports_texture(&desc) {
+        Ok(()) => {}
+        // The driver has not answered.
+        Err(
+            error @ (Error::OutOfHostMemory { .. } | Error::OutOfDeviceMemory { .. } | Error::Vulkan { .. }),
+        ) => return Err(error),
+        Err(_) => return Ok(None),
     }
     let texture = ctx.create_texture(&desc)?;
     if !is_from_file {

@@ -19,7 +19,7 @@ pub(crate) fn exchange() -> Result<Vec<u8>, Failure> {
     let (exporter, importer) = (context(desc.clone())?, context(desc)?);
     for ctx in [&exporter, &importer] {
         let clocks = ctx.calibrated_timestamps()?;
-        if !clocks.gpu_ms.is_finite() || !ctx.format_support(Format::Rgba8Unorm).target {
+        if !clocks.gpu_ms.is_finite() || !ctx.format_support(Format::Rgba8Unorm)?.target {
             return Err("the clock of the device has no time, or the format is no target".into());
         }
     }
