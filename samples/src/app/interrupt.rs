@@ -13,11 +13,11 @@ pub const STATUS: u8 = 130;
 /// and the second time ends the process. Either way no picture and no cache file is left in part, because files get their
 /// names when they are complete, and the temporary files are removed. On Windows, Ctrl-Break and the closing of the console
 /// count like Ctrl-C.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Interrupt {
     flags: Arc<Flags>,
     /// Kept for its end.
-    _listener: Option<Listener>,
+    _listener: Option<Arc<Listener>>,
 }
 
 #[derive(Debug, Default)]
@@ -27,13 +27,13 @@ struct Flags {
 }
 
 impl Interrupt {
-    /// Listens from now on, until the end of the value. If the system does not allow it, Ctrl-C ends the process as usual.
+    /// Listens from now on, until the end of the last clone. If the system does not allow it, Ctrl-C ends the process as usual.
     #[must_use]
     pub fn listen() -> Self {
         let flags = Arc::<Flags>::default();
         let heard = flags.clone();
         let listener = Listener::start(move || heard.ends_process());
-        Self { flags, _listener: listener }
+        Self { flags, _listener: listener.map(Arc::new) }
     }
 
     /// A flag without signal handlers; only [`Interrupt::raise`] raises it.
