@@ -143,11 +143,11 @@ mod tests {
         assert!(deferred.flags.ends_process(), "the second time");
     }
 
-    /// Its thread has a name of its own, by which the system lists it.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_listener_ends_with_its_value() -> std::io::Result<()> {
         let threads = || -> std::io::Result<usize> {
+            // By the name of the listener's thread.
             let tasks = std::fs::read_dir("/proc/self/task")?;
             let names = tasks.filter_map(|task| std::fs::read_to_string(task.ok()?.path().join("comm")).ok());
             Ok(names.filter(|name| name.trim() == "interrupt").count())

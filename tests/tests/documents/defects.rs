@@ -45,7 +45,7 @@ fn complaints(page: &str, names: &BTreeSet<String>) -> Vec<String> {
 }
 
 #[test]
-fn every_defect_that_was_found_has_its_test() {
+fn every_defect_of_the_page_has_its_test() {
     let mut names = BTreeSet::new();
     for folder in ["lvk", "lvk-gltf", "samples", "tests"] {
         add_declared(&project().join(folder), &mut names);
