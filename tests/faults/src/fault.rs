@@ -35,6 +35,18 @@ impl FaultError {
         }
     }
 
+    /// Texts of which an error that comes of this one has one, in lower case: the library's, or the name in Vulkan.
+    #[must_use]
+    pub const fn texts(self) -> [&'static str; 2] {
+        match self {
+            Self::HostMemory => ["out of host memory", "error_out_of_host_memory"],
+            Self::DeviceMemory => ["out of device memory", "error_out_of_device_memory"],
+            Self::DeviceLost => ["device was lost", "error_device_lost"],
+            Self::SurfaceLost => ["window is gone", "error_surface_lost"],
+            Self::OutOfDate => ["out of date", "error_out_of_date"],
+        }
+    }
+
     /// True for the errors of memory.
     #[must_use]
     pub const fn is_want_of_memory(self) -> bool {

@@ -1,6 +1,6 @@
 //! Runs all faults of a plan, and counts what came of them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -52,6 +52,8 @@ pub struct SweepReport {
     pub refused: usize,
     /// Runs in which the fault was reached, and that ended with success.
     pub succeeded: usize,
+    /// Those by command and error.
+    pub succeeded_by: BTreeMap<String, usize>,
     /// Runs that left a context alive on purpose, as its work could not be waited for.
     pub leaked: usize,
     /// Runs with flaws.
@@ -62,7 +64,19 @@ pub struct SweepReport {
 
 impl fmt::Display for SweepReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { calls, commands, planned, runs, reached, refused, succeeded, leaked, flawed, time } = self;
+        let Self {
+            calls,
+            commands,
+            planned,
+            runs,
+            reached,
+            refused,
+            succeeded,
+            succeeded_by,
+            leaked,
+            flawed,
+            time,
+        } = self;
         write!(
             out,
             "{calls} calls of {commands} commands, {runs} of {planned} faults, {reached} reached, {refused} errors, \
@@ -70,6 +84,9 @@ impl fmt::Display for SweepReport {
             flawed.len(),
             time.as_secs()
         )?;
+        for (by, count) in succeeded_by {
+            write!(out, "\n  right results with {by}: {count}")?;
+        }
         for run in flawed {
             let fault = run.fault.as_ref().map_or_else(|| "no fault".to_owned(), ToString::to_string);
             let texts: Vec<_> = run.flaws.iter().map(ToString::to_string).collect();
@@ -95,7 +112,11 @@ impl SweepReport {
         self.runs += 1;
         self.reached += usize::from(outcome.reached);
         match outcome.ending {
-            Ending::Status(0) => self.succeeded += usize::from(outcome.reached),
+            Ending::Status(0) if outcome.reached => {
+                self.succeeded += 1;
+                let by = format!("{} {}", fault.command, fault.error.name());
+                *self.succeeded_by.entry(by).or_default() += 1;
+            }
             Ending::Status(_) => self.refused += 1,
             _ => {}
         }
@@ -189,6 +210,7 @@ mod tests {
             reached: 410,
             refused: 400,
             succeeded: 10,
+            succeeded_by: BTreeMap::new(),
             leaked: 7,
             flawed: vec![FlawedRun { fault: None, flaws: vec![Flaw::Hang], stderr: String::new() }],
             time: Duration::from_secs(12),

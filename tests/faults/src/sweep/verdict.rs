@@ -94,6 +94,8 @@ pub enum Flaw {
     UnnamedCommand(String),
     /// An error that names commands, of which none has failed.
     OtherCommand(String),
+    /// An error that tells another cause than the one that was injected.
+    OtherCause(String),
     /// An error that does not name the object of that command in quotes.
     UnnamedObject(String),
     /// No result of a second try in the same process, or another.
@@ -122,6 +124,7 @@ impl fmt::Display for Flaw {
             Self::NoMessage => out.write_str("no message, or several"),
             Self::UnnamedCommand(message) => write!(out, "the command is not named: {message}"),
             Self::OtherCommand(message) => write!(out, "the command that is named has not failed: {message}"),
+            Self::OtherCause(message) => write!(out, "the cause is another: {message}"),
             Self::UnnamedObject(message) => write!(out, "the object is not named: {message}"),
             Self::NotRecovered => out.write_str("a second try in the same process fails"),
             Self::BrokenCache(stderr) => write!(out, "the next start fails or warns: {stderr}"),
@@ -224,7 +227,7 @@ fn judge_result(
     }
 }
 
-/// Judges the line of an error: it must name a command that has failed, and behind it the object of that command.
+/// Judges the line of an error: it must name a command that has failed, behind it the object of that command, and the cause.
 ///
 /// Two other forms count: the swapchain whose window is gone, for a lost surface, and what needs ray tracing on a device that
 /// was created without. Every command concerns an object, those before the device the loader, the instance or the window.
@@ -244,8 +247,12 @@ fn judge_error(error: &str, fault: &Fault, found: &RunOutcome) -> Option<Flaw> {
         return Some(flaw(error.to_owned()));
     }
     let without_rays = error.split_once(WITHOUT_RAY_TRACING).is_some_and(|(before, _)| before.contains(" '"));
-    let is_named = without_rays || of_failed.into_iter().any(starts_with_object);
-    (!is_named).then(|| Flaw::UnnamedObject(error.to_owned()))
+    if !without_rays && !of_failed.into_iter().any(starts_with_object) {
+        return Some(Flaw::UnnamedObject(error.to_owned()));
+    }
+    let lower = error.to_lowercase();
+    let tells_cause = fault.error.texts().iter().any(|text| lower.contains(text));
+    (!tells_cause).then(|| Flaw::OtherCause(error.to_owned()))
 }
 
 /// Returns the commands that an error may name: that of a fault that happens once; those that failed on other threads of a
@@ -350,9 +357,11 @@ mod tests {
         let told_others = BTreeSet::from(["vkWaitSemaphores".to_owned()]);
         let stderr = "error: the device was lost in vkWaitSemaphores for 'rain'".to_owned();
         let by_other_thread = RunOutcome { told_others, stderr, ..refused() };
-        for outcome in [clean(), refused(), other_shader, by_other_thread] {
+        for outcome in [clean(), refused(), other_shader] {
             assert_eq!(found(&outcome), []);
         }
+        let loss = Fault { error: FaultError::DeviceLost, ..fault(Span::Once) };
+        assert_eq!(flaws(Some(&loss), &by_other_thread, &clean()), []);
         let twice = RunOutcome { second_result: None, stderr: refused().stderr.repeat(2), ..refused() };
         let one_try = RunOutcome { tries_again: false, ..twice.clone() };
         assert_eq!(found(&one_try), [Flaw::NoMessage], "one try, one error");
@@ -394,7 +403,7 @@ mod tests {
         let named = |command: &str, error, text| judged(command, error, Span::Once, &[command], text);
         let memory = FaultError::HostMemory;
         let other = |text: &str| Some(Flaw::OtherCommand(text.to_owned()));
-        let device = "error: vkCreateDevice failed for 'llvmpipe'";
+        let device = "error: out of host memory in vkCreateDevice for 'llvmpipe'";
         assert_eq!(named("vkEnumerateDeviceExtensionProperties", memory, device), None);
         let deferred = "error: out of host memory in vkCreateRayTracingPipelinesKHR for 'rays'";
         assert_eq!(named("vkGetDeferredOperationResultKHR", memory, deferred), None);
@@ -433,11 +442,10 @@ mod tests {
             ["vkMapMemory", "vkGetPhysicalDeviceSurfaceSupportKHR", "vkCreateDevice", "vkQueueSubmit2"];
         let judge = |error, text: &str| judged("vkMapMemory", error, Span::Stays, &failed, text);
         for named in [
-            "error: out of host memory in vkMapMemory for 'rain'",
-            "error: rain: vkMapMemory failed for 'rain': unknown",
-            "error: no device (vkGetPhysicalDeviceSurfaceSupportKHR failed for 'window': lost)",
+            "error: rain: vkMapMemory failed for 'rain': ERROR_SURFACE_LOST_KHR",
+            "error: no device (vkGetPhysicalDeviceSurfaceSupportKHR failed for 'window': ERROR_SURFACE_LOST_KHR)",
             "error: swapchain 'main': its window is gone; resume it",
-            "error: shader 'a' needs ray queries: vkCreateDevice with ray tracing returned: lost",
+            "error: shader 'a' needs ray queries: vkCreateDevice with ray tracing returned: ERROR_SURFACE_LOST_KHR",
         ] {
             assert_eq!(judge(FaultError::SurfaceLost, named), None, "{named}");
         }
@@ -458,6 +466,22 @@ mod tests {
     }
 
     #[test]
+    fn an_error_tells_the_cause_that_was_injected() {
+        let judge = |error, text: &str| judged("vkMapMemory", error, Span::Once, &["vkMapMemory"], text);
+        for (error, cause) in [
+            (FaultError::HostMemory, "out of host memory"),
+            (FaultError::DeviceMemory, "out of device memory"),
+            (FaultError::DeviceLost, "the device was lost"),
+        ] {
+            assert_eq!(judge(error, &format!("error: {cause} in vkMapMemory for 'rain'")), None);
+            let other = "error: choose another format: vkMapMemory failed for 'rain'".to_owned();
+            assert_eq!(judge(error, &other), Some(Flaw::OtherCause(other.clone())));
+        }
+        let host = "error: out of host memory in vkMapMemory for 'rain'";
+        assert_eq!(judge(FaultError::DeviceMemory, host), Some(Flaw::OtherCause(host.to_owned())));
+    }
+
+    #[test]
     fn a_context_may_be_leaked_where_its_work_cannot_be_waited_for() {
         let stderr = format!("warning: the end of a context: no memory; {LEAKED}\n{}", refused().stderr);
         let live = BTreeMap::from([("VkDevice".to_owned(), 1)]);
@@ -466,11 +490,9 @@ mod tests {
         let judged = |error, span, outcome| flaws(Some(&Fault { error, ..fault(span) }), outcome, &clean());
         assert_eq!(judged(FaultError::HostMemory, Span::Unanswered, &leaked), []);
         let is_leak = std::slice::from_ref(&leak);
-        assert_eq!(
-            judged(FaultError::DeviceLost, Span::Unanswered, &leaked),
-            is_leak,
-            "a lost device is idle"
-        );
+        let stderr = leaked.stderr.replace("out of host memory", "the device was lost");
+        let lost = RunOutcome { stderr, ..leaked.clone() };
+        assert_eq!(judged(FaultError::DeviceLost, Span::Unanswered, &lost), is_leak, "a lost device is idle");
         for span in [Span::Once, Span::Command, Span::Stays] {
             assert_eq!(
                 judged(FaultError::HostMemory, span, &leaked),
