@@ -21,4 +21,5 @@ mod programs;
 mod readme;
 mod rust_modules;
 mod rust_tokens;
+mod sums;
 mod unsafety;
