@@ -35,15 +35,20 @@ impl FaultError {
         }
     }
 
-    /// Texts of which an error that comes of this one has one, in lower case: the library's, or the name in Vulkan.
+    /// Texts of which an error that comes of this one has one, in lower case: the library's, the name in Vulkan, or the
+    /// text of ash.
     #[must_use]
-    pub const fn texts(self) -> [&'static str; 2] {
+    pub const fn texts(self) -> [&'static str; 3] {
         match self {
-            Self::HostMemory => ["out of host memory", "error_out_of_host_memory"],
-            Self::DeviceMemory => ["out of device memory", "error_out_of_device_memory"],
-            Self::DeviceLost => ["device was lost", "error_device_lost"],
-            Self::SurfaceLost => ["window is gone", "error_surface_lost"],
-            Self::OutOfDate => ["out of date", "error_out_of_date"],
+            Self::HostMemory => {
+                ["out of host memory", "error_out_of_host_memory", "host memory allocation has failed"]
+            }
+            Self::DeviceMemory => {
+                ["out of device memory", "error_out_of_device_memory", "device memory allocation has failed"]
+            }
+            Self::DeviceLost => ["device was lost", "error_device_lost", "device has been lost"],
+            Self::SurfaceLost => ["window is gone", "error_surface_lost", "surface is no longer available"],
+            Self::OutOfDate => ["out of date", "error_out_of_date", "surface has changed"],
         }
     }
 
