@@ -154,7 +154,7 @@ impl<'a> Includes<'a> {
                 return read_text(&path).map(|text| (IncludeOrigin::File(canonicalize(path)), text));
             }
         }
-        Err(self.not_found(name, beside))
+        Err(if self.wants_reason() { self.not_found(name, beside) } else { String::new() })
     }
 
     fn resolve_listed(&self, local: bool, name: &str) -> Option<(IncludeOrigin, String)> {
@@ -168,6 +168,11 @@ impl<'a> Includes<'a> {
             let text = (*self.by_name.get(&wanted)?).to_owned();
             Some((IncludeOrigin::Listed(wanted), text))
         })
+    }
+
+    /// True if the next failure gets its full reason.
+    fn wants_reason(&self) -> bool {
+        self.failures.len() < MAX_FULL_REASONS
     }
 
     fn not_found(&self, name: &str, beside: Option<&Path>) -> String {
@@ -239,7 +244,7 @@ impl IncludeHandler for Includes<'_> {
                 Some(result)
             }
             Err(reason) => {
-                self.failures.push(match self.failures.len() < MAX_FULL_REASONS {
+                self.failures.push(match self.wants_reason() {
                     true => reason + &self.include_chain(),
                     false => format!("'{}' cannot be included either", readable_name(name)),
                 });
