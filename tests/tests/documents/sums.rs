@@ -34,7 +34,7 @@ fn complaints(page: &str) -> Vec<String> {
 }
 
 #[test]
-fn rows_of_sums_are_sums() {
+fn the_sums_of_tables_are_right() {
     let page = std::fs::read_to_string(project().join("docs/reliability.md")).unwrap();
     assert!(page.matches(SUM).count() >= 2);
     assert_eq!(complaints(&page), Vec::<String>::new());
