@@ -155,6 +155,7 @@ fn cut_files_and_other_formats_are_refused() {
     for length in 0..bytes.len() {
         assert!(load(&bytes[..length]).is_err(), "{length}");
     }
+    assert!(matches!(load(&bytes[..bytes.len() - 1]), Err(Problem::Container { .. })));
     assert!(matches!(load(b"mtllib x.mtl\n"), Err(Problem::NotGltf)));
     assert!(matches!(load(br#"{"asset":{"version":"1.0"}}"#), Err(Problem::Version { .. })));
     assert!(matches!(

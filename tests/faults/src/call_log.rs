@@ -5,19 +5,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::fault::FaultError;
 use crate::leftovers::Leftovers;
 
-/// A call of a run without fault.
+/// A call of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Call {
     /// Name of the command.
     pub command: String,
-    /// Errors that the command may answer.
+    /// Errors that the command may answer, in a run without a fault.
     pub errors: Vec<FaultError>,
 }
 
 /// Content of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CallLog {
-    /// The calls, of a run without fault only.
+    /// The calls. A run with a fault has those of the command of the fault alone.
     pub calls: Vec<Call>,
     /// True if the call that was to fail was reached.
     pub reached: bool,

@@ -69,10 +69,16 @@ fn whole(name: &str, line: &str, program: &Program) {
 fn whole_of(name: &str, line: &str, program: &Program, plan: &SweepPlan) {
     let report = sweep(program, plan, WHOLE).unwrap();
     println!("{line}: {report}\n{}", report.row(name));
-    // Threads change the order of calls, so that a few faults are not reached.
-    let is_reached = 20 * report.reached >= 19 * report.runs && report.reached > 0;
+    let unreached = report.runs - report.reached;
+    let is_reached = report.reached > 0 && 20 * unreached <= if varies(line) { report.runs } else { 0 };
     assert!(report.flawed.is_empty() && is_reached, "{line}: {report}");
     assert_eq!(report.runs, report.planned, "{line}: {report}");
+}
+
+/// True for programs whose number of calls differs from run to run, by the order of threads or the time of a window, so that a
+/// few faults are not reached.
+fn varies(line: &str) -> bool {
+    ["threads", "window"].iter().any(|start| line.starts_with(start))
 }
 
 /// Declares an ignored test for each scenario.
@@ -502,17 +508,18 @@ fn assert_losses_are_explained(line: &str, program: Program, plan: &SweepPlan) {
     let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
     let (clean, calls) = run(&program, &layer, caches.path(), None).unwrap();
     let description = DESCRIPTION.to_str().unwrap();
-    let mut explained = 0;
-    for fault in plan.faults(&calls) {
-        let (outcome, _) = run(&program, &layer, caches.path(), Some(&fault)).unwrap();
-        assert_eq!(flaws(Some(&fault), &outcome, &clean), [], "{line}, {fault}: {}", outcome.stderr);
+    let (mut explained, faults) = (0, plan.faults(&calls));
+    for fault in &faults {
+        let (outcome, _) = run(&program, &layer, caches.path(), Some(fault)).unwrap();
+        assert_eq!(flaws(Some(fault), &outcome, &clean), [], "{line}, {fault}: {}", outcome.stderr);
+        assert!(outcome.reached || varies(line), "{line}, {fault}: not reached");
         let has_failed = outcome.reached && outcome.result.is_none() && fault.command != "vkCreateDevice";
         if has_failed {
             assert!(error_line(&outcome).contains(description), "{line}, {fault}: {}", outcome.stderr);
             explained += 1;
         }
     }
-    println!("{line}: {explained} losses explained");
+    println!("{line}: {explained} of {} losses explained", faults.len());
     assert!(explained > 0, "{line}");
 }
 

@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::held_by::{cells, project};
 
-const PAGE: &str = include_str!("../../../docs/bad-input.md");
+pub const PAGE: &str = include_str!("../../../docs/bad-input.md");
+/// The title of the section about other crates than the library, which is the last.
+pub const CRATES: &str = "\n## Models and interfaces\n";
 /// The public interface, one item a line; `.ci/api` holds it to the sources.
 const INTERFACE: &str = include_str!("../../../lvk/public-api.txt");
 const ERRORS: &str = include_str!("../../../lvk/src/error/mod.rs");
@@ -55,14 +57,14 @@ struct Call {
 }
 
 /// Returns the names in backticks of a cell or line.
-fn quoted(text: &str) -> Vec<&str> {
+pub fn quoted(text: &str) -> Vec<&str> {
     text.split('`').skip(1).step_by(2).collect()
 }
 
 /// Returns the rows of all tables with the head `call | wrong | error | test`, or what is wrong with a line.
 fn rows(page: &str) -> Result<Vec<Row<'_>>, String> {
     let mut found = Vec::new();
-    for line in page.lines() {
+    for line in page.split(CRATES).next().unwrap_or_default().lines() {
         let Some(cells) = cells(line) else { continue };
         let [calls, wrong, errors, tests] = cells[..] else { return Err(format!("four cells: {line}")) };
         if tests == "test" || tests == "---" {
@@ -112,7 +114,7 @@ fn fallible_call(line: &str) -> Option<Call> {
 }
 
 /// Returns the variants of `pub enum Error` in a source.
-fn variants(source: &str) -> Vec<&str> {
+pub fn variants(source: &str) -> Vec<&str> {
     let (_, body) = source.split_once("pub enum Error {\n").unwrap();
     let body = body.split("\n}").next().unwrap();
     let lines = body.lines().filter_map(|line| line.strip_prefix("    "));
@@ -136,7 +138,7 @@ fn source(module: &[&str]) -> Option<String> {
 }
 
 /// True if the source has a test function of this name.
-fn has_test(source: &str, name: &str) -> bool {
+pub fn has_test(source: &str, name: &str) -> bool {
     let mut marked = false;
     source.lines().map(str::trim).any(|line| {
         let found = marked && line.starts_with(&format!("fn {name}("));
@@ -180,7 +182,7 @@ fn function_name(line: &str) -> Option<&str> {
 }
 
 /// Returns the text of a test and of every function of its file that the text names, and so on.
-fn reached_text(source: &str, name: &str) -> String {
+pub fn reached_text(source: &str, name: &str) -> String {
     let functions = functions(source);
     let (mut names, mut texts, mut open) = (BTreeSet::new(), String::new(), vec![name]);
     while let Some(name) = open.pop() {

@@ -2,6 +2,7 @@
 
 mod android;
 mod bad_input;
+mod bad_input_of_crates;
 mod circles;
 mod contributing;
 mod defaults;

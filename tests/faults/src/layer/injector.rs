@@ -135,6 +135,9 @@ impl Injector {
             return None;
         }
         let is_named = fault.command == name;
+        if is_named {
+            self.write(&call_log::call_line(name, &[]));
+        }
         let fails = if is_named && fault.call == count {
             self.reached.store(true, Ordering::Relaxed);
             let _ = self.thread.set(std::thread::current().id());

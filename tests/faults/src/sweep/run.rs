@@ -150,6 +150,7 @@ fn run_in(
         ending,
         stderr: String::from_utf8_lossy(&fs::read(folder.join("stderr"))?).into_owned(),
         reached: log.reached,
+        calls: counted(&log.calls),
         failed: log.failed,
         told_others: log.told_others,
         counts_objects: log.counts_objects,
@@ -165,6 +166,15 @@ fn run_in(
         next: None,
     };
     Ok((outcome, log.calls))
+}
+
+/// Returns the number of calls of each command.
+fn counted(calls: &[Call]) -> BTreeMap<String, usize> {
+    let mut counts = BTreeMap::new();
+    for call in calls {
+        *counts.entry(call.command.clone()).or_default() += 1;
+    }
+    counts
 }
 
 fn end(child: &mut Child) -> io::Result<Ending> {

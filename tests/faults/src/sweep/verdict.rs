@@ -3,8 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use crate::fault::{Fault, FaultError, Span};
+use crate::fault::{Fault, Span};
 use crate::leftovers::Leftovers;
+
+use super::error_line::{commands_of, judge_error, names_of};
+use super::fallbacks::{Instead, documented};
 
 /// The end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +29,8 @@ pub struct RunOutcome {
     pub stderr: String,
     /// True if the fault was reached.
     pub reached: bool,
+    /// Number of calls of each command. A run with a fault has that of its command alone.
+    pub calls: BTreeMap<String, usize>,
     /// Commands of which a call was made to fail.
     pub failed: BTreeSet<String>,
     /// Commands that told other threads of the loss of a device.
@@ -86,6 +91,8 @@ pub enum Flaw {
     Litter(String),
     /// Success with another result.
     WrongResult,
+    /// Success after the failure of a command that has no documented fallback, and that no warning names.
+    SwallowedError(String),
     /// Failure that leaves an incomplete result.
     PartialResult,
     /// Failure without one line that tells the error.
@@ -120,6 +127,9 @@ impl fmt::Display for Flaw {
             Self::Held(what) => write!(out, "held at the end: {what}"),
             Self::Litter(files) => write!(out, "left files {files}"),
             Self::WrongResult => out.write_str("wrong result"),
+            Self::SwallowedError(commands) => {
+                write!(out, "right result in silence, without a documented fallback, after {commands}")
+            }
             Self::PartialResult => out.write_str("partial result"),
             Self::NoMessage => out.write_str("no message, or several"),
             Self::UnnamedCommand(message) => write!(out, "the command is not named: {message}"),
@@ -212,6 +222,7 @@ fn judge_result(
         if found.result.is_none() || found.result != clean.result {
             flaws.push(Flaw::WrongResult);
         }
+        flaws.extend(fault.and_then(|fault| judge_silence(fault, found, clean)));
         return;
     }
     if found.result.is_some() && found.result != clean.result {
@@ -227,93 +238,35 @@ fn judge_result(
     }
 }
 
-/// Judges the line of an error: it must name a command that has failed, behind it the object of that command, and the cause.
-///
-/// Two other forms count: the swapchain whose window is gone, for a lost surface, and what needs ray tracing on a device that
-/// was created without. Every command concerns an object, those before the device the loader, the instance or the window.
-fn judge_error(error: &str, fault: &Fault, found: &RunOutcome) -> Option<Flaw> {
-    if fault.error == FaultError::SurfaceLost
-        && let Some((before, _)) = error.split_once(WINDOW_IS_GONE)
-    {
-        let is_named = before.contains(" '") && !before.ends_with('\'');
-        return (!is_named).then(|| Flaw::UnnamedObject(error.to_owned()));
-    }
-    let failed = failed_commands(fault, found);
-    let named: Vec<_> = commands_of(error).collect();
-    let of_failed: Vec<&str> =
-        named.iter().filter(|(command, _)| failed.contains(command)).map(|(_, rest)| *rest).collect();
-    if of_failed.is_empty() {
-        let flaw = if named.is_empty() { Flaw::UnnamedCommand } else { Flaw::OtherCommand };
-        return Some(flaw(error.to_owned()));
-    }
-    let without_rays = error.split_once(WITHOUT_RAY_TRACING).is_some_and(|(before, _)| before.contains(" '"));
-    if !without_rays && !of_failed.into_iter().any(starts_with_object) {
-        return Some(Flaw::UnnamedObject(error.to_owned()));
-    }
-    let lower = error.to_lowercase();
-    let tells_cause = fault.error.texts().iter().any(|text| lower.contains(text));
-    (!tells_cause).then(|| Flaw::OtherCause(error.to_owned()))
-}
-
-/// Returns the commands that an error may name: that of a fault that happens once; those that failed on other threads of a
-/// device that it has lost; and all that failed where later calls fail, too, as the library may go on without the first.
-fn failed_commands<'a>(fault: &'a Fault, found: &'a RunOutcome) -> BTreeSet<&'a str> {
-    let others = if fault.span == Span::Once { &found.told_others } else { &found.failed };
-    let mut commands: BTreeSet<&str> = others.iter().map(String::as_str).collect();
-    if fault.span == Span::Once {
-        commands.insert(&fault.command);
-    }
-    for (command, name) in OTHER_NAMES {
-        if commands.contains(command) {
-            commands.insert(name);
-        }
-    }
-    commands
-}
-
-/// Commands whose errors may be told as those of another command: the loader calls the first while it creates a device, the
-/// result of the second is that of the command that was deferred, and the layer logs the others by the names that were promoted.
-const OTHER_NAMES: [(&str, &str); 4] = [
-    ("vkEnumerateDeviceExtensionProperties", "vkCreateDevice"),
-    ("vkGetDeferredOperationResultKHR", "vkCreateRayTracingPipelinesKHR"),
-    ("vkGetPhysicalDeviceCalibrateableTimeDomainsKHR", "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT"),
-    ("vkGetCalibratedTimestampsKHR", "vkGetCalibratedTimestampsEXT"),
-];
-
-/// True if a text behind a command names its object, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`.
-fn starts_with_object(rest: &str) -> bool {
-    let rest = rest.strip_prefix(" failed").unwrap_or(rest);
-    rest.strip_prefix(" for '").is_some_and(|name| !name.starts_with('\''))
-}
-
-/// A part of errors about ray tracing behind the quoted name of what needs it, on a device that was created without.
-const WITHOUT_RAY_TRACING: &str = "vkCreateDevice with ray tracing returned";
-
-/// The end of an error about a lost surface, after the quoted name of the swapchain.
-const WINDOW_IS_GONE: &str = "': its window is gone";
-
-/// Returns each Vulkan command of a text, such as `vkMapMemory`, and the text behind it.
-fn commands_of(text: &str) -> impl Iterator<Item = (&str, &str)> {
-    let is_of_word = |letter: char| letter.is_ascii_alphanumeric();
-    text.match_indices("vk").filter_map(move |(start, _)| {
-        let (before, word) = text.split_at(start);
-        let is_command = word[2..].starts_with(|letter: char| letter.is_ascii_uppercase());
-        (is_command && !before.ends_with(is_of_word)).then(|| {
-            let rest = word.trim_start_matches(is_of_word);
-            (&word[..word.len() - rest.len()], rest)
-        })
-    })
+/// Judges a success in spite of a fault: a warning names each command that failed, or the command has a documented fallback,
+/// which the library has taken.
+fn judge_silence(fault: &Fault, found: &RunOutcome, clean: &RunOutcome) -> Option<Flaw> {
+    let warnings = found.stderr.lines().filter(|line| line.starts_with("warning: "));
+    let named: BTreeSet<&str> = warnings.flat_map(commands_of).map(|(command, _)| command).collect();
+    let calls = |outcome: &RunOutcome| outcome.calls.get(&fault.command).copied().unwrap_or_default();
+    let is_silent = |command: &&String| {
+        let is_documented = match documented(command, fault.error) {
+            Some(Instead::CallsAgain) if fault.span == Span::Once => calls(found) > calls(clean),
+            Some(_) => true,
+            None => false,
+        };
+        !is_documented && !names_of(command).any(|name| named.contains(name))
+    };
+    let silent: Vec<_> = found.failed.iter().filter(is_silent).cloned().collect();
+    (!silent.is_empty()).then(|| Flaw::SwallowedError(silent.join(", ")))
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use crate::fault::FaultError;
 
-    fn clean() -> RunOutcome {
+    pub(in crate::sweep) fn clean() -> RunOutcome {
         RunOutcome {
             ending: Ending::Status(0),
             stderr: String::new(),
             reached: false,
+            calls: BTreeMap::new(),
             failed: BTreeSet::new(),
             told_others: BTreeSet::new(),
             counts_objects: true,
@@ -330,7 +283,7 @@ mod tests {
         }
     }
 
-    fn refused() -> RunOutcome {
+    pub(in crate::sweep) fn refused() -> RunOutcome {
         RunOutcome {
             ending: Ending::Status(1),
             stderr: "warning: x\nerror: out of host memory in vkCreateBuffer for 'rain'\n".to_owned(),
@@ -388,97 +341,40 @@ mod tests {
         assert_eq!(found(&RunOutcome { counts_objects: false, ..clean() }), [Flaw::NoCounts]);
     }
 
-    /// Judges a line of a fault at `command`, where calls of `failed` were made to fail.
-    fn judged(command: &str, error: FaultError, span: Span, failed: &[&str], text: &str) -> Option<Flaw> {
-        let failed = failed.iter().map(|command| (*command).to_owned()).collect();
-        judge_error(
-            text,
-            &Fault { command: command.into(), call: 1, error, span },
-            &RunOutcome { failed, ..refused() },
-        )
-    }
-
     #[test]
-    fn commands_may_have_the_name_of_their_caller() {
-        let named = |command: &str, error, text| judged(command, error, Span::Once, &[command], text);
-        let memory = FaultError::HostMemory;
-        let other = |text: &str| Some(Flaw::OtherCommand(text.to_owned()));
-        let device = "error: out of host memory in vkCreateDevice for 'llvmpipe'";
-        assert_eq!(named("vkEnumerateDeviceExtensionProperties", memory, device), None);
-        let deferred = "error: out of host memory in vkCreateRayTracingPipelinesKHR for 'rays'";
-        assert_eq!(named("vkGetDeferredOperationResultKHR", memory, deferred), None);
-        assert_eq!(named("vkCreateBuffer", memory, device), other(device));
-        let extensions = ["vkCreateBuffer", "vkEnumerateDeviceExtensionProperties"];
-        assert_eq!(judged("vkCreateBuffer", memory, Span::Stays, &extensions, device), None);
-        let gone = "error: swapchain 'main': its window is gone";
-        assert_eq!(named("vkQueuePresentKHR", FaultError::SurfaceLost, gone), None);
-        assert_eq!(named("vkQueuePresentKHR", memory, gone), Some(Flaw::UnnamedCommand(gone.to_owned())));
-    }
-
-    #[test]
-    fn only_commands_that_have_failed_count() {
-        let (memory, lost) = (FaultError::DeviceMemory, FaultError::DeviceLost);
-        let image = "error: out of device memory in vkCreateImage for 'rain'";
-        let other = Some(Flaw::OtherCommand(image.to_owned()));
-        let both = ["vkAllocateMemory", "vkCreateImage"];
-        for span in [Span::Command, Span::Stays] {
-            assert_eq!(judged("vkAllocateMemory", memory, span, &both, image), None, "{span:?}");
-            assert_eq!(judged("vkAllocateMemory", memory, span, &both[..1], image), other, "{span:?}");
-        }
-        assert_eq!(judged("vkCreateImageView", memory, Span::Stays, &["vkCreateImageView"], image), other);
-        // After a loss that happens once, calls of the same thread fail too, but the first is to be told.
+    fn a_right_result_is_documented_or_told_by_a_warning() {
+        let failed = |commands: &[&str], stderr: &str| RunOutcome {
+            failed: commands.iter().map(|command| (*command).to_owned()).collect(),
+            stderr: stderr.to_owned(),
+            ..clean()
+        };
+        let swallowed = |commands: &str| vec![Flaw::SwallowedError(commands.to_owned())];
+        let begins_later = "vkBeginCommandBuffer";
+        assert_eq!(found(&failed(&[begins_later], "")), []);
+        let again = RunOutcome {
+            calls: BTreeMap::from([("vkAllocateMemory".to_owned(), 5)]),
+            ..failed(&["vkAllocateMemory"], "")
+        };
+        let without =
+            |calls| RunOutcome { calls: BTreeMap::from([("vkAllocateMemory".to_owned(), calls)]), ..clean() };
+        let of_memory = Fault { command: "vkAllocateMemory".into(), ..fault(Span::Once) };
+        assert_eq!(flaws(Some(&of_memory), &again, &without(4)), []);
         assert_eq!(
-            judged("vkQueueSubmit2", lost, Span::Once, &["vkQueueSubmit2", "vkCreateImage"], image),
-            other
+            flaws(Some(&of_memory), &again, &without(5)),
+            swallowed("vkAllocateMemory"),
+            "none in its place"
         );
-        let no_command = "error: lvk_faults failed for 'rain'";
-        let unnamed = Some(Flaw::UnnamedCommand(no_command.to_owned()));
-        assert_eq!(judged("vkCreateImage", memory, Span::Stays, &both, no_command), unnamed);
-    }
-
-    #[test]
-    fn objects_are_quoted_behind_the_command_that_failed_or_lose_their_window() {
-        let failed =
-            ["vkMapMemory", "vkGetPhysicalDeviceSurfaceSupportKHR", "vkCreateDevice", "vkQueueSubmit2"];
-        let judge = |error, text: &str| judged("vkMapMemory", error, Span::Stays, &failed, text);
-        for named in [
-            "error: rain: vkMapMemory failed for 'rain': ERROR_SURFACE_LOST_KHR",
-            "error: no device (vkGetPhysicalDeviceSurfaceSupportKHR failed for 'window': ERROR_SURFACE_LOST_KHR)",
-            "error: swapchain 'main': its window is gone; resume it",
-            "error: shader 'a' needs ray queries: vkCreateDevice with ray tracing returned: ERROR_SURFACE_LOST_KHR",
-        ] {
-            assert_eq!(judge(FaultError::SurfaceLost, named), None, "{named}");
-        }
-        for unnamed in [
-            "error: out of host memory in vkMapMemory",
-            "error: out of host memory in vkMapMemory for ''",
-            "error: the device was lost in vkQueueSubmit2; the graphics queue had not finished submission 3 'frame'",
-            "error: 'rain': vkMapMemory failed: unknown",
-            "error: no vkMapMemory after vkCreateBuffer for 'rain'",
-            "error: swapchain '': its window is gone; resume it",
-            "error: no ray queries: vkCreateDevice with ray tracing returned 'lost'",
-        ] {
-            let flaw = Some(Flaw::UnnamedObject(unnamed.to_owned()));
-            assert_eq!(judge(FaultError::SurfaceLost, unnamed), flaw, "{unnamed}");
-        }
-        let attached = "error: lvkMapMemory for 'rain'";
-        assert_eq!(judge(FaultError::HostMemory, attached), Some(Flaw::UnnamedCommand(attached.to_owned())));
-    }
-
-    #[test]
-    fn an_error_tells_the_cause_that_was_injected() {
-        let judge = |error, text: &str| judged("vkMapMemory", error, Span::Once, &["vkMapMemory"], text);
-        for (error, cause) in [
-            (FaultError::HostMemory, "out of host memory"),
-            (FaultError::DeviceMemory, "out of device memory"),
-            (FaultError::DeviceLost, "the device was lost"),
-        ] {
-            assert_eq!(judge(error, &format!("error: {cause} in vkMapMemory for 'rain'")), None);
-            let other = "error: choose another format: vkMapMemory failed for 'rain'".to_owned();
-            assert_eq!(judge(error, &other), Some(Flaw::OtherCause(other.clone())));
-        }
-        let host = "error: out of host memory in vkMapMemory for 'rain'";
-        assert_eq!(judge(FaultError::DeviceMemory, host), Some(Flaw::OtherCause(host.to_owned())));
+        assert_eq!(found(&failed(&["vkCreateBuffer"], "")), swallowed("vkCreateBuffer"));
+        let both = ["vkCreateBuffer", begins_later, "vkCreateImage"];
+        assert_eq!(found(&failed(&both, "")), swallowed("vkCreateBuffer, vkCreateImage"));
+        let warning = "warning: no cache: out of host memory in vkCreateBuffer for 'rain'\n";
+        assert_eq!(found(&failed(&both[..2], warning)), []);
+        assert_eq!(found(&failed(&both, warning)), swallowed("vkCreateImage"));
+        let note = "note: vkCreateBuffer for 'rain'\n";
+        assert_eq!(found(&failed(&both[..1], note)), swallowed("vkCreateBuffer"), "a note is no warning");
+        let loss = Fault { error: FaultError::DeviceLost, ..fault(Span::Once) };
+        let lost = failed(&["vkGetImageMemoryRequirements2"], "");
+        assert_eq!(flaws(Some(&loss), &lost, &clean()), swallowed("vkGetImageMemoryRequirements2"));
     }
 
     #[test]
