@@ -65,7 +65,7 @@ fn every_row_of_other_crates_names_tests_that_expect_the_error() {
 }
 
 #[test]
-fn wrong_rows_of_other_crates_are_noticed() {
+fn wrong_entries_of_other_crates_are_noticed() {
     let test = "lvk_gltf::containers::errors_name_the_file";
     assert_eq!(complaint(&["lvk_gltf::Problem::File"], &[test]), None);
     for (error, test) in [

@@ -16,9 +16,9 @@ pub struct Fallback {
 /// What the library does in place of a call that has failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instead {
-    /// It calls the command once more, for the same object or another one that serves as well.
+    /// A further call of the command, for the same object or another one that serves as well.
     CallsAgain,
-    /// It does without the call.
+    /// Nothing of the kind: another command serves, or the call was not needed yet.
     DoesWithout,
 }
 
