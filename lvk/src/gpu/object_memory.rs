@@ -97,7 +97,12 @@ fn allocation_error(name: &str, bytes: u64, error: AllocationError) -> Error {
     use vk::Result as Code;
     match error {
         AllocationError::OutOfMemory => Error::allocating(name, bytes)(Code::ERROR_OUT_OF_DEVICE_MEMORY),
-        AllocationError::FailedToMap(_) => Error::vulkan("vkMapMemory", name)(Code::ERROR_OUT_OF_HOST_MEMORY),
+        // A driver that answers success without an address lacks address space.
+        AllocationError::FailedToMap(text) => {
+            let codes = [Code::ERROR_OUT_OF_DEVICE_MEMORY, Code::ERROR_MEMORY_MAP_FAILED];
+            let code = codes.into_iter().find(|code| code.to_string() == text);
+            Error::vulkan("vkMapMemory", name)(code.unwrap_or(Code::ERROR_OUT_OF_HOST_MEMORY))
+        }
         AllocationError::Internal(text) if text.contains("OUT_OF_HOST_MEMORY") => {
             Error::allocating(name, bytes)(Code::ERROR_OUT_OF_HOST_MEMORY)
         }
@@ -132,10 +137,14 @@ mod tests {
             text(AllocationError::OutOfMemory),
             "out of device memory in vkAllocateMemory for 'sky' (400 bytes)"
         );
-        assert_eq!(
-            text(AllocationError::FailedToMap(String::new())),
-            "out of host memory in vkMapMemory for 'sky'"
-        );
+        let mapping = |told: String| text(AllocationError::FailedToMap(told));
+        let (host, device) = (vk::Result::ERROR_OUT_OF_HOST_MEMORY, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        for told in [host.to_string(), "Returned mapped pointer is null".to_owned()] {
+            assert_eq!(mapping(told), "out of host memory in vkMapMemory for 'sky'");
+        }
+        assert_eq!(mapping(device.to_string()), "out of device memory in vkMapMemory for 'sky'");
+        let refused = mapping(vk::Result::ERROR_MEMORY_MAP_FAILED.to_string());
+        assert!(refused.starts_with("vkMapMemory failed for 'sky': "), "{refused}");
         let of_driver =
             |code: &str| AllocationError::Internal(format!("Unexpected error in vkAllocateMemory: {code}"));
         assert_eq!(

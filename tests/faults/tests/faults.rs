@@ -40,12 +40,17 @@ fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Dura
     assert!(report.flawed.is_empty() && report.reached >= LEAST, "{line}: {report}");
 }
 
-/// Returns the plan of whole sweeps, bounded by `LVK_FAULT_MOST`, a number, and `LVK_FAULT_PART`, as `2/3`.
+/// Returns the plan of whole sweeps, bounded by `LVK_FAULT_MOST`, a number, by `LVK_FAULT_PART`, as `2/3`, and by `LVK_FAULT_COMMANDS`, as
+/// `vkMapMemory,vkCreateBuffer`.
 fn whole_plan() -> SweepPlan {
     let full = SweepPlan::full();
     SweepPlan {
         most: variable("LVK_FAULT_MOST", full.most),
         part: variable("LVK_FAULT_PART", full.part),
+        commands: variable("LVK_FAULT_COMMANDS", String::new())
+            .split_terminator(',')
+            .map(str::to_owned)
+            .collect(),
         ..full
     }
 }

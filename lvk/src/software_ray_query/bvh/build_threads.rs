@@ -11,7 +11,7 @@ const STACK_BYTES: usize = 8 << 20;
 
 /// Items of a task that does little for each, which threads share without much overhead. Sums of such chunks do not
 /// depend on the number of threads.
-pub(super) const TASK_LENGTH: usize = 4096;
+pub(crate) const TASK_LENGTH: usize = 4096;
 
 /// Runs `work` on the threads of builds, one for each core. If the system refuses them, the current thread does all of
 /// the work.

@@ -1,5 +1,11 @@
-//! Builds a BVH2 by the binned surface area heuristic, with a depth below the limit of the traversal stack.
+//! Builds a BVH2 by the binned surface area heuristic (Wald, 2007), with a depth below the limit of the traversal stack.
+//!
+//! Primitives move with their bounds, so that each pass over a range reads memory in order. A large range is divided among
+//! threads; the tree is the same for any number of them.
 
+use glam::Vec3;
+
+use super::build_threads::on_build_threads;
 use super::nodes::{Bvh, BvhNodes};
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::{
@@ -9,161 +15,229 @@ use crate::software_ray_query::layout::{
 const BINS: usize = 16;
 /// Depth from which halves have equal primitive counts, so that at most 27 levels follow.
 const MEDIAN_SPLIT_DEPTH: usize = MAX_BVH2_DEPTH - 28;
+/// Primitives of a range above which its halves are tasks of their own.
+const TASK_LENGTH: usize = 16 << 10;
 
-/// A range of the order that becomes a node or a leaf.
+/// A primitive, with its index in the caller's list.
 #[derive(Clone, Copy)]
-struct PendingRange {
+struct Primitive {
+    bounds: Bounds,
+    index: u32,
+}
+
+/// The place of a range in the tree.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Number of its first primitive in the order of the leaves.
     first: usize,
-    end: usize,
+    /// Nodes on the path to it.
     depth: usize,
 }
 
-struct Builder<'a> {
-    bounds: &'a [Bounds],
-    order: Vec<u32>,
+/// Nodes of a range, whose references count from the first of them.
+struct Subtree {
     nodes: Vec<Bvh2NodeRecord>,
-    leaf_size: usize,
+    root: u32,
+}
+
+/// A range in two parts.
+struct Split {
+    /// Primitives of the first part.
+    count: usize,
+    bounds: [Bounds; 2],
 }
 
 /// Builds a BVH2 whose leaves have at most `leaf_size` primitives.
 pub(crate) fn build_bvh2(bounds: &[Bounds], leaf_size: usize) -> Bvh {
     let leaf_size = leaf_size.clamp(1, MAX_LEAF_PRIMITIVES);
-    let mut builder =
-        Builder { bounds, order: (0..bounds.len() as u32).collect(), nodes: Vec::new(), leaf_size };
-    let root = builder.build_root();
-    Bvh { nodes: BvhNodes::Binary(builder.nodes), root, order: builder.order }
+    let mut primitives: Vec<_> =
+        bounds.iter().zip(0..).map(|(&bounds, index)| Primitive { bounds, index }).collect();
+    let whole = Place { first: 0, depth: 1 };
+    let tree = match primitives.len() > TASK_LENGTH {
+        true => on_build_threads(|| build_range(&mut primitives, whole, leaf_size)),
+        false => build_range(&mut primitives, whole, leaf_size),
+    };
+    let order = primitives.iter().map(|primitive| primitive.index).collect();
+    Bvh { nodes: BvhNodes::Binary(tree.nodes), root: tree.root, order }
 }
 
-impl Builder<'_> {
-    fn build_root(&mut self) -> u32 {
-        let whole = PendingRange { first: 0, end: self.order.len(), depth: 1 };
-        let mut open = Vec::new();
-        let root = self.push_range(whole, &mut open);
-        while let Some((node, work)) = open.pop() {
-            self.fill_node(node, work, &mut open);
+/// Builds the tree of a range, with tasks for the halves of a large one.
+fn build_range(primitives: &mut [Primitive], place: Place, leaf_size: usize) -> Subtree {
+    if primitives.len() <= TASK_LENGTH {
+        return build_alone(primitives, place, leaf_size);
+    }
+    let split = split_range(primitives, place.depth);
+    let (one, two) = primitives.split_at_mut(split.count);
+    let depth = place.depth + 1;
+    let (one, two) = rayon::join(
+        || build_range(one, Place { depth, ..place }, leaf_size),
+        || build_range(two, Place { first: place.first + split.count, depth }, leaf_size),
+    );
+    let mut nodes = Vec::with_capacity(1 + one.nodes.len() + two.nodes.len());
+    let behind = 1 + one.nodes.len() as u32;
+    nodes.push(node(split.bounds, [moved(one.root, 1), moved(two.root, behind)]));
+    let of = |part: Subtree, by| {
+        part.nodes.into_iter().map(move |node| Bvh2NodeRecord {
+            child0: moved(node.child0, by),
+            child1: moved(node.child1, by),
+            ..node
+        })
+    };
+    nodes.extend(of(one, 1));
+    nodes.extend(of(two, behind));
+    Subtree { nodes, root: 0 }
+}
+
+/// Returns a reference to a node as one to the node `by` places behind it. Leaves stay as they are.
+fn moved(reference: u32, by: u32) -> u32 {
+    if reference & LEAF == 0 { reference + by } else { reference }
+}
+
+/// Builds the tree of a range on this thread.
+fn build_alone(primitives: &mut [Primitive], place: Place, leaf_size: usize) -> Subtree {
+    let mut nodes: Vec<Bvh2NodeRecord> = Vec::with_capacity(primitives.len().div_ceil(leaf_size));
+    let mut open = Vec::new();
+    let whole = (0, primitives.len(), place.depth);
+    let reference = |nodes: &mut Vec<_>, open: &mut Vec<_>, (first, end, depth)| match end - first {
+        0 => NONE,
+        count if count <= leaf_size => leaf((place.first + first) as u32, count),
+        _ => {
+            nodes.push(bytemuck::Zeroable::zeroed());
+            open.push((nodes.len() - 1, (first, end, depth)));
+            nodes.len() as u32 - 1
         }
-        root
+    };
+    let root = reference(&mut nodes, &mut open, whole);
+    while let Some((slot, (first, end, depth))) = open.pop() {
+        let split = split_range(&mut primitives[first..end], depth);
+        let middle = first + split.count;
+        let parts = [(first, middle, depth + 1), (middle, end, depth + 1)];
+        let children = parts.map(|part| reference(&mut nodes, &mut open, part));
+        nodes[slot] = node(split.bounds, children);
     }
+    Subtree { nodes, root }
+}
 
-    /// Returns the reference to a range: a leaf, or a node that is filled later.
-    fn push_range(&mut self, work: PendingRange, open: &mut Vec<(usize, PendingRange)>) -> u32 {
-        match work.end - work.first {
-            0 => NONE,
-            count if count <= self.leaf_size => leaf(work.first as u32, count),
-            _ => {
-                self.nodes.push(bytemuck::Zeroable::zeroed());
-                open.push((self.nodes.len() - 1, work));
-                self.nodes.len() as u32 - 1
-            }
-        }
-    }
-
-    fn fill_node(&mut self, node: usize, work: PendingRange, open: &mut Vec<(usize, PendingRange)>) {
-        let middle = self.split_range(work);
-        let (one, two) = (self.union(work.first, middle), self.union(middle, work.end));
-        let depth = work.depth + 1;
-        let child0 = self.push_range(PendingRange { end: middle, depth, ..work }, open);
-        let child1 = self.push_range(PendingRange { first: middle, depth, ..work }, open);
-        self.nodes[node] = Bvh2NodeRecord {
-            low0: one.low,
-            child0,
-            high0: one.high,
-            child1,
-            low1: two.low,
-            reserved0: 0,
-            high1: two.high,
-            reserved1: 0,
-        };
-    }
-
-    fn union(&self, first: usize, end: usize) -> Bounds {
-        let of = |number: &u32| self.bounds[*number as usize];
-        self.order[first..end].iter().map(of).fold(Bounds::EMPTY, Bounds::union)
-    }
-
-    /// Partitions a range in two and returns the index of the second part.
-    fn split_range(&mut self, work: PendingRange) -> usize {
-        let PendingRange { first, end, depth } = work;
-        let centers = self.order[first..end].iter().map(|number| center(&self.bounds[*number as usize]));
-        let spread = centers.fold(Bounds::EMPTY, |all, at| all.union(Bounds { low: at, high: at }));
-        if depth < MEDIAN_SPLIT_DEPTH
-            && let Some((axis, bin)) = self.best_bin(work, &spread)
-        {
-            let bounds = self.bounds;
-            let below = |number: &u32| bin_of(&bounds[*number as usize], &spread, axis) < bin;
-            let middle = first + partition_primitives(&mut self.order[first..end], below);
-            if middle > first && middle < end {
-                return middle;
-            }
-        }
-        let size = spread.high - spread.low;
-        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        let (bounds, middle) = (self.bounds, first + (end - first) / 2);
-        self.order[first..end].select_nth_unstable_by(middle - first, |a, b| {
-            let at = |number: &u32| center(&bounds[*number as usize])[axis];
-            at(a).total_cmp(&at(b)).then(a.cmp(b))
-        });
-        middle
-    }
-
-    /// Returns the axis and the first bin of the second half for the cheapest children.
-    fn best_bin(&self, work: PendingRange, spread: &Bounds) -> Option<(usize, usize)> {
-        let mut best = None;
-        let mut least = f32::INFINITY;
-        for axis in 0..3 {
-            if spread.high[axis] <= spread.low[axis] {
-                continue;
-            }
-            let mut bins = [(Bounds::EMPTY, 0_usize); BINS];
-            for number in &self.order[work.first..work.end] {
-                let bounds = &self.bounds[*number as usize];
-                let bin = &mut bins[bin_of(bounds, spread, axis)];
-                *bin = (bin.0.union(*bounds), bin.1 + 1);
-            }
-            for (bin, cost) in costs(&bins) {
-                if cost < least {
-                    (least, best) = (cost, Some((axis, bin)));
-                }
-            }
-        }
-        best
+fn node([one, two]: [Bounds; 2], [child0, child1]: [u32; 2]) -> Bvh2NodeRecord {
+    Bvh2NodeRecord {
+        low0: one.low,
+        child0,
+        high0: one.high,
+        child1,
+        low1: two.low,
+        reserved0: 0,
+        high1: two.high,
+        reserved1: 0,
     }
 }
 
-/// Returns the cost of a split before each bin except the first.
-fn costs(bins: &[(Bounds, usize); BINS]) -> [(usize, f32); BINS - 1] {
-    let mut after = [0.0; BINS];
-    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-    for bin in (1..BINS).rev() {
-        (bounds, count) = (bounds.union(bins[bin].0), count + bins[bin].1);
-        after[bin] = bounds.half_area() * count as f32;
+/// Partitions a range of at least two primitives in two, neither of which is empty.
+fn split_range(primitives: &mut [Primitive], depth: usize) -> Split {
+    if let [one, two] = &*primitives {
+        return Split { count: 1, bounds: [one.bounds, two.bounds] };
     }
-    (bounds, count) = (Bounds::EMPTY, 0);
-    std::array::from_fn(|bin| {
-        (bounds, count) = (bounds.union(bins[bin].0), count + bins[bin].1);
-        (bin + 1, bounds.half_area() * count as f32 + after[bin + 1])
-    })
+    let spread = primitives.iter().map(|primitive| center(&primitive.bounds));
+    let spread = spread.fold(Bounds::EMPTY, |all, at| all.union(Bounds { low: at, high: at }));
+    let binned = if depth < MEDIAN_SPLIT_DEPTH { split_by_bins(primitives, &spread) } else { None };
+    binned.unwrap_or_else(|| split_at_median(primitives, &spread))
 }
 
-fn center(bounds: &Bounds) -> glam::Vec3 {
+/// Partitions a range in halves along the axis of its largest extent.
+fn split_at_median(primitives: &mut [Primitive], spread: &Bounds) -> Split {
+    let axis = (spread.high - spread.low).max_position();
+    let count = primitives.len() / 2;
+    primitives.select_nth_unstable_by(count, |a, b| {
+        let at = |primitive: &Primitive| center(&primitive.bounds)[axis];
+        at(a).total_cmp(&at(b)).then(a.index.cmp(&b.index))
+    });
+    let union = |part: &[Primitive]| part.iter().map(|one| one.bounds).fold(Bounds::EMPTY, Bounds::union);
+    Split { count, bounds: [union(&primitives[..count]), union(&primitives[count..])] }
+}
+
+/// Primitives in equal parts of the extent of their centers, along one axis.
+#[derive(Clone, Copy)]
+struct Bin {
+    bounds: Bounds,
+    count: u32,
+}
+
+impl Bin {
+    const EMPTY: Self = Self { bounds: Bounds::EMPTY, count: 0 };
+
+    fn and(self, other: Self) -> Self {
+        Self { bounds: self.bounds.union(other.bounds), count: self.count + other.count }
+    }
+
+    /// Returns the cost of its primitives as a child.
+    fn cost(&self) -> f32 {
+        self.bounds.half_area() * self.count as f32
+    }
+}
+
+/// A boundary of bins, with what lies before and behind it.
+struct Boundary {
+    axis: usize,
+    bin: usize,
+    parts: [Bin; 2],
+    cost: f32,
+}
+
+/// Partitions a range for the cheapest children; `None` if all centers lie in one bin of each axis.
+fn split_by_bins(primitives: &mut [Primitive], spread: &Bounds) -> Option<Split> {
+    // Small ranges are most of all: they need few bins.
+    let bin_count = (2 * primitives.len()).min(BINS);
+    let scale = Vec3::splat(bin_count as f32) / (spread.high - spread.low);
+    let bin_of = |primitive: &Primitive| {
+        let place = (center(&primitive.bounds) - spread.low) * scale;
+        // What is no number, where an extent is zero or infinite, lies in the first bin.
+        place.to_array().map(|place| (place as usize).min(bin_count - 1))
+    };
+    let mut bins = [[Bin::EMPTY; BINS]; 3];
+    for primitive in &*primitives {
+        for (bins, place) in bins.iter_mut().zip(bin_of(primitive)) {
+            bins[place] = bins[place].and(Bin { bounds: primitive.bounds, count: 1 });
+        }
+    }
+    let boundaries = bins.iter().enumerate().filter_map(|(axis, bins)| cheapest(axis, &bins[..bin_count]));
+    let best = boundaries.reduce(|one, two| if two.cost < one.cost { two } else { one })?;
+    partition(primitives, |primitive| bin_of(primitive)[best.axis] < best.bin);
+    Some(Split { count: best.parts[0].count as usize, bounds: best.parts.map(|part| part.bounds) })
+}
+
+/// Returns the boundary of the bins of an axis with the least cost; `None` if all primitives lie in one bin.
+fn cheapest(axis: usize, bins: &[Bin]) -> Option<Boundary> {
+    let mut behind = [Bin::EMPTY; BINS];
+    let mut sum = Bin::EMPTY;
+    for (place, bin) in bins.iter().enumerate().rev() {
+        sum = sum.and(*bin);
+        behind[place] = sum;
+    }
+    let (mut before, mut best) = (Bin::EMPTY, None::<Boundary>);
+    for bin in 1..bins.len() {
+        before = before.and(bins[bin - 1]);
+        let parts = [before, behind[bin]];
+        let cost = parts[0].cost() + parts[1].cost();
+        let is_split = parts.iter().all(|part| part.count > 0);
+        if is_split && best.as_ref().is_none_or(|best| cost < best.cost) {
+            best = Some(Boundary { axis, bin, parts, cost });
+        }
+    }
+    best
+}
+
+fn center(bounds: &Bounds) -> Vec3 {
     bounds.low * 0.5 + bounds.high * 0.5
 }
 
-fn bin_of(bounds: &Bounds, spread: &Bounds, axis: usize) -> usize {
-    let share = (center(bounds)[axis] - spread.low[axis]) / (spread.high[axis] - spread.low[axis]);
-    ((share * BINS as f32) as usize).min(BINS - 1)
-}
-
-/// Moves the primitives that satisfy `first` to the front. Returns their number.
-fn partition_primitives(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
+/// Moves the primitives that satisfy `is_first` to the front.
+fn partition(primitives: &mut [Primitive], is_first: impl Fn(&Primitive) -> bool) {
     let mut count = 0;
-    for index in 0..numbers.len() {
-        if first(&numbers[index]) {
-            numbers.swap(count, index);
+    for place in 0..primitives.len() {
+        if is_first(&primitives[place]) {
+            primitives.swap(count, place);
             count += 1;
         }
     }
-    count
 }
 
 /// True if the nodes are a tree: every path from the first node ends in primitives that exist, no path is too long, no
@@ -191,4 +265,90 @@ pub(crate) fn is_valid_bvh2(nodes: &[Bvh2NodeRecord], primitives: usize) -> bool
 pub(crate) fn is_valid_leaf(reference: u32, primitives: usize) -> bool {
     let (first, count) = (reference & 0x07ff_ffff, (reference >> 27 & 15) + 1);
     reference & LEAF != 0 && first as usize + count as usize <= primitives
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::software_ray_query::bvh::build_threads::on_new_threads;
+
+    fn cube(center: [f32; 3], side: f32) -> Bounds {
+        let (center, half) = (Vec3::from_array(center), Vec3::splat(side / 2.0));
+        Bounds { low: center - half, high: center + half }
+    }
+
+    /// Cubes along a spiral, more than one task has.
+    fn spiral(count: usize) -> Vec<Bounds> {
+        let at = |number: usize| {
+            let turn = number as f32 * 0.01;
+            cube([turn.cos() * turn, number as f32 * 1e-3, turn.sin() * turn], 0.02)
+        };
+        (0..count).map(at).collect()
+    }
+
+    fn nodes(bvh: &Bvh) -> &[Bvh2NodeRecord] {
+        match &bvh.nodes {
+            BvhNodes::Binary(nodes) => nodes,
+            BvhNodes::Wide(_) => panic!("wide nodes"),
+        }
+    }
+
+    /// Returns the bounds of what a reference refers to. Asserts that those of children in nodes are exact.
+    fn bounds_of(bvh: &Bvh, bounds: &[Bounds], reference: u32) -> Bounds {
+        if reference & LEAF != 0 {
+            let (first, count) = ((reference & 0x07ff_ffff) as usize, (reference >> 27 & 15) as usize + 1);
+            let of = |index: &u32| bounds[*index as usize];
+            return bvh.order[first..first + count].iter().map(of).fold(Bounds::EMPTY, Bounds::union);
+        }
+        let node = nodes(bvh)[reference as usize];
+        let stated = [(node.low0, node.high0, node.child0), (node.low1, node.high1, node.child1)];
+        stated.into_iter().fold(Bounds::EMPTY, |all, (low, high, child)| {
+            assert_eq!(bounds_of(bvh, bounds, child), Bounds { low, high });
+            all.union(Bounds { low, high })
+        })
+    }
+
+    #[test]
+    fn a_tree_is_the_same_for_any_number_of_threads() {
+        let bounds = spiral(2 * TASK_LENGTH + 1000);
+        let build = |threads| on_new_threads(threads, || build_bvh2(&bounds, 1));
+        let (one, many) = (build(1), build(5));
+        let bytes = |bvh: &Bvh| bytemuck::cast_slice::<_, u8>(nodes(bvh)).to_vec();
+        assert!(bytes(&one) == bytes(&many) && one.order == many.order && one.root == many.root);
+        assert!(is_valid_bvh2(nodes(&one), bounds.len()));
+        assert_eq!(nodes(&one).len(), bounds.len() - 1);
+        bounds_of(&one, &bounds, one.root);
+    }
+
+    #[test]
+    fn empty_lists_and_lists_of_one_have_no_node() {
+        assert_eq!(build_bvh2(&[], 1).root, NONE);
+        assert_eq!(build_bvh2(&spiral(1), 1).root, leaf(0, 1));
+    }
+
+    proptest! {
+        /// Also of primitives at one place, in a row, and of huge extents.
+        #[test]
+        fn any_bounds_have_a_tree_of_exact_bounds(
+            seeds in prop::collection::vec((prop::array::uniform3(-4_i32..4), -1.0_f32..30.0), 1..200),
+            scale in prop::sample::select(vec![0.0, 1e-30, 1.0, 1e30, f32::MAX / 8.0]),
+            leaf_size in 1_usize..5,
+        ) {
+            let of = |(at, exponent): &([i32; 3], f32)| {
+                let center = at.map(|at| at as f32 * scale);
+                cube(center, exponent.exp2().min(scale))
+            };
+            let bounds: Vec<Bounds> = seeds.iter().map(of).collect();
+            let bvh = build_bvh2(&bounds, leaf_size);
+            if bounds.len() > leaf_size {
+                prop_assert!(is_valid_bvh2(nodes(&bvh), bounds.len()));
+            }
+            bounds_of(&bvh, &bounds, bvh.root);
+            let mut order = bvh.order.clone();
+            order.sort_unstable();
+            prop_assert!(order.into_iter().eq(0..bounds.len() as u32));
+        }
+    }
 }

@@ -32,14 +32,12 @@ pub(crate) fn encode_tlas(instances: &[PlacedInstance], max_records: u32) -> Vec
         BvhNodes::Binary(nodes) => nodes,
         BvhNodes::Wide(_) => &[],
     };
-    let ordered: Vec<InstanceRecord> =
-        tree.order.iter().map(|number| records[*number as usize].instance).collect();
     let places = size_of::<BlobHeader>() / BLOCK_BYTES;
     let header = BlobHeader {
         format: FORMAT_BVH2,
         leaf_kind: LeafKind::Instances as u32,
         root: tree.root,
-        primitive_count: ordered.len() as u32,
+        primitive_count: records.len() as u32,
         nodes: places as u32,
         primitives: (places + size_of_val(nodes) / BLOCK_BYTES) as u32,
         node_count: nodes.len() as u32,
@@ -47,8 +45,12 @@ pub(crate) fn encode_tlas(instances: &[PlacedInstance], max_records: u32) -> Vec
         high: whole.high.to_array(),
         ..bytemuck::Zeroable::zeroed()
     };
-    let mut bytes = bytemuck::bytes_of(&header).to_vec();
+    let size = size_of::<BlobHeader>() + size_of_val(nodes) + records.len() * size_of::<InstanceRecord>();
+    let mut bytes = Vec::with_capacity(size);
+    bytes.extend_from_slice(bytemuck::bytes_of(&header));
     bytes.extend_from_slice(bytemuck::cast_slice(nodes));
-    bytes.extend_from_slice(bytemuck::cast_slice(&ordered));
+    for number in &tree.order {
+        bytes.extend_from_slice(bytemuck::bytes_of(&records[*number as usize].instance));
+    }
     bytes
 }

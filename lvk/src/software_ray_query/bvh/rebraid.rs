@@ -1,6 +1,7 @@
 //! Re-braiding: splits overlapping instances into parts (Benthin, Woop, Wald and Afra, "Improved Two-Level BVHs Using
 //! Partial Re-Braiding", 2017). A ray then enters only the parts that it hits, not every instance whose bounds it hits.
 
+use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -29,17 +30,13 @@ struct RebraidCandidate<'a> {
 
 /// Splits the largest overlapping instances if their parts leave empty space. Stops before there are more records than
 /// [`record_capacity`] for these instances, or more than `max_records`.
-pub(crate) fn rebraid<'a>(instances: &'a [PlacedInstance], max_records: usize) -> Vec<PlacedInstance> {
+pub(crate) fn rebraid(instances: &[PlacedInstance], max_records: usize) -> Cow<'_, [PlacedInstance]> {
     let most = max_records.min(record_capacity(instances.len() as u32) as usize);
     if most <= instances.len() {
-        return instances.to_vec();
+        return instances.into();
     }
-    let whole = |of: &'a PlacedInstance| RebraidCandidate {
-        instance: of,
-        part: &of.parts.whole,
-        record: of.clone(),
-        is_split: false,
-    };
+    let whole =
+        |of| RebraidCandidate { instance: of, part: &of.parts.whole, record: of.clone(), is_split: false };
     let mut candidates: Vec<_> = instances.iter().map(whole).collect();
     let mut count = candidates.len();
     let area = |bounds: &Bounds| bounds.half_area().to_bits(); // in order, as none is negative
@@ -148,7 +145,7 @@ mod tests {
             let capacity = record_capacity(instances.len() as u32) as usize;
             prop_assert!(records.len() <= instances.len().max(max_records.min(capacity)));
             let mut seen = HashMap::new();
-            for record in &records {
+            for record in &*records {
                 let matrix = transforms[record.instance.number as usize];
                 for held in primitives(&bytes, record.instance.entry) {
                     *seen.entry((record.instance.number, held.primitive)).or_insert(0) += 1;
@@ -170,7 +167,8 @@ mod tests {
         let apart = placed(&[at(0.0), at(400.0), at(800.0)]).1;
         assert_eq!(rebraid(&apart, 60).len(), 3);
         assert_eq!(rebraid(&placed(&[at(0.0)]).1, 60).len(), 1);
-        let records = rebraid(&placed(&[at(0.0), at(20.0), at(10.0), at(900.0), at(30.0), at(5.0)]).1, 100);
+        let (_, in_a_row) = placed(&[at(0.0), at(20.0), at(10.0), at(900.0), at(30.0), at(5.0)]);
+        let records = rebraid(&in_a_row, 100);
         assert!(records.len() > 6 && records.len() <= 22, "{}", records.len());
         assert_eq!(records.iter().filter(|record| record.instance.number == 3).count(), 1);
         assert!(records.iter().any(|record| record.instance.entry != 0));

@@ -3,6 +3,7 @@
 //! `disabled/record.rs` has the names that other files use, for builds without the feature `software-ray-query`.
 
 pub(crate) mod gpu_build;
+mod place_instances;
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use ash::vk;
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::blas_refs::{BlasRef, BlasRefSet};
-use crate::accel::instance::{DeviceInstances, TlasInstance, check_instance, instance_bytes};
+use crate::accel::instance::{DeviceInstances, TlasInstance, instance_bytes};
 use crate::accel::instance_writing::write_plain_addresses;
 use crate::command::CommandBuffer;
 use crate::software_ray_query::blas::{BvhOrigin, SoftwareBlas};
@@ -24,12 +25,11 @@ use crate::software_ray_query::tlas::SoftwareTlas;
 
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::error::{Error, Result};
-use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::software_ray_query::bvh::encode_instances::{InstancedBlas, PlacedInstance, place_instance};
 use crate::software_ray_query::bvh::encode_tlas;
 
 use gpu_build::{GpuBuild, GpuRefit};
+use place_instances::place_instances;
 
 /// Up to this many instances, the CPU builds the BVH of a TLAS, whose quality is worth its time. A driver that runs on
 /// the CPU has no faster builds.
@@ -244,7 +244,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         if (shared.gpu.caps.is_cpu || instances.len() <= MAX_CPU_TLAS_INSTANCES)
-            && let Some(placed) = self.place_instances(target, instances)?
+            && let Some(placed) = place_instances(&shared, &target.name, instances)?
         {
             let bytes = encode_tlas::encode_tlas(&placed, software.record_capacity);
             self.expect_unmoved_blas(instances)?;
@@ -288,29 +288,6 @@ impl CommandBuffer {
         self.record_software_tlas(target, software, source, vec![buffer])
     }
 
-    /// Returns the instances for a build on the CPU; `None` if the CPU does not know all of their bounds.
-    fn place_instances(
-        &self,
-        target: &AccelStruct,
-        instances: &[TlasInstance],
-    ) -> Result<Option<Vec<PlacedInstance>>> {
-        let mut placed = Vec::with_capacity(instances.len());
-        let mut last: Option<(AccelStructHandle, InstancedBlas)> = None;
-        for (number, instance) in instances.iter().enumerate() {
-            check_instance(&target.name, number, instance)?;
-            let shown = match last {
-                Some((handle, shown)) if handle == instance.blas => shown,
-                _ => match self.instanced_blas(instance.blas)? {
-                    Some(shown) => shown,
-                    None => return Ok(None),
-                },
-            };
-            placed.extend(place_instance(number as u32, instance, &shown));
-            last = Some((instance.blas, shown));
-        }
-        Ok(Some(placed))
-    }
-
     /// Declares that the BLAS of the instances must not be rebuilt before the command buffer is submitted.
     fn expect_unmoved_blas(&mut self, instances: &[TlasInstance]) -> Result<()> {
         let mut last = None;
@@ -321,13 +298,6 @@ impl CommandBuffer {
             }
         }
         Ok(())
-    }
-
-    fn instanced_blas(&self, handle: AccelStructHandle) -> Result<Option<InstancedBlas>> {
-        let blas = self.shared.store.accel_structs.get(handle)?;
-        let address = software_storage(&blas.name, blas.blas()?)?.address;
-        let parts = blas.blas()?.software.as_ref().and_then(SoftwareBlas::rebraid_parts);
-        Ok(parts.map(|parts| InstancedBlas { address, parts: Arc::clone(parts) }))
     }
 
     fn record_software_tlas(

@@ -13,6 +13,8 @@ pub struct SweepPlan {
     pub most: usize,
     /// Part of these faults to try, so that several runs share a sweep.
     pub part: Part,
+    /// Commands that fail; all where there is none.
+    pub commands: Vec<String>,
     /// Errors to inject.
     pub errors: Vec<FaultError>,
     /// Spans of the faults.
@@ -54,6 +56,7 @@ impl SweepPlan {
         Self {
             most: usize::MAX,
             part: Part::WHOLE,
+            commands: Vec::new(),
             errors: FaultError::ALL.to_vec(),
             spans: vec![Span::Once, Span::Stays],
         }
@@ -67,6 +70,9 @@ impl SweepPlan {
         for Call { command, errors } in calls {
             let call = counts.entry(command).or_default();
             *call += 1;
+            if !self.commands.is_empty() && !self.commands.contains(command) {
+                continue;
+            }
             for &error in errors.iter().filter(|error| self.errors.contains(error)) {
                 let of = |&span| Fault { command: command.clone(), call: *call, error, span };
                 // A swapchain that stays out of date shows nothing, which is no defect.
@@ -112,6 +118,8 @@ mod tests {
             "a 1 host-memory once, a 2 host-memory once"
         );
         assert_eq!(SweepPlan::full().faults(&calls).len(), 12);
+        let of_b = SweepPlan { commands: vec!["b".to_owned()], ..once.clone() };
+        assert_eq!(texts(&of_b), "b 1 host-memory once");
         let second = SweepPlan { part: "2/3".parse().unwrap(), ..once.clone() };
         assert_eq!(texts(&second), "b 1 host-memory once");
         // Half of the faults have half of those of each span.
