@@ -3,7 +3,7 @@
 //! Primitives move with their bounds, so that each pass over a range reads memory in order. A large range is divided among
 //! threads; the tree is the same for any number of them.
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use super::build_threads::on_build_threads;
 use super::nodes::{Bvh, BvhNodes};
@@ -18,11 +18,40 @@ const MEDIAN_SPLIT_DEPTH: usize = MAX_BVH2_DEPTH - 28;
 /// Primitives of a range above which its halves are tasks of their own.
 const TASK_LENGTH: usize = 16 << 10;
 
+/// Bounds in vectors of the processor.
+#[derive(Clone, Copy)]
+struct FastBounds {
+    low: Vec3A,
+    high: Vec3A,
+}
+
+impl FastBounds {
+    const EMPTY: Self = Self { low: Vec3A::INFINITY, high: Vec3A::NEG_INFINITY };
+
+    fn union(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    fn center(self) -> Vec3A {
+        self.low * 0.5 + self.high * 0.5
+    }
+
+    fn half_area(self) -> f32 {
+        Bounds { low: self.low.into(), high: self.high.into() }.half_area()
+    }
+}
+
 /// A primitive, with its index in the caller's list.
 #[derive(Clone, Copy)]
 struct Primitive {
-    bounds: Bounds,
+    bounds: FastBounds,
     index: u32,
+}
+
+impl Primitive {
+    fn new(bounds: &Bounds, index: u32) -> Self {
+        Self { bounds: FastBounds { low: bounds.low.into(), high: bounds.high.into() }, index }
+    }
 }
 
 /// The place of a range in the tree.
@@ -44,14 +73,14 @@ struct Subtree {
 struct Split {
     /// Primitives of the first part.
     count: usize,
-    bounds: [Bounds; 2],
+    bounds: [FastBounds; 2],
 }
 
 /// Builds a BVH2 whose leaves have at most `leaf_size` primitives.
 pub(crate) fn build_bvh2(bounds: &[Bounds], leaf_size: usize) -> Bvh {
     let leaf_size = leaf_size.clamp(1, MAX_LEAF_PRIMITIVES);
     let mut primitives: Vec<_> =
-        bounds.iter().zip(0..).map(|(&bounds, index)| Primitive { bounds, index }).collect();
+        bounds.iter().zip(0..).map(|(bounds, index)| Primitive::new(bounds, index)).collect();
     let whole = Place { first: 0, depth: 1 };
     let tree = match primitives.len() > TASK_LENGTH {
         true => on_build_threads(|| build_range(&mut primitives, whole, leaf_size)),
@@ -118,15 +147,15 @@ fn build_alone(primitives: &mut [Primitive], place: Place, leaf_size: usize) -> 
     Subtree { nodes, root }
 }
 
-fn node([one, two]: [Bounds; 2], [child0, child1]: [u32; 2]) -> Bvh2NodeRecord {
+fn node([one, two]: [FastBounds; 2], [child0, child1]: [u32; 2]) -> Bvh2NodeRecord {
     Bvh2NodeRecord {
-        low0: one.low,
+        low0: one.low.into(),
         child0,
-        high0: one.high,
+        high0: one.high.into(),
         child1,
-        low1: two.low,
+        low1: two.low.into(),
         reserved0: 0,
-        high1: two.high,
+        high1: two.high.into(),
         reserved1: 0,
     }
 }
@@ -136,33 +165,34 @@ fn split_range(primitives: &mut [Primitive], depth: usize) -> Split {
     if let [one, two] = &*primitives {
         return Split { count: 1, bounds: [one.bounds, two.bounds] };
     }
-    let spread = primitives.iter().map(|primitive| center(&primitive.bounds));
-    let spread = spread.fold(Bounds::EMPTY, |all, at| all.union(Bounds { low: at, high: at }));
+    let centers = primitives.iter().map(|primitive| primitive.bounds.center());
+    let spread = centers.fold(FastBounds::EMPTY, |all, at| all.union(FastBounds { low: at, high: at }));
     let binned = if depth < MEDIAN_SPLIT_DEPTH { split_by_bins(primitives, &spread) } else { None };
     binned.unwrap_or_else(|| split_at_median(primitives, &spread))
 }
 
 /// Partitions a range in halves along the axis of its largest extent.
-fn split_at_median(primitives: &mut [Primitive], spread: &Bounds) -> Split {
+fn split_at_median(primitives: &mut [Primitive], spread: &FastBounds) -> Split {
     let axis = (spread.high - spread.low).max_position();
     let count = primitives.len() / 2;
     primitives.select_nth_unstable_by(count, |a, b| {
-        let at = |primitive: &Primitive| center(&primitive.bounds)[axis];
+        let at = |primitive: &Primitive| primitive.bounds.center()[axis];
         at(a).total_cmp(&at(b)).then(a.index.cmp(&b.index))
     });
-    let union = |part: &[Primitive]| part.iter().map(|one| one.bounds).fold(Bounds::EMPTY, Bounds::union);
+    let union =
+        |part: &[Primitive]| part.iter().map(|one| one.bounds).fold(FastBounds::EMPTY, FastBounds::union);
     Split { count, bounds: [union(&primitives[..count]), union(&primitives[count..])] }
 }
 
 /// Primitives in equal parts of the extent of their centers, along one axis.
 #[derive(Clone, Copy)]
 struct Bin {
-    bounds: Bounds,
+    bounds: FastBounds,
     count: u32,
 }
 
 impl Bin {
-    const EMPTY: Self = Self { bounds: Bounds::EMPTY, count: 0 };
+    const EMPTY: Self = Self { bounds: FastBounds::EMPTY, count: 0 };
 
     fn and(self, other: Self) -> Self {
         Self { bounds: self.bounds.union(other.bounds), count: self.count + other.count }
@@ -183,12 +213,12 @@ struct Boundary {
 }
 
 /// Partitions a range for the cheapest children; `None` if all centers lie in one bin of each axis.
-fn split_by_bins(primitives: &mut [Primitive], spread: &Bounds) -> Option<Split> {
+fn split_by_bins(primitives: &mut [Primitive], spread: &FastBounds) -> Option<Split> {
     // Small ranges are most of all: they need few bins.
     let bin_count = (2 * primitives.len()).min(BINS);
-    let scale = Vec3::splat(bin_count as f32) / (spread.high - spread.low);
+    let scale = Vec3A::splat(bin_count as f32) / (spread.high - spread.low);
     let bin_of = |primitive: &Primitive| {
-        let place = (center(&primitive.bounds) - spread.low) * scale;
+        let place = (primitive.bounds.center() - spread.low) * scale;
         // What is no number, where an extent is zero or infinite, lies in the first bin.
         place.to_array().map(|place| (place as usize).min(bin_count - 1))
     };
@@ -223,10 +253,6 @@ fn cheapest(axis: usize, bins: &[Bin]) -> Option<Boundary> {
         }
     }
     best
-}
-
-fn center(bounds: &Bounds) -> Vec3 {
-    bounds.low * 0.5 + bounds.high * 0.5
 }
 
 /// Moves the primitives that satisfy `is_first` to the front.
@@ -269,6 +295,7 @@ pub(crate) fn is_valid_leaf(reference: u32, primitives: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
     use proptest::prelude::*;
 
     use super::*;
