@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, LazyLock, PoisonError, RwLock};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError, RwLock};
 
 use ash::vk;
 
@@ -39,6 +39,8 @@ pub(super) struct Table {
     pub(super) lost: AtomicBool,
     /// Calls under way that give a queue work.
     pub(super) submissions: AtomicUsize,
+    /// True if the work of the lost device has ended. Locked by the thread that waits for it.
+    finished: Mutex<bool>,
 }
 
 /// What a [`Table`] has the functions of.
@@ -78,6 +80,7 @@ impl Table {
             buffer_address: of_level("vkGetBufferDeviceAddress"),
             lost: AtomicBool::new(false),
             submissions: AtomicUsize::new(0),
+            finished: Mutex::new(false),
         }
     }
 
@@ -86,6 +89,11 @@ impl Table {
     /// The caller's own submission does not count as one under way.
     pub(super) fn lose(&self) {
         self.lost.store(true, Ordering::SeqCst);
+        // Two threads may lose a device at the same time, and a wait wants its queues for itself.
+        let mut finished = self.finished.lock().unwrap_or_else(PoisonError::into_inner);
+        if std::mem::replace(&mut *finished, true) {
+            return;
+        }
         while self.submissions.load(Ordering::SeqCst) > 0 {
             std::thread::yield_now();
         }

@@ -44,11 +44,12 @@ pub const FALLBACKS: &[Fallback] = &[
     fallback("vkDeviceWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], DoesWithout),
     fallback("vkSetDebugUtilsObjectNameEXT", &[HostMemory, DeviceMemory], DoesWithout),
     fallback("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", &[SurfaceLost], CallsAgain),
+    fallback("vkGetPhysicalDeviceSurfaceCapabilities2KHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfaceFormatsKHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfacePresentModesKHR", &[SurfaceLost], CallsAgain),
     fallback("vkCreateSwapchainKHR", &[SurfaceLost], CallsAgain),
-    fallback("vkAcquireNextImageKHR", &[SurfaceLost, OutOfDate], CallsAgain),
-    fallback("vkQueuePresentKHR", &[SurfaceLost, OutOfDate], CallsAgain),
+    fallback("vkAcquireNextImageKHR", &[SurfaceLost, OutOfDate], DoesWithout),
+    fallback("vkQueuePresentKHR", &[SurfaceLost, OutOfDate], DoesWithout),
 ];
 
 /// Returns what the library may do in silence after this error of the command.
