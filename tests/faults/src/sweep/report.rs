@@ -48,7 +48,7 @@ pub struct SweepReport {
     pub runs: usize,
     /// Runs in which the fault was reached.
     pub reached: usize,
-    /// Runs that ended with an error.
+    /// Runs in which the fault was reached, and that ended with an error.
     pub refused: usize,
     /// Runs in which the fault was reached, and that ended with success.
     pub succeeded: usize,
@@ -117,7 +117,7 @@ impl SweepReport {
                 let by = format!("{} {}", fault.command, fault.error.name());
                 *self.succeeded_by.entry(by).or_default() += 1;
             }
-            Ending::Status(_) => self.refused += 1,
+            Ending::Status(_) => self.refused += usize::from(outcome.reached),
             _ => {}
         }
         self.leaked += usize::from(leaks_on_purpose(Some(fault), outcome));
