@@ -305,7 +305,7 @@ fn attempt<S: Sample>(
     if args.validate.is_some() {
         device::report_validation(&sink)?;
     }
-    print_line(&closing_lines(&request, &played?, remark));
+    print_line(&closing_lines(&request, &played?, remark?));
     Ok(())
 }
 

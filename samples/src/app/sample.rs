@@ -115,8 +115,11 @@ pub trait Sample {
     }
 
     /// Returns the text below the timings after the last frame.
-    fn remark(&self) -> Option<String> {
-        None
+    ///
+    /// # Errors
+    /// Errors of the sample.
+    fn remark(&self) -> Result<Option<String>, RunError> {
+        Ok(None)
     }
 
     /// Resizes the images to `extent` pixels. Images of samples without this method are stretched.

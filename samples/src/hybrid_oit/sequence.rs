@@ -100,8 +100,8 @@ impl Sample for HybridOitSequence {
         Ok(self.sample.reload()?)
     }
 
-    fn remark(&self) -> Option<String> {
-        Some(format!("glass     {}", self.nodes))
+    fn remark(&self) -> Result<Option<String>, RunError> {
+        Ok(Some(format!("glass     {}", self.nodes)))
     }
 }
 

@@ -169,8 +169,8 @@ impl Sample for MeshShaders {
         Ok(self.counter.read(&self.ctx)?)
     }
 
-    fn remark(&self) -> Option<String> {
-        Some(format!("culling   {}", self.culling_text()))
+    fn remark(&self) -> Result<Option<String>, RunError> {
+        Ok(Some(format!("culling   {}", self.culling_text())))
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {

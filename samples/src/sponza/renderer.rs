@@ -261,8 +261,9 @@ impl Sample for Sponza {
         Ok(())
     }
 
-    fn remark(&self) -> Option<String> {
-        self.draw_counts.counts.map(|counts| format!("culling   {}", self.draw_counts_text(counts)))
+    fn remark(&self) -> Result<Option<String>, RunError> {
+        let text = |counts| format!("culling   {}", self.draw_counts_text(counts));
+        Ok(self.draw_counts.counts.map(text))
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {

@@ -121,18 +121,20 @@ impl Sample for Viewer {
         Ok(())
     }
 
-    fn remark(&self) -> Option<String> {
-        if let Some(rays) = self.ray_count().ok().flatten() {
+    fn remark(&self) -> Result<Option<String>, RunError> {
+        if let Some(rays) = self.ray_count()? {
             let paths = f64::from(self.config.width) * f64::from(self.config.height) * f64::from(self.done);
             let (rays, mean) = (rays as f64 / 1e6, rays as f64 / paths);
-            return Some(format!("rays      {rays:.1} million a frame, {mean:.1} a path"));
+            return Ok(Some(format!("rays      {rays:.1} million a frame, {mean:.1} a path")));
         }
-        let DrawnInstances { count, triangle_count, in_frustum } =
-            self.drawn.known().filter(|_| self.config.culls())?;
         let all = self.counts().1;
-        Some(format!(
-            "culling   {count} of {all} instances rasterised ({triangle_count} triangles), {in_frustum} in the frustum"
-        ))
+        let text = |drawn: DrawnInstances| {
+            let DrawnInstances { count, triangle_count, in_frustum } = drawn;
+            format!(
+                "culling   {count} of {all} instances rasterised ({triangle_count} triangles), {in_frustum} in the frustum"
+            )
+        };
+        Ok(self.drawn.known().filter(|_| self.config.culls()).map(text))
     }
 
     fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), RunError> {

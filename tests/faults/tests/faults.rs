@@ -15,7 +15,7 @@ use lvk_faults::fault_report::{DESCRIPTION, FaultReport, REPORT_VARIABLE};
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::sweep;
 use lvk_faults::sweep::run::{Caches, LayerFolder, Program, run};
-use lvk_faults::sweep::verdict::{Flaw, RunOutcome, flaws};
+use lvk_faults::sweep::verdict::{Ending, Flaw, RunOutcome, flaws};
 use x11rb::rust_connection::RustConnection;
 
 /// Time of a full sweep.
@@ -431,6 +431,17 @@ fn objects_that_may_be_in_use_are_leaked() {
 /// True if objects are alive at the end.
 fn leaks(outcome: &RunOutcome) -> bool {
     outcome.live.values().any(|count| *count != 0)
+}
+
+/// The path tracer reads the number of its rays after the picture.
+#[test]
+fn shortages_after_the_picture_are_errors() {
+    let line = "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2 --method pathtrace";
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
+    let last = calls.iter().filter(|call| call.command == "vkQueueSubmit2").count();
+    let [outcome, _] = assert_told(&program(line), &format!("vkQueueSubmit2 {last} device-memory once"));
+    assert!(outcome.result.is_some() && outcome.ending == Ending::Status(1), "{}", outcome.stderr);
 }
 
 /// Objects of calls that create nothing: recording, submission and waits.

@@ -132,8 +132,8 @@ impl<S: Sample> Sample for Loading<S> {
         self.sample_mut().map_or(Ok(()), |sample| sample.after_frame())
     }
 
-    fn remark(&self) -> Option<String> {
-        self.sample().and_then(S::remark)
+    fn remark(&self) -> Result<Option<String>, RunError> {
+        self.sample().map_or(Ok(None), S::remark)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
