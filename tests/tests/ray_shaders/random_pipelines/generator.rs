@@ -9,34 +9,44 @@ use super::program::{
     Shader, Signature, Statement, Test, VARIABLES, Value,
 };
 
-/// Most weight of a shader: its statements, with those of the functions that it calls in their place, and four for each wait.
-const MOST_WEIGHT: u32 = 70;
+/// Most weights of shaders, of which seeds take turns: its statements, with those of the functions that it calls in their place, and four for each wait.
+/// Drivers and the validation layer take long for large ones.
+const MOST_WEIGHTS: [u32; 4] = [20, 30, 30, 40];
 
 /// Returns the pipeline of a seed. No invocation of `launches` takes long.
 pub fn pipeline(seed: u64, launches: u32) -> Pipeline {
     let mut random = Random::new(seed);
     loop {
-        let found = any_pipeline(&mut random, seed % 2 == 1);
+        let found = any_pipeline(&mut random, seed);
         if (0..launches).all(|launch| interpreter::run(&found, launch).is_some()) {
             return found;
         }
     }
 }
 
-fn any_pipeline(random: &mut Random, traces_in_place: bool) -> Pipeline {
+fn any_pipeline(random: &mut Random, seed: u64) -> Pipeline {
+    let traces_in_place = seed % 2 == 1;
+    let most_weight = MOST_WEIGHTS[seed as usize % MOST_WEIGHTS.len()];
     // Few pipelines have traces or calls in all kinds of shaders.
     let (traces, callables, judges) = (!one_in(random, 3), !one_in(random, 2), one_in(random, 2));
-    let outer = Allowed { rays: &RAYS, callables: true, stage: ShaderStage::RayGen };
+    let outer = Allowed { rays: &RAYS, callables: true, stage: ShaderStage::RayGen, most_weight };
     let misses = Allowed {
         rays: if traces && !one_in(random, 3) { &RAYS } else { &[] },
         callables,
         stage: ShaderStage::Miss,
+        most_weight,
     };
     let only_shadows = one_in(random, 3);
     let rays: &[Ray] = if only_shadows { &RAYS[2..3] } else { &RAYS };
-    let hits = Allowed { rays: if traces { rays } else { &[] }, callables, stage: ShaderStage::ClosestHit };
-    let nested = Allowed { rays: &[], callables: !one_in(random, 2), stage: ShaderStage::Callable };
-    let judge = |stage| Allowed { rays: &[], callables: false, stage };
+    let hits = Allowed {
+        rays: if traces { rays } else { &[] },
+        callables,
+        stage: ShaderStage::ClosestHit,
+        most_weight,
+    };
+    let nested =
+        Allowed { rays: &[], callables: !one_in(random, 2), stage: ShaderStage::Callable, most_weight };
+    let judge = |stage| Allowed { rays: &[], callables: false, stage, most_weight };
     let group = |random: &mut Random, may_be_boxes: bool| {
         let closest_hit = shader(random, hits);
         let intersection = judges && may_be_boxes && one_in(random, 2);
@@ -80,6 +90,7 @@ struct Allowed {
     rays: &'static [Ray],
     callables: bool,
     stage: ShaderStage,
+    most_weight: u32,
 }
 
 fn shader(random: &mut Random, allowed: Allowed) -> Shader {
@@ -201,7 +212,7 @@ impl Made<'_> {
     fn statement(&mut self, around: Around) -> Statement {
         self.weight += 1;
         let variable = self.variable();
-        let nests = around.nesting > 0 && self.weight < MOST_WEIGHT;
+        let nests = around.nesting > 0 && self.weight < self.allowed.most_weight;
         match self.below(20) {
             0 if nests => {
                 let (test, yes) = (self.test(2), self.inner(around));
@@ -303,7 +314,7 @@ impl Made<'_> {
         }
         let callee = self.below(self.functions.len());
         let (signature, weight) = self.functions[callee];
-        let fits = is_wanted(signature) && self.weight + weight <= MOST_WEIGHT;
+        let fits = is_wanted(signature) && self.weight + weight <= self.allowed.most_weight;
         (fits && self.takes_wait(true)).then(|| {
             self.weight += weight;
             callee

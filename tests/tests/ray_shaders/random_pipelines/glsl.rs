@@ -64,11 +64,15 @@ pub const RAYS: [(&str, &str); 3] = [
     ("tracedOpaque", "gl_RayFlagsOpaqueEXT"),
 ];
 
+/// Stands in front of the functions of a shader.
+pub const FUNCTIONS: &str = "// Functions:\n";
+
 /// Returns the text of a shader of a pipeline. `is_procedural`: it is of a hit group of AABBs.
 pub fn text(pipeline: &Pipeline, shader: &Shader, stage: ShaderStage, is_procedural: bool) -> String {
     let mut text = HEADER.to_owned();
     write_macros(&mut text, pipeline, stage, is_procedural);
     write_interface(&mut text, stage, is_procedural);
+    text.push_str(FUNCTIONS);
     let signatures: Vec<Signature> = shader.functions.iter().map(|function| function.signature).collect();
     let depth = match stage {
         ShaderStage::RayGen | ShaderStage::AnyHit | ShaderStage::Intersection => "",

@@ -1,7 +1,7 @@
 //! Launches of random pipelines on the GPU.
 
 use lvk::{
-    Context, Dependencies, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleDesc,
+    Capabilities, Context, Dependencies, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleDesc,
     ShaderModuleHandle, ShaderRecord, ShaderSource, ShaderStage, compile_glsl,
 };
 use lvk_tests::compute::{read_words, words_buffer};
@@ -22,10 +22,11 @@ pub struct Module {
 }
 
 impl Module {
-    /// Returns the text, and what became of it.
+    /// Returns the text of the functions, and what became of them.
     pub fn description(&self) -> String {
         let passes = self.optimised.as_ref().map_or("", |(_, passes)| passes);
-        format!("// {:?} {passes}\n{}", self.stage, self.text)
+        let (_, functions) = self.text.split_once(glsl::FUNCTIONS).unwrap_or_default();
+        format!("// {:?} {passes}\n{functions}", self.stage)
     }
 
     fn create(&self, ctx: &Context) -> Result<Holder<ShaderModuleHandle>> {
@@ -48,7 +49,9 @@ pub fn modules(ctx: &Context, pipeline: &Pipeline, number: Option<u64>) -> Resul
         if let (Some(program), Some(number)) = (program, number) {
             let source = ShaderSource::Glsl(&module.text);
             let desc = ShaderModuleDesc { stage, source, ..Default::default() };
-            let words = compile_glsl(&desc, ctx.capabilities())?;
+            // Debian's optimiser does not know the capability for positions of triangles.
+            let capabilities = Capabilities { position_fetch: false, ..ctx.capabilities().clone() };
+            let words = compile_glsl(&desc, &capabilities)?;
             let of_module = number.wrapping_mul(64).wrapping_add(index);
             module.optimised = Some(optimised(&program, of_module, words).expect("the optimiser can be run"));
         }

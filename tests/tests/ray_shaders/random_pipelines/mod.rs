@@ -70,6 +70,7 @@ fn check(ctx: &Context, scene: &Scene, pipeline: Pipeline, optimised: Option<u64
     if !fails(ctx, scene, &pipeline, optimised) {
         return;
     }
+    eprintln!("{name} fails");
     let shrunk = shrink::shrunk(pipeline, &|smaller| fails(ctx, scene, smaller, optimised));
     let texts: String = modules(ctx, &shrunk, optimised)
         .map(|modules| modules.iter().map(|module| module.description()).collect())

@@ -3,7 +3,7 @@
 use super::program::{Pipeline, Statement};
 
 /// Most pipelines that are tried.
-const MOST_TRIALS: u32 = 200;
+const MOST_TRIALS: u32 = 100;
 
 /// Removes statements, and puts bodies in place of what they are in, while `fails`.
 pub fn shrunk(mut pipeline: Pipeline, fails: &dyn Fn(&Pipeline) -> bool) -> Pipeline {
