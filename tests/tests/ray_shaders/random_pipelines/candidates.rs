@@ -84,9 +84,8 @@ impl<'a> Invocation<'a> {
         let candidate = Candidate::Box(reports);
         let mut invocation =
             Invocation { shader, builtin, record, global: 17, depth: 0, calls: 0, candidate, ..*self };
-        match invocation.shade(builtin.wrapping_add(record)) {
-            Err(Leave::TooLong) => return Err(Leave::TooLong),
-            Ok(_) | Err(_) => {}
+        if invocation.shade(builtin.wrapping_add(record)) == Err(Leave::TooLong) {
+            return Err(Leave::TooLong);
         }
         Ok(match invocation.candidate {
             Candidate::Box(reports) => reports.nearest,

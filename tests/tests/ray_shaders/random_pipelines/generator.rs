@@ -251,13 +251,23 @@ impl Made<'_> {
         let test = if matches!(form, LoopForm::Endless | LoopForm::WhileTrue) || self.one_in(3) {
             None
         } else {
-            Some(self.test(2))
+            Some(self.loop_test())
         };
         let has_step = matches!(form, LoopForm::For | LoopForm::Endless) && self.one_in(3);
         let step = has_step.then(|| (self.variable(), self.value(2)));
         let body = self.inner(Around { is_in_loop: true, can_break: true, ..around });
         let count = 1 + self.below(3) as u32;
         Statement::Loop(Box::new(Loop { form, count, test, step, returns: self.one_in(2), body }))
+    }
+
+    /// A condition that is computed anew for each iteration, often with a wait.
+    fn loop_test(&mut self) -> Test {
+        if self.one_in(2) && self.takes_wait(!self.allowed.rays.is_empty()) {
+            let ray = self.ray();
+            let value = Value::Trace(ray, Box::new(self.value(1)));
+            return Test::Divides(Box::new(value), 2);
+        }
+        self.test(2)
     }
 
     fn switch(&mut self, around: Around) -> Statement {
@@ -325,8 +335,8 @@ impl Made<'_> {
         if nesting == 0 {
             return Value::Operand(self.operand());
         }
-        match self.below(8) {
-            0 if self.takes_wait(!self.allowed.rays.is_empty()) => {
+        match self.below(9) {
+            0 | 8 if self.takes_wait(!self.allowed.rays.is_empty()) => {
                 let ray = self.ray();
                 Value::Trace(ray, Box::new(self.value(nesting - 1)))
             }

@@ -53,7 +53,8 @@ pub fn modules(ctx: &Context, pipeline: &Pipeline, number: Option<u64>) -> Resul
             let capabilities = Capabilities { position_fetch: false, ..ctx.capabilities().clone() };
             let words = compile_glsl(&desc, &capabilities)?;
             let of_module = number.wrapping_mul(64).wrapping_add(index);
-            module.optimised = Some(optimised(&program, of_module, words).expect("the optimiser can be run"));
+            let done = optimised(&program, of_module, words);
+            module.optimised = Some(done.unwrap_or_else(|error| (Vec::new(), error.to_string())));
         }
         Ok(module)
     });

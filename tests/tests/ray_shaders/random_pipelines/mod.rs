@@ -13,7 +13,8 @@ mod scene;
 mod shrink;
 mod statements;
 
-use lvk::{Context, Error, RayTracingPipelinePath, Result};
+use lvk::{Error, RayTracingPipelinePath, Result};
+use lvk_tests::TestDevice;
 use lvk_tests::pipeline_paths::pipeline_devices;
 
 use self::launch::{launch, modules};
@@ -66,17 +67,20 @@ fn random_pipelines_compute_what_the_interpreter_computes() -> Result<()> {
 
 /// Fails, with a smaller pipeline, if a pipeline computes other results than the interpreter. `optimised`: the number that chooses how
 /// its modules are optimised.
-fn check(ctx: &Context, scene: &Scene, pipeline: Pipeline, optimised: Option<u64>, name: &str) {
-    if !fails(ctx, scene, &pipeline, optimised) {
-        return;
+fn check(ctx: &TestDevice, scene: &Scene, pipeline: Pipeline, optimised: Option<u64>, name: &str) {
+    let has_failed = fails(ctx, scene, &pipeline, optimised);
+    let mut report = String::new();
+    if has_failed {
+        eprintln!("{name} fails");
+        let shrunk = shrink::shrunk(pipeline, &|smaller| fails(ctx, scene, smaller, optimised));
+        report = modules(ctx, &shrunk, optimised)
+            .map(|modules| modules.iter().map(|module| module.description()).collect())
+            .unwrap_or_default();
+        let (found, expected) = (launch(ctx, scene, &shrunk, optimised), expected(&shrunk));
+        let messages: Vec<String> = ctx.take_messages().iter().map(ToString::to_string).collect();
+        report += &format!("\nfound    {found:?}\nexpected {expected:?}\n{}", messages.join("\n"));
     }
-    eprintln!("{name} fails");
-    let shrunk = shrink::shrunk(pipeline, &|smaller| fails(ctx, scene, smaller, optimised));
-    let texts: String = modules(ctx, &shrunk, optimised)
-        .map(|modules| modules.iter().map(|module| module.description()).collect())
-        .unwrap_or_default();
-    let (found, expected) = (launch(ctx, scene, &shrunk, optimised), expected(&shrunk));
-    panic!("{name}: {texts}\nfound    {found:?}\nexpected {expected:?}");
+    assert!(!has_failed, "{name}: {report}");
 }
 
 /// The results of the interpreter; `None` if an invocation takes too many steps.
@@ -84,10 +88,14 @@ fn expected(pipeline: &Pipeline) -> Option<Vec<u32>> {
     (0..LAUNCHES).map(|launch| interpreter::run(pipeline, launch)).collect()
 }
 
-/// True if the pipeline is refused, or its results differ. Text that does not compile is a mistake of the test.
-fn fails(ctx: &Context, scene: &Scene, pipeline: &Pipeline, optimised: Option<u64>) -> bool {
+/// True if the pipeline is refused, its results differ, or the validation layer sends messages. Text that does not compile is a mistake of the test.
+fn fails(ctx: &TestDevice, scene: &Scene, pipeline: &Pipeline, optimised: Option<u64>) -> bool {
     let Some(expected) = expected(pipeline) else { return false };
-    match launch(ctx, scene, pipeline, optimised) {
+    let launched = launch(ctx, scene, pipeline, optimised);
+    if !ctx.take_messages().is_empty() {
+        return true;
+    }
+    match launched {
         Ok(found) => found != expected,
         Err(Error::Shader { .. }) => false,
         Err(_) => true,

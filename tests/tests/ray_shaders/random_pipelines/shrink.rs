@@ -44,11 +44,13 @@ fn lists(pipeline: &mut Pipeline) -> Vec<&mut Vec<Statement>> {
 }
 
 fn count(pipeline: &mut Pipeline) -> usize {
-    fn inner(list: &mut Vec<Statement>) -> usize {
-        let within = |statement: &mut Statement| statement.bodies_mut().into_iter().map(inner).sum::<usize>();
+    fn inner(list: &mut [Statement]) -> usize {
+        let within = |statement: &mut Statement| {
+            statement.bodies_mut().into_iter().map(|body| inner(body)).sum::<usize>()
+        };
         list.iter_mut().map(|statement| 1 + within(statement)).sum()
     }
-    lists(pipeline).into_iter().map(inner).sum()
+    lists(pipeline).into_iter().map(|body| inner(body)).sum()
 }
 
 /// Replaces the statement that `left` others precede by nothing or by its bodies. Returns true if the list has it.
