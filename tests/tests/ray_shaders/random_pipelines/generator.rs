@@ -3,6 +3,7 @@
 use lvk::ShaderStage;
 use lvk_tests::random::Random;
 
+use super::PIPELINES;
 use super::interpreter;
 use super::program::{
     Case, Condition, Field, Function, Group, Loop, LoopForm, Operand, Operation, Pipeline, Place, Ray,
@@ -12,6 +13,9 @@ use super::program::{
 /// Most weights of shaders, of which seeds take turns: its statements, with those of the functions that it calls in their place, and four for each wait.
 /// Drivers and the validation layer take long for large ones.
 const MOST_WEIGHTS: [u32; 4] = [20, 30, 30, 40];
+
+/// Most weight of shaders in the normal test, which would take too long with others.
+const LEAST_WEIGHT: u32 = 10;
 
 /// Returns the pipeline of a seed. No invocation of `launches` takes long.
 pub fn pipeline(seed: u64, launches: u32) -> Pipeline {
@@ -26,7 +30,8 @@ pub fn pipeline(seed: u64, launches: u32) -> Pipeline {
 
 fn any_pipeline(random: &mut Random, seed: u64) -> Pipeline {
     let traces_in_place = seed % 2 == 1;
-    let most_weight = MOST_WEIGHTS[seed as usize % MOST_WEIGHTS.len()];
+    let most_weight =
+        if seed < PIPELINES { LEAST_WEIGHT } else { MOST_WEIGHTS[seed as usize % MOST_WEIGHTS.len()] };
     // Few pipelines have traces or calls in all kinds of shaders.
     let (traces, callables, judges) = (!one_in(random, 3), !one_in(random, 2), one_in(random, 2));
     let outer = Allowed { rays: &RAYS, callables: true, stage: ShaderStage::RayGen, most_weight };
