@@ -5,12 +5,15 @@ use std::fmt::Write;
 use lvk::ShaderStage;
 
 use super::program::{
-    Condition, ELEMENTS, MAX_CALLABLE_DEPTH, MAX_DEPTH, Operand, Operation, Shader, Statement,
+    ELEMENTS, MAX_CALLABLE_DEPTH, MAX_DEPTH, MOST_HITS, Pipeline, STRUCTS, Shader, Signature, never_ends,
 };
+use super::statements::{Traces, Writer};
 
 const HEADER: &str = "
     #extension GL_EXT_null_initializer : require
     struct Passed { uint value; uint depth; float unused[2]; };
+    struct Inner { uint x; float y; };
+    struct Struct { uint number; bool flag; float weights[2]; Inner inner; uvec3 vector; mat2 matrix; };
     layout(buffer_reference, scalar) buffer Words { uint at[]; };
     layout(push_constant, scalar) uniform Push { Words results; uint tlas; uint hits; uint misses; };
     layout(shaderRecordEXT, scalar) buffer Record { uint skipped; uint tag; };
@@ -19,6 +22,10 @@ const HEADER: &str = "
     uint gCalls = 0u;
 ";
 
+/// The column of instances that a ray to a target is sent along.
+const COLUMN: &str =
+    "float column(uint target) { return target + ((PROCEDURAL >> target) & 1u) * MOST_HITS + 0.25; }";
+
 const TRACE: &str = "
     uint traced(uint v) {
         if (gDepth >= MAX_DEPTH) return v * 3u;
@@ -26,7 +33,7 @@ const TRACE: &str = "
         bool isHit = target < hits;
         sent.value = v;
         sent.depth = gDepth + 1u;
-        traceRayEXT(kTLAS[tlas], FLAGS, 0xFF, 0, 0, isHit ? 0u : target - hits, vec3(target + 0.25, 0.25, -1), 0.0,
+        traceRayEXT(kTLAS[tlas], FLAGS, 0xFF, 0, 0, isHit ? 0u : target - hits, vec3(column(target), 0.25, -1), 0.0,
             vec3(0, 0, isHit ? 1 : -1), 10.0, 2);
         return sent.value;
     }
@@ -43,161 +50,181 @@ const CALL: &str = "
     }
 ";
 
-/// A trace where it stands, without a branch, so that several may share a block.
-const IN_PLACE: &str = "
-        at = VARIABLE % (hits + misses);
-        isHit = uint(at < hits);
-        sent.value = VARIABLE;
-        sent.depth = gDepth + 1u;
-        traceRayEXT(kTLAS[tlas], FLAGS, 0xFF, 0, 0, (at - hits) * (1u - isHit), vec3(at + 0.25, 0.25, -1), 0.0,
-            vec3(0, 0, 2.0 * isHit - 1.0), 10.0, 2);
-        VARIABLE = sent.value;
+const REPORT: &str = "
+    bool reported(uint v) {
+        mark = v;
+        return reportIntersectionEXT(0.5 + float(v % 8u) * 0.125, v % 100u);
+    }
 ";
-const SHADOW: &str = "gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT";
 
-/// Forms of traces.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Traces {
-    /// Calls of a function.
-    Called,
-    /// Where they stand.
-    InPlace,
-    /// None: the recursion has ended.
-    Ended,
-}
+/// Flags of rays, as the functions that trace them have names.
+pub const RAYS: [(&str, &str); 3] = [
+    ("traced", "0"),
+    ("tracedShadow", "gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT"),
+    ("tracedOpaque", "gl_RayFlagsOpaqueEXT"),
+];
 
-/// Returns the text of a shader in a pipeline with this number of callable shaders. `in_place`: its traces stand in its functions.
-pub fn text(shader: &Shader, stage: ShaderStage, callables: usize, in_place: bool) -> String {
-    let builtin = match stage {
-        ShaderStage::ClosestHit => "uint(gl_InstanceID) + uint(gl_HitTEXT + 0.5) + gl_LaunchIDEXT.x",
-        ShaderStage::Miss => "gl_LaunchIDEXT.x + uint(gl_RayTmaxEXT)",
-        _ => "gl_LaunchIDEXT.x",
+/// Stands in front of the functions of a shader.
+pub const FUNCTIONS: &str = "// Functions:\n";
+
+/// Returns the text of a shader of a pipeline. `is_procedural`: it is of a hit group of AABBs.
+pub fn text(pipeline: &Pipeline, shader: &Shader, stage: ShaderStage, is_procedural: bool) -> String {
+    let mut text = HEADER.to_owned();
+    write_macros(&mut text, pipeline, stage, is_procedural);
+    write_interface(&mut text, stage, is_procedural);
+    text.push_str(FUNCTIONS);
+    let signatures: Vec<Signature> = shader.functions.iter().map(|function| function.signature).collect();
+    let depth = match stage {
+        ShaderStage::RayGen | ShaderStage::AnyHit | ShaderStage::Intersection => "",
+        ShaderStage::Callable => "gCalls = given.depth;",
+        _ => "gDepth = given.depth;",
     };
-    let mut text =
-        format!("{HEADER}#define MAX_DEPTH {MAX_DEPTH}u\n#define MAX_CALLABLE_DEPTH {MAX_CALLABLE_DEPTH}u\n");
-    writeln!(text, "#define CALLABLES {callables}u\n#define BUILT_IN ({builtin})").ok();
-    if stage != ShaderStage::Callable {
-        text.push_str("layout(location = 2) rayPayloadEXT Passed sent;\n");
-        text.push_str(&TRACE.replace("FLAGS", "0"));
-        text.push_str(&TRACE.replace("traced", "tracedShadow").replace("FLAGS", SHADOW));
-    }
-    text.push_str(CALL);
-    match stage {
-        ShaderStage::RayGen => {}
-        ShaderStage::Callable => text.push_str("layout(location = 0) callableDataInEXT Passed given;\n"),
-        _ => text.push_str("layout(location = 0) rayPayloadInEXT Passed given;\n"),
-    }
-    for (index, body) in shader.functions.iter().enumerate() {
-        writeln!(
-            text,
-            "uint f{index}(uint v0) {{ uint v1 = v0 + 1u; uint v2 = 7u; uint a[{ELEMENTS}] = {{}};"
-        )
-        .ok();
-        if in_place && stage != ShaderStage::Callable {
-            text.push_str("uint at; uint isHit; if (gDepth >= MAX_DEPTH) {\n");
-            write_statements(&mut text, body, (Traces::Ended, 0));
-            text.push_str("} else {\n");
-            write_statements(&mut text, body, (Traces::InPlace, 0));
-            text.push_str("}\n");
+    let in_place = pipeline.traces_in_place && traces(stage);
+    for (index, function) in shader.functions.iter().enumerate() {
+        let signature = function.signature;
+        let mut writer = Writer {
+            text: String::new(),
+            traces: Traces::Called,
+            loops: 0,
+            signature,
+            signatures: &signatures,
+        };
+        if in_place {
+            writer.text.push_str("uint at; uint isHit; if (gDepth >= MAX_DEPTH) {\n");
+            writer.traces = Traces::Ended;
+            writer.write_statements(&function.body);
+            writer.text.push_str("} else {\n");
+            writer.traces = Traces::InPlace;
+            writer.write_statements(&function.body);
+            writer.text.push_str("}\n");
         } else {
-            write_statements(&mut text, body, (Traces::Called, 0));
+            writer.write_statements(&function.body);
         }
-        writeln!(text, "return v0 ^ v1 * 3u ^ v2 ^ a[1]; }}").ok();
+        let (mut variables, result) = locals(&writer.text, signature);
+        if !never_ends(&function.body) {
+            writer.write_return(&result);
+        }
+        if signature == Signature::Main {
+            variables = format!("{depth} uint v0 = INPUT; {variables}");
+        }
+        writeln!(text, "{} {{ {variables}\n{} }}", head(index, signature), writer.text).ok();
     }
-    let last = shader.functions.len() - 1;
-    let main = match stage {
-        ShaderStage::RayGen => format!("results.at[gl_LaunchIDEXT.x] = f{last}(gl_LaunchIDEXT.x) + g;"),
-        ShaderStage::Callable => format!("gCalls = given.depth; given.value = f{last}(given.value) + g;"),
-        _ => format!("gDepth = given.depth; given.value = f{last}(given.value) + g;"),
-    };
-    writeln!(text, "void main() {{ {main} }}").ok();
+    if signatures.last() == Some(&Signature::Plain) {
+        let last = signatures.len() - 1;
+        writeln!(text, "void main() {{ {depth} FINISH(f{last}(INPUT)) }}").ok();
+    }
     text
 }
 
-fn write_statements(text: &mut String, statements: &[Statement], within: (Traces, u32)) {
-    statements.iter().for_each(|statement| write_statement(text, statement, within));
+/// True for stages whose shaders trace rays.
+fn traces(stage: ShaderStage) -> bool {
+    matches!(stage, ShaderStage::RayGen | ShaderStage::Miss | ShaderStage::ClosestHit)
 }
 
-fn write_trace(text: &mut String, variable: usize, traces: Traces, is_shadow: bool) {
-    let written = match traces {
-        Traces::Ended => format!("v{variable} = v{variable} * 3u;"),
-        Traces::Called if is_shadow => format!("v{variable} = tracedShadow(v{variable});"),
-        Traces::Called => format!("v{variable} = traced(v{variable});"),
-        Traces::InPlace => {
-            let flags = if is_shadow { SHADOW } else { "0" };
-            IN_PLACE.replace("VARIABLE", &format!("v{variable}")).replace("FLAGS", flags)
-        }
+fn write_macros(text: &mut String, pipeline: &Pipeline, stage: ShaderStage, is_procedural: bool) {
+    let kind = if is_procedural { " + gl_HitKindEXT + mark" } else { "" };
+    let hit = format!("uint(gl_InstanceID) + uint(gl_HitTEXT * 8.0 + 0.5) + gl_LaunchIDEXT.x{kind}");
+    let builtin = match stage {
+        ShaderStage::ClosestHit | ShaderStage::AnyHit => &hit,
+        ShaderStage::Intersection => "uint(gl_InstanceID) + gl_LaunchIDEXT.x",
+        ShaderStage::Miss => "gl_LaunchIDEXT.x + uint(gl_RayTmaxEXT)",
+        _ => "gl_LaunchIDEXT.x",
     };
-    writeln!(text, "{written}").ok();
+    let (input, finish) = match stage {
+        ShaderStage::RayGen => ("gl_LaunchIDEXT.x", "results.at[gl_LaunchIDEXT.x] = (X) + g;"),
+        ShaderStage::AnyHit => ("given.value + BUILT_IN", "g ^= (X);"),
+        ShaderStage::Intersection => ("BUILT_IN + tag", "g ^= (X);"),
+        _ => ("given.value", "given.value = (X) + g;"),
+    };
+    let macros = [
+        ("MAX_DEPTH", format!("{MAX_DEPTH}u")),
+        ("MAX_CALLABLE_DEPTH", format!("{MAX_CALLABLE_DEPTH}u")),
+        ("CALLABLES", format!("{}u", pipeline.callables.len())),
+        ("PROCEDURAL", format!("{}u", pipeline.procedural())),
+        ("MOST_HITS", format!("{MOST_HITS}u")),
+        ("BUILT_IN", format!("({builtin})")),
+        ("INPUT", input.to_owned()),
+        ("FINISH(X)", finish.to_owned()),
+    ];
+    for (name, value) in macros {
+        writeln!(text, "#define {name} {value}").ok();
+    }
 }
 
-/// `traces`: their form. `loops`: around the statement.
-fn write_statement(text: &mut String, statement: &Statement, (traces, loops): (Traces, u32)) {
-    match statement {
-        Statement::Set(target, operation, operand) => {
-            let symbol = match operation {
-                Operation::Add => "+",
-                Operation::Multiply => "*",
-                Operation::Xor => "^",
-            };
-            writeln!(text, "v{target} = v{target} {symbol} {};", operand_text(*operand)).ok();
+/// Writes the payloads and the functions that wait or report.
+fn write_interface(text: &mut String, stage: ShaderStage, is_procedural: bool) {
+    if is_procedural {
+        text.push_str("hitAttributeEXT uint mark;\n");
+    }
+    if traces(stage) {
+        text.push_str("layout(location = 2) rayPayloadEXT Passed sent;\n");
+        text.push_str(COLUMN);
+        for (name, flags) in RAYS {
+            text.push_str(&TRACE.replace("traced", name).replace("FLAGS", flags));
         }
-        Statement::SetGlobal(variable) => _ = writeln!(text, "g ^= v{variable};"),
-        Statement::SetElement(index, variable) => {
-            writeln!(text, "a[v{index} % {ELEMENTS}u] += v{variable};").ok();
+    }
+    match stage {
+        ShaderStage::RayGen => text.push_str(CALL),
+        ShaderStage::Intersection => text.push_str(REPORT),
+        ShaderStage::Callable => {
+            text.push_str(CALL);
+            text.push_str("layout(location = 0) callableDataInEXT Passed given;\n");
         }
-        Statement::If(condition, yes, no) => {
-            writeln!(text, "if ({}) {{", condition_text(*condition)).ok();
-            write_statements(text, yes, (traces, loops));
-            if !no.is_empty() {
-                text.push_str("} else {\n");
-                write_statements(text, no, (traces, loops));
-            }
-            text.push_str("}\n");
-        }
-        Statement::Loop(count, body, leave, skip) => {
-            writeln!(text, "for (uint i{loops} = 0u; i{loops} < {count}u; ++i{loops}) {{").ok();
-            if let Some(condition) = skip {
-                writeln!(text, "if ({}) {{ v2 += 1u; continue; }}", condition_text(*condition)).ok();
-            }
-            write_statements(text, body, (traces, loops + 1));
-            if let Some(condition) = leave {
-                writeln!(text, "if ({}) break;", condition_text(*condition)).ok();
-            }
-            writeln!(text, "v1 += i{loops}; }}").ok();
-        }
-        Statement::Switch(variable, cases) => {
-            writeln!(text, "switch (v{variable} % 3u) {{ case 0u:").ok();
-            write_statements(text, &cases[0], (traces, loops));
-            text.push_str("case 1u:\n");
-            write_statements(text, &cases[1], (traces, loops));
-            text.push_str("break;\ndefault:\n");
-            write_statements(text, &cases[2], (traces, loops));
-            text.push_str("break; }\n");
-        }
-        Statement::Trace(variable) => write_trace(text, *variable, traces, false),
-        Statement::TraceShadow(variable) => write_trace(text, *variable, traces, true),
-        Statement::Callable(variable) => _ = writeln!(text, "v{variable} = called(v{variable});"),
-        Statement::Call(function, variable) => {
-            writeln!(text, "v{variable} = f{function}(v{variable});").ok();
-        }
-        Statement::ReturnIf(condition) => {
-            writeln!(text, "if ({}) return v0 + v1;", condition_text(*condition)).ok();
+        ShaderStage::AnyHit => text.push_str("layout(location = 0) rayPayloadInEXT Passed given;\n"),
+        _ => {
+            text.push_str(CALL);
+            text.push_str("layout(location = 0) rayPayloadInEXT Passed given;\n");
         }
     }
 }
 
-fn operand_text(operand: Operand) -> String {
-    match operand {
-        Operand::Variable(index) => format!("v{index}"),
-        Operand::Constant(value) => format!("{value}u"),
-        Operand::BuiltIn => "BUILT_IN".to_owned(),
-        Operand::Record => "tag".to_owned(),
-        Operand::Global => "g".to_owned(),
-        Operand::Element(index) => format!("a[v{index} % {ELEMENTS}u]"),
+/// Returns the result and the parameters of a function.
+fn head(index: usize, signature: Signature) -> String {
+    match signature {
+        Signature::Main => "void main()".to_owned(),
+        Signature::Plain => format!("uint f{index}(uint v0)"),
+        Signature::Bool => format!("bool f{index}(uint v0)"),
+        Signature::InOut => format!("uint f{index}(uint v0, inout uint v2)"),
+        Signature::Out => format!("uint f{index}(uint v0, out uint v2)"),
+        Signature::InOutStruct => format!("uint f{index}(uint v0, inout Struct own)"),
+        Signature::Void => format!("void f{index}(inout uint v0)"),
+        Signature::Struct => format!("Struct f{index}(uint v0, Struct own)"),
     }
 }
 
-fn condition_text(condition: Condition) -> String {
-    format!("v{} % {}u == 0u", condition.variable, condition.divisor)
+/// Returns the variables of a function, of those that its text names, and its result.
+fn locals(body: &str, signature: Signature) -> (String, String) {
+    let last = match signature {
+        Signature::InOut => "",
+        Signature::Out => "v2 = 7u;",
+        _ => "uint v2 = 7u;",
+    };
+    let mut variables = format!("uint v1 = v0 + 1u; {last} uint a[{ELEMENTS}] = {{}};");
+    let mut result = "v0 ^ v1 * 3u ^ v2 ^ a[1]".to_owned();
+    let has_struct = matches!(signature, Signature::InOutStruct | Signature::Struct);
+    let optional = [
+        ("flag", "bool flag = false;".to_owned(), " ^ uint(flag) * 7u"),
+        ("weight", "float weight = 0.0;".to_owned(), " ^ uint(weight)"),
+        ("vector", "uvec3 vector = {};".to_owned(), ""),
+        ("matrix", "mat2 matrix = {};".to_owned(), ""),
+        ("own", if has_struct { String::new() } else { "Struct own = {};".to_owned() }, " ^ own.number"),
+        ("structs", format!("Struct structs[{STRUCTS}] = {{}};"), ""),
+    ];
+    for (name, declaration, part) in optional {
+        let is_parameter = name == "own" && has_struct;
+        if is_parameter || names(body, name) {
+            variables.push_str(&declaration);
+            result.push_str(part);
+        }
+    }
+    (variables, result)
+}
+
+/// True if a text has a variable of this name, and not only a member.
+fn names(body: &str, name: &str) -> bool {
+    body.match_indices(name).any(|(at, _)| {
+        let before = body[..at].chars().next_back().unwrap_or(' ');
+        let behind = body[at + name.len()..].chars().next().unwrap_or(' ');
+        !before.is_alphanumeric() && before != '.' && !behind.is_alphanumeric()
+    })
 }
