@@ -1,5 +1,5 @@
 //! The section of the page of bad input about other crates than the library: it has each of their errors, with tests.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use std::collections::BTreeSet;
 
