@@ -8,13 +8,15 @@ layout(local_size_x = 64) in;
 const float kMostFrames = 256.0;
 const float kMostMovingFrames = 16.0;
 const float kMostSamples = 4096.0;
+// Samples that count in full until others take their place.
+const float kKeptSamples = 4.0;
 // Frames without an update before an entry is free.
 const uint kMostIdleFrames = 64u;
 
 // The mean with the samples of this frame. Those of the frames before count less each time, but not less than a few that a mean needs.
 CacheCell updated(CacheCell cell, uvec4 sums) {
     float kept = 1.0 - 1.0 / (frame.sceneMoves != 0u ? kMostMovingFrames : kMostFrames);
-    cell.samples = min(max(cell.samples * kept, min(cell.samples, kLeastSamples)), kMostSamples);
+    cell.samples = min(max(cell.samples * kept, min(cell.samples, kKeptSamples)), kMostSamples);
     if (sums.w == 0u) {
         cell.idle += 1u;
         return cell;

@@ -13,8 +13,8 @@
 const uint kNoEntry = 0xffffffffu;
 // The brightest sample, exposed.
 const float kBrightestCached = 32.0;
-// A path reads the cache where it is this wide at least, in sides of a cell: the surface before is then some cells away.
-const float kLeastWidth = 1.0;
+// A path reads the cache where it is this wide at least, in sides of a cell: what is nearer would get the light of both sides of a corner.
+const float kLeastWidth = 0.3;
 // Cells do not get smaller nearer to the eye, in distances of the near plane.
 const float kNearestCells = 50.0;
 // A layer that mirrors less than this share, or is rougher, scatters about the same light to everywhere.

@@ -10,7 +10,5 @@ const uint kBucketEntries = 16u;
 const uint kSumWords = 4u;
 // The unit of sums, of exposed light.
 const float kSumUnit = 1.0 / 256.0;
-// Samples of a mean before it is read.
-const float kLeastSamples = 4.0;
 
 #endif

@@ -134,7 +134,7 @@ bool endsInCache(inout Path path, Surface surface, Bsdf bsdf, uint place, Random
         return false;
     }
     vec4 cached = cachedLight(key);
-    bool isKnown = cached.a >= kLeastSamples;
+    bool isKnown = cached.a > 0.0;
     path.radiance += isKnown ? path.throughput * reflectanceOf(bsdf) * cached.rgb : vec3(0.0);
     return isKnown;
 }

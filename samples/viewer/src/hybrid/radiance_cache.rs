@@ -18,7 +18,7 @@ const BLOCK: u32 = 4;
 const GROUP: u32 = 64;
 /// Side of a cell in pixels, and its least and largest share of the distance from the eye.
 const CELL_PIXELS: f32 = 16.0;
-const CELL_SHARES: [f32; 2] = [0.01, 0.03];
+const CELL_SHARES: [f32; 2] = [0.01, 0.04];
 
 /// The table on the GPU, and the pass that adds what a frame has found.
 pub(crate) struct RadianceCache {
