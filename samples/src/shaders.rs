@@ -123,6 +123,8 @@ pub const INCLUDES: &[(&str, &str)] = includes![
     "viewer/path_launch",
     "viewer/plane",
     "viewer/pyramid",
+    "viewer/radiance_cache",
+    "viewer/radiance_cache_layout",
     "viewer/random",
     "viewer/sample_path",
     "viewer/sky",

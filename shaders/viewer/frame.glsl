@@ -158,6 +158,28 @@ struct StoredPath {
     uint pair; // random numbers drawn so far, in pairs
 };
 
+const uint kMostUpdates = 4u;
+
+// What the radiance cache knows of a cell.
+struct CacheCell {
+    vec3 mean; // light over reflectance
+    float samples; // in the mean
+    uint idle; // frames since the last sample
+};
+
+// A surface of a path that updates the radiance cache.
+struct CacheUpdate {
+    uint entry;
+    vec3 light; // of the path before what the surface scatters
+    vec3 factor; // of the light of the cell in that of the path
+};
+
+// A path that updates the radiance cache.
+struct UpdatingPath {
+    uint count;
+    CacheUpdate updates[kMostUpdates];
+};
+
 // What a pass over the visible surfaces draws to.
 struct VisibleTargets {
     uint triangles; // an index into kTexturesU2D: instance, geometry and primitive of each pixel
@@ -179,6 +201,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Flo
 layout(buffer_reference, scalar, buffer_reference_align = 4) coherent buffer LevelArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer SumArray { vec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer StoredPathArray { StoredPath at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CellArray { CacheCell at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UpdatingPathArray { UpdatingPath at[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MeshRunArray { MeshRun at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer NumberArray { uint at[]; };
@@ -226,6 +250,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     SumArray planes; // of plane.glsl
     NumberArray pathLists; // of path_launch.glsl
     StoredPathArray paths; // of each pixel
+    NumberArray cacheKeys; // checksums of the cells of the radiance cache; 0 where an entry is free
+    NumberArray cacheSums; // of the samples of this frame
+    CellArray cacheCells;
+    UpdatingPathArray updatingPaths; // one for each block of pixels
     uvec2 wantedMips; // of each image the finest level that was read; 0 if all levels are resident
     uint stillCount; // frames since the camera moved
     uint view; // what the picture shows: kViewLight or another of plane.glsl
@@ -233,6 +261,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint emitterCount;
     float emitterProbability; // of being chosen, among all lights, emitters and the sky
     float emitterPower; // sum of areas of emitters times their weights
+    uint cacheBuckets; // of the radiance cache; 0 without one
+    float cellShare; // side of its cells over their distance from the eye
 };
 
 layout(push_constant, scalar) uniform PushConstants {

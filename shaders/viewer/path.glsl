@@ -108,8 +108,7 @@ struct Bounce {
     float choice; // whether chance ends the path
 };
 
-Bounce bounceAt(Path path, Surface surface, inout Random random) {
-    Bsdf bsdf = bsdfOf(surface, -path.direction);
+Bounce bounceAt(Path path, Surface surface, Bsdf bsdf, inout Random random) {
     vec2 lightChoices = nextPair(random);
     vec2 lightPlace = nextPair(random);
     ShadowRay shadow = shadowRay(surface, bsdf, path.extinction, lightChoices.x, lightPlace);

@@ -23,7 +23,7 @@ bool advance(inout Path path, uint place, inout Random random) {
         return false;
     }
     path.radiance += path.throughput * emissionShare(path, hit, surface) * surface.emission;
-    Bounce bounce = bounceAt(path, surface, random);
+    Bounce bounce = bounceAt(path, surface, bsdfOf(surface, -path.direction), random);
     vec3 light = path.throughput * bounce.shadow.light;
     path.throughput *= bounce.scattered.weight;
     bool goesOn = follow(path, surface, bounce);

@@ -1,10 +1,11 @@
-// The light of what each pixel shows, of one sample: a shadow ray, and a path in a direction that the surface prefers. Matte layers and
-// all others are kept apart, without their colours, for the filter.
+// The light of what each pixel shows, of one sample: a shadow ray, and a path in a direction that the surface prefers, which may end with
+// the light of the radiance cache. Matte layers and all others are kept apart, without their colours, for the filter.
 #ifndef VIEWER_VISIBLE_LIGHT
 #define VIEWER_VISIBLE_LIGHT
 
 #include "viewer/path.glsl"
 #include "viewer/plane.glsl"
+#include "viewer/radiance_cache.glsl"
 #include "viewer/visible_triangle.glsl"
 
 // A sample that is brighter would leave a bright spot for many frames.
@@ -95,6 +96,9 @@ FirstLight storedFirst(uint place) {
 Path beginPath(uvec2 pixel, inout Random random) {
     Path path = cameraPath(cameraDirection(frame.camera, pixel));
     path.spread = frame.camera.pixelSpread;
+    if (usesCache() && isUpdating(pixelPlace(ivec2(pixel)))) {
+        beginUpdates(pixelPlace(ivec2(pixel)));
+    }
     return path;
 }
 
@@ -120,6 +124,19 @@ FirstLight leaveFirst(inout Path path, Surface surface, Bounce bounce, Seen seen
     path.throughput = vec3(any(greaterThan(weight, vec3(0.0))));
     ShadowRay shadow = bounce.shadow;
     return FirstLight(shadow.matte, shadow.light - shadow.matte, bounce.scattered.matte, weight - bounce.scattered.matte);
+}
+
+// Ends a path with the light that the cache knows of a surface. False: it goes on, since it updates the cache or the cache knows too little.
+bool endsInCache(inout Path path, Surface surface, Bsdf bsdf, uint place, Random random) {
+    CacheKey key = cacheKey(surface, cacheRandom(path, random));
+    if (isUpdating(place)) {
+        rememberUpdate(place, key, path, reflectanceOf(bsdf));
+        return false;
+    }
+    vec4 cached = cachedLight(key);
+    bool isKnown = cached.a > 0.0;
+    path.radiance += isKnown ? path.throughput * reflectanceOf(bsdf) * cached.rgb : vec3(0.0);
+    return isKnown;
 }
 
 // Leads a path to the next surface, of which the rasteriser may know the first, and on from there. False: it ends.
@@ -155,7 +172,11 @@ bool advance(inout Path path, uint place, inout Random random) {
             return false;
         }
     }
-    Bounce bounce = bounceAt(path, surface, random);
+    Bsdf bsdf = bsdfOf(surface, -path.direction);
+    if (!isFirst && usesCache() && isCached(path, surface, bsdf) && endsInCache(path, surface, bsdf, place, random)) {
+        return false;
+    }
+    Bounce bounce = bounceAt(path, surface, bsdf, random);
     FirstLight first;
     vec3 light = path.throughput * bounce.shadow.light;
     if (isFirst) {
@@ -174,6 +195,9 @@ bool advance(inout Path path, uint place, inout Random random) {
 }
 
 void endPath(Path path, uint place) {
+    if (usesCache() && isUpdating(place)) {
+        addUpdates(place, path);
+    }
     FirstLight first = storedFirst(place);
     vec3 beyond = radianceOf(path);
     vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;

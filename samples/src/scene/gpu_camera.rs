@@ -47,6 +47,12 @@ impl GpuCamera {
         }
     }
 
+    /// Growth of a pixel's footprint per unit of distance.
+    #[must_use]
+    pub fn pixel_spread(&self) -> f32 {
+        self.pixel_spread
+    }
+
     /// Cameras of the six faces of a cube map that is drawn from `eye`, with `size` pixels a side, in Vulkan's order of faces.
     /// They look at the cube from inside, as samplers do: left and right are those of a mirror.
     pub(crate) fn cube_faces(eye: [f32; 3], size: u32, near_plane: f32) -> [Self; 6] {

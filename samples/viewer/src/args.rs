@@ -6,7 +6,9 @@ use clap::Args;
 use lvk_samples::app::ray_args::RayArgs;
 use lvk_samples::app::value_parsers::{positive, whole};
 
-use crate::config::{Content, CullingMode, Method, PrimaryVisibility, ToneMapping, ViewerConfig};
+use crate::config::{
+    Content, CullingMode, IndirectLight, Method, PrimaryVisibility, ToneMapping, ViewerConfig,
+};
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -66,6 +68,15 @@ pub struct ViewerArgs {
     /// How the hybrid method finds the surfaces that pixels show
     #[arg(long, value_enum, default_value_t = PrimaryVisibility::Rays)]
     pub primary: PrimaryVisibility,
+
+    /// Where the hybrid method takes the light from that surfaces beyond the visible ones scatter
+    #[arg(long, value_enum, default_value_t = IndirectLight::Cache)]
+    pub indirect: IndirectLight,
+
+    /// Entries of the radiance cache of --indirect cache, 1 to 16777216, of 40 bytes each; where they do not suffice, more paths go on
+    #[arg(long, value_name = "N", default_value_t = ViewerConfig::DEFAULT_CACHE_ENTRIES)]
+    #[arg(value_parser = whole(1..=ViewerConfig::MAX_CACHE_ENTRIES))]
+    pub cache_entries: u32,
 
     /// Instances that --primary raster leaves out; the picture is the same
     #[arg(long, value_enum, default_value_t = CullingMode::Auto)]

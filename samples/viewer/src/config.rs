@@ -51,6 +51,16 @@ pub enum Content {
     Steps,
 }
 
+/// Where the hybrid method takes the light from that surfaces beyond the visible ones scatter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum IndirectLight {
+    /// A radiance cache, which a part of the paths updates. It remembers the light of small cells over some frames.
+    #[default]
+    Cache,
+    /// Paths alone, each with all of its surfaces.
+    Paths,
+}
+
 /// How the hybrid method finds the surfaces that pixels show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum PrimaryVisibility {
@@ -104,6 +114,10 @@ pub struct ViewerConfig {
     pub texture_budget: Option<u64>,
     /// How the hybrid method finds the surfaces that pixels show.
     pub primary: PrimaryVisibility,
+    /// Where the hybrid method takes the light from that surfaces beyond the visible ones scatter.
+    pub indirect: IndirectLight,
+    /// Entries of the radiance cache, 1 to [`ViewerConfig::MAX_CACHE_ENTRIES`]. Where they do not suffice, more paths go on.
+    pub cache_entries: u32,
     /// Culling of instances that are rasterised.
     pub culling: CullingMode,
     /// True if each frame adds a pass to those before while nothing moves, as in a window; else each frame has all its samples.
@@ -117,6 +131,10 @@ impl ViewerConfig {
     pub const DEFAULT_SAMPLES: u32 = 64;
     /// Usual largest number of surfaces of a path.
     pub const DEFAULT_BOUNCES: u32 = 32;
+    /// Most entries of the radiance cache.
+    pub const MAX_CACHE_ENTRIES: u32 = 1 << 24;
+    /// Usual number of entries of the radiance cache.
+    pub const DEFAULT_CACHE_ENTRIES: u32 = 1 << 20;
 
     /// A picture of this size by `path`, everything else as usual.
     #[must_use]
@@ -133,6 +151,8 @@ impl ViewerConfig {
             content: Content::default(),
             texture_budget: None,
             primary: PrimaryVisibility::default(),
+            indirect: IndirectLight::default(),
+            cache_entries: Self::DEFAULT_CACHE_ENTRIES,
             culling: CullingMode::default(),
             is_progressive: false,
         }
@@ -141,6 +161,11 @@ impl ViewerConfig {
     /// Width and height.
     pub(crate) fn extent(&self) -> [u32; 2] {
         [self.width, self.height]
+    }
+
+    /// True if frames have a radiance cache.
+    pub(crate) fn caches(&self) -> bool {
+        self.method == Method::Hybrid && self.indirect == IndirectLight::Cache
     }
 
     /// True if frames are rasterised.
@@ -167,6 +192,7 @@ impl ViewerConfig {
         SampleError::check_size(self.extent(), capabilities)?;
         SampleError::check_range("--samples", self.samples, [1, Self::MAX_SAMPLES])?;
         SampleError::check_range("--bounces", self.bounces, [1, u32::MAX - 1])?;
+        SampleError::check_range("--cache-entries", self.cache_entries, [1, Self::MAX_CACHE_ENTRIES])?;
         RayPath::choose(Some(self.path), capabilities)?;
         if self.content == Content::Steps {
             RayPath::choose(Some(RayPath::Query), capabilities)?;

@@ -91,7 +91,7 @@ fn at_once(request: &Request, setup: &mut SampleSetup<'_>) -> Result<ReadySample
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{CullingMode, PrimaryVisibility, ViewerConfig};
+    use crate::config::{CullingMode, IndirectLight, PrimaryVisibility, ViewerConfig};
     use crate::light::SunSetting;
     use lvk_samples::app::cli::{command, parse};
 
@@ -115,6 +115,9 @@ mod tests {
         assert_eq!(parsed("model.glb --exposure -1.5").unwrap().exposure, -1.5);
         assert_eq!(args.culling, CullingMode::default());
         assert_eq!(args.primary, PrimaryVisibility::Rays);
+        assert_eq!(args.indirect, IndirectLight::default());
+        assert_eq!(args.cache_entries, ViewerConfig::DEFAULT_CACHE_ENTRIES);
+        assert_eq!(parsed("--indirect paths").unwrap().indirect, IndirectLight::Paths);
         assert_eq!(parsed("--primary raster").unwrap().primary, PrimaryVisibility::Raster);
         assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
     }
@@ -138,6 +141,8 @@ mod tests {
             "--tone film",
             "--culling everything",
             "--primary guess",
+            "--indirect guess",
+            "--cache-entries 0",
             "a.glb b.glb",
         ] {
             assert_eq!(parsed(line), None, "{line}");

@@ -98,6 +98,8 @@ impl Request {
             tone_mapping: args.tone,
             texture_budget: args.texture_budget.map(|mib| u64::from(mib) << 20),
             primary: args.primary,
+            indirect: args.indirect,
+            cache_entries: args.cache_entries,
             culling: args.culling,
             is_progressive: self.is_for_window,
             ..ViewerConfig::new(path, width, height)

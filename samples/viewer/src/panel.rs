@@ -3,7 +3,9 @@
 use egui::{Color32, RichText};
 use lvk_gltf::Animation;
 
-use crate::config::{Content, CullingMode, Method, PrimaryVisibility, ToneMapping, ViewerConfig};
+use crate::config::{
+    Content, CullingMode, IndirectLight, Method, PrimaryVisibility, ToneMapping, ViewerConfig,
+};
 use crate::gpu::{DrawnInstances, TextureMemory};
 use crate::model::ModelCamera;
 
@@ -105,6 +107,11 @@ pub(crate) fn show_settings(ui: &mut egui::Ui, config: &mut ViewerConfig) {
             ui.label("primary visibility");
             ui.selectable_value(&mut config.primary, PrimaryVisibility::Rays, "rays");
             ui.selectable_value(&mut config.primary, PrimaryVisibility::Raster, "raster");
+        });
+        ui.horizontal(|ui| {
+            ui.label("indirect light");
+            ui.selectable_value(&mut config.indirect, IndirectLight::Cache, "cache");
+            ui.selectable_value(&mut config.indirect, IndirectLight::Paths, "paths");
         });
     }
     if config.rasterises() {

@@ -19,6 +19,8 @@ const GROUP: u32 = 8;
 /// invocations at work; on a CPU each costs more.
 const GPU_STEPS: &[u32] = &[1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 4, 4];
 const CPU_STEPS: &[u32] = &[2, 2, 4, 4];
+/// The same with a radiance cache, where most paths end at their second surface.
+const GPU_CACHE_STEPS: &[u32] = &[1, 1, 1, 2, 4];
 /// Bytes of a path between launches.
 const PATH_BYTES: u64 = size_of::<GpuStoredPath>() as u64;
 /// Bytes before the lists of paths (`kListHead` in `shaders/viewer/path_launch.glsl`).
@@ -71,7 +73,11 @@ impl PathPass {
         let [width, height] = config.extent();
         let size_bytes = list_bytes(config.extent()) + PATH_BYTES * u64::from(width) * u64::from(height);
         let paths = buffer(ctx, "paths", size_bytes)?;
-        let steps = if ctx.capabilities().is_cpu { CPU_STEPS } else { GPU_STEPS };
+        let steps = match ctx.capabilities().is_cpu {
+            true => CPU_STEPS,
+            false if config.caches() => GPU_CACHE_STEPS,
+            false => GPU_STEPS,
+        };
         Ok(Self { pipeline, paths, extent: config.extent(), steps })
     }
 
@@ -85,7 +91,7 @@ impl PathPass {
         &self,
         cmd: &mut CommandBuffer,
         work: PathWork,
-        own: BufferHandle,
+        own: &[BufferHandle],
         (visible, scene): (&[TextureHandle], FrameScene<'_>),
     ) -> lvk::Result<()> {
         let mut buffers = scene.buffers(own);

@@ -38,6 +38,7 @@ pub(crate) const TEMPORAL: SampleStage = stage!("temporal.comp");
 pub(crate) const FILTER: SampleStage = stage!("filter.comp");
 pub(crate) const COMPOSITE: SampleStage = stage!("composite.comp");
 pub(crate) const ANTIALIAS: SampleStage = stage!("antialias.comp");
+pub(crate) const RADIANCE_CACHE: SampleStage = stage!("radiance_cache.comp");
 pub(crate) const STEPS: SampleStage = stage!("steps.comp");
 pub(crate) const PRESENT: SampleStage = stage!("present.comp");
 
@@ -57,6 +58,7 @@ pub(crate) fn pipelines() -> Vec<SamplePipeline> {
         ),
         SamplePipeline::new("viewer: light by pipeline", &[LIGHT.rays, NEAREST_MISS, NEAREST_HIT, CANDIDATE]),
         SamplePipeline::new("viewer: light by query", &[LIGHT.query]),
+        SamplePipeline::new("viewer: radiance cache", &[RADIANCE_CACHE]),
         SamplePipeline::new("viewer: means over time", &[TEMPORAL]),
         SamplePipeline::new("viewer: filter", &[FILTER]),
         SamplePipeline::new("viewer: composite", &[COMPOSITE]),

@@ -7,7 +7,7 @@ use lvk_samples::app::frame::Frame;
 use crate::config::{Method, ViewerConfig};
 use crate::gpu::FrameScene;
 use crate::gpu::layout::VisibilityConstants;
-use crate::hybrid::Hybrid;
+use crate::hybrid::{CacheConstants, Hybrid};
 use crate::path_pass::{PathAddresses, PathPass, PathWork};
 use crate::pipelines::PATHS;
 
@@ -23,6 +23,7 @@ pub(crate) struct Addresses {
     pub(crate) planes: u64,
     pub(crate) paths: PathAddresses,
     pub(crate) visibility: VisibilityConstants,
+    pub(crate) cache: CacheConstants,
 }
 
 impl Renderer {
@@ -45,10 +46,12 @@ impl Renderer {
                 planes: hybrid.planes_address()?,
                 paths: hybrid.path_addresses()?,
                 visibility: hybrid.visibility()?,
+                cache: hybrid.cache()?,
             },
             Self::PathTrace { paths, sums } => {
                 let (sums, paths) = (sums.address()?, paths.addresses()?);
-                Addresses { sums, planes: sums, paths, visibility: VisibilityConstants::NONE }
+                let visibility = VisibilityConstants::NONE;
+                Addresses { sums, planes: sums, paths, visibility, cache: CacheConstants::NONE }
             }
         })
     }
@@ -69,17 +72,18 @@ impl Renderer {
         }
     }
 
-    /// Records a frame, or samples of the path tracer.
+    /// Records a frame, or samples of the path tracer. `is_first`: the real-time method knows no frame before.
     pub(crate) fn record(
         &self,
         to: &mut Frame<'_>,
         work: PathWork,
         scene: FrameScene<'_>,
+        is_first: bool,
     ) -> lvk::Result<()> {
         match self {
-            Self::Hybrid(hybrid) => hybrid.record(to, work, scene),
+            Self::Hybrid(hybrid) => hybrid.record(to, work, scene, is_first),
             Self::PathTrace { paths, sums } => {
-                to.pass("paths", |cmd| paths.record(cmd, work, **sums, (&[], scene)))
+                to.pass("paths", |cmd| paths.record(cmd, work, &[**sums], (&[], scene)))
             }
         }
     }

@@ -12,6 +12,7 @@ use crate::config::{Content, Method, ViewerConfig};
 use crate::dropped::DroppedFile;
 use crate::gpu::layout::{FrameConstants, Push};
 use crate::gpu::{DrawnCounts, DrawnInstances, FrameScene, GpuScene, TextureMemory};
+use crate::hybrid::cell_share;
 use crate::light::Environment;
 use crate::model::{self, ModelCamera};
 use crate::path_pass::PathWork;
@@ -237,6 +238,8 @@ impl Viewer {
         let needs_others = config.method != before.method
             || config.path != before.path
             || config.rasterises() != before.rasterises()
+            || config.caches() != before.caches()
+            || config.cache_entries != before.cache_entries
             || counts_steps(config) != counts_steps(before);
         let occludes = config.occludes(self.counts().1);
         if is_resized || needs_others {
@@ -342,11 +345,14 @@ impl Viewer {
             planes: addresses.planes,
             path_lists: addresses.paths.lists,
             paths: addresses.paths.paths,
+            cache: addresses.cache.addresses,
             wanted_mips: self.scene.wanted_mips().map_or(Ok(0), |buffer| self.ctx.buffer_address(buffer))?,
             still_count: if self.camera == self.before { self.done } else { 0 },
             view: content as u32,
             scene_moves: u32::from(self.scene.moves()),
             emission: self.scene.emission(),
+            cache_buckets: addresses.cache.bucket_count,
+            cell_share: cell_share(seen.pixel_spread()),
         })
     }
 
@@ -366,7 +372,7 @@ impl Viewer {
             wanted_mips: self.scene.wanted_mips(),
         };
         let work = PathWork { frame: constants, samples: count, bounces: self.config.bounces };
-        self.renderer.record(frame, work, scene)?;
+        self.renderer.record(frame, work, scene, self.is_first())?;
         self.done += count;
         if is_shown {
             let push = Push { frame: constants, argument: self.summed_samples(), _padding: 0 };

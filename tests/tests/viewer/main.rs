@@ -16,6 +16,7 @@ mod layers;
 mod moving_model;
 mod occlusion;
 mod paths;
+mod radiance_cache;
 mod reference;
 mod reference_tracer;
 mod sample_models;

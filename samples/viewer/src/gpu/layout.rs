@@ -7,6 +7,9 @@ use lvk_samples::scene::GpuCamera;
 /// Index of a texture slot that is not there (`kNoTexture`).
 pub(crate) const NO_TEXTURE: u32 = u32::MAX;
 
+/// Surfaces of a path at most that update the radiance cache (`kMostUpdates`).
+const MOST_UPDATES: usize = 4;
+
 /// Bit of `Geometry.flags`: positions are `Snorm16x4`.
 pub(crate) const QUANTISED: u32 = 1;
 
@@ -187,6 +190,42 @@ lvk::shader_struct! {
         pub(crate) pair: u32,
     }
 
+    /// `CacheCell`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuCacheCell {
+        pub(crate) mean: [f32; 3],
+        pub(crate) samples: f32,
+        pub(crate) idle: u32,
+    }
+
+    /// `CacheUpdate`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuCacheUpdate {
+        pub(crate) entry: u32,
+        pub(crate) light: [f32; 3],
+        pub(crate) factor: [f32; 3],
+    }
+
+    /// `UpdatingPath`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct GpuUpdatingPath {
+        pub(crate) count: u32,
+        pub(crate) updates: [GpuCacheUpdate; MOST_UPDATES],
+    }
+
+    /// `Frame`: addresses of the radiance cache.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct CacheAddresses {
+        pub(crate) keys as cacheKeys: u64,
+        pub(crate) sums as cacheSums: u64,
+        pub(crate) cells as cacheCells: u64,
+        pub(crate) updating_paths: u64,
+    }
+
     /// `Frame`: what culling reads and writes.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
@@ -275,11 +314,14 @@ lvk::shader_struct! {
         pub(crate) planes: u64,
         pub(crate) path_lists: u64,
         pub(crate) paths: u64,
+        pub(crate) cache: CacheAddresses,
         pub(crate) wanted_mips: u64,
         pub(crate) still_count: u32,
         pub(crate) view: u32,
         pub(crate) scene_moves: u32,
         pub(crate) emission: EmissionConstants,
+        pub(crate) cache_buckets: u32,
+        pub(crate) cell_share: f32,
     }
 
     /// `PushConstants`.
@@ -327,6 +369,12 @@ impl VisibilityConstants {
 /// Value of `DrawPush::first_visible` without culling.
 pub(crate) const ALL_INSTANCES: u32 = u32::MAX;
 
+/// Layouts that the pipeline of the radiance cache compares with its shader.
+pub(crate) const CACHE_LAYOUTS: &[BlockLayout] = &[
+    BlockLayout::buffer_reference::<FrameConstants>("Frame"),
+    BlockLayout::buffer_reference::<GpuCacheCell>("CellArray"),
+];
+
 /// The layout that pipelines compare with their shaders which read the frame alone.
 pub(crate) const FRAME_LAYOUT: &[BlockLayout] = &[BlockLayout::buffer_reference::<FrameConstants>("Frame")];
 
@@ -348,4 +396,6 @@ pub(crate) const SCENE_LAYOUTS: &[BlockLayout] = &[
     BlockLayout::buffer_reference::<GpuLight>("LightArray"),
     BlockLayout::buffer_reference::<GpuEmitter>("EmitterArray"),
     BlockLayout::buffer_reference::<GpuStoredPath>("StoredPathArray"),
+    BlockLayout::buffer_reference::<GpuCacheCell>("CellArray"),
+    BlockLayout::buffer_reference::<GpuUpdatingPath>("UpdatingPathArray"),
 ];

@@ -35,7 +35,7 @@ pub(crate) struct FrameScene<'a> {
 
 impl FrameScene<'_> {
     /// Buffers that a pass writes which reads textures and writes `own`.
-    pub(crate) fn buffers(&self, own: lvk::BufferHandle) -> Vec<lvk::BufferHandle> {
-        [Some(own), self.wanted_mips].into_iter().flatten().collect()
+    pub(crate) fn buffers(&self, own: &[lvk::BufferHandle]) -> Vec<lvk::BufferHandle> {
+        own.iter().copied().chain(self.wanted_mips).collect()
     }
 }

@@ -2,6 +2,7 @@
 
 mod depth_pyramid;
 mod passes;
+mod radiance_cache;
 mod visibility;
 
 use lvk::{BufferHandle, Context, Holder};
@@ -13,6 +14,8 @@ use crate::gpu::FrameScene;
 use crate::gpu::layout::{Push, VisibilityConstants};
 use crate::path_pass::{PathAddresses, PathWork};
 use passes::Passes;
+use radiance_cache::RadianceCache;
+pub(crate) use radiance_cache::{CacheConstants, cell_share};
 use visibility::Visibility;
 pub(crate) use visibility::{DEPTH_FORMAT, TRIANGLE_FORMAT};
 
@@ -28,6 +31,8 @@ pub(crate) struct Hybrid {
     /// The rasteriser; rays find the surfaces where there is none.
     visibility: Option<Visibility>,
     passes: Passes,
+    /// The light where paths end; they go on to their own end where there is none.
+    cache: Option<RadianceCache>,
     planes: Holder<BufferHandle>,
     extent: [u32; 2],
 }
@@ -44,6 +49,7 @@ impl Hybrid {
         Ok(Self {
             visibility,
             passes: Passes::new(ctx, config)?,
+            cache: config.caches().then(|| RadianceCache::new(ctx, config)).transpose()?,
             planes: buffer(ctx, "planes", size_bytes)?,
             extent,
         })
@@ -79,17 +85,23 @@ impl Hybrid {
         self.visibility.as_ref().map_or(Ok(VisibilityConstants::NONE), Visibility::constants)
     }
 
+    /// What a frame's constants say of the radiance cache.
+    pub(crate) fn cache(&self) -> lvk::Result<CacheConstants> {
+        self.cache.as_ref().map_or(Ok(CacheConstants::NONE), RadianceCache::constants)
+    }
+
     /// Leaves out what others hide, or no longer.
     pub(crate) fn set_occlusion(&mut self, ctx: &Context, is_on: bool) -> lvk::Result<()> {
         self.visibility.as_mut().map_or(Ok(()), |visibility| visibility.set_occlusion(ctx, is_on))
     }
 
-    /// Records a frame.
+    /// Records a frame. `is_first`: it knows none before.
     pub(crate) fn record(
         &self,
         to: &mut Frame<'_>,
         work: PathWork,
         scene: FrameScene<'_>,
+        is_first: bool,
     ) -> lvk::Result<()> {
         let frame = work.frame;
         let push = |argument| Push { frame, argument, _padding: 0 };
@@ -99,7 +111,17 @@ impl Hybrid {
             visible = visibility.textures();
         }
         let planes = *self.planes;
-        to.pass("light", |cmd| self.passes.light().record(cmd, work, planes, (&visible, scene)))?;
+        let mut own = vec![planes];
+        if let Some(cache) = &self.cache {
+            own.push(cache.table());
+            if is_first {
+                to.pass("cache", |cmd| cache.clear(cmd))?;
+            }
+        }
+        to.pass("light", |cmd| self.passes.light().record(cmd, work, &own, (&visible, scene)))?;
+        if let Some(cache) = &self.cache {
+            to.pass("cache", |cmd| cache.record(cmd, &push(0)))?;
+        }
         to.pass("filters", |cmd| self.passes.record_filters(cmd, push, planes, self.extent))?;
         match self.passes.counts_steps() {
             true => {

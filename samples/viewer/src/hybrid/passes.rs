@@ -59,7 +59,7 @@ impl Passes {
         cmd.bind_compute_pipeline(**steps)?;
         cmd.push_constants(push)?;
         let dependencies = Dependencies {
-            buffers: &scene.buffers(planes),
+            buffers: &scene.buffers(&[planes]),
             read_buffers: scene.written,
             ..Dependencies::default()
         };
