@@ -70,7 +70,7 @@ pub struct ViewerArgs {
     pub primary: PrimaryVisibility,
 
     /// Where the hybrid method takes the light from that surfaces beyond the visible ones scatter
-    #[arg(long, value_enum, default_value_t = IndirectLight::Cache)]
+    #[arg(long, value_enum, default_value_t = IndirectLight::default())]
     pub indirect: IndirectLight,
 
     /// Entries of the radiance cache of --indirect cache, 1 to 16777216, of 40 bytes each; where they do not suffice, more paths go on

@@ -55,9 +55,9 @@ pub enum Content {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum IndirectLight {
     /// A radiance cache, which a part of the paths updates. It remembers the light of small cells over some frames.
-    #[default]
     Cache,
     /// Paths alone, each with all of its surfaces.
+    #[default]
     Paths,
 }
 

@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(args.primary, PrimaryVisibility::Rays);
         assert_eq!(args.indirect, IndirectLight::default());
         assert_eq!(args.cache_entries, ViewerConfig::DEFAULT_CACHE_ENTRIES);
-        assert_eq!(parsed("--indirect paths").unwrap().indirect, IndirectLight::Paths);
+        assert_eq!(parsed("--indirect cache").unwrap().indirect, IndirectLight::Cache);
         assert_eq!(parsed("--primary raster").unwrap().primary, PrimaryVisibility::Raster);
         assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
     }
