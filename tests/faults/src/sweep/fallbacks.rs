@@ -42,6 +42,7 @@ pub const FALLBACKS: &[Fallback] = &[
     fallback("vkCreateAccelerationStructureKHR", &[DeviceMemory], CallsAgain),
     fallback("vkQueueWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], DoesWithout),
     fallback("vkDeviceWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], DoesWithout),
+    fallback("vkGetSemaphoreCounterValue", &[HostMemory, DeviceMemory], CallsAgain),
     fallback("vkSetDebugUtilsObjectNameEXT", &[HostMemory, DeviceMemory], DoesWithout),
     fallback("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfaceCapabilities2KHR", &[SurfaceLost], CallsAgain),

@@ -133,6 +133,7 @@ impl<'a> Demotion<'a> {
                 }
             };
             out.push(Inst::new(Op::Load, &[ty, copy, variable]));
+            self.linker.copy_value_decorations(&HashMap::from([(id, copy)]));
         } else {
             let repeats = matches!(
                 definition.op,
@@ -160,8 +161,8 @@ impl<'a> Demotion<'a> {
             });
             again.set_result(copy);
             out.push(again);
+            self.linker.copy_decorations(&HashMap::from([(id, copy)]));
         }
-        self.linker.copy_decorations(&HashMap::from([(id, copy)]));
         if self.linker.module.wide.contains(&id) {
             self.linker.module.wide.insert(copy);
         }

@@ -1,12 +1,12 @@
 //! Inlines functions into their callers.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use ::spirv::Op;
 
 use super::demote::declare_variable;
 use super::instruction::{Inst, for_each_id};
-use super::linker::Linker;
+use super::linker::{IdMap, Linker};
 use super::loop_headers::{can_leave_header, leave_loop_header};
 use super::module::{Block, Function};
 
@@ -100,26 +100,26 @@ fn declare_result(linker: &mut Linker, function: &mut Function, call: &Inst) -> 
 
 /// Gives the callee new ids, and the arguments in place of its parameters.
 fn rename_ids(linker: &mut Linker, callee: &mut Function, call: &Inst) {
-    let mut ids: HashMap<u32, u32> = HashMap::new();
-    for (parameter, argument) in callee.parameters.iter().zip(&call.operands[3..]) {
-        ids.insert(parameter.operand(1), *argument);
-    }
+    let parameters = callee.parameters.iter().map(|parameter| parameter.operand(1));
+    let arguments: IdMap = parameters.zip(call.operands[3..].iter().copied()).collect();
+    let mut copies = IdMap::new();
     for block in &callee.blocks {
         for id in block.code.iter().filter_map(Inst::result).chain([block.label]) {
-            ids.insert(id, linker.new_id());
+            copies.insert(id, linker.new_id());
         }
     }
     let wide = &linker.module.wide;
-    let renamed = |id: u32| ids.get(&id).copied().unwrap_or(id);
+    let renamed = |id: u32| copies.get(&id).or_else(|| arguments.get(&id)).copied().unwrap_or(id);
     for block in &mut callee.blocks {
         block.label = renamed(block.label);
         for inst in &mut block.code {
             let _ = for_each_id(inst, wide, |id| *id = renamed(*id));
         }
     }
-    let wide: Vec<u32> = wide.iter().filter_map(|id| ids.get(id)).copied().collect();
+    let wide: Vec<u32> = wide.iter().filter_map(|id| copies.get(id)).copied().collect();
     linker.module.wide.extend(wide);
-    linker.copy_decorations(&ids);
+    linker.copy_decorations(&copies);
+    linker.copy_parameter_decorations(&arguments);
 }
 
 /// Moves the variables of the callee to the start of the caller. Where the call was, they become undefined: nothing that an earlier

@@ -336,18 +336,6 @@ impl Linker {
         id
     }
 
-    /// Gives copies of values the decorations of the originals.
-    pub(super) fn copy_decorations(&mut self, copies: &IdMap) {
-        let copied = self.module.decorations.iter().filter_map(|inst| {
-            let copy = copies.get(&inst.operand(0))?;
-            let mut inst = inst.clone();
-            inst.operands[0] = *copy;
-            Some(inst)
-        });
-        let copied: Vec<Inst> = copied.collect();
-        self.module.decorations.extend(copied);
-    }
-
     /// True for a pointer to a buffer, or an array of them.
     fn holds_buffer_pointers(&self, ty: u32) -> bool {
         self.is_buffer_pointer(self.innermost_element(ty))

@@ -7,6 +7,7 @@ mod block_pointers;
 mod calls;
 mod constants;
 mod control_flow;
+mod decorations;
 mod demote;
 mod donor;
 mod emit;

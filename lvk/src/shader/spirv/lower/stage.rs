@@ -165,7 +165,7 @@ struct Entry {
     interface: Option<HashSet<u32>>,
 }
 
-/// Takes the entry points and their modes out, with the functions that only others call, and returns that of the stage.
+/// Takes the entry points and their modes out, with the functions that its own does not reach, and returns that of the stage.
 fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<Entry, String> {
     let model = match stage {
         ShaderStage::RayGen => ExecutionModel::RayGenerationKHR,
@@ -183,10 +183,10 @@ fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<Entry, String> 
     };
     let entry = entries.iter().find(is_main).ok_or("there is no entry point 'main' of the stage")?;
     let function = entry.operand(1);
+    keep_called(module, function);
     if entries.len() == 1 {
         return Ok(Entry { function, interface: None });
     }
-    keep_called(module, function);
     let interface = entry.operands.get(4..).unwrap_or(&[]).iter().copied().collect();
     Ok(Entry { function, interface: Some(interface) })
 }

@@ -477,3 +477,56 @@ fn every_id_is_defined_once_where_calls_are_replaced_in_place() {
         }
     }
 }
+
+/// Decorations of memory belong to variables and parameters, and those of arithmetic to what computes a value.
+#[test]
+fn qualifiers_of_parameters_are_not_those_of_arguments() {
+    use ::spirv::{Decoration, Op};
+
+    const OF_MEMORY: [Decoration; 6] = [
+        Decoration::Aliased,
+        Decoration::Restrict,
+        Decoration::Volatile,
+        Decoration::Coherent,
+        Decoration::NonWritable,
+        Decoration::NonReadable,
+    ];
+    const RAY_GEN: &str = "
+        layout(location = 0) rayPayloadEXT vec3 color;
+        layout(buffer_reference, scalar) readonly buffer Lights { vec4 at[]; };
+        layout(push_constant, scalar) uniform Push { Lights lights; uint tlas; uint image; float size; };
+        void shade(const Lights given, writeonly image2D target, const mediump float size) {
+            traceRayEXT(kTLAS[tlas], 0, 0xFF, 0, 1, 0, given.at[0].xyz, 0.0, vec3(0, 0, size), 100.0, 0);
+            imageStore(target, ivec2(gl_LaunchIDEXT.xy), vec4(color, given.at[1].x));
+        }
+        void main() {
+            float wide = size * 1.5;
+            shade(lights, kImages2D[image], wide);
+            shade(lights, kImages2D[image + 1], wide);
+            shade(lights, kImages2D[image + 2], wide);
+            imageStore(kImages2D[image], ivec2(0), vec4(wide));
+        }";
+    for words in lowered_ray_gen(RAY_GEN) {
+        let words = words.unwrap();
+        let code: Vec<_> = crate::shader::spirv::words::instructions(&words).map(Result::unwrap).collect();
+        let defining = |id: u32| {
+            let is_it =
+                |op: Op| code.iter().any(|inst| inst.op == Some(op) && inst.words.get(2) == Some(&id));
+            [Op::Variable, Op::FunctionParameter].into_iter().any(is_it)
+        };
+        let decorated = |kinds: &[Decoration]| -> Vec<u32> {
+            let is_one = |word: u32| kinds.iter().any(|kind| word == *kind as u32);
+            let decorations =
+                code.iter().filter(|inst| inst.op == Some(Op::Decorate) && is_one(inst.operand(1)));
+            decorations.map(|inst| inst.operand(0)).collect()
+        };
+        for id in decorated(&OF_MEMORY) {
+            assert!(defining(id), "%{id} is neither a variable nor a parameter");
+        }
+        let products =
+            code.iter().filter(|inst| inst.op == Some(Op::FMul)).filter_map(|inst| inst.words.get(2));
+        let precise: Vec<u32> = products.copied().collect();
+        let relaxed = decorated(&[Decoration::RelaxedPrecision]);
+        assert!(!precise.is_empty() && precise.iter().all(|id| !relaxed.contains(id)), "{relaxed:?}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Rewrites the instructions that trace rays and call callable shaders.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use ::spirv::Op;
 
@@ -153,14 +153,19 @@ fn store_as(
     emitter.store(variable, value);
 }
 
-/// Removes the handles of acceleration structures that only the traces used.
+/// Removes the handles of acceleration structures that only the traces used. Those that a call passes on stay.
 fn remove_structures(linker: &Linker, function: &mut Function) {
     let is_structure = |ty: u32| {
         let inner = linker.pointer(ty).map_or(ty, |(_, target)| target);
         linker.global(inner).is_some_and(|inst| inst.op == Op::TypeAccelerationStructureKHR)
     };
     let is_query = |inst: &Inst| inst.op == Op::RayQueryInitializeKHR;
-    if function.code().any(is_query) {
+    let of_structures = function.code().filter(|inst| inst.result_type().is_some_and(is_structure));
+    let structures: HashSet<u32> = of_structures.filter_map(Inst::result).collect();
+    let passes = |inst: &Inst| {
+        inst.op == Op::FunctionCall && inst.operands[3..].iter().any(|id| structures.contains(id))
+    };
+    if function.code().any(|inst| is_query(inst) || passes(inst)) {
         return;
     }
     for block in &mut function.blocks {
