@@ -54,15 +54,20 @@ impl Counts {
     }
 }
 
-/// Push constants of [`ray_gen`].
+/// Push constants of [`ray_gen`], and of other shaders that trace to each hit group and miss shader.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::NoUninit)]
-struct Push {
-    results: u64,
-    tlas: u32,
-    hits: u32,
-    misses: u32,
-    pad: u32,
+pub struct Push {
+    /// Address of the results.
+    pub results: u64,
+    /// Index of the TLAS.
+    pub tlas: u32,
+    /// Number of hit groups.
+    pub hits: u32,
+    /// Number of miss shaders.
+    pub misses: u32,
+    /// Padding, 0.
+    pub pad: u32,
 }
 
 /// One triangle for each hit group, and the buffer of results.

@@ -5,6 +5,7 @@ use lvk::{
     Aabbs, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, CommandBuffer, Context,
     GeometryFlags, Holder, Result, TlasDesc, TlasInstance, Triangles, transform_rows,
 };
+use lvk_tests::shader_groups::Push;
 
 use super::program::MOST_HITS;
 
@@ -76,15 +77,4 @@ impl Scene {
         let [hits, misses] = counts.map(|count| count as u32);
         cmd.push_constants(&Push { results, tlas: self.tlas.index(), hits, misses, pad: 0 })
     }
-}
-
-/// Push constants of the shaders.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::NoUninit)]
-struct Push {
-    results: u64,
-    tlas: u32,
-    hits: u32,
-    misses: u32,
-    pad: u32,
 }
