@@ -3,14 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::plan::SweepPlan;
 use super::run::{Caches, LayerFolder, Program, run};
-use super::verdict::{Ending, Flaw, flaws, leaks_on_purpose};
-use crate::fault::Fault;
+use super::verdict::{Ending, Flaw, RunOutcome, flaws, leaks_on_purpose};
+use crate::fault::{Fault, PROGRESS};
 
 /// Environment variable with the number of processes at the same time.
 pub const JOBS_VARIABLE: &str = "LVK_FAULT_JOBS";
@@ -48,6 +49,9 @@ pub struct SweepReport {
     pub runs: usize,
     /// Runs in which the fault was reached.
     pub reached: usize,
+    /// Faults that no run reached. Those in questions about the progress of work do not count: how often a program asks depends
+    /// on the speed of the device.
+    pub missed: usize,
     /// Runs in which the fault was reached, and that ended with an error.
     pub refused: usize,
     /// Runs in which the fault was reached, and that ended with success.
@@ -70,6 +74,7 @@ impl fmt::Display for SweepReport {
             planned,
             runs,
             reached,
+            missed,
             refused,
             succeeded,
             succeeded_by,
@@ -79,8 +84,8 @@ impl fmt::Display for SweepReport {
         } = self;
         write!(
             out,
-            "{calls} calls of {commands} commands, {runs} of {planned} faults, {reached} reached, {refused} errors, \
-             {succeeded} successes, {leaked} contexts leaked, {} flawed, {} s",
+            "{calls} calls of {commands} commands, {runs} of {planned} faults, {reached} reached, {missed} missed, \
+             {refused} errors, {succeeded} successes, {leaked} contexts leaked, {} flawed, {} s",
             flawed.len(),
             time.as_secs()
         )?;
@@ -108,9 +113,10 @@ impl SweepReport {
         )
     }
 
-    fn add(&mut self, fault: &Fault, outcome: &super::verdict::RunOutcome, flaws: Vec<Flaw>) {
+    fn add(&mut self, fault: &Fault, outcome: &RunOutcome, flaws: Vec<Flaw>) {
         self.runs += 1;
         self.reached += usize::from(outcome.reached);
+        self.missed += usize::from(!outcome.reached && fault.command != PROGRESS);
         match outcome.ending {
             Ending::Status(0) if outcome.reached => {
                 self.succeeded += 1;
@@ -124,6 +130,29 @@ impl SweepReport {
         if !flaws.is_empty() {
             let stderr = last_lines(&outcome.stderr);
             self.flawed.push(FlawedRun { fault: Some(fault.clone()), flaws, stderr });
+        }
+    }
+}
+
+/// Runs a program with a fault, again where the fault was not reached: threads and the speed of the device change the number of calls
+/// from run to run. Returns what the last run came to, and its flaws.
+///
+/// # Errors
+/// Those of files and processes.
+pub fn run_until_reached(
+    program: &Program,
+    layer: &LayerFolder,
+    caches: &Path,
+    fault: &Fault,
+    clean: &RunOutcome,
+) -> io::Result<(RunOutcome, Vec<Flaw>)> {
+    let mut tries = 0;
+    loop {
+        let (outcome, _) = run(program, layer, caches, Some(fault))?;
+        let flaws_found = flaws(Some(fault), &outcome, clean);
+        tries += 1;
+        if outcome.reached || !flaws_found.is_empty() || tries == TRIES {
+            return Ok((outcome, flaws_found));
         }
     }
 }
@@ -165,16 +194,7 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
             if start.elapsed() > budget {
                 break;
             }
-            let (mut outcome, _) = run(program, &layer, found_caches, Some(fault))?;
-            let mut flaws_found = flaws(Some(fault), &outcome, &clean);
-            // Threads change the number of calls from run to run.
-            for _ in 1..TRIES {
-                if outcome.reached || !flaws_found.is_empty() {
-                    break;
-                }
-                (outcome, _) = run(program, &layer, found_caches, Some(fault))?;
-                flaws_found = flaws(Some(fault), &outcome, &clean);
-            }
+            let (outcome, flaws_found) = run_until_reached(program, &layer, found_caches, fault, &clean)?;
             report.lock().unwrap_or_else(PoisonError::into_inner).add(fault, &outcome, flaws_found);
         }
         Ok(())
@@ -208,6 +228,7 @@ mod tests {
             planned: 430,
             runs: 420,
             reached: 410,
+            missed: 0,
             refused: 400,
             succeeded: 10,
             succeeded_by: BTreeMap::new(),

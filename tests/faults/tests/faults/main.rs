@@ -1,0 +1,100 @@
+//! Calls of the samples and of scenarios fail: each run ends with the right result or with an error, and leaves nothing.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+mod losses;
+mod sampled;
+mod told;
+mod whole;
+
+use std::path::PathBuf;
+
+use lvk::{Context, ContextDesc};
+use lvk_dev_driver::{DriverRequest, VirtualDisplay, prepare, virtual_display};
+use lvk_faults::sweep::plan::SweepPlan;
+use lvk_faults::sweep::run::{Caches, LayerFolder, Program, run};
+use lvk_faults::sweep::verdict::{RunOutcome, flaws};
+use x11rb::rust_connection::RustConnection;
+
+/// A scene of six triangles: a floor, a mirror behind and a pane of glass before it.
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scene.obj");
+
+fn program(line: &str) -> Program {
+    let args = line.split_whitespace().map(|word| word.replace("SCENE", SCENE)).collect();
+    let path = PathBuf::from(env!("CARGO_BIN_EXE_fault_scenarios"));
+    Program { path, args, variables: Vec::new(), caches: Caches::Warm, tries_again: true }
+}
+
+/// Returns a program with the validation layer: samples have an argument for it, scenarios a variable.
+fn validated(line: &str) -> Program {
+    let mut program = program(line);
+    match line.contains("--frames") {
+        true => program.args.push("--validate".to_owned()),
+        false => program.variables.push(("LVK_FAULT_VALIDATE".to_owned(), "1".to_owned())),
+    }
+    program
+}
+
+/// True for programs whose number of calls differs from run to run, by the order of threads or the time of a window, so that a
+/// few faults are not reached.
+fn varies(line: &str) -> bool {
+    ["threads", "window"].iter().any(|start| line.starts_with(start))
+}
+
+/// True if the device draws to windows of an X server without a screen. NVIDIA's driver (580.159.04) makes no swapchain there.
+fn draws_to_virtual_displays() -> bool {
+    let driver = prepare(&DriverRequest::default()).unwrap();
+    let desc = ContextDesc { vulkan_library: driver.loader.as_deref(), ..ContextDesc::default() };
+    let draws = Context::new(&desc).unwrap().capabilities().driver_name != "NVIDIA";
+    if !draws {
+        eprintln!("NOT TESTED, NVIDIA's driver does not draw to an X server without a screen");
+    }
+    draws
+}
+
+/// Returns the scenario in a window, the X server that shows it, and a connection: without one the server ends with the first
+/// program.
+fn in_window() -> Option<(RustConnection, VirtualDisplay, Program)> {
+    if !draws_to_virtual_displays() {
+        return None;
+    }
+    let display = match virtual_display() {
+        Ok(display) => display,
+        Err(error) => {
+            assert!(std::env::var_os("LVK_REQUIRE_GPU").is_none(), "{error}");
+            eprintln!("SKIPPED, no X server for windows: {error}");
+            return None;
+        }
+    };
+    let variables = vec![("DISPLAY".to_owned(), display.name().to_owned())];
+    let (connection, _) = RustConnection::connect(Some(display.name())).unwrap();
+    Some((connection, display, Program { variables, ..program("window") }))
+}
+
+/// Samples in a window.
+const WINDOWED: [&str; 3] = [
+    "windowed hybrid --rt software --scene SCENE",
+    "windowed hello_triangle",
+    "windowed viewer SCENE --rt query --samples 2",
+];
+
+/// Some of the faults of the whole sweeps, spread evenly.
+fn some(most: usize) -> SweepPlan {
+    SweepPlan { most, ..SweepPlan::full() }
+}
+
+/// Asserts that a fault is reached, and has no flaws. Returns what was found with the fault, and without.
+fn assert_told(program: &Program, fault: &str) -> [RunOutcome; 2] {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (clean, _) = run(program, &layer, caches.path(), None).unwrap();
+    let parsed = fault.parse().unwrap();
+    let (outcome, _) = run(program, &layer, caches.path(), Some(&parsed)).unwrap();
+    assert!(outcome.reached, "{fault}");
+    assert_eq!(flaws(Some(&parsed), &outcome, &clean), [], "{fault}: {}", outcome.stderr);
+    [outcome, clean]
+}
+
+/// Returns the error of a run.
+fn error_line(outcome: &RunOutcome) -> &str {
+    outcome.stderr.lines().find(|line| line.starts_with("error: ")).unwrap_or_default()
+}

@@ -1,0 +1,60 @@
+//! Some faults of some programs, spread evenly: a sample of the whole sweeps.
+
+use std::time::Duration;
+
+use lvk_faults::fault::FaultError;
+use lvk_faults::sweep::plan::SweepPlan;
+use lvk_faults::sweep::report::sweep;
+use lvk_faults::sweep::run::{Caches, Program};
+
+use crate::{WINDOWED, in_window, program, some, validated};
+
+/// Time of a sweep.
+const SAMPLE: Duration = Duration::from_secs(40);
+/// Faults that a sweep reaches in that time at the least, on slow machines too.
+const LEAST: usize = 5;
+
+fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Duration) {
+    let report = sweep(program, plan, budget).unwrap();
+    println!("{line}: {report}");
+    assert!(report.flawed.is_empty() && report.reached >= LEAST, "{line}: {report}");
+}
+
+#[test]
+fn some_calls_of_the_hybrid_sample_fail() {
+    let line = "hybrid --width 64 --height 36 --frames 1 --rt hardware --scene SCENE";
+    assert_no_flaws(line, &program(line), &some(30), SAMPLE);
+}
+
+#[test]
+fn some_calls_of_scenarios_fail() {
+    for line in ["blas", "threads", "queues", "raw_device", "hot_reload", "interop"] {
+        assert_no_flaws(line, &program(line), &some(12), SAMPLE / 2);
+    }
+}
+
+#[test]
+fn some_calls_fail_above_the_validation_layer() {
+    assert_no_flaws("queues", &validated("queues"), &some(12), SAMPLE / 2);
+}
+
+#[test]
+fn some_calls_of_a_sample_in_a_window_fail() {
+    let Some((_connection, _display, window)) = in_window() else { return };
+    let program = Program { variables: window.variables, tries_again: false, ..program(WINDOWED[0]) };
+    assert_no_flaws(WINDOWED[0], &program, &some(12), SAMPLE / 2);
+}
+
+#[test]
+fn some_calls_fail_while_caches_are_written() {
+    let line = "rtx_hello --width 64 --height 36 --frames 1 --rt hardware";
+    let cold = Program { caches: Caches::Cold, ..program(line) };
+    assert_no_flaws(line, &cold, &some(12), SAMPLE / 2);
+}
+
+#[test]
+fn some_calls_of_a_window_fail() {
+    let Some((_connection, _display, program)) = in_window() else { return };
+    let errors = vec![FaultError::SurfaceLost, FaultError::OutOfDate];
+    assert_no_flaws("window", &program, &SweepPlan { errors, ..some(12) }, SAMPLE);
+}

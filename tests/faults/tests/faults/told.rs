@@ -1,0 +1,188 @@
+//! What a run tells of a fault: the command, the object and the cause; and what a context does where its end fails.
+
+use std::collections::BTreeSet;
+
+use lvk_faults::sweep::plan::SweepPlan;
+use lvk_faults::sweep::run::{LayerFolder, Program, run};
+use lvk_faults::sweep::verdict::{Ending, Flaw, RunOutcome, flaws};
+
+use crate::{assert_told, error_line, in_window, program, validated};
+
+/// Faults that a whole sweep found once (docs/reliability.md).
+#[test]
+fn faults_that_had_flaws_have_none() {
+    assert_told(&program("queues"), "vkQueueWaitIdle 1 device-memory stays");
+    assert_told(&program("blas"), "vkGetQueryPoolResults 1 device-lost once");
+    let Some((_connection, _display, program)) = in_window() else { return };
+    for fault in [
+        "vkGetFenceStatus 1 device-lost once",
+        "vkGetPhysicalDeviceSurfaceSupportKHR 1 host-memory once",
+        "vkCreateXcbSurfaceKHR 1 host-memory once",
+    ] {
+        assert_told(&program, fault);
+    }
+}
+
+/// Shortages in questions about what a driver supports are no lack of support.
+#[test]
+fn shortages_in_questions_are_no_lack_of_support() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (_, calls) = run(&program("interop"), &layer, caches.path(), None).unwrap();
+    for command in
+        ["vkGetPhysicalDeviceImageFormatProperties2", "vkGetPhysicalDeviceCalibrateableTimeDomainsKHR"]
+    {
+        let count = calls.iter().filter(|call| call.command == command).count();
+        assert!(count > 1, "{command}: {count}");
+        for number in 1..=count {
+            // The verdict asks for the command where the run fails.
+            assert_told(&program("interop"), &format!("{command} {number} host-memory once"));
+        }
+    }
+}
+
+/// Every fault of commands that few programs call: handles of shader groups, sizes of fragments, modifiers of shared images.
+#[test]
+fn commands_of_few_programs_fail_as_others_do() {
+    let hybrid = "hybrid --width 64 --height 36 --frames 1 --rt hardware --scene SCENE";
+    let few = [
+        "vkGetRayTracingShaderGroupHandlesKHR",
+        "vkGetPhysicalDeviceFragmentShadingRatesKHR",
+        "vkGetImageDrmFormatModifierPropertiesEXT",
+    ];
+    let mut reached = BTreeSet::new();
+    for line in [hybrid, "interop"] {
+        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+        let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
+        let of_few = SweepPlan::full().faults(&calls).into_iter();
+        for fault in of_few.filter(|fault| few.contains(&&*fault.command)) {
+            assert_told(&program(line), &fault.to_string());
+            reached.insert(fault.command);
+        }
+    }
+    println!("reached: {reached:?}");
+    assert!(reached.contains(few[0]), "{reached:?}");
+}
+
+/// Returns the scenario whose context ends before its work. The C library overwrites memory that is freed, so that a driver
+/// that works on destroyed objects crashes.
+fn slow_work() -> Program {
+    let overwrite = ("MALLOC_PERTURB_".to_owned(), "165".to_owned());
+    Program { variables: vec![overwrite], ..program("slow_work") }
+}
+
+/// The end of a context asks the timelines where the queue cannot be waited for. The context destroys nothing before its work
+/// has ended: else lavapipe would execute a command buffer that is freed.
+#[test]
+fn objects_in_use_outlive_waits_that_fail() {
+    let [outcome, _] = assert_told(&slow_work(), "vkQueueWaitIdle 1 device-memory command");
+    assert!(outcome.result.is_some() && !leaks(&outcome), "{}", outcome.stderr);
+}
+
+/// Where questions about the timelines fail too, the context is leaked.
+#[test]
+fn objects_that_may_be_in_use_are_leaked() {
+    let [outcome, _] = assert_told(&slow_work(), "vkQueueWaitIdle 1 device-memory unanswered");
+    assert!(outcome.result.is_some() && leaks(&outcome), "{}", outcome.stderr);
+    let said = "warning: the end of a context: out of device memory in vkQueueWaitIdle for 'graphics queue'; its objects are";
+    assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+}
+
+/// True if objects are alive at the end.
+fn leaks(outcome: &RunOutcome) -> bool {
+    outcome.live.values().any(|count| *count != 0)
+}
+
+/// The path tracer reads the number of its rays after the picture.
+#[test]
+fn shortages_after_the_picture_are_errors() {
+    let line = "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2 --method pathtrace";
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
+    let last = calls.iter().filter(|call| call.command == "vkQueueSubmit2").count();
+    let [outcome, _] = assert_told(&program(line), &format!("vkQueueSubmit2 {last} device-memory once"));
+    assert!(outcome.result.is_some() && outcome.ending == Ending::Status(1), "{}", outcome.stderr);
+}
+
+/// Objects of calls that create nothing: recording, submission and waits.
+#[test]
+fn errors_of_recording_submission_and_waits_name_the_object() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    for (command, object) in [
+        ("vkResetCommandPool", "command buffer of the graphics queue"),
+        ("vkBeginCommandBuffer", "command buffer of the graphics queue"),
+        ("vkEndCommandBuffer", "uploads and builds"),
+        ("vkQueueSubmit2", "graphics queue"),
+        ("vkWaitSemaphores", "timeline semaphore of the graphics queue"),
+        ("vkEnumeratePhysicalDevices", "instance"),
+    ] {
+        let fault = format!("{command} 1 host-memory stays").parse().unwrap();
+        let (outcome, _) = run(&program("hot_reload"), &layer, caches.path(), Some(&fault)).unwrap();
+        let expected = format!("error: out of host memory in {command} for '{object}'\n");
+        assert!(outcome.reached && outcome.stderr.contains(&expected), "{fault}: {}", outcome.stderr);
+    }
+}
+
+/// The layer sees objects that are not destroyed, and the process what else it holds.
+#[test]
+fn what_a_scenario_forgets_is_seen() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let ran = |line| run(&program(line), &layer, caches.path(), None).unwrap();
+    let ((clean, _), (forgetful, calls)) = (ran("leak remembers"), ran("leak forgets"));
+    assert_eq!(flaws(None, &clean, &clean), [], "{}", clean.stderr);
+    let found = flaws(None, &forgetful, &clean);
+    let [Flaw::Leak(leak), Flaw::Held(held)] = &*found else { panic!("{found:?}") };
+    assert_eq!(leak, "1 VkFence", "{}", forgetful.stderr);
+    assert!(held.starts_with("1 file descriptors, 1 threads, 6"), "{held}");
+    assert!(calls.len() > 50 && calls.iter().any(|call| call.command == "vkCreateFence"));
+}
+
+/// The layer of the faults lies above the validation layer, which sees what the library does.
+#[test]
+fn a_mistake_of_a_scenario_is_a_validation_message() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    let (outcome, _) = run(&validated("leak forgets"), &layer, caches.path(), None).unwrap();
+    let found = flaws(None, &outcome, &outcome);
+    let is_message =
+        |flaw: &Flaw| matches!(flaw, Flaw::Validation(text) if text.contains("VUID-vkDestroyDevice"));
+    assert!(found.iter().any(is_message), "{found:?}");
+}
+
+/// Faults are injected, and told by the name of the call; a library that goes on without ray tracing needs a device, too.
+#[test]
+fn a_fault_at_the_creation_of_the_device_is_told() {
+    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+    for (error, text) in [("host-memory", "out of host memory"), ("device-lost", "lost")] {
+        let fault = format!("vkCreateDevice 1 {error} stays").parse().unwrap();
+        let (outcome, _) = run(&program("queues"), &layer, caches.path(), Some(&fault)).unwrap();
+        assert!(outcome.reached && outcome.stderr.contains(text), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("vkCreateDevice"), "{}", outcome.stderr);
+    }
+}
+
+/// The layer stays loaded, so that a fault that is to happen once does not hit the second try.
+#[test]
+fn a_fault_happens_once_in_a_process() {
+    let [outcome, clean] = assert_told(&program("queues"), "vkQueueSubmit2 2 device-lost once");
+    assert_eq!((outcome.result, outcome.second_result), (None, clean.result));
+}
+
+/// Shortages in questions about formats, tools and cached pipelines are errors too: none is an answer that the program goes on with.
+#[test]
+fn shortages_in_other_questions_are_no_answers() {
+    for (line, command) in [
+        ("interop", "vkGetPhysicalDeviceImageFormatProperties"),
+        ("interop", "vkGetPhysicalDeviceToolProperties"),
+        ("yuv --width 64 --height 36 --frames 1", "vkGetPhysicalDeviceImageFormatProperties2"),
+        ("yuv --width 64 --height 36 --frames 1", "vkCreatePipelineCache"),
+    ] {
+        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+        let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
+        let count = calls.iter().filter(|call| call.command == command).count();
+        assert!(count > 0, "{line}: {command}");
+        for number in 1..=count {
+            let [outcome, _] = assert_told(&program(line), &format!("{command} {number} host-memory once"));
+            let start = format!("error: out of host memory in {command} for '");
+            assert!(error_line(&outcome).starts_with(&start), "{line}: {}", outcome.stderr);
+        }
+    }
+}

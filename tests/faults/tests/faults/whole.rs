@@ -1,0 +1,217 @@
+//! Whole sweeps: every fault of every program, in minutes each (`.ci/slow faults`).
+
+use std::fmt::Display;
+use std::path::Path;
+use std::str::FromStr;
+use std::time::Duration;
+
+use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_faults::fault::Span;
+use lvk_faults::sweep::plan::SweepPlan;
+use lvk_faults::sweep::report::sweep;
+use lvk_faults::sweep::run::{Caches, Program};
+
+use crate::{WINDOWED, in_window, program, validated, varies};
+
+/// Time of a full sweep.
+const WHOLE: Duration = Duration::from_secs(6 * 3600);
+
+/// Returns the plan of whole sweeps, bounded by `LVK_FAULT_MOST`, a number, by `LVK_FAULT_PART`, as `2/3`, and by `LVK_FAULT_COMMANDS`, as
+/// `vkMapMemory,vkCreateBuffer`.
+fn whole_plan() -> SweepPlan {
+    let full = SweepPlan::full();
+    SweepPlan {
+        most: variable("LVK_FAULT_MOST", full.most),
+        part: variable("LVK_FAULT_PART", full.part),
+        commands: variable("LVK_FAULT_COMMANDS", String::new())
+            .split_terminator(',')
+            .map(str::to_owned)
+            .collect(),
+        ..full
+    }
+}
+
+/// Returns the value of an environment variable, or `default` where it is not set.
+fn variable<T: FromStr>(name: &str, default: T) -> T
+where
+    T::Err: Display,
+{
+    match std::env::var(name) {
+        Ok(text) => text.parse().unwrap_or_else(|error| panic!("{name}: {error}")),
+        Err(_) => default,
+    }
+}
+
+/// Runs the whole sweep, as far as [`whole_plan`] goes, and prints its row of the table in `docs/reliability.md`.
+fn whole(name: &str, line: &str, program: &Program) {
+    whole_of(name, line, program, &whole_plan());
+}
+
+fn whole_of(name: &str, line: &str, program: &Program, plan: &SweepPlan) {
+    let report = sweep(program, plan, WHOLE).unwrap();
+    println!("{line}: {report}\n{}", report.row(name));
+    let is_reached = report.reached > 0 && 20 * report.missed <= if varies(line) { report.runs } else { 0 };
+    assert!(report.flawed.is_empty() && is_reached, "{line}: {report}");
+    assert_eq!(report.runs, report.planned, "{line}: {report}");
+}
+
+/// Declares an ignored test for each scenario.
+macro_rules! whole_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            whole(stringify!($test), $line, &program($line));
+        }
+    )*};
+}
+
+whole_sweeps! {
+    whole_hybrid_pipeline: "hybrid --width 64 --height 36 --frames 1 --rt hardware --scene SCENE";
+    whole_hybrid_lowered: "hybrid --width 64 --height 36 --frames 1 --rt pipeline --scene SCENE";
+    whole_hybrid_query: "hybrid --width 64 --height 36 --frames 1 --rt query --scene SCENE";
+    whole_hybrid_software: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
+    whole_rtx_hello_pipeline: "rtx_hello --width 64 --height 36 --frames 1 --rt hardware";
+    whole_rtx_hello_lowered: "rtx_hello --width 64 --height 36 --frames 1 --rt pipeline";
+    whole_rtx_hello_query: "rtx_hello --width 64 --height 36 --frames 1 --rt query";
+    whole_rtx_hello_software: "rtx_hello --width 64 --height 36 --frames 1 --rt software";
+    whole_rtx_ao_pipeline: "rtx_ao --width 64 --height 36 --frames 1 --rt hardware --passes 1";
+    whole_rtx_ao_lowered: "rtx_ao --width 64 --height 36 --frames 1 --rt pipeline --passes 1";
+    whole_rtx_ao_query: "rtx_ao --width 64 --height 36 --frames 1 --rt query --passes 1";
+    whole_rtx_ao_software: "rtx_ao --width 64 --height 36 --frames 1 --rt software --passes 1";
+    whole_rtx_pipeline_pipeline: "rtx_pipeline --width 64 --height 36 --frames 1 --rt hardware";
+    whole_rtx_pipeline_lowered: "rtx_pipeline --width 64 --height 36 --frames 1 --rt pipeline";
+    whole_rtx_pipeline_query: "rtx_pipeline --width 64 --height 36 --frames 1 --rt query";
+    whole_rtx_pipeline_software: "rtx_pipeline --width 64 --height 36 --frames 1 --rt software";
+    whole_rtx_textures_pipeline: "rtx_textures --width 64 --height 36 --frames 1 --rt hardware";
+    whole_rtx_textures_lowered: "rtx_textures --width 64 --height 36 --frames 1 --rt pipeline";
+    whole_rtx_textures_query: "rtx_textures --width 64 --height 36 --frames 1 --rt query";
+    whole_rtx_textures_software: "rtx_textures --width 64 --height 36 --frames 1 --rt software";
+    whole_hybrid_oit_pipeline: "hybrid_oit --width 64 --height 36 --frames 1 --rt hardware --supersampling 1";
+    whole_hybrid_oit_lowered: "hybrid_oit --width 64 --height 36 --frames 1 --rt pipeline --supersampling 1";
+    whole_hybrid_oit_query: "hybrid_oit --width 64 --height 36 --frames 1 --rt query --supersampling 1";
+    whole_hybrid_oit_software: "hybrid_oit --width 64 --height 36 --frames 1 --rt software --supersampling 1";
+    whole_large_scene_pipeline: "large_scene --width 64 --height 36 --frames 1 --rt hardware --triangles 2000 --copies 3 --samples 1";
+    whole_large_scene_lowered: "large_scene --width 64 --height 36 --frames 1 --rt pipeline --triangles 2000 --copies 3 --samples 1";
+    whole_large_scene_query: "large_scene --width 64 --height 36 --frames 1 --rt query --triangles 2000 --copies 3 --samples 1";
+    whole_large_scene_software: "large_scene --width 64 --height 36 --frames 1 --rt software --triangles 2000 --copies 3 --samples 1";
+    whole_reflections_pipeline: "reflections --width 64 --height 36 --frames 1 --rt hardware --samples 1";
+    whole_reflections_lowered: "reflections --width 64 --height 36 --frames 1 --rt pipeline --samples 1";
+    whole_reflections_query: "reflections --width 64 --height 36 --frames 1 --rt query --samples 1";
+    whole_reflections_software: "reflections --width 64 --height 36 --frames 1 --rt software --samples 1";
+    whole_hello_triangle: "hello_triangle --width 64 --height 36 --frames 1";
+    whole_deferred: "deferred --width 64 --height 36 --frames 1 --lights 20";
+    whole_mesh_shaders: "mesh_shaders --width 64 --height 36 --frames 1";
+    whole_omni_shadows: "omni_shadows --width 64 --height 36 --frames 1";
+    whole_render_to_cube_map: "render_to_cube_map --width 64 --height 36 --frames 1 --face-size 32";
+    whole_sponza: "sponza --width 64 --height 36 --frames 1 --shadow-size 256";
+    whole_triplanar: "triplanar --width 64 --height 36 --frames 1";
+    whole_yuv: "yuv --width 64 --height 36 --frames 1";
+    whole_triangle: "triangle";
+    whole_viewer_pipeline: "viewer SCENE --width 64 --height 36 --frames 1 --rt hardware --samples 2";
+    whole_viewer_lowered: "viewer SCENE --width 64 --height 36 --frames 1 --rt pipeline --samples 2";
+    whole_viewer_query: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2";
+    whole_viewer_software: "viewer SCENE --width 64 --height 36 --frames 1 --rt software --samples 2";
+    whole_path_tracer: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2 --method pathtrace";
+    whole_blas: "blas";
+    whole_blas_software: "blas_software";
+    whole_threads: "threads";
+    whole_queues: "queues";
+    whole_raw_device: "raw_device";
+    whole_hot_reload: "hot_reload";
+    whole_interop: "interop";
+}
+
+/// The example opens the loader that the dynamic linker finds.
+#[test]
+#[ignore = "minutes: .ci/slow faults"]
+fn whole_example_triangle() {
+    let driver = prepare(&DriverRequest::default()).unwrap();
+    let folder = driver.loader.as_deref().and_then(Path::parent).map(|folder| folder.display().to_string());
+    let variables = folder.map(|folder| ("LD_LIBRARY_PATH".to_owned(), folder)).into_iter().collect();
+    whole(
+        "whole_example_triangle",
+        "example_triangle",
+        &Program { variables, ..program("example_triangle") },
+    );
+}
+
+/// Declares an ignored test for each program that runs with the validation layer, below the layer of the faults: what the library does
+/// after a failed call must be valid.
+macro_rules! validated_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            whole(stringify!($test), $line, &validated($line));
+        }
+    )*};
+}
+
+validated_sweeps! {
+    whole_validated_hybrid_pipeline: "hybrid --width 64 --height 36 --frames 1 --rt hardware --scene SCENE";
+    whole_validated_hybrid_lowered: "hybrid --width 64 --height 36 --frames 1 --rt pipeline --scene SCENE";
+    whole_validated_viewer: "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2";
+    whole_validated_blas: "blas";
+    whole_validated_blas_software: "blas_software";
+    whole_validated_threads: "threads";
+    whole_validated_queues: "queues";
+    whole_validated_hot_reload: "hot_reload";
+    whole_validated_interop: "interop";
+}
+
+/// Declares an ignored test for each scenario whose context may be leaked, as questions about the progress of its work fail too.
+macro_rules! unanswered_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            let plan = SweepPlan { spans: vec![Span::Unanswered], ..whole_plan() };
+            whole_of(stringify!($test), $line, &program($line), &plan);
+        }
+    )*};
+}
+
+unanswered_sweeps! {
+    whole_unanswered_threads: "threads";
+    whole_unanswered_queues: "queues";
+    whole_unanswered_blas: "blas";
+    whole_unanswered_raw_device: "raw_device";
+    whole_unanswered_hybrid: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
+}
+
+/// Declares an ignored test for each program that starts without caches and writes them: of shaders, pipelines, BVHs and scenes.
+macro_rules! cold_sweeps {
+    ($($test:ident: $line:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes: .ci/slow faults"]
+        fn $test() {
+            whole(stringify!($test), $line, &Program { caches: Caches::Cold, ..program($line) });
+        }
+    )*};
+}
+
+cold_sweeps! {
+    whole_cold_hybrid: "hybrid --width 64 --height 36 --frames 1 --rt software --scene SCENE";
+    whole_cold_large_scene: "large_scene --width 64 --height 36 --frames 1 --rt query --triangles 2000 --copies 3 --samples 1";
+    whole_cold_rtx_hello: "rtx_hello --width 64 --height 36 --frames 1 --rt hardware";
+    whole_cold_blas_software: "blas_software";
+}
+
+#[test]
+#[ignore = "minutes: .ci/slow faults"]
+fn whole_window() {
+    let Some((_connection, _display, program)) = in_window() else { return };
+    whole("whole_window", "window", &program);
+}
+
+/// The samples in a window: three frames of each. A process has one event loop, so there is no second try.
+#[test]
+#[ignore = "minutes: .ci/slow faults"]
+fn whole_windows_of_samples() {
+    let Some((_connection, _display, window)) = in_window() else { return };
+    for line in WINDOWED {
+        let program = Program { variables: window.variables.clone(), tries_again: false, ..program(line) };
+        whole(&format!("window of {line}"), line, &program);
+    }
+}
