@@ -177,7 +177,7 @@ impl Gpu {
         chosen.capabilities.checkpoints &= request.checkpoints;
         use_single_queue(&mut chosen, request.queues);
         let mut caps = chosen.capabilities.clone();
-        caps.choose_ray_tracing(request.pipeline, request.query);
+        caps.choose_ray_tracing(request.pipeline, request.query, request.required);
         let given = raw.queues();
         if request.query.prefers_hardware() && !raw.ray_query {
             caps.ray_query_reason = "the engine's device has no ray queries enabled";
@@ -472,6 +472,13 @@ pub(super) fn candidate(index: usize, device: &mut PhysicalDevice, request: &Dev
     for name in request.extra.device_extensions() {
         demand(&name.to_string_lossy(), false, device.has_extension(name));
     }
+    let mut used = left.clone();
+    used.choose_ray_tracing(request.pipeline, request.query, request.required);
+    let lost = request.required.iter().filter(|feature| left.has(**feature) && !used.has(**feature));
+    missing.extend(lost.map(|feature| {
+        let (name, reason) = (feature.vulkan_name(), used.ray_tracing_pipeline_reason);
+        format!("{name} (it is of ray tracing by the device, which is not used: {reason})")
+    }));
     let wanted = [
         request.pipeline.prefers_hardware() && left.ray_tracing_pipeline,
         (request.query.prefers_hardware() || request.pipeline.requires_queries()) && left.ray_query,
@@ -498,7 +505,7 @@ fn create_with_fallback(
     request: &DeviceRequest<'_>,
 ) -> Result<(ash::Device, Capabilities, Features)> {
     let mut caps = chosen.capabilities.clone();
-    caps.choose_ray_tracing(request.pipeline, request.query);
+    caps.choose_ray_tracing(request.pipeline, request.query, request.required);
     let first = match create(instance, chosen, &caps, &request.extra) {
         Ok((device, features)) => return Ok((device, caps, features)),
         Err(error) => error,
@@ -510,7 +517,7 @@ fn create_with_fallback(
     caps = chosen.capabilities.clone();
     caps.limit_ray_tracing(false, false);
     caps.limits.max_bindless_tlas = 0;
-    caps.choose_ray_tracing(request.pipeline, request.query);
+    caps.choose_ray_tracing(request.pipeline, request.query, request.required);
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing returned {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it returned {first}", caps.device_name);
     let (device, features) = create(instance, chosen, &caps, &request.extra)

@@ -70,7 +70,7 @@ impl<'a> DeviceRequirements<'a> {
         }
         use_single_queue(&mut found, request.queues);
         let mut caps = found.capabilities.clone();
-        caps.choose_ray_tracing(request.pipeline, request.query);
+        caps.choose_ray_tracing(request.pipeline, request.query, request.required);
         let (features, extensions) = plan(&found, &caps);
         Ok(Self { instance, instance_extensions, found, caps, features, extensions })
     }

@@ -90,6 +90,8 @@ impl LoweringJob<'_> {
             shader: error.shader,
             why: error.message,
         })?;
+        #[cfg(any(test, feature = "test-hooks"))]
+        crate::test_support::kept_modules::keep(&words);
         let name = self.name_of(ray_gen);
         let module = ShaderModule::from_lowered(gpu, &name, &words)?;
         let compute = ComputePipelineDesc { debug_name: &name, ..Default::default() };

@@ -3,6 +3,7 @@
 
 pub(crate) mod fault_injection;
 pub mod hooks;
+pub(crate) mod kept_modules;
 #[cfg(test)]
 pub(crate) mod micromap_functions;
 pub(crate) mod null_commands;

@@ -81,8 +81,8 @@ pub(super) fn open(
     }
 }
 
-/// Opens the device for the best path. A profile rehearses the device's own paths, which keep no structures for software
-/// beside theirs.
+/// Opens the device for the best path: its own pipelines or queries, else queries in software. On GPUs without units for ray tracing
+/// the library lowers pipelines. A profile rehearses the device's own paths, which keep no structures for software beside theirs.
 fn open_best(
     args: &RunArgs,
     open: impl Fn(RayTracingPipelineRequest, RayQueryRequest) -> lvk::Result<Context>,
@@ -90,10 +90,13 @@ fn open_best(
     let best = open(RayTracingPipelineRequest::HardwareIfPresent, RayQueryRequest::HardwareIfPresent)?;
     let caps = best.capabilities();
     let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
-    let is_slow = caps.is_cpu && args.profile.is_none();
-    let chosen = match can_trace && !is_slow {
-        true => best,
-        false => open(RayTracingPipelineRequest::Off, RayQueryRequest::Auto)?,
+    let is_profiled = args.profile.is_some();
+    let chosen = if caps.lacks_ray_tracing_units && !is_profiled {
+        open(RayTracingPipelineRequest::Auto, RayQueryRequest::Off)?
+    } else if can_trace && (is_profiled || !caps.is_cpu) {
+        best
+    } else {
+        open(RayTracingPipelineRequest::Off, RayQueryRequest::Auto)?
     };
     eprintln!("note: --rt auto takes {}", choice(chosen.capabilities()));
     Ok(chosen)
@@ -126,6 +129,9 @@ fn lacks_ray_queries(device: &DeviceCandidate) -> bool {
 /// Describes the chosen path, and the reason.
 fn choice(capabilities: &Capabilities) -> String {
     match (capabilities.ray_tracing_pipeline, capabilities.ray_query_path) {
+        (true, _) if capabilities.ray_tracing_pipeline_path.is_lowered() => {
+            format!("a {}", pipeline_text(capabilities))
+        }
         (true, _) => "the ray tracing pipelines that the device has".to_owned(),
         (false, RayQueryPath::Hardware) => {
             "ray queries of the device, which has no ray tracing pipelines".to_owned()

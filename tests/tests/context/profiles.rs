@@ -6,8 +6,9 @@ use std::ffi::CStr;
 use lvk::ash::{self, vk};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceCandidate,
-    DeviceProfile, Error, FeatureSet, Holder, OptionalFeature, RayQueryRequest, RayTracingPipelineRequest,
-    ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc, Triangles, UserExtensions,
+    DeviceProfile, Error, FeatureSet, Holder, OptionalFeature, RayQueryRequest, RayTracingPipelinePath,
+    RayTracingPipelineRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc, Triangles,
+    UserExtensions,
 };
 use lvk_tests::accel_backend::requires_device_accel_structs;
 use lvk_tests::device::vulkan;
@@ -296,6 +297,46 @@ fn required_features_choose_the_device() {
             assert_eq!(device.missing, ["shaderClipDistance (hidden by the device profile 'no clipping')"]);
         }
         other => unreachable!("{:?}", other.map(drop)),
+    }
+}
+
+/// Pipelines of a CPU are lowered, and have no features of the device's own, unless one is required.
+#[test]
+fn a_required_feature_of_pipelines_keeps_the_pipelines_of_the_device() {
+    let Some(real) = device_with(|desc| {
+        desc.ray_tracing_pipeline = RayTracingPipelineRequest::HardwareIfPresent;
+    }) else {
+        return;
+    };
+    let feature = OptionalFeature::RayTracingMaintenance1;
+    if !real.capabilities().has(feature) {
+        eprintln!("NOT TESTED, the device lacks {}", feature.vulkan_name());
+        return;
+    }
+    let name = real.capabilities().device_name.clone();
+    let start = |request, required: &[OptionalFeature]| {
+        Context::new(&ContextDesc {
+            vulkan_library: vulkan().flatten(),
+            device: Some(&name),
+            ray_tracing_pipeline: request,
+            required_features: required,
+            ..Default::default()
+        })
+    };
+    let ctx = start(RayTracingPipelineRequest::Auto, &[feature]).unwrap();
+    assert!(ctx.capabilities().has(feature), "{}", ctx.capabilities().ray_tracing_pipeline_reason);
+    assert_eq!(ctx.capabilities().ray_tracing_pipeline_path, RayTracingPipelinePath::Hardware);
+    for (request, reason) in [
+        (RayTracingPipelineRequest::Software, "software was asked for"),
+        (RayTracingPipelineRequest::Off, "ray tracing pipelines are turned off"),
+    ] {
+        assert!(start(request, &[]).is_ok());
+        let Err(Error::NoDevice { candidates, .. }) = start(request, &[feature]) else {
+            unreachable!("{request:?} has {}", feature.vulkan_name())
+        };
+        let device = candidates.iter().find(|device| device.name == name).unwrap();
+        let [missing] = &*device.missing else { unreachable!("{:?}", device.missing) };
+        assert!(missing.starts_with(feature.vulkan_name()) && missing.contains(reason), "{missing}");
     }
 }
 

@@ -23,6 +23,9 @@ pub struct Capabilities {
     pub api_version: (u32, u32, u32),
     /// True if the device is a CPU: it traces and rasterises in software.
     pub is_cpu: bool,
+    /// True for GPUs that are known to have no units for ray tracing, though their driver offers it: NVIDIA's H100 and H200, and others with
+    /// their chip. Vulkan does not tell, so the device's name decides.
+    pub lacks_ray_tracing_units: bool,
     /// Ray tracing pipelines can be created and traced.
     /// [`ray_tracing_pipeline_path`](Self::ray_tracing_pipeline_path) is the implementation. In
     /// [`Context::devices`](crate::Context::devices), where no path is selected yet, it is true if the device
@@ -222,13 +225,23 @@ impl Capabilities {
     }
 
     /// Enables the requested ray tracing features, by the device or by the library.
-    pub(crate) fn choose_ray_tracing(&mut self, pipeline: RayTracingPipelineRequest, query: RayQueryRequest) {
+    /// Features that the application requires, `required`, may need pipelines or structures of the device.
+    pub(crate) fn choose_ray_tracing(
+        &mut self,
+        pipeline: RayTracingPipelineRequest,
+        query: RayQueryRequest,
+        required: &[OptionalFeature],
+    ) {
+        let is_of_device = |feature| {
+            OF_RAY_TRACING_PIPELINES.contains(feature) || *feature == OptionalFeature::OpacityMicromaps
+        };
         let queries = query.choose(self.ray_query, self.is_cpu);
         let pipelines = pipeline.choose(PathInputs {
             has_pipelines: self.ray_tracing_pipeline,
             has_queries: self.ray_query,
             query_path: queries.path,
-            is_cpu: self.is_cpu,
+            is_without_units: self.is_cpu || self.lacks_ray_tracing_units,
+            needs_device: required.iter().any(is_of_device),
         });
         (self.ray_query_path, self.ray_query_reason) = (queries.path, queries.reason);
         (self.ray_tracing_pipeline_path, self.ray_tracing_pipeline_reason) =
@@ -272,7 +285,7 @@ mod tests {
     #[test]
     fn pipelines_lowered_onto_queries_leave_the_queries_of_shaders_off() {
         let mut caps = device(true, true);
-        caps.choose_ray_tracing(RayTracingPipelineRequest::Query, RayQueryRequest::Off);
+        caps.choose_ray_tracing(RayTracingPipelineRequest::Query, RayQueryRequest::Off, &[]);
         assert!(caps.ray_tracing_pipeline && !caps.ray_query && !caps.hardware_ray_query());
         assert!(caps.device_ray_queries() && !caps.device_pipelines());
         assert!(caps.builds_device_structures() && !caps.builds_software_structures());
@@ -292,7 +305,7 @@ mod tests {
             (RayTracingPipelineRequest::Off, RayQueryRequest::Off, [false, false]),
         ] {
             let mut caps = device(true, true);
-            caps.choose_ray_tracing(pipeline, query);
+            caps.choose_ray_tracing(pipeline, query, &[]);
             let found = [caps.builds_device_structures(), caps.builds_software_structures()];
             assert_eq!(found, expected, "{pipeline:?}, {query:?}");
         }
@@ -303,7 +316,7 @@ mod tests {
     fn a_device_without_ray_tracing_has_pipelines_in_software() {
         let mut caps = device(false, false);
         assert_eq!(caps.ray_tracing_pipeline_path, RayTracingPipelinePath::None);
-        caps.choose_ray_tracing(RayTracingPipelineRequest::Auto, RayQueryRequest::HardwareIfPresent);
+        caps.choose_ray_tracing(RayTracingPipelineRequest::Auto, RayQueryRequest::HardwareIfPresent, &[]);
         assert_eq!(caps.ray_tracing_pipeline_path, RayTracingPipelinePath::Software);
         assert!(caps.ray_tracing_pipeline && !caps.ray_query && caps.position_fetch);
     }

@@ -16,6 +16,7 @@ pub(crate) mod portability;
 pub(crate) mod queues;
 pub(crate) mod ray_query_path;
 pub(crate) mod ray_tracing_pipeline_path;
+pub(crate) mod ray_tracing_units;
 pub(crate) mod resolve_modes;
 pub(crate) mod shading_rate;
 pub(crate) mod subgroup_limits;

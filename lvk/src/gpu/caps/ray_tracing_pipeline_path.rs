@@ -12,9 +12,10 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayTracingPipelineRequest {
     /// The device's own pipelines where it has them. Otherwise lowered: onto the library's traversal if ray queries use
-    /// it too, else onto the device's ray queries, else onto the library's traversal. On CPUs, pipelines are lowered onto
-    /// the library's traversal, which is faster there, unless ray queries of shaders use the device's structures. Without
-    /// the feature `software-ray-query` the library has no traversal.
+    /// it too, else onto the device's ray queries, else onto the library's traversal. On devices without units for ray tracing (CPUs,
+    /// and [GPUs that are known to have none](crate::Capabilities::lacks_ray_tracing_units)) pipelines are lowered onto the library's
+    /// traversal, which is faster there, unless ray queries of shaders use the device's structures, or a required feature is one of
+    /// the device's pipelines. Without the feature `software-ray-query` the library has no traversal.
     #[default]
     Auto,
     /// Only devices with `VK_KHR_ray_tracing_pipeline` are considered.
@@ -69,8 +70,10 @@ pub(crate) struct PathInputs {
     pub(crate) has_queries: bool,
     /// The path that ray queries of shaders take.
     pub(crate) query_path: RayQueryPath,
-    /// The device is a CPU.
-    pub(crate) is_cpu: bool,
+    /// The device has no units for ray tracing: it is a CPU, or a GPU that is known to have none.
+    pub(crate) is_without_units: bool,
+    /// The application requires features of ray tracing by the device, which lowered pipelines do not have.
+    pub(crate) needs_device: bool,
 }
 
 impl RayTracingPipelineRequest {
@@ -113,9 +116,13 @@ impl RayTracingPipelineRequest {
             Self::Hardware | Self::HardwareIfPresent => {
                 (None, "the device has no ray tracing pipelines of its own")
             }
-            Self::Auto if is_faster_lowered(device) => {
-                (Software, "the device is a CPU, on which the library's own traversal is faster")
+            Self::Auto if has_pipelines && device.needs_device => {
+                (Hardware, "a required feature is that of ray tracing by the device")
             }
+            Self::Auto if is_faster_lowered(device) => (
+                Software,
+                "the device has no units for ray tracing, so the library's own traversal is faster",
+            ),
             Self::Auto if has_pipelines => (Hardware, "the device has ray tracing pipelines"),
             Self::Auto if HAS_SOFTWARE && device.query_path == RayQueryPath::Software => (
                 Software,
@@ -134,7 +141,7 @@ impl RayTracingPipelineRequest {
 /// Returns true if pipelines in software are known to be faster than the device's own, and need no structures beside
 /// those of ray queries.
 fn is_faster_lowered(device: PathInputs) -> bool {
-    HAS_SOFTWARE && device.is_cpu && device.query_path != RayQueryPath::Hardware
+    HAS_SOFTWARE && device.is_without_units && device.query_path != RayQueryPath::Hardware
 }
 
 #[cfg(test)]
@@ -150,10 +157,12 @@ mod tests {
     fn paths_of(
         request: RayTracingPipelineRequest,
         query_path: RayQueryPath,
-        is_cpu: bool,
+        is_without_units: bool,
     ) -> [RayTracingPipelinePath; 3] {
         [(false, false), (false, true), (true, true)].map(|(has_pipelines, has_queries)| {
-            request.choose(PathInputs { has_pipelines, has_queries, query_path, is_cpu }).path
+            let device =
+                PathInputs { has_pipelines, has_queries, query_path, is_without_units, needs_device: false };
+            request.choose(device).path
         })
     }
 
@@ -191,7 +200,7 @@ mod tests {
 
     #[cfg(feature = "software-ray-query")]
     #[test]
-    fn cpus_lower_unless_queries_use_their_structures() {
+    fn devices_without_units_lower_unless_queries_use_their_structures() {
         use RayQueryPath as Queries;
         let of = |request, queries| paths_of(request, queries, true);
         for queries in [Queries::None, Queries::Software] {
@@ -199,6 +208,19 @@ mod tests {
         }
         assert_eq!(of(RayTracingPipelineRequest::Auto, Queries::Hardware), [Software, Query, Hardware]);
         assert_eq!(of(RayTracingPipelineRequest::Hardware, Queries::Software), [None, None, Hardware]);
+    }
+
+    #[test]
+    fn features_of_the_device_keep_its_pipelines() {
+        let device = PathInputs {
+            has_pipelines: true,
+            has_queries: false,
+            query_path: RayQueryPath::None,
+            is_without_units: true,
+            needs_device: true,
+        };
+        assert_eq!(RayTracingPipelineRequest::Auto.choose(device).path, Hardware);
+        assert_eq!(RayTracingPipelineRequest::Off.choose(device).path, None);
     }
 
     #[test]

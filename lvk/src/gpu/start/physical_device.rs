@@ -15,6 +15,7 @@ use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 use crate::gpu::caps::queues::{QueueFamily, QueueLocation, describe_queues, locate_queues, queue_families};
 use crate::gpu::caps::ray_query_path::RayQueryPath;
 use crate::gpu::caps::ray_tracing_pipeline_path::RayTracingPipelinePath;
+use crate::gpu::caps::ray_tracing_units;
 use crate::gpu::caps::shading_rate::ShadingRateLimits;
 use crate::gpu::caps::subgroup_limits::SubgroupLimits;
 
@@ -53,6 +54,10 @@ impl PhysicalDevice {
                 device_name: device_name(&plain),
                 api_version: version(plain.api_version),
                 is_cpu: plain.device_type == vk::PhysicalDeviceType::CPU,
+                lacks_ray_tracing_units: ray_tracing_units::are_missing(
+                    plain.vendor_id,
+                    &device_name(&plain),
+                ),
                 ..Default::default()
             },
             kind: device_kind(plain.device_type),
