@@ -69,6 +69,8 @@ pub(super) enum Benchmark {
     Core,
     /// Cost against size: instances, textures, buffers, draws, triangles, OBJ files; exponents and log-log plots
     Growth(GrowthArgs),
+    /// Frames by the driver's ray tracing pipelines, by pipelines lowered to software, and by ray queries in software
+    Lowered(ImageSizeArgs),
     /// Ray tracing cost of a mesh split into several BLAS, compared with one BLAS
     Split(SplitArgs),
     /// TLAS updates, compared with a memory copy plus the driver's build
@@ -208,6 +210,7 @@ Examples:
   bench compaction --scene living_room.obj         builds, refits and compaction of that scene
   bench core                                       CPU overhead of the library, with its limits
   bench growth --only handles,draws --out growth   cost against size, with plots in that folder
+  bench lowered --width 640 --height 360           ray tracing pipelines with and without the driver's own
   bench split --parts 100 --runs 200               the generated mesh in at least 100 parts
   bench order --scene living_room.obj --camera 3   rays per second by triangle order
   bench queries --scene living_room.obj            software ray queries and the driver's ray tracing

@@ -15,6 +15,7 @@ pub mod flip;
 mod growth;
 mod hand_written;
 mod instance_record;
+mod lowered;
 mod measure;
 mod mesh;
 mod morton;

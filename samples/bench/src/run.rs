@@ -9,7 +9,9 @@ use crate::growth::GrowthArgs;
 use crate::peers::{self, PeersArgs, RunOptions};
 use crate::setup::Setup;
 use crate::table::Table;
-use crate::{batch, builds, compaction, cpu_overhead, growth, order, overhead, paper, queries, split, tlas};
+use crate::{
+    batch, builds, compaction, cpu_overhead, growth, lowered, order, overhead, paper, queries, split, tlas,
+};
 use lvk_samples::app::{device, scene_list};
 
 /// Runs the selected benchmark. Prints tables to standard output, and an error in one line to standard error. The exit status
@@ -67,6 +69,7 @@ fn measure(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchE
         Benchmark::Compaction(args) => vec![compaction::measure(&setup, args)?],
         Benchmark::Core => vec![cpu_overhead::measure(&setup)?],
         Benchmark::Growth(args) => growth::measure(&setup, args)?,
+        Benchmark::Lowered(image) => vec![lowered::measure(&setup, image)?],
         Benchmark::Split(args) => vec![split::measure(&setup, args)?],
         Benchmark::Tlas(args) => vec![tlas::measure(&setup, args)?],
         Benchmark::Order(args) => vec![order::measure(&setup, args)?],

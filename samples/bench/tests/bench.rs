@@ -295,6 +295,27 @@ fn the_papers_experiment_in_software_names_the_path_and_renders_the_same() {
 }
 
 #[test]
+fn lowered_pipelines_are_timed_beside_those_of_the_driver() {
+    let with_driver = table(&["lowered", "--quick"]);
+    let without = table(&["lowered", "--quick", "--profile", "no-ray-tracing"]);
+    assert!(without.contains("the driver's pipelines not measured"), "{without}");
+    for name in
+        ["hybrid", "hybrid --method standalone", "reflections --samples 1", "rtx_pipeline", "rtx_hello"]
+    {
+        assert_positive(&with_driver, name, 0..5);
+        assert_positive(&with_driver, &format!("{name}, rays"), 0..5);
+        assert_positive(&without, name, 1..3);
+        let cells = row(&without, name);
+        assert!(cells[0].is_empty() && cells[3].is_empty(), "{without}");
+    }
+    let triangle = row(&with_driver, "triangle, 640x480, until done");
+    assert!(
+        number(&triangle[0]) > 0.0 && triangle[2].is_empty() && number(&triangle[3]) > 0.0,
+        "{with_driver}"
+    );
+}
+
+#[test]
 fn a_missing_feature_is_reported_and_no_failure() {
     let without_query = table(&["order", "--quick", "--profile", "no-ray-query"]);
     assert!(without_query.contains("ray queries not measured"), "{without_query}");

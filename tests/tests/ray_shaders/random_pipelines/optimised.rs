@@ -73,7 +73,8 @@ pub fn optimiser() -> Option<PathBuf> {
     std::env::var_os("LVK_SPIRV_OPT").filter(|name| !name.is_empty()).map(PathBuf::from)
 }
 
-/// Returns the words after passes that the number chooses, with the names of the passes. A module that the program refuses stays as it is.
+/// Returns the words after passes that the number chooses, with the names of the passes. A module that the program refuses, or makes
+/// invalid, stays as it is: SPIRV-Tools 2023.1 puts functions that return early in place in continue constructs.
 pub fn optimised(program: &Path, number: u64, words: Vec<u32>) -> std::io::Result<(Vec<u32>, String)> {
     let mut random = Random::new(number);
     let count = 1 + random.bits() % 5;
@@ -86,7 +87,7 @@ pub fn optimised(program: &Path, number: u64, words: Vec<u32>) -> std::io::Resul
     let [before, after] = ["before.spv", "after.spv"].map(|name| folder.path().join(name));
     std::fs::write(&before, bytemuck::cast_slice(&words))?;
     let done = Command::new(program)
-        .args(["--target-env=vulkan1.3", "--scalar-block-layout"])
+        .args(["--target-env=vulkan1.3", "--scalar-block-layout", "--validate-after-all"])
         .args(&passes)
         .args([before.as_os_str(), "-o".as_ref(), after.as_os_str()])
         .output()?;
