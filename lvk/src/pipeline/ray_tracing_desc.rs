@@ -45,7 +45,8 @@ pub struct RayTracingPipelineDesc<'a> {
     pub libraries: &'a [RayTracingLibraryHandle],
     /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays. Deeper traces are undefined behaviour,
     /// which the library does not check. A lowered pipeline returns at once from traces, and from calls of callable shaders
-    /// that call others, where more than `max_recursion` (plus `max_callable_depth` with such shaders) are open. Default: 1.
+    /// that call others, where more than `max_recursion` (plus `max_callable_depth` with such shaders) are open; on CPUs, rays that
+    /// run no closest-hit shader may be traced at any depth. Default: 1.
     pub max_recursion: u32,
     /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others. The stack of a ray grows with it and
     /// has at most `u32::MAX` bytes. A lowered pipeline takes at most 31. Default: 1.

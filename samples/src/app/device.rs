@@ -91,7 +91,7 @@ fn open_best(
     let caps = best.capabilities();
     let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
     let is_profiled = args.profile.is_some();
-    let chosen = if caps.lacks_ray_tracing_units && !is_profiled {
+    let chosen = if caps.prefers_lowered_pipelines && !is_profiled {
         open(RayTracingPipelineRequest::Auto, RayQueryRequest::Off)?
     } else if can_trace && (is_profiled || !caps.is_cpu) {
         best

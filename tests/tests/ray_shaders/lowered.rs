@@ -1,10 +1,13 @@
 //! Pipelines that are lowered to compute shaders, on devices whose own pipelines are hidden.
 
 use lvk::{
-    Context, Error, Holder, RayTracingLibraryDesc, RayTracingPipelineDesc, RayTracingPipelineHandle, Result,
-    ShaderModuleDesc, ShaderSource, ShaderStage, SpecializationConstant, SpecializationValue,
+    Context, Dependencies, DeviceProfile, Error, HitGroup, Holder, RayQueryRequest, RayTracingLibraryDesc,
+    RayTracingPipelineDesc, RayTracingPipelineHandle, RayTracingPipelineRequest, Result, ShaderModuleDesc,
+    ShaderSource, ShaderStage, SpecializationConstant, SpecializationValue,
 };
-use lvk_tests::pipeline_paths::lowered_devices;
+use lvk_tests::compute::words_buffer;
+use lvk_tests::device_with;
+use lvk_tests::pipeline_paths::{lowered_devices, pipeline_devices};
 use lvk_tests::shader_groups::{Counts, GroupScene, answering, ray_gen};
 
 /// Returns a pipeline with a miss shader that answers 1, and two ray generation shaders of which the second adds 500.
@@ -44,6 +47,60 @@ fn a_lowered_pipeline_traces_without_pipelines_of_the_device() -> Result<()> {
         assert_eq!(ctx.ray_tracing_stack_bytes(*pipeline)?, 0);
         let raw = ctx.raw_ray_tracing_pipeline(*pipeline);
         assert!(matches!(raw, Err(Error::Unsupported { .. })), "{raw:?}");
+    }
+    Ok(())
+}
+
+/// A hit and a miss of one triangle, as of the sample `triangle`, under each built-in profile, by whatever `Auto` takes there.
+#[test]
+fn the_smallest_pipeline_traces_under_every_profile() -> Result<()> {
+    for name in DeviceProfile::names() {
+        let profile = DeviceProfile::named(name)?;
+        let opened = device_with(|desc| {
+            (desc.ray_query, desc.ray_tracing_pipeline) =
+                (RayQueryRequest::Off, RayTracingPipelineRequest::Auto);
+            desc.profile = Some(&profile);
+        });
+        let Some(ctx) = opened else { continue };
+        let ray_gen = ray_gen(&ctx, "", "0u")?;
+        let miss = answering(&ctx, ShaderStage::Miss, "", "1u")?;
+        let hit = answering(&ctx, ShaderStage::ClosestHit, "", "2u")?;
+        let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+            ray_gen: &[*ray_gen],
+            miss: &[*miss],
+            hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }],
+            ..Default::default()
+        })?;
+        let counts = Counts { hits: 1, misses: 1, callables: 0 };
+        let found = GroupScene::new(&ctx)?.run(*pipeline, 0, counts)?;
+        assert_eq!(found, [2, 1], "{name}: {}", ctx.capabilities().ray_tracing_pipeline_reason);
+    }
+    Ok(())
+}
+
+/// A trace is inside of the label around it on every path: its time counts there.
+#[test]
+fn traces_are_profiled() -> Result<()> {
+    for (path, ctx) in pipeline_devices() {
+        let (scene, pipeline) = (GroupScene::new(&ctx)?, pipeline(&ctx)?);
+        let counts = Counts { hits: 0, misses: 1, callables: 0 };
+        let results = words_buffer(&ctx, &[0]);
+        ctx.set_profiling(true)?;
+        let mut cmd = ctx.acquire_command_buffer()?;
+        for name in ["rays", "nothing"] {
+            cmd.push_label(name);
+            if name == "rays" {
+                scene.bind(&mut cmd, *pipeline, counts, *results)?;
+                let writes = Dependencies { buffers: &[*results], ..Default::default() };
+                cmd.trace_rays([1, 1, 1], &writes)?;
+            }
+            cmd.pop_label();
+        }
+        ctx.wait(ctx.submit(cmd)?)?;
+        let profile = ctx.last_profile()?.expect("the submission was profiled");
+        let scopes: Vec<_> = profile.scopes.iter().map(|scope| (&*scope.name, scope.ms)).collect();
+        let [("rays", rays), ("nothing", nothing)] = scopes[..] else { unreachable!("{path:?}: {scopes:?}") };
+        assert!(rays > nothing, "{path:?}: {rays} and {nothing} ms");
     }
     Ok(())
 }

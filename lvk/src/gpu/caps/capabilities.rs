@@ -23,9 +23,9 @@ pub struct Capabilities {
     pub api_version: (u32, u32, u32),
     /// True if the device is a CPU: it traces and rasterises in software.
     pub is_cpu: bool,
-    /// True for GPUs that are known to have no units for ray tracing, though their driver offers it: NVIDIA's H100 and H200, and others with
-    /// their chip. Vulkan does not tell, so the device's name decides.
-    pub lacks_ray_tracing_units: bool,
+    /// True for GPUs on which lowered ray tracing pipelines were measured to be faster than the driver's: NVIDIA's H100, and others with
+    /// its chip, which has no ray tracing cores. Vulkan does not tell, so the device's name decides.
+    pub prefers_lowered_pipelines: bool,
     /// Ray tracing pipelines can be created and traced.
     /// [`ray_tracing_pipeline_path`](Self::ray_tracing_pipeline_path) is the implementation. In
     /// [`Context::devices`](crate::Context::devices), where no path is selected yet, it is true if the device
@@ -240,7 +240,7 @@ impl Capabilities {
             has_pipelines: self.ray_tracing_pipeline,
             has_queries: self.ray_query,
             query_path: queries.path,
-            is_without_units: self.is_cpu || self.lacks_ray_tracing_units,
+            prefers_lowered: self.is_cpu || self.prefers_lowered_pipelines,
             needs_device: required.iter().any(is_of_device),
         });
         (self.ray_query_path, self.ray_query_reason) = (queries.path, queries.reason);

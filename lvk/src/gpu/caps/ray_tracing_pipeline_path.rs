@@ -12,8 +12,8 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayTracingPipelineRequest {
     /// The device's own pipelines where it has them. Otherwise lowered: onto the library's traversal if ray queries use
-    /// it too, else onto the device's ray queries, else onto the library's traversal. On devices without units for ray tracing (CPUs,
-    /// and [GPUs that are known to have none](crate::Capabilities::lacks_ray_tracing_units)) pipelines are lowered onto the library's
+    /// it too, else onto the device's ray queries, else onto the library's traversal. On CPUs,
+    /// and on [GPUs where it was measured](crate::Capabilities::prefers_lowered_pipelines), pipelines are lowered onto the library's
     /// traversal, which is faster there, unless ray queries of shaders use the device's structures, or a required feature is one of
     /// the device's pipelines. Without the feature `software-ray-query` the library has no traversal.
     #[default]
@@ -70,8 +70,8 @@ pub(crate) struct PathInputs {
     pub(crate) has_queries: bool,
     /// The path that ray queries of shaders take.
     pub(crate) query_path: RayQueryPath,
-    /// The device has no units for ray tracing: it is a CPU, or a GPU that is known to have none.
-    pub(crate) is_without_units: bool,
+    /// The library's traversal is known to be faster than the driver's: on CPUs, and on GPUs where that was measured.
+    pub(crate) prefers_lowered: bool,
     /// The application requires features of ray tracing by the device, which lowered pipelines do not have.
     pub(crate) needs_device: bool,
 }
@@ -119,20 +119,25 @@ impl RayTracingPipelineRequest {
             Self::Auto if has_pipelines && device.needs_device => {
                 (Hardware, "a required feature is that of ray tracing by the device")
             }
-            Self::Auto if is_faster_lowered(device) => (
-                Software,
-                "the device has no units for ray tracing, so the library's own traversal is faster",
-            ),
+            Self::Auto if has_pipelines && is_faster_lowered(device) => {
+                (Software, "on this device the library's own traversal is faster than its pipelines")
+            }
             Self::Auto if has_pipelines => (Hardware, "the device has ray tracing pipelines"),
             Self::Auto if HAS_SOFTWARE && device.query_path == RayQueryPath::Software => (
                 Software,
                 "the device has no ray tracing pipelines of its own, and ray queries are in software as well",
             ),
+            Self::Auto if has_queries && is_faster_lowered(device) => {
+                (Software, "on this device the library's own traversal is faster than its ray queries")
+            }
             Self::Auto if has_queries => {
                 (Query, "the device has no ray tracing pipelines of its own, but ray queries")
             }
             Self::Auto if HAS_SOFTWARE => (Software, LACKS_BOTH),
-            Self::Auto | Self::Software => (None, LACKS_BOTH),
+            Self::Auto | Self::Software => (
+                None,
+                "the device has neither ray tracing pipelines nor ray queries of its own, and lvk lacks its feature `software-ray-query`",
+            ),
         };
         RayTracingPipelineChoice { path, reason }
     }
@@ -141,7 +146,7 @@ impl RayTracingPipelineRequest {
 /// Returns true if pipelines in software are known to be faster than the device's own, and need no structures beside
 /// those of ray queries.
 fn is_faster_lowered(device: PathInputs) -> bool {
-    HAS_SOFTWARE && device.is_without_units && device.query_path != RayQueryPath::Hardware
+    HAS_SOFTWARE && device.prefers_lowered && device.query_path != RayQueryPath::Hardware
 }
 
 #[cfg(test)]
@@ -157,11 +162,11 @@ mod tests {
     fn paths_of(
         request: RayTracingPipelineRequest,
         query_path: RayQueryPath,
-        is_without_units: bool,
+        prefers_lowered: bool,
     ) -> [RayTracingPipelinePath; 3] {
         [(false, false), (false, true), (true, true)].map(|(has_pipelines, has_queries)| {
             let device =
-                PathInputs { has_pipelines, has_queries, query_path, is_without_units, needs_device: false };
+                PathInputs { has_pipelines, has_queries, query_path, prefers_lowered, needs_device: false };
             request.choose(device).path
         })
     }
@@ -200,7 +205,7 @@ mod tests {
 
     #[cfg(feature = "software-ray-query")]
     #[test]
-    fn devices_without_units_lower_unless_queries_use_their_structures() {
+    fn devices_that_prefer_it_lower_unless_queries_use_their_structures() {
         use RayQueryPath as Queries;
         let of = |request, queries| paths_of(request, queries, true);
         for queries in [Queries::None, Queries::Software] {
@@ -216,7 +221,7 @@ mod tests {
             has_pipelines: true,
             has_queries: false,
             query_path: RayQueryPath::None,
-            is_without_units: true,
+            prefers_lowered: true,
             needs_device: true,
         };
         assert_eq!(RayTracingPipelineRequest::Auto.choose(device).path, Hardware);

@@ -10,12 +10,12 @@ use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::features::{Calibration, Features, Subgroups, missing_required};
 use crate::gpu::caps::invocation_reorder::InvocationReorderProperties;
 use crate::gpu::caps::limits::{Limits, MicromapLimits};
+use crate::gpu::caps::lowering_preference;
 use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 use crate::gpu::caps::queues::{QueueFamily, QueueLocation, describe_queues, locate_queues, queue_families};
 use crate::gpu::caps::ray_query_path::RayQueryPath;
 use crate::gpu::caps::ray_tracing_pipeline_path::RayTracingPipelinePath;
-use crate::gpu::caps::ray_tracing_units;
 use crate::gpu::caps::shading_rate::ShadingRateLimits;
 use crate::gpu::caps::subgroup_limits::SubgroupLimits;
 
@@ -54,7 +54,7 @@ impl PhysicalDevice {
                 device_name: device_name(&plain),
                 api_version: version(plain.api_version),
                 is_cpu: plain.device_type == vk::PhysicalDeviceType::CPU,
-                lacks_ray_tracing_units: ray_tracing_units::are_missing(
+                prefers_lowered_pipelines: lowering_preference::is_preferred(
                     plain.vendor_id,
                     &device_name(&plain),
                 ),

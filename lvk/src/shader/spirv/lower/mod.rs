@@ -32,6 +32,7 @@ mod shaders;
 mod simplify;
 mod slots;
 mod split_structs;
+mod stack_size;
 mod stage;
 mod structure_arguments;
 mod switches;

@@ -21,7 +21,7 @@ use super::traces::{TraceVariables, hide_remap_table, is_trace, rewrite_traces, 
 use super::{HitShaders, Lowering, LoweringError, Traversal};
 use crate::shader::ShaderStage;
 
-/// The linked shaders, by their index in [`Lowering::modules`]; shaders that no trace reaches are left out.
+/// The linked shaders, by their index in [`Lowering::modules`]; shaders that no group of the pipeline names are left out.
 pub(super) struct Shaders {
     pub(super) linked: HashMap<usize, Shader>,
     /// Variables with the addresses of the shaders' records.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::emit::Emitter;
 use super::linker::Linker;
+use super::stack_size::value_bytes;
 
 /// Variables of the invocation that hold values of functions, as many of each type as one piece of code needs.
 ///
@@ -40,6 +41,15 @@ impl Slots {
         slots
     }
 
+    /// Returns the bytes of all values, or any number above [`MAX_STACK_BYTES`](super::stack_size::MAX_STACK_BYTES) for more.
+    pub(super) fn bytes(&self, linker: &Linker) -> u32 {
+        let length = self.length.unwrap_or(1);
+        let of_type = |(ty, slots): (&u32, &Vec<u32>)| {
+            value_bytes(linker, *ty).saturating_mul(slots.len() as u32).saturating_mul(length)
+        };
+        self.by_type.iter().map(of_type).fold(0, u32::saturating_add)
+    }
+
     /// Makes all values undefined.
     pub(super) fn forget(&self, emitter: &mut Emitter<'_>) {
         self.by_type.values().flatten().for_each(|slot| emitter.forget(*slot));
@@ -69,5 +79,14 @@ mod tests {
         let stack = Slots::stacks(5).allocate(&mut linker, &[uint])[0];
         let array = linker.array(uint, 5);
         assert_eq!(linker.variable_type(stack), Some(array));
+    }
+
+    #[test]
+    fn each_slot_of_a_stack_counts_at_each_depth() {
+        let mut linker = Linker::new(0x0001_0600);
+        let (uint, pair) = (linker.uint(), linker.uvec2());
+        let mut stacks = Slots::stacks(5);
+        stacks.allocate(&mut linker, &[uint, pair, uint]);
+        assert_eq!(stacks.bytes(&linker), 5 * (4 + 8 + 4));
     }
 }

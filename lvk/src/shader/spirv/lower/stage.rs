@@ -83,6 +83,7 @@ pub(super) fn link_stage(linker: &mut Linker, stage: &StageModule<'_>) -> Result
     let mut module = Module::parse(stage.words)?;
     check_module(&module)?;
     let entry = take_entry(&mut module, stage.stage)?;
+    check_instructions(&module, stage.stage)?;
     freeze_constants(&mut module, stage.specialization);
     join_equal_branches(&mut module);
     let roles = roles(&module, &entry);
@@ -141,6 +142,23 @@ fn check_module(module: &Module) -> Result<(), String> {
         Some(ty) => Err(format!(
             "OpTypeStruct %{ty} is the block of a buffer and the type of a payload, callable data or attributes; declare two types"
         )),
+        None => Ok(()),
+    }
+}
+
+/// Fails for an instruction of ray tracing that the stage does not have: lowered, it would be a call in a circle, or stay in the module.
+fn check_instructions(module: &Module, stage: ShaderStage) -> Result<(), String> {
+    use ShaderStage::{AnyHit, Callable, ClosestHit, Intersection, Miss, RayGen};
+    let mut code = module.functions.iter().flat_map(Function::code);
+    let is_allowed = |op| match op {
+        Op::TraceRayKHR => matches!(stage, RayGen | ClosestHit | Miss),
+        Op::ExecuteCallableKHR => matches!(stage, RayGen | ClosestHit | Miss | Callable),
+        Op::ReportIntersectionKHR => stage == Intersection,
+        Op::IgnoreIntersectionKHR | Op::TerminateRayKHR => stage == AnyHit,
+        _ => true,
+    };
+    match code.find(|inst| !is_allowed(inst.op)) {
+        Some(inst) => Err(format!("Op{:?} is not allowed in a shader of the stage {stage:?}", inst.op)),
         None => Ok(()),
     }
 }

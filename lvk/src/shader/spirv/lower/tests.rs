@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
+use ::spirv::{ExecutionModel, Op};
+
 use super::*;
 use crate::shader::options::{CompileFiles, CompileOptions};
 use crate::shader::{ShaderModuleDesc, ShaderSource, compile};
@@ -407,6 +409,74 @@ fn columns_of_row_major_matrices_are_aligned_as_their_elements() {
 }
 
 /// A module has one memory model, and the traversal has that of GLSL.
+/// Each instruction of ray tracing in a stage that does not have it: words of the right stage, under the name of another.
+#[test]
+fn instructions_of_other_stages_are_refused() {
+    let options = CompileOptions::default();
+    let models = [
+        (ShaderStage::RayGen, ExecutionModel::RayGenerationKHR),
+        (ShaderStage::Miss, ExecutionModel::MissKHR),
+        (ShaderStage::ClosestHit, ExecutionModel::ClosestHitKHR),
+        (ShaderStage::AnyHit, ExecutionModel::AnyHitKHR),
+        (ShaderStage::Intersection, ExecutionModel::IntersectionKHR),
+        (ShaderStage::Callable, ExecutionModel::CallableKHR),
+    ];
+    let trace = "layout(location = 1) rayPayloadEXT vec3 light;
+        void main() { traceRayEXT(kTLAS[0], 0, 0xFF, 0, 0, 0, vec3(0), 0.0, vec3(1), 9.0, 1); }";
+    let call = "layout(location = 1) callableDataEXT vec3 data; void main() { executeCallableEXT(0, 1); }";
+    let report = "void main() { reportIntersectionEXT(1.0, 0u); }";
+    use ShaderStage::{AnyHit, Callable, ClosestHit, Intersection, Miss, RayGen};
+    for (stage, text, op, allowed) in [
+        (RayGen, trace, "OpTraceRayKHR", &[RayGen, Miss, ClosestHit][..]),
+        (RayGen, call, "OpExecuteCallableKHR", &[RayGen, Miss, ClosestHit, Callable]),
+        (Intersection, report, "OpReportIntersectionKHR", &[Intersection]),
+        (AnyHit, "void main() { ignoreIntersectionEXT; }", "OpIgnoreIntersectionKHR", &[AnyHit]),
+        (AnyHit, "void main() { terminateRayEXT; }", "OpTerminateRayKHR", &[AnyHit]),
+    ] {
+        let words = compiled(stage, text, &options);
+        for (other, model) in models {
+            let mut words = words.clone();
+            let entry = words.windows(2).position(|pair| pair[0] & 0xffff == Op::EntryPoint as u32);
+            words[entry.unwrap() + 1] = model as u32;
+            let mut linker = linker::Linker::new(VERSION_1_6);
+            let module = StageModule { name: "shader", stage: other, words: &words, specialization: &[] };
+            match stage::link_stage(&mut linker, &module) {
+                Ok(_) => assert!(allowed.contains(&other), "{op} in {other:?}"),
+                Err(message) => {
+                    let expected = format!("{op} is not allowed in a shader of the stage {other:?}");
+                    assert!(!allowed.contains(&other) && message == expected, "{op} in {other:?}: {message}");
+                }
+            }
+        }
+    }
+}
+
+/// Sixteen kilobytes that are needed behind a trace, at nine levels.
+#[test]
+fn stacks_have_a_limit() {
+    let hit = "layout(location = 0) rayPayloadInEXT vec3 color;
+        void main() {
+            uint kept[4096];
+            for (uint i = 0; i < 4096; ++i) { kept[i] = i * gl_PrimitiveID; }
+            traceRayEXT(kTLAS[0], 0, 0xFF, 0, 1, 0, color, 0.0, vec3(1), 9.0, 0);
+            color.x += float(kept[uint(color.y) & 4095u]);
+        }";
+    let hit = hit.replace("traceRayEXT", "own = color; traceRayEXT").replace("9.0, 0)", "9.0, 1)");
+    let hit = format!("layout(location = 1) rayPayloadEXT vec3 own; {hit}");
+    for (max_recursion, is_lowered) in [(2, true), (8, false)] {
+        let mut pipeline = simple();
+        let place = pipeline.shaders.iter().position(|(stage, _)| *stage == ShaderStage::ClosestHit).unwrap();
+        pipeline.shaders[place].1 = &hit;
+        pipeline.max_recursion = max_recursion;
+        for result in lowered(&pipeline) {
+            assert_eq!(result.is_ok(), is_lowered, "{:?}", result.err());
+            let Err(error) = result else { continue };
+            let words = ["bytes of values at 9 levels", "at most 65536", "lower `max_recursion`"];
+            assert!(words.iter().all(|word| error.message.contains(word)), "{}", error.message);
+        }
+    }
+}
+
 #[test]
 fn shaders_of_the_vulkan_memory_model_are_refused() {
     const MISS: &str = "
