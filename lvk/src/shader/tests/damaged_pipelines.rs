@@ -6,10 +6,25 @@ use super::*;
 use crate::shader::spirv::lower::Traversal;
 use crate::test_support::outside_pipelines::{NAME, SHADERS, lower_with};
 
-/// Lowers the pipeline with other words of the shader `damaged`, and returns whether it could be.
+/// Instructions of ray tracing pipelines, which a compute shader does not have.
+const OF_PIPELINES: [Op; 5] = [
+    Op::TraceRayKHR,
+    Op::ExecuteCallableKHR,
+    Op::ReportIntersectionKHR,
+    Op::IgnoreIntersectionKHR,
+    Op::TerminateRayKHR,
+];
+
+/// True for words of a compute shader.
+fn is_compute(words: &[u32]) -> bool {
+    let is_of_compute = |inst: words::Instruction<'_>| inst.op.is_none_or(|op| !OF_PIPELINES.contains(&op));
+    words::validate(words).is_ok() && words::instructions(words).all(|found| found.is_ok_and(is_of_compute))
+}
+
+/// Lowers the pipeline with other words of the shader `damaged`. Returns true if it is a compute shader, or refused.
 fn lowered(damaged: usize, words: &[u32]) -> bool {
     match lower_with(damaged, words, Traversal::Query) {
-        Ok(words) => words::validate(&words).is_ok(),
+        Ok(words) => is_compute(&words),
         Err(error) => !error.message.is_empty() && error.shader == NAME,
     }
 }
