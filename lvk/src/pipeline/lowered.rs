@@ -91,7 +91,7 @@ impl LoweringJob<'_> {
             why: error.message,
         })?;
         #[cfg(any(test, feature = "test-hooks"))]
-        crate::test_support::kept_modules::keep(&words);
+        crate::test_support::kept_modules::write_module(&words);
         let name = self.name_of(ray_gen);
         let module = ShaderModule::from_lowered(gpu, &name, &words)?;
         let compute = ComputePipelineDesc { debug_name: &name, ..Default::default() };

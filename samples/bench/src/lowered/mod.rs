@@ -28,9 +28,9 @@ const WAYS: [&str; 3] = ["driver's pipeline", "lowered", "by hand"];
 /// Milliseconds of a frame.
 #[derive(Debug, Clone, Copy)]
 struct FrameTimes {
-    /// From the begin of the first pass to the end of the last, on the GPU; with submission and wait for the triangle.
+    /// Time from the begin of the first pass to the end of the last, on the GPU; with submission and wait for the triangle.
     frame: f64,
-    /// Of the passes that trace rays.
+    /// Time of the passes that trace rays.
     rays: f64,
 }
 
