@@ -36,6 +36,8 @@ pub(crate) struct ParsedModule {
     pub(crate) variables: Vec<Variable>,
     decorations: HashMap<(u32, u32), u32>,
     member_decorations: HashMap<(u32, u32, u32), u32>,
+    /// Levels of each type: 1 for a scalar, 0 for one that is only mentioned.
+    nesting: HashMap<u32, u32>,
 }
 
 /// An entry point.
@@ -123,7 +125,7 @@ impl ParsedModule {
             let instruction = instruction?;
             match instruction.op {
                 Some(Op::Function) => break,
-                Some(op) => module.collect(op, &instruction, values),
+                Some(op) => module.collect(op, &instruction, values)?,
                 None => {}
             }
         }
@@ -294,7 +296,7 @@ impl ParsedModule {
         Ok(u64::from(constant.value))
     }
 
-    fn collect(&mut self, op: Op, i: &Instruction<'_>, values: &HashMap<u32, u32>) {
+    fn collect(&mut self, op: Op, i: &Instruction<'_>, values: &HashMap<u32, u32>) -> Result<(), String> {
         match op {
             Op::Capability => _ = self.capabilities.insert(i.operand(0)),
             Op::EntryPoint => self.entries.push(parse_entry_point(i)),
@@ -328,8 +330,9 @@ impl ParsedModule {
             Op::ConstantComposite | Op::SpecConstantComposite => {
                 self.composites.insert(i.operand(1), [i.operand(2), i.operand(3), i.operand(4)]);
             }
-            _ => self.collect_type(op, i),
+            _ => self.collect_type(op, i)?,
         }
+        Ok(())
     }
 
     fn add_constant(&mut self, i: &Instruction<'_>, value: u32, is_spec: bool) {
@@ -364,7 +367,7 @@ impl ParsedModule {
         plain.or_else(|| self.folded.get(&id).copied())
     }
 
-    fn collect_type(&mut self, op: Op, i: &Instruction<'_>) {
+    fn collect_type(&mut self, op: Op, i: &Instruction<'_>) -> Result<(), String> {
         let ty = match op {
             Op::TypeBool => Type::Bool,
             Op::TypeFloat => Type::Number { bytes: i.operand(1).div_ceil(8), numbers: NumericFormat::Float },
@@ -383,9 +386,34 @@ impl ParsedModule {
             }
             Op::TypeImage => parse_image_type(i),
             Op::TypeSampler | Op::TypeSampledImage | Op::TypeAccelerationStructureKHR => Type::Opaque(op),
-            _ => return,
+            _ => return Ok(()),
         };
+        self.count_nesting(i.operand(0), &ty)?;
         self.types.insert(i.operand(0), ty);
+        Ok(())
+    }
+
+    /// Fails for a type that contains itself, or that is nested deeper than [`MAX_NESTING`]: code that follows types into
+    /// their parts ends.
+    fn count_nesting(&mut self, id: u32, ty: &Type) -> Result<(), String> {
+        let parts = match ty {
+            Type::Vector { element: part, .. }
+            | Type::Matrix { column: part, .. }
+            | Type::Array { element: part, .. }
+            | Type::RuntimeArray { element: part } => std::slice::from_ref(part),
+            Type::Struct { members } => members.as_slice(),
+            _ => &[],
+        };
+        let deepest = parts.iter().map(|part| *self.nesting.entry(*part).or_insert(0)).max().unwrap_or(0);
+        if deepest >= MAX_NESTING {
+            return Err(format!("type {id} is nested deeper than {MAX_NESTING} types"));
+        }
+        // A pointer may be declared behind the structs that hold it.
+        let is_late = self.nesting.insert(id, deepest + 1).is_some();
+        if is_late && !matches!(ty, Type::Pointer { .. }) {
+            return Err(format!("type {id} is declared twice, or behind a type that contains it"));
+        }
+        Ok(())
     }
 
     /// Records the target of a pointer type if it is the block of a buffer reference.
@@ -423,6 +451,47 @@ fn parse_image_type(i: &Instruction<'_>) -> Type {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A module of type declarations: opcode and operands of each.
+    fn types(declared: &[(Op, &[u32])]) -> Result<ParsedModule, String> {
+        let mut words = vec![::spirv::MAGIC_NUMBER, words::VERSION_1_4, 0, 1000, 0];
+        for (op, operands) in declared {
+            words.push((operands.len() as u32 + 1) << 16 | *op as u32);
+            words.extend_from_slice(operands);
+        }
+        ParsedModule::parse(&words)
+    }
+
+    #[test]
+    fn types_that_contain_themselves_are_refused() {
+        const FLOAT: (Op, &[u32]) = (Op::TypeFloat, &[1, 32]);
+        let circles: [&[(Op, &[u32])]; 4] = [
+            &[(Op::TypeStruct, &[2, 2])],
+            &[FLOAT, (Op::TypeVector, &[2, 2, 3])],
+            &[FLOAT, (Op::TypeStruct, &[2, 3]), (Op::TypeStruct, &[3, 2])],
+            &[FLOAT, (Op::TypeStruct, &[2, 1]), (Op::TypeArray, &[3, 2, 9]), (Op::TypeStruct, &[2, 3])],
+        ];
+        for declared in circles {
+            assert!(types(declared).unwrap_err().contains("is declared twice, or behind"), "{declared:?}");
+        }
+        let list: &[(Op, &[u32])] = &[
+            (Op::TypeForwardPointer, &[3, StorageClass::PhysicalStorageBuffer as u32]),
+            FLOAT,
+            (Op::TypeStruct, &[2, 1, 3]),
+            (Op::TypePointer, &[3, StorageClass::PhysicalStorageBuffer as u32, 2]),
+        ];
+        assert!(types(list).is_ok(), "structs may lead to themselves by pointers");
+    }
+
+    #[test]
+    fn types_nested_too_deeply_are_refused() {
+        let operands: Vec<[u32; 2]> = (2..=MAX_NESTING).map(|id| [id, id - 1]).collect();
+        let mut nested: Vec<(Op, &[u32])> = vec![(Op::TypeFloat, &[1, 32])];
+        nested.extend(operands.iter().map(|operands| (Op::TypeStruct, &operands[..])));
+        assert!(types(&nested).is_ok());
+        nested.push((Op::TypeStruct, &[MAX_NESTING + 1, MAX_NESTING]));
+        assert_eq!(types(&nested).unwrap_err(), "type 65 is nested deeper than 64 types");
+    }
 
     #[test]
     fn nested_structs_with_matrix_layouts_are_sized_once_each() {

@@ -7,6 +7,8 @@ use super::linker::Linker;
 
 /// Barycentrics of a hit.
 const COUNT: usize = 2;
+/// Most types that are looked at for them. Structs without members have no scalars, however many there are.
+const MAX_PARTS: usize = 64;
 
 /// A scalar within a type: the indices that lead to it, and its own type.
 struct Scalar {
@@ -55,19 +57,41 @@ pub(super) fn emit_barycentrics(emitter: &mut Emitter<'_>, barycentrics: u32, at
 
 /// The first two scalars of a type, in the order of its members.
 fn first_scalars(linker: &Linker, ty: u32) -> Vec<Scalar> {
-    let Some(inst) = linker.global(ty) else { return Vec::new() };
-    let members: Vec<u32> = match inst.op {
-        Op::TypeStruct => inst.operands.iter().skip(1).copied().collect(),
-        Op::TypeVector | Op::TypeMatrix => vec![inst.operand(1); (inst.operand(2) as usize).min(COUNT)],
-        Op::TypeArray => {
-            let length = linker.array_length(ty).unwrap_or(0);
-            vec![inst.operand(1); (length as usize).min(COUNT)]
-        }
-        _ => return vec![Scalar { path: Vec::new(), ty }],
-    };
-    let inside = (0..).zip(members).flat_map(|(index, member)| {
-        let scalars = first_scalars(linker, member).into_iter();
-        scalars.map(move |Scalar { path, ty }| Scalar { path: [vec![index], path].concat(), ty })
-    });
-    inside.take(COUNT).collect()
+    let mut found = Vec::new();
+    let mut waiting = vec![Scalar { path: Vec::new(), ty }];
+    for _ in 0..MAX_PARTS {
+        let Some(part) = waiting.pop().filter(|_| found.len() < COUNT) else { break };
+        let Some(inst) = linker.global(part.ty) else { continue };
+        let element = |count: u32| vec![inst.operand(1); (count as usize).min(COUNT)];
+        let members = match inst.op {
+            Op::TypeStruct => inst.operands.iter().skip(1).take(MAX_PARTS).copied().collect(),
+            Op::TypeVector | Op::TypeMatrix => element(inst.operand(2)),
+            Op::TypeArray => element(linker.array_length(part.ty).unwrap_or(0)),
+            _ => {
+                found.push(part);
+                continue;
+            }
+        };
+        let inside = (0..).zip(members);
+        let inside = inside.map(|(index, ty)| Scalar { path: [&part.path[..], &[index]].concat(), ty });
+        waiting.extend(inside.collect::<Vec<_>>().into_iter().rev());
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scalars_are_found_in_nested_types() {
+        let mut linker = Linker::new(0x0001_0600);
+        let (uint, pair) = (linker.uint(), linker.uvec2());
+        let pairs = linker.array(pair, 3);
+        let paths = |ty| first_scalars(&linker, ty).into_iter().map(|scalar| scalar.path).collect::<Vec<_>>();
+        assert_eq!(paths(uint), [Vec::<u32>::new()]);
+        assert_eq!(paths(pair), [[0], [1]]);
+        assert_eq!(paths(pairs), [[0, 0], [0, 1]]);
+        assert!(paths(0xffff).is_empty(), "no type");
+    }
 }

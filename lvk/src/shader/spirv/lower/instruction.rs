@@ -58,6 +58,11 @@ impl Inst {
         String::from_utf8_lossy(text).into_owned()
     }
 
+    /// True for types, constants, decorations and declarations. Variables and undefined values stand in functions too.
+    pub(super) fn is_global(&self) -> bool {
+        Form::of_global(self.op).is_some()
+    }
+
     /// True for an instruction that ends a block.
     pub(super) fn is_terminator(&self) -> bool {
         matches!(

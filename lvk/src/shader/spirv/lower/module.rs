@@ -216,9 +216,13 @@ impl Module {
                 reader.function = Some(Function { head: inst, parameters: Vec::new(), blocks: Vec::new() });
             }
             Op::FunctionEnd => self.functions.push(reader.function.take().ok_or_else(out_of_place)?),
+            Op::Function => return Err(out_of_place()),
             _ => match &mut reader.function {
-                None if inst.op == Op::Label => return Err(out_of_place()),
+                None if !inst.is_global() => return Err(out_of_place()),
                 None => self.globals.push(inst),
+                Some(_) if inst.is_global() && !matches!(inst.op, Op::Variable | Op::Undef) => {
+                    return Err(format!("Op{:?} stands in a function", inst.op));
+                }
                 Some(function) if inst.op == Op::FunctionParameter => function.parameters.push(inst),
                 Some(function) if inst.op == Op::Label => {
                     function.blocks.push(Block { label: inst.operand(0), code: Vec::new() });
