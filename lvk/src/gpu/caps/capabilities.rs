@@ -225,6 +225,7 @@ impl Capabilities {
     }
 
     /// Enables the requested ray tracing features, by the device or by the library.
+    ///
     /// Features that the application requires, `required`, may need pipelines or structures of the device.
     pub(crate) fn choose_ray_tracing(
         &mut self,

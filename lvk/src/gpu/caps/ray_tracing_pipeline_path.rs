@@ -12,10 +12,11 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayTracingPipelineRequest {
     /// The device's own pipelines where it has them. Otherwise lowered: onto the library's traversal if ray queries use
-    /// it too, else onto the device's ray queries, else onto the library's traversal. On CPUs,
-    /// and on [GPUs where it was measured](crate::Capabilities::prefers_lowered_pipelines), pipelines are lowered onto the library's
-    /// traversal, which is faster there, unless ray queries of shaders use the device's structures, or a required feature is one of
-    /// the device's pipelines. Without the feature `software-ray-query` the library has no traversal.
+    /// it too, else onto the device's ray queries, else onto the library's traversal. On CPUs, and
+    /// on [GPUs where it was measured](crate::Capabilities::prefers_lowered_pipelines), pipelines are lowered onto the
+    /// library's traversal, which is faster there, unless ray queries of shaders use the device's structures, or a
+    /// required feature is one of the device's pipelines. Without the feature `software-ray-query` the library has no
+    /// traversal.
     #[default]
     Auto,
     /// Only devices with `VK_KHR_ray_tracing_pipeline` are considered.

@@ -41,9 +41,10 @@ impl PhysicalDevice {
     pub(crate) fn query(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Result<Self> {
         // SAFETY: `raw` was enumerated from `instance`.
         let plain = unsafe { instance.get_physical_device_properties(raw) };
+        let name = device_name(&plain);
         // SAFETY: as above.
         let extensions = unsafe { instance.enumerate_device_extension_properties(raw) }
-            .map_err(Error::vulkan("vkEnumerateDeviceExtensionProperties", device_name(&plain)))?;
+            .map_err(Error::vulkan("vkEnumerateDeviceExtensionProperties", &name))?;
         let names = extensions.iter().filter_map(|extension| extension.extension_name_as_c_str().ok());
         let families = queue_families(instance, raw);
         let everything = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
@@ -51,13 +52,10 @@ impl PhysicalDevice {
         let mut found = Self {
             raw,
             capabilities: Capabilities {
-                device_name: device_name(&plain),
                 api_version: version(plain.api_version),
                 is_cpu: plain.device_type == vk::PhysicalDeviceType::CPU,
-                prefers_lowered_pipelines: lowering_preference::is_preferred(
-                    plain.vendor_id,
-                    &device_name(&plain),
-                ),
+                prefers_lowered_pipelines: lowering_preference::is_preferred(plain.vendor_id, &name),
+                device_name: name,
                 ..Default::default()
             },
             kind: device_kind(plain.device_type),

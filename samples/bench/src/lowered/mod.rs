@@ -22,8 +22,11 @@ use crate::table::{Table, format_ms, format_ratio};
 /// Frames in which the camera of a sample goes round.
 const ROUND: u32 = 60;
 
-/// The ways to the same picture.
+/// The ways to the same picture, each a column of the table.
 const WAYS: [&str; 4] = ["driver's pipeline", "lowered", "lowered to queries", "by hand"];
+
+/// For each of [`WAYS`] the context and the path of the sample; `None` where the device has no such way.
+type Ways = [Option<(Context, RayPath)>; WAYS.len()];
 
 /// Milliseconds of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -34,13 +37,13 @@ struct FrameTimes {
     rays: f64,
 }
 
-/// Renders the frame with a number.
-type Frames = Box<dyn FnMut(u32) -> Result<FrameTimes, BenchError>>;
+/// Renders the next frame.
+type Frames = Box<dyn FnMut() -> Result<FrameTimes, BenchError>>;
 
-/// A sample: its name, and a function that creates it for a path and a picture of this width and height.
-type SampleRow = (&'static str, fn(&Context, RayPath, [u32; 2]) -> Result<Frames, BenchError>);
+/// Creates a sample for a path and a picture of this width and height.
+type Make = fn(&Context, RayPath, [u32; 2]) -> Result<Frames, BenchError>;
 
-const SAMPLES: [SampleRow; 5] = [
+const SAMPLES: [(&str, Make); 5] = [
     ("hybrid", |ctx, path, size| hybrid(ctx, path, size, Method::Hybrid)),
     ("rtx_hello", |ctx, path, [width, height]| {
         Ok(frames(RtxHello::new(ctx, &RtxConfig { path, width, height }).map_err(RunError::from)?))
@@ -60,82 +63,69 @@ const SAMPLES: [SampleRow; 5] = [
 pub(super) fn measure(setup: &Setup, args: &ImageSizeArgs) -> Result<Table, BenchError> {
     use RayTracingPipelineRequest::{HardwareIfPresent, Off, Query, Software};
     let driver = setup.open_tracing(HardwareIfPresent, RayQueryRequest::Off, None)?;
-    let lowered = setup.open_tracing(Software, RayQueryRequest::Off, None)?;
     let onto_queries = match setup.open_tracing(Query, RayQueryRequest::Off, None) {
         Err(BenchError::Device(lvk::Error::NoDevice { .. })) => None,
         opened => Some(opened?),
     };
-    let by_hand = setup.open_tracing(Off, RayQueryRequest::Software, None)?;
     let size = setup.image_size(&driver, args);
     let runs = setup.runs(&driver, DefaultBy { quick: 1, cpu: 9, gpu: 60 });
+    // A smoke test does with two: the others take the same way.
+    let count = setup.default_for(&driver, DefaultBy { quick: 2, cpu: SAMPLES.len(), gpu: SAMPLES.len() });
     let what = format!("lowered ray tracing pipelines, {}x{}", size[0], size[1]);
     let columns = ["", WAYS[0], WAYS[1], WAYS[2], WAYS[3], "lowered / driver's", "lowered / by hand"];
     let mut table = Table::new(setup.title(&driver, &what), &columns);
-    let has_driver = driver.capabilities().ray_tracing_pipeline;
-    if !has_driver {
-        let device = &driver.capabilities().device_name;
-        table.add_note(format!("the driver's pipelines not measured: {device} has none"));
+    let device = driver.capabilities().device_name.clone();
+    let mut ways = [
+        Some(driver).filter(|ctx| ctx.capabilities().ray_tracing_pipeline).map(by_pipeline),
+        Some(by_pipeline(setup.open_tracing(Software, RayQueryRequest::Off, None)?)),
+        onto_queries.map(by_pipeline),
+        Some((setup.open_tracing(Off, RayQueryRequest::Software, None)?, RayPath::Query)),
+    ];
+    for (way, what) in ways.iter().zip(["the driver's pipelines", "", "pipelines lowered to ray queries", ""])
+    {
+        if way.is_none() {
+            table.add_note(format!("{what} not measured: {device} has none"));
+        }
     }
-    if onto_queries.is_none() {
-        let device = &driver.capabilities().device_name;
-        table.add_note(format!("pipelines lowered to ray queries not measured: {device} has none"));
-    }
-    // A smoke test does with two: the others take the same way.
-    let count = setup.default_for(&driver, DefaultBy { quick: 2, cpu: SAMPLES.len(), gpu: SAMPLES.len() });
     for (name, make) in SAMPLES.into_iter().take(count) {
-        let mut ways =
-            vec![(1, make(&lowered, RayPath::Pipeline, size)?), (3, make(&by_hand, RayPath::Query, size)?)];
-        if let Some(ctx) = &onto_queries {
-            ways.push((2, make(ctx, RayPath::Pipeline, size)?));
-        }
-        if has_driver {
-            ways.push((0, make(&driver, RayPath::Pipeline, size)?));
-        }
-        add_rows(&mut table, name, runs, &mut ways, true)?;
+        let [frame, rays] = medians(&ways, make, size, runs)?;
+        add_row(&mut table, name.to_owned(), frame);
+        add_row(&mut table, format!("{name}, rays"), rays);
     }
-    let mut ways = vec![(1, triangle::frames(&lowered)?)];
-    if let Some(ctx) = &onto_queries {
-        ways.push((2, triangle::frames(ctx)?));
-    }
-    if has_driver {
-        ways.push((0, triangle::frames(&driver)?));
-    }
-    add_rows(&mut table, "triangle, 640x480, until done", runs, &mut ways, false)?;
+    ways[3] = None;
+    let [until_done, _] = medians(&ways, |ctx, _, _| triangle::frames(ctx), size, runs)?;
+    add_row(&mut table, "triangle, 640x480, until done".to_owned(), until_done);
     table.add_note(format!("GPU times, medians of {runs} interleaved frames, each followed by a wait"));
     table.add_note("lowered: to the library's own traversal, as in both ratios");
     table.add_note("until done: from the acquisition of the command buffer until the GPU is done");
     Ok(table)
 }
 
-/// Measures the ways, each with its column, and adds a row for the frame, and one for its rays where other passes take time too.
-fn add_rows(
-    table: &mut Table,
-    name: &str,
-    runs: u32,
-    ways: &mut [(usize, Frames)],
-    has_passes: bool,
-) -> Result<(), BenchError> {
-    let mut counts = [0; WAYS.len()];
-    let samples = interleave_all(ways.len(), runs, |way| {
-        let (column, render) = &mut ways[way];
-        counts[*column] += 1;
-        render(counts[*column])
-    })?;
-    let medians = |of: fn(&FrameTimes) -> f64| {
-        let mut cells = [None; WAYS.len()];
-        for ((column, _), samples) in ways.iter().zip(&samples) {
-            cells[*column] = Some(median_of(samples, of));
-        }
-        cells
-    };
-    add_row(table, name.to_owned(), medians(|times| times.frame));
-    if has_passes {
-        add_row(table, format!("{name}, rays"), medians(|times| times.rays));
-    }
-    Ok(())
+fn by_pipeline(ctx: Context) -> (Context, RayPath) {
+    (ctx, RayPath::Pipeline)
 }
 
-fn add_row(table: &mut Table, name: String, medians: [Option<f64>; WAYS.len()]) {
+/// A time by each of [`WAYS`].
+type Times = [Option<f64>; WAYS.len()];
+
+/// Returns the median times of the frame and of its rays.
+fn medians(ways: &Ways, make: Make, size: [u32; 2], runs: u32) -> Result<[Times; 2], BenchError> {
+    let mut samples = Vec::new();
+    for (column, way) in ways.iter().enumerate() {
+        if let Some((ctx, path)) = way {
+            samples.push((column, make(ctx, *path, size)?));
+        }
+    }
+    let measured = interleave_all(samples.len(), runs, |sample| (samples[sample].1)())?;
+    let mut medians = [Times::default(); 2];
+    for ((column, _), times) in samples.iter().zip(measured) {
+        medians[0][*column] = Some(median_of(&times, |times| times.frame));
+        medians[1][*column] = Some(median_of(&times, |times| times.rays));
+    }
+    Ok(medians)
+}
+
+fn add_row(table: &mut Table, name: String, medians: Times) {
     let ratio = |to: Option<f64>| {
         medians[1].zip(to).map(|(ours, other)| format_ratio(ours / other)).unwrap_or_default()
     };
@@ -158,7 +148,9 @@ fn hybrid(
 
 /// Returns the frames of a sample that is set up.
 fn frames<S: Sample + 'static>(mut sample: S) -> Frames {
-    Box::new(move |frame| {
+    let mut frame = 0;
+    Box::new(move || {
+        frame += 1;
         sample.update(FrameTime::from_frame(frame, ROUND));
         let times = headless::render(&mut sample, &mut |_| {})?.times;
         let traces = |name: &str| name.contains("ray");

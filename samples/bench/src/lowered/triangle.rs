@@ -58,7 +58,7 @@ pub(super) fn frames(ctx: &Context) -> Result<Frames, BenchError> {
         ..RayTracingPipelineDesc::default()
     })?;
     let stopwatch = Stopwatch::new(ctx)?;
-    Ok(Box::new(move |_| {
+    Ok(Box::new(move || {
         let _alive = (&vertices, &blas);
         let times = stopwatch.time(|cmd| {
             cmd.bind_ray_tracing_pipeline(*pipeline)?;

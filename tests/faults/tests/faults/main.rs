@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 mod losses;
+mod messages;
 mod sampled;
-mod told;
 mod whole;
 
 use std::path::PathBuf;

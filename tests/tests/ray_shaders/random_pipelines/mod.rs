@@ -68,20 +68,29 @@ fn random_pipelines_compute_what_the_interpreter_computes() -> Result<()> {
     Ok(())
 }
 
-/// Fails, with a smaller pipeline, if a pipeline computes other results than the interpreter. `optimised`: the number that chooses how
-/// its modules are optimised.
-/// Returns true if results were compared, and false if an invocation takes too many steps.
+/// What came of a pipeline.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Comparison {
+    /// The results are those of the interpreter, and the validation layer is silent.
+    Agrees,
+    /// The results differ, the pipeline is refused, or the validation layer sends messages.
+    Differs,
+    /// An invocation takes too many steps for the interpreter.
+    TooLong,
+    /// A text does not compile, for the reason of the compiler.
+    DoesNotCompile(String),
+}
+
+/// Fails, with a smaller pipeline, if a pipeline computes other results than the interpreter, and if its text does not compile, which is
+/// a mistake of the generator. `optimised`: the number that chooses how its modules are optimised. Returns true if results were
+/// compared, and false if an invocation takes too many steps.
 fn check(ctx: &TestDevice, scene: &Scene, pipeline: Pipeline, optimised: Option<u64>, name: &str) -> bool {
-    if expected(&pipeline).is_none() {
-        return false;
-    }
-    let compiled = modules(ctx, &pipeline, optimised).map(drop);
-    assert!(compiled.is_ok(), "{name}: the generator writes text that does not compile: {compiled:?}");
-    let has_failed = fails(ctx, scene, &pipeline, optimised);
+    let found = compare(ctx, scene, &pipeline, optimised);
     let mut report = String::new();
-    if has_failed {
+    if found == Comparison::Differs {
         eprintln!("{name} fails");
-        let shrunk = shrink::shrunk(pipeline, &|smaller| fails(ctx, scene, smaller, optimised));
+        let differs = |smaller: &Pipeline| compare(ctx, scene, smaller, optimised) == Comparison::Differs;
+        let shrunk = shrink::shrunk(pipeline, &differs);
         report = modules(ctx, &shrunk, optimised)
             .map(|modules| modules.iter().map(|module| module.description()).collect())
             .unwrap_or_default();
@@ -89,8 +98,8 @@ fn check(ctx: &TestDevice, scene: &Scene, pipeline: Pipeline, optimised: Option<
         let messages: Vec<String> = ctx.take_messages().iter().map(ToString::to_string).collect();
         report += &format!("\nfound    {found:?}\nexpected {expected:?}\n{}", messages.join("\n"));
     }
-    assert!(!has_failed, "{name}: {report}");
-    true
+    assert!(matches!(found, Comparison::Agrees | Comparison::TooLong), "{name}: {found:?} {report}");
+    found == Comparison::Agrees
 }
 
 /// The results of the interpreter; `None` if an invocation takes too many steps.
@@ -98,16 +107,16 @@ fn expected(pipeline: &Pipeline) -> Option<Vec<u32>> {
     (0..LAUNCHES).map(|launch| interpreter::run(pipeline, launch)).collect()
 }
 
-/// True if the pipeline is refused, its results differ, or the validation layer sends messages. Text that does not compile is a mistake of the test.
-fn fails(ctx: &TestDevice, scene: &Scene, pipeline: &Pipeline, optimised: Option<u64>) -> bool {
-    let Some(expected) = expected(pipeline) else { return false };
+/// Runs a pipeline and compares its results with those of the interpreter.
+fn compare(ctx: &TestDevice, scene: &Scene, pipeline: &Pipeline, optimised: Option<u64>) -> Comparison {
+    let Some(expected) = expected(pipeline) else { return Comparison::TooLong };
     let launched = launch(ctx, scene, pipeline, optimised);
     if !ctx.take_messages().is_empty() {
-        return true;
+        return Comparison::Differs;
     }
     match launched {
-        Ok(found) => found != expected,
-        Err(Error::Shader { .. }) => false,
-        Err(_) => true,
+        Ok(found) if found == expected => Comparison::Agrees,
+        Err(error @ Error::Shader { .. }) => Comparison::DoesNotCompile(error.to_string()),
+        Ok(_) | Err(_) => Comparison::Differs,
     }
 }

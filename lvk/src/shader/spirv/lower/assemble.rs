@@ -16,7 +16,7 @@ use super::module::{Block, Function, functions_that_reach};
 use super::passed::Passed;
 use super::shaders::Shaders;
 use super::slots::Slots;
-use super::stack_size::MAX_STACK_BYTES;
+use super::stack_size::check_stacks;
 use super::stage::Shader;
 use super::traces::{RAY_FLAG_SKIP_CLOSEST_HIT, TraceVariables, skips_closest_hit};
 use super::{Lowering, LoweringError};
@@ -166,14 +166,7 @@ impl<'a> Assembly<'a> {
             let Some(machine) = &mut self.machine else { continue };
             let is_wait = |inst: &Inst| self.shaders.is_wait(inst);
             let pieces = flatten(self.linker, machine, function, frame, &is_wait).map_err(failed)?;
-            let bytes = machine.stacks.bytes(self.linker);
-            if bytes > MAX_STACK_BYTES {
-                let levels = machine.max_depth + 1;
-                return Err(failed(format!(
-                    "OpTraceRayKHR and OpExecuteCallableKHR keep {bytes} bytes of values at {levels} levels of recursion; at most \
-                     {MAX_STACK_BYTES} are possible: lower `max_recursion` or `max_callable_depth`, or keep smaller arrays behind them"
-                )));
-            }
+            check_stacks(machine.stacks.bytes(self.linker), machine.max_depth + 1).map_err(failed)?;
             self.entries.insert(index, pieces.entry);
             self.pieces.push(pieces);
         }

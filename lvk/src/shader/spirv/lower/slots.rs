@@ -41,7 +41,7 @@ impl Slots {
         slots
     }
 
-    /// Returns the bytes of all values, or any number above [`MAX_STACK_BYTES`](super::stack_size::MAX_STACK_BYTES) for more.
+    /// Returns the bytes of all values, or any number that [`check_stacks`](super::stack_size::check_stacks) refuses for more.
     pub(super) fn bytes(&self, linker: &Linker) -> u32 {
         let length = self.length.unwrap_or(1);
         let of_type = |(ty, slots): (&u32, &Vec<u32>)| {

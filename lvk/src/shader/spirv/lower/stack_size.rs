@@ -7,9 +7,20 @@ use crate::shader::spirv::parsed::MAX_NESTING;
 
 /// Most bytes of the stacks of an invocation. Drivers keep them in memory of the thread, of which CPUs have some megabytes for all invocations that
 /// a thread runs at once.
-pub(super) const MAX_STACK_BYTES: u32 = 64 << 10;
+const MAX_STACK_BYTES: u32 = 64 << 10;
 
-/// Returns the bytes of a value of this type without padding, or any number above [`MAX_STACK_BYTES`] for more.
+/// Fails for stacks of too many bytes at all levels of recursion together. The error is a message.
+pub(super) fn check_stacks(bytes: u32, levels: u32) -> Result<(), String> {
+    if bytes <= MAX_STACK_BYTES {
+        return Ok(());
+    }
+    Err(format!(
+        "OpTraceRayKHR and OpExecuteCallableKHR keep {bytes} bytes of values at {levels} levels of recursion; at most \
+         {MAX_STACK_BYTES} are possible: lower `max_recursion` or `max_callable_depth`, or keep smaller arrays behind them"
+    ))
+}
+
+/// Returns the bytes of a value of this type without padding, or any number that [`check_stacks`] refuses for more.
 pub(super) fn value_bytes(linker: &Linker, ty: u32) -> u32 {
     bytes_within(linker, ty, MAX_NESTING)
 }

@@ -183,16 +183,21 @@ struct Entry {
     interface: Option<HashSet<u32>>,
 }
 
-/// Takes the entry points and their modes out, with the functions that its own does not reach, and returns that of the stage.
-fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<Entry, String> {
-    let model = match stage {
+/// Returns the execution model of a stage of ray tracing pipelines.
+pub(super) fn execution_model(stage: ShaderStage) -> ExecutionModel {
+    match stage {
         ShaderStage::RayGen => ExecutionModel::RayGenerationKHR,
         ShaderStage::Miss => ExecutionModel::MissKHR,
         ShaderStage::ClosestHit => ExecutionModel::ClosestHitKHR,
         ShaderStage::AnyHit => ExecutionModel::AnyHitKHR,
         ShaderStage::Intersection => ExecutionModel::IntersectionKHR,
         _ => ExecutionModel::CallableKHR,
-    };
+    }
+}
+
+/// Takes the entry points and their modes out, with the functions that its own does not reach, and returns that of the stage.
+fn take_entry(module: &mut Module, stage: ShaderStage) -> Result<Entry, String> {
+    let model = execution_model(stage);
     let entries = std::mem::take(&mut module.entry_points);
     module.modes.clear();
     let is_main = |entry: &&Inst| {

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
 
-use ::spirv::{ExecutionModel, Op};
+use ::spirv::Op;
 
 use super::*;
 use crate::shader::options::{CompileFiles, CompileOptions};
@@ -408,19 +408,10 @@ fn columns_of_row_major_matrices_are_aligned_as_their_elements() {
     }
 }
 
-/// A module has one memory model, and the traversal has that of GLSL.
 /// Each instruction of ray tracing in a stage that does not have it: words of the right stage, under the name of another.
 #[test]
 fn instructions_of_other_stages_are_refused() {
     let options = CompileOptions::default();
-    let models = [
-        (ShaderStage::RayGen, ExecutionModel::RayGenerationKHR),
-        (ShaderStage::Miss, ExecutionModel::MissKHR),
-        (ShaderStage::ClosestHit, ExecutionModel::ClosestHitKHR),
-        (ShaderStage::AnyHit, ExecutionModel::AnyHitKHR),
-        (ShaderStage::Intersection, ExecutionModel::IntersectionKHR),
-        (ShaderStage::Callable, ExecutionModel::CallableKHR),
-    ];
     let trace = "layout(location = 1) rayPayloadEXT vec3 light;
         void main() { traceRayEXT(kTLAS[0], 0, 0xFF, 0, 0, 0, vec3(0), 0.0, vec3(1), 9.0, 1); }";
     let call = "layout(location = 1) callableDataEXT vec3 data; void main() { executeCallableEXT(0, 1); }";
@@ -434,10 +425,10 @@ fn instructions_of_other_stages_are_refused() {
         (AnyHit, "void main() { terminateRayEXT; }", "OpTerminateRayKHR", &[AnyHit]),
     ] {
         let words = compiled(stage, text, &options);
-        for (other, model) in models {
+        for other in [RayGen, Miss, ClosestHit, AnyHit, Intersection, Callable] {
             let mut words = words.clone();
             let entry = words.windows(2).position(|pair| pair[0] & 0xffff == Op::EntryPoint as u32);
-            words[entry.unwrap() + 1] = model as u32;
+            words[entry.unwrap() + 1] = stage::execution_model(other) as u32;
             let mut linker = linker::Linker::new(VERSION_1_6);
             let module = StageModule { name: "shader", stage: other, words: &words, specialization: &[] };
             match stage::link_stage(&mut linker, &module) {
@@ -454,19 +445,20 @@ fn instructions_of_other_stages_are_refused() {
 /// Sixteen kilobytes that are needed behind a trace, at nine levels.
 #[test]
 fn stacks_have_a_limit() {
-    let hit = "layout(location = 0) rayPayloadInEXT vec3 color;
+    const HIT: &str = "
+        layout(location = 0) rayPayloadInEXT vec3 color;
+        layout(location = 1) rayPayloadEXT vec3 own;
         void main() {
             uint kept[4096];
             for (uint i = 0; i < 4096; ++i) { kept[i] = i * gl_PrimitiveID; }
-            traceRayEXT(kTLAS[0], 0, 0xFF, 0, 1, 0, color, 0.0, vec3(1), 9.0, 0);
+            own = color;
+            traceRayEXT(kTLAS[0], 0, 0xFF, 0, 1, 0, color, 0.0, vec3(1), 9.0, 1);
             color.x += float(kept[uint(color.y) & 4095u]);
         }";
-    let hit = hit.replace("traceRayEXT", "own = color; traceRayEXT").replace("9.0, 0)", "9.0, 1)");
-    let hit = format!("layout(location = 1) rayPayloadEXT vec3 own; {hit}");
     for (max_recursion, is_lowered) in [(2, true), (8, false)] {
         let mut pipeline = simple();
         let place = pipeline.shaders.iter().position(|(stage, _)| *stage == ShaderStage::ClosestHit).unwrap();
-        pipeline.shaders[place].1 = &hit;
+        pipeline.shaders[place].1 = HIT;
         pipeline.max_recursion = max_recursion;
         for result in lowered(&pipeline) {
             assert_eq!(result.is_ok(), is_lowered, "{:?}", result.err());
@@ -477,6 +469,7 @@ fn stacks_have_a_limit() {
     }
 }
 
+/// A module has one memory model, and the traversal has that of GLSL.
 #[test]
 fn shaders_of_the_vulkan_memory_model_are_refused() {
     const MISS: &str = "

@@ -1,4 +1,4 @@
-//! What a run tells of a fault: the command, the object and the cause; and what a context does where its end fails.
+//! Messages of runs with a fault: the command, the object and the cause. The end of a context whose waits fail.
 
 use std::collections::BTreeSet;
 
