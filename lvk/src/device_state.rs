@@ -418,7 +418,8 @@ fn persistent_wait(
 }
 
 /// Waits for a minute at most until `is_done`, where a wait of the device fails. Questions that fail for
-/// want of memory too are asked again for a second. Returns false if the work never was done, or it cannot be known.
+/// want of memory too are asked again for a second. Returns true if the device no longer uses any object: the work is done, or the
+/// device is lost. Returns false if the work never was done, or it cannot be known.
 fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl FnMut(Duration)) -> bool {
     const PAUSE: Duration = Duration::from_millis(20);
     const TRIES: usize = 3_000;
@@ -433,7 +434,8 @@ fn wait_by_polling(mut is_done: impl FnMut() -> Result<bool>, mut pause: impl Fn
             {
                 failures += 1;
             }
-            Err(_) => return false,
+            // A lost device uses no objects.
+            Err(error) => return matches!(error, Error::DeviceLost { .. }),
         }
         pause(PAUSE);
     }
@@ -460,6 +462,11 @@ mod tests {
         assert_eq!(polled(&[Ok(true)]), (true, 0));
         assert_eq!(polled(&[Ok(false), short, Ok(true)]), (true, 2));
         assert_eq!(polled(&[Ok(false), Err(vk::Result::ERROR_UNKNOWN)]), (false, 1));
+        assert_eq!(
+            polled(&[short, Err(vk::Result::ERROR_DEVICE_LOST)]),
+            (true, 1),
+            "a lost device uses no objects"
+        );
         assert_eq!(polled(&[short]), (false, 50));
         assert_eq!(polled(&[Ok(false)]), (false, 3_000));
     }

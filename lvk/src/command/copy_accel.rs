@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
+use super::open_build::OpenBuild;
 use crate::accel::AccelStruct;
 use crate::accel::blas::BlasStructures;
 use crate::accel::compaction::CompactedSizeQuery;
@@ -130,9 +131,10 @@ impl CommandBuffer {
     }
 
     /// Prepares a BLAS whose parts were all deserialized for rebuilds and refits. Frees the inputs of builds if the
-    /// BLAS allows neither.
+    /// BLAS allows neither. The BLAS counts as built once this is submitted.
     pub(crate) fn prepare_deserialized(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
-        let body = target.blas()?.structures();
+        let (build, body) = OpenBuild::for_blas(target)?;
+        self.state.open_builds.push(build);
         if may_be_rebuilt(target, &body) {
             // A refit reads the same indices as the build did.
             return self.gather_inputs(std::iter::once((&**target, false)));

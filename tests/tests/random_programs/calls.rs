@@ -311,11 +311,10 @@ impl World<'_> {
         if self.blas.iter().filter(|blas| blas.holder.is_some()).count() >= MOST / 2 {
             return Ok(false);
         }
-        let (is_updatable, can_compact) = (n[1] & 1 == 1, n[1] & 2 == 2);
         let mut flags =
             [BuildFlags::FAST_TRACE, BuildFlags::FAST_BUILD, BuildFlags::LOW_MEMORY][usize::from(n[2] % 3)];
-        flags.set(BuildFlags::ALLOW_UPDATE, is_updatable);
-        flags.set(BuildFlags::ALLOW_COMPACTION, can_compact);
+        flags.set(BuildFlags::ALLOW_UPDATE, n[1] & 1 == 1);
+        flags.set(BuildFlags::ALLOW_COMPACTION, n[1] & 2 == 2);
         let mut problems: Vec<_> = mesh.problem.into_iter().collect();
         if n[3] % 24 == 23 {
             flags |= BuildFlags::FAST_TRACE | BuildFlags::FAST_BUILD;
@@ -333,8 +332,7 @@ impl World<'_> {
         if let (Some(holder), Some(mesh)) = (judge(made, &problems)?, mesh.live) {
             self.memory.blas.push(Blas { mesh, ..Default::default() });
             self.memory.apply(&Effect::Build { blas: self.blas.len() });
-            let info = BlasInfo { mesh, is_updatable, can_compact, was_compacted: false };
-            self.blas.push(Object::new(holder, info));
+            self.blas.push(Object::new(holder, BlasInfo { mesh, flags, was_compacted: false }));
         }
         Ok(true)
     }
@@ -369,7 +367,7 @@ impl World<'_> {
     pub(super) fn compact(&mut self, n: [u16; 6]) -> Outcome {
         let Some(blas) = self.pick_blas(n[0]) else { return Ok(false) };
         let mut problems: Vec<_> = blas.problem.into_iter().collect();
-        if blas.live.is_some_and(|number| !self.blas[number].info.can_compact) {
+        if blas.live.is_some_and(|number| !self.blas[number].info.can_compact()) {
             problems.push(Problem::Usage);
         }
         self.record_problems(&problems);

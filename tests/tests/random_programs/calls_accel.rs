@@ -82,10 +82,52 @@ impl World<'_> {
         self.memory.blas.push(Blas { mesh, ..Default::default() });
         let effect = Effect::Build { blas: self.blas.len() };
         self.memory.apply(&self.env.expected(Kind::CreateBlasBatch, effect));
-        let is_updatable = flags.contains(BuildFlags::ALLOW_UPDATE);
-        let can_compact = flags.contains(BuildFlags::ALLOW_COMPACTION);
-        let info = BlasInfo { mesh, is_updatable, can_compact, was_compacted: false };
-        self.blas.push(Object::new(holder, info));
+        self.blas.push(Object::new(holder, BlasInfo { mesh, flags, was_compacted: false }));
+    }
+
+    /// Serialises a BLAS, and loads the bytes as another one of the same mesh. Now and then the bytes are damaged, or the
+    /// description has other flags.
+    pub(super) fn reload_blas(&mut self, n: [u16; 6]) -> Outcome {
+        let Some(blas) = self.pick_blas(n[0]) else { return Ok(false) };
+        if self.blas.iter().filter(|blas| blas.holder.is_some()).count() >= MOST / 2 {
+            return Ok(false);
+        }
+        let problems: Vec<_> = blas.problem.into_iter().collect();
+        self.record_problems(&problems);
+        let serialized = judge(self.ctx().serialize_blas(blas.handle), &problems)?;
+        let (Some(mut bytes), Some(number)) = (serialized, blas.live) else { return Ok(true) };
+        let mut info = self.blas[number].info;
+        let mesh = &self.meshes[info.mesh];
+        // Software ray queries get a BVH of what the mesh holds now.
+        if self.memory.blas[number].depths != self.memory.meshes[info.mesh] {
+            return Ok(false);
+        }
+        let mut problems: Vec<_> = mesh.holder.is_none().then_some(Problem::Stale).into_iter().collect();
+        match n[1] % 8 {
+            6 => info.flags.toggle(BuildFlags::ALLOW_UPDATE),
+            7 => {
+                let at = usize::from(n[2]) % bytes.len();
+                bytes[at] ^= 1 << (n[3] % 8);
+            }
+            _ => {}
+        }
+        problems.extend((n[1] % 8 >= 6).then_some(Problem::Serialized));
+        let geometries = [BlasGeometry::Triangles(Triangles::packed(mesh.handle, 3 * mesh.info as u32))];
+        let desc = BlasDesc {
+            geometries: &geometries,
+            flags: info.flags,
+            debug_name: "random BLAS",
+            ..Default::default()
+        };
+        self.record_problems(&problems);
+        // SAFETY: the bytes come from `serialize_blas`; a flipped bit is damage that the checksum detects.
+        let loaded = unsafe { self.ctx().load_blas(&desc, &bytes) };
+        if let Some(holder) = judge(loaded, &problems)? {
+            let depths = self.memory.blas[number].depths.clone();
+            self.memory.blas.push(Blas { mesh: info.mesh, depths, version: 1 });
+            self.blas.push(Object::new(holder, info));
+        }
+        Ok(true)
     }
 
     /// Requests compaction of up to three structures, which may be one several times. One that is wrong fails them all.
@@ -94,7 +136,7 @@ impl World<'_> {
         for at in 0..usize::from(n[0] % 4) {
             let Some(blas) = self.pick_blas(n[1 + at]) else { return Ok(false) };
             problems.extend(blas.problem);
-            let can_compact = blas.live.is_none_or(|number| self.blas[number].info.can_compact);
+            let can_compact = blas.live.is_none_or(|number| self.blas[number].info.can_compact());
             problems.extend((!can_compact).then_some(Problem::Usage));
             handles.push(blas.handle);
             numbers.extend(blas.live);

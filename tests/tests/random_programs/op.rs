@@ -91,6 +91,7 @@ pub enum Kind {
     CountSamples,
     UpdateTlasFromBuffer,
     WrongStructure,
+    ReloadBlas,
 }
 
 /// Kinds that record a command, of which `RecordOnThreads` chooses. Kept programs need this table as it is: newer kinds
@@ -142,7 +143,7 @@ const RECORDED_LATER: [(Kind, u16); 13] = [
 ];
 
 /// Calls of the context.
-const CALLED: [(Kind, u16); 46] = [
+const CALLED: [(Kind, u16); 47] = [
     (Kind::CreateBuffer, 4),
     (Kind::DestroyBuffer, 2),
     (Kind::UploadBuffer, 5),
@@ -189,6 +190,7 @@ const CALLED: [(Kind, u16); 46] = [
     (Kind::CreateVolume, 1),
     (Kind::ReadQueries, 3),
     (Kind::RecordAnyOnThreads, 1),
+    (Kind::ReloadBlas, 1),
 ];
 
 /// An operation.

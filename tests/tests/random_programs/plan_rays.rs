@@ -55,13 +55,13 @@ impl World<'_> {
             let Some(number) = blas.live else { continue };
             let info = &self.blas[number].info;
             // Whether a compaction is done yet, and with it the outcome of a rebuild, depends on the time.
-            if info.was_compacted && !(info.is_updatable && mode != BuildMode::Rebuild) {
+            if info.was_compacted && !(info.is_updatable() && mode != BuildMode::Rebuild) {
                 return None;
             }
             if self.meshes[info.mesh].holder.is_none() {
                 problems.push(Problem::Stale);
             }
-            if mode == BuildMode::Refit && !info.is_updatable {
+            if mode == BuildMode::Refit && !info.is_updatable() {
                 problems.push(Problem::Usage);
             }
         }

@@ -95,6 +95,7 @@ impl World<'_> {
             Kind::MapBuffer => self.map_buffer(n),
             Kind::CreateBlasBatch => self.create_blas_batch(n),
             Kind::CompactSeveral => self.compact_several(n),
+            Kind::ReloadBlas => self.reload_blas(n),
             Kind::AskAccel => self.ask_accel(n),
             Kind::AskContext => self.ask_context(n),
             Kind::AskRaw => self.ask_raw(n),

@@ -145,7 +145,7 @@ fn unseen(total: &Tally) -> Vec<(Kind, Option<Problem>)> {
         Kind::DrawCounted,
         Kind::WrongStructure,
     ];
-    const OF_BLAS: [Kind; 9] = [
+    const OF_BLAS: [Kind; 10] = [
         Kind::CreateTlas,
         Kind::UpdateTlas,
         Kind::UpdateTlasFromBuffer,
@@ -154,6 +154,7 @@ fn unseen(total: &Tally) -> Vec<(Kind, Option<Problem>)> {
         Kind::CompactSeveral,
         Kind::AccelInfo,
         Kind::AskAccel,
+        Kind::ReloadBlas,
         Kind::WrongStructure,
     ];
     let kinds = Kind::all().filter(|kind| !WITHOUT_PROBLEM.contains(kind)).map(|kind| (kind, None));

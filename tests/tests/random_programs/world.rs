@@ -3,9 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use lvk::{
-    AccelStructHandle, AddressMode, BufferHandle, BufferUsage, CommandBuffer, Context, Destroy, Error,
-    Format, Holder, MemoryKind, Queue, RayTracingPipelineHandle, Readback, SamplerHandle, SubmitHandle,
-    TextureHandle, TextureUsage,
+    AccelStructHandle, AddressMode, BufferHandle, BufferUsage, BuildFlags, CommandBuffer, Context, Destroy,
+    Error, Format, Holder, MemoryKind, Queue, RayTracingPipelineHandle, Readback, SamplerHandle,
+    SubmitHandle, TextureHandle, TextureUsage,
 };
 
 use super::cell::Cell;
@@ -36,6 +36,8 @@ pub enum Problem {
     WrongQueue,
     /// A shader record does not fit its block.
     Record,
+    /// Serialised bytes are damaged, or of another description.
+    Serialized,
 }
 
 impl Problem {
@@ -48,6 +50,7 @@ impl Problem {
             Self::Unsupported => matches!(error, Error::Unsupported { .. }),
             Self::WrongQueue => matches!(error, Error::WrongQueue { .. }),
             Self::Record => matches!(error, Error::ShaderRecord { .. }),
+            Self::Serialized => matches!(error, Error::Serialized { .. }),
         }
     }
 }
@@ -152,9 +155,18 @@ pub struct TextureInfo {
 #[derive(Debug, Clone, Copy)]
 pub struct BlasInfo {
     pub mesh: usize,
-    pub is_updatable: bool,
-    pub can_compact: bool,
+    pub flags: BuildFlags,
     pub was_compacted: bool,
+}
+
+impl BlasInfo {
+    pub fn is_updatable(&self) -> bool {
+        self.flags.contains(BuildFlags::ALLOW_UPDATE)
+    }
+
+    pub fn can_compact(&self) -> bool {
+        self.flags.contains(BuildFlags::ALLOW_COMPACTION)
+    }
 }
 
 /// Properties of a TLAS in the model. The number of the TLAS is that of its contents.

@@ -143,6 +143,8 @@ fn loaded_structures_are_hit_like_built_ones() -> Result<()> {
                 &mine.tlas_of(&ctx, &loaded.blas)?,
                 &mine.scene,
             )?;
+            let progress = ctx.build_progress(&[*loaded.blas])?;
+            assert_eq!((progress.built, progress.total), (1, 1), "{what}: the GPU has it");
         }
     }
     Ok(())

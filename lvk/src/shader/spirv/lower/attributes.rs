@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scalars_are_found_in_nested_types() {
+    fn scalars_of_nested_types_have_their_paths() {
         let mut linker = Linker::new(0x0001_0600);
         let (uint, pair) = (linker.uint(), linker.uvec2());
         let pairs = linker.array(pair, 3);
