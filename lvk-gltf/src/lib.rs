@@ -6,6 +6,7 @@
 //!
 //! What a file has and the model leaves out is listed in [`Model::warnings`]. Files are not trusted: a file that breaks
 //! the format's rules is an [`Error`], and never a panic, and the memory of a load has a bound ([`MemoryLimit`]).
+#![forbid(unsafe_code)]
 
 mod animation;
 mod bounds;
