@@ -393,6 +393,18 @@ fn cpu_overhead_is_compared_with_its_limits() {
     assert_positive(&table, "- library share", 0..1);
     assert_positive(&table, "dispatch after", 0..2);
     assert_positive(&table, "empty submission", 0..2);
+    assert_positive(&table, "resident memory with the first context", 0..1);
+    assert_positive(&table, "TLAS refit recorded", 0..1);
+    assert_positive(&table, "- first refit of each of 16 TLAS", 0..1);
+    for of_objects in
+        ["buffer created + destroyed", "texture created + destroyed", "texture created among 60"]
+    {
+        assert_positive(&table, of_objects, 0..2);
+    }
+    assert_positive(&table, "50 uploads of 4 KiB", 0..2);
+    for counted in ["heap allocations per draw", "heap allocations per frame"] {
+        assert!(number(&row(&table, counted)[0]) < 1.0, "{table}");
+    }
     assert!(table.contains("60 ms") && !table.contains("NaN"), "{table}");
 }
 
