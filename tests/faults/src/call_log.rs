@@ -12,12 +12,14 @@ pub struct Call {
     pub command: String,
     /// Errors that the command may answer, in a run without a fault.
     pub errors: Vec<FaultError>,
+    /// True if the layer has made the call fail.
+    pub fails: bool,
 }
 
 /// Content of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CallLog {
-    /// The calls. A run with a fault has those of the command of the fault alone.
+    /// The calls, in order.
     pub calls: Vec<Call>,
     /// True if the call that was to fail was reached.
     pub reached: bool,
@@ -35,6 +37,10 @@ pub struct CallLog {
     pub orphaning: usize,
     /// Types of objects that were destroyed though they were not alive.
     pub dead: BTreeSet<String>,
+    /// Commands that used a command buffer which an earlier call had not begun or reset, because it had failed.
+    pub unready: BTreeSet<String>,
+    /// Names that were given to objects, and those of physical devices, as errors show them.
+    pub names: BTreeSet<String>,
     /// What the process held at its end.
     pub leftovers: Option<Leftovers>,
 }
@@ -45,15 +51,27 @@ impl CallLog {
     pub fn parse(text: &str) -> Self {
         let mut log = Self::default();
         for line in text.lines() {
+            // A name may have several spaces.
+            if let Some(name) = line.strip_prefix("name ") {
+                log.names.insert(name.to_owned());
+                continue;
+            }
             let mut words = line.split_whitespace();
             match words.next() {
                 Some("call") => log.calls.extend(words.next().map(|command| Call {
                     command: command.to_owned(),
                     errors: words.filter_map(FaultError::named).collect(),
+                    fails: false,
                 })),
+                Some("fails") => {
+                    if let Some(command) = words.next().map(str::to_owned) {
+                        log.failed.insert(command.clone());
+                        log.calls.push(Call { command, errors: Vec::new(), fails: true });
+                    }
+                }
                 Some("fault") => log.reached = true,
-                Some("failed") => log.failed.extend(words.next().map(str::to_owned)),
                 Some("dead") => log.dead.extend(words.next().map(str::to_owned)),
+                Some("unready") => log.unready.extend(words.next().map(str::to_owned)),
                 Some("left") => log.leftovers = Leftovers::parse(words),
                 Some("told") => log.told_others.extend(words.next().map(str::to_owned)),
                 Some("live") => {
@@ -83,14 +101,19 @@ pub(crate) fn call_line(command: &str, errors: &[FaultError]) -> String {
     errors.iter().fold(format!("call {command}"), |line, error| format!("{line} {}", error.name()))
 }
 
-/// Returns the line for the call that fails.
+/// Returns the line that says that the call of the fault was reached.
 pub(crate) fn fault_line(command: &str) -> String {
     format!("fault {command}")
 }
 
-/// Returns the line for a command of which a call fails for the first time.
-pub(crate) fn failed_line(command: &str) -> String {
-    format!("failed {command}")
+/// Returns the line for a call that is made to fail.
+pub(crate) fn fails_line(command: &str) -> String {
+    format!("fails {command}")
+}
+
+/// Returns the line for the name of an object.
+pub(crate) fn name_line(name: &str) -> String {
+    format!("name {name}")
 }
 
 /// Returns the line for a call on a lost device, by another thread than that of the fault.
@@ -106,6 +129,11 @@ pub(crate) fn live_line(live: &BTreeMap<&'static str, usize>) -> String {
 /// Returns the line for an object that is destroyed though it is not alive.
 pub(crate) fn dead_line(kind: &str) -> String {
     format!("dead {kind}")
+}
+
+/// Returns the line for a command that uses a command buffer which is not ready.
+pub(crate) fn unready_line(command: &str) -> String {
+    format!("unready {command}")
 }
 
 /// Returns the line for what a process holds at its end.
@@ -125,8 +153,18 @@ fn counts_line(word: &str, objects: &BTreeMap<&'static str, usize>) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// Returns the calls of a text, as in `vkCreateBuffer! vkCreateBuffer`, where the first fails.
+    pub(crate) fn calls(text: &str) -> Vec<Call> {
+        let call = |word: &str| Call {
+            command: word.trim_end_matches('!').to_owned(),
+            errors: Vec::new(),
+            fails: word.ends_with('!'),
+        };
+        text.split_whitespace().map(call).collect()
+    }
 
     #[test]
     fn lines_come_back_and_the_last_live_objects_count() {
@@ -136,19 +174,26 @@ mod tests {
             call_line("vkQueueSubmit2", &errors),
             live_line(&BTreeMap::from([("VkInstance", 1)])),
             fault_line("vkCreateBuffer"),
-            failed_line("vkCreateBuffer"),
+            fails_line("vkCreateBuffer"),
             told_line("vkWaitSemaphores"),
             told_line("vkWaitSemaphores"),
-            failed_line("vkWaitSemaphores"),
+            fails_line("vkWaitSemaphores"),
+            fails_line("vkWaitSemaphores"),
+            name_line("height map,  rough"),
             live_line(&BTreeMap::from([("VkInstance", 0), ("VkBuffer", 2)])),
             orphans_line(&BTreeMap::from([("VkFence", 1)])),
             orphans_line(&BTreeMap::from([("VkFence", 2), ("VkImage", 1)])),
             dead_line("VkQueryPool"),
+            unready_line("vkEndCommandBuffer"),
             left_line(&left),
             "ca".to_owned(),
         ];
+        let mut calls = calls("vkQueueSubmit2 vkCreateBuffer! vkWaitSemaphores! vkWaitSemaphores!");
+        calls[0].errors = errors.to_vec();
         let expected = CallLog {
-            calls: vec![Call { command: "vkQueueSubmit2".into(), errors: errors.to_vec() }],
+            calls,
+            unready: BTreeSet::from(["vkEndCommandBuffer".to_owned()]),
+            names: BTreeSet::from(["height map,  rough".to_owned()]),
             reached: true,
             failed: ["vkCreateBuffer", "vkWaitSemaphores"].map(str::to_owned).into(),
             told_others: BTreeSet::from(["vkWaitSemaphores".to_owned()]),

@@ -33,6 +33,8 @@ pub(super) struct Table {
     pub(super) finish: Option<(vk::PFN_vkDeviceWaitIdle, vk::Device)>,
     /// `vkGetPhysicalDeviceFeatures2` of the next layer, for an instance.
     pub(super) features: usize,
+    /// `vkGetPhysicalDeviceProperties` of the next layer, for an instance.
+    pub(super) properties: usize,
     /// `vkGetBufferDeviceAddress` of the next layer, for a device.
     pub(super) buffer_address: usize,
     /// True for a device that a fault has lost.
@@ -77,6 +79,7 @@ impl Table {
             destroy: find(destroy),
             finish: None,
             features: of_level("vkGetPhysicalDeviceFeatures2"),
+            properties: of_level("vkGetPhysicalDeviceProperties"),
             buffer_address: of_level("vkGetBufferDeviceAddress"),
             lost: AtomicBool::new(false),
             submissions: AtomicUsize::new(0),

@@ -1,6 +1,7 @@
 //! Counts calls and live objects of the process, and says which call fails.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::ffi::CStr;
 use std::fs::File;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,7 +9,10 @@ use std::sync::{LazyLock, Mutex, OnceLock, PoisonError};
 use std::thread::ThreadId;
 
 use ash::vk;
+use ash::vk::Handle;
+use lvk::readable_bytes;
 
+use super::command_buffers::CommandBuffers;
 use super::commands::{Creates, DATED, LOST, SURFACE};
 use super::dispatch::{COMMANDS, table_of};
 use crate::call_log;
@@ -44,7 +48,9 @@ struct Counts {
     calls: HashMap<&'static str, u32>,
     /// Live objects by the handle of their device or instance, and by kind.
     live: BTreeMap<(u64, &'static str), Handles>,
-    failed: BTreeSet<&'static str>,
+    command_buffers: CommandBuffers,
+    /// Names that are in the log.
+    names: BTreeSet<String>,
 }
 
 impl Injector {
@@ -81,21 +87,14 @@ impl Injector {
             table.submissions.fetch_add(1, Ordering::SeqCst);
         }
         let is_lost = table.as_ref().is_some_and(|table| table.lost.load(Ordering::SeqCst));
-        let fault = self.called_by_name(command.name, command.answers);
-        if let Some(table) = submission.filter(|_| fault.is_some() || is_lost) {
+        let error = self.error_of_call(command.name, command.answers, is_lost);
+        if let Some(table) = submission.filter(|_| error.is_some()) {
             table.submissions.fetch_sub(1, Ordering::SeqCst);
         }
-        if fault == Some(vk::Result::ERROR_DEVICE_LOST) && !is_lost {
+        if error == Some(FaultError::DeviceLost) && !is_lost {
             table.inspect(|table| table.lose());
         }
-        if fault.is_some() || !is_lost || command.answers & LOST == 0 {
-            return fault;
-        }
-        if self.thread.get() != Some(&std::thread::current().id()) {
-            self.write(&call_log::told_line(command.name));
-        }
-        self.log_failed(command.name);
-        Some(vk::Result::ERROR_DEVICE_LOST)
+        error.map(result_of)
     }
 
     /// True for a presentation to a surface that is lost or has changed: Vulkan still executes its waits for semaphores.
@@ -112,44 +111,123 @@ impl Injector {
         }
     }
 
-    /// Logs a command the first time that a call of it fails.
-    fn log_failed(&self, name: &'static str) {
-        if self.counts().failed.insert(name) {
-            self.write(&call_log::failed_line(name));
-        }
-    }
-
     /// Counts a call of a command that may give `answers`. Returns the error if the call is to fail.
     pub(super) fn called_by_name(&self, name: &'static str, answers: u8) -> Option<vk::Result> {
+        self.error_of_call(name, answers, false).map(result_of)
+    }
+
+    /// Counts and logs a call. Returns its error: that of the fault, or the loss where the device is lost.
+    fn error_of_call(&self, name: &'static str, answers: u8, is_lost: bool) -> Option<FaultError> {
+        let injected = self.injected(name, answers);
+        let told = (is_lost && answers & LOST != 0).then_some(FaultError::DeviceLost);
+        let error = injected.or(told);
+        if injected.is_none() && error.is_some() && self.thread.get() != Some(&std::thread::current().id()) {
+            self.write(&call_log::told_line(name));
+        }
+        match (error, &self.fault) {
+            (Some(_), _) => self.write(&call_log::fails_line(name)),
+            (None, Some(_)) => self.write(&call_log::call_line(name, &[])),
+            (None, None) => self.write(&call_log::call_line(name, &errors_of(answers))),
+        }
+        error
+    }
+
+    /// Counts a call. Returns the error of the fault, if the call is one of those that it makes fail.
+    fn injected(&self, name: &'static str, answers: u8) -> Option<FaultError> {
         let count = {
             let mut counts = self.counts();
             let count = counts.calls.entry(name).or_default();
             *count += 1;
             *count
         };
-        let Some(fault) = &self.fault else {
-            self.write(&call_log::call_line(name, &errors_of(answers)));
-            return None;
-        };
-        if !errors_of(answers).contains(&fault.error) {
-            return None;
-        }
-        let is_named = fault.command == name;
-        if is_named {
-            self.write(&call_log::call_line(name, &[]));
-        }
-        let fails = if is_named && fault.call == count {
+        let fault = self.fault.as_ref().filter(|fault| errors_of(answers).contains(&fault.error))?;
+        if fault.command == name && fault.call == count {
             self.reached.store(true, Ordering::Relaxed);
             let _ = self.thread.set(std::thread::current().id());
             self.write(&call_log::fault_line(name));
-            true
-        } else {
-            self.reached.load(Ordering::Relaxed) && fault.span.goes_on(fault.error, &fault.command, name)
+            return Some(fault.error);
+        }
+        let goes_on =
+            self.reached.load(Ordering::Relaxed) && fault.span.goes_on(fault.error, &fault.command, name);
+        goes_on.then_some(fault.error)
+    }
+
+    /// Logs a call that uses a command buffer which is not ready for it. `fails` says that the call is made to fail.
+    pub(super) fn uses(&self, number: usize, words: &[u64], fails: bool) {
+        let (command, second) = (COMMANDS[number].name, words.get(1).copied().unwrap_or_default());
+        if !self.counts().command_buffers.called(command, [words[0], second], fails) {
+            self.write(&call_log::unready_line(command));
+        }
+    }
+
+    /// Logs the name that a call is about to give an object.
+    ///
+    /// # Safety
+    /// `words` are the arguments of the call.
+    pub(super) unsafe fn names(&self, number: usize, words: &[u64]) {
+        if COMMANDS[number].name != "vkSetDebugUtilsObjectNameEXT" {
+            return;
+        }
+        // SAFETY: the second argument of the command points to a structure with the name.
+        let name = unsafe {
+            let info = words[1] as usize as *const vk::DebugUtilsObjectNameInfoEXT<'_>;
+            (*info).object_name_as_c_str()
         };
-        fails.then(|| {
-            self.log_failed(name);
-            result_of(fault.error)
-        })
+        if let Some(name) = name {
+            self.log_name(name);
+        }
+    }
+
+    /// Notes the pool of the command buffers that a successful call has allocated.
+    ///
+    /// # Safety
+    /// `words` are the arguments of the call.
+    pub(super) unsafe fn allocated(&self, number: usize, words: &[u64]) {
+        if COMMANDS[number].name != "vkAllocateCommandBuffers" {
+            return;
+        }
+        // SAFETY: the command has read its second argument, and has written as many handles to the third as that says.
+        unsafe {
+            let info = &*(words[1] as usize as *const vk::CommandBufferAllocateInfo<'_>);
+            let handles = words[2] as usize as *const u64;
+            for index in 0..info.command_buffer_count as usize {
+                self.counts()
+                    .command_buffers
+                    .allocated(info.command_pool.as_raw(), handles.add(index).read());
+            }
+        }
+    }
+
+    /// Logs the names of the physical devices that a successful call has listed.
+    ///
+    /// # Safety
+    /// `words` are the arguments of the call.
+    pub(super) unsafe fn listed(&self, number: usize, words: &[u64]) {
+        if COMMANDS[number].name != "vkEnumeratePhysicalDevices" || words[2] == 0 {
+            return;
+        }
+        let Some(table) = table_of(words[0]).filter(|table| table.properties != 0) else { return };
+        // SAFETY: the command has written the devices and their number, and the address is that of the next layer's function.
+        unsafe {
+            let devices = words[2] as usize as *const vk::PhysicalDevice;
+            let properties_of =
+                std::mem::transmute::<usize, vk::PFN_vkGetPhysicalDeviceProperties>(table.properties);
+            for index in 0..*(words[1] as usize as *const u32) as usize {
+                let mut properties = vk::PhysicalDeviceProperties::default();
+                properties_of(devices.add(index).read(), &mut properties);
+                if let Ok(name) = properties.device_name_as_c_str() {
+                    self.log_name(name);
+                }
+            }
+        }
+    }
+
+    /// Logs a name the first time.
+    fn log_name(&self, name: &CStr) {
+        let shown = readable_bytes(name.to_bytes());
+        if self.counts().names.insert(shown.clone()) {
+            self.write(&call_log::name_line(&shown));
+        }
     }
 
     /// Counts the objects that a successful call has created.

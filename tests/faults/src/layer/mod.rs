@@ -1,10 +1,12 @@
 //! The Vulkan layer: what the loader calls, and the commands that create and destroy instances and devices.
 
+mod command_buffers;
 mod commands;
 mod device_fault;
 mod dispatch;
 mod injector;
 mod loader;
+mod name_reader;
 mod wrappers;
 
 use std::ffi::{CStr, c_char};
@@ -19,6 +21,7 @@ pub use injector::{FAULT_VARIABLE, LOG_VARIABLE};
 use loader::{
     DEVICE_LINK, ExtensionsChain, INSTANCE_LINK, LayersChain, Negotiation, VersionChain, find_link,
 };
+pub use name_reader::NAMES_VARIABLE;
 
 /// Exchanges versions and functions with the loader.
 ///
@@ -201,7 +204,15 @@ fn own(name: &str) -> usize {
         "vkDestroyInstance" => destroy_instance as *const () as usize,
         "vkCreateDevice" => create_device as *const () as usize,
         "vkDestroyDevice" => destroy_device as *const () as usize,
-        _ => device_fault::own(name),
+        _ => replaced(name),
+    }
+}
+
+/// Returns the function that takes the place of the driver's for an extension or a tool that the layer offers; else 0.
+fn replaced(name: &str) -> usize {
+    match device_fault::own(name) {
+        0 => name_reader::own(name),
+        own => own,
     }
 }
 
@@ -249,7 +260,7 @@ unsafe extern "system" fn get_device_proc_addr(
     };
     let ours = match text {
         "vkGetDeviceProcAddr" | "vkDestroyDevice" => own(text),
-        _ => device_fault::own(text),
+        _ => replaced(text),
     };
     if ours != 0 {
         return function(ours);

@@ -29,7 +29,10 @@ macro_rules! wrapper {
                 $($argument: $type),+
             ) -> vk::Result {
                 let words = [$(word($argument)),+];
+                // SAFETY: these are the arguments of the call.
+                unsafe { injector().names(N, &words) };
                 let fault = injector().called(N, words[0]);
+                injector().uses(N, &words, fault.is_some());
                 if let Some(fault) = fault.filter(|fault| !injector().still_executes(N, *fault)) {
                     return fault;
                 }
@@ -49,6 +52,11 @@ macro_rules! wrapper {
                 if result.as_raw() >= 0 {
                     // SAFETY: a command that creates objects has written their handles to its last argument.
                     unsafe { injector().created(N, &words) };
+                    // SAFETY: these are the arguments of the call, which has succeeded.
+                    unsafe {
+                        injector().allocated(N, &words);
+                        injector().listed(N, &words);
+                    }
                 }
                 result
             }
@@ -76,6 +84,7 @@ pub(super) fn end<const N: usize, A: Copy, B: Copy, C: Copy>(
         allocator: C,
     ) {
         injector().destroys(N, word(owner), word(object));
+        injector().uses(N, &[word(owner), word(object)], false);
         if let Some(next) = next(N, word(owner)) {
             // SAFETY: the address is that of the command in the next layer, which has this type.
             let next = unsafe { std::mem::transmute::<usize, unsafe extern "system" fn(A, B, C)>(next) };

@@ -2,35 +2,57 @@
 
 use std::collections::BTreeSet;
 
+use super::evidence::remakes_swapchain;
+use super::object_names::KnownObjects;
 use super::verdict::{Flaw, RunOutcome};
 use crate::fault::{Fault, FaultError, Span};
 
 /// Judges the line of an error: it must name a command that has failed, behind it the object of that command, and the cause.
 ///
-/// Two other forms count: the swapchain whose window is gone, for a lost surface, and what needs ray tracing on a device that
-/// was created without. Every command concerns an object, those before the device the loader, the instance or the window.
-pub(super) fn judge_error(error: &str, fault: &Fault, found: &RunOutcome) -> Option<Flaw> {
+/// Three other forms count: the swapchain whose window is gone, for a lost surface; the swapchain that stays out of date; and what
+/// needs ray tracing on a device that was created without. Every command concerns an object, those before the device the loader, the instance or the window.
+pub(super) fn judge_error(
+    error: &str,
+    fault: &Fault,
+    found: &RunOutcome,
+    clean: &RunOutcome,
+) -> Option<Flaw> {
+    let objects = KnownObjects::of(found, clean);
     if fault.error == FaultError::SurfaceLost
         && let Some((before, _)) = error.split_once(WINDOW_IS_GONE)
     {
-        let is_named = before.contains(" '") && !before.ends_with('\'');
-        return (!is_named).then(|| Flaw::UnnamedObject(error.to_owned()));
+        return (!objects.end(before)).then(|| Flaw::UnnamedObject(error.to_owned()));
+    }
+    if fault.error == FaultError::OutOfDate
+        && fault.span != Span::Once
+        && let Some((before, _)) = error.split_once(STAYS_OUT_OF_DATE)
+    {
+        return judge_no_image(error, &objects, before, found);
     }
     let failed = failed_commands(fault, found);
     let named: Vec<_> = commands_of(error).collect();
-    let of_failed: Vec<&str> =
-        named.iter().filter(|(command, _)| failed.contains(command)).map(|(_, rest)| *rest).collect();
+    let of_failed: Vec<_> = named.iter().filter(|(command, _)| failed.contains(command)).collect();
     if of_failed.is_empty() {
         let flaw = if named.is_empty() { Flaw::UnnamedCommand } else { Flaw::OtherCommand };
         return Some(flaw(error.to_owned()));
     }
-    let without_rays = error.split_once(WITHOUT_RAY_TRACING).is_some_and(|(before, _)| before.contains(" '"));
-    if !without_rays && !of_failed.into_iter().any(starts_with_object) {
+    let without_rays = error.split_once(WITHOUT_RAY_TRACING).is_some_and(|(before, _)| objects.occur(before));
+    if !without_rays && !of_failed.into_iter().any(|(command, rest)| objects.follow(command, rest)) {
         return Some(Flaw::UnnamedObject(error.to_owned()));
     }
     let lower = error.to_lowercase();
     let tells_cause = fault.error.texts().iter().any(|text| lower.contains(text));
     (!tells_cause).then(|| Flaw::OtherCause(error.to_owned()))
+}
+
+/// Judges the error of a program that gives up a swapchain which stays out of date: `before` ends with its name, and it was made
+/// anew for each frame.
+fn judge_no_image(error: &str, objects: &KnownObjects<'_>, before: &str, found: &RunOutcome) -> Option<Flaw> {
+    if !objects.end(before) {
+        return Some(Flaw::UnnamedObject(error.to_owned()));
+    }
+    let is_remade = found.failed.iter().all(|command| remakes_swapchain(command, &found.calls));
+    (!is_remade).then_some(Flaw::NotRemade)
 }
 
 /// Returns the commands that an error may name: that of a fault that happens once; those that failed on other threads of a
@@ -59,17 +81,14 @@ const OTHER_NAMES: [(&str, &str); 4] = [
     ("vkGetCalibratedTimestampsKHR", "vkGetCalibratedTimestampsEXT"),
 ];
 
-/// True if a text behind a command names its object, as in `vkCreateBuffer for 'rain'` and `vkCreateBuffer failed for 'rain'`.
-fn starts_with_object(rest: &str) -> bool {
-    let rest = rest.strip_prefix(" failed").unwrap_or(rest);
-    rest.strip_prefix(" for '").is_some_and(|name| !name.starts_with('\''))
-}
-
 /// A part of errors about ray tracing behind the quoted name of what needs it, on a device that was created without.
 const WITHOUT_RAY_TRACING: &str = "vkCreateDevice with ray tracing returned";
 
 /// The end of an error about a lost surface, after the quoted name of the swapchain.
 const WINDOW_IS_GONE: &str = "': its window is gone";
+
+/// The end of a scenario's error about a swapchain without an image, after its quoted name.
+const STAYS_OUT_OF_DATE: &str = "' stays out of date";
 
 /// Returns each Vulkan command of a text, such as `vkMapMemory`, and the text behind it.
 pub(super) fn commands_of(text: &str) -> impl Iterator<Item = (&str, &str)> {
@@ -86,7 +105,7 @@ pub(super) fn commands_of(text: &str) -> impl Iterator<Item = (&str, &str)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::verdict::tests::refused;
+    use super::super::verdict::tests::{clean, refused};
     use super::*;
 
     /// Judges a line of a fault at `command`, where calls of `failed` were made to fail.
@@ -96,6 +115,10 @@ mod tests {
             text,
             &Fault { command: command.into(), call: 1, error, span },
             &RunOutcome { failed, ..refused() },
+            &RunOutcome {
+                names: ["rain", "main", "a", "rays", "llvmpipe"].map(str::to_owned).into(),
+                ..clean()
+            },
         )
     }
 
@@ -153,6 +176,9 @@ mod tests {
         for unnamed in [
             "error: out of host memory in vkMapMemory",
             "error: out of host memory in vkMapMemory for ''",
+            "error: out of host memory in vkMapMemory for 'snow'",
+            "error: swapchain 'other': its window is gone; resume it",
+            "error: shader 'b' needs ray queries: vkCreateDevice with ray tracing returned: ERROR_SURFACE_LOST_KHR",
             "error: the device was lost in vkQueueSubmit2; the graphics queue had not finished submission 3 'frame'",
             "error: 'rain': vkMapMemory failed: unknown",
             "error: no vkMapMemory after vkCreateBuffer for 'rain'",
@@ -180,5 +206,34 @@ mod tests {
         }
         let host = "error: out of host memory in vkMapMemory for 'rain'";
         assert_eq!(judge(FaultError::DeviceMemory, host), Some(Flaw::OtherCause(host.to_owned())));
+    }
+
+    #[test]
+    fn a_swapchain_that_stays_out_of_date_is_made_anew_for_each_frame() {
+        let judge = |error, span, text: &str, calls: &str| {
+            let found = RunOutcome {
+                calls: crate::call_log::tests::calls(calls),
+                failed: ["vkAcquireNextImageKHR".to_owned()].into(),
+                ..refused()
+            };
+            judge_error(
+                text,
+                &Fault { command: "vkAcquireNextImageKHR".into(), call: 1, error, span },
+                &found,
+                &clean(),
+            )
+        };
+        let remade =
+            "vkCreateSwapchainKHR vkAcquireNextImageKHR! vkCreateSwapchainKHR vkAcquireNextImageKHR!";
+        let stuck = "vkCreateSwapchainKHR vkAcquireNextImageKHR! vkAcquireNextImageKHR!";
+        let stale = "error: the swapchain 'rain' stays out of date: 20 frames have no image";
+        let (dated, stays) = (FaultError::OutOfDate, Span::Stays);
+        assert_eq!(judge(dated, stays, stale, remade), None);
+        assert_eq!(judge(dated, stays, stale, stuck), Some(Flaw::NotRemade));
+        let other = stale.replace("rain", "snow");
+        assert_eq!(judge(dated, stays, &other, remade), Some(Flaw::UnnamedObject(other.clone())));
+        for (error, span) in [(dated, Span::Once), (FaultError::HostMemory, stays)] {
+            assert_eq!(judge(error, span, stale, remade), Some(Flaw::UnnamedCommand(stale.to_owned())));
+        }
     }
 }

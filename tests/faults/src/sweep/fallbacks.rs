@@ -18,12 +18,18 @@ pub struct Fallback {
 pub enum Instead {
     /// A further call of the command, for the same object or another one that serves as well.
     CallsAgain,
-    /// Nothing of the kind: another command serves, or the call was not needed yet.
-    DoesWithout,
+    /// The command buffer that was to be begun ahead is begun by the next acquisition, or not needed.
+    BeginsLater,
+    /// The end of a context learns in another way that its work has ended.
+    WaitsOtherwise,
+    /// The next frame has a new swapchain.
+    RemakesSwapchain,
+    /// An object has no name in tools.
+    LosesName,
 }
 
 use FaultError::{DeviceLost, DeviceMemory, HostMemory, OutOfDate, SurfaceLost};
-use Instead::{CallsAgain, DoesWithout};
+use Instead::{BeginsLater, CallsAgain, LosesName, RemakesSwapchain, WaitsOtherwise};
 
 const fn fallback(command: &'static str, errors: &'static [FaultError], instead: Instead) -> Fallback {
     Fallback { command, errors, instead }
@@ -31,26 +37,25 @@ const fn fallback(command: &'static str, errors: &'static [FaultError], instead:
 
 /// Every fallback. The table in `docs/reliability.md` says what the library does.
 pub const FALLBACKS: &[Fallback] = &[
-    fallback("vkCreateCommandPool", &[HostMemory, DeviceMemory], DoesWithout),
-    fallback("vkAllocateCommandBuffers", &[HostMemory, DeviceMemory], DoesWithout),
-    fallback("vkResetCommandPool", &[HostMemory, DeviceMemory], DoesWithout),
-    fallback("vkBeginCommandBuffer", &[HostMemory, DeviceMemory], DoesWithout),
+    fallback("vkCreateCommandPool", &[HostMemory, DeviceMemory], BeginsLater),
+    fallback("vkAllocateCommandBuffers", &[HostMemory, DeviceMemory], BeginsLater),
+    fallback("vkResetCommandPool", &[HostMemory, DeviceMemory], BeginsLater),
+    fallback("vkBeginCommandBuffer", &[HostMemory, DeviceMemory], BeginsLater),
     fallback("vkAllocateMemory", &[HostMemory, DeviceMemory], CallsAgain),
     fallback("vkCreateBuffer", &[DeviceMemory], CallsAgain),
     fallback("vkBindBufferMemory", &[DeviceMemory], CallsAgain),
     fallback("vkMapMemory", &[HostMemory, DeviceMemory], CallsAgain),
     fallback("vkCreateAccelerationStructureKHR", &[DeviceMemory], CallsAgain),
-    fallback("vkQueueWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], DoesWithout),
-    fallback("vkDeviceWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], DoesWithout),
+    fallback("vkQueueWaitIdle", &[HostMemory, DeviceMemory, DeviceLost], WaitsOtherwise),
     fallback("vkGetSemaphoreCounterValue", &[HostMemory, DeviceMemory], CallsAgain),
-    fallback("vkSetDebugUtilsObjectNameEXT", &[HostMemory, DeviceMemory], DoesWithout),
+    fallback("vkSetDebugUtilsObjectNameEXT", &[HostMemory, DeviceMemory], LosesName),
     fallback("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfaceCapabilities2KHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfaceFormatsKHR", &[SurfaceLost], CallsAgain),
     fallback("vkGetPhysicalDeviceSurfacePresentModesKHR", &[SurfaceLost], CallsAgain),
     fallback("vkCreateSwapchainKHR", &[SurfaceLost], CallsAgain),
-    fallback("vkAcquireNextImageKHR", &[SurfaceLost, OutOfDate], DoesWithout),
-    fallback("vkQueuePresentKHR", &[SurfaceLost, OutOfDate], DoesWithout),
+    fallback("vkAcquireNextImageKHR", &[SurfaceLost, OutOfDate], RemakesSwapchain),
+    fallback("vkQueuePresentKHR", &[SurfaceLost, OutOfDate], RemakesSwapchain),
 ];
 
 /// Returns what the library may do in silence after this error of the command.
@@ -106,7 +111,7 @@ mod tests {
         };
         let known: BTreeSet<_> = FALLBACKS.iter().flat_map(of).collect();
         assert_eq!(page(), known);
-        assert_eq!(documented("vkBeginCommandBuffer", HostMemory), Some(DoesWithout));
+        assert_eq!(documented("vkBeginCommandBuffer", HostMemory), Some(BeginsLater));
         assert_eq!(documented("vkCreateBuffer", DeviceMemory), Some(CallsAgain));
         assert_eq!(documented("vkCreateBuffer", HostMemory), None);
         assert_eq!(documented("vkCreateImage", HostMemory), None);

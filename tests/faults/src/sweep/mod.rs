@@ -1,7 +1,9 @@
 //! Runs a program once for each fault, and judges each run.
 
 mod error_line;
+mod evidence;
 pub mod fallbacks;
+pub mod object_names;
 pub mod plan;
 #[cfg(target_os = "linux")]
 pub mod report;

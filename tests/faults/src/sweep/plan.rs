@@ -19,6 +19,8 @@ pub struct SweepPlan {
     pub errors: Vec<FaultError>,
     /// Spans of the faults.
     pub spans: Vec<Span>,
+    /// True if swapchains stay out of date, too: a program must give up at some frame, as none is shown.
+    pub stays_out_of_date: bool,
 }
 
 /// One of several parts of a list: every `count`-th element, from the one numbered `index`.
@@ -59,6 +61,7 @@ impl SweepPlan {
             commands: Vec::new(),
             errors: FaultError::ALL.to_vec(),
             spans: vec![Span::Once, Span::Stays],
+            stays_out_of_date: false,
         }
     }
 
@@ -67,7 +70,7 @@ impl SweepPlan {
     pub fn faults(&self, calls: &[Call]) -> Vec<Fault> {
         let mut counts: HashMap<&str, u32> = HashMap::new();
         let mut faults = Vec::new();
-        for Call { command, errors } in calls {
+        for Call { command, errors, .. } in calls {
             let call = counts.entry(command).or_default();
             *call += 1;
             if !self.commands.is_empty() && !self.commands.contains(command) {
@@ -75,9 +78,8 @@ impl SweepPlan {
             }
             for &error in errors.iter().filter(|error| self.errors.contains(error)) {
                 let of = |&span| Fault { command: command.clone(), call: *call, error, span };
-                // A swapchain that stays out of date shows nothing, which is no defect.
-                let spans =
-                    self.spans.iter().filter(|span| **span == Span::Once || error != FaultError::OutOfDate);
+                let may_stay = self.stays_out_of_date || error != FaultError::OutOfDate;
+                let spans = self.spans.iter().filter(|span| **span == Span::Once || may_stay);
                 faults.extend(spans.map(of));
             }
         }
@@ -97,7 +99,11 @@ mod tests {
     use super::*;
 
     fn call(command: &str, errors: &[FaultError]) -> Call {
-        Call { command: command.into(), errors: errors.to_vec() }
+        Call { command: command.into(), errors: errors.to_vec(), fails: false }
+    }
+
+    fn texts_of(plan: &SweepPlan, calls: &[Call]) -> Vec<String> {
+        plan.faults(calls).iter().map(ToString::to_string).collect()
     }
 
     #[test]
@@ -105,9 +111,7 @@ mod tests {
         let memory = [FaultError::HostMemory, FaultError::DeviceMemory];
         let submit = [FaultError::HostMemory, FaultError::DeviceLost];
         let calls = [call("a", &memory), call("b", &submit), call("a", &memory)];
-        let texts = |plan: &SweepPlan| {
-            plan.faults(&calls).iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-        };
+        let texts = |plan: &SweepPlan| texts_of(plan, &calls).join(", ");
         let lost = SweepPlan { errors: vec![FaultError::DeviceLost], ..SweepPlan::full() };
         assert_eq!(texts(&lost), "b 1 device-lost once, b 1 device-lost stays");
         let once =
@@ -131,6 +135,8 @@ mod tests {
             assert!(bad.parse::<Part>().is_err(), "{bad}");
         }
         let dated = [call("c", &[FaultError::OutOfDate])];
-        assert_eq!(SweepPlan::full().faults(&dated).len(), 1, "it does not stay");
+        assert_eq!(texts_of(&SweepPlan::full(), &dated), ["c 1 out-of-date once"]);
+        let stays = SweepPlan { stays_out_of_date: true, ..SweepPlan::full() };
+        assert_eq!(texts_of(&stays, &dated), ["c 1 out-of-date once", "c 1 out-of-date stays"]);
     }
 }

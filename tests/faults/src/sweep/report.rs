@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::plan::SweepPlan;
-use super::run::{Caches, LayerFolder, Program, run};
+use super::run::{Caches, LayerFolder, Program, clean_run, run};
 use super::verdict::{Ending, Flaw, RunOutcome, flaws, leaks_on_purpose};
 use crate::fault::{Fault, PROGRESS};
 
@@ -148,7 +148,7 @@ pub fn run_until_reached(
 ) -> io::Result<(RunOutcome, Vec<Flaw>)> {
     let mut tries = 0;
     loop {
-        let (outcome, _) = run(program, layer, caches, Some(fault))?;
+        let outcome = run(program, layer, caches, Some(fault))?;
         let flaws_found = flaws(Some(fault), &outcome, clean);
         tries += 1;
         if outcome.reached || !flaws_found.is_empty() || tries == TRIES {
@@ -165,22 +165,24 @@ pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Resul
     let start = Instant::now();
     let (layer, caches) = (LayerFolder::new()?, tempfile::tempdir()?);
     // The first run fills the caches.
-    let first = run(program, &layer, caches.path(), None)?;
+    let first = clean_run(program, &layer, caches.path())?;
     let empty = tempfile::tempdir()?;
-    let ((clean, calls), found_caches) = match program.caches {
-        Caches::Warm => (run(program, &layer, caches.path(), None)?, caches.path()),
+    let (clean, found_caches) = match program.caches {
+        Caches::Warm => {
+            (RunOutcome { names: first.names, ..run(program, &layer, caches.path(), None)? }, caches.path())
+        }
         Caches::Cold => (first, empty.path()),
     };
-    let commands: BTreeSet<_> = calls.iter().map(|call| &call.command).collect();
-    let faults = plan.faults(&calls);
+    let commands: BTreeSet<_> = clean.calls.iter().map(|call| &call.command).collect();
+    let faults = plan.faults(&clean.calls);
     let mut report = SweepReport {
-        calls: calls.len(),
+        calls: clean.calls.len(),
         commands: commands.len(),
         planned: faults.len(),
         ..Default::default()
     };
     let mut flaws_of_clean = flaws(None, &clean, &clean);
-    if clean.ending != Ending::Status(0) || calls.is_empty() {
+    if clean.ending != Ending::Status(0) || clean.calls.is_empty() {
         flaws_of_clean.push(Flaw::WrongResult);
     }
     if !flaws_of_clean.is_empty() {

@@ -9,9 +9,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use super::verdict::{Ending, NextStart, RunOutcome};
-use crate::call_log::{Call, CallLog};
+use crate::call_log::CallLog;
 use crate::fault::{Fault, Span};
-use crate::layer::{FAULT_VARIABLE, LOG_VARIABLE};
+use crate::layer::{FAULT_VARIABLE, LOG_VARIABLE, NAMES_VARIABLE};
 
 /// Longest time of one run: a busy machine needs a minute for a program that starts in two seconds.
 const TIMEOUT: Duration = Duration::from_secs(600);
@@ -87,7 +87,20 @@ fn layer_library() -> io::Result<PathBuf> {
     newest.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "liblvk_faults.so was not built"))
 }
 
-/// Runs the program. Without a fault it uses `caches` itself and fills them, and the calls are returned, too. With one it uses a
+/// Runs the program twice without a fault, and fills `caches`. Returns the first run, with the names that the second has given to
+/// objects for a tool that reads them.
+///
+/// # Errors
+/// Those of files and processes.
+pub fn clean_run(program: &Program, layer: &LayerFolder, caches: &Path) -> io::Result<RunOutcome> {
+    let mut clean = run(program, layer, caches, None)?;
+    let mut named = program.clone();
+    named.variables.push((NAMES_VARIABLE.to_owned(), "1".to_owned()));
+    clean.names.extend(run(&named, layer, caches, None)?.names);
+    Ok(clean)
+}
+
+/// Runs the program. Without a fault it uses `caches` itself and fills them. With one it uses a
 /// copy, and where that has changed the program is started once more, without a fault.
 ///
 /// # Errors
@@ -97,19 +110,19 @@ pub fn run(
     layer: &LayerFolder,
     caches: &Path,
     fault: Option<&Fault>,
-) -> io::Result<(RunOutcome, Vec<Call>)> {
+) -> io::Result<RunOutcome> {
     let folder = tempfile::tempdir()?;
     let used = match fault {
         Some(_) => copied(caches, &folder.path().join("caches"))?,
         None => caches.to_owned(),
     };
-    let (mut outcome, calls) = run_in(folder.path(), program, layer, &used, fault)?;
+    let mut outcome = run_in(folder.path(), program, layer, &used, fault)?;
     if fault.is_some() && contents(&used)? != contents(caches)? {
         let folder = tempfile::tempdir()?;
-        let (next, _) = run_in(folder.path(), program, layer, &used, None)?;
+        let next = run_in(folder.path(), program, layer, &used, None)?;
         outcome.next = Some(NextStart { ending: next.ending, result: next.result, stderr: next.stderr });
     }
-    Ok((outcome, calls))
+    Ok(outcome)
 }
 
 /// Runs the program in `folder` with the caches `used`.
@@ -119,7 +132,7 @@ fn run_in(
     layer: &LayerFolder,
     used: &Path,
     fault: Option<&Fault>,
-) -> io::Result<(RunOutcome, Vec<Call>)> {
+) -> io::Result<RunOutcome> {
     let (out, log) = (folder.join("out"), folder.join("log"));
     fs::create_dir(&out)?;
     let stderr = fs::File::create(folder.join("stderr"))?;
@@ -130,6 +143,7 @@ fn run_in(
         .env("LVK_CACHE", used)
         .env(LOG_VARIABLE, &log)
         .env_remove(FAULT_VARIABLE)
+        .env_remove(NAMES_VARIABLE)
         .env_remove(AGAIN_VARIABLE);
     command.envs(program.variables.iter().map(|(name, value)| (name, value)));
     // A fault that stays hinders a second try, too.
@@ -146,11 +160,11 @@ fn run_in(
     for result in [FIRST, SECOND] {
         files.remove(&format!("out/{result}"));
     }
-    let outcome = RunOutcome {
+    Ok(RunOutcome {
         ending,
         stderr: String::from_utf8_lossy(&fs::read(folder.join("stderr"))?).into_owned(),
         reached: log.reached,
-        calls: counted(&log.calls),
+        calls: log.calls,
         failed: log.failed,
         told_others: log.told_others,
         counts_objects: log.counts_objects,
@@ -158,23 +172,15 @@ fn run_in(
         orphans: log.orphans,
         orphaning: log.orphaning,
         dead: log.dead,
+        unready: log.unready,
+        names: log.names,
         leftovers: log.leftovers,
         result: fs::read(out.join(FIRST)).ok(),
         second_result: fs::read(out.join(SECOND)).ok(),
         tries_again,
         files,
         next: None,
-    };
-    Ok((outcome, log.calls))
-}
-
-/// Returns the number of calls of each command.
-fn counted(calls: &[Call]) -> BTreeMap<String, usize> {
-    let mut counts = BTreeMap::new();
-    for call in calls {
-        *counts.entry(call.command.clone()).or_default() += 1;
-    }
-    counts
+    })
 }
 
 fn end(child: &mut Child) -> io::Result<Ending> {

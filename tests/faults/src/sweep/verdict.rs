@@ -3,11 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
+use crate::call_log::Call;
 use crate::fault::{Fault, Span};
 use crate::leftovers::Leftovers;
 
 use super::error_line::{commands_of, judge_error, names_of};
-use super::fallbacks::{Instead, documented};
+use super::evidence::is_seen;
+use super::fallbacks::documented;
 
 /// The end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,8 +31,8 @@ pub struct RunOutcome {
     pub stderr: String,
     /// True if the fault was reached.
     pub reached: bool,
-    /// Number of calls of each command. A run with a fault has that of its command alone.
-    pub calls: BTreeMap<String, usize>,
+    /// The calls, in order.
+    pub calls: Vec<Call>,
     /// Commands of which a call was made to fail.
     pub failed: BTreeSet<String>,
     /// Commands that told other threads of the loss of a device.
@@ -45,6 +47,10 @@ pub struct RunOutcome {
     pub orphaning: usize,
     /// Types of objects that were destroyed though they were not alive.
     pub dead: BTreeSet<String>,
+    /// Commands that used a command buffer which an earlier call had not begun or reset, because it had failed.
+    pub unready: BTreeSet<String>,
+    /// Names of objects and of physical devices. A run without a fault has those that it gives to a tool, too.
+    pub names: BTreeSet<String>,
     /// What the process held at its end.
     pub leftovers: Option<Leftovers>,
     /// The result of the first try, a picture or values. `None` if it was not written.
@@ -85,13 +91,17 @@ pub enum Flaw {
     Leak(String),
     /// Objects that were destroyed though they were not alive.
     Dead(String),
+    /// Commands that used a command buffer which an earlier call had not begun or reset, because it had failed.
+    Unready(String),
+    /// A swapchain that is out of date, and that is not made anew for the next frame.
+    NotRemade,
     /// File descriptors, threads and memory that a run without a fault does not hold at its end.
     Held(String),
     /// Files that a run without fault does not leave.
     Litter(String),
     /// Success with another result.
     WrongResult,
-    /// Success after the failure of a command that has no documented fallback, and that no warning names.
+    /// Success after the failure of a command that no warning names, without a documented fallback that the calls show.
     SwallowedError(String),
     /// Failure that leaves an incomplete result.
     PartialResult,
@@ -124,11 +134,16 @@ impl fmt::Display for Flaw {
             Self::Status(status) => write!(out, "status {status}"),
             Self::Leak(objects) => write!(out, "leak of {objects}"),
             Self::Dead(objects) => write!(out, "destroyed twice: {objects}"),
+            Self::Unready(commands) => write!(out, "a command buffer is not ready for {commands}"),
+            Self::NotRemade => out.write_str("the swapchain that is out of date is not made anew"),
             Self::Held(what) => write!(out, "held at the end: {what}"),
             Self::Litter(files) => write!(out, "left files {files}"),
             Self::WrongResult => out.write_str("wrong result"),
             Self::SwallowedError(commands) => {
-                write!(out, "right result in silence, without a documented fallback, after {commands}")
+                write!(
+                    out,
+                    "right result in silence, without a documented fallback that is seen, after {commands}"
+                )
             }
             Self::PartialResult => out.write_str("partial result"),
             Self::NoMessage => out.write_str("no message, or several"),
@@ -168,6 +183,9 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
     if !found.dead.is_empty() {
         flaws.push(Flaw::Dead(found.dead.iter().cloned().collect::<Vec<_>>().join(", ")));
     }
+    if !found.unready.is_empty() {
+        flaws.push(Flaw::Unready(found.unready.iter().cloned().collect::<Vec<_>>().join(", ")));
+    }
     let held = found.leftovers.as_ref().zip(clean.leftovers.as_ref());
     let held = held.and_then(|(found, clean)| found.beyond(clean));
     flaws.extend(held.filter(|_| !on_purpose).map(Flaw::Held));
@@ -179,13 +197,20 @@ pub fn flaws(fault: Option<&Fault>, found: &RunOutcome, clean: &RunOutcome) -> V
         flaws.push(Flaw::Litter(litter.join(", ")));
     }
     flaws.extend(found.next.as_ref().and_then(|next| judge_next(next, clean)));
-    // Without an instance there is nothing to count.
-    let counts = found.counts_objects || found.ending != Ending::Status(0);
     let has_ended = matches!(found.ending, Ending::Status(_));
-    if !counts || has_ended && found.leftovers.is_none() {
+    let counts_objects = found.counts_objects || has_no_instance(found);
+    if !counts_objects || has_ended && found.leftovers.is_none() {
         flaws.push(Flaw::NoCounts);
     }
     flaws
+}
+
+/// True if a command has failed before there was an instance, and none was created: there are no objects to count.
+fn has_no_instance(found: &RunOutcome) -> bool {
+    let is_before =
+        |command: &String| command == "vkCreateInstance" || command.starts_with("vkEnumerateInstance");
+    let creates = |call: &Call| call.command == "vkCreateInstance" && !call.fails;
+    found.failed.iter().any(is_before) && !found.calls.iter().any(creates)
 }
 
 /// Judges the next start: the result is right, and nothing warns of a cache that cannot be read.
@@ -230,7 +255,7 @@ fn judge_result(
     }
     let errors: Vec<&str> = found.stderr.lines().filter(|line| line.starts_with("error: ")).collect();
     match *errors {
-        [error] => flaws.extend(fault.and_then(|fault| judge_error(error, fault, found))),
+        [error] => flaws.extend(fault.and_then(|fault| judge_error(error, fault, found, clean))),
         _ => flaws.push(Flaw::NoMessage),
     }
     if found.tries_again && (found.second_result.is_none() || found.second_result != clean.result) {
@@ -239,18 +264,14 @@ fn judge_result(
 }
 
 /// Judges a success in spite of a fault: a warning names each command that failed, or the command has a documented fallback,
-/// which the library has taken.
+/// and the calls of the run show it.
 fn judge_silence(fault: &Fault, found: &RunOutcome, clean: &RunOutcome) -> Option<Flaw> {
     let warnings = found.stderr.lines().filter(|line| line.starts_with("warning: "));
     let named: BTreeSet<&str> = warnings.flat_map(commands_of).map(|(command, _)| command).collect();
-    let calls = |outcome: &RunOutcome| outcome.calls.get(&fault.command).copied().unwrap_or_default();
     let is_silent = |command: &&String| {
-        let is_documented = match documented(command, fault.error) {
-            Some(Instead::CallsAgain) if fault.span == Span::Once => calls(found) > calls(clean),
-            Some(_) => true,
-            None => false,
-        };
-        !is_documented && !names_of(command).any(|name| named.contains(name))
+        let instead = documented(command, fault.error);
+        let is_explained = instead.is_some_and(|instead| is_seen(instead, command, fault, found, clean));
+        !is_explained && !names_of(command).any(|name| named.contains(name))
     };
     let silent: Vec<_> = found.failed.iter().filter(is_silent).cloned().collect();
     (!silent.is_empty()).then(|| Flaw::SwallowedError(silent.join(", ")))
@@ -259,6 +280,7 @@ fn judge_silence(fault: &Fault, found: &RunOutcome, clean: &RunOutcome) -> Optio
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::call_log::tests::calls;
     use crate::fault::FaultError;
 
     pub(in crate::sweep) fn clean() -> RunOutcome {
@@ -266,7 +288,9 @@ pub(super) mod tests {
             ending: Ending::Status(0),
             stderr: String::new(),
             reached: false,
-            calls: BTreeMap::new(),
+            calls: Vec::new(),
+            unready: BTreeSet::new(),
+            names: BTreeSet::from(["rain".to_owned()]),
             failed: BTreeSet::new(),
             told_others: BTreeSet::new(),
             counts_objects: true,
@@ -338,7 +362,28 @@ pub(super) mod tests {
 
     #[test]
     fn a_run_whose_objects_were_not_counted_says_nothing_of_leaks() {
-        assert_eq!(found(&RunOutcome { counts_objects: false, ..clean() }), [Flaw::NoCounts]);
+        let uncounted = |outcome: RunOutcome| found(&RunOutcome { counts_objects: false, ..outcome });
+        assert_eq!(uncounted(clean()), [Flaw::NoCounts]);
+        assert_eq!(
+            uncounted(refused()),
+            [Flaw::NoCounts],
+            "an error does not say that there was no instance"
+        );
+        let without_instance = |command: &str, calls_made: &str| RunOutcome {
+            calls: calls(calls_made),
+            failed: BTreeSet::from([command.to_owned()]),
+            stderr: format!("error: out of host memory in {command} for 'rain'"),
+            ..refused()
+        };
+        for command in ["vkCreateInstance", "vkEnumerateInstanceVersion"] {
+            let fault = Fault { command: command.into(), ..fault(Span::Once) };
+            let judged = |made: &str| {
+                let outcome = RunOutcome { counts_objects: false, ..without_instance(command, made) };
+                flaws(Some(&fault), &outcome, &clean())
+            };
+            assert_eq!(judged(&format!("{command}!")), [], "{command}");
+            assert_eq!(judged(&format!("{command}! vkCreateInstance")), [Flaw::NoCounts], "{command}");
+        }
     }
 
     #[test]
@@ -349,23 +394,33 @@ pub(super) mod tests {
             ..clean()
         };
         let swallowed = |commands: &str| vec![Flaw::SwallowedError(commands.to_owned())];
-        let begins_later = "vkBeginCommandBuffer";
-        assert_eq!(found(&failed(&[begins_later], "")), []);
-        let again = RunOutcome {
-            calls: BTreeMap::from([("vkAllocateMemory".to_owned(), 5)]),
-            ..failed(&["vkAllocateMemory"], "")
-        };
-        let without =
-            |calls| RunOutcome { calls: BTreeMap::from([("vkAllocateMemory".to_owned(), calls)]), ..clean() };
+        let loses_name = "vkSetDebugUtilsObjectNameEXT";
+        assert_eq!(found(&failed(&[loses_name], "")), []);
         let of_memory = Fault { command: "vkAllocateMemory".into(), ..fault(Span::Once) };
-        assert_eq!(flaws(Some(&of_memory), &again, &without(4)), []);
+        let allocates = |made: &str| RunOutcome { calls: calls(made), ..failed(&["vkAllocateMemory"], "") };
+        let without = RunOutcome { calls: calls("vkAllocateMemory"), ..clean() };
+        assert_eq!(flaws(Some(&of_memory), &allocates("vkAllocateMemory! vkAllocateMemory"), &without), []);
         assert_eq!(
-            flaws(Some(&of_memory), &again, &without(5)),
+            flaws(Some(&of_memory), &allocates("vkAllocateMemory!"), &without),
             swallowed("vkAllocateMemory"),
             "none in its place"
         );
+        let waits = Fault { command: "vkQueueWaitIdle".into(), ..fault(Span::Once) };
+        let ends = |made: &str| {
+            flaws(
+                Some(&waits),
+                &RunOutcome { calls: calls(made), ..failed(&["vkQueueWaitIdle"], "") },
+                &clean(),
+            )
+        };
+        assert_eq!(ends("vkQueueSubmit2 vkQueueWaitIdle! vkGetSemaphoreCounterValue"), []);
+        assert_eq!(
+            ends("vkQueueSubmit2 vkQueueWaitIdle!"),
+            swallowed("vkQueueWaitIdle"),
+            "the end is not seen"
+        );
         assert_eq!(found(&failed(&["vkCreateBuffer"], "")), swallowed("vkCreateBuffer"));
-        let both = ["vkCreateBuffer", begins_later, "vkCreateImage"];
+        let both = ["vkCreateBuffer", loses_name, "vkCreateImage"];
         assert_eq!(found(&failed(&both, "")), swallowed("vkCreateBuffer, vkCreateImage"));
         let warning = "warning: no cache: out of host memory in vkCreateBuffer for 'rain'\n";
         assert_eq!(found(&failed(&both[..2], warning)), []);
@@ -437,6 +492,10 @@ pub(super) mod tests {
             (
                 RunOutcome { dead: BTreeSet::from(["VkBuffer".to_owned()]), ..clean() },
                 Flaw::Dead("VkBuffer".into()),
+            ),
+            (
+                RunOutcome { unready: BTreeSet::from(["vkEndCommandBuffer".to_owned()]), ..clean() },
+                Flaw::Unready("vkEndCommandBuffer".into()),
             ),
             (
                 RunOutcome {

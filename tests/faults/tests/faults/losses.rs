@@ -4,7 +4,7 @@ use lvk_faults::fault::{FaultError, PROGRESS, Span};
 use lvk_faults::fault_report::{DESCRIPTION, FaultReport, REPORT_VARIABLE};
 use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::report::run_until_reached;
-use lvk_faults::sweep::run::{LayerFolder, Program, run};
+use lvk_faults::sweep::run::{LayerFolder, Program, clean_run};
 
 use crate::{assert_told, error_line, in_window, program, some, varies};
 
@@ -18,9 +18,9 @@ fn reporting(program: Program, report: FaultReport) -> Program {
 fn assert_losses_are_explained(line: &str, program: Program, plan: &SweepPlan) {
     let program = reporting(program, FaultReport::Complete);
     let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let (clean, calls) = run(&program, &layer, caches.path(), None).unwrap();
+    let clean = clean_run(&program, &layer, caches.path()).unwrap();
     let description = DESCRIPTION.to_str().unwrap();
-    let (mut explained, faults) = (0, plan.faults(&calls));
+    let (mut explained, faults) = (0, plan.faults(&clean.calls));
     for fault in &faults {
         let (outcome, flaws) = run_until_reached(&program, &layer, caches.path(), fault, &clean).unwrap();
         assert_eq!(flaws, [], "{line}, {fault}: {}", outcome.stderr);
@@ -46,7 +46,7 @@ fn losses(most: usize) -> SweepPlan {
 fn the_fault_of_a_lost_device_is_told() {
     for report in FaultReport::ALL {
         let program = reporting(program("device_fault"), report);
-        let [outcome, _] = assert_told(&program, "vkQueueSubmit2 1 device-lost once");
+        let outcome = assert_told(program, "vkQueueSubmit2 1 device-lost once");
         let error = error_line(&outcome);
         let loss = "error: the device was lost in vkQueueSubmit2 for 'graphics queue'";
         let has_report = !matches!(report, FaultReport::NoCounts | FaultReport::NoLists);
@@ -82,7 +82,7 @@ fn losses_are_told_with_their_fault() {
 #[test]
 fn losses_that_lacked_their_fault_have_it() {
     let assert_explained = |program: Program, fault| {
-        let [outcome, _] = assert_told(&reporting(program, FaultReport::Complete), fault);
+        let outcome = assert_told(reporting(program, FaultReport::Complete), fault);
         assert!(error_line(&outcome).contains("injected page fault"), "{fault}: {}", outcome.stderr);
     };
     assert_explained(program("blas"), "vkGetQueryPoolResults 2 device-lost once");

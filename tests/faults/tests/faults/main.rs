@@ -12,8 +12,9 @@ use std::path::PathBuf;
 use lvk::{Context, ContextDesc};
 use lvk_dev_driver::{DriverRequest, VirtualDisplay, prepare, virtual_display};
 use lvk_faults::sweep::plan::SweepPlan;
-use lvk_faults::sweep::run::{Caches, LayerFolder, Program, run};
+use lvk_faults::sweep::run::{Caches, LayerFolder, Program, clean_run, run};
 use lvk_faults::sweep::verdict::{RunOutcome, flaws};
+use tempfile::TempDir;
 use x11rb::rust_connection::RustConnection;
 
 /// A scene of six triangles: a floor, a mirror behind and a pane of glass before it.
@@ -83,15 +84,39 @@ fn some(most: usize) -> SweepPlan {
     SweepPlan { most, ..SweepPlan::full() }
 }
 
-/// Asserts that a fault is reached, and has no flaws. Returns what was found with the fault, and without.
-fn assert_told(program: &Program, fault: &str) -> [RunOutcome; 2] {
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let (clean, _) = run(program, &layer, caches.path(), None).unwrap();
-    let parsed = fault.parse().unwrap();
-    let (outcome, _) = run(program, &layer, caches.path(), Some(&parsed)).unwrap();
-    assert!(outcome.reached, "{fault}");
-    assert_eq!(flaws(Some(&parsed), &outcome, &clean), [], "{fault}: {}", outcome.stderr);
-    [outcome, clean]
+/// A program, and its run without a fault.
+struct CleanProgram {
+    program: Program,
+    layer: LayerFolder,
+    caches: TempDir,
+    clean: RunOutcome,
+}
+
+impl CleanProgram {
+    fn new(program: Program) -> Self {
+        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
+        let clean = clean_run(&program, &layer, caches.path()).unwrap();
+        Self { program, layer, caches, clean }
+    }
+
+    /// Asserts that a fault is reached, and has no flaws. Returns what was found.
+    fn assert_told(&self, fault: &str) -> RunOutcome {
+        let parsed = fault.parse().unwrap();
+        let outcome = run(&self.program, &self.layer, self.caches.path(), Some(&parsed)).unwrap();
+        assert!(outcome.reached, "{fault}");
+        assert_eq!(flaws(Some(&parsed), &outcome, &self.clean), [], "{fault}: {}", outcome.stderr);
+        outcome
+    }
+
+    /// Returns the number of calls of a command without a fault.
+    fn count(&self, command: &str) -> usize {
+        self.clean.calls.iter().filter(|call| call.command == command).count()
+    }
+}
+
+/// Asserts that a fault of a program is reached, and has no flaws. Returns what was found.
+fn assert_told(program: Program, fault: &str) -> RunOutcome {
+    CleanProgram::new(program).assert_told(fault)
 }
 
 /// Returns the error of a run.

@@ -6,36 +6,36 @@ use lvk_faults::sweep::plan::SweepPlan;
 use lvk_faults::sweep::run::{LayerFolder, Program, run};
 use lvk_faults::sweep::verdict::{Ending, Flaw, RunOutcome, flaws};
 
-use crate::{assert_told, error_line, in_window, program, validated};
+use crate::{CleanProgram, assert_told, error_line, in_window, program, validated};
 
 /// Faults that a whole sweep found once (docs/reliability.md).
 #[test]
 fn faults_that_had_flaws_have_none() {
-    assert_told(&program("queues"), "vkQueueWaitIdle 1 device-memory stays");
-    assert_told(&program("blas"), "vkGetQueryPoolResults 1 device-lost once");
+    assert_told(program("queues"), "vkQueueWaitIdle 1 device-memory stays");
+    assert_told(program("blas"), "vkGetQueryPoolResults 1 device-lost once");
     let Some((_connection, _display, program)) = in_window() else { return };
+    let program = CleanProgram::new(program);
     for fault in [
         "vkGetFenceStatus 1 device-lost once",
         "vkGetPhysicalDeviceSurfaceSupportKHR 1 host-memory once",
         "vkCreateXcbSurfaceKHR 1 host-memory once",
     ] {
-        assert_told(&program, fault);
+        program.assert_told(fault);
     }
 }
 
 /// Shortages in questions about what a driver supports are no lack of support.
 #[test]
 fn shortages_in_questions_are_no_lack_of_support() {
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let (_, calls) = run(&program("interop"), &layer, caches.path(), None).unwrap();
+    let interop = CleanProgram::new(program("interop"));
     for command in
         ["vkGetPhysicalDeviceImageFormatProperties2", "vkGetPhysicalDeviceCalibrateableTimeDomainsKHR"]
     {
-        let count = calls.iter().filter(|call| call.command == command).count();
+        let count = interop.count(command);
         assert!(count > 1, "{command}: {count}");
         for number in 1..=count {
             // The verdict asks for the command where the run fails.
-            assert_told(&program("interop"), &format!("{command} {number} host-memory once"));
+            interop.assert_told(&format!("{command} {number} host-memory once"));
         }
     }
 }
@@ -51,11 +51,10 @@ fn commands_of_few_programs_fail_as_others_do() {
     ];
     let mut reached = BTreeSet::new();
     for line in [hybrid, "interop"] {
-        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-        let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
-        let of_few = SweepPlan::full().faults(&calls).into_iter();
+        let program = CleanProgram::new(program(line));
+        let of_few = SweepPlan::full().faults(&program.clean.calls).into_iter();
         for fault in of_few.filter(|fault| few.contains(&&*fault.command)) {
-            assert_told(&program(line), &fault.to_string());
+            program.assert_told(&fault.to_string());
             reached.insert(fault.command);
         }
     }
@@ -74,14 +73,14 @@ fn slow_work() -> Program {
 /// has ended: else lavapipe would execute a command buffer that is freed.
 #[test]
 fn objects_in_use_outlive_waits_that_fail() {
-    let [outcome, _] = assert_told(&slow_work(), "vkQueueWaitIdle 1 device-memory command");
+    let outcome = assert_told(slow_work(), "vkQueueWaitIdle 1 device-memory command");
     assert!(outcome.result.is_some() && !leaks(&outcome), "{}", outcome.stderr);
 }
 
 /// Where questions about the timelines fail too, the context is leaked.
 #[test]
 fn objects_that_may_be_in_use_are_leaked() {
-    let [outcome, _] = assert_told(&slow_work(), "vkQueueWaitIdle 1 device-memory unanswered");
+    let outcome = assert_told(slow_work(), "vkQueueWaitIdle 1 device-memory unanswered");
     assert!(outcome.result.is_some() && leaks(&outcome), "{}", outcome.stderr);
     let said = "warning: the end of a context: out of device memory in vkQueueWaitIdle for 'graphics queue'; its objects are";
     assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
@@ -96,10 +95,9 @@ fn leaks(outcome: &RunOutcome) -> bool {
 #[test]
 fn shortages_after_the_picture_are_errors() {
     let line = "viewer SCENE --width 64 --height 36 --frames 1 --rt query --samples 2 --method pathtrace";
-    let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
-    let last = calls.iter().filter(|call| call.command == "vkQueueSubmit2").count();
-    let [outcome, _] = assert_told(&program(line), &format!("vkQueueSubmit2 {last} device-memory once"));
+    let program = CleanProgram::new(program(line));
+    let last = program.count("vkQueueSubmit2");
+    let outcome = program.assert_told(&format!("vkQueueSubmit2 {last} device-memory once"));
     assert!(outcome.result.is_some() && outcome.ending == Ending::Status(1), "{}", outcome.stderr);
 }
 
@@ -116,7 +114,7 @@ fn errors_of_recording_submission_and_waits_name_the_object() {
         ("vkEnumeratePhysicalDevices", "instance"),
     ] {
         let fault = format!("{command} 1 host-memory stays").parse().unwrap();
-        let (outcome, _) = run(&program("hot_reload"), &layer, caches.path(), Some(&fault)).unwrap();
+        let outcome = run(&program("hot_reload"), &layer, caches.path(), Some(&fault)).unwrap();
         let expected = format!("error: out of host memory in {command} for '{object}'\n");
         assert!(outcome.reached && outcome.stderr.contains(&expected), "{fault}: {}", outcome.stderr);
     }
@@ -127,12 +125,13 @@ fn errors_of_recording_submission_and_waits_name_the_object() {
 fn what_a_scenario_forgets_is_seen() {
     let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
     let ran = |line| run(&program(line), &layer, caches.path(), None).unwrap();
-    let ((clean, _), (forgetful, calls)) = (ran("leak remembers"), ran("leak forgets"));
+    let (clean, forgetful) = (ran("leak remembers"), ran("leak forgets"));
     assert_eq!(flaws(None, &clean, &clean), [], "{}", clean.stderr);
     let found = flaws(None, &forgetful, &clean);
     let [Flaw::Leak(leak), Flaw::Held(held)] = &*found else { panic!("{found:?}") };
     assert_eq!(leak, "1 VkFence", "{}", forgetful.stderr);
     assert!(held.starts_with("1 file descriptors, 1 threads, 6"), "{held}");
+    let calls = &forgetful.calls;
     assert!(calls.len() > 50 && calls.iter().any(|call| call.command == "vkCreateFence"));
 }
 
@@ -140,7 +139,7 @@ fn what_a_scenario_forgets_is_seen() {
 #[test]
 fn a_mistake_of_a_scenario_is_a_validation_message() {
     let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-    let (outcome, _) = run(&validated("leak forgets"), &layer, caches.path(), None).unwrap();
+    let outcome = run(&validated("leak forgets"), &layer, caches.path(), None).unwrap();
     let found = flaws(None, &outcome, &outcome);
     let is_message =
         |flaw: &Flaw| matches!(flaw, Flaw::Validation(text) if text.contains("VUID-vkDestroyDevice"));
@@ -153,7 +152,7 @@ fn a_fault_at_the_creation_of_the_device_is_told() {
     let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
     for (error, text) in [("host-memory", "out of host memory"), ("device-lost", "lost")] {
         let fault = format!("vkCreateDevice 1 {error} stays").parse().unwrap();
-        let (outcome, _) = run(&program("queues"), &layer, caches.path(), Some(&fault)).unwrap();
+        let outcome = run(&program("queues"), &layer, caches.path(), Some(&fault)).unwrap();
         assert!(outcome.reached && outcome.stderr.contains(text), "{}", outcome.stderr);
         assert!(outcome.stderr.contains("vkCreateDevice"), "{}", outcome.stderr);
     }
@@ -162,8 +161,9 @@ fn a_fault_at_the_creation_of_the_device_is_told() {
 /// The layer stays loaded, so that a fault that is to happen once does not hit the second try.
 #[test]
 fn a_fault_happens_once_in_a_process() {
-    let [outcome, clean] = assert_told(&program("queues"), "vkQueueSubmit2 2 device-lost once");
-    assert_eq!((outcome.result, outcome.second_result), (None, clean.result));
+    let program = CleanProgram::new(program("queues"));
+    let outcome = program.assert_told("vkQueueSubmit2 2 device-lost once");
+    assert_eq!((outcome.result, outcome.second_result), (None, program.clean.result));
 }
 
 /// Shortages in questions about formats, tools and cached pipelines are errors too: none is an answer that the program goes on with.
@@ -175,12 +175,11 @@ fn shortages_in_other_questions_are_no_answers() {
         ("yuv --width 64 --height 36 --frames 1", "vkGetPhysicalDeviceImageFormatProperties2"),
         ("yuv --width 64 --height 36 --frames 1", "vkCreatePipelineCache"),
     ] {
-        let (layer, caches) = (LayerFolder::new().unwrap(), tempfile::tempdir().unwrap());
-        let (_, calls) = run(&program(line), &layer, caches.path(), None).unwrap();
-        let count = calls.iter().filter(|call| call.command == command).count();
+        let program = CleanProgram::new(program(line));
+        let count = program.count(command);
         assert!(count > 0, "{line}: {command}");
         for number in 1..=count {
-            let [outcome, _] = assert_told(&program(line), &format!("{command} {number} host-memory once"));
+            let outcome = program.assert_told(&format!("{command} {number} host-memory once"));
             let start = format!("error: out of host memory in {command} for '");
             assert!(error_line(&outcome).starts_with(&start), "{line}: {}", outcome.stderr);
         }

@@ -1,8 +1,11 @@
 //! A context on a device that another engine has created.
 
+use std::ffi::CStr;
+
 use lvk::ash::{self, vk};
 use lvk::{Context, ContextDesc, RawSignal};
 use lvk_dev_driver::{DriverRequest, prepare};
+use lvk_faults::layer::NAMES_VARIABLE;
 
 use crate::Failure;
 use crate::compute::{read_words, record_step, step_pipeline, words_buffer};
@@ -58,7 +61,10 @@ impl Drop for EngineSemaphore<'_> {
     fn drop(&mut self) {
         // SAFETY: the engine waits for the device before.
         unsafe {
-            let _ = self.device.device_wait_idle();
+            if let Err(result) = self.device.device_wait_idle() {
+                let error = in_call("vkDeviceWaitIdle", "device")(result);
+                eprintln!("warning: the semaphore of the engine may be in use: {error}");
+            }
             self.device.destroy_semaphore(self.raw, None);
         }
     }
@@ -66,15 +72,18 @@ impl Drop for EngineSemaphore<'_> {
 
 /// Runs a step on the engine's device; the engine waits for it. Returns the words.
 pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
-    let engine = instance()?;
+    // A run that is to tell the names of objects needs an instance with names.
+    let reads_names = std::env::var_os(NAMES_VARIABLE).is_some();
+    let extensions: &[&CStr] = if reads_names { &[ash::ext::debug_utils::NAME] } else { &[] };
+    let engine = instance(extensions)?;
     // SAFETY: the instance is alive.
     let devices = unsafe { engine.raw.enumerate_physical_devices() }
         .map_err(in_call("vkEnumeratePhysicalDevices", "instance"))?;
     let physical = *devices.first().ok_or("no device")?;
-    let desc = ContextDesc::default();
+    let desc = ContextDesc { debug_names: reads_names.then_some(true), ..Default::default() };
     // SAFETY: the handles belong together, and are destroyed after the context and all that it made.
     unsafe {
-        let needs = Context::requirements(&engine.entry, &engine.raw, &[], physical, &desc)?;
+        let needs = Context::requirements(&engine.entry, &engine.raw, extensions, physical, &desc)?;
         let (queues, mut chain) = (needs.queue_create_infos(), needs.feature_chain());
         let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
         let info = chain.merge_into(info)?;
@@ -92,10 +101,12 @@ pub(crate) fn guest() -> Result<Vec<u8>, Failure> {
     }
 }
 
-fn instance() -> Result<EngineInstance, Failure> {
+fn instance(extensions: &[&CStr]) -> Result<EngineInstance, Failure> {
     let driver = prepare(&DriverRequest::default())?;
     let version = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-    let info = vk::InstanceCreateInfo::default().application_info(&version);
+    let extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
+    let info =
+        vk::InstanceCreateInfo::default().application_info(&version).enabled_extension_names(&extensions);
     // SAFETY: the library is a Vulkan loader, and the description is valid.
     unsafe {
         let entry = match &driver.loader {

@@ -21,6 +21,10 @@ use crate::{Failure, context};
 
 /// Frames until a colour must be visible.
 const FRAMES: usize = 300;
+/// Frames without an image, one after the other, until the swapchain is given up.
+const FRAMES_WITHOUT_IMAGE: usize = 20;
+/// Name of the swapchain.
+const SWAPCHAIN: &str = "swapchain of the scenario";
 
 struct XWindow {
     connection: &'static XCBConnection,
@@ -109,7 +113,11 @@ impl XWindow {
 pub(crate) fn frames_and_resize() -> Result<Vec<u8>, Failure> {
     let window = Arc::new(XWindow::open()?);
     let ctx = context(ContextDesc { window: Some(window.clone()), ..Default::default() })?;
-    let swapchain = ctx.create_swapchain(&SwapchainDesc { extent: [64, 48], ..Default::default() })?;
+    let swapchain = ctx.create_swapchain(&SwapchainDesc {
+        extent: [64, 48],
+        debug_name: SWAPCHAIN,
+        ..Default::default()
+    })?;
     let first = show(&ctx, *swapchain, &window, [1.0, 0.0, 0.0, 1.0])?;
     let size = ConfigureWindowAux::new().width(80).height(60);
     window.connection.configure_window(window.id, &size)?;
@@ -128,13 +136,22 @@ fn show(
     color: [f32; 4],
 ) -> Result<[u8; 3], Failure> {
     let wanted = [color[0], color[1], color[2]].map(|part| (part * 255.0) as u8);
+    let mut frames_without_image = 0;
     for _ in 0..FRAMES {
         ctx.next_frame()?;
+        frames_without_image += 1;
         if let Some(image) = ctx.next_image(swapchain)? {
             let mut cmd = ctx.acquire_command_buffer()?;
             let target = [ColorAttachment::clear(image.texture(), color)];
             drop(cmd.begin_rendering(&RenderPassDesc { color: &target, ..Default::default() })?);
             ctx.present(cmd, image)?;
+            frames_without_image = 0;
+        }
+        if frames_without_image == FRAMES_WITHOUT_IMAGE {
+            return Err(format!(
+                "the swapchain '{SWAPCHAIN}' stays out of date: {FRAMES_WITHOUT_IMAGE} frames have no image"
+            )
+            .into());
         }
         ctx.wait_idle()?;
         if window.pixel()? == wanted {

@@ -1,0 +1,122 @@
+//! What the calls of a run show of a fallback.
+
+use super::fallbacks::Instead;
+use super::verdict::RunOutcome;
+use crate::call_log::Call;
+use crate::fault::{Fault, FaultError, PROGRESS, Span};
+
+/// True if the calls of a run with `fault` show what the library does in place of the calls of `command` that have failed.
+pub(super) fn is_seen(
+    instead: Instead,
+    command: &str,
+    fault: &Fault,
+    found: &RunOutcome,
+    clean: &RunOutcome,
+) -> bool {
+    let calls = |outcome: &RunOutcome| count(outcome, |call| call.command == command);
+    match instead {
+        Instead::CallsAgain if fault.span == Span::Once => calls(found) > calls(clean),
+        // Where later calls fail too, a second call fails.
+        Instead::CallsAgain => count(found, |call| call.command == command && call.fails) > 1,
+        Instead::BeginsLater => found.unready.is_empty(),
+        Instead::WaitsOtherwise => waits_otherwise(command, fault.error, &found.calls),
+        Instead::RemakesSwapchain => remakes_swapchain(command, &found.calls),
+        Instead::LosesName => true,
+    }
+}
+
+fn count(outcome: &RunOutcome, counts: impl Fn(&Call) -> bool) -> usize {
+    outcome.calls.iter().filter(|call| counts(call)).count()
+}
+
+/// True if no more work follows the wait of `command` that has failed, and a wait or a question about the progress of work has
+/// succeeded behind the last work. A lost device has no work.
+fn waits_otherwise(command: &str, error: FaultError, calls: &[Call]) -> bool {
+    let last = |is_meant: fn(&Call) -> bool| calls.iter().rposition(is_meant);
+    let work = last(|call| call.command.starts_with("vkQueueSubmit") || call.command == "vkQueuePresentKHR");
+    let end = last(|call| {
+        !call.fails && matches!(&*call.command, "vkQueueWaitIdle" | "vkWaitSemaphores" | PROGRESS)
+    });
+    let failure = calls.iter().position(|call| call.fails && call.command == command);
+    work < failure && (!error.is_want_of_memory() || work < end)
+}
+
+/// True if the creation of a swapchain lies between each failure of `command` and the next acquisition.
+pub(super) fn remakes_swapchain(command: &str, calls: &[Call]) -> bool {
+    let mut is_stale = false;
+    for call in calls {
+        match &*call.command {
+            "vkCreateSwapchainKHR" if !call.fails => is_stale = false,
+            "vkAcquireNextImageKHR" if is_stale => return false,
+            _ => {}
+        }
+        is_stale |= call.fails && call.command == command;
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::verdict::tests::clean;
+    use super::*;
+    use crate::call_log::tests::calls;
+
+    fn outcome(text: &str) -> RunOutcome {
+        RunOutcome { calls: calls(text), ..clean() }
+    }
+
+    /// True if the calls `found` show what is done instead of `command`, where a run without a fault has the calls `without`.
+    fn seen(instead: Instead, command: &str, span: Span, found: &str, without: &str) -> bool {
+        let fault = Fault { command: command.into(), call: 1, error: FaultError::HostMemory, span };
+        is_seen(instead, command, &fault, &outcome(found), &outcome(without))
+    }
+
+    #[test]
+    fn a_command_is_called_again() {
+        let again = |span, found: &str| seen(Instead::CallsAgain, "vkMapMemory", span, found, "vkMapMemory");
+        assert!(again(Span::Once, "vkMapMemory! vkMapMemory"));
+        assert!(!again(Span::Once, "vkMapMemory!"));
+        for span in [Span::Command, Span::Stays, Span::Unanswered] {
+            assert!(again(span, "vkMapMemory! vkMapMemory!"), "{span:?}");
+            assert!(!again(span, "vkMapMemory vkMapMemory!"), "{span:?}");
+        }
+    }
+
+    #[test]
+    fn a_command_buffer_is_ready_where_it_is_used() {
+        let begin = "vkBeginCommandBuffer";
+        assert!(seen(Instead::BeginsLater, begin, Span::Once, "vkBeginCommandBuffer!", ""));
+        let found = RunOutcome { unready: ["vkEndCommandBuffer".to_owned()].into(), ..clean() };
+        let fault = Fault { command: begin.into(), call: 1, error: FaultError::HostMemory, span: Span::Once };
+        assert!(!is_seen(Instead::BeginsLater, begin, &fault, &found, &clean()));
+    }
+
+    #[test]
+    fn the_end_of_the_work_is_seen_behind_the_last_of_it() {
+        let wait = "vkQueueWaitIdle";
+        let waits = |found: &str| seen(Instead::WaitsOtherwise, wait, Span::Stays, found, "");
+        assert!(waits("vkQueueSubmit2 vkQueueWaitIdle! vkQueueWaitIdle"));
+        assert!(waits("vkQueueSubmit2 vkQueueWaitIdle! vkGetSemaphoreCounterValue"));
+        assert!(waits("vkQueueSubmit2 vkWaitSemaphores vkQueueWaitIdle!"));
+        assert!(!waits("vkQueueSubmit2 vkQueueWaitIdle!"));
+        assert!(!waits("vkWaitSemaphores vkQueueSubmit2 vkQueueWaitIdle! vkWaitSemaphores!"));
+        assert!(!waits("vkQueueWaitIdle! vkQueueSubmit2 vkWaitSemaphores"), "work goes on");
+        let lost = |found: &str| waits_otherwise(wait, FaultError::DeviceLost, &calls(found));
+        assert!(lost("vkQueueSubmit2 vkQueueWaitIdle!"), "a lost device has no work");
+        assert!(!lost("vkQueueWaitIdle! vkQueueSubmit2"));
+    }
+
+    #[test]
+    fn a_swapchain_is_made_anew_for_the_next_frame() {
+        let remakes = |text: &str| {
+            let long = text.replace("make", "vkCreateSwapchainKHR").replace("next", "vkAcquireNextImageKHR");
+            ["vkAcquireNextImageKHR", "vkQueuePresentKHR"]
+                .map(|command| remakes_swapchain(command, &calls(&long)))
+        };
+        assert_eq!(remakes("make next! make next! make! make next vkQueuePresentKHR"), [true; 2]);
+        assert_eq!(remakes("make next vkQueuePresentKHR!"), [true; 2], "no frame follows");
+        assert_eq!(remakes("make next! next"), [false, true]);
+        assert_eq!(remakes("make next! make! next"), [false, true]);
+        assert_eq!(remakes("make next vkQueuePresentKHR! next make"), [true, false]);
+    }
+}

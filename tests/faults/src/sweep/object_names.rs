@@ -1,0 +1,149 @@
+//! The object that an error names: one that a program has named, or one of the few that have no name of their own.
+
+use std::collections::BTreeSet;
+
+use lvk::Format;
+
+use super::verdict::RunOutcome;
+
+/// Objects that the library or a scenario gives no name in Vulkan, with the starts of the commands whose errors tell them.
+pub const UNNAMED_OBJECTS: &[(&str, &[&str])] = &[
+    ("Vulkan loader", &["vkEnumerateInstance"]),
+    ("instance", &["vkCreateInstance", "vkEnumeratePhysicalDevices"]),
+    ("window", &["vkGetPhysicalDeviceSurfaceSupportKHR", "vkCreateX"]),
+    ("graphics queue", QUEUE),
+    ("compute queue", QUEUE),
+    ("transfer queue", QUEUE),
+    ("command buffer of the graphics queue", COMMAND_BUFFER),
+    ("command buffer of the compute queue", COMMAND_BUFFER),
+    ("command buffer of the transfer queue", COMMAND_BUFFER),
+    ("uploads and builds", COMMAND_BUFFER),
+    ("pipeline layout", &["vkCreatePipelineLayout"]),
+    ("input attachments", &["vkCreateDescriptor", "vkAllocateDescriptorSets"]),
+    ("default tlas", MEMORY),
+    ("fragment sizes", &["vkGetPhysicalDeviceFragmentShadingRatesKHR"]),
+    (
+        "clocks of device and host",
+        &["vkGetPhysicalDeviceCalibrateableTimeDomains", "vkGetCalibratedTimestamps"],
+    ),
+    ("messages of the validation layer", &["vkCreateDebugUtilsMessengerEXT"]),
+    ("instance of the engine", &["vkCreateInstance", "vkEnumeratePhysicalDevices"]),
+    ("device of the engine", &["vkCreateDevice", "vkDeviceWaitIdle"]),
+    ("semaphore of the engine", &["vkCreateSemaphore", "vkWaitSemaphores"]),
+];
+
+const QUEUE: &[&str] = &["vkQueue"];
+const COMMAND_BUFFER: &[&str] =
+    &["vkCreateCommandPool", "vkAllocateCommandBuffers", "vkResetCommandPool", "vkBegin", "vkEnd"];
+const MEMORY: &[&str] = &["vkCreateBuffer", "vkAllocateMemory", "vkBindBufferMemory", "vkMapMemory"];
+
+/// Start of the names that the library makes of the name of another object.
+const READ_BACK: &str = "readback of ";
+
+/// Start of the commands that ask for a format, by its name in the library.
+const FORMAT_QUERY: &str = "vkGetPhysicalDeviceImageFormatProperties";
+
+/// The objects that errors of one run may name.
+pub(super) struct KnownObjects<'a> {
+    names: BTreeSet<&'a str>,
+    files: BTreeSet<&'a str>,
+}
+
+impl<'a> KnownObjects<'a> {
+    /// Collects the names of objects and physical devices, and the files of caches.
+    pub(super) fn of(found: &'a RunOutcome, clean: &'a RunOutcome) -> Self {
+        let both = [found, clean];
+        let names = both.iter().flat_map(|outcome| &outcome.names);
+        let files = both.iter().flat_map(|outcome| &outcome.files);
+        Self {
+            names: names.map(String::as_str).filter(|name| !name.is_empty()).collect(),
+            files: files.map(String::as_str).filter(|file| file.starts_with("caches/")).collect(),
+        }
+    }
+
+    /// True if a text behind `command` names an object of it in quotes, as in `vkCreateBuffer for 'rain'` and
+    /// `vkCreateBuffer failed for 'rain'`.
+    pub(super) fn follow(&self, command: &str, rest: &str) -> bool {
+        let rest = rest.strip_prefix(" failed").unwrap_or(rest);
+        rest.strip_prefix(" for '").is_some_and(|quoted| self.start(command, quoted))
+    }
+
+    /// True if a text ends with a quote and the name of an object.
+    pub(super) fn end(&self, text: &str) -> bool {
+        self.names.iter().any(|name| text.strip_suffix(name).is_some_and(|before| before.ends_with('\'')))
+    }
+
+    /// True if a text quotes the name of an object.
+    pub(super) fn occur(&self, text: &str) -> bool {
+        text.match_indices('\'')
+            .any(|(place, _)| self.names.iter().any(|name| starts_with(&text[place + 1..], name)))
+    }
+
+    /// True if a text starts with the name of an object of `command` and the closing quote.
+    fn start(&self, command: &str, quoted: &str) -> bool {
+        let concerns = |starts: &[&str]| starts.iter().any(|start| command.starts_with(start));
+        let source = quoted.strip_prefix(READ_BACK).filter(|_| concerns(MEMORY));
+        let is_named =
+            |name: &&str| starts_with(quoted, name) || source.is_some_and(|source| starts_with(source, name));
+        let is_unnamed = |(name, starts): &(&str, &[&str])| concerns(starts) && starts_with(quoted, name);
+        self.names.iter().any(is_named)
+            || UNNAMED_OBJECTS.iter().any(is_unnamed)
+            || command.starts_with(FORMAT_QUERY)
+                && Format::ALL.iter().any(|format| starts_with(quoted, &format!("{format:?}")))
+            || command.contains("PipelineCache") && self.is_file(quoted)
+    }
+
+    /// True if a text starts with the path of a file of the caches.
+    fn is_file(&self, quoted: &str) -> bool {
+        let path = quoted.split('\'').next().unwrap_or_default();
+        self.files.iter().any(|file| path.strip_suffix(file).is_some_and(|folder| folder.ends_with('/')))
+    }
+}
+
+/// True if a text starts with a name and the closing quote.
+fn starts_with(text: &str, name: &str) -> bool {
+    text.strip_prefix(name).is_some_and(|rest| rest.starts_with('\''))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::verdict::tests::clean;
+    use super::*;
+
+    #[test]
+    fn only_objects_of_the_program_count() {
+        let names = ["rain", "the sky's colour", ""].map(str::to_owned).into();
+        let (found, without) = (clean(), RunOutcome { names, ..clean() });
+        let objects = KnownObjects::of(&found, &without);
+        for (command, rest) in [
+            ("vkCreateBuffer", " for 'rain'"),
+            ("vkCreateBuffer", " failed for 'rain': ERROR_UNKNOWN"),
+            ("vkCreateImage", " for 'the sky's colour'; create it later"),
+            ("vkMapMemory", " for 'readback of rain'"),
+            ("vkQueueSubmit2", " for 'compute queue'; create a new context"),
+            ("vkGetPhysicalDeviceImageFormatProperties", " for 'Rgba8Unorm'"),
+            ("vkGetPipelineCacheData", " for '/var/run/caches/pipelines'"),
+        ] {
+            assert!(objects.follow(command, rest), "{command}{rest}");
+        }
+        for (command, rest) in [
+            ("vkCreateBuffer", ""),
+            ("vkCreateBuffer", " for rain"),
+            ("vkCreateBuffer", " for ''"),
+            ("vkCreateBuffer", " for 'snow'"),
+            ("vkCreateBuffer", " for 'rain and snow'"),
+            ("vkCreateBuffer", " for 'compute queue'"),
+            ("vkCreateImage", " for 'Rgba8Unorm'"),
+            ("vkCreateImage", " for 'readback of rain'"),
+            ("vkMapMemory", " for 'readback of snow'"),
+            ("vkGetPipelineCacheData", " for '/var/run/other'"),
+            ("vkCreateBuffer", " for '/var/run/caches/pipelines'"),
+        ] {
+            assert!(!objects.follow(command, rest), "{command}{rest}");
+        }
+        assert!(
+            objects.end("swapchain 'rain") && !objects.end("swapchain 'snow") && !objects.end("swapchain '")
+        );
+        assert!(objects.occur("shader 'rain' needs") && !objects.occur("shader 'snow' needs"));
+    }
+}
