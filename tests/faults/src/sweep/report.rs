@@ -113,6 +113,12 @@ impl SweepReport {
         )
     }
 
+    /// True if at least half of the planned faults have run, and at most `most_missed` of them were not reached.
+    #[must_use]
+    pub fn is_large_enough(&self, most_missed: usize) -> bool {
+        self.runs > 0 && 2 * self.runs >= self.planned && self.missed <= most_missed
+    }
+
     fn add(&mut self, fault: &Fault, outcome: &RunOutcome, flaws: Vec<Flaw>) {
         self.runs += 1;
         self.reached += usize::from(outcome.reached);
@@ -239,5 +245,14 @@ mod tests {
             time: Duration::from_secs(12),
         };
         assert_eq!(report.row("queues"), "| queues | 105 | 420 | 410 | 400 | 10 | 7 | 1 | 12 |");
+    }
+
+    #[test]
+    fn a_sample_has_half_of_its_faults_and_misses_none() {
+        let report = |runs, missed| SweepReport { planned: 12, runs, missed, ..Default::default() };
+        assert!(report(6, 0).is_large_enough(0) && report(12, 1).is_large_enough(1));
+        assert!(!report(5, 0).is_large_enough(0), "too few");
+        assert!(!report(12, 1).is_large_enough(0), "one was missed");
+        assert!(!SweepReport::default().is_large_enough(0), "no fault");
     }
 }

@@ -16,9 +16,8 @@ fn assert_no_flaws(line: &str, program: &Program, plan: &SweepPlan, budget: Dura
     let report = sweep(program, plan, budget).unwrap();
     println!("{line}: {report}");
     assert!(report.flawed.is_empty(), "{line}: {report}");
-    assert!(report.runs > 0 && 2 * report.runs >= report.planned, "too few faults in time: {line}: {report}");
-    let most_missed = usize::from(varies(line));
-    assert!(report.missed <= most_missed, "{line}: {report}");
+    // Programs whose number of calls differs from run to run may miss one.
+    assert!(report.is_large_enough(usize::from(varies(line))), "too few faults: {line}: {report}");
 }
 
 #[test]
