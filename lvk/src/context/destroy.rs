@@ -2,6 +2,7 @@
 
 use super::Context;
 use crate::device_state::{DeferredObject, DeviceState};
+use crate::error::{Error, Result};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, OpacityMicromapHandle, QueryPoolHandle,
     RayTracingLibraryHandle, RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle,
@@ -16,10 +17,19 @@ pub trait Destroy: Handle {
 
 impl Context {
     /// Destroys an object. The handle is stale from then on. Memory is freed when the last command buffer that may use
-    /// the object is done. Does nothing for a stale handle or for an image of a swapchain.
+    /// the object is done. Does nothing for a stale handle or for an image of a swapchain. Warns of the handle of
+    /// another context, whose object stays.
     pub fn destroy<H: Destroy>(&self, handle: H) {
         handle.destroy_in(self);
     }
+}
+
+/// Returns what was removed from a pool, and warns of the handle of another context.
+pub(super) fn removed<T>(found: Result<T>) -> Option<T> {
+    if let Err(error @ Error::ForeignHandle { .. }) = &found {
+        log::warn!("nothing is destroyed: {error}");
+    }
+    found.ok()
 }
 
 macro_rules! destroy {
@@ -27,7 +37,7 @@ macro_rules! destroy {
         $(impl Destroy for $handle {
             fn destroy_in(self, ctx: &Context) {
                 let shared: &DeviceState = ctx.device_state();
-                if let Ok(object) = shared.store.$pool.remove(self) {
+                if let Some(object) = removed(shared.store.$pool.remove(self)) {
                     shared.free_later(DeferredObject::$variant(object));
                 }
             }
@@ -54,7 +64,7 @@ impl Destroy for TextureHandle {
         if textures.get(self).is_ok_and(|texture| texture.lent) {
             return;
         }
-        if let Ok(texture) = textures.remove(self) {
+        if let Some(texture) = removed(textures.remove(self)) {
             shared.free_later(DeferredObject::Texture(texture));
         }
     }
@@ -63,13 +73,13 @@ impl Destroy for TextureHandle {
 impl Destroy for ShaderModuleHandle {
     /// Destroys the module. Pipelines do not need their modules after creation.
     fn destroy_in(self, ctx: &Context) {
-        drop(ctx.device_state().store.shader_modules.remove(self));
+        drop(removed(ctx.device_state().store.shader_modules.remove(self)));
     }
 }
 
 impl Destroy for RayTracingLibraryHandle {
     /// Removes the handle. Pipelines that are linked from the library keep the library.
     fn destroy_in(self, ctx: &Context) {
-        drop(ctx.device_state().store.ray_tracing_libraries.remove(self));
+        drop(removed(ctx.device_state().store.ray_tracing_libraries.remove(self)));
     }
 }

@@ -46,7 +46,10 @@ impl Context {
     }
 
     /// Calls `call` with the graphics queue locked, so that it may submit. `call` must neither use the context nor drop
-    /// holders or command buffers: these wait for the lock of the queue.
+    /// holders or command buffers: these wait for the lock of the queue, so that the thread waits for itself.
+    ///
+    /// # Panics
+    /// In debug builds, in place of that wait.
     pub fn with_raw_queue<T>(&self, call: impl FnOnce(vk::Queue) -> T) -> T {
         self.with_raw_queue_of(Queue::Graphics, call)
     }

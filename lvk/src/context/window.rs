@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::Context;
 use super::create_texture::default_views;
-use super::destroy::Destroy;
+use super::destroy::{Destroy, removed};
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::device_state::DeferredObject;
@@ -32,7 +32,7 @@ use crate::swapchain::surface::{Surface, SurfaceState};
 impl Destroy for SwapchainHandle {
     /// Destroys the swapchain and its images, including an acquired one.
     fn destroy_in(self, ctx: &Context) {
-        if let Ok(swapchain) = ctx.device_state().store.swapchains.remove(self) {
+        if let Some(swapchain) = removed(ctx.device_state().store.swapchains.remove(self)) {
             ctx.retire_swapchain(swapchain);
         }
     }

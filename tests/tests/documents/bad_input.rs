@@ -9,7 +9,7 @@ pub const PAGE: &str = include_str!("../../../docs/bad-input.md");
 /// The title of the section about other crates than the library, which is the last.
 pub const CRATES: &str = "\n## Models and interfaces\n";
 /// The public interface, one item a line; `.ci/api` holds it to the sources.
-const INTERFACE: &str = include_str!("../../../lvk/public-api.txt");
+pub const INTERFACE: &str = include_str!("../../../lvk/public-api.txt");
 const ERRORS: &str = include_str!("../../../lvk/src/error/mod.rs");
 /// Handles of objects. A submission has none.
 const HANDLES: [&str; 12] = [
@@ -123,7 +123,7 @@ pub fn variants(source: &str) -> Vec<&str> {
 }
 
 /// Returns the source of the module of a test.
-fn source(module: &[&str]) -> Option<String> {
+pub fn source(module: &[&str]) -> Option<String> {
     let files = match module {
         ["lvk", path @ ..] => {
             let path = format!("lvk/src/{}", path.join("/"));

@@ -3,6 +3,7 @@
 mod android;
 mod bad_input;
 mod bad_input_of_crates;
+mod calls_without_error;
 mod circles;
 mod contributing;
 mod defaults;

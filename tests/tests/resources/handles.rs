@@ -12,6 +12,7 @@ use lvk::{
 use lvk_tests::compute::{
     Evaluator, compute_pipeline, module, read_vec4, read_words, vec4_buffer, words_buffer,
 };
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
 /// The reason why a handle has no object.
@@ -131,6 +132,23 @@ fn destroyed_objects_leave_stale_handles() {
     assert_eq!(read_words(&ctx, news.buffer, 3), [1, 2, 3], "the old handle must not destroy its successor");
     expect_all_refused(&ctx, &made, Refusal::Stale);
     destroy(&ctx, &news);
+}
+
+#[test]
+fn a_handle_of_another_context_destroys_nothing_and_is_warned_of() {
+    let (Some(ctx), Some(other)) = (device(), device()) else { return };
+    capture_warnings();
+    let theirs = objects(&other);
+    destroy(&ctx, &theirs);
+    for kind in ["buffer", "texture", "sampler", "shader module", "compute pipeline", "query pool"] {
+        let warning = format!("nothing is destroyed: foreign {kind} handle");
+        let told = take_warnings(&warning);
+        assert!(told.len() == 1 && told[0].contains("use the handle with the context"), "{kind}: {told:?}");
+    }
+    assert_eq!(read_words(&other, theirs.buffer, 3), [1, 2, 3]);
+    destroy(&other, &theirs);
+    destroy(&other, &theirs);
+    assert_eq!(take_warnings("nothing is destroyed"), Vec::<String>::new(), "a stale handle has no object");
 }
 
 #[test]
