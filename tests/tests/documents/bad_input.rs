@@ -6,6 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::held_by::{cells, project};
 
 pub const PAGE: &str = include_str!("../../../docs/bad-input.md");
+/// The title of the section about calls that return no `lvk::Result`, behind the tables of those that do.
+pub const WITHOUT_ERROR: &str = "\n## Calls without an error\n";
 /// The title of the section about other crates than the library, which is the last.
 pub const CRATES: &str = "\n## Models and interfaces\n";
 /// The public interface, one item a line; `.ci/api` holds it to the sources.
@@ -64,7 +66,7 @@ pub fn quoted(text: &str) -> Vec<&str> {
 /// Returns the rows of all tables with the head `call | wrong | error | test`, or what is wrong with a line.
 fn rows(page: &str) -> Result<Vec<Row<'_>>, String> {
     let mut found = Vec::new();
-    for line in page.split(CRATES).next().unwrap_or_default().lines() {
+    for line in page.split(WITHOUT_ERROR).next().unwrap_or_default().lines() {
         let Some(cells) = cells(line) else { continue };
         let [calls, wrong, errors, tests] = cells[..] else { return Err(format!("four cells: {line}")) };
         if tests == "test" || tests == "---" {
@@ -194,6 +196,15 @@ pub fn reached_text(source: &str, name: &str) -> String {
     texts
 }
 
+/// True if a source has a whole name, behind which `may_end` finds the next character.
+fn has_name(source: &str, name: &str, may_end: impl Fn(Option<char>) -> bool) -> bool {
+    let is_letter = |letter: char| letter.is_alphanumeric() || letter == '_';
+    source.match_indices(name).any(|(at, _)| {
+        let next = source[at + name.len()..].chars().next();
+        !source[..at].ends_with(is_letter) && !next.is_some_and(char::is_alphanumeric) && may_end(next)
+    })
+}
+
 /// Returns what is wrong with the tests of a row: they are missing, or they and the functions of their files that they call
 /// contain neither the call nor the error.
 fn complaints(row: &Row<'_>) -> Vec<String> {
@@ -209,14 +220,15 @@ fn complaints(row: &Row<'_>) -> Vec<String> {
     }
     let is_expected = |error: &&str| {
         let by_helper = EXPECTING.iter().filter(|(variant, _)| variant == error);
-        sources.contains(&format!("Error::{error}"))
+        has_name(&sources, &format!("Error::{error}"), |end| end != Some('_'))
             || by_helper.map(|(_, helper)| helper).any(|name| sources.contains(name))
     };
     let in_tests = row.tests.iter().any(|test| !test.starts_with("lvk::"));
     let functions = row.calls.iter().filter_map(|call| call.rsplit("::").next()).filter(|_| in_tests);
     let is_called = |name: &str| {
         let mut by_helper = CALLING.iter().filter(|(call, _)| *call == name);
-        sources.contains(&format!("{name}(")) || by_helper.any(|(_, helper)| sources.contains(helper))
+        has_name(&sources, name, |end| end == Some('('))
+            || by_helper.any(|(_, helper)| sources.contains(helper))
     };
     let absent = functions.filter(|name| !is_called(name)).map(|name| format!("{name}("));
     let unexpected = row.errors.iter().filter(|error| !is_expected(error)).map(|error| (*error).to_owned());

@@ -3,10 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::bad_input::{INTERFACE, PAGE, has_test, quoted, source};
+use crate::bad_input::{INTERFACE, PAGE, WITHOUT_ERROR, has_test, quoted, source};
 use crate::held_by::cells;
-
-const TITLE: &str = "\n## Calls without an error\n";
 
 /// Types whose calls count.
 const TYPES: [&str; 3] = ["Context", "CommandBuffer", "RenderPass"];
@@ -26,7 +24,7 @@ fn infallible_call(line: &str) -> Option<String> {
 
 /// Returns the rows of the section.
 fn rows(page: &str) -> Vec<Vec<&str>> {
-    let (_, section) = page.split_once(TITLE).unwrap();
+    let (_, section) = page.split_once(WITHOUT_ERROR).unwrap();
     let section = section.split("\n## ").next().unwrap();
     section.lines().filter_map(cells).skip(2).collect()
 }
