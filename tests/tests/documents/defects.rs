@@ -6,23 +6,30 @@ use std::path::Path;
 
 use crate::held_by::{cells, project};
 
-/// Returns the function that a line declares, or the test that it has in a table of a macro, such as `whole_threads: "threads";`.
-fn declared(line: &str) -> Option<&str> {
-    let line = line.trim_start();
-    let function = line.strip_prefix("fn ").and_then(|rest| rest.split(['(', '<']).next());
-    function.or_else(|| line.split_once(": \"").map(|(name, _)| name))
+/// Returns the tests of a source: functions that are marked as such, and sweeps in the table of a macro, such as
+/// `whole_threads: "threads";`.
+fn tests_of(source: &str) -> Vec<&str> {
+    let (mut found, mut marked) = (Vec::new(), false);
+    for line in source.lines().map(str::trim_start) {
+        let function = line.strip_prefix("fn ").and_then(|rest| rest.split(['(', '<']).next());
+        found.extend(function.filter(|_| marked));
+        let sweep = line.split_once(": \"").map(|(name, _)| name);
+        found.extend(sweep.filter(|name| name.starts_with("whole_")));
+        marked = line == "#[test]" || marked && line.starts_with(['#', '/']);
+    }
+    found
 }
 
-/// Adds the names that the Rust files of a folder declare.
-fn add_declared(folder: &Path, names: &mut BTreeSet<String>) {
+/// Adds the names of the tests in the Rust files of a folder.
+fn add_tests(folder: &Path, names: &mut BTreeSet<String>) {
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let path = entry.path();
         let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
         if path.is_dir() && !is_hidden && entry.file_name() != "target" {
-            add_declared(&path, names);
+            add_tests(&path, names);
         } else if path.extension().is_some_and(|end| end == "rs") {
             let text = std::fs::read_to_string(path).unwrap();
-            names.extend(text.lines().filter_map(declared).map(str::to_owned));
+            names.extend(tests_of(&text).into_iter().map(str::to_owned));
         }
     }
 }
@@ -48,7 +55,7 @@ fn complaints(page: &str, names: &BTreeSet<String>) -> Vec<String> {
 fn every_defect_of_the_page_has_its_test() {
     let mut names = BTreeSet::new();
     for folder in ["lvk", "lvk-gltf", "samples", "tests"] {
-        add_declared(&project().join(folder), &mut names);
+        add_tests(&project().join(folder), &mut names);
     }
     let page = std::fs::read_to_string(project().join("docs/defects.md")).unwrap();
     assert!(page.lines().filter_map(cells).count() > 50);
@@ -65,6 +72,6 @@ fn a_row_without_a_test_is_noticed() {
         complaints(&bad, &names),
         ["no test is called it_snows", "no test in ''", "no test in 'later'"]
     );
-    assert_eq!(declared("    fn it_rains() {"), Some("it_rains"));
-    assert_eq!(declared("    whole_rain: \"rain\";"), Some("whole_rain"));
+    let source = "    #[test]\n    // Slow.\n    #[ignore]\n    fn it_rains() {\n}\nfn helper() {}\n    whole_rain: \"rain\";";
+    assert_eq!(tests_of(source), ["it_rains", "whole_rain"]);
 }
