@@ -8,8 +8,8 @@
 #include "viewer/radiance_cache.glsl"
 #include "viewer/visible_triangle.glsl"
 
-// A sample that is brighter would leave a bright spot for many frames.
-const float kBrightestSample = 12.0;
+// Exposed light that a path brings in the first frame of a still at most. A brighter path would leave a bright spot for many frames.
+const float kBrightestPath = 12.0;
 
 // Where the ray of a pixel meets the plane of the triangle that the pixel shows.
 Hit visibleHit(uint place, vec3 direction) {
@@ -50,9 +50,12 @@ vec3 pointBefore(Hit hit, vec3 point) {
     return frame.sceneMoves != 0u ? point + way : point;
 }
 
-vec3 clamped(vec3 light) {
+// Light that a path brings to the eye. The bound grows with the frames of a still, and more slowly than their number, so that a spot
+// fades and the mean comes to that of all paths.
+vec3 boundedLight(vec3 light) {
+    float bound = kBrightestPath * sqrt(1.0 + float(frame.stillCount));
     float most = largest(light) * frame.exposure;
-    return most > kBrightestSample ? light * (kBrightestSample / most) : light;
+    return most > bound ? light * (bound / most) : light;
 }
 
 // What later passes need of a pixel, beside its light.
@@ -202,10 +205,10 @@ void endPath(Path path, uint place) {
     vec3 beyond = radianceOf(path);
     vec3 matteAlbedo = frame.planes.at[planePlace(kPlaneMatteAlbedo, place)].rgb;
     vec3 share = frame.planes.at[planePlace(kPlaneMirroredShare, place)].rgb;
-    vec3 matte = first.matte + first.matteWeight * beyond;
-    vec3 mirrored = first.mirrored + first.mirroredWeight * beyond;
-    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(clamped(matte / max(matteAlbedo, 1e-3)), 0.0);
-    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(clamped(mirrored / max(share, 1e-3)), 0.0);
+    vec3 matte = first.matte + boundedLight(first.matteWeight * beyond);
+    vec3 mirrored = first.mirrored + boundedLight(first.mirroredWeight * beyond);
+    frame.planes.at[planePlace(kPlaneMatte, place)] = vec4(matte / max(matteAlbedo, 1e-3), 0.0);
+    frame.planes.at[planePlace(kPlaneMirrored, place)] = vec4(mirrored / max(share, 1e-3), 0.0);
 }
 
 #include "viewer/path_launch.glsl"

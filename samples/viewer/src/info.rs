@@ -22,9 +22,9 @@ impl SampleInfo for Viewer {
     const ABOUT: &'static str =
         "Shows a glTF or OBJ model by hybrid ray tracing or by a path tracer, and writes pictures as PNG";
     const DETAILS: &'static str = "Without FILE the sample shows balls of many materials around a knot. The hybrid \
-        method rasterises surfaces, traces a few rays from each, and filters over time and space. The path tracer is the reference: \
-        light of the sun, the sky and the model's lamps reaches surfaces by any number of reflections and refractions, and more \
-        samples have less noise and the same mean.";
+        method finds surfaces by rays or by a rasteriser, traces a few rays from each, and filters over time and space. The path \
+        tracer is the reference: light of the sun, the sky and the model's lamps reaches surfaces by up to `--bounces` reflections \
+        and refractions, and more samples have less noise and the same mean.";
     const EXAMPLES: &'static str = "
         | the built-in model, on the most capable device and its fastest path
         model.glb --method pathtrace --samples 1024 | a glTF file by the path tracer

@@ -1,6 +1,7 @@
 //! The real-time method against the path tracer.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use glam::Vec3;
 use image::RgbaImage;
 use lvk::{Context, RayQueryPath};
 use lvk_gltf::Model;
@@ -14,7 +15,7 @@ use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::{Content, Method, PrimaryVisibility, ViewerConfig};
 
-use crate::scenes::{View, viewer};
+use crate::scenes::{Builder, View, assert_close, matte, mean, viewer};
 use crate::still_life::still_life;
 
 const SIZE: [u32; 2] = [96, 64];
@@ -41,6 +42,27 @@ fn a_still_comes_close_to_the_reference() {
     assert_similar("four frames", &picture(&ctx, Method::Hybrid, &model, &view(4)), &reference, &few);
     let many = Tolerance { psnr: 28.0, ssim: 0.9, flip: 0.08, ..Tolerance::default() };
     assert_similar("64 frames", &picture(&ctx, Method::Hybrid, &model, &view(64)), &reference, &many);
+}
+
+/// A dark floor in bright exposure returns all of the light that the path tracer finds, though it is far from the first bound of a path.
+#[test]
+fn dark_surfaces_in_bright_exposure_keep_their_light() {
+    let Some(ctx) = software_device() else { return };
+    let floor = Builder::default().quad(
+        Vec3::new(-50.0, 0.0, 50.0),
+        Vec3::X * 100.0,
+        Vec3::NEG_Z * 100.0,
+        matte([0.02; 3]),
+    );
+    let (model, down) = (floor.model(), Camera::looking_at([0.0, 2.0, 0.5], [0.0, 0.0, 0.0], 40.0));
+    let shown = |method, samples| {
+        let view = View { camera: down, size: [24, 16], samples };
+        let mut viewer = viewer(&ctx, (method, RayPath::Query), &model, &environment(), &view);
+        viewer.configure(&ViewerConfig { exposure_stops: 5.0, ..*viewer.config() }).unwrap();
+        headless::picture(&mut viewer).unwrap();
+        mean(&viewer.radiance().unwrap())
+    };
+    assert_close("a dark floor", shown(Method::Hybrid, 64), shown(Method::PathTrace, 256), 0.02);
 }
 
 /// Rays and the rasteriser may disagree at edges of triangles alone. Of the first frame of a still life with masks and panes.

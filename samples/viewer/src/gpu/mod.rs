@@ -5,6 +5,7 @@ mod culling;
 mod deformation;
 mod emitters;
 mod geometry;
+mod ignored;
 mod instances;
 pub(crate) mod layout;
 mod lights;

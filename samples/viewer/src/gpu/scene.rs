@@ -11,6 +11,7 @@ use super::albedo_table::albedo_table;
 use super::culling::Culling;
 use super::emitters::Emitters;
 use super::geometry::{GpuMeshes, UploadedMeshes};
+use super::ignored;
 use super::instances::{Draw, MeshKey, SceneInstances};
 use super::layout::{EmissionConstants, GpuTextureSlot, LightConstants, SceneConstants};
 use super::lights::{GpuLights, LightSetting};
@@ -76,6 +77,7 @@ impl GpuScene {
         let culling = Culling::new(ctx, &instances)?;
         let mut arrays = Arrays { ctx, held: Vec::new() };
         let materials = GpuMaterials::new(&model, &textures);
+        let warnings = [textures.warnings.clone(), ignored::warnings(&model)].concat();
         let shown_meshes = (&meshes, &instances, &culling);
         let constants = arrays.constants(shown_meshes, &materials, (&lights, &emitters), environment)?;
         let tlas = tlas(ctx, &instances)?;
@@ -88,7 +90,7 @@ impl GpuScene {
             offset_extent: (largest / OFFSET_SHARE).max(f32::MIN_POSITIVE),
             triangle_count: meshes.triangle_counts.iter().map(|count| u64::from(*count)).sum(),
             structure_bytes: structure_bytes(ctx, &meshes, *tlas)?,
-            warnings: textures.warnings.clone(),
+            warnings,
             tlas,
             rig: rig(model),
             shown,
