@@ -69,16 +69,14 @@ impl Context {
     }
 
     fn query_compacted_sizes(&self, wanted: &[Arc<AccelStruct>]) -> Result<Option<Arc<CompactedSizeQuery>>> {
-        if wanted.is_empty() {
-            return Ok(None);
-        }
+        let [first, ..] = wanted else { return Ok(None) };
         let mut count = 0;
         let mut targets = Vec::with_capacity(wanted.len());
         for target in wanted {
             targets.push((Arc::clone(target), count));
             count += target.blas()?.parts.len() as u32;
         }
-        let desc = QueryPoolDesc { count, debug_name: "compacted sizes", ..Default::default() };
+        let desc = QueryPoolDesc { count, debug_name: &first.name, ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
         let pool = QueryPool::with_type(&self.device_state().gpu, &desc, ty)?;
         let query = Arc::new(CompactedSizeQuery::new(pool, targets));

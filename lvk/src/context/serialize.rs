@@ -126,7 +126,7 @@ impl Context {
 
     fn serialized_sizes(&self, object: &AccelStruct, body: &BlasStructures) -> Result<Vec<u64>> {
         let count = body.structures.len() as u32;
-        let desc = QueryPoolDesc { count, debug_name: "serialised sizes", ..Default::default() };
+        let desc = QueryPoolDesc { count, debug_name: &object.name, ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR;
         let pool = Arc::new(QueryPool::with_type(&self.device_state().gpu, &desc, ty)?);
         let mut cmd = self.acquire_command_buffer()?;
