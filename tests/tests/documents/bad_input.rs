@@ -139,14 +139,19 @@ pub fn source(module: &[&str]) -> Option<String> {
     files.iter().find_map(|file| std::fs::read_to_string(project().join(file)).ok())
 }
 
+/// Returns the names of the test functions of a source.
+pub fn tests_of(source: &str) -> impl Iterator<Item = &str> {
+    let mut marked = false;
+    source.lines().map(str::trim).filter_map(move |line| {
+        let name = line.strip_prefix("fn ").and_then(|rest| rest.split('(').next()).filter(|_| marked);
+        marked = line == "#[test]" || (marked && (line.starts_with("#[") || line.starts_with("//")));
+        name
+    })
+}
+
 /// True if the source has a test function of this name.
 pub fn has_test(source: &str, name: &str) -> bool {
-    let mut marked = false;
-    source.lines().map(str::trim).any(|line| {
-        let found = marked && line.starts_with(&format!("fn {name}("));
-        marked = line == "#[test]" || (marked && (line.starts_with("#[") || line.starts_with("//")));
-        found
-    })
+    tests_of(source).any(|test| test == name)
 }
 
 /// Returns the functions of a source by name, each with its text up to the brace that ends it. Functions of one name are one.
@@ -196,12 +201,14 @@ pub fn reached_text(source: &str, name: &str) -> String {
     texts
 }
 
-/// True if a source has a whole name, behind which `may_end` finds the next character.
-fn has_name(source: &str, name: &str, may_end: impl Fn(Option<char>) -> bool) -> bool {
+/// True if a source has these words, and not as a part of a longer name.
+fn has_words(source: &str, words: &str) -> bool {
     let is_letter = |letter: char| letter.is_alphanumeric() || letter == '_';
-    source.match_indices(name).any(|(at, _)| {
-        let next = source[at + name.len()..].chars().next();
-        !source[..at].ends_with(is_letter) && !next.is_some_and(char::is_alphanumeric) && may_end(next)
+    source.match_indices(words).any(|(at, _)| {
+        let (before, behind) = (&source[..at], &source[at + words.len()..]);
+        let is_part =
+            before.ends_with(is_letter) || words.ends_with(is_letter) && behind.starts_with(is_letter);
+        !is_part
     })
 }
 
@@ -220,15 +227,14 @@ fn complaints(row: &Row<'_>) -> Vec<String> {
     }
     let is_expected = |error: &&str| {
         let by_helper = EXPECTING.iter().filter(|(variant, _)| variant == error);
-        has_name(&sources, &format!("Error::{error}"), |end| end != Some('_'))
+        has_words(&sources, &format!("Error::{error}"))
             || by_helper.map(|(_, helper)| helper).any(|name| sources.contains(name))
     };
     let in_tests = row.tests.iter().any(|test| !test.starts_with("lvk::"));
     let functions = row.calls.iter().filter_map(|call| call.rsplit("::").next()).filter(|_| in_tests);
     let is_called = |name: &str| {
         let mut by_helper = CALLING.iter().filter(|(call, _)| *call == name);
-        has_name(&sources, name, |end| end == Some('('))
-            || by_helper.any(|(_, helper)| sources.contains(helper))
+        has_words(&sources, &format!("{name}(")) || by_helper.any(|(_, helper)| sources.contains(helper))
     };
     let absent = functions.filter(|name| !is_called(name)).map(|name| format!("{name}("));
     let unexpected = row.errors.iter().filter(|error| !is_expected(error)).map(|error| (*error).to_owned());

@@ -4,20 +4,13 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use crate::bad_input::tests_of;
 use crate::held_by::{cells, project};
 
-/// Returns the tests of a source: functions that are marked as such, and sweeps in the table of a macro, such as
-/// `whole_threads: "threads";`.
-fn tests_of(source: &str) -> Vec<&str> {
-    let (mut found, mut marked) = (Vec::new(), false);
-    for line in source.lines().map(str::trim_start) {
-        let function = line.strip_prefix("fn ").and_then(|rest| rest.split(['(', '<']).next());
-        found.extend(function.filter(|_| marked));
-        let sweep = line.split_once(": \"").map(|(name, _)| name);
-        found.extend(sweep.filter(|name| name.starts_with("whole_")));
-        marked = line == "#[test]" || marked && line.starts_with(['#', '/']);
-    }
-    found
+/// Returns the sweeps of a source in the table of a macro, such as `whole_threads: "threads";`.
+fn sweeps_of(source: &str) -> impl Iterator<Item = &str> {
+    let names = source.lines().filter_map(|line| line.trim_start().split_once(": \""));
+    names.map(|(name, _)| name).filter(|name| name.starts_with("whole_"))
 }
 
 /// Adds the names of the tests in the Rust files of a folder.
@@ -29,7 +22,7 @@ fn add_tests(folder: &Path, names: &mut BTreeSet<String>) {
             add_tests(&path, names);
         } else if path.extension().is_some_and(|end| end == "rs") {
             let text = std::fs::read_to_string(path).unwrap();
-            names.extend(tests_of(&text).into_iter().map(str::to_owned));
+            names.extend(tests_of(&text).chain(sweeps_of(&text)).map(str::to_owned));
         }
     }
 }
@@ -73,5 +66,5 @@ fn a_row_without_a_test_is_noticed() {
         ["no test is called it_snows", "no test in ''", "no test in 'later'"]
     );
     let source = "    #[test]\n    // Slow.\n    #[ignore]\n    fn it_rains() {\n}\nfn helper() {}\n    whole_rain: \"rain\";";
-    assert_eq!(tests_of(source), ["it_rains", "whole_rain"]);
+    assert!(tests_of(source).eq(["it_rains"]) && sweeps_of(source).eq(["whole_rain"]));
 }

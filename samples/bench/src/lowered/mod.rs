@@ -92,6 +92,7 @@ pub(super) fn measure(setup: &Setup, args: &ImageSizeArgs) -> Result<Table, Benc
         add_row(&mut table, name.to_owned(), frame);
         add_row(&mut table, format!("{name}, rays"), rays);
     }
+    // The triangle has no version by hand.
     ways[3] = None;
     let [until_done, _] = medians(&ways, |ctx, _, _| triangle::frames(ctx), size, runs)?;
     add_row(&mut table, "triangle, 640x480, until done".to_owned(), until_done);

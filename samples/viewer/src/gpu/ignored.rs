@@ -1,4 +1,4 @@
-//! What a model has and the viewer does not show.
+//! Features of a model that the viewer ignores.
 
 use lvk_gltf::Model;
 

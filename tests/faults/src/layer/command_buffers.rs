@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-/// What the calls that fail leave behind.
+/// Command buffers and their pools, with the failures of earlier calls.
 #[derive(Default)]
 pub(super) struct CommandBuffers {
     /// Pools by command buffer.

@@ -1,4 +1,4 @@
-//! What the calls of a run show of a fallback.
+//! Evidence of a fallback in the calls of a run.
 
 use super::fallbacks::Instead;
 use super::verdict::RunOutcome;

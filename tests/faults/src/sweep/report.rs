@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::plan::SweepPlan;
-use super::run::{Caches, LayerFolder, Program, clean_run, run};
+use super::run::{Caches, LayerFolder, Program, clean_run, names_of, run};
 use super::verdict::{Ending, Flaw, RunOutcome, flaws, leaks_on_purpose};
 use crate::fault::{Fault, PROGRESS};
 
@@ -170,14 +170,16 @@ pub fn run_until_reached(
 pub fn sweep(program: &Program, plan: &SweepPlan, budget: Duration) -> io::Result<SweepReport> {
     let start = Instant::now();
     let (layer, caches) = (LayerFolder::new()?, tempfile::tempdir()?);
-    // The first run fills the caches.
-    let first = clean_run(program, &layer, caches.path())?;
     let empty = tempfile::tempdir()?;
     let (clean, found_caches) = match program.caches {
         Caches::Warm => {
-            (RunOutcome { names: first.names, ..run(program, &layer, caches.path(), None)? }, caches.path())
+            // This run fills the caches.
+            let names = names_of(program, &layer, caches.path())?;
+            let mut clean = run(program, &layer, caches.path(), None)?;
+            clean.names.extend(names);
+            (clean, caches.path())
         }
-        Caches::Cold => (first, empty.path()),
+        Caches::Cold => (clean_run(program, &layer, caches.path())?, empty.path()),
     };
     let commands: BTreeSet<_> = clean.calls.iter().map(|call| &call.command).collect();
     let faults = plan.faults(&clean.calls);

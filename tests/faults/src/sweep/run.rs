@@ -87,17 +87,24 @@ fn layer_library() -> io::Result<PathBuf> {
     newest.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "liblvk_faults.so was not built"))
 }
 
-/// Runs the program twice without a fault, and fills `caches`. Returns the first run, with the names that the second has given to
-/// objects for a tool that reads them.
+/// Runs the program without a fault, and once more to read the names that it gives to objects for a tool. Fills `caches`.
 ///
 /// # Errors
 /// Those of files and processes.
 pub fn clean_run(program: &Program, layer: &LayerFolder, caches: &Path) -> io::Result<RunOutcome> {
     let mut clean = run(program, layer, caches, None)?;
+    clean.names.extend(names_of(program, layer, caches)?);
+    Ok(clean)
+}
+
+/// Runs the program without a fault for a tool that reads names, and fills `caches`. Returns the names of its objects.
+///
+/// # Errors
+/// Those of files and processes.
+pub fn names_of(program: &Program, layer: &LayerFolder, caches: &Path) -> io::Result<BTreeSet<String>> {
     let mut named = program.clone();
     named.variables.push((NAMES_VARIABLE.to_owned(), "1".to_owned()));
-    clean.names.extend(run(&named, layer, caches, None)?.names);
-    Ok(clean)
+    Ok(run(&named, layer, caches, None)?.names)
 }
 
 /// Runs the program. Without a fault it uses `caches` itself and fills them. With one it uses a

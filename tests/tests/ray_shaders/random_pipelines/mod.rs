@@ -68,7 +68,7 @@ fn random_pipelines_compute_what_the_interpreter_computes() -> Result<()> {
     Ok(())
 }
 
-/// What came of a pipeline.
+/// Result of the comparison of a pipeline with the interpreter.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Comparison {
     /// The results are those of the interpreter, and the validation layer is silent.

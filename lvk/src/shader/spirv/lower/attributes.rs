@@ -63,7 +63,7 @@ fn first_scalars(linker: &Linker, ty: u32) -> Vec<Scalar> {
         let Some(part) = waiting.pop().filter(|_| found.len() < COUNT) else { break };
         let Some(inst) = linker.global(part.ty) else { continue };
         let element = |count: u32| vec![inst.operand(1); (count as usize).min(COUNT)];
-        let members = match inst.op {
+        let members: Vec<u32> = match inst.op {
             Op::TypeStruct => inst.operands.iter().skip(1).take(MAX_PARTS).copied().collect(),
             Op::TypeVector | Op::TypeMatrix => element(inst.operand(2)),
             Op::TypeArray => element(linker.array_length(part.ty).unwrap_or(0)),
@@ -72,9 +72,11 @@ fn first_scalars(linker: &Linker, ty: u32) -> Vec<Scalar> {
                 continue;
             }
         };
-        let inside = (0..).zip(members);
-        let inside = inside.map(|(index, ty)| Scalar { path: [&part.path[..], &[index]].concat(), ty });
-        waiting.extend(inside.collect::<Vec<_>>().into_iter().rev());
+        // The first member is looked at first.
+        let inside = members.into_iter().enumerate().rev();
+        waiting.extend(
+            inside.map(|(index, ty)| Scalar { path: [&part.path[..], &[index as u32]].concat(), ty }),
+        );
     }
     found
 }
