@@ -65,10 +65,11 @@ impl CopyAspect {
 impl Format {
     /// Returns the bytes of a region of width x height x depth texels in uploads and downloads, tightly
     /// packed. They contain the colour, or the depth without its stencil, or all planes one after the other.
-    /// Compressed formats round up to whole [blocks](Self::block_extent).
+    /// Compressed formats round up to whole [blocks](Self::block_extent). Numbers beyond 64 bits become `u64::MAX`.
     pub fn bytes(self, extent: [u32; 3]) -> u64 {
         let Some(main) = self.copy_aspect(Aspect::Main) else {
-            return self.planes().map(|plane| plane.bytes(plane.aspect_extent(extent))).sum();
+            let planes = self.planes().map(|plane| plane.bytes(plane.aspect_extent(extent)));
+            return planes.fold(0, u64::saturating_add);
         };
         main.bytes(extent)
     }
@@ -246,6 +247,7 @@ mod tests {
         assert_eq!(Format::Nv12.copy_aspect(Aspect::Plane(2)), None);
         assert_eq!(Format::Nv12.copy_aspect(Aspect::Main), None);
         assert_eq!(Format::Rgba8Unorm.copy_aspect(Aspect::Plane(0)), None);
+        assert_eq!(Format::Nv12.bytes([u32::MAX; 3]), u64::MAX);
         assert_eq!(Format::Yuv420p8.uploaded_aspects().count(), 3);
         assert_eq!(Format::D32FloatS8.uploaded_aspects().collect::<Vec<_>>(), [Aspect::Main]);
     }
