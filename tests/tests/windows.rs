@@ -577,3 +577,17 @@ fn numbers_queues_and_contexts_that_do_not_fit_are_refused() {
     assert!(told.contains("swapchain") && told.contains("belong to the graphics queue"), "{told}");
     present_until_visible(&ctx, *swapchain, &window, RED);
 }
+
+#[test]
+fn images_of_a_swapchain_are_not_destroyed_alone() {
+    let Some((window, ctx)) = window() else { return };
+    capture_warnings();
+    let desc = SwapchainDesc { debug_name: "the shown one", ..Default::default() };
+    let swapchain = ctx.create_swapchain(&desc).unwrap();
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    ctx.destroy(image.texture());
+    let told = take_warnings("the shown one");
+    assert!(matches!(&told[..], [told] if told.contains("destroy the swapchain")), "{told:?}");
+    ctx.present(fill(&ctx, image.texture(), GREEN).unwrap(), image).unwrap();
+    present_until_visible(&ctx, *swapchain, &window, RED);
+}

@@ -25,9 +25,13 @@ impl CommandBuffer {
         self.open_labels += 1;
     }
 
-    /// Closes the innermost labelled range (`vkCmdEndDebugUtilsLabelEXT`); does nothing if none is open.
+    /// Closes the innermost labelled range (`vkCmdEndDebugUtilsLabelEXT`). If none is open, records nothing and tells so
+    /// by a warning of the `log` crate.
     pub fn pop_label(&mut self) {
-        self.pop_labels(self.open_labels.saturating_sub(1));
+        match self.open_labels.checked_sub(1) {
+            Some(left) => self.pop_labels(left),
+            None => log::warn!("{}: pop_label closes nothing; push a label before", self.recording.name()),
+        }
     }
 
     /// Inserts a label for debuggers (`vkCmdInsertDebugUtilsLabelEXT`): a name, or a [`Label`] with a colour.
@@ -71,10 +75,13 @@ impl RenderPass<'_> {
         self.cmd.push_label(label);
     }
 
-    /// As [`CommandBuffer::pop_label`]; does nothing if none was opened in the pass.
+    /// As [`CommandBuffer::pop_label`]. Closes no label that was opened outside of the pass.
     pub fn pop_label(&mut self) {
         if self.cmd.open_labels > self.labels_outside + u32::from(self.labelled) {
             self.cmd.pop_label();
+        } else {
+            let name = self.cmd.recording.name();
+            log::warn!("{name}: pop_label closes nothing in a render pass; push a label in the pass before");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::Context;
 use crate::device_state::{DeferredObject, DeviceState};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, stale_object};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, OpacityMicromapHandle, QueryPoolHandle,
     RayTracingLibraryHandle, RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle,
@@ -12,34 +12,34 @@ use crate::handle::{
 /// A handle whose object a context can destroy. All handles implement it.
 pub trait Destroy: Handle {
     #[doc(hidden)]
-    fn destroy_in(self, ctx: &Context);
+    fn destroy_in(self, ctx: &Context) -> Result<()>;
 }
 
 impl Context {
     /// Destroys an object. The handle is stale from then on. Memory is freed when the last command buffer that may use
-    /// the object is done. Does nothing for a stale handle or for an image of a swapchain. Warns of the handle of
-    /// another context, whose object stays.
+    /// the object is done.
+    ///
+    /// Destroys nothing for a stale handle, for a handle of another context and for an image of a swapchain. A warning
+    /// of the `log` crate tells so.
     pub fn destroy<H: Destroy>(&self, handle: H) {
-        handle.destroy_in(self);
+        match handle.destroy_in(self) {
+            Ok(()) => {}
+            Err(Error::StaleHandle { kind, name }) => {
+                let object = stale_object(kind, &name);
+                log::warn!("nothing is destroyed: {object} was destroyed before; destroy it once");
+            }
+            Err(error) => log::warn!("nothing is destroyed: {error}"),
+        }
     }
-}
-
-/// Returns what was removed from a pool, and warns of the handle of another context.
-pub(super) fn removed<T>(found: Result<T>) -> Option<T> {
-    if let Err(error @ Error::ForeignHandle { .. }) = &found {
-        log::warn!("nothing is destroyed: {error}");
-    }
-    found.ok()
 }
 
 macro_rules! destroy {
     ($($handle:ident: $pool:ident => $variant:ident;)*) => {
         $(impl Destroy for $handle {
-            fn destroy_in(self, ctx: &Context) {
+            fn destroy_in(self, ctx: &Context) -> Result<()> {
                 let shared: &DeviceState = ctx.device_state();
-                if let Some(object) = removed(shared.store.$pool.remove(self)) {
-                    shared.free_later(DeferredObject::$variant(object));
-                }
+                shared.free_later(DeferredObject::$variant(shared.store.$pool.remove(self)?));
+                Ok(())
             }
         })*
     };
@@ -57,29 +57,28 @@ destroy! {
 }
 
 impl Destroy for TextureHandle {
-    /// Does nothing for images of a swapchain: they are destroyed with the swapchain.
-    fn destroy_in(self, ctx: &Context) {
+    /// Fails for images of a swapchain: they are destroyed with the swapchain.
+    fn destroy_in(self, ctx: &Context) -> Result<()> {
         let shared: &DeviceState = ctx.device_state();
-        let textures = &shared.store.textures;
-        if textures.get(self).is_ok_and(|texture| texture.lent) {
-            return;
+        let texture = shared.store.textures.get(self)?;
+        if texture.lent {
+            return Err(Error::usage(&*texture.name, "it is an image of a swapchain; destroy the swapchain"));
         }
-        if let Some(texture) = removed(textures.remove(self)) {
-            shared.free_later(DeferredObject::Texture(texture));
-        }
+        shared.free_later(DeferredObject::Texture(shared.store.textures.remove(self)?));
+        Ok(())
     }
 }
 
 impl Destroy for ShaderModuleHandle {
     /// Destroys the module. Pipelines do not need their modules after creation.
-    fn destroy_in(self, ctx: &Context) {
-        drop(removed(ctx.device_state().store.shader_modules.remove(self)));
+    fn destroy_in(self, ctx: &Context) -> Result<()> {
+        ctx.device_state().store.shader_modules.remove(self).map(drop)
     }
 }
 
 impl Destroy for RayTracingLibraryHandle {
     /// Removes the handle. Pipelines that are linked from the library keep the library.
-    fn destroy_in(self, ctx: &Context) {
-        drop(removed(ctx.device_state().store.ray_tracing_libraries.remove(self)));
+    fn destroy_in(self, ctx: &Context) -> Result<()> {
+        ctx.device_state().store.ray_tracing_libraries.remove(self).map(drop)
     }
 }

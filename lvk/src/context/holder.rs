@@ -63,7 +63,8 @@ impl<H: Destroy> Deref for Holder<H> {
 
 impl<H: Destroy> Drop for Holder<H> {
     fn drop(&mut self) {
-        self.ctx.destroy(self.handle);
+        // Its object may have been destroyed by the handle.
+        let _ = self.handle.destroy_in(&self.ctx);
     }
 }
 

@@ -14,7 +14,8 @@ impl Context {
         self.device_state().gpu.begin_queue_label(queue, label.into());
     }
 
-    /// Closes the innermost labelled range of a queue (`vkQueueEndDebugUtilsLabelEXT`); does nothing if none is open.
+    /// Closes the innermost labelled range of a queue (`vkQueueEndDebugUtilsLabelEXT`). If none is open, does nothing and,
+    /// where a tool reads labels, tells so by a warning of the `log` crate.
     pub fn pop_queue_label(&self, queue: Queue) {
         self.device_state().gpu.end_queue_label(queue);
     }

@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::Context;
 use super::create_texture::default_views;
-use super::destroy::{Destroy, removed};
+use super::destroy::Destroy;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::device_state::DeferredObject;
@@ -31,10 +31,9 @@ use crate::swapchain::surface::{Surface, SurfaceState};
 
 impl Destroy for SwapchainHandle {
     /// Destroys the swapchain and its images, including an acquired one.
-    fn destroy_in(self, ctx: &Context) {
-        if let Some(swapchain) = removed(ctx.device_state().store.swapchains.remove(self)) {
-            ctx.retire_swapchain(swapchain);
-        }
+    fn destroy_in(self, ctx: &Context) -> Result<()> {
+        ctx.retire_swapchain(ctx.device_state().store.swapchains.remove(self)?);
+        Ok(())
     }
 }
 

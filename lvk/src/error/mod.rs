@@ -395,7 +395,8 @@ fn memory_request(bytes: Option<u64>) -> String {
     bytes.map(|bytes| format!(" ({bytes} bytes)")).unwrap_or_default()
 }
 
-fn stale_object(kind: &str, name: &Option<String>) -> String {
+/// Names an object that was destroyed: its name, or its kind where the name is not kept.
+pub(crate) fn stale_object(kind: &str, name: &Option<String>) -> String {
     match name {
         Some(name) => format!("'{}'", readable_name(name)),
         None => format!("the {kind}"),

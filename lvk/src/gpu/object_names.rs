@@ -70,11 +70,14 @@ impl Gpu {
         let raw = self.queues.raw(queue.index());
         let open = self.queues.open_labels(queue);
         // The count changes only while the queue is locked.
-        let left = open.load(Ordering::Relaxed).checked_sub(1);
-        if let Some(left) = left {
-            open.store(left, Ordering::Relaxed);
-            // SAFETY: as above, and a range is open.
-            unsafe { ext.queue_end_debug_utils_label(*raw) };
-        }
+        let Some(left) = open.load(Ordering::Relaxed).checked_sub(1) else {
+            drop(raw);
+            let queue = queue.label();
+            log::warn!("{queue} queue: pop_queue_label closes nothing; push a label before");
+            return;
+        };
+        open.store(left, Ordering::Relaxed);
+        // SAFETY: as above, and a range is open.
+        unsafe { ext.queue_end_debug_utils_label(*raw) };
     }
 }

@@ -102,7 +102,7 @@ impl Recording {
     }
 
     /// Returns the name of the command buffer in errors.
-    pub(super) fn name(&self) -> CommandsName<'_> {
+    pub(crate) fn name(&self) -> CommandsName<'_> {
         CommandsName { debug_name: self.labels.name(), queue_index: self.queue_index }
     }
 
@@ -157,7 +157,7 @@ impl Recording {
 
 /// The name of a command buffer in errors: its debug name, or its queue where it has none.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CommandsName<'a> {
+pub(crate) struct CommandsName<'a> {
     /// Name given by [`set_name`](Recording::set_name); empty without one.
     debug_name: &'a str,
     queue_index: usize,

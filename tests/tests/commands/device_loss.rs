@@ -6,6 +6,7 @@ use std::sync::Arc;
 use lvk::ash::vk;
 use lvk::test_hooks::{lose_device_after, with_fault_injection};
 use lvk::{Context, DeviceLossReport, Error, Label, LabelProgress, Queue, QueueRequest, RawWait};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device_with};
 
 /// A timeline semaphore that work waits for, until the value is dropped.
@@ -155,13 +156,18 @@ fn a_loss_without_unfinished_work_names_the_call_and_its_queue_alone() {
 #[test]
 fn queues_take_labels_with_colours() {
     let Some(ctx) = device_with(|desc| desc.debug_names = Some(true)) else { return };
+    capture_warnings();
     for queue in Queue::ALL {
         ctx.pop_queue_label(queue);
+        let told = take_warnings("pop_queue_label");
+        assert!(told.len() == 1 && told[0].contains("push a label before"), "{queue:?}: {told:?}");
         ctx.push_queue_label(queue, Label::colored("frame", [0.0, 0.5, 1.0]));
         ctx.insert_queue_label(queue, "a place");
         ctx.submit(ctx.acquire_command_buffer_on(queue).unwrap()).unwrap();
         ctx.pop_queue_label(queue);
+        assert_eq!(take_warnings("pop_queue_label"), [""; 0], "{queue:?}");
         ctx.pop_queue_label(queue);
+        assert_eq!(take_warnings("pop_queue_label").len(), 1, "{queue:?}");
     }
     ctx.wait_idle().unwrap();
 }
