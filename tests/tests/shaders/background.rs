@@ -1,14 +1,18 @@
 //! Pipelines that are compiled in the background: placeholders, errors, drops, and the end of a context.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::mem::discriminant;
+
+use bytemuck::NoUninit;
 use lvk::{
-    ColorTarget, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Error, Format, HitGroup,
-    Holder, PendingPipeline, RayTracingPipelineDesc, RayTracingPipelineHandle, RenderPipelineDesc,
-    ShaderModuleHandle, ShaderRecord, ShaderStage, SpecializationConstant, SpecializationValue,
+    BlockLayout, ColorTarget, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Destroy,
+    DeviceProfile, Error, Format, HitGroup, Holder, PendingPipeline, RayTracingPipelineDesc,
+    RayTracingPipelineHandle, RenderPipelineDesc, Result, ShaderModuleHandle, ShaderRecord, ShaderStage,
+    SpecializationConstant, SpecializationValue, shader_struct,
 };
 use lvk_tests::compute::{compute_pipeline, module, read_words, run_on_words, words_buffer};
-use lvk_tests::device;
 use lvk_tests::warnings::{capture_warnings, take_warnings};
+use lvk_tests::{device, device_with};
 
 /// Writes the specialisation constant 0.
 const WRITE: &str = "
@@ -125,6 +129,118 @@ fn wrong_handles_are_refused_at_once() {
     let none = ComputePipelineDesc { debug_name: "empty", ..Default::default() };
     let error = ctx.create_compute_pipeline_in_background(&none).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("empty"), "{error}");
+}
+
+/// Returns the error of a creation in the background, which must be that of the creation at once.
+#[track_caller]
+fn same_error<H: Destroy>(now: Result<Holder<H>>, later: Result<PendingPipeline<H>>) -> Error {
+    let (now, later) = (now.unwrap_err(), later.and_then(PendingPipeline::wait).unwrap_err());
+    assert_eq!(now.to_string(), later.to_string());
+    assert_eq!(discriminant(&now), discriminant(&later), "{now}");
+    later
+}
+
+shader_struct! {
+    #[derive(Clone, Copy, NoUninit)]
+    #[repr(C)]
+    /// Lacks the address that the shader reads.
+    struct Unlike {
+        number: u32,
+    }
+}
+
+#[test]
+fn compute_pipelines_in_the_background_have_the_errors_of_those_at_once() {
+    let Some(ctx) = device() else { return };
+    let compute = module(&ctx, ShaderStage::Compute, WRITE);
+    let wide = module(&ctx, ShaderStage::Compute, "layout(local_size_x_id = 0) in; void main() {}");
+    let vertex = module(&ctx, ShaderStage::Vertex, "void main() { gl_Position = vec4(0); }");
+    let refuse = |desc: ComputePipelineDesc<'_>| {
+        let desc = ComputePipelineDesc { debug_name: "odd one", ..desc };
+        same_error(ctx.create_compute_pipeline(&desc), ctx.create_compute_pipeline_in_background(&desc))
+    };
+    let constant = |id, value| [SpecializationConstant { id, value: SpecializationValue::U32(value) }];
+    let desc = ComputePipelineDesc { module: Some(*compute), ..Default::default() };
+    for desc in [
+        ComputePipelineDesc { module: None, ..desc },
+        ComputePipelineDesc { module: Some(*vertex), ..desc },
+        ComputePipelineDesc { specialization: &constant(4, 1), ..desc },
+    ] {
+        let error = refuse(desc);
+        assert!(matches!(error, Error::InvalidUsage { .. }), "{error}");
+    }
+    let huge = ComputePipelineDesc { module: Some(*wide), specialization: &constant(0, 1 << 30), ..desc };
+    let error = refuse(huge);
+    assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+    let error = refuse(ComputePipelineDesc { layouts: &[BlockLayout::push_constants::<Unlike>()], ..desc });
+    assert!(matches!(error, Error::LayoutMismatch { .. }), "{error}");
+}
+
+#[test]
+fn render_pipelines_in_the_background_have_the_errors_of_those_at_once() {
+    let Some(ctx) = device() else { return };
+    let vertex = module(&ctx, ShaderStage::Vertex, "void main() { gl_Position = vec4(0); }");
+    let fragment = module(&ctx, ShaderStage::Fragment, "void main() {}");
+    let refuse = |desc: RenderPipelineDesc<'_>| {
+        let desc = RenderPipelineDesc { debug_name: "odd one", ..desc };
+        same_error(ctx.create_render_pipeline(&desc), ctx.create_render_pipeline_in_background(&desc))
+    };
+    let desc = RenderPipelineDesc { vertex: Some(*vertex), ..Default::default() };
+    for desc in [
+        RenderPipelineDesc { vertex: None, ..desc },
+        RenderPipelineDesc { vertex: Some(*fragment), ..desc },
+        RenderPipelineDesc { fragment: Some(*vertex), ..desc },
+    ] {
+        let error = refuse(desc);
+        assert!(matches!(error, Error::InvalidUsage { .. }), "{error}");
+    }
+    let error = refuse(RenderPipelineDesc { color: &[Format::D32Float.into()], ..desc });
+    assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+    let many = vec![ColorTarget::from(Format::Rgba8Unorm); 9];
+    let error = refuse(RenderPipelineDesc { color: &many, ..desc });
+    assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+}
+
+#[test]
+fn ray_tracing_pipelines_in_the_background_have_the_errors_of_those_at_once() {
+    let Some(ctx) = device() else { return };
+    if !has_rays(&ctx) {
+        return;
+    }
+    let ray_gen = module(&ctx, ShaderStage::RayGen, "void main() {}");
+    let text = "layout(shaderRecordEXT, scalar) buffer Record { uint value; } record;
+        layout(location = 0) rayPayloadInEXT uint payload;
+        void main() { payload = record.value; }";
+    let miss = module(&ctx, ShaderStage::Miss, text);
+    let refuse = |desc: RayTracingPipelineDesc<'_>| {
+        let desc = RayTracingPipelineDesc { debug_name: "odd one", ..desc };
+        let later = ctx.create_ray_tracing_pipeline_in_background(&desc);
+        same_error(ctx.create_ray_tracing_pipeline(&desc), later)
+    };
+    let (ray_gens, misses) = ([*ray_gen], [*miss]);
+    let desc = RayTracingPipelineDesc { ray_gen: &ray_gens, ..Default::default() };
+    for desc in [
+        RayTracingPipelineDesc { ray_gen: &[], ..desc },
+        RayTracingPipelineDesc { ray_gen: &misses, ..desc },
+        RayTracingPipelineDesc { max_recursion: 0, ..desc },
+    ] {
+        let error = refuse(desc);
+        assert!(matches!(error, Error::InvalidUsage { .. }), "{error}");
+    }
+    let error = refuse(RayTracingPipelineDesc { max_recursion: u32::MAX, ..desc });
+    assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+    let error = refuse(RayTracingPipelineDesc { miss: &misses, ..desc });
+    assert!(matches!(error, Error::ShaderRecord { .. }), "{error}");
+}
+
+#[test]
+fn without_ray_tracing_pipelines_those_in_the_background_are_unsupported() {
+    let profile = DeviceProfile::no_ray_tracing();
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
+    let desc = RayTracingPipelineDesc { debug_name: "no rays", ..Default::default() };
+    let later = ctx.create_ray_tracing_pipeline_in_background(&desc);
+    let error = same_error(ctx.create_ray_tracing_pipeline(&desc), later);
+    assert!(matches!(error, Error::Unsupported { .. }), "{error}");
 }
 
 /// The scaffold checks that the context ends in silence, and the report of leaks would be a warning.
