@@ -12,6 +12,8 @@ pub const WITHOUT_ERROR: &str = "\n## Calls without an error\n";
 pub const CRATES: &str = "\n## Models and interfaces\n";
 /// The public interface, one item a line; `.ci/api` holds it to the sources.
 pub const INTERFACE: &str = include_str!("../../../lvk/public-api.txt");
+/// The title of the section about values that every call takes.
+const CLAMPED: &str = "\n## Values that are clamped\n";
 const ERRORS: &str = include_str!("../../../lvk/src/error/mod.rs");
 /// Handles of objects. A submission has none.
 const HANDLES: [&str; 12] = [
@@ -28,6 +30,9 @@ const HANDLES: [&str; 12] = [
     "SwapchainHandle",
     "TextureHandle",
 ];
+
+/// Errors of handles without an object.
+const OF_HANDLES: [&str; 2] = ["StaleHandle", "ForeignHandle"];
 
 /// Functions of the harness that expect an error of a variant.
 const EXPECTING: [(&str, &str); 4] = [
@@ -51,11 +56,26 @@ struct Row<'a> {
     tests: Vec<&'a str>,
 }
 
-/// A function of the public interface that returns `lvk::Result`.
+/// A function of the public interface.
 #[derive(Debug, PartialEq)]
-struct Call {
-    name: String,
-    takes_handle: bool,
+pub struct Call<'a> {
+    /// The type and the function, as `Context::wait`, or the function alone.
+    pub name: String,
+    /// The list of the arguments, with its parentheses.
+    pub arguments: &'a str,
+    /// True if it returns `lvk::Result`.
+    pub is_fallible: bool,
+}
+
+impl Call<'_> {
+    fn takes_handle(&self) -> bool {
+        words(self.arguments).any(|word| HANDLES.contains(&word))
+    }
+
+    /// True if it takes more than handles.
+    fn takes_more(&self) -> bool {
+        words(self.arguments).any(|word| !["self", "mut", "lvk"].contains(&word) && !HANDLES.contains(&word))
+    }
 }
 
 /// Returns the names in backticks of a cell or line.
@@ -82,24 +102,22 @@ fn rows(page: &str) -> Result<Vec<Row<'_>>, String> {
 }
 
 /// Returns the names that begin the items of the list below a title.
-fn list<'a>(page: &'a str, title: &str) -> Vec<&'a str> {
+pub fn list<'a>(page: &'a str, title: &str) -> Vec<&'a str> {
     let (_, section) = page.split_once(&format!("\n## {title}\n")).unwrap();
     let section = section.split("\n## ").next().unwrap();
     let items = section.lines().filter_map(|line| line.strip_prefix("- "));
     items.flat_map(|item| quoted(item.split(": ").next().unwrap())).collect()
 }
 
-/// Returns the fallible functions among the lines of the interface.
-fn fallible_calls(interface: &str) -> Vec<Call> {
-    interface.lines().filter_map(fallible_call).collect()
+/// Returns the functions that return `lvk::Result`.
+fn fallible_calls() -> Vec<Call<'static>> {
+    INTERFACE.lines().filter_map(call).filter(|call| call.is_fallible).collect()
 }
 
-fn fallible_call(line: &str) -> Option<Call> {
+/// Returns the function of a line of the interface.
+pub fn call(line: &str) -> Option<Call<'_>> {
     let (_, function) = line.split_once("fn lvk::")?;
-    let (head, result) = function.rsplit_once(" -> ")?;
-    if !result.contains("lvk::Result<") {
-        return None;
-    }
+    let (head, result) = function.rsplit_once(" -> ").unwrap_or((function, ""));
     let (mut name, mut depth) = (String::new(), 0);
     let mut letters = head.char_indices();
     let arguments = loop {
@@ -111,8 +129,12 @@ fn fallible_call(line: &str) -> Option<Call> {
             _ => {}
         }
     };
-    let takes_handle = HANDLES.iter().any(|handle| arguments.contains(&format!("lvk::{handle}")));
-    Some(Call { name, takes_handle })
+    Some(Call { name, arguments, is_fallible: result.contains("lvk::Result<") })
+}
+
+/// Returns the words of a text: names and numbers.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|letter: char| !letter.is_alphanumeric() && letter != '_').filter(|word| !word.is_empty())
 }
 
 /// Returns the variants of `pub enum Error` in a source.
@@ -194,15 +216,14 @@ pub fn reached_text(source: &str, name: &str) -> String {
     let (mut names, mut texts, mut open) = (BTreeSet::new(), String::new(), vec![name]);
     while let Some(name) = open.pop() {
         let Some(text) = functions.get(name).filter(|_| names.insert(name)) else { continue };
-        let words = text.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
-        open.extend(words.filter(|word| functions.contains_key(word)));
+        open.extend(words(text).filter(|word| functions.contains_key(word)));
         texts += text;
     }
     texts
 }
 
 /// True if a source has these words, and not as a part of a longer name.
-fn has_words(source: &str, words: &str) -> bool {
+pub fn has_words(source: &str, words: &str) -> bool {
     let is_letter = |letter: char| letter.is_alphanumeric() || letter == '_';
     source.match_indices(words).any(|(at, _)| {
         let (before, behind) = (&source[..at], &source[at + words.len()..]);
@@ -252,7 +273,7 @@ fn every_fallible_call_has_a_row_or_a_reason() {
     let rows = rows(PAGE).unwrap();
     let by_shortage: BTreeSet<_> = list(PAGE, "Calls that no input makes fail").into_iter().collect();
     let with_rows: BTreeSet<_> = rows.iter().flat_map(|row| &row.calls).copied().collect();
-    let calls = fallible_calls(INTERFACE);
+    let calls = fallible_calls();
     assert!(calls.len() > 150, "{} calls", calls.len());
     let known: BTreeSet<_> = calls.iter().map(|call| call.name.as_str()).collect();
     let named: BTreeSet<_> = with_rows.union(&by_shortage).copied().collect();
@@ -283,13 +304,27 @@ fn every_row_names_tests_that_make_the_call_and_expect_the_error() {
 fn every_call_with_a_handle_is_tried_with_destroyed_and_foreign_ones() {
     let rows = rows(PAGE).unwrap();
     let tried = |call: &str| {
-        let of_handles =
-            |row: &&Row<'_>| ["StaleHandle", "ForeignHandle"].iter().all(|error| row.errors.contains(error));
+        let of_handles = |row: &&Row<'_>| OF_HANDLES.iter().all(|error| row.errors.contains(error));
         rows.iter().filter(of_handles).any(|row| row.calls.contains(&call))
     };
-    let calls = fallible_calls(INTERFACE).into_iter().filter(|call| call.takes_handle);
+    let calls = fallible_calls().into_iter().filter(Call::takes_handle);
     let untried: Vec<_> = calls.filter(|call| !tried(&call.name)).map(|call| call.name).collect();
     assert_none("no row of handles has", &untried);
+}
+
+#[test]
+fn every_call_that_takes_more_than_handles_has_more_than_their_row() {
+    let rows = rows(PAGE).unwrap();
+    let of_more = |row: &&Row<'_>| row.errors.iter().any(|error| !OF_HANDLES.contains(error));
+    let with_more: BTreeSet<_> = rows.iter().filter(of_more).flat_map(|row| &row.calls).copied().collect();
+    let with_rows: BTreeSet<_> = rows.iter().flat_map(|row| &row.calls).copied().collect();
+    let (_, clamped) = PAGE.split_once(CLAMPED).unwrap();
+    let clamped = quoted(clamped.split("\n## ").next().unwrap());
+    let is_alone =
+        |name: &str| with_rows.contains(name) && !with_more.contains(name) && !clamped.contains(&name);
+    let calls = fallible_calls().into_iter().filter(Call::takes_more).map(|call| call.name);
+    let alone: Vec<_> = calls.filter(|name| is_alone(name)).collect();
+    assert_none("only a row of handles has", &alone);
 }
 
 #[test]
@@ -344,15 +379,24 @@ fn texts_of_tests_have_the_functions_that_they_call() {
 
 #[test]
 fn the_interface_is_read() {
-    let call = |line| fallible_call(line);
-    let found = |name: &str, takes_handle| Some(Call { name: name.to_owned(), takes_handle });
+    let found =
+        |name: &str, arguments, is_fallible| Some(Call { name: name.to_owned(), arguments, is_fallible });
     let upload = "pub fn lvk::CommandBuffer::upload<T: a::B>(&mut self, &T) -> lvk::Result<u64>";
-    assert_eq!(call(upload), found("CommandBuffer::upload", false));
+    assert_eq!(call(upload), found("CommandBuffer::upload", "(&mut self, &T)", true));
     let address = "pub fn lvk::Holder<lvk::BufferHandle>::address(&self) -> lvk::Result<u64>";
-    assert_eq!(call(address), found("Holder::address", false));
+    assert_eq!(call(address), found("Holder::address", "(&self)", true));
+    assert_eq!(
+        call("pub const fn lvk::a(u32) -> &'static lvk::B").map(|call| call.name).as_deref(),
+        Some("a")
+    );
+    assert_eq!(call("pub struct lvk::Context"), None);
     let raw = "pub unsafe fn lvk::Context::raw(&self, &[lvk::BufferHandle]) -> a::Vec<lvk::Result<()>>";
-    assert_eq!(call(raw), found("Context::raw", true));
-    assert_eq!(call("pub fn lvk::Context::limits(&self) -> lvk::Limits"), None);
+    assert_eq!(call(raw), found("Context::raw", "(&self, &[lvk::BufferHandle])", true));
+    let takes = |line| call(line).map(|call| (call.takes_handle(), call.takes_more()));
+    assert_eq!(takes(raw), Some((true, false)));
+    assert_eq!(takes(upload), Some((false, true)));
+    assert_eq!(takes(address), Some((false, false)));
+    assert_eq!(takes("pub fn lvk::A::b(&self, lvk::BufferHandle, [u32; 2])"), Some((true, true)));
     assert_eq!(
         variants(
             "pub enum Error {\n    /// A.\n    A {\n        /// B.\n        b: u32,\n    },\n    C(u32),\n}\n"
