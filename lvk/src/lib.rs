@@ -93,8 +93,8 @@
 //! # What is not checked
 //!
 //! Shaders are not checked: their indices, addresses, loops, and the dependencies of their commands. One table,
-//! [`manual::unchecked`], lists every mistake of safe code that is no [`Error`], with its result, the tool that notices
-//! it, and the remedy.
+//! [`manual::unchecked`], lists the known mistakes of safe code that are neither an [`Error`] nor a warning, with their
+//! results, the tools that notice them, and the remedies.
 //!
 //! # What `lvk` does not do (yet)
 //!
