@@ -26,33 +26,45 @@ bool isSameSurface(Seen seen, vec3 point, Seen before, ivec2 pixel) {
     return abs(dot(way, seen.normal)) < 0.01 * seen.distance;
 }
 
-// The mean of the frames before around a place in pixels, of the pixels that saw the same surface, which was at `point`; its matte.a
-// is 0 without any.
+const History kNoHistory = History(vec4(0.0), vec4(0.0), vec4(0.0));
+
+// Adds the history of a pixel that saw the same surface, which was at `point`. Returns its weight, or 0.
+float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 point) {
+    bool isInside = all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, ivec2(frame.camera.width, frame.camera.height)));
+    if (weight <= 0.0 || !isInside) {
+        return 0.0;
+    }
+    uint from = pixelPlace(pixel);
+    if (!isSameSurface(seen, point, unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]), pixel)) {
+        return 0.0;
+    }
+    sum.matte += weight * frame.planes.at[previousPlane(kPlaneMatteHistory, from)];
+    sum.mirrored += weight * frame.planes.at[previousPlane(kPlaneMirroredHistory, from)];
+    sum.moments += weight * frame.planes.at[previousPlane(kPlaneMoments, from)];
+    return weight;
+}
+
+// The mean of the frames before around a place in pixels, of the pixels that saw the same surface; its matte.a is 0 without any. If
+// none of the nearest four did, of the nearest nine: what is covered by chance shows a pixel one surface now and another one then.
 History historyAt(vec2 place, Seen seen, vec3 point) {
-    History sum = History(vec4(0.0), vec4(0.0), vec4(0.0));
+    History sum = kNoHistory;
     vec2 low = floor(place - 0.5);
     vec2 part = place - 0.5 - low;
     part = mix(part, round(part), lessThan(abs(part - round(part)), vec2(0.01)));
     float total = 0.0;
     for (int corner = 0; corner < 4; ++corner) {
         ivec2 offset = ivec2(corner & 1, corner >> 1);
-        ivec2 pixel = ivec2(low) + offset;
         vec2 share = mix(1.0 - part, part, vec2(offset));
-        float weight = share.x * share.y;
-        bool isInside = all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, ivec2(frame.camera.width, frame.camera.height)));
-        if (weight <= 0.0 || !isInside) {
-            continue;
-        }
-        uint from = pixelPlace(pixel);
-        if (!isSameSurface(seen, point, unpackedSeen(frame.planes.at[previousPlane(kPlaneSurface, from)]), pixel)) {
-            continue;
-        }
-        sum.matte += weight * frame.planes.at[previousPlane(kPlaneMatteHistory, from)];
-        sum.mirrored += weight * frame.planes.at[previousPlane(kPlaneMirroredHistory, from)];
-        sum.moments += weight * frame.planes.at[previousPlane(kPlaneMoments, from)];
-        total += weight;
+        total += addHistory(sum, ivec2(low) + offset, share.x * share.y, seen, point);
     }
-    float inverse = total > 0.05 ? 1.0 / total : 0.0;
+    if (total <= 0.05) {
+        sum = kNoHistory;
+        total = 0.0;
+        for (int tap = 0; tap < 9; ++tap) {
+            total += addHistory(sum, ivec2(floor(place)) + ivec2(tap % 3, tap / 3) - 1, 1.0, seen, point);
+        }
+    }
+    float inverse = total > 0.0 ? 1.0 / total : 0.0;
     return History(sum.matte * inverse, sum.mirrored * inverse, sum.moments * inverse);
 }
 
@@ -68,7 +80,7 @@ void temporalPixel(uvec2 at) {
     Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, place)]);
     vec3 matte = frame.planes.at[planePlace(kPlaneMatte, place)].rgb;
     vec3 mirrored = frame.planes.at[planePlace(kPlaneMirrored, place)].rgb;
-    History history = History(vec4(0.0), vec4(0.0), vec4(0.0));
+    History history = kNoHistory;
     if (frame.frameNumber > 0u && !isSky(seen)) {
         vec3 before = frame.planes.at[planePlace(kPlaneBefore, place)].xyz;
         vec2 moved = motionOf(seenPoint(frame.camera, pixel, seen.distance), before);

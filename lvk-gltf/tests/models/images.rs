@@ -85,6 +85,24 @@ fn webp_without_loss_is_decoded_to_rgba() {
     assert_eq!(model.images[0].data.mips[0].bytes, TEXELS);
 }
 
+/// WebP with loss: 16 x 16 texels, the upper half red and the lower one blue.
+const LOSSY_WEBP: &[u8] =
+    b"RIFF<\x00\x00\x00WEBPVP8 0\x00\x00\x00\x90\x01\x00\x9d\x01*\x10\x00\x10\x00\x02\x80B%\
+    \xa0\x02t\xba\x00\x03\x98\x00\xfe\xef/\xff\xf9\xb7\xff\xad\xafo\xfe\x09?t\xff\xfe\xb8\
+    \x0f\xfep\x18\xc3\xeb\x00\x00\x00";
+
+#[test]
+fn webp_with_loss_is_decoded_to_rgba() {
+    let image = decoded(LOSSY_WEBP);
+    assert_eq!(image.extent(), [16, 16]);
+    let texels: Vec<_> = image.mips[0].bytes.chunks(4).collect();
+    // Away from the border, which the format blurs.
+    for (at, colour) in [(0, [220, 40, 30, 255]), (255, [20, 60, 200, 255])] {
+        let is_near = texels[at].iter().zip(colour).all(|(found, wanted)| found.abs_diff(wanted) <= 12);
+        assert!(is_near, "{at}: {:?}", texels[at]);
+    }
+}
+
 #[test]
 fn jpeg_is_decoded_and_a_cut_off_one_is_warned_of() {
     let mut bytes = Vec::new();

@@ -26,6 +26,9 @@ pub struct DeviceNeeds {
     pub textures: u32,
     /// Conversions of textures in Y'CbCr; where there are none, the library's own.
     pub yuv: &'static [YuvConversion],
+    /// True if `--rt auto` takes the pipelines of a GPU even where the library would lower them: measured to be faster where much
+    /// is shaded between the rays of a path.
+    pub prefers_device_pipelines: bool,
 }
 
 impl DeviceNeeds {
@@ -77,7 +80,7 @@ pub(super) fn open(
         Some(RayTracing::Hardware) => Ok(with(RayTracingPipelineRequest::Hardware, RayQueryRequest::Off)?),
         Some(RayTracing::Query) => with(PipelineIfPresent, Hardware).map_err(without_queries),
         Some(RayTracing::Software) => Ok(with(Off, Software)?),
-        Some(RayTracing::Auto) => Ok(open_best(args, with)?),
+        Some(RayTracing::Auto) => Ok(open_best(args, needs.prefers_device_pipelines, with)?),
     }
 }
 
@@ -85,13 +88,15 @@ pub(super) fn open(
 /// the library lowers pipelines. A profile rehearses the device's own paths, which keep no structures for software beside theirs.
 fn open_best(
     args: &RunArgs,
+    prefers_device_pipelines: bool,
     open: impl Fn(RayTracingPipelineRequest, RayQueryRequest) -> lvk::Result<Context>,
 ) -> lvk::Result<Context> {
     let best = open(RayTracingPipelineRequest::HardwareIfPresent, RayQueryRequest::HardwareIfPresent)?;
     let caps = best.capabilities();
     let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
     let is_profiled = args.profile.is_some();
-    let chosen = if caps.prefers_lowered_pipelines && !is_profiled {
+    let lowers = caps.prefers_lowered_pipelines && !prefers_device_pipelines;
+    let chosen = if lowers && !is_profiled {
         open(RayTracingPipelineRequest::Auto, RayQueryRequest::Off)?
     } else if can_trace && (is_profiled || !caps.is_cpu) {
         best

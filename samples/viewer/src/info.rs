@@ -67,8 +67,7 @@ fn in_background(
     request: Request,
     setup: &mut SampleSetup<'_>,
 ) -> Result<ReadySample<Loading<Viewer>>, RunError> {
-    let tracing = DeviceNeeds::tracing(request.args.tracing.rt);
-    let context = setup.device(&DeviceNeeds { textures: WINDOW_TEXTURES, ..tracing })?;
+    let context = setup.device(&needs(&request, WINDOW_TEXTURES))?;
     setup.progress.pause();
     let ctx = context.clone();
     let sample = Loading::start(&context, move |progress| {
@@ -82,10 +81,15 @@ fn in_background(
 fn at_once(request: &Request, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Loading<Viewer>>, RunError> {
     let model = request.model(&mut setup.progress)?;
     let textures = model.model.images.len() as u32 + OTHER_TEXTURES;
-    let tracing = DeviceNeeds::tracing(request.args.tracing.rt);
-    let context = setup.device(&DeviceNeeds { textures, ..tracing })?;
+    let context = setup.device(&needs(request, textures))?;
     let ReadySample { sample, summary } = request.viewer(&context, model, &mut setup.progress)?;
     Ok(ReadySample { sample: Loading::ready(sample), summary })
+}
+
+/// A path is shaded at each of its surfaces.
+fn needs(request: &Request, textures: u32) -> DeviceNeeds {
+    let tracing = DeviceNeeds::tracing(request.args.tracing.rt);
+    DeviceNeeds { textures, prefers_device_pipelines: true, ..tracing }
 }
 
 #[cfg(test)]

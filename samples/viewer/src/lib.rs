@@ -36,4 +36,4 @@ mod viewer_sample;
 pub use args::{LightArgs, SkyArg, ViewerArgs};
 pub use config::{Content, CullingMode, IndirectLight, Method, PrimaryVisibility, ToneMapping, ViewerConfig};
 pub use gpu::{DrawnInstances, TextureMemory};
-pub use viewer::{Viewer, ViewerScene};
+pub use viewer::{PreparationTimes, Viewer, ViewerScene};

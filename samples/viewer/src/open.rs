@@ -14,7 +14,7 @@ use crate::config::{Content, ViewerConfig};
 use crate::light::{Environment, EnvironmentError, SunSetting};
 use crate::model::{ModelError, load, showcase};
 use crate::names::{animation_place, camera_place};
-use crate::viewer::{Viewer, ViewerScene};
+use crate::viewer::{PreparationTimes, Viewer, ViewerScene};
 
 /// What to open, on any thread.
 pub(crate) struct Request {
@@ -53,14 +53,13 @@ impl Request {
         LoadedModel { model, time }: LoadedModel,
         progress: &mut Progress,
     ) -> Result<ReadySample<Viewer>, RunError> {
-        let (args, start) = (&self.args, Instant::now());
+        let args = &self.args;
         let animation = args.animation.as_deref().map(|wish| animation_place(&model, wish));
         let animation = animation.transpose().map_err(RunError::input)?;
         progress.stage("uploading the model and building acceleration structures", 0);
         let config = self.config(ctx)?;
         let scene = self.scene(model).map_err(RunError::input)?;
         let mut viewer = Viewer::new(ctx, scene, &config)?;
-        let times = [time, start.elapsed()].map(|time| time.as_secs_f64());
         warn_beside(progress, viewer.warnings());
         if config.content == Content::Steps && ctx.capabilities().ray_query_path == RayQueryPath::Hardware {
             let text = "--view steps is black: the device counts no steps of its rays; --rt software does";
@@ -72,12 +71,12 @@ impl Request {
             viewer.choose_camera(place);
         }
         let (triangles, instances) = viewer.counts();
+        let PreparationTimes { scene, pipelines } = viewer.preparation();
+        let [read, built, made] = [time, scene, pipelines].map(|time| time.as_secs_f64());
         let text = format!(
-            "{}: {triangles} triangles, {instances} instances, read in {:.2} s and made ready in {:.2} s; {} samples a pixel, \
-             paths of {} surfaces at most",
+            "{}: {triangles} triangles, {instances} instances, read in {read:.2} s, uploaded and built in {built:.2} s, \
+             pipelines made in {made:.2} s; {} samples a pixel, paths of {} surfaces at most",
             viewer.name(),
-            times[0],
-            times[1],
             config.samples,
             config.bounces
         );

@@ -1,5 +1,7 @@
 //! The viewer: a model on the GPU, a camera, and the picture so far.
 
+use std::time::{Duration, Instant};
+
 use glam::Vec3;
 use lvk::{CommandBuffer, Context};
 use lvk_gltf::{Bounds, Model};
@@ -39,6 +41,15 @@ pub struct ViewerScene {
     pub disc_radius: f32,
 }
 
+/// How long a [`Viewer`] took to be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PreparationTimes {
+    /// Uploads, and builds of acceleration structures.
+    pub scene: Duration,
+    /// Pipelines.
+    pub pipelines: Duration,
+}
+
 /// Shows a model.
 pub struct Viewer {
     pub(crate) ctx: Context,
@@ -71,6 +82,7 @@ pub struct Viewer {
     pub(crate) frame_number: u32,
     /// Instances that culling has left.
     pub(crate) drawn: DrawnCounts,
+    preparation: PreparationTimes,
 }
 
 impl Viewer {
@@ -83,6 +95,7 @@ impl Viewer {
         config.check(ctx.capabilities())?;
         let ViewerScene { name, model, environment, disc_radius } = scene;
         let target = RenderTarget::storage(ctx, config.extent())?;
+        let start = Instant::now();
         let shown = model.default_scene.unwrap_or(0);
         let pose = model.pose(None, 0.0);
         let bounds = model::bounds(&model, shown, &pose);
@@ -96,11 +109,14 @@ impl Viewer {
         )?;
         let cameras = model::cameras_around(gpu.rig(), shown, &pose, &bounds);
         let camera = cameras[0].camera;
+        let built = Instant::now();
         let occludes = config.occludes(gpu.instance_count());
+        let (renderer, present) = (Renderer::new(ctx, config, occludes)?, Present::new(ctx)?);
         Ok(Self {
+            preparation: PreparationTimes { scene: built - start, pipelines: built.elapsed() },
             scene: gpu,
-            renderer: Renderer::new(ctx, config, occludes)?,
-            present: Present::new(ctx)?,
+            renderer,
+            present,
             ctx: ctx.clone(),
             name,
             config: *config,
@@ -121,6 +137,12 @@ impl Viewer {
             frame_number: 0,
             drawn: DrawnCounts::default(),
         })
+    }
+
+    /// Returns how long the uploads, the builds and the pipelines took.
+    #[must_use]
+    pub fn preparation(&self) -> PreparationTimes {
+        self.preparation
     }
 
     /// Cameras of the model; never empty.

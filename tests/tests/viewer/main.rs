@@ -11,6 +11,7 @@ mod dropped;
 mod emitters;
 mod furnace;
 mod hybrid;
+mod hybrid_materials;
 mod known_values;
 mod layers;
 mod moving_model;

@@ -9,7 +9,7 @@ use lvk_tests::rtx_sample::{contexts_and_paths, software_device};
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::{Method, ViewerConfig};
 
-use crate::scenes::{View, assert_close, mean, radiance_by, viewer};
+use crate::scenes::{View, assert_close, mean, radiance, radiance_by, viewer};
 use crate::still_life::still_life;
 
 #[test]
@@ -30,6 +30,24 @@ fn all_paths_trace_the_same_light() {
             assert_alike(&format!("{method:?} by {path:?}"), first, other);
         }
     }
+}
+
+/// The path tracer draws the same numbers by either path, and lavapipe traverses for both by the same code.
+#[test]
+fn pipelines_and_queries_of_a_cpu_have_the_same_light_to_the_bit() {
+    let Some(ctx) = device() else { return };
+    if !ctx.capabilities().is_cpu {
+        eprintln!("not checked: GPUs may traverse for pipelines and for queries in different ways");
+        return;
+    }
+    let camera = Camera::looking_at([1.5, 1.7, 4.5], [-0.2, 0.5, 0.0], 40.0);
+    let view = View { camera, size: [60, 40], samples: 16 };
+    let (environment, model) = (Environment::day(&SunSetting::default()), still_life());
+    let [pipeline, query] =
+        [RayPath::Pipeline, RayPath::Query].map(|path| radiance(&ctx, path, &model, &environment, &view));
+    let differing =
+        pipeline.iter().zip(&query).filter(|(a, b)| a.map(f32::to_bits) != b.map(f32::to_bits)).count();
+    assert_eq!(differing, 0, "of {} pixels", pipeline.len());
 }
 
 /// Paths are chaotic: the last bit of a distance may send one to the other side of an edge, and the filter of the hybrid method
