@@ -1,4 +1,5 @@
-//! The README's first program is an example of the library that runs, and the README stays short.
+//! The README's first program is an example of the library that runs, its figures are those of the page on performance, and it
+//! stays short.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::OsStr;
@@ -42,6 +43,28 @@ fn the_first_program_of_the_readme_is_the_example_and_is_small() {
 fn the_pipeline_triangle_of_the_samples_is_small() {
     let lines = project_file("samples/src/bin/triangle.rs").lines().count();
     assert!(lines <= 100, "{lines} lines");
+}
+
+/// Numbers with a fraction, as `1.05`.
+fn fractions(text: &str) -> Vec<&str> {
+    let numbers = text.split(|letter: char| !letter.is_ascii_digit() && letter != '.');
+    let numbers = numbers.map(|number| number.trim_matches('.'));
+    numbers.filter(|number| number.contains('.')).collect()
+}
+
+/// A figure that is measured anew in one place only would be wrong in the other.
+#[test]
+fn figures_of_the_readme_stand_in_the_page_on_performance() {
+    let (readme, performance) = (project_file("README.md"), project_file("docs/performance.md"));
+    let known = fractions(&performance);
+    let (_, section) = readme.split_once("\n## Performance\n").unwrap();
+    let (section, _) = section.split_once("\n## ").unwrap();
+    let rows = section.lines().filter(|line| line.starts_with("| "));
+    let results: Vec<_> = rows.filter_map(|row| row.trim_matches('|').split('|').nth(1)).collect();
+    let figures: Vec<_> = results.iter().flat_map(|result| fractions(result)).collect();
+    assert!(figures.len() >= 8, "{figures:?}");
+    let missing: Vec<_> = figures.iter().filter(|figure| !known.contains(figure)).collect();
+    assert!(missing.is_empty(), "not in docs/performance.md: {missing:?}");
 }
 
 #[test]

@@ -22,11 +22,17 @@ pub(super) fn measure(
     let count = workload.draws;
     let name = format!("push constants + draw, {count} pairs recorded");
     let limits = Limits { ratio: 1.10, library_ns: 7.0 };
-    measure_recording(ctx, silent, (workload.runs, count), (ours, by_hand), (name, limits))
+    measure_recording(
+        ctx,
+        silent,
+        (workload.runs, count),
+        (record_draws, record_draws_by_hand),
+        (name, limits),
+    )
 }
 
-/// Returns the milliseconds of the recording.
-fn ours(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
+/// Returns the milliseconds to record `count` draws by the library. They are never submitted.
+pub(crate) fn record_draws(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
     let mut cmd = ctx.acquire_command_buffer()?;
     let mut pass = scene.pass(&mut cmd)?;
     let mut push: Push = [1; 16];
@@ -39,7 +45,13 @@ fn ours(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
     Ok(elapsed_ms(start))
 }
 
-fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> Result<f64, BenchError> {
+/// Returns the milliseconds of the same draws by hand.
+pub(crate) fn record_draws_by_hand(
+    ctx: &Context,
+    raw: &Rc<RawRecorder>,
+    scene: &Scene,
+    count: u32,
+) -> Result<f64, BenchError> {
     let (view, pipeline) = (ctx.raw_target_view(*scene.target, 0, 0)?, ctx.raw_render_pipeline(*scene.draw)?);
     let (device, layout) = (ctx.raw_device(), ctx.raw_pipeline_layout());
     let commands = raw.begin()?;

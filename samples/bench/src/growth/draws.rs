@@ -7,22 +7,37 @@ use lvk::Context;
 use super::curve::{Curve, Expected, Unit};
 use super::effort::Effort;
 use super::group::{Group, GroupKey};
-use crate::cpu_overhead::{DrawScene, Push};
+use crate::cpu_overhead::{DrawScene, Push, record_draws, record_draws_by_hand};
 use crate::error::BenchError;
+use crate::hand_written::{RawDevice, RawRecorder};
 use crate::measure::elapsed_ms;
+use crate::setup::Setup;
 
-pub(super) fn measure(ctx: &Context, effort: Effort) -> Result<Group, BenchError> {
-    let scene = DrawScene::new(ctx)?;
-    let curve = |name| Curve::new(name, Unit::Milliseconds, Expected::Constant);
-    let mut recorded = curve("push constants and draw, recorded, each");
-    let mut done = curve("the same, recorded, submitted and done, each");
+pub(super) fn measure(setup: &Setup, ctx: &Context, effort: Effort) -> Result<Group, BenchError> {
+    let silent = setup.open_null_device()?;
+    let (scene, silent_scene) = (DrawScene::new(ctx)?, DrawScene::new(&silent)?);
+    let by_hand = RawRecorder::new(&RawDevice::new(ctx))?;
+    let mut curves: Vec<_> = [
+        ("push constants and draw, recorded, each", Expected::Constant),
+        // Of a driver whose commands do nothing.
+        ("of it the library, each", Expected::Constant),
+        // Of a command buffer that is never submitted, so that the driver keeps its memory.
+        ("the same by hand, recorded, each", Expected::Grows("the driver")),
+        ("the same, recorded, submitted and done, each", Expected::Constant),
+    ]
+    .map(|(name, expected)| Curve::new(name, Unit::Milliseconds, expected))
+    .into();
     let sizes = GroupKey::Draws.sizes(effort.quick).to_vec();
     for &count in &sizes {
-        let record = effort.median(|| Ok(pass(ctx, &scene, count)?.0 / count as f64))?;
-        recorded.push(count, record);
-        done.push(count, effort.median(|| Ok(pass(ctx, &scene, count)?.1 / count as f64))?);
+        let number = count as u32;
+        let costs = [
+            effort.median(|| Ok(pass(ctx, &scene, count)?.0))?,
+            effort.median(|| Ok(record_draws(&silent, &silent_scene, number)?))?,
+            effort.median(|| record_draws_by_hand(ctx, &by_hand, &scene, number))?,
+            effort.median(|| Ok(pass(ctx, &scene, count)?.1))?,
+        ];
+        curves.iter_mut().zip(costs).for_each(|(curve, cost)| curve.push(count, cost / count as f64));
     }
-    let curves = vec![recorded, done];
     Ok(Group { key: GroupKey::Draws, sizes, curves, notes: Vec::new() })
 }
 

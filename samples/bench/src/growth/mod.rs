@@ -81,7 +81,7 @@ fn measure_group(
         GroupKey::Instances => instances::measure(&backends::open(setup)?, image, effort),
         GroupKey::Textures => textures::measure(setup, effort),
         GroupKey::Handles => handles::measure(ctx, effort),
-        GroupKey::Draws => draws::measure(ctx, effort),
+        GroupKey::Draws => draws::measure(setup, ctx, effort),
         GroupKey::Triangles => triangles::measure(&backends::open(setup)?, image, effort),
         GroupKey::Loading => loading::measure(effort),
     }
