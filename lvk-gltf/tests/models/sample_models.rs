@@ -53,3 +53,22 @@ fn sample_models_become_what_the_table_says() {
     let missing: Vec<&String> = rows.iter().filter(|row| !DOCUMENT.contains(row.as_str())).collect();
     assert!(!rows.is_empty() && missing.is_empty(), "not in docs/gltf.md:\n{}", rows.join("\n"));
 }
+
+#[test]
+#[ignore = "needs a folder of models in LVK_GLTF_CLEAN_MODELS"]
+fn sample_models_load_without_a_warning() {
+    let folder = std::env::var_os("LVK_GLTF_CLEAN_MODELS").expect("LVK_GLTF_CLEAN_MODELS names no folder");
+    let mut paths = Vec::new();
+    models(Path::new(&folder), &mut paths);
+    let (mut triangles, mut images) = (0, 0);
+    for path in &paths {
+        let model = Model::load(path, &LoadOptions::default());
+        let model = model.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert!(model.warnings.is_empty(), "{}: {:?}", path.display(), model.warnings);
+        let parts = model.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        triangles += parts.map(|part| part.triangle_count()).sum::<usize>();
+        images += model.images.len();
+    }
+    let figures = format!("{} files, {triangles} triangles and {images} images", paths.len());
+    assert!(DOCUMENT.contains(&figures), "not in docs/gltf.md: {figures}");
+}
