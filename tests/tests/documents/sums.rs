@@ -1,6 +1,8 @@
 //! Figures of `docs/reliability.md`: rows of sums, and the first table, which repeats figures of the sections.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::held_by::{cells, project};
 
 /// The first cell of a row of sums.
@@ -45,6 +47,43 @@ fn total(section: &str, column: &str) -> u64 {
         sum += at.filter(|_| row[0] == SUM).and_then(|at| number(row.get(at)?)).unwrap_or(0);
     }
     sum
+}
+
+/// Returns the letter in brackets of a cell, as `b` of `interop [b]`; empty without one.
+fn letter(cell: &str) -> &str {
+    cell.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map_or("", |(letter, _)| letter)
+}
+
+/// Returns the sweeps and faults that a cell states for a letter, as `[b] (40 sweeps, 34,798 faults)`.
+fn stated(cell: &str) -> Option<(u64, u64)> {
+    let (_, counts) = cell.strip_suffix(" faults)")?.split_once('(')?;
+    let (sweeps, faults) = counts.split_once(" sweeps, ")?;
+    Some((number(sweeps)?, number(faults)?))
+}
+
+/// Returns what is wrong with the sweeps and faults that are stated for each letter: they are those of the rows with that letter, in
+/// tables with a column of faults.
+fn wrong_letters(page: &str) -> Vec<String> {
+    let (mut column, mut told, mut counted) = (None, BTreeMap::new(), BTreeMap::<_, (u64, u64)>::new());
+    for row in page.lines().map(cells) {
+        let Some(row) = row else {
+            column = None;
+            continue;
+        };
+        told.extend(stated(row[0]).map(|counts| (letter(row[0]), counts)));
+        let faults = column.and_then(|column: usize| number(row.get(column)?)).filter(|_| row[0] != SUM);
+        if let Some(faults) = faults {
+            let of_letter = counted.entry(letter(row[0])).or_default();
+            *of_letter = (of_letter.0 + 1, of_letter.1 + faults);
+        }
+        column = column.or_else(|| row.iter().position(|cell| *cell == "faults"));
+    }
+    let letters = told.keys().chain(counted.keys()).collect::<BTreeSet<_>>();
+    let wrong = letters.into_iter().filter(|letter| told.get(*letter) != counted.get(*letter));
+    let tell = |letter| {
+        format!("[{letter}] states {:?}, and its rows have {:?}", told.get(letter), counted.get(letter))
+    };
+    wrong.map(|letter| tell(*letter)).collect()
 }
 
 /// Returns the parts of a text that are numbers above 99, as they are written, with the words that follow.
@@ -100,6 +139,25 @@ fn a_wrong_figure_of_the_first_table_is_noticed() {
     assert_eq!(wrong_headlines(page), Vec::<String>::new());
     assert_eq!(wrong_headlines(&page.replacen("1,002", "1,003", 1)).len(), 1);
     assert_eq!(wrong_headlines(&page.replacen("300", "301", 1)).len(), 1);
+}
+
+#[test]
+fn sweeps_and_faults_are_counted_by_letter() {
+    let page = std::fs::read_to_string(project().join("docs/reliability.md")).unwrap();
+    assert_eq!(wrong_letters(&page), Vec::<String>::new());
+}
+
+#[test]
+fn a_wrong_count_of_a_letter_is_noticed() {
+    let page = "| rows |\n|---|\n| [b] (2 sweeps, 1,007 faults) |\n| without a letter (1 sweeps, 3 faults) |\n\n\
+                | program | faults |\n|---|---|\n| x [b] | 1,000 |\n| y [b], in part | 7 |\n| z | 3 |\n\
+                | all of these | 1,010 |\n";
+    assert_eq!(wrong_letters(page), Vec::<String>::new());
+    for (right, wrong) in
+        [("(2 sweeps", "(3 sweeps"), ("1,007", "1,008"), ("| 7 |", "| 8 |"), ("z |", "z [c] |")]
+    {
+        assert!(!wrong_letters(&page.replacen(right, wrong, 1)).is_empty(), "{right}");
+    }
 }
 
 #[test]
