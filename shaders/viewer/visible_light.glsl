@@ -50,10 +50,10 @@ vec3 pointBefore(Hit hit, vec3 point) {
     return frame.sceneMoves != 0u ? point + way : point;
 }
 
-// Light that a path brings to the eye. The bound grows with the frames of a still, and more slowly than their number, so that a spot
-// fades and the mean comes to that of all paths.
+// Light that a path brings to the eye. The bound grows with the frames of a still, by the fourth root of their number: a spot fades
+// before it is seen, and the mean still comes to that of all paths.
 vec3 boundedLight(vec3 light) {
-    float bound = kBrightestPath * sqrt(1.0 + float(frame.stillCount));
+    float bound = kBrightestPath * sqrt(sqrt(1.0 + float(frame.stillCount)));
     float most = largest(light) * frame.exposure;
     return most > bound ? light * (bound / most) : light;
 }

@@ -159,7 +159,15 @@ fn growth_is_measured_for_every_group_and_plotted() {
             "buffers alive",
             &["create one more", "buffer_address of handles at random, each", "VkDeviceMemory objects"],
         ),
-        ("draws of one pass", &["push constants and draw, recorded, each"]),
+        (
+            "draws of one pass",
+            &[
+                "push constants and draw, recorded, each",
+                "of it the library, each",
+                "the same by hand, recorded, each",
+                "the same, recorded, submitted and done, each",
+            ],
+        ),
         (
             "triangles of one BLAS",
             &["BLAS created and built, lvk", "first trace, lvk", "memory of the BLAS, lvk"],

@@ -3,8 +3,8 @@
 use std::rc::Rc;
 use std::time::Instant;
 
-use lvk::Context;
 use lvk::ash::vk;
+use lvk::{Context, RenderPass};
 
 use super::Workload;
 use super::recording::{Limits, measure_recording};
@@ -35,14 +35,20 @@ pub(super) fn measure(
 pub(crate) fn record_draws(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
     let mut cmd = ctx.acquire_command_buffer()?;
     let mut pass = scene.pass(&mut cmd)?;
-    let mut push: Push = [1; 16];
     let start = Instant::now();
+    draw_many(&mut pass, count)?;
+    Ok(elapsed_ms(start))
+}
+
+/// Records `count` draws, each with push constants of its own.
+pub(crate) fn draw_many(pass: &mut RenderPass<'_>, count: u32) -> lvk::Result<()> {
+    let mut push: Push = [1; 16];
     for number in 0..count {
         push[0] = number;
         pass.push_constants(&push)?;
         pass.draw(0..3, 0..1)?;
     }
-    Ok(elapsed_ms(start))
+    Ok(())
 }
 
 /// Returns the milliseconds of the same draws by hand.
@@ -55,9 +61,10 @@ pub(crate) fn record_draws_by_hand(
     let (view, pipeline) = (ctx.raw_target_view(*scene.target, 0, 0)?, ctx.raw_render_pipeline(*scene.draw)?);
     let (device, layout) = (ctx.raw_device(), ctx.raw_pipeline_layout());
     let commands = raw.begin()?;
+    const SIDE: f32 = Scene::SIDE as f32;
     let extent = vk::Extent2D { width: Scene::SIDE, height: Scene::SIDE };
     let area = vk::Rect2D { extent, ..vk::Rect2D::default() };
-    let viewport = vk::Viewport { width: 16.0, height: 16.0, max_depth: 1.0, ..vk::Viewport::default() };
+    let viewport = vk::Viewport { width: SIDE, height: SIDE, max_depth: 1.0, ..vk::Viewport::default() };
     let color = [vk::RenderingAttachmentInfo::default()
         .image_view(view)
         .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)

@@ -17,7 +17,7 @@ mod tlas_updates;
 
 pub use allocations::CountingAllocator;
 pub(super) use allocations::{peak_bytes, restart_peak};
-pub(super) use draws::{record_draws, record_draws_by_hand};
+pub(super) use draws::{draw_many, record_draws, record_draws_by_hand};
 pub(super) use scene::{Push, Scene as DrawScene};
 pub(super) use start::resident_mb;
 

@@ -7,7 +7,7 @@ use lvk::Context;
 use super::curve::{Curve, Expected, Unit};
 use super::effort::Effort;
 use super::group::{Group, GroupKey};
-use crate::cpu_overhead::{DrawScene, Push, record_draws, record_draws_by_hand};
+use crate::cpu_overhead::{DrawScene, draw_many, record_draws, record_draws_by_hand};
 use crate::error::BenchError;
 use crate::hand_written::{RawDevice, RawRecorder};
 use crate::measure::elapsed_ms;
@@ -28,30 +28,25 @@ pub(super) fn measure(setup: &Setup, ctx: &Context, effort: Effort) -> Result<Gr
     .map(|(name, expected)| Curve::new(name, Unit::Milliseconds, expected))
     .into();
     let sizes = GroupKey::Draws.sizes(effort.quick).to_vec();
-    for &count in &sizes {
-        let number = count as u32;
+    for &size in &sizes {
+        let count = size as u32;
         let costs = [
             effort.median(|| Ok(pass(ctx, &scene, count)?.0))?,
-            effort.median(|| Ok(record_draws(&silent, &silent_scene, number)?))?,
-            effort.median(|| record_draws_by_hand(ctx, &by_hand, &scene, number))?,
+            effort.median(|| Ok(record_draws(&silent, &silent_scene, count)?))?,
+            effort.median(|| record_draws_by_hand(ctx, &by_hand, &scene, count))?,
             effort.median(|| Ok(pass(ctx, &scene, count)?.1))?,
         ];
-        curves.iter_mut().zip(costs).for_each(|(curve, cost)| curve.push(count, cost / count as f64));
+        curves.iter_mut().zip(costs).for_each(|(curve, cost)| curve.push(size, cost / f64::from(count)));
     }
     Ok(Group { key: GroupKey::Draws, sizes, curves, notes: Vec::new() })
 }
 
 /// Returns the milliseconds to record a pass with `count` draws, and those until the GPU is done.
-fn pass(ctx: &Context, scene: &DrawScene, count: u64) -> lvk::Result<(f64, f64)> {
+fn pass(ctx: &Context, scene: &DrawScene, count: u32) -> lvk::Result<(f64, f64)> {
     let start = Instant::now();
     let mut cmd = ctx.acquire_command_buffer()?;
     let mut pass = scene.pass(&mut cmd)?;
-    let mut push: Push = [1; 16];
-    for number in 0..count {
-        push[0] = number as u32;
-        pass.push_constants(&push)?;
-        pass.draw(0..3, 0..1)?;
-    }
+    draw_many(&mut pass, count)?;
     drop(pass);
     let recorded = elapsed_ms(start);
     ctx.wait(ctx.submit(cmd)?)?;
