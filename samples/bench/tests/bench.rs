@@ -41,9 +41,9 @@ fn row(table: &str, name: &str) -> Vec<String> {
     cells[..cells.len() - 1].to_vec()
 }
 
-/// Returns the number of a cell without its unit.
+/// Returns the number of a cell without its unit. A difference may be negative.
 fn number(cell: &str) -> f64 {
-    let digits: String = cell.chars().take_while(|c| c.is_ascii_digit() || ".,".contains(*c)).collect();
+    let digits: String = cell.chars().take_while(|c| c.is_ascii_digit() || "-.,".contains(*c)).collect();
     digits.replace(',', "").parse().unwrap_or_else(|_| panic!("no number in '{cell}'"))
 }
 
