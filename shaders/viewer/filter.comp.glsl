@@ -5,7 +5,7 @@
 const float kBrightnessScale = 3.0; // in standard deviations
 const float kSharpRoughness = 0.06; // mirrors below it are not blurred
 
-// Roughly how wide the light of a surface varies with its normal.
+// Light of a surface counts less, the more the normals differ.
 float normalWeight(vec3 a, vec3 b, float power) {
     return pow(max(dot(a, b), 0.0), power);
 }
@@ -73,7 +73,7 @@ void filterPixel(uvec2 at) {
                 continue;
             }
             vec3 way = seenPoint(frame.camera, tap, other.distance) - point;
-            // Another instance lights what lies behind it otherwise, as a veil that each frame shows by chance.
+            // What lies behind another instance has other light, as behind a veil.
             float tolerance = other.instance == seen.instance ? depthScale * float(1u << argument) : depthScale;
             float weight = kernel[abs(x)] * kernel[abs(y)] * exp(-abs(dot(way, seen.normal)) / tolerance);
             addTap(matte, frame.planes.at[planePlace(kPlaneMatte + from, tapPlace)], weight * normalWeight(seen.normal, other.normal, 64.0));

@@ -11,6 +11,8 @@ const float kMostMovingFrames = 16.0;
 const float kMostStillFrames = 65536.0;
 // Frames before the variance over time says enough.
 const float kFirstFrames = 4.0;
+// Of the weight of the nearest four pixels.
+const float kLeastShare = 0.05;
 
 struct History {
     vec4 matte;
@@ -45,7 +47,7 @@ float addHistory(inout History sum, ivec2 pixel, float weight, Seen seen, vec3 p
 }
 
 // The mean of the frames before around a place in pixels, of the pixels that saw the same surface; its matte.a is 0 without any. If
-// none of the nearest four did, of the nearest nine: what is covered by chance shows a pixel one surface now and another one then.
+// hardly any of the nearest four did, of the nearest nine: what is covered by chance shows a pixel one surface now and another one then.
 History historyAt(vec2 place, Seen seen, vec3 point) {
     History sum = kNoHistory;
     vec2 low = floor(place - 0.5);
@@ -57,7 +59,7 @@ History historyAt(vec2 place, Seen seen, vec3 point) {
         vec2 share = mix(1.0 - part, part, vec2(offset));
         total += addHistory(sum, ivec2(low) + offset, share.x * share.y, seen, point);
     }
-    if (total <= 0.05) {
+    if (total <= kLeastShare) {
         sum = kNoHistory;
         total = 0.0;
         for (int tap = 0; tap < 9; ++tap) {

@@ -194,8 +194,10 @@ impl ViewerConfig {
         SampleError::check_range("--bounces", self.bounces, [1, u32::MAX - 1])?;
         SampleError::check_range("--cache-entries", self.cache_entries, [1, Self::MAX_CACHE_ENTRIES])?;
         RayPath::choose(Some(self.path), capabilities)?;
-        if self.content == Content::Steps {
-            RayPath::choose(Some(RayPath::Query), capabilities)?;
+        if self.content == Content::Steps && !capabilities.ray_query {
+            let (device, lacks) =
+                (capabilities.device_name.clone(), "ray queries here, whose steps the view counts");
+            return Err(SampleError::PathMissing { device, lacks, instead: "software" });
         }
         Ok(())
     }

@@ -3,9 +3,11 @@
 use lvk_samples::app::loading::Loading;
 use lvk_samples::app::png;
 use lvk_samples::app::progress::Progress;
+use lvk_samples::app::ray_args::RayTracing;
 use lvk_samples::app::sample_info::prelude::*;
 
 use crate::args::ViewerArgs;
+use crate::config::Content;
 use crate::model::cameras;
 use crate::names::{animation_lines, numbered};
 use crate::open::{Request, model};
@@ -67,7 +69,7 @@ fn in_background(
     request: Request,
     setup: &mut SampleSetup<'_>,
 ) -> Result<ReadySample<Loading<Viewer>>, RunError> {
-    let context = setup.device(&needs(&request, WINDOW_TEXTURES))?;
+    let context = setup.device(&needs(&request.args, WINDOW_TEXTURES))?;
     setup.progress.pause();
     let ctx = context.clone();
     let sample = Loading::start(&context, move |progress| {
@@ -81,15 +83,19 @@ fn in_background(
 fn at_once(request: &Request, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Loading<Viewer>>, RunError> {
     let model = request.model(&mut setup.progress)?;
     let textures = model.model.images.len() as u32 + OTHER_TEXTURES;
-    let context = setup.device(&needs(request, textures))?;
+    let context = setup.device(&needs(&request.args, textures))?;
     let ReadySample { sample, summary } = request.viewer(&context, model, &mut setup.progress)?;
     Ok(ReadySample { sample: Loading::ready(sample), summary })
 }
 
-/// A path is shaded at each of its surfaces.
-fn needs(request: &Request, textures: u32) -> DeviceNeeds {
-    let tracing = DeviceNeeds::tracing(request.args.tracing.rt);
-    DeviceNeeds { textures, prefers_device_pipelines: true, ..tracing }
+/// Returns what the device must have: its own pipelines, if any, since a path is shaded at each of its surfaces, or the queries that
+/// count steps.
+fn needs(args: &ViewerArgs, textures: u32) -> DeviceNeeds {
+    let wish = match args.tracing.rt {
+        RayTracing::Auto if args.view == Content::Steps => RayTracing::Software,
+        wish => wish,
+    };
+    DeviceNeeds { textures, prefers_device_pipelines: true, ..DeviceNeeds::tracing(wish) }
 }
 
 #[cfg(test)]
@@ -124,6 +130,14 @@ mod tests {
         assert_eq!(parsed("--indirect cache").unwrap().indirect, IndirectLight::Cache);
         assert_eq!(parsed("--primary raster").unwrap().primary, PrimaryVisibility::Raster);
         assert_eq!(parsed("--culling none").unwrap().culling, CullingMode::None);
+    }
+
+    #[test]
+    fn steps_are_counted_in_software_unless_a_path_is_named() {
+        let rays = |line| needs(&parsed(line).unwrap(), 1).rays;
+        assert_eq!(rays(""), Some(RayTracing::Auto));
+        assert_eq!(rays("--view steps"), Some(RayTracing::Software));
+        assert_eq!(rays("--view steps --rt query"), Some(RayTracing::Query));
     }
 
     #[test]

@@ -161,7 +161,6 @@ fn flags(material: &Material) -> u32 {
     };
     let set = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     alpha
-        | set(material.double_sided, material_flag::DOUBLE_SIDED)
         | set(material.unlit, material_flag::UNLIT)
         | set(is_thin(material), material_flag::THIN)
         | set(has_tangents(material), material_flag::TANGENTS)
