@@ -57,7 +57,8 @@ void filterPixel(uvec2 at) {
     Blur matte = startBlur(kPlaneMatte + from, pixel, ownMatte);
     Blur mirrored = startBlur(kPlaneMirrored + from, pixel, ownMirrored);
     vec3 point = seenPoint(frame.camera, pixel, seen.distance);
-    float depthScale = max(2.0 * frame.camera.pixelSpread * seen.distance, 1e-6);
+    float otherTolerance = max(2.0 * frame.camera.pixelSpread * seen.distance, 1e-6);
+    float ownTolerance = otherTolerance * float(1u << argument);
     float sharpness = 1.0 / max(seen.roughness * seen.roughness, 1e-3);
     const float kernel[3] = float[](1.0, 2.0 / 3.0, 1.0 / 6.0);
     for (int y = -2; y <= 2 && !isSky(seen); ++y) {
@@ -74,7 +75,7 @@ void filterPixel(uvec2 at) {
             }
             vec3 way = seenPoint(frame.camera, tap, other.distance) - point;
             // What lies behind another instance has other light, as behind a veil.
-            float tolerance = other.instance == seen.instance ? depthScale * float(1u << argument) : depthScale;
+            float tolerance = other.instance == seen.instance ? ownTolerance : otherTolerance;
             float weight = kernel[abs(x)] * kernel[abs(y)] * exp(-abs(dot(way, seen.normal)) / tolerance);
             addTap(matte, frame.planes.at[planePlace(kPlaneMatte + from, tapPlace)], weight * normalWeight(seen.normal, other.normal, 64.0));
             bool isAlike = abs(other.roughness - seen.roughness) < 0.1 && seen.roughness > kSharpRoughness;

@@ -41,7 +41,7 @@ pub struct ViewerScene {
     pub disc_radius: f32,
 }
 
-/// How long a [`Viewer`] took to be made.
+/// Durations of the parts of [`Viewer::new`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PreparationTimes {
     /// Uploads, and builds of acceleration structures.

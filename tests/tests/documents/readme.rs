@@ -8,6 +8,8 @@ use std::path::Path;
 use lvk_tests::device::vulkan;
 use lvk_tests::subprocess::in_subprocess;
 
+use crate::held_by::cells;
+
 #[path = "../../../lvk/examples/triangle.rs"]
 mod triangle;
 
@@ -59,9 +61,7 @@ fn figures_of_the_readme_stand_in_the_page_on_performance() {
     let known = fractions(&performance);
     let (_, section) = readme.split_once("\n## Performance\n").unwrap();
     let (section, _) = section.split_once("\n## ").unwrap();
-    let rows = section.lines().filter(|line| line.starts_with("| "));
-    let results: Vec<_> = rows.filter_map(|row| row.trim_matches('|').split('|').nth(1)).collect();
-    let figures: Vec<_> = results.iter().flat_map(|result| fractions(result)).collect();
+    let figures: Vec<_> = section.lines().filter_map(cells).flat_map(|row| fractions(row[1])).collect();
     assert!(figures.len() >= 8, "{figures:?}");
     let missing: Vec<_> = figures.iter().filter(|figure| !known.contains(figure)).collect();
     assert!(missing.is_empty(), "not in docs/performance.md: {missing:?}");

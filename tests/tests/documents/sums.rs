@@ -126,9 +126,13 @@ fn wrong_headlines(page: &str) -> Vec<String> {
     wrong
 }
 
+fn reliability() -> String {
+    std::fs::read_to_string(project().join("docs/reliability.md")).unwrap()
+}
+
 #[test]
 fn figures_of_the_first_table_are_those_of_the_sections() {
-    let page = std::fs::read_to_string(project().join("docs/reliability.md")).unwrap();
+    let page = reliability();
     assert_eq!(wrong_headlines(&page), Vec::<String>::new());
 }
 
@@ -143,7 +147,7 @@ fn a_wrong_figure_of_the_first_table_is_noticed() {
 
 #[test]
 fn sweeps_and_faults_are_counted_by_letter() {
-    let page = std::fs::read_to_string(project().join("docs/reliability.md")).unwrap();
+    let page = reliability();
     assert_eq!(wrong_letters(&page), Vec::<String>::new());
 }
 
@@ -162,7 +166,7 @@ fn a_wrong_count_of_a_letter_is_noticed() {
 
 #[test]
 fn the_sums_of_tables_are_right() {
-    let page = std::fs::read_to_string(project().join("docs/reliability.md")).unwrap();
+    let page = reliability();
     assert!(page.matches(SUM).count() >= 2);
     assert_eq!(complaints(&page), Vec::<String>::new());
 }

@@ -61,10 +61,10 @@ pub(crate) fn record_draws_by_hand(
     let (view, pipeline) = (ctx.raw_target_view(*scene.target, 0, 0)?, ctx.raw_render_pipeline(*scene.draw)?);
     let (device, layout) = (ctx.raw_device(), ctx.raw_pipeline_layout());
     let commands = raw.begin()?;
-    const SIDE: f32 = Scene::SIDE as f32;
     let extent = vk::Extent2D { width: Scene::SIDE, height: Scene::SIDE };
     let area = vk::Rect2D { extent, ..vk::Rect2D::default() };
-    let viewport = vk::Viewport { width: SIDE, height: SIDE, max_depth: 1.0, ..vk::Viewport::default() };
+    let [width, height] = [Scene::SIDE as f32; 2];
+    let viewport = vk::Viewport { width, height, max_depth: 1.0, ..vk::Viewport::default() };
     let color = [vk::RenderingAttachmentInfo::default()
         .image_view(view)
         .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
