@@ -133,7 +133,8 @@ pub struct TextureDesc<'a> {
     /// of the format. Default: none.
     pub conversion: Option<usize>,
     /// True if the other mips are created by halving mip 0, the only one in `data`. Needs a colour format that the
-    /// device can filter, and more than one mip: with `mips: 0` the texture has all. Default: false.
+    /// device can filter, and more than one mip: with `mips: 0` the texture has all. Odd sides are halved as
+    /// [`generate_mipmaps`](crate::CommandBuffer::generate_mipmaps) tells. Default: false.
     pub generate_mips: bool,
     /// Name in error messages, validation messages and debuggers. Default: `"texture"`.
     pub debug_name: &'a str,

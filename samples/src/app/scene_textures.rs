@@ -3,28 +3,38 @@
 use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureKind, TextureUsage};
 
 use crate::hybrid::half_float::half_bits;
-use crate::scene::{Sky, Texture};
+use crate::scene::{Encoding, Sky, Texture, blits_keep_the_mean, mip_levels};
 
 /// Index of a texture that is not there (`kNoTexture` in `shaders/common/no_texture.glsl`).
 pub(crate) const NO_TEXTURE: u32 = u32::MAX;
 
 /// A picture of a scene, with all its mips.
 pub(crate) fn picture(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
-    with_mips(ctx, texture, Format::Rgba8Srgb)
+    with_mips(ctx, texture, Encoding::Srgb)
 }
 
 /// A normal map of a scene, with all its mips.
 pub(crate) fn normal_map(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
-    with_mips(ctx, texture, Format::Rgba8Unorm)
+    with_mips(ctx, texture, Encoding::Linear)
 }
 
-fn with_mips(ctx: &Context, texture: &Texture, format: Format) -> lvk::Result<Holder<TextureHandle>> {
+fn with_mips(ctx: &Context, texture: &Texture, encoding: Encoding) -> lvk::Result<Holder<TextureHandle>> {
+    let extent = [texture.width, texture.height];
+    let is_halved = blits_keep_the_mean(extent);
+    let whole_chain = (!is_halved).then(|| {
+        let levels = mip_levels(&texture.pixels, extent, encoding).concat();
+        [texture.pixels.as_slice(), &levels].concat()
+    });
     ctx.create_texture(&TextureDesc {
-        format,
-        extent: [texture.width, texture.height],
+        format: match encoding {
+            Encoding::Srgb => Format::Rgba8Srgb,
+            Encoding::Linear => Format::Rgba8Unorm,
+        },
+        extent,
         mips: 0,
-        data: Some(&texture.pixels),
-        generate_mips: true,
+        data: Some(whole_chain.as_deref().unwrap_or(&texture.pixels)),
+        data_mips: if is_halved { 1 } else { 0 },
+        generate_mips: is_halved,
         debug_name: &texture.name,
         ..TextureDesc::default()
     })

@@ -39,6 +39,7 @@ mod large_polygon;
 mod light;
 mod material;
 mod mesh;
+mod mip_levels;
 mod mtl;
 mod mtl_text;
 pub(crate) mod noise;
@@ -74,6 +75,7 @@ pub use error::SceneError;
 pub use gpu_camera::GpuCamera;
 pub use light::{Ambient, DirectionalLight, PointLight, display};
 pub use material::Material;
+pub use mip_levels::{Encoding, blits_keep_the_mean, mip_levels};
 pub(crate) use procedural::{PAINTED, Valley, painted_textures};
 
 pub use sky::Sky;

@@ -51,7 +51,7 @@ pub(super) fn painted(text: &[u8]) -> Vec<[f32; 3]> {
 }
 
 /// The linear value of an sRGB-encoded one (IEC 61966-2-1), both 0 to 1.
-fn decode_srgb(encoded: f32) -> f32 {
+pub(super) fn decode_srgb(encoded: f32) -> f32 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 

@@ -1,10 +1,15 @@
 //! The real-time method against the path tracer.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use image::RgbaImage;
 use lvk::{Context, RayQueryPath};
-use lvk_gltf::Model;
+use lvk_gltf::{
+    ColorSpace, Image, ImageData, Material, MipLevel, Model, Sampler, TexelFormat, TextureRef,
+    TextureTransform,
+};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::Sample as _;
 use lvk_samples::hybrid::RayPath;
@@ -15,7 +20,7 @@ use lvk_tests::rtx_sample::software_device;
 use lvk_viewer::light::{Environment, SunSetting};
 use lvk_viewer::{Content, Method, PrimaryVisibility, ViewerConfig};
 
-use crate::scenes::{Builder, View, assert_close, matte, mean, viewer};
+use crate::scenes::{Builder, View, assert_close, matte, mean, radiance_by, viewer};
 use crate::still_life::still_life;
 
 const SIZE: [u32; 2] = [96, 64];
@@ -63,6 +68,34 @@ fn dark_surfaces_in_bright_exposure_keep_their_light() {
         mean(&viewer.radiance().unwrap())
     };
     assert_close("a dark floor", shown(Method::Hybrid, 64), shown(Method::PathTrace, 256), 0.02);
+}
+
+/// A wall beside a floor whose image repeats so often that scattered rays read its smallest mip level. Of nine texels the middle one alone is
+/// bright, and the only one that a blit would leave.
+#[test]
+fn the_smallest_mip_of_an_image_of_odd_sides_has_its_light() {
+    let Some(ctx) = software_device() else { return };
+    let bytes = (0..9).flat_map(|texel| if texel == 4 { [255; 4] } else { [0, 0, 0, 255] }).collect();
+    let level = MipLevel { width: 3, height: 3, bytes };
+    let data = Arc::new(ImageData { format: TexelFormat::Rgba8, mips: vec![level] });
+    let often = TextureTransform { offset: [0.0; 2], rotation: 0.0, scale: [400.0; 2] };
+    let texture = TextureRef { image: 0, sampler: 0, tex_coord: 0, transform: Some(often) };
+    let floor = Material { base_color_texture: Some(texture), ..matte([1.0; 3]) };
+    let mut model = Builder::default()
+        .quad(Vec3::new(-10.0, 0.0, 20.0), Vec3::X * 20.0, Vec3::NEG_Z * 20.0, floor)
+        .quad(Vec3::new(-10.0, 0.0, 0.0), Vec3::X * 20.0, Vec3::Y * 4.0, matte([0.8; 3]))
+        .model();
+    model.images = vec![Image { name: None, source: 0, color_space: ColorSpace::Srgb, data }];
+    model.samplers = vec![Sampler::default()];
+    // The sun stands behind the wall: it shines on the floor, and not on the wall.
+    let behind = SunSetting { elevation_degrees: 60.0, azimuth_degrees: 180.0, ..SunSetting::default() };
+    let environment = Environment { sun: Environment::day(&behind).sun, ..Environment::uniform([0.0; 3]) };
+    let camera = Camera::looking_at([0.0, 1.5, 4.0], [0.0, 1.5, 0.0], 20.0);
+    let light = |method, samples| {
+        let view = View { camera, size: [24, 16], samples };
+        mean(&radiance_by(&ctx, (method, RayPath::Query), &model, &environment, &view))
+    };
+    assert_close("the wall", light(Method::Hybrid, 64), light(Method::PathTrace, 512), 0.06);
 }
 
 /// Rays and the rasteriser may disagree at edges of triangles alone. Of the first frame of a still life with masks and panes.

@@ -1,21 +1,21 @@
 //! Mip levels of an image, as a texture.
 
 use lvk::{Context, Error, Holder, TextureDesc, TextureHandle, TextureRegion};
-use lvk_gltf::{Image, TexelFormat};
+use lvk_gltf::{ColorSpace, Image, TexelFormat};
+use lvk_samples::scene::{Encoding, blits_keep_the_mean, mip_levels};
 
 use super::formats::format_of;
 
-/// The number of mip levels that a texture of the image has: those of the file, or the whole chain where the file has one level that a
-/// device can halve.
+/// The number of mip levels that a texture of the image has: those of the file, or the whole chain where the file has one level.
 pub(super) fn mip_count(image: &Image) -> u32 {
     let [width, height] = image.data.extent();
-    if is_to_be_halved(image) { width.max(height).max(1).ilog2() + 1 } else { image.data.mips.len() as u32 }
+    if lacks_mips(image) { width.max(height).max(1).ilog2() + 1 } else { image.data.mips.len() as u32 }
 }
 
 /// Uploads the levels of an image from `first_mip` on. `None` if the device cannot read its format.
 ///
-/// Levels that the file lacks are made from the largest one on the device, in a texture that lives no longer than this call. They are
-/// therefore the same whichever level is the first.
+/// Levels that the file lacks are made from the largest one, so they are the same whichever level is the first: on the device, in a texture
+/// that lives no longer than this call, or here where the device would not keep the mean.
 pub(super) fn texture(
     ctx: &Context,
     image: &Image,
@@ -23,22 +23,20 @@ pub(super) fn texture(
 ) -> lvk::Result<Option<Holder<TextureHandle>>> {
     let Some(format) = format_of(image) else { return Ok(None) };
     let halved = is_to_be_halved(image);
-    let is_from_file = first_mip == 0 || !halved;
-    let levels = if is_from_file { image.data.mips.get(first_mip as usize..).unwrap_or(&[]) } else { &[] };
-    let [width, height] = image.data.extent();
-    let extent = levels.first().map_or_else(
-        || [width, height].map(|side| (side >> first_mip).max(1)),
-        |level| [level.width, level.height],
-    );
+    let is_given = first_mip == 0 || !halved;
+    let made = made_mips(image);
+    let all_levels = image.data.mips.iter().map(|level| &level.bytes).chain(&made);
+    let levels: Vec<_> = if is_given { all_levels.skip(first_mip as usize).collect() } else { Vec::new() };
     let bytes: Vec<u8>;
-    let data = match levels {
+    let data = match levels.as_slice() {
         [] => None,
-        [only] => Some(only.bytes.as_slice()),
+        [only] => Some(only.as_slice()),
         levels => {
-            bytes = levels.iter().flat_map(|level| &level.bytes).copied().collect();
+            bytes = levels.iter().copied().flatten().copied().collect();
             Some(bytes.as_slice())
         }
     };
+    let extent = image.data.extent().map(|side| (side >> first_mip).max(1));
     let desc = TextureDesc {
         format,
         extent,
@@ -58,7 +56,7 @@ pub(super) fn texture(
         Err(_) => return Ok(None),
     }
     let texture = ctx.create_texture(&desc)?;
-    if !is_from_file {
+    if !is_given {
         copy_halved(ctx, image, first_mip, *texture)?;
     }
     Ok(Some(texture))
@@ -76,6 +74,23 @@ fn copy_halved(ctx: &Context, image: &Image, first_mip: u32, target: TextureHand
     ctx.wait(ctx.submit(cmd)?)
 }
 
-fn is_to_be_halved(image: &Image) -> bool {
+fn lacks_mips(image: &Image) -> bool {
     image.data.mips.len() == 1 && image.data.format == TexelFormat::Rgba8
+}
+
+/// True if the device makes the levels that the file lacks.
+fn is_to_be_halved(image: &Image) -> bool {
+    lacks_mips(image) && blits_keep_the_mean(image.data.extent())
+}
+
+/// The levels that the file lacks and the device does not make.
+fn made_mips(image: &Image) -> Vec<Vec<u8>> {
+    if !lacks_mips(image) || is_to_be_halved(image) {
+        return Vec::new();
+    }
+    let encoding = match image.color_space {
+        ColorSpace::Srgb => Encoding::Srgb,
+        ColorSpace::Linear => Encoding::Linear,
+    };
+    mip_levels(&image.data.mips[0].bytes, image.data.extent(), encoding)
 }
