@@ -37,6 +37,11 @@ fn every_peer_does_every_row_that_it_can_with_the_same_result() {
         let expected = ["no ray tracing pipelines", "no ray queries", "no acceleration structures"];
         assert!(expected.iter().any(|part| reason.contains(part)), "{report}");
     }
+    let gpu_times = report.lines().find(|line| line.contains("|  GPU |")).unwrap();
+    assert!(
+        gpu_times.matches("s (").count() + 2 >= lvk_bench_peers::peers().len(),
+        "times of draws: {gpu_times}"
+    );
     let peers = lvk_bench_peers::peers();
     let rows: Vec<_> = report.lines().filter(|line| line.starts_with("| ")).collect();
     let heads: Vec<_> = rows[0].split('|').skip(3).map(str::trim).take(peers.len()).collect();

@@ -368,6 +368,14 @@ fn every_row_is_done_by_lvk_and_by_plain_ash_with_equal_results() {
     for name in ["50 draws", "20 dispatches", "12 uploads", "frame with 12 textures"] {
         assert_positive(&table, name, 1..3);
     }
+    let gpu_times: Vec<_> = table.lines().filter(|line| line.contains("|  GPU |")).collect();
+    let has_time = |line: &&str| {
+        line.split('|')
+            .skip(3)
+            .take(2)
+            .all(|cell| cell.trim_start().starts_with(|c: char| c.is_ascii_digit()))
+    };
+    assert!(gpu_times.len() >= 6 && gpu_times.iter().all(has_time), "{table}");
     assert!(table.contains("textures: equal") && table.contains("| 40x20 rays by query "), "{table}");
     for reason in
         table.lines().filter(|line| line.starts_with("- ash cannot") || line.starts_with("- lvk cannot"))

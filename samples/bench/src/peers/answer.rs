@@ -22,6 +22,8 @@ pub(super) enum Answer {
     Result(Option<f64>),
     /// Resident memory of the process in megabytes.
     Memory(Option<f64>),
+    /// Milliseconds in which the GPU worked since the last question.
+    GpuTime(Option<f64>),
 }
 
 impl fmt::Display for Answer {
@@ -38,6 +40,7 @@ impl fmt::Display for Answer {
             Self::Times(Sample { cpu, done }) => write!(f, "times {cpu} {done}"),
             Self::Result(result) => write!(f, "result {}", number(result)),
             Self::Memory(megabytes) => write!(f, "memory {}", number(megabytes)),
+            Self::GpuTime(milliseconds) => write!(f, "gpu-time {}", number(milliseconds)),
         }
     }
 }
@@ -63,6 +66,7 @@ impl Answer {
             }
             "result" => Some(Self::Result(optional()?)),
             "memory" => Some(Self::Memory(optional()?)),
+            "gpu-time" => Some(Self::GpuTime(optional()?)),
             _ => None,
         }
     }
@@ -88,6 +92,7 @@ mod tests {
             Answer::Result(Some(-2.0)),
             Answer::Result(None),
             Answer::Memory(Some(88.5)),
+            Answer::GpuTime(Some(0.5)),
         ];
         for answer in answers {
             assert_eq!(Answer::from_line(&format!("{answer}\n")), Some(answer));

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use super::answer::{Answer, one_line};
+use super::gpu_timer::GpuTimer;
 use super::peer::{Failure, PeerDevice, Sample};
-use super::serve::{MEMORY, RESULT, SAMPLE};
+use super::serve::{GPU_TIME, MEMORY, RESULT, SAMPLE};
 
 /// How children are started.
 pub(super) struct Launch {
@@ -20,13 +21,16 @@ pub(super) struct Launch {
 }
 
 impl Launch {
-    /// Starts a child with these options, and waits until the row is prepared.
+    /// Starts a child with these options, and waits until the row is prepared. With `timer` the child can tell its GPU time.
     ///
     /// # Errors
     /// The reason that the child gives, or how it ended.
-    pub(super) fn start(&self, args: &[String]) -> Result<PeerProcess, Failure> {
+    pub(super) fn start(&self, args: &[String], timer: Option<&GpuTimer>) -> Result<PeerProcess, Failure> {
         let mut command = Command::new(&self.program);
         command.args(self.subcommand).args(args);
+        if let Some(timer) = timer {
+            timer.enable(&mut command);
+        }
         if let Some(log) = &self.validation_log {
             command
                 .env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation")
@@ -86,6 +90,20 @@ impl PeerProcess {
     pub(super) fn result(&mut self) -> Result<Option<f64>, Failure> {
         match self.ask(RESULT)? {
             Answer::Result(result) => Ok(result),
+            other => Err(unexpected(&other)),
+        }
+    }
+
+    /// Takes a sample, and returns the milliseconds in which the GPU worked for it. `None` without a timer, or where nothing was submitted.
+    pub(super) fn gpu_time(&mut self) -> Result<Option<f64>, Failure> {
+        self.take_gpu_time()?;
+        self.sample()?;
+        self.take_gpu_time()
+    }
+
+    fn take_gpu_time(&mut self) -> Result<Option<f64>, Failure> {
+        match self.ask(GPU_TIME)? {
+            Answer::GpuTime(milliseconds) => Ok(milliseconds),
             other => Err(unexpected(&other)),
         }
     }

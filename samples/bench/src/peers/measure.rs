@@ -8,6 +8,7 @@ use lvk_dev_driver::{DriverRequest, prepare};
 use super::args::{PeersArgs, WorkClass};
 use super::child::{Launch, PeerProcess};
 use super::cold_build::cold_build;
+use super::gpu_timer::GpuTimer;
 use super::peer::{Failure, PeerEntry, Sample};
 use super::report::{Measured, Report};
 use super::row::Row;
@@ -89,7 +90,7 @@ fn measure(
     options: &RunOptions,
     launch: &Launch,
 ) -> Result<Report, Failure> {
-    let probe = launch.start(&args.child(entries[0].name, Row::EmptySubmit, WorkClass::Quick))?;
+    let probe = launch.start(&args.child(entries[0].name, Row::EmptySubmit, WorkClass::Quick), None)?;
     let class = match (options.quick, probe.device.is_cpu) {
         (true, _) => WorkClass::Quick,
         (false, true) => WorkClass::Cpu,
@@ -100,12 +101,16 @@ fn measure(
     let device = probe.device.name.clone();
     let mut report = Report::new(entries, &device, rounds, options.quick || options.validate);
     drop(probe);
-    let run = Rounds { entries, args, launch, device: &device, class, rounds };
+    let timer = GpuTimer::new()?;
+    let run = Rounds { entries, args, launch, timer: &timer, device: &device, class, rounds };
     let [opened, memory] = run.opened();
     report.add_times("context created", 1, true, opened);
     for row in args.selected() {
         eprintln!("measuring {} ...", row.key());
-        let measured = run.row(row);
+        let mut measured = run.row(row);
+        if !row.is_cpu_only() {
+            run.add_gpu_times(row, &mut measured);
+        }
         report.add_times(&row.title(&work), row.items(&work), row.is_cpu_only(), measured);
     }
     report.add_memory(memory);
@@ -124,6 +129,7 @@ struct Rounds<'a> {
     entries: &'a [PeerEntry],
     args: &'a PeersArgs,
     launch: &'a Launch,
+    timer: &'a GpuTimer,
     /// Name of the first peer's device, with its driver.
     device: &'a str,
     class: WorkClass,
@@ -152,7 +158,7 @@ impl Rounds<'_> {
     }
 
     fn open_once(&self, which: usize) -> Result<(f64, Option<f64>), Failure> {
-        let mut process = self.start(&self.entries[which], Row::EmptySubmit, WorkClass::Quick)?;
+        let mut process = self.start(&self.entries[which], Row::EmptySubmit, WorkClass::Quick, None)?;
         process.sample()?;
         Ok((process.opened_ms, process.memory()?))
     }
@@ -175,9 +181,37 @@ impl Rounds<'_> {
         peers.into_iter().map(RunningPeer::finish).collect()
     }
 
+    /// Measures the GPU time of a row, in rounds of its own: the timer takes time of the CPU. Peers that fail have none.
+    fn add_gpu_times(&self, row: Row, measured: &mut [Measured]) {
+        let timed = |entry| self.start(entry, row, self.class, Some(self.timer)).ok();
+        let mut peers: Vec<_> = self.entries.iter().map(timed).collect();
+        let rounds = self.rounds.div_ceil(2);
+        let (began, warm_up) = (Instant::now(), WARM_UP_ROUNDS.min(rounds));
+        for round in 0..warm_up + rounds {
+            for turn in 0..peers.len() {
+                let which = (turn + round as usize) % peers.len();
+                let time = peers[which].as_mut().map_or(Ok(None), PeerProcess::gpu_time);
+                match time {
+                    Ok(time) if round >= warm_up => measured[which].gpu.extend(time),
+                    Ok(_) => {}
+                    Err(_) => peers[which] = None,
+                }
+            }
+            if began.elapsed() > LONGEST_ROW && round as usize >= warm_up as usize + FEWEST_ROUNDS {
+                break;
+            }
+        }
+    }
+
     /// Starts a child. All have to open the same device.
-    fn start(&self, entry: &PeerEntry, row: Row, class: WorkClass) -> Result<PeerProcess, Failure> {
-        let process = self.launch.start(&self.args.child(entry.name, row, class))?;
+    fn start(
+        &self,
+        entry: &PeerEntry,
+        row: Row,
+        class: WorkClass,
+        timer: Option<&GpuTimer>,
+    ) -> Result<PeerProcess, Failure> {
+        let process = self.launch.start(&self.args.child(entry.name, row, class), timer)?;
         let name = &process.device.name;
         if self.device.starts_with(name) {
             return Ok(process);
@@ -192,7 +226,7 @@ impl Rounds<'_> {
 
     fn running(&self, entry: &PeerEntry, row: Row) -> RunningPeer {
         let mut measured = Measured::default();
-        let started = self.start(entry, row, self.class);
+        let started = self.start(entry, row, self.class, None);
         let process = started.map_err(|reason| measured.fail(&*reason)).ok();
         RunningPeer { process, measured }
     }

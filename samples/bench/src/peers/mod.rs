@@ -10,6 +10,7 @@ mod ash_peer;
 mod child;
 mod cold_build;
 mod glsl;
+mod gpu_timer;
 mod lvk_peer;
 mod measure;
 mod peer;

@@ -16,6 +16,8 @@ const LOCK: &str = include_str!("../../../../Cargo.lock");
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Measured {
     pub(super) samples: Vec<Sample>,
+    /// Milliseconds in which the GPU worked, in rounds of their own.
+    pub(super) gpu: Vec<f64>,
     /// The result of the work.
     pub(super) result: Option<f64>,
     /// Why there are no samples.
@@ -62,6 +64,10 @@ impl Report {
             "CPU: the thread until all work is submitted; done: until the GPU has finished; each peer in a process of its \
              own, asked in turn",
         );
+        table.add_note(
+            "GPU: while any queue works, by timestamps around each submission, which the layer of lvk-gpu-timer adds in rounds of \
+             their own",
+        );
         Self {
             table,
             peers,
@@ -88,6 +94,11 @@ impl Report {
         let name = if is_cpu_only { title } else { "" };
         self.table
             .add_row(name, std::iter::once("done".to_owned()).chain(cells(&times(|s| s.done), format_time)));
+        let gpu: Vec<Vec<f64>> =
+            measured.iter().map(|m| m.gpu.iter().map(|time| time / count).collect()).collect();
+        if gpu.iter().any(|times| !times.is_empty()) {
+            self.table.add_row("", std::iter::once("GPU".to_owned()).chain(cells(&gpu, format_time)));
+        }
         for (peer, measured) in self.peers.clone().into_iter().zip(&measured) {
             if let Some(reason) = &measured.reason {
                 self.add_reason(reason, peer, title);
@@ -189,7 +200,8 @@ mod tests {
 
     fn measured(times: &[f64], result: Option<f64>) -> Measured {
         let samples = times.iter().map(|&time| Sample { cpu: time, done: 2.0 * time }).collect();
-        Measured { samples, result, reason: None }
+        let gpu = times.iter().map(|&time| 0.5 * time).collect();
+        Measured { samples, gpu, result, reason: None }
     }
 
     #[test]
@@ -221,6 +233,7 @@ mod tests {
             "ash 0.38",
             "| two items ",
             "1.00 ms (0.50; 0.50-0.50)",
+            "GPU | 1.00 ms |  500 us (0.50; 0.50-0.50)",
             "lvk cannot: other; third: no such feature",
             "DIFFERENT: two items: the result of lvk is 7, not 8",
             "50.0 MB (1.25; 1.25-1.25)",

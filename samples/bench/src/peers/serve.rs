@@ -7,6 +7,7 @@ use lvk::ash;
 use lvk_dev_driver::{DriverRequest, prepare};
 
 use super::answer::Answer;
+use super::gpu_timer::take_busy_time;
 use super::peer::{Failure, PeerEntry, RowRun};
 use super::row::Row;
 use super::workload::Workload;
@@ -17,6 +18,7 @@ use crate::measure::elapsed_ms;
 pub(super) const SAMPLE: &str = "sample";
 pub(super) const RESULT: &str = "result";
 pub(super) const MEMORY: &str = "memory";
+pub(super) const GPU_TIME: &str = "gpu-time";
 
 /// Serves the parent until it closes the process's standard input. Ends the process, as libraries may leave objects behind.
 pub(super) fn serve(entry: &PeerEntry, row: Row, workload: &Workload) -> Result<(), Failure> {
@@ -33,6 +35,7 @@ pub(super) fn serve(entry: &PeerEntry, row: Row, workload: &Workload) -> Result<
             SAMPLE => run.sample().map(Answer::Times),
             RESULT => run.result().map(Answer::Result),
             MEMORY => Ok(Answer::Memory(resident_mb())),
+            GPU_TIME => take_busy_time().map(Answer::GpuTime),
             other => Err(format!("unknown request '{other}'").into()),
         };
         answer(&found.unwrap_or_else(|reason| Answer::Cannot(reason.to_string())))?;

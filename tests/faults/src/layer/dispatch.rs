@@ -112,10 +112,10 @@ pub(super) fn number_of(name: &str) -> Option<usize> {
     NUMBERS.get(name).copied()
 }
 
-/// Returns the key of an instance, a physical device, a device, a queue or a command buffer: the loader's dispatch table.
+/// Returns the key of a dispatchable handle.
 pub(super) fn key_of(handle: u64) -> usize {
-    // SAFETY: a dispatchable handle points to the pointer to the loader's dispatch table.
-    unsafe { *(handle as usize as *const usize) }
+    // SAFETY: the loader and applications pass handles that are alive.
+    unsafe { lvk_layer::key_of(handle) }
 }
 
 /// Keeps the functions for a new instance or device.

@@ -18,9 +18,8 @@ use commands::LOST;
 use dispatch::{Level, Table, insert, number_of, remove, table_of};
 use injector::injector;
 pub use injector::{FAULT_VARIABLE, LOG_VARIABLE};
-use loader::{
-    DEVICE_LINK, ExtensionsChain, INSTANCE_LINK, LayersChain, Negotiation, VersionChain, find_link,
-};
+use loader::{ExtensionsChain, LayersChain, VersionChain};
+use lvk_layer::{DEVICE_LINK, INSTANCE_LINK, Negotiation, find_link};
 pub use name_reader::NAMES_VARIABLE;
 
 /// Exchanges versions and functions with the loader.
@@ -30,11 +29,7 @@ pub use name_reader::NAMES_VARIABLE;
 #[unsafe(export_name = "vkNegotiateLoaderLayerInterfaceVersion")]
 pub unsafe extern "system" fn negotiate(negotiation: *mut Negotiation) -> vk::Result {
     // SAFETY: by contract.
-    let negotiation = unsafe { &mut *negotiation };
-    negotiation.version = 2;
-    negotiation.get_instance_proc_addr = Some(get_instance_proc_addr);
-    negotiation.get_device_proc_addr = Some(get_device_proc_addr);
-    negotiation.get_physical_device_proc_addr = None;
+    unsafe { (*negotiation).answer(get_instance_proc_addr, get_device_proc_addr) };
     vk::Result::SUCCESS
 }
 
