@@ -1,18 +1,22 @@
 // Antialiasing over time: each frame sees another place in every pixel, and the picture is their mean. Where the camera moves, a mean
-// that is unlike the neighbourhood is pulled towards it (Karis, "High Quality Temporal Supersampling", 2014). `argument`: which of
-// both planes the filter ended in.
+// that is unlike the neighbourhood is pulled towards it, and bright light counts less, so that one bright sample does not outweigh all
+// others (Karis, "High Quality Temporal Supersampling", 2014). A still is the plain mean, as that of the path tracer. `argument`: which
+// of both planes the filter ended in.
 #include "viewer/plane.glsl"
 
 const float kMostFrames = 12.0; // while the camera moves
 const float kMostStillFrames = 64.0;
 
-// Bright light counts less, so that one bright sample does not outweigh all others.
+bool isStill() {
+    return frame.stillCount > 0u;
+}
+
 vec3 compressed(vec3 color) {
-    return color / (1.0 + frame.exposure * brightness(color));
+    return isStill() ? color : color / (1.0 + frame.exposure * brightness(color));
 }
 
 vec3 expanded(vec3 color) {
-    return color / max(1.0 - frame.exposure * brightness(color), 1e-4);
+    return isStill() ? color : color / max(1.0 - frame.exposure * brightness(color), 1e-4);
 }
 
 vec3 nearby(ivec2 pixel, vec3 before) {
@@ -38,7 +42,8 @@ vec4 before(vec2 place) {
     for (int corner = 0; corner < 4; ++corner) {
         ivec2 offset = ivec2(corner & 1, corner >> 1);
         vec2 share = mix(1.0 - part, part, vec2(offset));
-        sum += share.x * share.y * frame.planes.at[previousPlane(kPlaneColor, pixelPlace(clamp(ivec2(low) + offset, ivec2(0), last)))];
+        vec4 mean = frame.planes.at[previousPlane(kPlaneColor, pixelPlace(clamp(ivec2(low) + offset, ivec2(0), last)))];
+        sum += share.x * share.y * vec4(compressed(mean.rgb), mean.a);
     }
     return sum;
 }
@@ -67,19 +72,18 @@ void antialiasPixel(uvec2 at) {
     Seen seen = unpackedSeen(frame.planes.at[currentPlane(kPlaneSurface, place)]);
     vec3 color = compressed(frame.planes.at[planePlace(kPlaneFrame, place)].rgb);
     vec4 mean = vec4(0.0);
-    bool isStill = frame.stillCount > 0u;
     if (frame.frameNumber > 0u) {
-        vec2 from = vec2(pixel) + 0.5 - (isStill ? vec2(0.0) : motionAt(pixel, seen));
+        vec2 from = vec2(pixel) + 0.5 - (isStill() ? vec2(0.0) : motionAt(pixel, seen));
         bool isInside = all(greaterThanEqual(from, vec2(0.0))) && all(lessThan(from, vec2(frame.camera.width, frame.camera.height)));
         if (isInside) {
             mean = before(from);
-            mean.rgb = isStill ? mean.rgb : nearby(pixel, mean.rgb);
+            mean.rgb = isStill() ? mean.rgb : nearby(pixel, mean.rgb);
         }
     }
-    float count = min(mean.a + 1.0, isStill ? kMostStillFrames : kMostFrames);
-    mean = vec4(mix(mean.rgb, color, 1.0 / count), count);
+    float count = min(mean.a + 1.0, isStill() ? kMostStillFrames : kMostFrames);
+    mean = vec4(expanded(mix(mean.rgb, color, 1.0 / count)), count);
     frame.planes.at[currentPlane(kPlaneColor, place)] = mean;
-    vec3 shown = frame.view == kViewLight ? expanded(mean.rgb) : dataOf(place, pixel, seen);
+    vec3 shown = frame.view == kViewLight ? mean.rgb : dataOf(place, pixel, seen);
     frame.planes.at[planePlace(kPlaneShown, place)] = vec4(shown, 1.0);
 }
 

@@ -70,6 +70,24 @@ fn dark_surfaces_in_bright_exposure_keep_their_light() {
     assert_close("a dark floor", shown(Method::Hybrid, 64), shown(Method::PathTrace, 256), 0.02);
 }
 
+/// Bright strips that are narrower than a pixel: the picture is the plain mean over the frames, not one in which bright light counts less.
+#[test]
+fn a_still_of_bright_strips_has_the_light_of_the_reference() {
+    let Some(ctx) = software_device() else { return };
+    let glowing = Material { emissive: [1.0; 3], emissive_strength: 8.0, ..matte([0.0; 3]) };
+    let strips = (0..12).fold(Builder::default(), |builder, number| {
+        let corner = Vec3::new(-2.0, 0.31 * number as f32 - 1.8, 0.0);
+        builder.quad(corner, Vec3::new(4.0, 0.3, 0.0), Vec3::Y * 0.08, glowing.clone())
+    });
+    let (model, dark) = (strips.model(), Environment::uniform([0.0; 3]));
+    let camera = Camera::looking_at([0.0, 0.0, 5.0], [0.0; 3], 40.0);
+    let light = |method, samples| {
+        let view = View { camera, size: [32, 24], samples };
+        mean(&radiance_by(&ctx, (method, RayPath::Query), &model, &dark, &view))
+    };
+    assert_close("strips", light(Method::Hybrid, 64), light(Method::PathTrace, 256), 0.02);
+}
+
 /// A wall beside a floor whose image repeats so often that scattered rays read its smallest mip level. Of nine texels the middle one alone is
 /// bright, and the only one that a blit would leave.
 #[test]
