@@ -7,6 +7,17 @@ use lvk::{CommandBuffer, Context, Holder, QueryPoolDesc, QueryPoolHandle};
 use crate::error::BenchError;
 use lvk_samples::app::timings;
 
+/// Milliseconds of the parts of a frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct FrameParts {
+    /// Until there is a command buffer.
+    pub(super) begin: f64,
+    /// Commands recorded.
+    pub(super) record: f64,
+    /// Commands submitted.
+    pub(super) submit: f64,
+}
+
 /// Times of one submission, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SubmissionTimes {

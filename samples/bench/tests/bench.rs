@@ -408,6 +408,9 @@ fn cpu_overhead_is_compared_with_its_limits() {
     assert_positive(&table, "push constants + draw", 0..2);
     assert_positive(&table, "- library share", 0..1);
     assert_positive(&table, "dispatch after", 0..2);
+    for part in ["frame of one dispatch: command buffer", "- the same: commands", "- the same: submission"] {
+        assert_positive(&table, part, 0..2);
+    }
     assert_positive(&table, "empty submission", 0..2);
     assert_positive(&table, "resident memory with the first context", 0..1);
     assert_positive(&table, "TLAS refit recorded", 0..1);

@@ -6,6 +6,7 @@
 mod allocations;
 mod dispatches;
 mod draws;
+mod frames;
 mod heap_growth;
 mod objects;
 mod recording;
@@ -52,6 +53,7 @@ pub(super) fn measure(setup: &Setup) -> Result<Table, BenchError> {
     rows.extend(dispatches::measure(&ctx, &silent, workload)?);
     rows.extend(tlas_updates::measure(&silent, workload)?);
     rows.extend(objects::measure(setup, &ctx, workload)?);
+    rows.extend(frames::measure(&ctx, workload)?);
     rows.extend(submits::measure(&ctx, workload)?);
     rows.extend(heap_growth::measure(&silent, workload)?);
     let columns = ["", "lvk", "compared with", "ratio", "limit", ""];

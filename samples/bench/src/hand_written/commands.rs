@@ -8,7 +8,7 @@ use lvk::ash::vk;
 
 use super::RawDevice;
 use crate::error::BenchError;
-use crate::measure::{SubmissionTimes, elapsed_ms};
+use crate::measure::{FrameParts, SubmissionTimes, elapsed_ms};
 
 /// A command buffer that is recorded, submitted and waited for repeatedly.
 pub(crate) struct RawCommands {
@@ -88,18 +88,28 @@ impl RawCommands {
 
     /// Submits an empty command buffer and waits for a timeline semaphore.
     pub(crate) fn submit_empty_on_timeline(&self) -> Result<(), BenchError> {
+        self.frame(|_| ()).map(|_| ())
+    }
+
+    /// Submits the commands that `record` records and waits for a timeline semaphore. Returns the time before the wait, by its parts.
+    pub(crate) fn frame(&self, record: impl FnOnce(vk::CommandBuffer)) -> Result<FrameParts, BenchError> {
         let next = self.reached.get() + 1;
         let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.timeline).value(next);
         let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
         let (semaphores, values) = ([self.timeline], [next]);
         let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        let start = Instant::now();
         self.begin_bare()?;
+        let begin = elapsed_ms(start);
+        record(self.commands);
+        let recorded = elapsed_ms(start);
         self.submit_with(&signals, vk::Fence::null())?;
+        let submitted = elapsed_ms(start);
         // SAFETY: the semaphore is a timeline, and its next value was submitted.
         let waited = unsafe { self.device.device.wait_semaphores(&wait, u64::MAX) };
         waited.map_err(BenchError::hand_written("vkWaitSemaphores"))?;
         self.reached.set(next);
-        Ok(())
+        Ok(FrameParts { begin, record: recorded - begin, submit: submitted - recorded })
     }
 
     fn begin(&self) -> Result<(), BenchError> {
