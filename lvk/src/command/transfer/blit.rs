@@ -60,7 +60,7 @@ impl CommandBuffer {
     ///
     /// Each texel is the mean of two texels of each side. An odd side has a texel left over, so a linear blit weighs
     /// its texels unevenly: of a side of three, the middle one alone remains. Where small mips must keep the mean of
-    /// the texture, give it sides that are powers of two, or mips of your own ([`TextureDesc::data_mips`]).
+    /// the texture, give it sides that are powers of two, or mips of your own ([`data_mips`](crate::TextureDesc::data_mips)).
     ///
     /// # Errors
     /// As [`blit_texture`](Self::blit_texture).
