@@ -55,7 +55,8 @@ pub fn display(radiance: [f32; 3]) -> [u8; 3] {
 }
 
 /// IEC 61966-2-1 encoding of a linear value from 0 to 1.
-pub(super) fn encode_srgb(linear: f32) -> u8 {
+#[must_use]
+pub fn encode_srgb(linear: f32) -> u8 {
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (encoded.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }

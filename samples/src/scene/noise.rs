@@ -3,7 +3,8 @@
 use glam::FloatExt;
 
 /// A number from 0 to 1 that looks random, the same for the same lattice point everywhere.
-pub(crate) fn lattice(x: i32, y: i32, seed: u32) -> f32 {
+#[must_use]
+pub fn lattice(x: i32, y: i32, seed: u32) -> f32 {
     let mut h = (x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77) ^ seed;
     h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
     h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
@@ -11,7 +12,8 @@ pub(crate) fn lattice(x: i32, y: i32, seed: u32) -> f32 {
 }
 
 /// Smooth noise from 0 to 1 that repeats every `period` units of `x` and `y` (0 for never).
-pub(crate) fn smooth(x: f32, y: f32, period: [i32; 2], seed: u32) -> f32 {
+#[must_use]
+pub fn smooth(x: f32, y: f32, period: [i32; 2], seed: u32) -> f32 {
     let (cell_x, cell_y) = (x.floor(), y.floor());
     let (fx, fy) = (fade(x - cell_x), fade(y - cell_y));
     let corners = |cell: f32, period: i32| {
@@ -26,12 +28,14 @@ pub(crate) fn smooth(x: f32, y: f32, period: [i32; 2], seed: u32) -> f32 {
 }
 
 /// Sum of `octaves` of [`smooth`] noise, each twice as fine and half as strong; about 0 to 1.
-pub(crate) fn fractal(x: f32, y: f32, octaves: u32) -> f32 {
+#[must_use]
+pub fn fractal(x: f32, y: f32, octaves: u32) -> f32 {
     tiled(x, y, [0, 0], octaves)
 }
 
 /// [`fractal`] that repeats every `period` units of `x` and `y` (0 for never).
-pub(crate) fn tiled(x: f32, y: f32, period: [i32; 2], octaves: u32) -> f32 {
+#[must_use]
+pub fn tiled(x: f32, y: f32, period: [i32; 2], octaves: u32) -> f32 {
     let (mut sum, mut weight, mut frequency) = (0.0, 0.5, 1);
     for octave in 0..octaves {
         let scale = frequency as f32;

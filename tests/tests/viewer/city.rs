@@ -1,4 +1,5 @@
-//! The city: culled or not, and on a device with the limits of a phone, it is the same picture.
+//! The city: culled or not, with all of its textures or those that a budget leaves, and on a device with the limits of a phone, it is the
+//! same picture.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use glam::{Quat, Vec3};
@@ -12,7 +13,7 @@ use lvk_tests::hybrid::paths;
 use lvk_tests::{device, device_with};
 use lvk_viewer::city::{CityConfig, city};
 use lvk_viewer::light::{Environment, SunSetting};
-use lvk_viewer::{CullingMode, Method, Viewer, ViewerConfig};
+use lvk_viewer::{CullingMode, Method, Viewer, ViewerConfig, ViewerScene};
 
 use crate::moving_model::{DURATION, moving_model};
 use crate::occlusion::frame;
@@ -23,7 +24,7 @@ use crate::scenes::{View, viewer};
 const PHONE_TRIANGLES: u64 = 2_000;
 
 fn tiny_city(blocks: u32, kinds: u32) -> Model {
-    let city = city(&CityConfig { blocks, kinds, seed: 3 }).unwrap();
+    let city = city(&CityConfig { blocks, kinds, seed: 3, texture_size: 64 }).unwrap();
     Model::from_bytes(&city.glb, None, &LoadOptions::default()).unwrap()
 }
 
@@ -110,6 +111,31 @@ fn meshes_that_deform_and_nodes_that_move_look_the_same_with_culling() {
             }
         }
     }
+}
+
+#[test]
+fn a_street_needs_few_levels_of_the_citys_textures() {
+    let Some(ctx) = device() else { return };
+    let config = CityConfig { blocks: 1, kinds: 2, seed: 3, texture_size: 256 };
+    let city = city(&config).unwrap();
+    let picture = |texture_budget: Option<u64>| {
+        let model = Model::from_bytes(&city.glb, None, &LoadOptions::default()).unwrap();
+        let scene =
+            ViewerScene { name: "city".to_owned(), model, environment: environment(), disc_radius: 0.01 };
+        let usual = ViewerConfig::new(RayPath::Query, 64, 36);
+        let config = ViewerConfig { samples: 2, bounces: 4, texture_budget, ..usual };
+        let mut viewer = Viewer::new(&ctx, scene, &config).unwrap();
+        viewer.set_view(&Camera::looking_at([44.0, 1.75, 70.0], [20.0, 12.0, 0.0], 57.0));
+        headless::picture(&mut viewer).unwrap();
+        (viewer.radiance().unwrap(), viewer.texture_memory())
+    };
+    // With its smaller levels a texture has four thirds of the texels of its largest one, and each has four bytes.
+    let whole = city.texture_count as u64 * 4 * 4 * u64::from(config.texture_size).pow(2) / 3;
+    let (expected, _) = picture(None);
+    let (found, memory) = picture(Some(whole / 4));
+    let memory = memory.unwrap();
+    assert!(found == expected, "{memory:?} of {whole}");
+    assert!(memory.coarse_count == 0 && memory.resident <= whole / 4, "{memory:?} of {whole}");
 }
 
 #[test]

@@ -28,6 +28,11 @@ struct Args {
     /// Cities of other seeds differ
     #[arg(long, value_name = "N", default_value_t = CityConfig::default().seed)]
     seed: u64,
+
+    /// Texels along each side of the textures, up to 4096; 0 for none
+    #[arg(long, value_name = "N", default_value_t = CityConfig::default().texture_size)]
+    #[arg(value_parser = whole(0..=CityConfig::MOST_TEXTURE_SIZE))]
+    texture_size: u32,
 }
 
 fn main() -> ExitCode {
@@ -44,17 +49,18 @@ fn main() -> ExitCode {
 }
 
 fn write(args: &Args) -> Result<String, String> {
-    let Args { file, blocks, kinds, seed } = args;
+    let Args { file, blocks, kinds, seed, texture_size } = args;
     let name = lvk::readable_name(file);
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("glb")) {
         return Err(format!("{name}: the city is a GLB file; give it a name that ends with .glb"));
     }
-    let city = city(&CityConfig { blocks: *blocks, kinds: *kinds, seed: *seed });
-    let city = city.map_err(|error| error.to_string())?;
+    let config = CityConfig { blocks: *blocks, kinds: *kinds, seed: *seed, texture_size: *texture_size };
+    let city = city(&config).map_err(|error| error.to_string())?;
     replace_file(file, &city.glb).map_err(|error| format!("cannot write {name}: {error}"))?;
     Ok(format!(
-        "{name}: {:.1} MB, {} meshes of {} triangles, {} instances of {} triangles",
+        "{name}: {:.1} MB, {} textures, {} meshes of {} triangles, {} instances of {} triangles",
         city.glb.len() as f64 / 1e6,
+        city.texture_count,
         city.mesh_count,
         city.distinct_triangles,
         city.instance_count,

@@ -50,16 +50,21 @@ impl Glb {
         }
     }
 
-    /// Adds an accessor with a buffer view of its own.
-    pub(super) fn accessor(&mut self, elements: &Elements<'_>) -> usize {
-        let Elements { bytes, component, shape, count, is_normalized, stride, range } = elements;
+    /// Adds a buffer view of its own for some bytes, such as an image.
+    pub(super) fn view(&mut self, bytes: &[u8], stride: Option<usize>) -> usize {
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
         let mut view = json!({ "buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len() });
         if let Some(stride) = stride {
             view["byteStride"] = json!(stride);
         }
         self.bin.extend_from_slice(bytes);
-        let view = self.push("bufferViews", view);
+        self.push("bufferViews", view)
+    }
+
+    /// Adds an accessor with a buffer view of its own.
+    pub(super) fn accessor(&mut self, elements: &Elements<'_>) -> usize {
+        let Elements { bytes, component, shape, count, is_normalized, stride, range } = elements;
+        let view = self.view(bytes, *stride);
         let mut accessor =
             json!({ "bufferView": view, "componentType": component, "type": shape, "count": count });
         if *is_normalized {

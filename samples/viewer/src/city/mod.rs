@@ -1,13 +1,14 @@
 //! A city made by code, as a glTF file: few meshes in fine detail, which thousands of instances show (`EXT_mesh_gpu_instancing`,
-//! `KHR_mesh_quantization`). It measures how the viewer loads and draws large scenes.
+//! `KHR_mesh_quantization`), with textures that repeat by metres (`KHR_texture_transform`). It measures how the viewer loads and draws large scenes.
 //!
 //! `plan` says what stands where, `buildings`, `trees` and `street` make its meshes of the quads and rings of `solid`, `surfaces`
-//! lists the materials, and `file` writes all of it.
+//! lists the materials, `patterns` paints their textures, and `file` writes all of it.
 
 mod buildings;
 mod facade;
 mod file;
 mod glb;
+mod patterns;
 mod plan;
 mod random;
 mod solid;
@@ -26,6 +27,8 @@ pub struct CityConfig {
     pub kinds: u32,
     /// Cities of the same numbers and another seed differ.
     pub seed: u64,
+    /// Texels along each side of the textures, up to [`CityConfig::MOST_TEXTURE_SIZE`]; 0 for none.
+    pub texture_size: u32,
 }
 
 impl CityConfig {
@@ -33,12 +36,14 @@ impl CityConfig {
     pub const MOST_BLOCKS: u32 = 64;
     /// Most kinds of buildings.
     pub const MOST_KINDS: u32 = 256;
+    /// Most texels along a side of a texture.
+    pub const MOST_TEXTURE_SIZE: u32 = 4096;
 }
 
 impl Default for CityConfig {
     /// A square kilometre: more than 10 million triangles by instances.
     fn default() -> Self {
-        Self { blocks: 10, kinds: 40, seed: 1 }
+        Self { blocks: 10, kinds: 40, seed: 1, texture_size: 512 }
     }
 }
 
@@ -47,6 +52,8 @@ impl Default for CityConfig {
 pub struct City {
     /// The bytes of a `.glb` file.
     pub glb: Vec<u8>,
+    /// Textures.
+    pub texture_count: usize,
     /// Meshes.
     pub mesh_count: usize,
     /// Triangles of all meshes, each mesh once.
@@ -60,9 +67,10 @@ pub struct City {
 /// Builds a city, the same on every machine and every call. It is lit by the sky and the sun of who shows it.
 ///
 /// # Errors
-/// [`CityError`] for numbers out of range.
+/// [`CityError`] for numbers out of range, and for a file of more than 4 GiB.
 pub fn city(config: &CityConfig) -> Result<City, CityError> {
-    CityError::check("--blocks", config.blocks, CityConfig::MOST_BLOCKS)?;
-    CityError::check("--kinds", config.kinds, CityConfig::MOST_KINDS)?;
-    file::write(&plan::plan(config))
+    CityError::check("--blocks", config.blocks, 1..=CityConfig::MOST_BLOCKS)?;
+    CityError::check("--kinds", config.kinds, 1..=CityConfig::MOST_KINDS)?;
+    CityError::check("--texture-size", config.texture_size, 0..=CityConfig::MOST_TEXTURE_SIZE)?;
+    file::write(&plan::plan(config), Some(config.texture_size).filter(|size| *size > 0))
 }

@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn triangles_are_counter_clockwise_seen_from_where_their_normals_point() {
-        let plan = plan(&CityConfig { blocks: 4, kinds: 16, seed: 2 });
+        let plan = plan(&CityConfig { blocks: 4, kinds: 16, seed: 2, texture_size: 0 });
         assert!(plan.kinds.len() > 30);
         for kind in &plan.kinds {
             for (surface, part) in kind.solid.parts() {
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn nothing_but_traffic_stands_on_streets_and_towers_are_in_the_middle() {
-        let plan = plan(&CityConfig { blocks: 6, kinds: 16, seed: 2 });
+        let plan = plan(&CityConfig { blocks: 6, kinds: 16, seed: 2, texture_size: 0 });
         let half = 3.0 * PITCH;
         let mut heights = [Vec::new(), Vec::new()];
         for kind in plan.kinds.iter().filter(|kind| kind.name.starts_with("building")) {

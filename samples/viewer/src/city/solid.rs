@@ -1,4 +1,4 @@
-//! Triangles of several materials, put together from quads, boxes and rings.
+//! Triangles of several materials, put together from quads, boxes and rings, with texture coordinates in metres.
 
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
@@ -19,6 +19,8 @@ pub(super) struct Part {
     pub(super) positions: Vec<Vec3>,
     /// Unit normals.
     pub(super) normals: Vec<Vec3>,
+    /// Metres to the right and down, seen from where the normal points.
+    pub(super) texcoords: Vec<Vec2>,
     pub(super) indices: Vec<u32>,
 }
 
@@ -53,6 +55,7 @@ impl Solid {
         let base = part.positions.len() as u32;
         part.positions.extend(corners);
         part.normals.extend([normal; 4]);
+        part.texcoords.extend(corners.map(|corner| in_plane(corner, normal)));
         part.indices.extend([0, 1, 2, 2, 1, 3].map(|corner| base + corner));
     }
 
@@ -64,6 +67,7 @@ impl Solid {
         let base = part.positions.len() as u32;
         part.positions.extend(corners);
         part.normals.extend([normal; 3]);
+        part.texcoords.extend(corners.map(|corner| in_plane(corner, normal)));
         part.indices.extend([base, base + 1, base + 2]);
     }
 
@@ -93,10 +97,12 @@ impl Solid {
         let part = self.parts.entry(surface).or_default();
         let base = part.positions.len() as u32;
         for segment in 0..=segments {
-            let (sine, cosine) = (TAU * segment as f32 / segments as f32).sin_cos();
-            let out = across * cosine + beside * sine;
+            let angle = TAU * segment as f32 / segments as f32;
+            let out = across * angle.cos() + beside * angle.sin();
+            let around = angle * 0.5 * (low + high);
             part.positions.extend([from + low * out, to + high * out]);
             part.normals.extend([out; 2]);
+            part.texcoords.extend([Vec2::new(around, 0.0), Vec2::new(around, -from.distance(to))]);
         }
         for segment in 0..segments {
             part.indices.extend([0, 2, 1, 1, 2, 3].map(|corner| base + 2 * segment + corner));
@@ -111,8 +117,10 @@ impl Solid {
         let base = part.positions.len() as u32;
         for segment in 0..segments {
             let (sine, cosine) = (TAU * segment as f32 / segments as f32).sin_cos();
-            part.positions.push(middle + radius * (across * cosine + beside * sine));
+            let corner = middle + radius * (across * cosine + beside * sine);
+            part.positions.push(corner);
             part.normals.push(normal);
+            part.texcoords.push(in_plane(corner, normal));
         }
         for segment in 2..segments {
             part.indices.extend([base, base + segment - 1, base + segment]);
@@ -135,6 +143,12 @@ impl Solid {
             self.triangle(surface, [at(a, -1.0), at(c, -1.0), at(b, -1.0)]);
         }
     }
+}
+
+/// Texture coordinates of a point of a flat surface, in metres. Surfaces in one plane agree, so that patterns go on across them.
+fn in_plane(position: Vec3, normal: Vec3) -> Vec2 {
+    let across = Vec3::Y.cross(normal).try_normalize().unwrap_or(Vec3::X);
+    Vec2::new(position.dot(across), -position.dot(normal.cross(across)))
 }
 
 #[cfg(test)]
@@ -174,5 +188,27 @@ mod tests {
             assert!(solid.triangle_count() >= 10);
             assert_faces_outwards(&solid);
         }
+    }
+
+    #[test]
+    fn texture_coordinates_are_metres_to_the_right_and_down() {
+        let mut solid = Solid::default();
+        solid.cuboid(Surface::Brick, [-1.0, 0.5, -2.0], [1.5, 3.0, 2.0]);
+        let slope = [Vec3::new(-1.0, 0.0, 2.0), Vec3::new(2.0, 0.0, 2.0), Vec3::new(0.0, 3.0, -1.0)];
+        solid.triangle(Surface::Brick, slope);
+        let (_, part) = solid.parts().next().unwrap();
+        for corners in part.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|corner| corners[corner] as usize);
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let metres = part.positions[from].distance(part.positions[to]);
+                assert!((part.texcoords[from].distance(part.texcoords[to]) - metres).abs() < 1e-5);
+            }
+            // Not mirrored: rows of images run down.
+            let area =
+                (part.texcoords[b] - part.texcoords[a]).perp_dot(part.texcoords[c] - part.texcoords[a]);
+            assert!(area < 0.0, "{corners:?}");
+        }
+        let [foot, _, top] = [0, 1, 2].map(|corner| part.texcoords[part.texcoords.len() - 3 + corner]);
+        assert!(top.y < foot.y, "rows run down a slope");
     }
 }
