@@ -8,7 +8,7 @@ use super::vertex_colors::decode_srgb;
 /// Channels of a texel: red, green, blue, alpha.
 const CHANNELS: usize = 4;
 
-/// What the numbers of an image mean.
+/// How the numbers of an image encode light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// Red, green and blue are sRGB-encoded, alpha is linear.
@@ -51,10 +51,10 @@ fn half(side: usize) -> usize {
 /// The next level of an image.
 fn halved(texels: &[u8], extent: [usize; 2], codec: &Codec) -> Vec<u8> {
     let [width, height] = extent;
-    let columns: Vec<_> = (0..half(width)).map(|column| covered(width, column)).collect();
+    let columns: Vec<_> = (0..half(width)).map(|column| box_weights(width, column)).collect();
     let mut level = Vec::with_capacity(CHANNELS * half(width) * half(height));
     for row in 0..half(height) {
-        let rows = covered(height, row);
+        let rows = box_weights(height, row);
         for column in &columns {
             let mut mean = [0.0; CHANNELS];
             for (y, share) in rows {
@@ -72,7 +72,7 @@ fn halved(texels: &[u8], extent: [usize; 2], codec: &Codec) -> Vec<u8> {
 }
 
 /// The texels of a side of `side` that texel `place` of half of it covers, and their shares.
-fn covered(side: usize, place: usize) -> [(usize, f32); 3] {
+fn box_weights(side: usize, place: usize) -> [(usize, f32); 3] {
     let first = 2 * place;
     if side == 1 {
         return [(0, 1.0), (0, 0.0), (0, 0.0)];
@@ -90,7 +90,7 @@ struct Codec {
     /// The linear value of each number of red, green and blue.
     colors: [f32; 256],
     /// The value from which on the next number is nearer.
-    borders: [f32; 255],
+    thresholds: [f32; 255],
 }
 
 impl Codec {
@@ -101,7 +101,7 @@ impl Codec {
         };
         Self {
             colors: std::array::from_fn(|number| decode(number as f32 / 255.0)),
-            borders: std::array::from_fn(|number| decode((number as f32 + 0.5) / 255.0)),
+            thresholds: std::array::from_fn(|number| decode((number as f32 + 0.5) / 255.0)),
         }
     }
 
@@ -113,7 +113,7 @@ impl Codec {
         if channel == CHANNELS - 1 {
             return (value * 255.0 + 0.5) as u8;
         }
-        self.borders.partition_point(|border| *border <= value) as u8
+        self.thresholds.partition_point(|threshold| *threshold <= value) as u8
     }
 }
 
@@ -159,8 +159,8 @@ mod tests {
 
     #[test]
     fn a_texel_of_half_of_five_covers_two_and_a_half() {
-        assert_eq!(covered(5, 0), [(0, 0.4), (1, 0.4), (2, 0.2)]);
-        assert_eq!(covered(5, 1), [(2, 0.2), (3, 0.4), (4, 0.4)]);
+        assert_eq!(box_weights(5, 0), [(0, 0.4), (1, 0.4), (2, 0.2)]);
+        assert_eq!(box_weights(5, 1), [(2, 0.2), (3, 0.4), (4, 0.4)]);
     }
 
     proptest! {

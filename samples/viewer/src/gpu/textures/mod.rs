@@ -50,11 +50,12 @@ impl GpuTextures {
     /// Uploads the images of a model: all levels, or with a budget in bytes those that are always resident.
     pub(crate) fn new(ctx: &Context, model: &Model, budget: Option<u64>) -> Result<Self, SampleError> {
         let streaming = budget.map(|budget| TextureStreaming::new(ctx, model, budget)).transpose()?;
-        let first_mips = streaming.as_ref().map_or(Vec::new(), TextureStreaming::coarsest);
         let mut all = Self { images: Vec::new(), samplers: Vec::new(), streaming, warnings: Vec::new() };
         for (place, image) in model.images.iter().enumerate() {
-            let first_mip = first_mips.get(place).copied().unwrap_or(0);
-            let texture = upload::texture(ctx, image, first_mip)?;
+            let LoadedMips { first_mip, texture, .. } = match &all.streaming {
+                Some(streaming) => streaming.load_coarsest(ctx, place)?,
+                None => LoadedMips { image: place, first_mip: 0, texture: upload::whole(ctx, image)? },
+            };
             if texture.is_none() {
                 let (format, name) = (image.data.format, image.name.as_deref().unwrap_or("image"));
                 all.warnings.push(format!(

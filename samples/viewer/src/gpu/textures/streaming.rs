@@ -9,7 +9,7 @@ use lvk_samples::app::sample_error::SampleError;
 
 use super::super::materials::textures_of;
 use super::plan::{MipChain, bytes, least_bytes, next_change, plan};
-use super::upload::{mip_count, texture};
+use super::upload::{mip_count, texture, with_levels};
 use super::wanted::{UNREAD, WantedMips};
 
 const MIB: u64 = 1 << 20;
@@ -67,7 +67,7 @@ impl TextureStreaming {
         let size = (model.images.len() * size_of::<u32>()).max(size_of::<u32>());
         Ok(Self {
             budget,
-            images: model.images.clone(),
+            images: model.images.iter().map(with_levels).collect(),
             wanted: WantedMips::new(chains.len()),
             report: buffer(ctx, "wanted mips", size as u64)?,
             chains,
@@ -76,9 +76,9 @@ impl TextureStreaming {
         })
     }
 
-    /// The first level of each image that is always resident.
-    pub(super) fn coarsest(&self) -> Vec<u32> {
-        self.chains.iter().map(MipChain::coarsest).collect()
+    /// Uploads the levels of an image that are always resident.
+    pub(super) fn load_coarsest(&self, ctx: &Context, image: usize) -> lvk::Result<LoadedMips> {
+        self.load(ctx, image, self.chains.get(image).map_or(0, MipChain::coarsest))
     }
 
     /// The budget, and the bytes of what is resident, in bytes.

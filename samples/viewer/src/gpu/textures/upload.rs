@@ -1,7 +1,9 @@
 //! Mip levels of an image, as a texture.
 
+use std::sync::Arc;
+
 use lvk::{Context, Error, Holder, TextureDesc, TextureHandle, TextureRegion};
-use lvk_gltf::{ColorSpace, Image, TexelFormat};
+use lvk_gltf::{ColorSpace, Image, ImageData, MipLevel, TexelFormat};
 use lvk_samples::scene::{Encoding, blits_keep_the_mean, mip_levels};
 
 use super::formats::format_of;
@@ -12,21 +14,44 @@ pub(super) fn mip_count(image: &Image) -> u32 {
     if lacks_mips(image) { width.max(height).max(1).ilog2() + 1 } else { image.data.mips.len() as u32 }
 }
 
+/// Returns the image with the levels that its file lacks, where the device would not make them with its mean. Any other image is returned as
+/// it is, and shares its texels.
+pub(super) fn with_levels(image: &Image) -> Image {
+    let extent = image.data.extent();
+    if !lacks_mips(image) || blits_keep_the_mean(extent) {
+        return image.clone();
+    }
+    let encoding = match image.color_space {
+        ColorSpace::Srgb => Encoding::Srgb,
+        ColorSpace::Linear => Encoding::Linear,
+    };
+    let mut data = ImageData::clone(&image.data);
+    for (below, bytes) in mip_levels(&image.data.mips[0].bytes, extent, encoding).into_iter().enumerate() {
+        let [width, height] = extent.map(|side| (side >> (below + 1)).max(1));
+        data.mips.push(MipLevel { width, height, bytes });
+    }
+    Image { data: Arc::new(data), ..image.clone() }
+}
+
+/// Uploads all levels of an image. `None` if the device cannot read its format.
+pub(super) fn whole(ctx: &Context, image: &Image) -> lvk::Result<Option<Holder<TextureHandle>>> {
+    texture(ctx, &with_levels(image), 0)
+}
+
 /// Uploads the levels of an image from `first_mip` on. `None` if the device cannot read its format.
 ///
-/// Levels that the file lacks are made from the largest one, so they are the same whichever level is the first: on the device, in a texture
-/// that lives no longer than this call, or here where the device would not keep the mean.
+/// The device makes the levels that [`with_levels`] has left to it. They come from the largest one, in a texture that lives no longer than
+/// this call, so they are the same whichever level is the first.
 pub(super) fn texture(
     ctx: &Context,
     image: &Image,
     first_mip: u32,
 ) -> lvk::Result<Option<Holder<TextureHandle>>> {
     let Some(format) = format_of(image) else { return Ok(None) };
-    let halved = is_to_be_halved(image);
-    let is_given = first_mip == 0 || !halved;
-    let made = made_mips(image);
-    let all_levels = image.data.mips.iter().map(|level| &level.bytes).chain(&made);
-    let levels: Vec<_> = if is_given { all_levels.skip(first_mip as usize).collect() } else { Vec::new() };
+    let halved = lacks_mips(image);
+    let is_uploaded = first_mip == 0 || !halved;
+    let all_levels = image.data.mips.iter().map(|level| &level.bytes);
+    let levels: Vec<_> = if is_uploaded { all_levels.skip(first_mip as usize).collect() } else { Vec::new() };
     let bytes: Vec<u8>;
     let data = match levels.as_slice() {
         [] => None,
@@ -56,7 +81,7 @@ pub(super) fn texture(
         Err(_) => return Ok(None),
     }
     let texture = ctx.create_texture(&desc)?;
-    if !is_given {
+    if !is_uploaded {
         copy_halved(ctx, image, first_mip, *texture)?;
     }
     Ok(Some(texture))
@@ -76,21 +101,4 @@ fn copy_halved(ctx: &Context, image: &Image, first_mip: u32, target: TextureHand
 
 fn lacks_mips(image: &Image) -> bool {
     image.data.mips.len() == 1 && image.data.format == TexelFormat::Rgba8
-}
-
-/// True if the device makes the levels that the file lacks.
-fn is_to_be_halved(image: &Image) -> bool {
-    lacks_mips(image) && blits_keep_the_mean(image.data.extent())
-}
-
-/// The levels that the file lacks and the device does not make.
-fn made_mips(image: &Image) -> Vec<Vec<u8>> {
-    if !lacks_mips(image) || is_to_be_halved(image) {
-        return Vec::new();
-    }
-    let encoding = match image.color_space {
-        ColorSpace::Srgb => Encoding::Srgb,
-        ColorSpace::Linear => Encoding::Linear,
-    };
-    mip_levels(&image.data.mips[0].bytes, image.data.extent(), encoding)
 }
